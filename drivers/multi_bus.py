@@ -127,7 +127,7 @@ class MixedBus:
         ordered = [tuple([column[k] for k in order]) for column in columns[:-1]]
         return Feedback._make((*ordered, tuple(sorted(missing))))
 
-    def engage(self) -> tuple[int, ...]:
+    def enable_torque(self) -> tuple[int, ...]:
         """Switch torque on, bus by bus; where one refuses, all are released again.
 
         Returns the goals that are now in force, in steps.
@@ -138,7 +138,7 @@ class MixedBus:
         goals = [0] * self._count
         try:
             for _, bus, places in self._shares:
-                for place, goal in zip(places, bus.engage(), strict=True):
+                for place, goal in zip(places, bus.enable_torque(), strict=True):
                     goals[place] = goal
         except BaseException:
             self._release_quietly()
@@ -180,7 +180,7 @@ class MixedBus:
         for _, bus, places in self._shares:
             bus.retune([setups[place] for place in places])
 
-    def release(self) -> None:
+    def disable_torque(self) -> None:
         """Torque off on every bus, whatever befalls the others.
 
         Raises:
@@ -189,7 +189,7 @@ class MixedBus:
         lost = []
         for share in self._shares:
             try:
-                share.bus.release()
+                share.bus.disable_torque()
             except BusLost as error:
                 lost.append(str(error))
         if lost:
@@ -198,7 +198,7 @@ class MixedBus:
     def _release_quietly(self) -> None:
         """Release what can be: another error is on its way already."""
         try:
-            self.release()
+            self.disable_torque()
         except BusLost:
             return
 

@@ -35,7 +35,7 @@ class Supervising(Protocol):
 
     engaged: bool
 
-    def let_go(self) -> None:
+    def torque_disabled(self) -> None:
         """Leave servos without torque alone."""
 
 
@@ -107,14 +107,14 @@ class PortBus(ABC):
         errors = {kind: count for kind, count in self._line.errors.items() if count}
         return BusHealth(self._line.tx_bytes, self._line.rx_bytes, errors)
 
-    def release(self) -> None:
+    def disable_torque(self) -> None:
         """Torque off on every servo, confirmed; never raises for a servo that does not answer.
 
         Raises:
             BusLost: the port is gone, and stays so when tried once more; the
                 torque is taken off by the first read after it is back.
         """
-        self._supervisor.let_go()
+        self._supervisor.torque_disabled()
         if not self._opened:
             return
         if self._link.down and not self._link.open_once_more(self._now_s):
@@ -125,7 +125,7 @@ class PortBus(ABC):
     def close(self) -> None:
         """Close the port; safe to call twice. Servos go on as they were last told."""
         self._opened = False
-        self._supervisor.let_go()
+        self._supervisor.torque_disabled()
         self._port.closePort()
 
     def _reachable(self, now_s: float) -> bool:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 
 from gazerig.drivers.dynamixel.control_table import MODELS as DYNAMIXEL
 from gazerig.drivers.dynamixel.control_table import STEPS_PER_TURN as STEPS_PER_TURN
-from gazerig.drivers.dynamixel.control_table import Model as DynamixelModel
+from gazerig.drivers.dynamixel.control_table import DynamixelModel
 from gazerig.drivers.event_log import servo_label as label_with
 from gazerig.drivers.feetech.memory_table import MODELS as FEETECH
 from gazerig.drivers.feetech.memory_table import SCS_MODELS, SCS_STEPS, FeetechModel

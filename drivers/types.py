@@ -147,7 +147,7 @@ class ServoBus(Protocol):
         """
         ...
 
-    def engage(self) -> tuple[int, ...]:
+    def enable_torque(self) -> tuple[int, ...]:
         """Set every goal to the present position (clipped to its limits), then torque on.
 
         Returns the goals that are now in force, in steps.
@@ -170,7 +170,7 @@ class ServoBus(Protocol):
         """Set the servos up so when the torque comes on the next time; the same ids and models."""
         ...
 
-    def release(self) -> None:
+    def disable_torque(self) -> None:
         """Torque off on every servo; never raises for a servo that does not answer."""
         ...
 

@@ -68,7 +68,7 @@ class IdealBus:
             (self._torque,) * n, ("",) * n, self._measured, (False,) * n, (),
         )  # fmt: skip
 
-    def engage(self) -> tuple[int, ...]:
+    def enable_torque(self) -> tuple[int, ...]:
         self._torque = True
         self.write([round(positions[place]) for positions, place in self._shafts])
         return self._goals
@@ -77,7 +77,7 @@ class IdealBus:
         pairs = zip(self._setups, goals_steps, strict=True)
         self._goals = tuple([min(max(goal, s.min_steps), s.max_steps) for s, goal in pairs])
 
-    def release(self) -> None:
+    def disable_torque(self) -> None:
         self._torque = False
 
     def retune(self, setups: Sequence[ServoSetup]) -> None:

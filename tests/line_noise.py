@@ -178,14 +178,14 @@ class Noisy:
                 self._command[k] += min(max(goals[k] - self._command[k], -most), most)
         return [round(command) for command in self._command]
 
-    def engage(self) -> None:
+    def enable_torque(self) -> None:
         """Switch torque on, and plan from there."""
-        self._command = [float(goal) for goal in self.bus.engage()]
+        self._command = [float(goal) for goal in self.bus.enable_torque()]
 
     def start(self) -> None:
         """Open the bus, switch torque on and lead all joints to their first goals."""
         self.bus.open()
-        self.engage()
+        self.enable_torque()
         self.bus.events()
         for _ in range(200):
             self._tick(None)

@@ -45,7 +45,7 @@ def drive(kind: str, guarded: bool, watchdog: bool, path: str) -> None:
         else rig_bus(rig, {name: BlockingPort(path) for name, path in paths.items()})
     )
     bus.open()
-    bus.engage()
+    bus.enable_torque()
     goals = [setup.max_steps for setup in rig_setups(rig)]
     said = False
     ticks = 0

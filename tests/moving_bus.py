@@ -31,7 +31,7 @@ class MovingBus:
 
     def start(self):
         self.bus.open()
-        self.bus.engage()
+        self.bus.enable_torque()
         self.bus.events()
         # So many answers it takes to know how late they are.
         for _ in range(130):

@@ -124,7 +124,7 @@ class Bench:
             self.now_s = begin + seconds * k / steps
             self.chain.positions_steps()
 
-    def engage(self, servo_id=1, goal=None):
+    def enable_torque(self, servo_id=1, goal=None):
         """Switch the torque on with a goal, the present place where None."""
         self.put("goal_position", self.position(servo_id) if goal is None else goal, servo_id)
         assert self.put("torque_enable", 1, servo_id) == 0

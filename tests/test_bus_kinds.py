@@ -38,10 +38,10 @@ def holding(twin):
     twin.pulses_on()
     bus = twin.bus()
     bus.open()
-    bus.engage()
+    bus.enable_torque()
     bus.events()
     yield bus
-    bus.release()
+    bus.disable_torque()
     bus.close()
 
 
@@ -105,14 +105,14 @@ def test_engage_holds_every_servo_where_it_is(here):
     bus = here.bus()
     bus.open()
     before = here.truth()
-    goals = bus.engage()
+    goals = bus.enable_torque()
     assert here.near(here.shares(goals), before)
     for _ in range(10):
         readings = here.run(bus, 0.02)
         assert here.near(here.truth(), before)
     assert well(readings)
     assert here.holding() == [True] * here.count
-    bus.release()
+    bus.disable_torque()
     bus.close()
 
 
@@ -120,7 +120,7 @@ def test_who_cannot_tell_his_place_goes_to_his_rest_and_that_is_said(here):
     bus = here.bus()
     bus.open()
     before = here.truth()
-    bus.engage()
+    bus.enable_torque()
     hobby = [here.on[p] in BOARDS for p in range(here.count)]
     wanted = [0.5 if one else at for one, at in zip(hobby, before, strict=True)]
     here.run(bus, 0.3, wanted)
@@ -130,7 +130,7 @@ def test_who_cannot_tell_his_place_goes_to_his_rest_and_that_is_said(here):
     assert len(limp) == any(hobby)
     for place, setup in enumerate(here.setups):
         assert not any(hobby) or hobby[place] == (servo_label(setup) in limp[0])
-    bus.release()
+    bus.disable_torque()
     bus.close()
 
 
@@ -172,7 +172,7 @@ def test_what_is_no_number_is_refused_and_nothing_is_sent(here, held_here):
 def test_release_takes_the_torque_of_all_and_is_confirmed(twin, held):
     twin.run(held, 0.05)
     assert all(twin.holding())
-    held.release()
+    held.disable_torque()
     assert twin.holding() == [False] * twin.count
     readings = twin.run(held, 0.1, away(twin))
     assert not any(r.torque for r in readings)
@@ -186,9 +186,9 @@ def test_a_bus_is_opened_again_and_closed_twice(here):
     for _ in range(2):
         here.pulses_on()
         bus.open()
-        bus.engage()
+        bus.enable_torque()
         assert here.near(here.seen(rows(bus.read(here.now_s()))), starts(here))
-        bus.release()
+        bus.disable_torque()
         bus.close()
         bus.close()
 
@@ -324,20 +324,20 @@ def _given_up(here, name):
     here.pulses_on()
     bus = here.bus(give_up_s=1.0)
     bus.open()
-    bus.engage()
+    bus.enable_torque()
     here.command("unplug", name)
     began_s = here.now_s()
     with pytest.raises(BusLost, match=f"emulated {name} has been gone for 1.[012] s"):
         here.run(bus, 3.0, starts(here))
     assert here.now_s() - began_s < 1.3
     with pytest.raises(BusLost, match=f"emulated {name} is gone.*cut the servo power"):
-        bus.release()
+        bus.disable_torque()
     # What could be reached was let go of all the same.
     assert [on for p, on in enumerate(here.holding()) if here.on[p] != name] == [False] * (
         here.count - len(here.buses[name])
     )
     here.command("plug", name)
-    bus.release()
+    bus.disable_torque()
     assert not any(here.holding())
     bus.close()
 
@@ -346,7 +346,7 @@ def test_no_read_takes_long_while_nobody_answers(here):
     here.pulses_on()
     bus = here.bus(give_up_s=2.0)
     bus.open()
-    bus.engage()
+    bus.enable_torque()
     here.run(bus, 0.5, starts(here))
     here.command("lose all")
     spent = []
@@ -387,7 +387,7 @@ def test_no_servo_is_faster_than_it_was_set_up_whatever_it_went_through(here, be
     slow = [s._replace(max_speed_steps_s=0.2 * s.max_speed_steps_s) for s in here.setups]
     bus = here.bus(slow)
     bus.open()
-    bus.engage()
+    bus.enable_torque()
     here.run(bus, 0.3, starts(here))
     _befall(here, bus, befalls)
     before_s, before = here.now_s(), here.steps(here.truth())
@@ -422,7 +422,7 @@ def test_a_fault_is_named_with_its_joint_or_board(here):
     here.pulses_on()
     bus = here.bus()
     bus.open()
-    bus.engage()
+    bus.enable_torque()
     here.run(bus, 0.5, starts(here))
     bus.events()
     for name, places in here.buses.items():
@@ -449,7 +449,7 @@ def test_a_fault_is_named_with_its_joint_or_board(here):
         assert None not in readings
         if name not in BOARDS:
             assert readings[places[1]].fault == "overload"
-    bus.release()
+    bus.disable_torque()
     bus.close()
 
 
@@ -460,7 +460,7 @@ def test_retune_waits_for_the_next_torque(here):
     here.pulses_on()
     bus = here.bus()
     bus.open()
-    bus.engage()
+    bus.enable_torque()
     narrow = [
         s._replace(min_steps=at - 40, max_steps=at + 40)
         for s, at in zip(here.setups, here.steps([0.5] * here.count), strict=True)
@@ -468,8 +468,8 @@ def test_retune_waits_for_the_next_torque(here):
     bus.retune(narrow)
     here.run(bus, 1.5, away(here))
     assert here.near(here.truth(), away(here))
-    bus.release()
-    goals = bus.engage()
+    bus.disable_torque()
+    goals = bus.enable_torque()
     for setup, goal in zip(narrow, goals, strict=True):
         assert setup.min_steps <= goal <= setup.max_steps
     here.run(bus, 1.0, away(here))
@@ -490,7 +490,7 @@ def test_a_goal_between_two_steps_is_rounded(kind):
     twin.pulses_on()
     bus = twin.bus()
     bus.open()
-    bus.engage()
+    bus.enable_torque()
     bus.read(twin.now_s())
     middle = [(setup.min_steps + setup.max_steps) // 2 for setup in twin.setups]
     bus.write([steps + 0.4 for steps in middle])
@@ -511,7 +511,7 @@ def test_no_goal_outside_the_limits_ever_reaches_a_servo(kind, data):
     twin.pulses_on()
     bus = twin.bus()
     bus.open()
-    bus.engage()
+    bus.enable_torque()
     rows = data.draw(st.lists(st.lists(ANY, min_size=twin.count, max_size=twin.count), max_size=6))
     twin.command(data.draw(st.sampled_from(FAULTS)) or "clear")
     for goals in rows:

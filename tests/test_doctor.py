@@ -8,7 +8,7 @@ import pytest
 from gazerig.drivers.errors import PortError
 from gazerig.drivers.feetech.memory_table import REGISTERS, TABLE_END
 from gazerig.drivers.serial.list_ports import Access, Host, SerialPort
-from gazerig.drivers.servo_bus.discovery import Found, ping
+from gazerig.drivers.servo_bus.discovery import FoundServo, ping
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoSetup
 from gazerig.robot.bringup.bus_search import SearchRound
@@ -587,7 +587,7 @@ def test_findings_in_words():
 
 
 def test_remarks_of_a_scan():
-    two = (Found(1, 1190, 53, BAUD, "xl330-m077"), Found(1, 1190, 53, BAUD, "xl330-m077"))
+    two = (FoundServo(1, 1190, 53, BAUD, "xl330-m077"), FoundServo(1, 1190, 53, BAUD, "xl330-m077"))
     said = " ".join(remarks([SearchRound("dynamixel", BAUD, True, two)], "/dev/x"))
     assert "2 servos on /dev/x" in said and "two or more servos have id 1 at 1000000" in said
     merged = [SearchRound("dynamixel", BAUD, True, two[:1], shared=(1,))]

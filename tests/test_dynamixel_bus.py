@@ -83,7 +83,7 @@ def bus(request, twin):
     made = twin.bus(fast_sync_read=request.param)
     made.open()
     yield made
-    made.release()
+    made.disable_torque()
     made.close()
 
 
@@ -104,20 +104,20 @@ def places(readings):
 
 def test_from_open_to_release_with_fast_and_with_plain_reads(twin, bus):
     assert places(rows(bus.read(twin.port.now_s()))) == [1800, 2048, 2300, 2048]
-    assert bus.engage() == (1800, 2048, 2300, 2048)
+    assert bus.enable_torque() == (1800, 2048, 2300, 2048)
     twin.run(bus, 0.6, [1900, 1900, 2200, 2200])
     assert places(rows(bus.read(twin.port.now_s()))) == pytest.approx(
         [1900, 1900, 2200, 2200], abs=12
     )
     assert registers(twin, 64, 1) == {3: 1, 1: 1, 12: 1, 7: 1}
     assert registers(twin, 116, 4) == {3: 1900, 1: 1900, 12: 2200, 7: 2200}
-    bus.release()
+    bus.disable_torque()
     assert registers(twin, 64, 1) == {3: 0, 1: 0, 12: 0, 7: 0}
     assert "refused" not in bus.health().errors
 
 
 def test_a_silent_servo_costs_only_itself_and_is_taken_back(twin, bus):
-    bus.engage()
+    bus.enable_torque()
     twin.port.write(instruction(1, REBOOT))
     twin.port.drain()
     seen = [places(twin.run(bus, 0.0)) for _ in range(2)]
@@ -161,7 +161,7 @@ def test_a_joint_outside_its_limits_comes_in_slowly(kind):
     for twin in make_twin(kind, specs):
         bus = twin.bus([ServoSetup(i, "xl330-m077", 1000, 3000, SPEED) for i in (1, 2)])
         bus.open()
-        assert bus.engage() == (1000, 3000)
+        assert bus.enable_torque() == (1000, 3000)
         slowest = 30 / 360 * 4096
         for _ in range(60):
             readings = rows(bus.read(twin.port.now_s()))
@@ -171,5 +171,5 @@ def test_a_joint_outside_its_limits_comes_in_slowly(kind):
         assert near(readings, [1000, 3000])
         twin.run(bus, 1.0, [1100, 2900])
         assert registers(twin, 112, 4, ids=(1, 2)) == {1: 383, 2: 383}
-        bus.release()
+        bus.disable_torque()
         bus.close()

@@ -57,7 +57,7 @@ def rig(fast):
 
 def test_the_watchdog_stops_the_servos_when_the_host_falls_silent():
     rig = Rig(watchdog_ms=100)
-    rig.bus.engage()
+    rig.bus.enable_torque()
     rig.tick([3000] * 3)
     rig.now_s += 5.0
     stopped = rig.chain.positions_steps()
@@ -65,7 +65,7 @@ def test_the_watchdog_stops_the_servos_when_the_host_falls_silent():
 
 
 def test_a_host_that_stalled_brings_the_servos_back_without_a_jump(rig):
-    rig.bus.engage()
+    rig.bus.enable_torque()
     rig.tick([2800] * 3)
     rig.now_s += 5.0
     stopped = rig.chain.positions_steps()
@@ -83,7 +83,7 @@ def test_a_host_that_stalled_brings_the_servos_back_without_a_jump(rig):
 
 
 def test_a_stall_shown_by_a_write_is_healed_by_the_next_read_and_told(rig):
-    rig.bus.engage()
+    rig.bus.enable_torque()
     rig.now_s += 1.0
     rig.bus.write([2500] * 3)
     # Whoever plans goals has not heard of it yet: no goal goes out before a read has told.
@@ -99,7 +99,7 @@ def test_a_stall_shown_by_a_write_is_healed_by_the_next_read_and_told(rig):
 
 def test_a_sleep_that_the_clock_does_not_show_is_found_by_asking(rig):
     """A suspended laptop's monotonic clock stands still; the servos' time goes on."""
-    rig.bus.engage()
+    rig.bus.enable_torque()
     for servo in rig.chain.servos:
         servo._trip(0)
     for _ in range(250):
@@ -111,7 +111,7 @@ def test_a_sleep_that_the_clock_does_not_show_is_found_by_asking(rig):
 @pytest.mark.parametrize("indirect", [True, False])
 def test_without_watchdog_nothing_is_armed_and_a_restart_is_still_healed(indirect):
     rig = Rig(watchdog_ms=0, indirect_block=indirect)
-    rig.bus.engage()
+    rig.bus.enable_torque()
     assert [s.memory.get("bus_watchdog") for s in rig.chain.servos] == [0] * 3
     rig.now_s += 60.0
     rig.chain[2].restart()
@@ -124,7 +124,7 @@ def test_without_watchdog_nothing_is_armed_and_a_restart_is_still_healed(indirec
 
 def test_a_quick_restart_between_two_reads_is_found_by_asking_in_turn(fast):
     rig = Rig(fast, indirect_block=False)
-    rig.bus.engage()
+    rig.bus.enable_torque()
     rig.chain[2].restart()
     rig.chain[2]._deaf_until_ms = 0
     for _ in range(100):
@@ -135,7 +135,7 @@ def test_a_quick_restart_between_two_reads_is_found_by_asking_in_turn(fast):
 
 def test_healing_keeps_to_the_limits():
     rig = Rig(starts=(900, 2002, 2003))
-    rig.bus.engage()
+    rig.bus.enable_torque()
     rig.tick()
     rig.now_s += 1.0
     rig.tick()
@@ -146,7 +146,7 @@ def test_healing_keeps_to_the_limits():
 
 def test_an_alert_whose_name_is_not_told_is_asked_about_seldom(fast):
     rig = Rig(fast, indirect_block=False)
-    rig.bus.engage()
+    rig.bus.enable_torque()
     rig.chain[2].alert = 0x20
     for _ in range(50):
         rig.tick()

@@ -139,7 +139,7 @@ def test_a_truncated_answer_gives_what_arrived(rig, kept):
 
 
 def test_a_repeated_answer_is_not_taken_for_the_next_one(rig):
-    rig.bus.engage()
+    rig.bus.enable_torque()
     size = 50 if rig.bus._plan.packets is not None else 21
     rig.port.spoil = lambda code, raw: raw + raw[-size:]
     for k in range(20):
@@ -158,7 +158,7 @@ def test_noise_around_an_answer_does_no_harm(rig):
 @pytest.mark.parametrize("more", [b"\x00", b"\xff\xff\xfd\x00\xfe", b"\x55" * 300, None])
 def test_bytes_behind_a_whole_answer_do_not_spoil_the_next_one(fast, more):
     rig = Rig(fast).open()
-    rig.bus.engage()
+    rig.bus.enable_torque()
     for _ in range(5):
         rig.tick([2000] * 3)
     asked = []
@@ -197,7 +197,7 @@ def test_the_everyday_stuffed_answer_is_read():
 @pytest.mark.parametrize("delay", [1, 2, 3])
 def test_a_late_answer_is_never_taken_for_a_fresh_one(rig, delay):
     """All answers come ``delay`` exchanges late while the joints move."""
-    rig.bus.engage()
+    rig.bus.enable_torque()
     held: list[bytes] = []
 
     def late(code, raw):
@@ -232,7 +232,7 @@ def test_a_refused_read_is_counted_and_has_no_value():
 
 
 def test_two_silent_servos_cost_only_themselves(rig):
-    rig.bus.engage()
+    rig.bus.enable_torque()
     for servo_id in (1, 3):
         rig.port.write(instruction(servo_id, 8))
     rig.port.drain()
@@ -256,7 +256,7 @@ def test_a_silent_servo_is_asked_seldom(rig):
 
 
 def test_an_alert_keeps_its_value_and_is_named_once(rig):
-    rig.bus.engage()
+    rig.bus.enable_torque()
     rig.chain[2].fail("overload")
     readings = rig.tick([2500] * 3)
     assert [r.fault for r in readings] == ["", "overload", ""]
@@ -278,7 +278,7 @@ def test_engaging_a_latched_servo_names_it_and_leaves_all_without_torque():
     rig = Rig().open()
     rig.chain[3].fail("overload")
     with pytest.raises(ServoFault, match="servo 3: overload: let it cool"):
-        rig.bus.engage()
+        rig.bus.enable_torque()
     assert not any(servo.torque for servo in rig.chain.servos)
 
 
@@ -286,7 +286,7 @@ def test_engaging_a_silent_servo_names_it_and_leaves_all_without_torque():
     rig = Rig().open()
     rig.chain[2].restart()
     with pytest.raises(ServoMissing, match="servo 2 does not answer"):
-        rig.bus.engage()
+        rig.bus.enable_torque()
     assert not any(servo.torque for servo in rig.chain.servos)
 
 
@@ -301,16 +301,16 @@ def test_a_position_that_wraps_as_the_torque_comes_on_is_found():
 
     rig.port.spoil = wrap
     with pytest.raises(ServoFault, match="servo 2: position jumped from 2002 to 6098"):
-        rig.bus.engage()
+        rig.bus.enable_torque()
     assert not any(s.torque for s in rig.chain.servos)
 
 
 def test_a_joint_moved_by_hand_is_held_where_it_is_now():
     rig = Rig().open()
-    rig.bus.engage()
-    rig.bus.release()
+    rig.bus.enable_torque()
+    rig.bus.disable_torque()
     rig.chain[1].shaft.place(2400)
-    assert rig.bus.engage()[0] == 2400
+    assert rig.bus.enable_torque()[0] == 2400
     for _ in range(20):
         assert abs(rig.tick()[0].position_steps - 2400) <= 1
 
@@ -329,7 +329,7 @@ def test_torque_does_not_come_on_before_the_goal_is_known_to_be_kept():
 
     rig.chain[1].write = deaf_to_goals
     with pytest.raises(ServoMissing, match="goal_position is not taken .servo 1: 2400."):
-        rig.bus.engage()
+        rig.bus.enable_torque()
     assert len(refused) == 3
     assert rig.chain[1].shaft.x == 2400
 
@@ -340,7 +340,7 @@ def test_torque_does_not_come_on_before_the_goal_is_known_to_be_kept():
 @pytest.mark.parametrize("fast", [True, False])
 def test_a_bus_without_any_answer_is_given_up_in_the_end(fast):
     rig = Rig(fast, give_up_s=1.6).open()
-    rig.bus.engage()
+    rig.bus.enable_torque()
     rig.bus.events()
     rig.port.spoil = lambda code, raw: b""
     start_s = rig.now_s
@@ -352,14 +352,14 @@ def test_a_bus_without_any_answer_is_given_up_in_the_end(fast):
 
 
 def test_release_survives_a_dead_bus(rig):
-    rig.bus.engage()
+    rig.bus.enable_torque()
     rig.port.spoil = lambda code, raw: b""
-    rig.bus.release()
+    rig.bus.disable_torque()
     assert not any(servo.torque for servo in rig.chain.servos)
 
 
 def test_release_repeats_until_the_torque_is_off(rig):
-    rig.bus.engage()
+    rig.bus.enable_torque()
     stubborn = rig.chain[2]
     real, ignored = stubborn.write, []
 
@@ -370,29 +370,29 @@ def test_release_repeats_until_the_torque_is_off(rig):
         return real(address, data)
 
     stubborn.write = hard_of_hearing
-    rig.bus.release()
+    rig.bus.disable_torque()
     assert len(ignored) == 3
     assert not stubborn.torque
 
 
 def test_release_counts_a_servo_that_keeps_its_torque(rig):
-    rig.bus.engage()
+    rig.bus.enable_torque()
     rig.chain[2].write = lambda address, data: 0
-    rig.bus.release()
+    rig.bus.disable_torque()
     assert rig.errors() == {"refused": 1}
 
 
 def test_a_lost_port_gives_no_values_and_release_tells_what_the_servos_do(rig):
-    rig.bus.engage()
+    rig.bus.enable_torque()
     rig.port.gone = True
     assert rig.tick([2000] * 3) == (None, None, None)
     rig.bus.write([2000] * 3)
     with pytest.raises(BusLost, match="torque could not be switched off.*cut the servo power"):
-        rig.bus.release()
+        rig.bus.disable_torque()
 
 
 def test_release_and_close_before_open_do_nothing():
     rig = Rig()
-    rig.bus.release()
+    rig.bus.disable_torque()
     rig.bus.close()
     assert rig.sent == []

@@ -235,9 +235,9 @@ def test_17_a_port_that_stays_away_is_given_up():
             rig.tick()
     assert 2.0 <= rig.now_s - began_s <= 2.1
     with pytest.raises(BusLost, match="cut the servo power to free them"):
-        rig.bus.release()
+        rig.bus.disable_torque()
     rig.command("plug")
-    rig.bus.release()
+    rig.bus.disable_torque()
     assert not any(servo.torque for servo in rig.chain.servos)
 
 
@@ -328,9 +328,9 @@ def test_21_a_servo_that_keeps_restarting_stays_limp(rig):
 )  # fmt: skip
 def test_22_to_26_latched_errors(rig, fault, name):
     # Here every error takes the torque away.
-    rig.bus.release()
+    rig.bus.disable_torque()
     rig.chain[2].memory.set("shutdown", 0x3F)
-    rig.bus.engage()
+    rig.bus.enable_torque()
     rig.bus.events()
     rig.command(f"{fault} 2")
     readings = rig.tick()
@@ -398,7 +398,7 @@ def test_30_factory_defaults():
         servo.memory.set("baud_rate", 3)
     rig.chain.refresh()
     rig.start()
-    rig.bus.release()
+    rig.bus.disable_torque()
     rig.command("reset 3")
     rig.now_s += 1.0
     with pytest.raises(ServoMissing, match="neck .servo 3. does not answer"):
@@ -416,9 +416,9 @@ def test_31_lost_writes_while_the_torque_comes_on():
     rig = Rig()
     rig.bus.open()
     rig.command("lose-writes 2")
-    rig.bus.engage()
+    rig.bus.enable_torque()
     rig.command("lose-writes 2")
-    rig.bus.release()
+    rig.bus.disable_torque()
     assert not any(servo.torque for servo in rig.chain.servos)
 
 
@@ -452,7 +452,7 @@ def test_14_one_silent_servo_of_nine_costs_little_time(fast):
     setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0) for i in ids]
     bus = SmartServoBus(DYNAMIXEL, port, setups, DynamixelParams(fast_sync_read=fast))
     bus.open()
-    bus.engage()
+    bus.enable_torque()
 
     def cycle():
         """Run flat out: gives the time a read takes, and the values that came."""

@@ -146,7 +146,7 @@ def test_the_block_and_the_kind_of_reading_are_those_that_all_servos_have(
     setups = [ServoSetup(s.id, s.model, 0, 4095, 6000.0) for s in specs]
     bus = SmartServoBus(DYNAMIXEL, port, setups, DynamixelParams())
     bus.open()
-    bus.engage()
+    bus.enable_torque()
     spans = set()
     for _ in range(60):
         now_s[0] += 0.01
@@ -223,7 +223,7 @@ def test_negative_registers_are_read_as_negative():
 
 def test_servos_without_a_current_sensor_report_their_load_as_it_is():
     rig = Rig(model="xl430-w250").open()
-    rig.bus.engage()
+    rig.bus.enable_torque()
     rig.tick([2500] * 3)
     readings = rig.tick([2500] * 3)
     assert readings[0].velocity_steps_s > 0.0
@@ -234,7 +234,7 @@ def test_the_same_run_sends_the_same_bytes():
     runs = []
     for _ in range(2):
         rig = Rig().open()
-        rig.bus.engage()
+        rig.bus.enable_torque()
         for k in range(50):
             rig.tick([2000 + 10 * k] * 3)
         runs.append(b"".join(rig.sent))

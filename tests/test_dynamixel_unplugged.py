@@ -34,7 +34,7 @@ setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 200.0) for i in (1, 2, 3)]
 params = DynamixelParams(reply_timeout_ms=100.0)
 bus = SmartServoBus(DYNAMIXEL, BlockingPort(sys.argv[1]), setups, params)
 bus.open()
-bus.engage()
+bus.enable_torque()
 while True:
     bus.read(time.monotonic())
     bus.write([2900] * 3)
@@ -68,7 +68,7 @@ def test_pulled_out_and_put_back_it_goes_on_from_where_the_joints_are():
             DynamixelParams(reply_timeout_ms=100.0),
         )
         bus.open()
-        bus.engage()
+        bus.enable_torque()
         run(bus, 0.2, [2000] * 3)
         bus.events()
         server.command("unplug")
@@ -89,7 +89,7 @@ def test_pulled_out_and_put_back_it_goes_on_from_where_the_joints_are():
             bus, 20.0, [1500] * 3, lambda rs: all(r and r.position_steps > 1450 for r in rs)
         )
         assert all(reading.position_steps > 1450 for reading in readings)
-        bus.release()
+        bus.disable_torque()
         bus.close()
 
 

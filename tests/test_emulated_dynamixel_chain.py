@@ -97,7 +97,7 @@ def test_examples_of_the_manual_to_the_byte(name):
 
 def test_after_a_reboot_the_goal_is_where_it_is():
     bench = DynamixelBench((1, "xl330-m288", 1000))
-    bench.engage(1, 1500)
+    bench.enable_torque(1, 1500)
     bench.write(1, 112, 50, 4)
     bench.ask(1, REBOOT)
     bench.now_s = 0.399
@@ -219,7 +219,7 @@ def test_old_firmware_knows_no_fast_read():
 
 def test_a_latched_error_takes_the_torque_and_marks_every_status():
     bench = DynamixelBench((1, "xl330-m288", 1000))
-    bench.engage(1, 3000)
+    bench.enable_torque(1, 3000)
     bench.now_s = 0.05
     bench.read(1, 132, 4)
     bench.chain[1].fail("overload")
@@ -238,7 +238,7 @@ def test_a_latched_error_takes_the_torque_and_marks_every_status():
 
 def test_an_error_outside_shutdown_only_marks_the_status():
     bench = DynamixelBench((1, "xc330-m288"))
-    bench.engage(1)
+    bench.enable_torque(1)
     bench.chain[1].fail("input voltage")
     assert bench.write(1, 116, 2100, 4) == ALERT
     assert bench.read(1, 64, 1) == 1
@@ -249,7 +249,7 @@ def test_an_error_outside_shutdown_only_marks_the_status():
 
 def test_the_watchdog_stops_motion_and_refuses_goals_until_cleared():
     bench = DynamixelBench((1, "xl330-m288", 1000), (2, "xl330-m288"))
-    bench.engage(1, 3000)
+    bench.enable_torque(1, 3000)
     bench.write(1, 98, 5, 1)
     bench.now_s = 0.1
     (at_trip, _) = bench.chain.positions_steps()
@@ -264,7 +264,7 @@ def test_the_watchdog_stops_motion_and_refuses_goals_until_cleared():
 
 def test_any_packet_feeds_the_watchdog():
     bench = DynamixelBench((1, "xl330-m288", 1000), (2, "xl330-m288"))
-    bench.engage(1)
+    bench.enable_torque(1)
     bench.write(1, 98, 1, 1)
     for _ in range(20):
         bench.now_s += 0.019
@@ -383,7 +383,7 @@ def test_backup_and_restore_of_the_control_table():
     assert bench.chain.receive(restore) == status(1, 0, b"")
     bench.now_s = 0.5
     assert bench.read(1, 31, 1) == 55
-    bench.engage(1)
+    bench.enable_torque(1)
     assert bench.chain.receive(store)[8] == 1
     assert bench.chain.receive(instruction(1, 0x20, b"\x03CTRL"))[8] == 4
     assert bench.chain.receive(instruction(1, 0x20))[8] == 4

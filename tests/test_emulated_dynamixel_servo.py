@@ -27,7 +27,7 @@ class Bench:
         self.advance()
         return int.from_bytes(self.servo.read(address, size), "little", signed=signed)
 
-    def engage(self, goal: int | None = None) -> None:
+    def enable_torque(self, goal: int | None = None) -> None:
         assert self.write(64, 1, 1) == 0
         if goal is not None:
             assert self.write(116, 4, goal) == 0
@@ -59,7 +59,7 @@ def test_the_limit_registers_narrow_the_goal():
     bench.write(48, 4, 3000)
     bench.write(52, 4, 1000)
     assert [bench.write(116, 4, goal) for goal in (999, 1000, 3000, 3001)] == [6, 0, 0, 6]
-    bench.engage()
+    bench.enable_torque()
     assert [bench.write(116, 4, goal) for goal in (999, 1000, 3000, 3001)] == [6, 0, 0, 6]
 
 
@@ -120,7 +120,7 @@ def test_some_firmware_wraps_the_position_as_the_torque_comes_on():
 def test_live_registers_tell_the_motion():
     bench = Bench("xl330-m077", 1000)
     bench.write(112, 4, 100)
-    bench.engage(2000)
+    bench.enable_torque(2000)
     bench.now_s = 0.2
     assert bench.read(128, 4) == pytest.approx(100, abs=25)
     assert bench.read(136, 4) == 100
@@ -138,7 +138,7 @@ def test_live_registers_tell_the_motion():
 
 def test_a_joint_that_cannot_follow_reports_a_following_error():
     bench = Bench("xl330-m077", 1000)
-    bench.engage(1900)
+    bench.enable_torque(1900)
     bench.servo.jam()
     bench.now_s = 0.5
     assert bench.read(123, 1) == 0b001000
@@ -146,7 +146,7 @@ def test_a_joint_that_cannot_follow_reports_a_following_error():
 
 def test_current_points_the_way_the_shaft_is_pushed():
     bench = Bench("xl330-m077", 1000)
-    bench.engage(3000)
+    bench.enable_torque(3000)
     bench.now_s = 0.010
     assert 100 < bench.read(126, 2, signed=True) <= 1470
     bench.write(116, 4, 0)
@@ -157,7 +157,7 @@ def test_current_points_the_way_the_shaft_is_pushed():
 def test_a_servo_that_holds_still_flickers_by_its_seed_however_often_one_looks():
     def heard(seed, looks):
         bench = Bench("xl330-m077", 1000, 53, Physics(), Quirks(), seed)
-        bench.engage()
+        bench.enable_torque()
         out = []
         for k in range(200 * looks):
             bench.now_s = 1.0 + k / looks / 1000.0
@@ -177,7 +177,7 @@ def test_a_servo_that_holds_still_flickers_by_its_seed_however_often_one_looks()
 
 def test_eeprom_is_locked_while_the_torque_is_on():
     bench = Bench("xl330-m288")
-    bench.engage()
+    bench.enable_torque()
     assert bench.write(9, 1, 0) == 7
     assert bench.read(9, 1) == 250
     bench.write(64, 1, 0)
@@ -189,7 +189,7 @@ def test_reverse_mode_mirrors_position_velocity_current_and_pwm():
     bench = Bench("xl330-m077", 1000)
     bench.write(10, 1, 1)
     assert bench.read(132, 4) == 4096 - 1000
-    bench.engage(3500)
+    bench.enable_torque(3500)
     bench.now_s = 0.04
     assert bench.read(132, 4) > 3100 and bench.servo.shaft.x < 1000
     assert bench.read(128, 4, signed=True) > 0
@@ -213,7 +213,7 @@ def test_a_time_based_profile_needs_its_bit_and_firmware():
         bench = Bench("xl330-m077", 1000, firmware)
         bench.write(10, 1, 4)
         bench.write(112, 4, 1000)
-        bench.engage(2000)
+        bench.enable_torque(2000)
         bench.now_s = 0.5
         # 1000 register units of velocity have long arrived; of time they are half way.
         assert bench.read(140, 4) == (1500 if firmware == 53 else 2000), at
@@ -240,7 +240,7 @@ def test_backup_and_restore():
     assert (bench.servo.backup(), bench.read(147, 1)) == (0, 1)
     bench.write(9, 1, 0)
     bench.write(84, 2, 1)
-    bench.engage()
+    bench.enable_torque()
     assert (bench.servo.backup(), bench.servo.restore()) == (1, 1)
     bench.write(64, 1, 0)
     assert bench.servo.restore() == 0
@@ -261,7 +261,7 @@ def test_factory_reset_puts_the_eeprom_back_and_spares_what_it_was_told():
         assert (bench.servo.id, bench.servo.baud) == (servo_id, baud)
         assert (bench.read(9, 1), bench.read(20, 4), bench.read(48, 4)) == (250, 0, 4095)
         assert bench.read(132, 4) == 2048
-    bench.engage()
+    bench.enable_torque()
     assert (bench.servo.factory_reset(3), bench.servo.factory_reset(1)) == (4, 7)
 
 
@@ -269,7 +269,7 @@ def test_a_reboot_restarts_tick_ram_and_turns_and_keeps_the_eeprom():
     bench = Bench("xl330-m288", 4000)
     bench.write(11, 1, 4)
     bench.write(9, 1, 3)
-    bench.engage(4500)
+    bench.enable_torque(4500)
     bench.write(112, 4, 77)
     bench.now_s = 3.0
     assert bench.read(132, 4) > 4400

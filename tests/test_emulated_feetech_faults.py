@@ -11,7 +11,7 @@ VOLTAGE, ANGLE, HEAT, CURRENT, OVERLOAD = 1, 2, 4, 8, 32
 def jammed(goal=3000, **physics):
     """A servo that pushes against something."""
     bench = FeetechBench(ServoSpec(1, "sts3215", 2048, physics=Physics(**physics)))
-    bench.engage()
+    bench.enable_torque()
     bench.chain.faults.command("stick 1")
     bench.write(1, 42, goal, 2)
     return bench
@@ -37,7 +37,7 @@ def test_voltage_stands_in_every_answer_as_long_as_it_is_wrong(volts, bits):
 
 def test_a_wrong_voltage_takes_the_torque_only_where_that_is_chosen():
     bench = FeetechBench()
-    bench.engage()
+    bench.enable_torque()
     bench.chain.faults.command("voltage 1 9")
     bench.wait(0.1)
     assert bench.read(1, 40) == 1
@@ -49,7 +49,7 @@ def test_a_wrong_voltage_takes_the_torque_only_where_that_is_chosen():
 
 def test_heat_takes_the_torque_until_it_has_cooled_and_someone_switches_it_on():
     bench = FeetechBench()
-    bench.engage()
+    bench.enable_torque()
     bench.chain.faults.command("overheat 1")
     bench.wait(0.04)
     assert (bench.error(), bench.read(1, 40), bench.read(1, 63)) == (HEAT, 0, 75)
@@ -125,7 +125,7 @@ def test_a_torque_limit_below_it_never_overloads(limit):
 def test_what_ends_an_overload(policy, by_goal, by_torque):
     bench = FeetechBench()
     bench.chain.choose("overload-ends", policy)
-    bench.engage()
+    bench.enable_torque()
     bench.chain.faults.command("overload 1")
     assert bench.error() == OVERLOAD
     bench.write(1, 42, 2048, 2)

@@ -34,7 +34,7 @@ def led_to(bench):
 @pytest.mark.parametrize("seconds", [0.1, 0.4, 0.9])
 def test_goal_speed_alone_is_a_straight_line(seconds):
     bench = one()
-    bench.engage()
+    bench.enable_torque()
     command(bench, 3048, speed=1000)
     bench.wait(seconds, 7)
     assert led_to(bench) == pytest.approx(2048 + 1000 * seconds)
@@ -46,7 +46,7 @@ def test_goal_speed_alone_is_a_straight_line(seconds):
 def test_acceleration_makes_ramps_at_both_ends(seconds, at):
     # 20 units are 2000 steps/s2: 0.5 s to 1000 steps/s, 0.5 s at it, 0.5 s to rest
     bench = one()
-    bench.engage()
+    bench.enable_torque()
     command(bench, 3048, speed=1000, acceleration=20)
     bench.wait(seconds, 5)
     assert led_to(bench) == pytest.approx(2048 + at)
@@ -56,7 +56,7 @@ def test_goal_time_decides_how_long_it_takes_or_nothing():
     for policy, at in (("obey", 2248.0), ("ignore", 3000.0)):
         bench = one()
         bench.chain.choose("goal-time", policy)
-        bench.engage()
+        bench.enable_torque()
         command(bench, 3048, speed=2000, time_ms=2400)
         bench.wait(0.48)
         assert led_to(bench) == pytest.approx(at + (policy == "ignore") * 8)
@@ -64,7 +64,7 @@ def test_goal_time_decides_how_long_it_takes_or_nothing():
 
 def test_goal_speed_0_is_the_fastest_of_the_data_sheet():
     bench = one(start=0.0)
-    bench.engage()
+    bench.enable_torque()
     command(bench, 4095)
     bench.wait(0.5)
     assert led_to(bench) == pytest.approx(TOP_STEPS_S * 0.5)
@@ -74,7 +74,7 @@ def test_goal_speed_0_is_the_fastest_of_the_data_sheet():
 
 def test_no_goal_speed_is_faster_than_the_motor():
     bench = one(start=0.0)
-    bench.engage()
+    bench.enable_torque()
     command(bench, 4095, speed=30_000)
     bench.wait(0.5)
     assert led_to(bench) == pytest.approx(TOP_STEPS_S * 0.5)
@@ -84,7 +84,7 @@ def test_no_goal_speed_is_faster_than_the_motor():
 @pytest.mark.parametrize("model", ["sts3215", "sts3215-12v"])
 def test_it_comes_to_its_goal_and_stays(goal, model):
     bench = one(Physics(), model=model)
-    bench.engage()
+    bench.enable_torque()
     command(bench, goal, speed=1500, acceleration=50)
     assert bench.read(1, 66) == 1
     path = []
@@ -99,7 +99,7 @@ def test_it_comes_to_its_goal_and_stays(goal, model):
 
 def test_a_new_speed_counts_at_once_and_the_same_command_changes_nothing():
     bench = one()
-    bench.engage()
+    bench.enable_torque()
     command(bench, 3048, speed=500)
     bench.wait(0.2)
     command(bench, 3048, speed=1000)
@@ -112,7 +112,7 @@ def test_a_new_speed_counts_at_once_and_the_same_command_changes_nothing():
 def test_the_same_goals_give_the_same_bytes():
     def run():
         bench, said = one(Physics(gravity_nm=0.2)), []
-        bench.engage()
+        bench.enable_torque()
         for k in range(200):
             command(bench, 2048 + 300 * (k // 40 % 2), speed=900)
             bench.wait(0.01)
@@ -151,7 +151,7 @@ def test_limp_it_is_turned_by_hand_and_under_torque_it_comes_back():
     bench = one()
     bench.chain.faults.command("turn 1 300")
     assert bench.position() == 2348
-    bench.engage()
+    bench.enable_torque()
     bench.chain.faults.command("turn 1 -100")
     assert bench.position() == 2248
     assert bench.read(1, 60, 2, 10) == 0
@@ -178,7 +178,7 @@ def test_torque_off_lets_a_load_pull_it_and_damping_slows_it():
 def test_the_torque_limit_bounds_what_it_can_lift(limit, moves):
     bench = one(SMOOTH._replace(load_nm=-0.5 * 1.91))
     bench.write(1, 48, limit, 2)
-    bench.engage(goal=2200)
+    bench.enable_torque(goal=2200)
     bench.wait(0.6)
     assert (bench.position() > 2150) == moves
     assert bench.read(1, 60, 2, 10) <= limit
@@ -186,13 +186,13 @@ def test_the_torque_limit_bounds_what_it_can_lift(limit, moves):
 
 def test_load_and_current_at_a_stop_are_those_of_the_stall():
     bench = one(SMOOTH._replace(stop_high_steps=2100.0))
-    bench.engage(goal=3000)
+    bench.enable_torque(goal=3000)
     bench.wait(0.5)
     assert bench.position() == 2100
     assert bench.read(1, 60, 2, 10) == 1000
     assert bench.read(1, 69, 2, 15) * 0.0065 == pytest.approx(2.7, rel=0.01)
     # the path comes back from where it had led to
-    bench.engage(goal=2000)
+    bench.enable_torque(goal=2000)
     bench.wait(0.25)
     assert bench.read(1, 60, 2, 10) < 0
     assert bench.read(1, 58, 2, 15) < 0
@@ -200,7 +200,7 @@ def test_load_and_current_at_a_stop_are_those_of_the_stall():
 
 def test_a_load_sags_the_voltage():
     bench = one(SMOOTH._replace(stop_high_steps=2100.0, supply_ohm=0.5))
-    bench.engage(goal=3000)
+    bench.enable_torque(goal=3000)
     bench.wait(0.5)
     assert bench.read(1, 62) == pytest.approx(74 - 0.5 * 2.7 * 10, abs=3)
 
@@ -209,7 +209,7 @@ def test_a_smaller_gain_holds_softer():
     def away(gain):
         bench = one(SMOOTH._replace(load_nm=-0.2 * 1.91))
         bench.write(1, 21, gain)
-        bench.engage()
+        bench.enable_torque()
         bench.wait(2.0)
         return 2048 - bench.position()
 
@@ -225,7 +225,7 @@ def test_goals_end_at_the_angle_limits(goal, at):
     bench = one()
     bench.write(1, 9, 1000, 2)
     bench.write(1, 11, 3000, 2)
-    bench.engage(goal=goal)
+    bench.enable_torque(goal=goal)
     bench.wait(1.5)
     assert bench.position() == pytest.approx(at, abs=STEADY_STEPS)
     assert bench.read(1, 42, 2) == goal
@@ -235,7 +235,7 @@ def test_both_limits_0_count_turns():
     bench = one(start=4000.0)
     bench.write(1, 9, 0, 2)
     bench.write(1, 11, 0, 2)
-    bench.engage(goal=4000 + 5000)
+    bench.enable_torque(goal=4000 + 5000)
     bench.wait(3.0)
     assert bench.position() == pytest.approx(9000, abs=STEADY_STEPS)
     command(bench, 0x8000 | 700)
@@ -251,7 +251,7 @@ def test_within_one_turn_it_reads_on_from_0_and_goes_the_long_way():
     bench = one(start=4090.0)
     bench.chain.faults.command("turn 1 20")
     assert bench.position() == 14
-    bench.engage(goal=4000)
+    bench.enable_torque(goal=4000)
     bench.wait(0.2)
     assert 14 < bench.position() < 1000
     bench.wait(1.5)
@@ -282,7 +282,7 @@ def test_128_makes_the_present_place_the_middle_for_good(start):
 
 def test_making_it_the_middle_under_torque_moves_nothing():
     bench = one(start=1500.0)
-    bench.engage()
+    bench.enable_torque()
     bench.wait(0.1)
     true = bench.chain[1].shaft.x
     bench.write(1, 40, 128)
@@ -359,7 +359,7 @@ def test_mode_step_goes_on_from_the_last_goal():
 
 def test_a_change_of_mode_under_torque_begins_at_rest_where_it_is():
     bench = one()
-    bench.engage()
+    bench.enable_torque()
     bench.write(1, 33, 1)
     bench.wait(0.5)
     assert bench.position() == 2048
@@ -375,7 +375,7 @@ def test_a_change_of_mode_under_torque_begins_at_rest_where_it_is():
 def test_coarse_speeds_are_50_steps_a_second():
     bench = one()
     bench.write(1, 18, 8)
-    bench.engage()
+    bench.enable_torque()
     command(bench, 3048, speed=20)
     bench.wait(0.5)
     assert led_to(bench) == pytest.approx(2548)
@@ -385,7 +385,7 @@ def test_coarse_speeds_are_50_steps_a_second():
 def test_speed_0_may_mean_to_stop():
     bench = one()
     bench.write(1, 18, 4)
-    bench.engage()
+    bench.enable_torque()
     command(bench, 3048, speed=0)
     bench.wait(0.5)
     assert bench.position() == 2048

@@ -196,7 +196,7 @@ def test_a_sync_write_may_change_an_id(make):
 
 def test_a_reboot_is_confirmed_then_deaf_then_as_at_power_on(make):
     bench = three(make)
-    bench.engage(1, 1500)
+    bench.enable_torque(1, 1500)
     bench.put("position_p_gain", 99)
     assert bench.ask(1, REBOOT) == [(1, 0, b"")]
     deaf_s = bench.chain[1].restart_ms / 1000.0
@@ -241,7 +241,7 @@ def test_limp_it_is_turned_by_hand_and_under_torque_it_comes_back(make):
     bench = make()
     bench.chain.faults.command("turn 1 300")
     assert bench.position() == 2348
-    bench.engage()
+    bench.enable_torque()
     bench.chain.faults.command("turn 1 -100")
     assert bench.position() == 2248
     bench.wait(1.0)
@@ -252,7 +252,7 @@ def test_without_torque_a_joint_stays_or_falls_to_its_stop(make):
     load = Physics(load_nm=-0.5, stop_low_steps=700.0)
     stays, sinks = make(), make(ServoSpec(1, make.model, 2048.0, physics=load))
     for bench in (stays, sinks):
-        bench.engage()
+        bench.enable_torque()
         bench.wait(1.0)
         bench.put("torque_enable", 0)
         bench.wait(6.0)
@@ -275,7 +275,7 @@ def test_servos_that_are_given_one_id_answer_at_once(make):
 
 def test_heat_takes_the_torque(make):
     bench = make()
-    bench.engage()
+    bench.enable_torque()
     bench.chain.faults.command("overheat 1")
     bench.wait(0.04)
     assert bench.error() != 0
@@ -286,7 +286,7 @@ def test_heat_takes_the_torque(make):
 
 def test_a_brown_out_is_deaf_and_then_as_at_power_on(make):
     bench = make()
-    bench.engage()
+    bench.enable_torque()
     bench.chain.faults.command("turn 1 10")
     bench.chain.faults.command("brown-out 1")
     assert bench.ask(1, PING) == []

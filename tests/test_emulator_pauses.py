@@ -36,13 +36,13 @@ def lived_ms(monkeypatch):
 
 def moved(bench):
     bench.write(1, 48, 1000, 2)
-    bench.engage(1, 3000)
+    bench.enable_torque(1, 3000)
     bench.wait(0.5)
 
 
 def slow(bench):
     bench.write(1, GOAL_SPEED, 20, 2)  # 40 s and more for what is left
-    bench.engage(1, 3000)
+    bench.enable_torque(1, 3000)
     bench.wait(0.5)
 
 
@@ -59,7 +59,7 @@ def loose(bench):
 
 
 def jammed(bench):
-    bench.engage(1, 2048)
+    bench.enable_torque(1, 2048)
     bench.chain.faults.command("stick 1")
     bench.write(1, GOAL, 2100, 2)
     bench.wait(0.5)

@@ -78,14 +78,14 @@ def test_from_open_to_close(twin):
     assert not any(r.torque or r.fault for r in readings)
     bus.write([2000] * 3)
     assert places(twin.run(bus, 0.1)) == STARTS
-    assert bus.engage() == tuple(STARTS)
+    assert bus.enable_torque() == tuple(STARTS)
     assert places(twin.run(bus, 0.2)) == pytest.approx(STARTS, abs=2)
     readings = twin.run(bus, 0.8, [1900, 1900, 2200])
     assert places(readings) == pytest.approx([1900, 1900, 2200], abs=12)
     assert all(r.torque for r in readings)
     twin.run(bus, 1.2, [-5000, 99999, 999])
     assert places(rows(bus.read(twin.port.now_s()))) == pytest.approx([1000, 3000, 1000], abs=12)
-    bus.release()
+    bus.disable_torque()
     readings = twin.run(bus, 0.1, [2000] * 3)
     assert places(readings) == pytest.approx([1000, 3000, 1000], abs=12)
     assert not any(r.torque for r in readings)
@@ -137,7 +137,7 @@ def test_a_joint_outside_its_limits_comes_in_slowly(low, high):
     setups = [ServoSetup(i, "sts3215", 1000, 3000, 3000.0) for i in (1, 2)]
     rig = Rig(specs, setups)
     rig.bus.open()
-    assert rig.bus.engage() == (1000, 3000)
+    assert rig.bus.enable_torque() == (1000, 3000)
     for _ in range(100):
         readings = rig.tick([1500, 2500])
         outside = [r for r in readings if not 1000 <= r.position_steps <= 3000]
@@ -152,7 +152,7 @@ def test_speed_and_acceleration_are_armed_before_the_torque():
     rig = Rig([ServoSpec(1, "sts3215", 2000)], setups)
     rig.bus.open()
     rig.sent.clear()
-    rig.bus.engage()
+    rig.bus.enable_torque()
     writes = [(p[5], p[8:-1]) for p in rig.sent if p[4] == 0x83]
     names = [address for address, _ in writes]
     assert names.index(41) < names.index(42) < names.index(40)
@@ -167,7 +167,7 @@ def test_strength_and_gains_reach_the_servo_and_outlive_a_restart():
     setup = ServoSetup(1, "sts3215", 1000, 3000, 3000.0, gains=(20, 1, 16), strength=0.4)
     rig = Rig([ServoSpec(1, "sts3215", 2000)], [setup])
     rig.bus.open()
-    rig.bus.engage()
+    rig.bus.enable_torque()
     assert [rig.get(1, at) for at in (21, 22, 23)] == [20, 16, 1]
     assert rig.get(1, 48, 2) == 400
     rig.command("brown-out 1")
@@ -198,8 +198,8 @@ def test_retune_waits_for_the_next_engage():
     rig.bus.retune(narrow)
     rig.run(0.6, [2600] * 4)
     assert rig.chain.positions_steps() == pytest.approx([2600] * 4, abs=8)
-    rig.bus.release()
-    assert rig.bus.engage() == (2100,) * 4
+    rig.bus.disable_torque()
+    assert rig.bus.enable_torque() == (2100,) * 4
     assert rig.get(1, 11, 2) == 2100
     with pytest.raises(ValueError, match="other servos need another bus"):
         rig.bus.retune(narrow[:2])
@@ -222,7 +222,7 @@ def test_a_refused_torque_is_named():
     rig.now_s += 0.1
     rig.chain.positions_steps()
     with pytest.raises(ServoFault, match=r"jaw \(servo 2\): overheating: let it cool"):
-        rig.bus.engage()
+        rig.bus.enable_torque()
     assert not any(servo.torque for servo in rig.chain.servos)
 
 
@@ -247,7 +247,7 @@ GOALS = st.lists(st.integers(-(2**40), 2**40) | st.just(10**400), min_size=4, ma
 def test_no_goal_outside_its_limits_ever_leaves(many, fault):
     rig = Rig()
     rig.bus.open()
-    rig.bus.engage()
+    rig.bus.enable_torque()
     if fault:
         rig.command(fault)
     for goals in many:
@@ -267,7 +267,7 @@ def test_corrupted_answers_never_become_readings(flips):
     """The rig asserts in every tick that a value was true in it."""
     rig = Rig()
     rig.bus.open()
-    rig.bus.engage()
+    rig.bus.enable_torque()
     for servo_id, bit in flips:
         rig.command(f"corrupt {servo_id} {bit} count 3")
         for _ in range(4):

@@ -174,7 +174,7 @@ def test_power_and_port_gone_before_the_torque_was_on():
     for _ in range(200):
         readings = rig.tick()
     assert not any(r.torque or r.rearmed for r in readings)
-    assert rig.bus.engage() == (2000,) * 4
+    assert rig.bus.enable_torque() == (2000,) * 4
     rig.run(0.6, [2200] * 4)
     assert rig.chain.positions_steps() == pytest.approx([2200] * 4, abs=8)
 
@@ -188,9 +188,9 @@ def test_a_port_that_stays_away_is_given_up():
             rig.tick()
     assert 2.0 <= rig.now_s - began_s <= 2.1
     with pytest.raises(BusLost, match="no bus watchdog: cut the servo power to free them"):
-        rig.bus.release()
+        rig.bus.disable_torque()
     rig.command("plug")
-    rig.bus.release()
+    rig.bus.disable_torque()
     assert not any(servo.torque for servo in rig.chain.servos)
 
 
@@ -251,10 +251,10 @@ def test_a_restarted_servo_is_set_up_anew_where_it_is(rig):
 
 def test_a_restart_in_the_wink_of_an_eye_is_found(rig):
     """One that nobody missed, after which a goal has switched the torque on again."""
-    rig.bus.release()
+    rig.bus.disable_torque()
     setups = [s._replace(strength=0.5, max_accel_steps_s2=20_000.0) for s in rig.setups]
     rig.bus.retune(setups)
-    rig.bus.engage()
+    rig.bus.enable_torque()
     rig.run(0.2, [2000] * 4)
     assert (rig.get(3, 41), rig.get(3, 48, 2)) == (200, 500)
     memory = rig.chain[3].memory
@@ -286,7 +286,7 @@ def test_a_servo_that_keeps_restarting_stays_limp(rig):
     assert (reading.torque, reading.fault) == (False, AGAIN_AND_AGAIN)
     assert not rig.chain[2].torque
     assert rig.chain[1].torque
-    rig.bus.engage()
+    rig.bus.enable_torque()
     assert rig.bus.faults() == ()
     assert rig.tick()[1].fault == ""
 
@@ -366,7 +366,7 @@ def test_a_babbling_node(rig):
 
 def test_factory_defaults():
     rig = Rig(baud=1_000_000).start()
-    rig.bus.release()
+    rig.bus.disable_torque()
     rig.command("reset 3")
     rig.now_s += 1.0
     with pytest.raises(ServoMissing, match=r"neck \(servo 3\) does not answer"):
@@ -384,9 +384,9 @@ def test_lost_writes_while_the_torque_comes_on_and_goes():
     rig = Rig()
     rig.bus.open()
     rig.command("lose-writes 2")
-    rig.bus.engage()
+    rig.bus.enable_torque()
     rig.command("lose-writes 2")
-    rig.bus.release()
+    rig.bus.disable_torque()
     assert not any(servo.torque for servo in rig.chain.servos)
 
 
@@ -407,7 +407,7 @@ def test_whatever_goal_and_torque_do_nothing_leaps(goal, torque_on):
     rig.bus.open()
     for servo in rig.chain.servos:
         servo.memory.set("goal_position", 3000)
-    assert rig.bus.engage() == (2000,) * 4
+    assert rig.bus.enable_torque() == (2000,) * 4
     for _ in range(20):
         rig.tick([2000] * 4)
         assert rig.chain.positions_steps() == pytest.approx([2000] * 4, abs=3)
@@ -416,7 +416,7 @@ def test_whatever_goal_and_torque_do_nothing_leaps(goal, torque_on):
         rig.tick([2000] * 4)
         assert rig.chain.positions_steps() == pytest.approx([2000] * 4, abs=3)
     rig.until_all()
-    rig.bus.release()
+    rig.bus.disable_torque()
     rig.run(0.2, [2500] * 4)
     assert not any(servo.torque for servo in rig.chain.servos)
 
@@ -434,7 +434,7 @@ def test_servos_whose_goal_goes_with_their_place_while_they_are_limp(place):
 
     servo.read = read
     rig.bus.open()
-    assert rig.bus.engage() == (max(1000, place),)
+    assert rig.bus.enable_torque() == (max(1000, place),)
     assert rig.get(1, 42, 2) == max(1000, place)
     for _ in range(30):
         (reading,) = rig.tick([max(1000, place)])
@@ -453,17 +453,17 @@ def test_a_joint_beyond_its_encoders_zero_is_told_so_and_not_led_the_wrong_way()
     rig.now_s += 0.01
     assert rows(rig.bus.read(rig.now_s))[0].position_steps == 4090 - 4096
     with pytest.raises(ServoFault, match=r"eye \(servo 1\) stands at 4090, beyond .*by hand"):
-        rig.bus.engage()
+        rig.bus.enable_torque()
     assert not any(servo.torque for servo in rig.chain.servos)
     rig.command("turn 1 100")
-    assert rig.bus.engage() == (100, 700)
+    assert rig.bus.enable_torque() == (100, 700)
 
 
 def test_a_joint_that_restarts_beyond_zero_stays_limp_until_it_is_turned_back():
     rig = far_rig()
     rig.bus.open()
     rig.command("turn 1 200")
-    rig.bus.engage()
+    rig.bus.enable_torque()
     for _ in range(20):
         rig.bus.read(rig.now_s)
         rig.now_s += 0.01

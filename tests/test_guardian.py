@@ -172,26 +172,26 @@ def sts():
 def test_it_watches_from_before_torque_on_until_torque_off(sts):
     other = sts.guardian.other
     assert not other.armed(0)
-    refused, sts.inner.engage = sts.inner.engage, _refuse
+    refused, sts.inner.enable_torque = sts.inner.enable_torque, _refuse
     with pytest.raises(ServoFault):
-        sts.bus.engage()
+        sts.bus.enable_torque()
     assert other.armed(0), "some servos may have had their torque already"
-    sts.inner.engage = refused
-    sts.bus.engage()
+    sts.inner.enable_torque = refused
+    sts.bus.enable_torque()
     assert other.armed(0)
-    sts.bus.release()
+    sts.bus.disable_torque()
     assert not other.armed(0)
 
 
 def test_every_tick_is_a_sign_of_life(sts):
-    sts.bus.engage()
+    sts.bus.enable_torque()
     before = sts.guardian.other.beats
     sts.run(0.1, [2000] * 4)
     assert sts.guardian.other.beats == before + 20  # a read and a write each
 
 
 def test_a_loop_that_wakes_takes_hold_where_the_joints_are(sts):
-    sts.bus.engage()
+    sts.bus.enable_torque()
     sts.run(0.3, [2200] * 4)
     other = sts.guardian.other
     other.set_state(0, RELEASING)
@@ -212,21 +212,21 @@ def test_a_loop_that_wakes_takes_hold_where_the_joints_are(sts):
 
 
 def test_servos_that_refuse_are_asked_again_and_get_no_goals(sts):
-    sts.bus.engage()
-    engage, sts.inner.engage = sts.inner.engage, _refuse
+    sts.bus.enable_torque()
+    enabled, sts.inner.enable_torque = sts.inner.enable_torque, _refuse
     sts.guardian.other.set_state(0, RELEASED)
     readings = sts.run(0.2, [2300] * 4)
     assert not any(r.torque for r in readings if r is not None)
     lines = sts.bus.events()
     assert [line for line in lines if "torque stays off" in line], lines
-    sts.inner.engage = engage
+    sts.inner.enable_torque = enabled
     sts.run(RETRY_S + 0.05, [2300] * 4)
     assert any("torque on again" in line for line in sts.bus.events())
 
 
 def test_servos_that_nobody_held_stay_limp(sts):
-    sts.bus.engage()
-    sts.bus.release()
+    sts.bus.enable_torque()
+    sts.bus.disable_torque()
     sts.guardian.other.set_state(0, RELEASED)
     sts.bus.events()
     sts.run(0.2, [2300] * 4)

@@ -34,7 +34,7 @@ def test_a_line_that_says_its_last_answer_again_first_is_not_believed(kind):
 def test_a_joint_that_was_turned_by_hand_is_believed_soon(kind):
     noisy = Noisy(kind)
     noisy.start()
-    noisy.bus.release()
+    noisy.bus.disable_torque()
     for _ in range(100):  # it comes to rest
         noisy.bus.read(noisy.now)
         noisy.now += 0.005

@@ -82,7 +82,7 @@ def bench():
 @pytest.fixture
 def held(bench):
     bench.order(5000, 6000, 7000)
-    assert bench.bus.engage() == (5000, 6000, 7000)
+    assert bench.bus.enable_torque() == (5000, 6000, 7000)
     bench.run(0.1)
     bench.bus.events()
     return bench
@@ -133,7 +133,7 @@ def test_errors_from_before_are_told_and_cleared():
 def test_every_form_of_the_commands(form, crc):
     bench = Bench(protocol=form, crc=crc)
     bench.bus.open()
-    bench.bus.engage()
+    bench.bus.enable_torque()
     bench.run(0.5, [5000, 5500, 6500])
     assert places(bench.run(0.01)[-1]) == [5000, 5500, 6500]
     assert bench.bus.health().errors == {}
@@ -143,7 +143,7 @@ def test_every_form_of_the_commands(form, crc):
 def test_a_board_that_detects_its_baud_rate_is_woken(form):
     bench = Bench(chosen=[("mode", "uart-detect")], protocol=form)
     bench.bus.open()
-    bench.bus.engage()
+    bench.bus.enable_torque()
     assert bench.pulses() == [6100, CENTRE, HIGH]
 
 
@@ -208,7 +208,7 @@ def test_two_servos_on_one_channel():
 def test_pulses_that_are_on_stay_as_they_are(bench):
     bench.order(5000, 6000, 7000)
     bench.packets()
-    assert bench.bus.engage() == (5000, 6000, 7000)
+    assert bench.bus.enable_torque() == (5000, 6000, 7000)
     assert bench.pulses() == [5000, 6000, 7000]
     assert bench.now_s < 0.01
 
@@ -221,7 +221,7 @@ def test_limits_are_armed_before_the_goal(bench):
     )
     bench.bus.open()
     bench.packets()
-    bench.bus.engage()
+    bench.bus.enable_torque()
     sent = b"".join(bench.packets())
     speed, accel, target = (
         sent.index(bytes.fromhex(text)) for text in ("87 00 78 00", "89 00 50 00", "84 00 54 2F")
@@ -230,7 +230,7 @@ def test_limits_are_armed_before_the_goal(bench):
 
 
 def test_channels_without_pulses_go_to_their_rest_one_after_another(bench):
-    assert bench.bus.engage() == (6100, CENTRE, HIGH)
+    assert bench.bus.enable_torque() == (6100, CENTRE, HIGH)
     assert bench.pulses() == [6100, CENTRE, HIGH]
     assert bench.now_s >= 0.2
     said = " ".join(bench.bus.events())
@@ -240,24 +240,24 @@ def test_channels_without_pulses_go_to_their_rest_one_after_another(bench):
 
 
 def test_that_nothing_is_measured_is_said_once(bench):
-    bench.bus.engage()
-    bench.bus.release()
+    bench.bus.enable_torque()
+    bench.bus.disable_torque()
     bench.bus.events()
-    bench.bus.engage()
+    bench.bus.enable_torque()
     assert not any("tell no positions" in line for line in bench.bus.events())
 
 
 def test_after_a_release_they_begin_where_they_were(bench):
-    bench.bus.engage()
+    bench.bus.enable_torque()
     bench.run(1.0, [5000, 5500, 6500])
-    bench.bus.release()
+    bench.bus.disable_torque()
     assert bench.pulses() == [0, 0, 0]
-    assert bench.bus.engage() == (5000, 5500, 6500)
+    assert bench.bus.enable_torque() == (5000, 5500, 6500)
 
 
 def test_a_joint_outside_its_limits_comes_inside_slowly(bench):
     bench.order(4000, 6000, 7000)
-    assert bench.bus.engage() == (LOW, 6000, 7000)
+    assert bench.bus.enable_torque() == (LOW, 6000, 7000)
     bench.run(0.1, [LOW, 6000, 7000])
     assert 4000 < bench.pulses()[0] < 4200
     bench.run(0.6, [LOW, 6000, 7000])
@@ -269,14 +269,14 @@ def test_a_joint_outside_its_limits_comes_inside_slowly(bench):
 def test_a_board_with_a_narrower_range_is_refused(bench):
     bench.board.choose("max-us", "1800")
     with pytest.raises(ServoMissing, match="brow.*sent to 1900 us and gets 1800 us.*widen"):
-        bench.bus.engage()
+        bench.bus.enable_torque()
     assert bench.pulses() == [0, 0, 0]
 
 
 def test_no_answer_at_engage(bench):
     bench.board.choose("mode", "mute")
     with pytest.raises(ServoMissing, match="no answer about eyes"):
-        bench.bus.engage()
+        bench.bus.enable_torque()
 
 
 # --- following
@@ -300,7 +300,7 @@ def test_readings_keep_to_the_board_within_its_own_period(held):
 def test_a_slow_servo_lags_behind_its_pulse():
     bench = Bench((SETUPS[0]._replace(own_speed_steps_s=2000.0),))
     bench.bus.open()
-    bench.bus.engage()
+    bench.bus.enable_torque()
     reading = bench.run(0.2, [7100])[-1][0]
     assert bench.pulses((0,)) == [7100]
     assert reading.position_steps == pytest.approx(6100 + 0.19 * 2000.0, abs=45)
@@ -316,7 +316,7 @@ def test_neighbours_share_one_command_and_all_goals_one_write(held):
 def test_a_micro_has_no_command_for_several():
     bench = Bench(SETUPS[:2], 6)
     bench.bus.open()
-    bench.bus.engage()
+    bench.bus.enable_torque()
     bench.packets()
     bench.bus.write([5000, 6000])
     assert bench.packets() == [bytes.fromhex("84 00 08 27 84 01 70 2E")]
@@ -357,7 +357,7 @@ def targets(packet):
 def test_no_goal_outside_the_limits_ever_leaves(moves):
     bench = Bench(stagger_ms=0.0)
     bench.bus.open()
-    bench.bus.engage()
+    bench.bus.enable_torque()
     for goals in moves:
         bench.run(TICK_S)
         bench.packets()
@@ -383,20 +383,20 @@ def test_retune_counts_from_the_next_hold(held):
     held.bus.retune(narrow)
     held.run(0.5, [7500] * 3)
     assert held.pulses() == [7500] * 3
-    held.bus.release()
-    assert held.bus.engage() == (6500, 6500, 6500)
+    held.bus.disable_torque()
+    assert held.bus.enable_torque() == (6500, 6500, 6500)
     with pytest.raises(ValueError, match="another bus"):
         held.bus.retune(narrow[:2])
 
 
 def test_release_is_confirmed_and_reported_where_it_is_not(held):
-    held.bus.release()
+    held.bus.disable_torque()
     assert held.pulses() == [0, 0, 0]
     assert not any(reading.torque for reading in held.run(0.05)[-1])
-    held.bus.engage()
+    held.bus.enable_torque()
     held.bus.events()
     held.board.choose("mode", "mute")
-    held.bus.release()
+    held.bus.disable_torque()
     assert sum("does not confirm" in line for line in held.bus.events()) == 3
 
 
@@ -466,7 +466,7 @@ def test_where_home_is_reached_at_once_they_are_held_there():
     bench = Bench(tuple(setup._replace(max_speed_steps_s=2e6) for setup in SETUPS))
     bench.board.choose("on-error", "home")
     bench.bus.open()
-    bench.bus.engage()
+    bench.bus.enable_torque()
     bench.run(1.0, [5000, 5000, 5000])
     bench.raw("55")
     seen = bench.run(0.3)
@@ -526,7 +526,7 @@ def test_a_channel_that_meets_an_end_of_the_board_is_told_once(held):
 
 def test_a_running_script_is_stopped_at_engage(bench):
     bench.board.faults.command("script on")
-    bench.bus.engage()
+    bench.bus.enable_torque()
     assert "the board ran a script of its own: stopped" in bench.bus.events()
     assert bench.raw("AE") != b"\0"
 
@@ -603,7 +603,7 @@ def test_a_port_that_stays_away(held):
     with pytest.raises(BusLost, match="check the USB cable"):
         held.run(2.0)
     with pytest.raises(BusLost, match="pulses could not be stopped"):
-        held.bus.release()
+        held.bus.disable_torque()
 
 
 def test_over_a_pseudo_terminal():
@@ -611,7 +611,7 @@ def test_over_a_pseudo_terminal():
         port = BlockingPort(server.start_device(MaestroLine(12)))
         bus = MaestroBus(port, SETUPS, MaestroParams(reply_timeout_ms=200.0, stagger_ms=0.0))
         bus.open()
-        assert bus.engage() == (6100, CENTRE, HIGH)
+        assert bus.enable_torque() == (6100, CENTRE, HIGH)
         goals = [5500, 5600, 6600]
         end_s = port.now_s() + 20.0
         readings = rows(bus.read(port.now_s()))
@@ -621,7 +621,7 @@ def test_over_a_pseudo_terminal():
             readings = rows(bus.read(port.now_s()))
         assert places(readings) == goals
         assert bus.health().errors == {}
-        bus.release()
+        bus.disable_torque()
         assert not any(reading.torque for reading in rows(bus.read(port.now_s())))
         bus.close()
 
@@ -629,7 +629,7 @@ def test_over_a_pseudo_terminal():
 def test_a_slow_line_is_asked_less_often():
     bench = Bench(watch_ms=40.0)
     bench.bus.open()
-    bench.bus.engage()
+    bench.bus.enable_torque()
     bench.run(0.1)
     before = bench.bus.health().rx_bytes
     seen = bench.run(0.4, [5500, 5600, 6600])

@@ -49,7 +49,7 @@ class Bench:
         self.port = InProcessPort(self.board, None, "board", self._sleep_until, wire_time=True)
         self.bus = MaestroBus(self.port, SETUPS, MaestroParams(stagger_ms=0.0))
         self.bus.open()
-        self.bus.engage()
+        self.bus.enable_torque()
         self.goals = [6000.0] * len(SETUPS)
         self.slowest_s = 0.0
 

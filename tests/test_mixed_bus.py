@@ -47,8 +47,8 @@ class Scripted:
             [None if i in gone else row_at(at, now_s) for i, at in enumerate(self.steps)]
         )
 
-    def engage(self):
-        self._do("engage")
+    def enable_torque(self):
+        self._do("enable_torque")
         return tuple(self.steps)
 
     def write(self, goals_steps):
@@ -64,8 +64,8 @@ class Scripted:
     def retune(self, setups):
         self._do("retune " + ",".join(str(setup.id) for setup in setups))
 
-    def release(self):
-        self._do("release")
+    def disable_torque(self):
+        self._do("disable_torque")
 
     def health(self):
         return BusHealth(10, 20, Counter({"timeout": 1, self.name: 2}))
@@ -105,7 +105,7 @@ def test_every_place_must_be_there_once(places):
 
 
 def test_every_sequence_is_in_the_order_of_the_whole(mixture):
-    assert mixture.bus.engage() == (10, 11, 12, 13, 14)
+    assert mixture.bus.enable_torque() == (10, 11, 12, 13, 14)
     told = mixture.bus.read(1.0)
     assert rows(told) == tuple(row_at(at, 1.0) for at in (10, 11, 12, 13, 14))
     assert told.missing == ()
@@ -132,21 +132,26 @@ def test_open_closes_what_is_open_where_the_next_cannot_be(mixture):
 
 
 def test_where_one_refuses_its_torque_all_are_let_go(mixture):
-    mixture.b.wrong["engage"] = ServoMissing("servo 2 refuses")
-    mixture.a.wrong["release"] = BusLost("port a is gone")
+    mixture.b.wrong["enable_torque"] = ServoMissing("servo 2 refuses")
+    mixture.a.wrong["disable_torque"] = BusLost("port a is gone")
     with pytest.raises(ServoMissing, match="servo 2 refuses"):
-        mixture.bus.engage()
-    assert mixture.told() == ["a engage", "b engage", "a release", "b release"]
+        mixture.bus.enable_torque()
+    assert mixture.told() == [
+        "a enable_torque",
+        "b enable_torque",
+        "a disable_torque",
+        "b disable_torque",
+    ]
 
 
 def test_release_reaches_all_and_names_every_port_that_is_gone(mixture):
-    mixture.a.wrong["release"] = BusLost("port a is gone")
+    mixture.a.wrong["disable_torque"] = BusLost("port a is gone")
     with pytest.raises(BusLost, match="^port a is gone$"):
-        mixture.bus.release()
-    assert mixture.told() == ["a release", "b release"]
-    mixture.b.wrong["release"] = BusLost("port b is gone")
+        mixture.bus.disable_torque()
+    assert mixture.told() == ["a disable_torque", "b disable_torque"]
+    mixture.b.wrong["disable_torque"] = BusLost("port b is gone")
     with pytest.raises(BusLost, match="^port a is gone; port b is gone$"):
-        mixture.bus.release()
+        mixture.bus.disable_torque()
 
 
 @pytest.mark.parametrize("goals", [[1, 2, 3, 4, nan], [nan, 2, 3, 4, 5], [1, 2, 3, 4], [1] * 6])

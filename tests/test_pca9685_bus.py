@@ -54,7 +54,7 @@ class World:
 
     def held(self):
         self.bus.open()
-        self.bus.engage()
+        self.bus.enable_torque()
         self.bus.events()
         return self
 
@@ -113,7 +113,7 @@ def test_open_changes_nothing_and_engage_sets_up_and_goes_to_the_rest(world):
     before = bytes(world.chip()._registers)
     world.bus.open()
     assert bytes(world.chip()._registers) == before
-    goals = world.bus.engage()
+    goals = world.bus.enable_torque()
     assert goals == (6000, 6000, 6000)
     assert world.chip().read(0) == b""
     assert world.chip()._registers[MODE1] == AWAKE
@@ -129,7 +129,7 @@ def test_pulses_that_are_there_go_on_and_nothing_sleeps(world):
     again = Pca9685Bus(world.port, world.setups, QUICK)
     world.sent.clear()
     again.open()
-    goals = again.engage()
+    goals = again.enable_torque()
     assert [abs(g - w) <= GRAIN for g, w in zip(goals, (5000, 6800, 6000), strict=True)]
     asleep = write(0x40, MODE1, b"\x30")
     assert not any(asleep in packet for packet in world.sent)
@@ -141,7 +141,7 @@ def test_first_pulses_come_one_after_another():
     world = World(params=Pca9685Params(stagger_ms=100.0))
     world.bus.open()
     began_s = world.now[0]
-    world.bus.engage()
+    world.bus.enable_torque()
     assert world.now[0] - began_s == pytest.approx(0.2, abs=0.02)
 
 
@@ -170,7 +170,7 @@ def test_two_boards_are_one_bus():
     world.run(1.0, [5000, 7000])
     assert world.widths() == pytest.approx([5000, 7000], abs=GRAIN / 2)
     assert world.chip(0x43).counts(1) and not world.chip(0x43).counts(2)
-    world.bus.release()
+    world.bus.disable_torque()
     assert world.widths() == [0, 0]
 
 
@@ -221,7 +221,7 @@ def test_a_joint_outside_its_limits_comes_inside_slowly():
     world.run(1.0, [8400])
     narrow = Pca9685Bus(world.port, [setup(0)], QUICK)
     narrow.open()
-    assert narrow.engage() == (7600,)
+    assert narrow.enable_torque() == (7600,)
     world.bus, before = narrow, world.widths()[0]
     assert before == pytest.approx(8400, abs=GRAIN)
     readings = world.run(0.2, [7600])
@@ -324,12 +324,12 @@ def test_only_own_channels_stop_unless_they_do_not(world):
     world.held()
     other = EmulatedSMBus(world.device.body)
     other.i2c_rdwr(i2c_msg.write(0x40, [6 + 4 * 9, *pulse(300)]))
-    world.bus.release()
+    world.bus.disable_torque()
     assert world.widths() == [0, 0, 0]
     assert world.chip().counts(9) == 300
-    world.bus.engage()
+    world.bus.enable_torque()
     world.command("lose-writes 6")
-    world.bus.release()
+    world.bus.disable_torque()
     assert not any(world.chip().counts(k) for k in range(16))
 
 
@@ -422,12 +422,12 @@ def test_the_kernels_bus_is_driven_as_a_bridge_is(world, kernel):
     bus.open()
     # Its oscillator's start is waited for by the clock of this world.
     world.now[0] += 0.01
-    bus.engage()
+    bus.enable_torque()
     world.now[0] += 0.01
     ticks(world, bus, 0.6, [5000, 6500, 7000])
     assert world.widths() == pytest.approx([5000, 6500, 7000], abs=GRAIN / 2)
     assert bus.health().errors == {}
-    bus.release()
+    bus.disable_torque()
     assert world.widths() == [0, 0, 0]
     bus.close()
 
@@ -435,7 +435,7 @@ def test_the_kernels_bus_is_driven_as_a_bridge_is(world, kernel):
 def test_an_adapter_that_goes_comes_back_and_holds(world, kernel):
     bus = kernel.servos
     bus.open()
-    bus.engage()
+    bus.enable_torque()
     ticks(world, bus, 0.3, [6500] * 3)
     kernel.bus.gone, kernel.refuses = True, errno.ENOENT
     assert ticks(world, bus, 0.3, [6500] * 3) == (None,) * 3

@@ -9,7 +9,7 @@ from gazerig.drivers.dynamixel.protocol_1 import protocol_1_ids
 from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.feetech.homing import set_middle
-from gazerig.drivers.servo_bus.discovery import Found, corrupt, ping, scan, scan_ids
+from gazerig.drivers.servo_bus.discovery import FoundServo, corrupt, ping, scan, scan_ids
 from gazerig.drivers.servo_bus.registers import Registers, transact
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -31,7 +31,7 @@ class Bench:
         if family is FEETECH:
             self.rig = Rig([ServoSpec(i, STS, 1900 + 7 * i) for i in ids], setups=[], baud=baud)
             self.port, self.chain = self.rig.port, self.rig.chain
-            self.names = [Found(i, 777, 353, baud, STS) for i in ids]
+            self.names = [FoundServo(i, 777, 353, baud, STS) for i in ids]
         else:
             specs, self.now_s = [ServoSpec(i, XL, 2000) for i in ids], 0.0
             chain = self.chain = build_dynamixel(specs, lambda: self.now_s)
@@ -40,7 +40,7 @@ class Bench:
             chain.choose("baud", "heed")
             chain.refresh()
             self.port = InProcessPort(chain, sleep_until=self.sleep_until)
-            self.names = [Found(i, 1190, 53, baud, XL) for i in ids]
+            self.names = [FoundServo(i, 1190, 53, baud, XL) for i in ids]
 
     def sleep_until(self, t_s):
         self.now_s = max(self.now_s, t_s)
@@ -147,9 +147,9 @@ def test_a_ping_to_all_finds_servos_with_model_and_firmware():
     port.setBaudRate(57_600)
     assert scan_ids(port, DYNAMIXEL, 57_600) == (
         (
-            Found(1, 1190, 45, 57_600, XL),
-            Found(9, 1240, 53, 57_600, XC),
-            Found(250, 1060, 46, 57_600, "xl430-w250"),
+            FoundServo(1, 1190, 45, 57_600, XL),
+            FoundServo(9, 1240, 53, 57_600, XC),
+            FoundServo(250, 1060, 46, 57_600, "xl430-w250"),
         ),
         0,
     )

@@ -6,7 +6,7 @@ import pytest
 
 from gazerig.drivers.dynamixel.control_table import BAUD_RATES
 from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
-from gazerig.drivers.servo_bus.discovery import Found, any_reply, ping
+from gazerig.drivers.servo_bus.discovery import FoundServo, any_reply, ping
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.types import ServoSetup
 from gazerig.robot.bringup.servo_families import DYNAMIXEL, FEETECH
@@ -260,8 +260,8 @@ def test_any_reply_is_a_matter_of_answers_not_of_echoes():
 def test_a_factory_fresh_servo_gets_its_id_and_rate():
     bench = Bench()
     result = bench.assign()
-    assert result.before == Found(1, 1240, 53, 57_600, "xc330-m288")
-    assert result.now == Found(7, 1240, 53, BAUD, "xc330-m288")
+    assert result.before == FoundServo(1, 1240, 53, 57_600, "xc330-m288")
+    assert result.now == FoundServo(7, 1240, 53, BAUD, "xc330-m288")
     assert result.done == ("id 1 -> 7", f"baud rate 57600 -> {BAUD} bit/s")
     (servo,) = bench.chain.servos
     assert (servo.id, servo.memory.get("baud_rate")) == (7, BAUD_RATES.index(BAUD))
@@ -271,7 +271,7 @@ def test_a_factory_fresh_servo_gets_its_id_and_rate():
 @pytest.mark.parametrize("baud", [b for b in RATES if b != 4_500_000])
 def test_it_is_found_whatever_its_id_and_rate(baud):
     bench = Bench(ServoSpec(200, "xc330-m288"), baud=baud)
-    assert bench.find() == Found(200, 1240, 53, baud, "xc330-m288")
+    assert bench.find() == FoundServo(200, 1240, 53, baud, "xc330-m288")
     assert bench.assign().now.id == 7
 
 
@@ -357,7 +357,7 @@ def test_a_lost_confirmation_does_not_matter(address):
 
     bench = Bench()
     bench.port = Lossy(bench.chain)
-    assert bench.assign().now == Found(7, 1240, 53, BAUD, "xc330-m288")
+    assert bench.assign().now == FoundServo(7, 1240, 53, BAUD, "xc330-m288")
 
 
 def test_a_lost_status_of_the_restart_does_not_matter():

@@ -15,9 +15,9 @@ from gazerig.drivers.feetech.family import FEETECH, window
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.feetech.protocol import checksum
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
-from gazerig.drivers.servo_bus.poll_list import AGAIN_FIRST_S, AGAIN_LAST_S, Roll, silent_ones
+from gazerig.drivers.servo_bus.poll_list import AGAIN_FIRST_S, AGAIN_LAST_S, PollList, silent_ones
 from gazerig.drivers.servo_bus.sync_packets import SyncRead
-from gazerig.drivers.servo_bus.sync_read import Heard, Whole
+from gazerig.drivers.servo_bus.sync_read import GroupReply, ServoReply
 from gazerig.drivers.types import ServoSetup
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.dynamixel.packets import status
@@ -221,7 +221,7 @@ def both_ways(group, raw, *columns):
         for slot in range(len(group.ids)):
             each.places.place(slot, 900, 0.99)
             assert each.places.one(slot, 900, 1.0)
-    whole = Whole(group, raw, group.whole(raw), 1.01)
+    whole = GroupReply(group, raw, group.whole(raw), 1.01)
     taken, each = one.take_whole(whole), whole.each()
     for slot, servo_id in enumerate(group.ids):
         other.take(slot, each[servo_id])
@@ -281,7 +281,7 @@ def test_a_place_that_no_joint_can_have_come_to_must_be_said_twice():
 
     def believes(position, at_s):
         sample = SENSED.sample(0, struct.pack("<H", position) + BLOCK[2:])
-        return columns.believes(0, Heard(sample, at_s))
+        return columns.believes(0, ServoReply(sample, at_s))
 
     assert believes(1000, 0.0)
     assert not believes(3000, 0.01)
@@ -318,52 +318,52 @@ def test_only_those_who_kept_silent_themselves_are_blamed(heard, blamed):
 
 
 def test_a_silent_servo_is_asked_at_once_then_ever_more_seldom():
-    roll = Roll(IDS)
+    polled = PollList(IDS)
     now_s = 10.0
-    roll.silent(1, now_s)
-    assert (roll.group, roll.due(now_s)) == ((4, 9), 1)
+    polled.silent(1, now_s)
+    assert (polled.group, polled.due(now_s)) == ((4, 9), 1)
     waits = []
     for _ in range(6):
-        roll.silent(1, now_s)
+        polled.silent(1, now_s)
         start_s = now_s
-        while roll.due(now_s) is None:
+        while polled.due(now_s) is None:
             now_s += AGAIN_FIRST_S / 4
         waits.append(now_s - start_s)
     assert waits == [0.0625, 0.125, 0.25, 0.5, 0.5, AGAIN_LAST_S]
-    assert roll.answered(1)
-    assert (roll.group, roll.troubled) == (IDS, False)
-    assert not roll.answered(1)
+    assert polled.answered(1)
+    assert (polled.group, polled.troubled) == (IDS, False)
+    assert not polled.answered(1)
 
 
 def test_where_all_are_out_somebody_is_always_asked_and_one_answer_calls_all_back():
-    roll = Roll(IDS)
+    polled = PollList(IDS)
     for servo_id in IDS:
-        roll.silent(servo_id, 1.0)
-        roll.silent(servo_id, 1.0)
-    assert roll.group == ()
-    assert roll.due(1.0) == 4
-    roll.silent(4, 1.0)
-    assert roll.due(1.0) == 1
-    assert roll.answered(1)
-    assert (roll.group, roll.due(1.0)) == (IDS, None)
+        polled.silent(servo_id, 1.0)
+        polled.silent(servo_id, 1.0)
+    assert polled.group == ()
+    assert polled.due(1.0) == 4
+    polled.silent(4, 1.0)
+    assert polled.due(1.0) == 1
+    assert polled.answered(1)
+    assert (polled.group, polled.due(1.0)) == (IDS, None)
 
 
 def test_damage_three_times_in_a_row_takes_a_servo_out():
-    roll = Roll(IDS)
+    polled = PollList(IDS)
     for _ in range(2):
-        roll.damaged(9, 0.0)
-    roll.answered(9)
+        polled.damaged(9, 0.0)
+    polled.answered(9)
     for _ in range(2):
-        roll.damaged(9, 0.0)
-    assert roll.group == IDS
-    roll.damaged(9, 0.0)
-    assert roll.group == (4, 1)
+        polled.damaged(9, 0.0)
+    assert polled.group == IDS
+    polled.damaged(9, 0.0)
+    assert polled.group == (4, 1)
 
 
 def test_several_out_take_turns():
-    roll = Roll(IDS)
-    roll.silent(4, 1.0)
-    roll.silent(9, 1.1)
-    assert roll.due(2.0) == 4
-    roll.silent(4, 2.0)
-    assert roll.due(2.0) == 9
+    polled = PollList(IDS)
+    polled.silent(4, 1.0)
+    polled.silent(9, 1.1)
+    assert polled.due(2.0) == 4
+    polled.silent(4, 2.0)
+    assert polled.due(2.0) == 9

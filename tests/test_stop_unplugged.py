@@ -31,11 +31,11 @@ def test_what_could_not_be_released_is_when_the_port_is_back(twin: Twin) -> None
     twin.pulses_on()
     bus = twin.bus(give_up_s=1.0)
     bus.open()
-    bus.engage()
+    bus.enable_torque()
     twin.run(bus, 0.1)
     twin.command("unplug")
     with pytest.raises(BusLost):
-        bus.release()
+        bus.disable_torque()
     for _ in range(300):  # longer than its patience
         twin.wait(0.01)
         try:
@@ -49,10 +49,10 @@ def test_what_could_not_be_released_is_when_the_port_is_back(twin: Twin) -> None
     assert any("torque switched off" in event for event in bus.events())
     _read_on(twin, bus, 3.0)
     assert not any(twin.holding())
-    bus.engage()
+    bus.enable_torque()
     _read_on(twin, bus, 0.2)
     assert all(twin.holding())
-    bus.release()
+    bus.disable_torque()
     bus.close()
 
 
@@ -64,7 +64,7 @@ def test_torque_that_came_on_only_here_and_there_is_taken_off(twin: Twin) -> Non
     twin.run(bus, 0.1)
     twin.command("unplug")
     with pytest.raises(BusLost):
-        bus.engage()
+        bus.enable_torque()
     twin.command("plug")
     _read_on(twin, bus, 1.0)
     assert not any(twin.holding())
@@ -177,7 +177,7 @@ def test_torque_that_comes_on_after_a_stop_is_taken_off_again(machine: Machine) 
     machine.go(0.5)
     machine.made.robot.order(Stop("a hand"))
     machine.go(0.5)
-    machine.made.robot.body.bus.engage()  # somebody else on the line
+    machine.made.robot.body.bus.enable_torque()  # somebody else on the line
     assert all(machine.holding())
     machine.go(1.0)
     assert not any(machine.holding())

@@ -2,7 +2,7 @@
 
 Units of the registers: position 1 step = 1/4096 turn; velocity 0.229 rev/min;
 profile acceleration 214.577 rev/min^2; PWM 0.113 %; voltage 0.1 V; temperature 1 degC;
-bus watchdog 20 ms; return delay 2 us; current ``Model.current_unit_ma``.
+bus watchdog 20 ms; return delay 2 us; current ``DynamixelModel.current_unit_ma``.
 Source: ROBOTIS e-Manual, X series.
 """
 
@@ -57,7 +57,7 @@ GAINS = (
 )
 
 
-class Register(NamedTuple):
+class DynamixelRegister(NamedTuple):
     """One entry of the control table.
 
     initial: factory value of the EEPROM area, start value of the RAM area;
@@ -88,7 +88,7 @@ class Register(NamedTuple):
         return int.from_bytes(data, "little", signed=self.signed)
 
 
-class Model(NamedTuple):
+class DynamixelModel(NamedTuple):
     """What differs from model to model.
 
     temperature_limit .. shutdown: factory values of the registers of that name
@@ -143,95 +143,95 @@ class Model(NamedTuple):
 
 
 # fmt: off
-MODELS: dict[str, Model] = {m.name: m for m in (
-    Model("xl330-m077", 1190, "x330", 70, 70, 35, 1750, 1620, 53,
+MODELS: dict[str, DynamixelModel] = {m.name: m for m in (
+    DynamixelModel("xl330-m077", 1190, "x330", 70, 70, 35, 1750, 1620, 53,
           (400, 40, 400, 0, 400), 0.215, 5.0, 1.47, 383.0),
-    Model("xl330-m288", 1200, "x330", 70, 70, 35, 1750, 445, 53,
+    DynamixelModel("xl330-m288", 1200, "x330", 70, 70, 35, 1750, 445, 53,
           (1600, 180, 0, 0, 400), 0.52, 5.0, 1.47, 103.0),
-    Model("xc330-m181", 1230, "x330", 70, 70, 35, 2352, 545, 52,
+    DynamixelModel("xc330-m181", 1230, "x330", 70, 70, 35, 2352, 545, 52,
           (1400, 100, 500, 0, 1200), 0.60, 5.0, 1.80, 129.0),
-    Model("xc330-m288", 1240, "x330", 70, 70, 35, 2352, 350, 52,
+    DynamixelModel("xc330-m288", 1240, "x330", 70, 70, 35, 2352, 350, 52,
           (1600, 50, 500, 0, 1100), 0.93, 5.0, 1.80, 81.0),
-    Model("xc330-t181", 1210, "x330", 70, 140, 55, 910, 510, 52,
+    DynamixelModel("xc330-t181", 1210, "x330", 70, 140, 55, 910, 510, 52,
           (1200, 40, 0, 0, 900), 0.80, 12.0, 0.88, 113.0),
-    Model("xc330-t288", 1220, "x330", 70, 140, 55, 910, 320, 52,
+    DynamixelModel("xc330-t288", 1220, "x330", 70, 140, 55, 910, 320, 52,
           (1200, 40, 0, 0, 900), 1.00, 12.0, 0.88, 71.0),
-    Model("xl430-w250", 1060, "x430", 72, 140, 60, None, 265, 52,
+    DynamixelModel("xl430-w250", 1060, "x430", 72, 140, 60, None, 265, 52,
           (1000, 100, 4000, 0, 640), 1.5, 12.0, 1.4, 61.0),
-    Model("xm430-w350", 1020, "x430", 80, 160, 95, 1193, 200, 52,
+    DynamixelModel("xm430-w350", 1020, "x430", 80, 160, 95, 1193, 200, 52,
           (1920, 100, 0, 0, 800), 4.1, 12.0, 2.3, 46.0),
-    Model("xm430-w210", 1030, "x430", 80, 160, 95, 1193, 330, 52,
+    DynamixelModel("xm430-w210", 1030, "x430", 80, 160, 95, 1193, 330, 52,
           (1920, 100, 0, 0, 800), 3.0, 12.0, 2.3, 77.0),
-    Model("xh430-w350", 1000, "x430", 80, 160, 95, 648, 130, 52,
+    DynamixelModel("xh430-w350", 1000, "x430", 80, 160, 95, 648, 130, 52,
           (1920, 100, 0, 0, 900), 3.4, 12.0, 1.3, 30.0),
-    Model("xh430-w210", 1010, "x430", 80, 160, 95, 648, 210, 52,
+    DynamixelModel("xh430-w210", 1010, "x430", 80, 160, 95, 648, 210, 52,
           (1920, 100, 0, 0, 900), 2.5, 12.0, 1.3, 50.0),
-    Model("xh430-v350", 1040, "x430", 80, 300, 110, 689, 135, 52,
+    DynamixelModel("xh430-v350", 1040, "x430", 80, 300, 110, 689, 135, 52,
           (1920, 100, 0, 0, 800), 3.3, 24.0, 0.7, 31.0),
-    Model("xh430-v210", 1050, "x430", 80, 300, 110, 689, 230, 52,
+    DynamixelModel("xh430-v210", 1050, "x430", 80, 300, 110, 689, 230, 52,
           (1920, 100, 0, 0, 800), 2.6, 24.0, 0.7, 52.0),
 )}
 
 _BASE = (
-    Register("model_number",            0, 2),
-    Register("model_information",       2, 4),
-    Register("firmware_version",        6, 1),
-    Register("id",                      7, 1, "rw", 1, 0, 252),
-    Register("baud_rate",               8, 1, "rw", 1, 0, 6),
-    Register("return_delay_time",       9, 1, "rw", 250, 0, 254),
-    Register("drive_mode",             10, 1, "rw", 0, 0, 13),
-    Register("operating_mode",         11, 1, "rw", 3, 0, 16),
-    Register("secondary_id",           12, 1, "rw", 255, 0, 255),
-    Register("protocol_type",          13, 1, "rw", 2, 1, 22),
-    Register("homing_offset",          20, 4, "rw", 0, -1_044_479, 1_044_479, True),
-    Register("moving_threshold",       24, 4, "rw", 10, 0, 1023),
-    Register("temperature_limit",      31, 1, "rw", None, 0, 100),
-    Register("max_voltage_limit",      32, 2, "rw"),
-    Register("min_voltage_limit",      34, 2, "rw"),
-    Register("pwm_limit",              36, 2, "rw", 885, 0, 885),
-    Register("current_limit",          38, 2, "rw"),
-    Register("velocity_limit",         44, 4, "rw"),
-    Register("max_position_limit",     48, 4, "rw", 4095, 0, 4095),
-    Register("min_position_limit",     52, 4, "rw", 0, 0, 4095),
-    Register("startup_configuration",  60, 1, "rw", 0, 0, 3),
-    Register("pwm_slope",              62, 1, "rw", 140, 1, 255),
-    Register("shutdown",               63, 1, "rw", None, 0, 63),
-    Register("torque_enable",          64, 1, "rw", 0, 0, 1),
-    Register("led",                    65, 1, "rw", 0, 0, 1),
-    Register("status_return_level",    68, 1, "rw", 2, 0, 2),
-    Register("registered_instruction", 69, 1, "r", 0),
-    Register("hardware_error_status",  70, 1, "r", 0),
-    Register("velocity_i_gain",        76, 2, "rw", None, 0, 16383),
-    Register("velocity_p_gain",        78, 2, "rw", None, 0, 16383),
-    Register("position_d_gain",        80, 2, "rw", None, 0, 16383),
-    Register("position_i_gain",        82, 2, "rw", None, 0, 16383),
-    Register("position_p_gain",        84, 2, "rw", None, 0, 16383),
-    Register("feedforward_2nd_gain",   88, 2, "rw", 0, 0, 16383),
-    Register("feedforward_1st_gain",   90, 2, "rw", 0, 0, 16383),
+    DynamixelRegister("model_number",            0, 2),
+    DynamixelRegister("model_information",       2, 4),
+    DynamixelRegister("firmware_version",        6, 1),
+    DynamixelRegister("id",                      7, 1, "rw", 1, 0, 252),
+    DynamixelRegister("baud_rate",               8, 1, "rw", 1, 0, 6),
+    DynamixelRegister("return_delay_time",       9, 1, "rw", 250, 0, 254),
+    DynamixelRegister("drive_mode",             10, 1, "rw", 0, 0, 13),
+    DynamixelRegister("operating_mode",         11, 1, "rw", 3, 0, 16),
+    DynamixelRegister("secondary_id",           12, 1, "rw", 255, 0, 255),
+    DynamixelRegister("protocol_type",          13, 1, "rw", 2, 1, 22),
+    DynamixelRegister("homing_offset",          20, 4, "rw", 0, -1_044_479, 1_044_479, True),
+    DynamixelRegister("moving_threshold",       24, 4, "rw", 10, 0, 1023),
+    DynamixelRegister("temperature_limit",      31, 1, "rw", None, 0, 100),
+    DynamixelRegister("max_voltage_limit",      32, 2, "rw"),
+    DynamixelRegister("min_voltage_limit",      34, 2, "rw"),
+    DynamixelRegister("pwm_limit",              36, 2, "rw", 885, 0, 885),
+    DynamixelRegister("current_limit",          38, 2, "rw"),
+    DynamixelRegister("velocity_limit",         44, 4, "rw"),
+    DynamixelRegister("max_position_limit",     48, 4, "rw", 4095, 0, 4095),
+    DynamixelRegister("min_position_limit",     52, 4, "rw", 0, 0, 4095),
+    DynamixelRegister("startup_configuration",  60, 1, "rw", 0, 0, 3),
+    DynamixelRegister("pwm_slope",              62, 1, "rw", 140, 1, 255),
+    DynamixelRegister("shutdown",               63, 1, "rw", None, 0, 63),
+    DynamixelRegister("torque_enable",          64, 1, "rw", 0, 0, 1),
+    DynamixelRegister("led",                    65, 1, "rw", 0, 0, 1),
+    DynamixelRegister("status_return_level",    68, 1, "rw", 2, 0, 2),
+    DynamixelRegister("registered_instruction", 69, 1, "r", 0),
+    DynamixelRegister("hardware_error_status",  70, 1, "r", 0),
+    DynamixelRegister("velocity_i_gain",        76, 2, "rw", None, 0, 16383),
+    DynamixelRegister("velocity_p_gain",        78, 2, "rw", None, 0, 16383),
+    DynamixelRegister("position_d_gain",        80, 2, "rw", None, 0, 16383),
+    DynamixelRegister("position_i_gain",        82, 2, "rw", None, 0, 16383),
+    DynamixelRegister("position_p_gain",        84, 2, "rw", None, 0, 16383),
+    DynamixelRegister("feedforward_2nd_gain",   88, 2, "rw", 0, 0, 16383),
+    DynamixelRegister("feedforward_1st_gain",   90, 2, "rw", 0, 0, 16383),
     # The range is that of the written byte: 0 off or clear, 1..127 armed; reads 255 once tripped.
-    Register("bus_watchdog",           98, 1, "rw", 0, 0, 127),
-    Register("goal_pwm",              100, 2, "rw", None, None, None, True),
-    Register("goal_current",          102, 2, "rw", None, None, None, True),
-    Register("goal_velocity",         104, 4, "rw", None, None, None, True),
-    Register("profile_acceleration",  108, 4, "rw", 0, 0, 32767),
-    Register("profile_velocity",      112, 4, "rw", 0, 0, 32767),
-    Register("goal_position",         116, 4, "rw", None, None, None, True),
-    Register("realtime_tick",         120, 2),
-    Register("moving",                122, 1),
-    Register("moving_status",         123, 1),
-    Register("present_pwm",           124, 2, signed=True),
-    Register("present_current",       126, 2, signed=True),
-    Register("present_velocity",      128, 4, signed=True),
-    Register("present_position",      132, 4, signed=True),
-    Register("velocity_trajectory",   136, 4, signed=True),
-    Register("position_trajectory",   140, 4, signed=True),
-    Register("present_input_voltage", 144, 2),
-    Register("present_temperature",   146, 1),
-    Register("backup_ready",          147, 1),
+    DynamixelRegister("bus_watchdog",           98, 1, "rw", 0, 0, 127),
+    DynamixelRegister("goal_pwm",              100, 2, "rw", None, None, None, True),
+    DynamixelRegister("goal_current",          102, 2, "rw", None, None, None, True),
+    DynamixelRegister("goal_velocity",         104, 4, "rw", None, None, None, True),
+    DynamixelRegister("profile_acceleration",  108, 4, "rw", 0, 0, 32767),
+    DynamixelRegister("profile_velocity",      112, 4, "rw", 0, 0, 32767),
+    DynamixelRegister("goal_position",         116, 4, "rw", None, None, None, True),
+    DynamixelRegister("realtime_tick",         120, 2),
+    DynamixelRegister("moving",                122, 1),
+    DynamixelRegister("moving_status",         123, 1),
+    DynamixelRegister("present_pwm",           124, 2, signed=True),
+    DynamixelRegister("present_current",       126, 2, signed=True),
+    DynamixelRegister("present_velocity",      128, 4, signed=True),
+    DynamixelRegister("present_position",      132, 4, signed=True),
+    DynamixelRegister("velocity_trajectory",   136, 4, signed=True),
+    DynamixelRegister("position_trajectory",   140, 4, signed=True),
+    DynamixelRegister("present_input_voltage", 144, 2),
+    DynamixelRegister("present_temperature",   146, 1),
+    DynamixelRegister("backup_ready",          147, 1),
 )
 # fmt: on
 
-REGISTERS: dict[str, Register] = {r.name: r for r in _BASE}
+REGISTERS: dict[str, DynamixelRegister] = {r.name: r for r in _BASE}
 """Registers by name with the values all models share; addresses hold for every model."""
 
 
@@ -249,7 +249,7 @@ class IndirectBlock(NamedTuple):
     target_high: int
 
 
-def indirect_blocks(model: Model, firmware: int) -> tuple[IndirectBlock, ...]:
+def indirect_blocks(model: DynamixelModel, firmware: int) -> tuple[IndirectBlock, ...]:
     """List the indirect windows of a model with a firmware version."""
     if model.family == "x430":
         return (IndirectBlock(168, 224, 28, 64, 661), IndirectBlock(578, 634, 28, 64, 661))
@@ -258,13 +258,13 @@ def indirect_blocks(model: Model, firmware: int) -> tuple[IndirectBlock, ...]:
     return (IndirectBlock(168, 208, 20, 64, 227),)
 
 
-def registers_of(model: Model) -> tuple[Register, ...]:
+def registers_of(model: DynamixelModel) -> tuple[DynamixelRegister, ...]:
     """List a model's registers with its own initial values and ranges (no indirect windows)."""
     fitted = (_fit(register, model) for register in _BASE)
     return tuple(register for register in fitted if register is not None)
 
 
-def _fit(register: Register, model: Model) -> Register | None:
+def _fit(register: DynamixelRegister, model: DynamixelModel) -> DynamixelRegister | None:
     """Return the register as this model has it, None where it has none."""
     name = register.name
     if model.current_limit is None and name in ("current_limit", "goal_current"):
@@ -276,7 +276,7 @@ def _fit(register: Register, model: Model) -> Register | None:
     return register._replace(initial=initial, low=low, high=high)
 
 
-def _initials(model: Model) -> dict[str, int | None]:
+def _initials(model: DynamixelModel) -> dict[str, int | None]:
     """Return the start values that depend on the model."""
     return {
         "model_number": model.number,
@@ -291,7 +291,7 @@ def _initials(model: Model) -> dict[str, int | None]:
     }
 
 
-def _ranges(model: Model) -> dict[str, tuple[int, int]]:
+def _ranges(model: DynamixelModel) -> dict[str, tuple[int, int]]:
     """Return the ranges that depend on the model."""
     small = model.family == "x330"
     return {
@@ -304,7 +304,7 @@ def _ranges(model: Model) -> dict[str, tuple[int, int]]:
     }
 
 
-def _lowest_voltage(model: Model) -> int:
+def _lowest_voltage(model: DynamixelModel) -> int:
     """Return the low end of both voltage limits, 0.1 V; the 5 V models go below their initial."""
     return 31 if model.rated_v == 5.0 else model.min_voltage
 

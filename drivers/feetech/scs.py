@@ -18,7 +18,7 @@ from gazerig.drivers.feetech.memory_table import (
     SCS_MODELS,
     SCS_STEPS,
     TORQUE_FULL,
-    Register,
+    FeetechRegister,
 )
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.feetech.protocol import GoalWrite
@@ -43,7 +43,7 @@ _OTHERWISE: dict[str, dict[str, Any]] = {
     "unloading_condition": {"initial": 0x24},  # [A]: overheating, overload
 }
 
-SCS_REGISTERS: dict[str, Register] = {
+SCS_REGISTERS: dict[str, FeetechRegister] = {
     name: register._replace(
         address=_ELSEWHERE.get(name, register.address), order="big", **_OTHERWISE.get(name, {})
     )

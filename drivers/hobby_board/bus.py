@@ -137,7 +137,7 @@ class HobbyBoardBus(PortBus):
             tuple([i for i, known in enumerate(sure) if not known]),
         )
 
-    def engage(self) -> tuple[int, ...]:
+    def enable_torque(self) -> tuple[int, ...]:
         """Hold every channel at the pulse that it gives, clipped to its limits.
 
         A channel without pulses begins at its servo's last place, or at its rest where it
@@ -157,13 +157,13 @@ class HobbyBoardBus(PortBus):
                 self._log.add(UNMEASURED)
             take_on(self._board, self._channels, self._log)
         except ServoMissing:
-            self.release()
+            self.disable_torque()
             raise
         except BusLost:
             self._link.refused_release()  # some may have their pulses already
             raise
         self._link.release_due = False
-        self._supervisor.take_on()
+        self._supervisor.torque_enabled()
         return tuple(channel.goal_steps for channel in self._channels)
 
     def write(self, goals_steps: Sequence[int]) -> None:

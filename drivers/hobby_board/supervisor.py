@@ -47,7 +47,7 @@ class BoardSupervisor:
         self._damages = 0
         self._damaged_s = self._hold_at_s = self._told_s = -inf
 
-    def take_on(self) -> None:
+    def torque_enabled(self) -> None:
         """Begin to look after channels that are held."""
         self.engaged = True
         self._restarts.clear()
@@ -56,7 +56,7 @@ class BoardSupervisor:
         self._pending.clear()
         self._unsure, self._unhandled = False, ()
 
-    def let_go(self) -> None:
+    def torque_disabled(self) -> None:
         """Leave the channels alone."""
         self.engaged = False
         self._pending.clear()

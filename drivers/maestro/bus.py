@@ -35,7 +35,7 @@ class MaestroBus(HobbyBoardBus):
         Raises:
             BusLost: the port is gone.
         """
-        self._supervisor.let_go()
+        self._supervisor.torque_disabled()
         self._maestro.line.send(self._maestro.line.speech.go_home())
 
     def moving(self) -> bool | None:

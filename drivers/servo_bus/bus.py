@@ -18,12 +18,12 @@ from gazerig.drivers.servo_bus.goals import clipped
 from gazerig.drivers.servo_bus.latched_faults import LatchedFaultSupervisor
 from gazerig.drivers.servo_bus.params import BusParams
 from gazerig.drivers.servo_bus.passing_faults import PassingFaultSupervisor
-from gazerig.drivers.servo_bus.poll_list import Roll
+from gazerig.drivers.servo_bus.poll_list import PollList
 from gazerig.drivers.servo_bus.provisioning import Provisioning
 from gazerig.drivers.servo_bus.recovery import Recovery
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.servo_bus.supervisor import Supervisor
-from gazerig.drivers.servo_bus.sync_read import Heard, Reader, Whole
+from gazerig.drivers.servo_bus.sync_read import GroupReply, Reader, ServoReply
 from gazerig.drivers.servo_bus.torque import switch_off
 from gazerig.drivers.servo_bus.transaction import Line
 from gazerig.drivers.types import Feedback, ServoSetup
@@ -92,7 +92,7 @@ class SmartServoBus(PortBus):
         self._link = LastingPort(
             self._port, self._params.baud, self._params.give_up_s, log, self._trust_nobody
         )
-        self._roll = Roll(self._ids)
+        self._poll_list = PollList(self._ids)
         self._health = Health(by_id, log)
         plan = self._plan = self._family.read_plan(self._setups, self._params, firmware)
         single = Registers(self._port, self._family, 1)
@@ -102,7 +102,7 @@ class SmartServoBus(PortBus):
         )
         self._speeds = self._recovery.speeds(self._ids, ())
         self._feedback = FeedbackColumns(self._family, self._setups)
-        self._reader = Reader(line, self._roll, plan)
+        self._reader = Reader(line, self._poll_list, plan)
         kind: Callable[..., Supervisor]
         kind = LatchedFaultSupervisor if self._family.faults_latch else PassingFaultSupervisor
         self._supervisor = kind(
@@ -118,23 +118,23 @@ class SmartServoBus(PortBus):
             BusLost: the port is gone.
         """
         if self._line.starved:
-            self._supervisor.recover_tripped(self._roll.group)
+            self._supervisor.recover_tripped(self._poll_list.group)
         answer = self._reader.read(now_s)
-        if not isinstance(answer, Whole):
+        if not isinstance(answer, GroupReply):
             self._take(answer, now_s)
         elif not self._take_whole(answer, now_s):
             self._take(answer.each(), now_s)
         elif self._health.returning:
             self._health.heard_again(now_s, self._line.lateness)
-        self._supervisor.service(self._roll.group, now_s)
+        self._supervisor.service(self._poll_list.group, now_s)
 
-    def _take_whole(self, answer: Whole, now_s: float) -> bool:
+    def _take_whole(self, answer: GroupReply, now_s: float) -> bool:
         """Take an answer in which nothing is amiss; False where anything must be looked at."""
         if self._family.weak_check and (self._disturbed(now_s) or self._reader.any_owing(now_s)):
             return False
         return self._supervisor.at_ease and self._feedback.take_whole(answer)
 
-    def _take(self, heard: dict[int, Heard], now_s: float) -> None:
+    def _take(self, heard: dict[int, ServoReply], now_s: float) -> None:
         """Take an answer servo by servo, each with its errors."""
         supervisor, feedback = self._supervisor, self._feedback
         feedback.begin()
@@ -143,10 +143,10 @@ class SmartServoBus(PortBus):
             supervisor.mark_all_for_recovery()
         if self._family.weak_check:
             heard = self._without_doubtful(heard, now_s)
-        believed, dark = feedback.all_believed(heard), not self._roll.group
+        believed, dark = feedback.all_believed(heard), not self._poll_list.group
         for servo_id, one in heard.items():
             slot = self._slot[servo_id]
-            was_out = self._roll.answered(servo_id)
+            was_out = self._poll_list.answered(servo_id)
             if was_out:
                 supervisor.answers_again(servo_id)
             if one.sample.error & self._family.codec.REFUSAL:
@@ -161,9 +161,9 @@ class SmartServoBus(PortBus):
                 feedback.take(slot, one)
             else:
                 self._line.errors["implausible"] += 1
-        supervisor.note_out(self._roll.out, now_s)
+        supervisor.note_out(self._poll_list.out, now_s)
         self._health.note_silent(
-            self._roll.out, now_s, self._roll.garbling, self._line.lateness, bool(heard)
+            self._poll_list.out, now_s, self._poll_list.garbling, self._line.lateness, bool(heard)
         )
 
     def _disturbed(self, now_s: float) -> bool:
@@ -174,7 +174,9 @@ class SmartServoBus(PortBus):
             places.damaged(now_s)
         return places.disturbed(now_s)
 
-    def _without_doubtful(self, heard: dict[int, Heard], now_s: float) -> dict[int, Heard]:
+    def _without_doubtful(
+        self, heard: dict[int, ServoReply], now_s: float
+    ) -> dict[int, ServoReply]:
         """Ask servos whose answers may be damaged or late once more; keep what both answers say.
 
         Raises:
@@ -185,7 +187,7 @@ class SmartServoBus(PortBus):
         again = self._reader.again(doubtful) if doubtful else {}
         kept = {i: one for i, one in heard.items() if i not in doubtful}
         for servo_id in doubtful:
-            self._roll.answered(servo_id)
+            self._poll_list.answered(servo_id)
             second = again.get(servo_id)
             slot, first = self._slot[servo_id], heard[servo_id]
             both = second and self._feedback.confirmed(slot, first, second)
@@ -260,11 +262,11 @@ class SmartServoBus(PortBus):
         except BusLost as lost:
             self._lose(lost)
             return self._nothing
-        if self._roll.troubled:
+        if self._poll_list.troubled:
             self._mind_silence(now_s)
         return self._feedback.now
 
-    def engage(self) -> tuple[int, ...]:
+    def enable_torque(self) -> tuple[int, ...]:
         """Set every goal to the present position (clipped to its limits), then torque on.
 
         A joint outside its limits is brought inside at 30 deg/s. Returns the goals that
@@ -282,13 +284,13 @@ class SmartServoBus(PortBus):
             self._provisioning.apply(self._ids)
             goals, outside = self._recovery.enable(self._ids)
         except (ServoMissing, ServoFault):
-            self.release()
+            self.disable_torque()
             raise
         except BusLost:
             self._link.refused_release()  # some may have their torque already
             raise
         self._link.release_due = False
-        self._supervisor.take_on(outside)
+        self._supervisor.torque_enabled(outside)
         self._speeds = self._recovery.speeds(self._ids, ())
         return goals
 
@@ -326,14 +328,14 @@ class SmartServoBus(PortBus):
     def faults(self) -> tuple[str, ...]:
         """Name every fault that servos suffer from now, e.g. "neck_yaw (servo 7): overload"."""
         return tuple(
-            f"{self._line.who(i)}: {fault}" for i, fault in sorted(self._health.faults.items())
+            f"{self._line.label(i)}: {fault}" for i, fault in sorted(self._health.faults.items())
         )
 
     def _switch_off(self) -> Released:
         return switch_off(self._line, self._ids)
 
     def _servo_label(self, servo_id: int) -> str:
-        return self._line.who(servo_id)
+        return self._line.label(servo_id)
 
     def _cannot_release(self) -> str:
         unit_s = self._family.watchdog_unit_s
@@ -363,7 +365,7 @@ class SmartServoBus(PortBus):
 
     def _trust_nobody(self) -> None:
         """Begin anew with a port that was away."""
-        self._roll = self._reader.roll = Roll(self._ids)
+        self._poll_list = self._reader.poll_list = PollList(self._ids)
         self._line.starved = False
         self._supervisor.mark_all_for_recovery()
 

@@ -33,7 +33,7 @@ Progress = Callable[[int, int], None]
 """Called with the baud rate and the id that is asked."""
 
 
-class Found(NamedTuple):
+class FoundServo(NamedTuple):
     """One servo that answered.
 
     number: its model number; firmware: as its make counts it
@@ -57,7 +57,7 @@ class BaudScan(NamedTuple):
 
     baud: int
     possible: bool
-    found: tuple[Found, ...] = ()
+    found: tuple[FoundServo, ...] = ()
     junk: int = 0
     shared: tuple[int, ...] = ()
     protocol_1: tuple[int, ...] = ()
@@ -109,7 +109,7 @@ def scan_ids(
     quiet_s: float | None = None,
     progress: Progress | None = None,
     ids: Sequence[int] | None = None,
-) -> tuple[tuple[Found, ...], int]:
+) -> tuple[tuple[FoundServo, ...], int]:
     """Ask all servos who is there; return them and the number of bytes that made no sense.
 
     Two servos with one id answer over each other; whole answers that differ are two servos.
@@ -155,7 +155,9 @@ def any_reply(port: BusPort, family: Family) -> bool:
     return bool(heard.replace(question, b"", 1))
 
 
-def ping(port: BusPort, family: Family, servo_id: int, baud: int, tries: int = 2) -> Found | None:
+def ping(
+    port: BusPort, family: Family, servo_id: int, baud: int, tries: int = 2
+) -> FoundServo | None:
     """Ask one servo what it is; None where no whole answer came."""
     codec = family.codec
     for _ in range(tries):
@@ -211,12 +213,12 @@ def read_until_quiet(port: BusPort, quiet_s: float) -> bytes:
     return raw
 
 
-def _found(family: Family, status: Status, baud: int) -> Found | None:
+def _found(family: Family, status: Status, baud: int) -> FoundServo | None:
     """Return the servo that told what it is, None where this is no such answer."""
     identity = family.codec.identity(status)
     if identity is None:
         return None
-    return Found(status.id, *identity, baud, family.model_name(identity.model_number))
+    return FoundServo(status.id, *identity, baud, family.model_name(identity.model_number))
 
 
 def identities(line: Line) -> dict[int, Identity]:

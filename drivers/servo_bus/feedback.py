@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 from gazerig.drivers.plausibility import Plausibility
 from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.read_windows import Columns
-from gazerig.drivers.servo_bus.sync_read import Heard, Whole
+from gazerig.drivers.servo_bus.sync_read import GroupReply, ServoReply
 from gazerig.drivers.servo_bus.turn import nearest_turn
 from gazerig.drivers.types import Feedback, ServoSetup
 
@@ -89,7 +89,7 @@ class FeedbackColumns:
 
     # --- an answer of all servos
 
-    def take_whole(self, answer: Whole) -> bool:
+    def take_whole(self, answer: GroupReply) -> bool:
         """Take an answer in which nothing is amiss; False where anything must be looked at."""
         group, _, values, at_s = answer
         at, now, none = group.columns, self.now, self._none
@@ -168,7 +168,7 @@ class FeedbackColumns:
 
     # --- answers servo by servo
 
-    def all_believed(self, heard: Mapping[int, Heard]) -> bool:
+    def all_believed(self, heard: Mapping[int, ServoReply]) -> bool:
         """Return whether all servos have answered in one exchange, and all of it can be true."""
         if len(heard) < len(self._ids):
             return False
@@ -180,11 +180,11 @@ class FeedbackColumns:
             [self._near(slot, one.sample.position) for slot, one in enumerate(answers)], at_s
         )
 
-    def believes(self, slot: int, heard: Heard) -> bool:
+    def believes(self, slot: int, heard: ServoReply) -> bool:
         """Return whether one servo's answer can be true; to be asked once for every answer."""
         return self.places.one(slot, self._near(slot, heard.sample.position), heard.at_s)
 
-    def confirmed(self, slot: int, first: Heard, second: Heard) -> Heard | None:
+    def confirmed(self, slot: int, first: ServoReply, second: ServoReply) -> ServoReply | None:
         """Return what two answers right after one another both say; None where they differ."""
         one, other = first.sample, second.sample
         alike = (
@@ -205,7 +205,7 @@ class FeedbackColumns:
             )
         )
 
-    def take(self, slot: int, heard: Heard) -> None:
+    def take(self, slot: int, heard: ServoReply) -> None:
         """Take one servo's answer, which was not refused."""
         sample = heard.sample
         if sample.torque is not None:

@@ -34,9 +34,9 @@ class PassingFaultSupervisor(Supervisor):
         doubts = self._limp or self._doubted or self._seen_s or self._health.faults
         return not (doubts or any(self._told_before.values()))
 
-    def take_on(self, entering: Collection[int]) -> None:
+    def torque_enabled(self, entering: Collection[int]) -> None:
         """Begin to look after servos under torque; some of them are outside their limits."""
-        super().take_on(entering)
+        super().torque_enabled(entering)
         self._limp.clear()
         self._doubted.clear()
         # What was wrong of old is not: all have just taken their goals and their torque.
@@ -44,9 +44,9 @@ class PassingFaultSupervisor(Supervisor):
             del self._health.faults[servo_id]
             self._name_fault(servo_id)
 
-    def let_go(self) -> None:
+    def torque_disabled(self) -> None:
         """Leave servos without torque alone."""
-        super().let_go()
+        super().torque_disabled()
         self._limp.clear()
         self._doubted.clear()
 

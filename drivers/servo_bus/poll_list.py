@@ -13,7 +13,7 @@ DAMAGED_IN_A_ROW = 3
 """A servo whose answers arrive damaged so often costs every read its time limit: out."""
 
 
-class Roll:
+class PollList:
     """The servos by id, in the order of the bus.
 
     group: those asked together

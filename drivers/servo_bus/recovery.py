@@ -192,7 +192,7 @@ class Recovery:
             if self.is_lost(servo_id, steps):
                 low, high = self._setups[servo_id].min_steps, self._setups[servo_id].max_steps
                 raise ServoFault(
-                    f"{self._line.who(servo_id)} stands at {steps}, beyond its encoder's zero, and "
+                    f"{self._line.label(servo_id)} stands at {steps}, beyond its encoder's zero, and "
                     f"would go the long way round into {low}..{high}: turn it in there by hand"
                 )
 

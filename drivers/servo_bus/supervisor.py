@@ -65,7 +65,7 @@ class Supervisor(ABC):
         """Return whether nothing is known of any servo that an answer could change."""
         return True
 
-    def take_on(self, entering: Collection[int]) -> None:
+    def torque_enabled(self, entering: Collection[int]) -> None:
         """Begin to look after servos under torque; some of them are outside their limits."""
         self.engaged = True
         self.entering.begin(entering)
@@ -75,7 +75,7 @@ class Supervisor(ABC):
         self._feedback.expect_torque(True)
         self._feedback.places.forget()
 
-    def let_go(self) -> None:
+    def torque_disabled(self) -> None:
         """Leave servos without torque alone."""
         self.engaged = False
         self.entering.clear()

@@ -106,7 +106,7 @@ class SyncRead:
             elif not status.params and status.error & self._codec.REFUSAL:
                 samples[status.id] = Sample(status.error)
             else:
-                # Whole, but not what was asked for: late, or the servo is out of its mind.
+                # GroupReply, but not what was asked for: late, or the servo is out of its mind.
                 damaged.add(status.id)
         for servo_id in twofold:
             del samples[servo_id]

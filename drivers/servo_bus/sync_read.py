@@ -8,7 +8,7 @@ from collections.abc import Collection, Sequence
 from math import inf
 from typing import NamedTuple
 
-from gazerig.drivers.servo_bus.poll_list import Roll, silent_ones
+from gazerig.drivers.servo_bus.poll_list import PollList, silent_ones
 from gazerig.drivers.servo_bus.read_plan import ReadPlan
 from gazerig.drivers.servo_bus.read_windows import ReadWindow, Sample, WindowSchedule
 from gazerig.drivers.servo_bus.sync_packets import GroupRead, SyncRead, Values
@@ -21,14 +21,14 @@ OWED_S = 0.5
 """An answer may still come so long after waiting for it has ended."""
 
 
-class Heard(NamedTuple):
+class ServoReply(NamedTuple):
     """One servo's answer and when it arrived."""
 
     sample: Sample
     at_s: float
 
 
-class Whole(NamedTuple):
+class GroupReply(NamedTuple):
     """A faultless answer of all servos asked, and when it arrived."""
 
     group: GroupRead
@@ -36,10 +36,10 @@ class Whole(NamedTuple):
     values: Values
     at_s: float
 
-    def each(self) -> dict[int, Heard]:
+    def each(self) -> dict[int, ServoReply]:
         """Return the answer servo by servo."""
         samples = self.group.pieces(self.raw).samples
-        return {servo_id: Heard(sample, self.at_s) for servo_id, sample in samples.items()}
+        return {servo_id: ServoReply(sample, self.at_s) for servo_id, sample in samples.items()}
 
 
 class Reader:
@@ -47,13 +47,13 @@ class Reader:
 
     Args:
         line: the bus.
-        roll: who is asked; told who failed.
+        polled: who is asked; told who failed.
         plan: how they are read.
     """
 
-    def __init__(self, line: Line, roll: Roll, plan: ReadPlan) -> None:
+    def __init__(self, line: Line, polled: PollList, plan: ReadPlan) -> None:
         self._line = line
-        self.roll = roll
+        self.poll_list = polled
         self._together, self._alone, self._second = plan.together, plan.alone, plan.second
         self._packets, self._header = plan.packets, line.family.codec.HEADER
         self._until_s = inf
@@ -62,24 +62,24 @@ class Reader:
         self._prepared_ids: tuple[int, ...] = ()
         self._prepared: dict[int, GroupRead] = {}
 
-    def read(self, now_s: float) -> Whole | dict[int, Heard]:
+    def read(self, now_s: float) -> GroupReply | dict[int, ServoReply]:
         """Read everybody who is asked now; who is not in the answer gave no good one.
 
         Raises:
             BusLost: the port is gone.
         """
-        roll = self.roll
+        polled = self.poll_list
         if self._together.troubled:
             self._together.calm(now_s)
-        if roll.troubled or not self._line.family.sync_read:
+        if polled.troubled or not self._line.family.sync_read:
             return self._with_care(now_s)
-        group = self._group(roll.group, self._together.next())
+        group = self._group(polled.group, self._together.next())
         raw, at_s = self._line.exchange(group.request, group.reply_length)
         self._until_s = self._line.whole_s + self._line.most_s
         values = group.whole(raw)
         if values is not None:
-            return Whole(group, raw, values, at_s)
-        heard: dict[int, Heard] = {}
+            return GroupReply(group, raw, values, at_s)
+        heard: dict[int, ServoReply] = {}
         self._save(group, raw, at_s, heard, now_s, self._together)
         return heard
 
@@ -96,13 +96,13 @@ class Reader:
         unanswered_s = self._unanswered_s
         return bool(unanswered_s) and now_s - max(unanswered_s.values()) <= OWED_S
 
-    def again(self, ids: Sequence[int]) -> dict[int, Heard]:
+    def again(self, ids: Sequence[int]) -> dict[int, ServoReply]:
         """Ask some servos once more, in one exchange; who is not in the answer gave no good one.
 
         Raises:
             BusLost: the port is gone.
         """
-        heard: dict[int, Heard] = {}
+        heard: dict[int, ServoReply] = {}
         window = self._second.next()
         for asked in self._line.family.asked_together(ids):
             group = self._group(asked, window)
@@ -111,13 +111,13 @@ class Reader:
             samples = group.pieces(raw).samples
             if len(samples) < len(group.ids) and not self._line.quiet:
                 self._line.drain(self._line.timeout.seconds)
-            heard |= {servo_id: Heard(sample, at_s) for servo_id, sample in samples.items()}
+            heard |= {servo_id: ServoReply(sample, at_s) for servo_id, sample in samples.items()}
         return heard
 
-    def _with_care(self, now_s: float) -> dict[int, Heard]:
+    def _with_care(self, now_s: float) -> dict[int, ServoReply]:
         """Read the group, and one of those who are out of it."""
-        heard: dict[int, Heard] = {}
-        together, due = self.roll.group, self.roll.due(now_s)
+        heard: dict[int, ServoReply] = {}
+        together, due = self.poll_list.group, self.poll_list.due(now_s)
         self._until_s = inf
         if together:
             window = self._together.next()
@@ -131,7 +131,7 @@ class Reader:
     def _read(
         self,
         ids: tuple[int, ...],
-        heard: dict[int, Heard],
+        heard: dict[int, ServoReply],
         now_s: float,
         turns: WindowSchedule,
         window: ReadWindow,
@@ -173,7 +173,7 @@ class Reader:
         group: GroupRead,
         raw: bytes,
         at_s: float,
-        heard: dict[int, Heard],
+        heard: dict[int, ServoReply],
         now_s: float,
         turns: WindowSchedule,
     ) -> None:
@@ -182,7 +182,7 @@ class Reader:
             raw = self._line.complete(raw, group.missing, self._line.deadline_s)
             samples, damaged, unproved = group.pieces(raw)
             for servo_id, sample in samples.items():
-                heard[servo_id] = Heard(sample, at_s)
+                heard[servo_id] = ServoReply(sample, at_s)
             if len(samples) == len(group.ids):
                 return
             for servo_id in group.ids:
@@ -203,15 +203,15 @@ class Reader:
         self, damaged: Collection[int], silent: Collection[int], now_s: float, turns: WindowSchedule
     ) -> None:
         """Note who failed; what still comes must not be taken for the next answer."""
-        line, roll = self._line, self.roll
+        line, polled = self._line, self.poll_list
         if damaged:
             line.lateness.forget()  # noise looks late, too
         for servo_id in damaged:
             line.errors["corrupt"] += 1
-            roll.damaged(servo_id, now_s)
+            polled.damaged(servo_id, now_s)
         for servo_id in silent:
             line.errors["timeout"] += 1
-            roll.silent(servo_id, now_s)
+            polled.silent(servo_id, now_s)
         turns.trouble(now_s)
         if not line.quiet and line.drain(line.timeout.seconds):
             line.timeout.missed()

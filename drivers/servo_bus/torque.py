@@ -95,7 +95,7 @@ def _until(
         if not left:
             return
     _raise_missing(line, [servo_id for servo_id in left if servo_id not in found])
-    refused = ", ".join(f"{line.who(servo_id)}: {value}" for servo_id, value in left.items())
+    refused = ", ".join(f"{line.label(servo_id)}: {value}" for servo_id, value in left.items())
     raise ServoMissing(
         f"{line.port.port_name}: {name} is not taken ({refused}): restart the servo power"
     )
@@ -125,13 +125,14 @@ def switch_on(line: Line, ids: Sequence[int], goals: Sequence[int], speeds: Sequ
         if not ailing:
             raise
         named = ", ".join(
-            f"{line.who(i)}: {' and '.join(family.name_errors(bits))}" for i, bits in ailing.items()
+            f"{line.label(i)}: {' and '.join(family.name_errors(bits))}"
+            for i, bits in ailing.items()
         )
         raise ServoFault(f"{named}: let it cool, free it, {family.fault_cure}") from None
     for servo_id, was, now in zip(ids, before, positions(line, ids), strict=True):
         if abs(now - was) > JUMP_TURN * family.steps_per_turn:
             raise ServoFault(
-                f"{line.who(servo_id)}: position jumped from {was} to {now} as the torque came on: "
+                f"{line.label(servo_id)}: position jumped from {was} to {now} as the torque came on: "
                 f"{family.jump_cure}"
             )
     if family.goal_speed:
@@ -184,5 +185,5 @@ def heal_tripped(
 
 def _raise_missing(line: Line, missing: Sequence[int]) -> None:
     if missing:
-        named = ", ".join(line.who(servo_id) for servo_id in missing)
+        named = ", ".join(line.label(servo_id) for servo_id in missing)
         raise ServoMissing(f"{line.port.port_name}: no answer from {named}: check its cable")

@@ -63,7 +63,7 @@ class Line:
         self._sent_s = port.now_s()
         self._free_s = self._sent_s
 
-    def who(self, servo_id: int) -> str:
+    def label(self, servo_id: int) -> str:
         """Name a servo for people."""
         return self._names.get(servo_id, f"servo {servo_id}")
 

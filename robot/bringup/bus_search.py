@@ -23,7 +23,7 @@ from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.maestro.probe import USB_CHANNELS, MaestroFound, probe
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.port_owner import POLOLU
-from gazerig.drivers.servo_bus.discovery import Found, scan
+from gazerig.drivers.servo_bus.discovery import FoundServo, scan
 from gazerig.drivers.servo_families import FAMILY_OF
 from gazerig.drivers.servo_models import BUS_KINDS, BusKind
 from gazerig.robot.bringup.servo_families import KINDS
@@ -52,7 +52,7 @@ class SearchRound:
     kind: BusKind
     baud: int
     possible: bool = True
-    found: tuple[Found, ...] = ()
+    found: tuple[FoundServo, ...] = ()
     junk: int = 0
     shared: tuple[int, ...] = ()
     protocol_1: tuple[int, ...] = ()
@@ -127,7 +127,7 @@ def _board(port: BusPort, usb: str, baud: int) -> SearchRound:
     return SearchRound("maestro", baud, board=found, channels=USB_CHANNELS.get(usb))
 
 
-def found_of(rounds: Iterable[SearchRound]) -> list[tuple[BusKind, Found]]:
+def found_of(rounds: Iterable[SearchRound]) -> list[tuple[BusKind, FoundServo]]:
     """Return all servos that answered, with their kinds."""
     return [(one.kind, servo) for one in rounds for servo in one.found]
 

@@ -3,12 +3,12 @@
 from collections.abc import Container, Iterator, Sequence
 
 from gazerig.drivers.hobby_board.models import US_STEPS
-from gazerig.drivers.servo_bus.discovery import Found
+from gazerig.drivers.servo_bus.discovery import FoundServo
 from gazerig.drivers.servo_models import BusKind
 from gazerig.robot.bringup.bus_search import SearchRound, found_of
 
 
-def servo_plain(kind: BusKind, servo: Found) -> dict[str, object]:
+def servo_plain(kind: BusKind, servo: FoundServo) -> dict[str, object]:
     """Return a servo as JSON can hold it."""
     return {
         "kind": kind,

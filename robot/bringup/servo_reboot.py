@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_bus.discovery import Found, ping, reboot
+from gazerig.drivers.servo_bus.discovery import FoundServo, ping, reboot
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.robot.bringup.servo_family import ServoKind
 
@@ -45,7 +45,7 @@ class Rebooted(NamedTuple):
     away_s: float
 
 
-def present(port: BusPort, kind: ServoKind, servo_id: int, baud: int) -> Found:
+def present(port: BusPort, kind: ServoKind, servo_id: int, baud: int) -> FoundServo:
     """Find one servo.
 
     Raises:

@@ -13,7 +13,14 @@ from typing import NamedTuple
 
 from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_bus.discovery import SHARED, Found, any_reply, corrupt, ping, scan_ids
+from gazerig.drivers.servo_bus.discovery import (
+    SHARED,
+    FoundServo,
+    any_reply,
+    corrupt,
+    ping,
+    scan_ids,
+)
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
@@ -23,8 +30,8 @@ from gazerig.robot.bringup.servo_family import ServoKind, Tell
 class SetUp(NamedTuple):
     """What has become of one servo: as it was found, as it is now, and what was written."""
 
-    before: Found
-    now: Found
+    before: FoundServo
+    now: FoundServo
     done: tuple[str, ...]
 
 
@@ -33,7 +40,7 @@ def search_order(kind: ServoKind, baud: int) -> tuple[int, ...]:
     return tuple(dict.fromkeys((kind.family.factory_baud, baud, *kind.family.usual_rates)))
 
 
-def find_alone(port: BusPort, kind: ServoKind, bauds: Sequence[int], tell: Tell) -> Found:
+def find_alone(port: BusPort, kind: ServoKind, bauds: Sequence[int], tell: Tell) -> FoundServo:
     """Find the one servo that is connected, whatever its id and baud rate; all rates are asked.
 
     Raises:
@@ -41,7 +48,7 @@ def find_alone(port: BusPort, kind: ServoKind, bauds: Sequence[int], tell: Tell)
         PortError: the port cannot be opened.
         BusLost: it has gone away.
     """
-    found: list[Found] = []
+    found: list[FoundServo] = []
     junk = 0
     for baud in bauds:
         tell(f"asking at {baud} bit/s")
@@ -66,14 +73,14 @@ def find_alone(port: BusPort, kind: ServoKind, bauds: Sequence[int], tell: Tell)
     return found[0]
 
 
-def _crowd(found: Iterable[Found]) -> str:
+def _crowd(found: Iterable[FoundServo]) -> str:
     named = [f"id {one.id} ({one.model}) at {one.baud} bit/s" for one in found]
     if len(set(named)) < len(named):
         return f"two servos answer as {named[0]}"
     return f"{len(named)} servos answer: {', '.join(named)}"
 
 
-def refuse_model(found: Found, kind: ServoKind, setup: ServoSetup, where: str) -> None:
+def refuse_model(found: FoundServo, kind: ServoKind, setup: ServoSetup, where: str) -> None:
     """See that the servo found is of the model the joint wants.
 
     Raises:
@@ -87,7 +94,7 @@ def refuse_model(found: Found, kind: ServoKind, setup: ServoSetup, where: str) -
 
 
 def assign(
-    port: BusPort, kind: ServoKind, found: Found, setup: ServoSetup, baud: int, tell: Tell
+    port: BusPort, kind: ServoKind, found: FoundServo, setup: ServoSetup, baud: int, tell: Tell
 ) -> SetUp:
     """Return the servo found the id of a joint and the bus's baud rate, and see that it has them.
 
@@ -111,7 +118,7 @@ def assign(
 class _Assignment:
     """One servo alone on a line, being given its id and baud rate."""
 
-    def __init__(self, port: BusPort, kind: ServoKind, found: Found) -> None:
+    def __init__(self, port: BusPort, kind: ServoKind, found: FoundServo) -> None:
         self._port, self._kind, self._found = port, kind, found
         self._registers = Registers(port, kind.family)
         self._id, self._baud = found.id, found.baud

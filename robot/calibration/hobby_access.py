@@ -98,7 +98,7 @@ class OneHobby:
             ServoMissing: the channel does not take it.
         """
         self._bus.retune([self._setup._replace(rest_steps=self._within(place_us))])
-        (self._goal,) = self._bus.engage()
+        (self._goal,) = self._bus.enable_torque()
         return self.place_us
 
     def aim(self, place_us: float) -> float:
@@ -157,7 +157,7 @@ class OneHobby:
             BusLost: the port is gone.
         """
         try:
-            self._bus.release()
+            self._bus.disable_torque()
         finally:
             self._bus.close()
 

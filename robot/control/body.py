@@ -153,7 +153,7 @@ class Body:
             BusLost: the port is gone; the torque is taken off when it is back.
         """
         self._let_go = True
-        self.bus.release()
+        self.bus.disable_torque()
 
     def take_hold(self) -> JointAngles:
         """Torque on again where the joints are; give the goals in force.
@@ -162,7 +162,7 @@ class Body:
             SetupError: a servo does not answer, refuses or has latched a fault.
             BusLost: the port is gone.
         """
-        goals = self.bus.engage()
+        goals = self.bus.enable_torque()
         self._let_go = False
         self._set_up = self._joints
         return self.angles(goals)
@@ -176,13 +176,13 @@ class Body:
 
     def _release(self) -> None:
         try:
-            self.bus.release()
+            self.bus.disable_torque()
         except DriverError:
             raise
         except Exception:  # no fault of the bus, such as no memory: it is tried once more
-            self.bus.release()
+            self.bus.disable_torque()
         except BaseException:
-            self.bus.release()
+            self.bus.disable_torque()
             raise
 
 

@@ -61,7 +61,7 @@ class GuardedBus:
         feedback = self._bus.read(now_s)
         return self._marked(feedback) if self._rearmed else feedback
 
-    def engage(self) -> tuple[int, ...]:
+    def enable_torque(self) -> tuple[int, ...]:
         """Switch torque on where the joints are, under the guardian's eyes.
 
         Raises:
@@ -70,7 +70,7 @@ class GuardedBus:
         """
         # Before the torque, which comes on servo by servo.
         self._guardian.arm(self._plan)
-        goals = self._bus.engage()
+        goals = self._bus.enable_torque()
         self._holding, self._lost_hold = True, False
         return goals
 
@@ -85,7 +85,7 @@ class GuardedBus:
             return
         self._bus.write(goals_steps)
 
-    def release(self) -> None:
+    def disable_torque(self) -> None:
         """Torque off on every servo; after that the guardian has nothing to release.
 
         Raises:
@@ -93,7 +93,7 @@ class GuardedBus:
         """
         self._holding = self._lost_hold = False
         self._rearmed.clear()
-        self._bus.release()
+        self._bus.disable_torque()
         self._guardian.disarm(self._plan)
 
     def close(self) -> None:
@@ -134,8 +134,8 @@ class GuardedBus:
         self._retry_s = now_s + RETRY_S
         try:
             # A packet of goals that was on its way as the loop stopped may have come after.
-            self._bus.release()
-            self._bus.engage()
+            self._bus.disable_torque()
+            self._bus.enable_torque()
         except DriverError as error:
             self._events.append(f"torque stays off: {error}")
             return

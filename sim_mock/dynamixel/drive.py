@@ -9,7 +9,7 @@ from gazerig.drivers.dynamixel.control_table import (
     PWM_FULL,
     STEPS_PER_TURN,
     VELOCITY_UNIT_STEPS_S,
-    Model,
+    DynamixelModel,
 )
 from gazerig.sim_mock.dynamixel.memory import DynamixelMemory
 from gazerig.sim_mock.dynamixel.modes import (
@@ -57,7 +57,7 @@ class DynamixelDrive(Drive):
 
     memory: DynamixelMemory
 
-    def __init__(self, memory: DynamixelMemory, model: Model, spec: ServoSpec) -> None:
+    def __init__(self, memory: DynamixelMemory, model: DynamixelModel, spec: ServoSpec) -> None:
         self._model = model
         self._quirks = Quirks(*spec.quirks)
         unit = model.current_unit_ma

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 from gazerig.drivers.dynamixel.control_table import (
     EEPROM_END,
+    DynamixelModel,
+    DynamixelRegister,
     IndirectBlock,
-    Model,
-    Register,
     indirect_blocks,
     registers_of,
 )
@@ -26,7 +26,7 @@ DATA_LENGTH = 5
 DATA_LIMIT = 6
 ACCESS = 7
 
-Fields = tuple[tuple[Register, int], ...]
+Fields = tuple[tuple[DynamixelRegister, int], ...]
 """Registers with the values to be written to them."""
 
 
@@ -44,16 +44,16 @@ class Gather(NamedTuple):
     profiled: bool
 
 
-class DynamixelMemory(ServoMemory[Register]):
+class DynamixelMemory(ServoMemory[DynamixelRegister]):
     """One servo's control table."""
 
-    def __init__(self, model: Model, firmware: int) -> None:
+    def __init__(self, model: DynamixelModel, firmware: int) -> None:
         blocks = indirect_blocks(model, firmware)
         registers = registers_of(model) + tuple(_window_registers(blocks))
         size = max(register.address + register.size for register in registers)
         super().__init__(registers, size)
         self._by_address = {register.address: register for register in registers}
-        self._layouts: dict[tuple[int, int], tuple[Register, ...] | int] = {}
+        self._layouts: dict[tuple[int, int], tuple[DynamixelRegister, ...] | int] = {}
         self._windows = [(b.data_base, b.data_base + b.entries, b.address_base) for b in blocks]
         self._window_low = min(low for low, _, _ in self._windows)
         self._pointers_low = min(pointers for _, _, pointers in self._windows)
@@ -64,7 +64,7 @@ class DynamixelMemory(ServoMemory[Register]):
             self._defined[register.address : end] = b"\x01" * register.size
         self.restore(lambda register: True)
 
-    def restore(self, chosen: Callable[[Register], bool]) -> None:
+    def restore(self, chosen: Callable[[DynamixelRegister], bool]) -> None:
         """Put the initial values back into the chosen registers."""
         for register in self._by_address.values():
             if register.initial is not None and chosen(register):
@@ -74,22 +74,22 @@ class DynamixelMemory(ServoMemory[Register]):
         """Set the start values of the RAM area."""
         self.restore(lambda register: not in_eeprom(register))
 
-    def writable(self) -> Iterator[Register]:
+    def writable(self) -> Iterator[DynamixelRegister]:
         """Return the writable registers but indirect data, which stands for other registers."""
         for register in self._by_address.values():
             if register.access == "rw" and not register.name.startswith("indirect_data"):
                 yield register
 
-    def put(self, register: Register, value: int) -> None:
+    def put(self, register: DynamixelRegister, value: int) -> None:
         """Store a value."""
         super().put(register, value)
         if register.address >= self._pointers_low:
             self._gathers.clear()
 
-    def _decode(self, register: Register, data: bytes | bytearray) -> int:
+    def _decode(self, register: DynamixelRegister, data: bytes | bytearray) -> int:
         return int.from_bytes(data, "little", signed=register.signed)
 
-    def _encode(self, register: Register, value: int) -> bytes:
+    def _encode(self, register: DynamixelRegister, value: int) -> bytes:
         """Return two's complement where the value is negative."""
         return (value & ((1 << 8 * register.size) - 1)).to_bytes(register.size, "little")
 
@@ -159,14 +159,14 @@ class DynamixelMemory(ServoMemory[Register]):
             out.append((register, value))
         return tuple(out)
 
-    def _layout(self, address: int, length: int) -> tuple[Register, ...] | int:
+    def _layout(self, address: int, length: int) -> tuple[DynamixelRegister, ...] | int:
         """Return the registers that a write covers exactly, or give the error number."""
         key = (address, length)
         if key not in self._layouts:
             self._layouts[key] = self._lay_out(address, length)
         return self._layouts[key]
 
-    def _lay_out(self, address: int, length: int) -> tuple[Register, ...] | int:
+    def _lay_out(self, address: int, length: int) -> tuple[DynamixelRegister, ...] | int:
         end, found = address + length, []
         while address < end:
             register = self._by_address.get(address)
@@ -185,7 +185,7 @@ class DynamixelMemory(ServoMemory[Register]):
                 runs[-1][1].append(byte)
             else:
                 runs.append((target, bytearray([byte])))
-        out: list[tuple[Register, int]] = []
+        out: list[tuple[DynamixelRegister, int]] = []
         for target, run in runs:
             part = self.fields(target, bytes(run))
             if isinstance(part, int):
@@ -194,17 +194,17 @@ class DynamixelMemory(ServoMemory[Register]):
         return tuple(out)
 
 
-def _window_registers(blocks: tuple[IndirectBlock, ...]) -> Iterator[Register]:
+def _window_registers(blocks: tuple[IndirectBlock, ...]) -> Iterator[DynamixelRegister]:
     """Return the registers of the indirect windows; each starts as its own data byte."""
     for block in blocks:
         for i in range(block.entries):
             at, data = block.address_base + 2 * i, block.data_base + i
-            yield Register(
+            yield DynamixelRegister(
                 f"indirect_address_{at}", at, 2, "rw", data, block.target_low, block.target_high
             )
-            yield Register(f"indirect_data_{data}", data, 1, "rw", 0, 0, 255)
+            yield DynamixelRegister(f"indirect_data_{data}", data, 1, "rw", 0, 0, 255)
 
 
-def in_eeprom(register: Register) -> bool:
+def in_eeprom(register: DynamixelRegister) -> bool:
     """True if a register is kept without power."""
     return register.address < EEPROM_END

@@ -9,7 +9,7 @@ comes out is in units of PWM (885 are 100 %).
 from collections.abc import Callable
 from math import inf
 
-from gazerig.drivers.dynamixel.control_table import PWM_FULL, VELOCITY_UNIT_STEPS_S, Model
+from gazerig.drivers.dynamixel.control_table import PWM_FULL, VELOCITY_UNIT_STEPS_S, DynamixelModel
 from gazerig.sim_mock.smart_servo.motor import Loop
 
 CURRENT, VELOCITY, POSITION, EXTENDED, CURRENT_POSITION, PWM = 0, 1, 3, 4, 5, 16
@@ -35,12 +35,12 @@ FAR_BEYOND = 2.0
 Get = Callable[[str], int]
 
 
-def modes_of(model: Model) -> tuple[int, ...]:
+def modes_of(model: DynamixelModel) -> tuple[int, ...]:
     """Return the operating modes a model has."""
     return MODES_WITHOUT_CURRENT if model.current_limit is None else MODES
 
 
-def loop_of(get: Get, model: Model, side: int) -> Loop:
+def loop_of(get: Get, model: DynamixelModel, side: int) -> Loop:
     """Return the controller that the registers describe; ``side`` is -1 in reverse mode."""
     mode = get("operating_mode")
     slew = inf
@@ -75,7 +75,7 @@ def loop_of(get: Get, model: Model, side: int) -> Loop:
     )
 
 
-def _torque_limit(get: Get, model: Model) -> float:
+def _torque_limit(get: Get, model: DynamixelModel) -> float:
     """Return the torque that the goal current and its limit allow, as a share of stall."""
     units = min(abs(get("goal_current")), get("current_limit"))
     return units * model.current_unit_ma / 1000.0 / model.stall_current_a

@@ -16,7 +16,7 @@ from gazerig.drivers.dynamixel.control_table import (
     HARDWARE_ERRORS,
     MODELS,
     SHADOW_OFF,
-    Model,
+    DynamixelModel,
 )
 from gazerig.sim_mock.dynamixel.backup import Backup
 from gazerig.sim_mock.dynamixel.drive import TRIPPED, DynamixelDrive
@@ -68,7 +68,7 @@ class DynamixelServo(EmulatedServo):
     none_registered = INSTRUCTION_ERROR
     read_level, answer_level = 1, 2
     error_bits: ClassVar = {name: 1 << bit for bit, name in HARDWARE_ERRORS.items()}
-    model: Model
+    model: DynamixelModel
     memory: DynamixelMemory
     drive: DynamixelDrive
 

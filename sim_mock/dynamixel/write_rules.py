@@ -1,6 +1,6 @@
 """Which writes an emulated servo permits now: EEPROM lock, modes, limits, tripped watchdog."""
 
-from gazerig.drivers.dynamixel.control_table import EEPROM_END, Model, Register
+from gazerig.drivers.dynamixel.control_table import EEPROM_END, DynamixelModel, DynamixelRegister
 from gazerig.sim_mock.dynamixel.drive import TRIPPED, DynamixelDrive
 from gazerig.sim_mock.dynamixel.memory import (
     ACCESS,
@@ -22,7 +22,9 @@ class Rules:
     goal_range: positions that a goal may have now
     """
 
-    def __init__(self, memory: DynamixelMemory, model: Model, drive: DynamixelDrive) -> None:
+    def __init__(
+        self, memory: DynamixelMemory, model: DynamixelModel, drive: DynamixelDrive
+    ) -> None:
         self._memory = memory
         self._modes = modes_of(model)
         self._drive = drive
@@ -53,7 +55,7 @@ class Rules:
         low, high = self.goal_range
         return 0 if low <= goal <= high else DATA_LIMIT
 
-    def _refusal(self, register: Register, value: int) -> int:
+    def _refusal(self, register: DynamixelRegister, value: int) -> int:
         name = register.name
         if register.address < EEPROM_END:
             if self._drive.torque:

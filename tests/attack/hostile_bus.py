@@ -43,11 +43,11 @@ def torque_on(kind: str) -> tuple[int, int, float, float]:
         board = kind.startswith("maestro")
         noisy.strike(packet, "brown-out" if board else "brown-out 3")
         try:
-            noisy.engage()
+            noisy.enable_torque()
         except DriverError:
             refused += 1
             noisy.now += 1.0
-            noisy.engage()
+            noisy.enable_torque()
         outcome = noisy.run("clear", 0.0, 300)
         outside += outcome.outside
         farthest = max(farthest, outcome.farthest)

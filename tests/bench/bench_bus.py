@@ -115,7 +115,7 @@ def line_alone() -> None:
                 DYNAMIXEL, port, SETUPS, DynamixelParams(baud=baud, indirect_block=indirect)
             )
             bus.open()
-            bus.engage()
+            bus.enable_torque()
             _line_cycles(bus, now, 300)
             usual_s, _ = _line_cycles(bus, now, 500)
             chain.faults.command("lose 5")
@@ -153,7 +153,7 @@ def unplug(times: int) -> None:
         path = server.start(SPECS)
         bus = SmartServoBus(DYNAMIXEL, BlockingPort(path), SETUPS, DynamixelParams())
         bus.open()
-        bus.engage()
+        bus.enable_torque()
         for _ in range(times):
             _cycles(bus, lambda told: False, 0.3)
             bus.events()
@@ -162,7 +162,7 @@ def unplug(times: int) -> None:
             _cycles(bus, lambda told: False, 0.5)
             server.command("plug")
             returns.append(_cycles(bus, lambda told: all(told.torque) and not told.missing, 5.0))
-        bus.release()
+        bus.disable_torque()
         bus.close()
     table = Table("", "median ms", "worst ms", title=f"unplugged for 0.5 s, {times} times, 100 Hz")
     table.add_row("unplug to notice", f"{median(notices):.1f}", f"{max(notices):.1f}")
@@ -207,7 +207,7 @@ def dice(cycles: int) -> None:
     )
     bus = SmartServoBus(DYNAMIXEL, port, SETUPS, DynamixelParams(give_up_s=600.0))
     bus.open()
-    bus.engage()
+    bus.enable_torque()
     dice = random.Random(7)
     injected = stale = values = missing = longest = 0
     for k in range(cycles):

@@ -119,7 +119,7 @@ def ours(
     bus = MixedBus(shares) if len(shares) > 1 else shares[0].bus
     now_s = next(iter(opened.values())).now_s
     bus.open()
-    bus.engage()
+    bus.enable_torque()
 
     def tick(k: int) -> int:
         feedback = bus.read(now_s())
@@ -129,7 +129,7 @@ def ours(
     try:
         yield tick
     finally:
-        bus.release()
+        bus.disable_torque()
         bus.close()
 
 

@@ -89,7 +89,7 @@ def main() -> None:
             path = stack.enter_context(PtyBus()).start_device(emulated(kind, None))
             bus = driver(kind, path, 1_000_000)
             bus.open()
-            bus.engage()
+            bus.enable_torque()
             cycles = layers(bus)
             for client in clients(kind):
                 if client.name in ("bare", "rustypot"):
@@ -98,7 +98,7 @@ def main() -> None:
                         pass
                     cycles[client.name] = stack.enter_context(client.opened(path, 1_000_000))
             found = in_turns(cycles, args.rounds, args.cycles)
-            bus.release()
+            bus.disable_torque()
             bus.close()
         table = Table("layer", "CPU us", "more than above", title=f"{kind}, {len(IDS)} servos")
         before = 0.0

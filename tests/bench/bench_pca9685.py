@@ -65,7 +65,7 @@ def ours():
         I2cPort("/dev/i2c-1", open_bus=lambda path: bus), setups, Pca9685Params(stagger_ms=0.0)
     )
     made.open()
-    made.engage()
+    made.enable_torque()
 
     def both(steps):
         made.read(time.monotonic())

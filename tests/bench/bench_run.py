@@ -146,7 +146,7 @@ def bus_exchange(cycles: int = 4000) -> None:
     chain = build_dynamixel(specs, lambda: now[0])
     bus = SmartServoBus(DYNAMIXEL, InProcessPort(chain), setups, rig.bus.dynamixel)
     bus.open()
-    bus.engage()
+    bus.enable_torque()
     goals = [2048] * 9
 
     def ours() -> None:

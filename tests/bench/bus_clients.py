@@ -63,7 +63,7 @@ def ours(kind: str, path: str, baud: int, **chosen: object) -> AbstractContextMa
 @contextmanager
 def _driven(bus: ServoBus) -> Iterator[Cycle]:
     bus.open()
-    bus.engage()
+    bus.enable_torque()
 
     def cycle(k: int) -> int:
         feedback = bus.read(time.monotonic())
@@ -73,7 +73,7 @@ def _driven(bus: ServoBus) -> Iterator[Cycle]:
     try:
         yield cycle
     finally:
-        bus.release()
+        bus.disable_torque()
         bus.close()
 
 

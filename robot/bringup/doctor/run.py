@@ -18,7 +18,7 @@ from gazerig.drivers.serial.list_ports import (
     set_latency,
 )
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_bus.discovery import Found, any_reply, corrupt, ping, scan_ids
+from gazerig.drivers.servo_bus.discovery import FoundServo, any_reply, corrupt, ping, scan_ids
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
 from gazerig.robot.bringup.doctor.checks import visit
@@ -36,10 +36,10 @@ class Presence(NamedTuple):
     corrupt: how many of six answers came in pieces, by id, where any did
     """
 
-    there: dict[int, Found]
+    there: dict[int, FoundServo]
     missing: tuple[ServoSetup, ...]
-    strangers: tuple[Found, ...]
-    elsewhere: tuple[Found, ...]
+    strangers: tuple[FoundServo, ...]
+    elsewhere: tuple[FoundServo, ...]
     corrupt: dict[int, int]
 
 
@@ -138,7 +138,7 @@ def _open(port: BusPort, baud: int) -> None:
         raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose 57600 or 1000000")
 
 
-def _elsewhere(port: BusPort, kind: ServoKind, baud: int, tell: Tell) -> Iterator[Found]:
+def _elsewhere(port: BusPort, kind: ServoKind, baud: int, tell: Tell) -> Iterator[FoundServo]:
     """Look at all other baud rates."""
     for other in kind.family.usual_rates:
         if other == baud:
@@ -178,7 +178,7 @@ def judge_presence(presence: Presence, kind: ServoKind, baud: int) -> Iterator[D
         )
 
 
-def _missing(setup: ServoSetup, at: Found | None, spoilt: int, baud: int) -> Diagnostic:
+def _missing(setup: ServoSetup, at: FoundServo | None, spoilt: int, baud: int) -> Diagnostic:
     where = servo_label(setup)
     if at is not None:
         return Diagnostic(

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from gazerig.drivers.servo_bus.discovery import Found
+from gazerig.drivers.servo_bus.discovery import FoundServo
 from gazerig.drivers.servo_bus.family import Model
 from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoSetup
@@ -110,7 +110,7 @@ class ServoState:
 
     checks: ServoChecks
     setup: ServoSetup
-    found: Found
+    found: FoundServo
     values: Mapping[str, int | None]
     corrupt: int = 0
 
