@@ -61,7 +61,7 @@ def releaser(plan: ReleasePlan) -> Releaser:
 
 
 def _smart(plan: ReleasePlan) -> Releaser:
-    from gazerig.drivers.servo_bus.disable_torque import disable_torque
+    from gazerig.drivers.servo_bus.release import disable_torque
     from gazerig.drivers.servo_families import FAMILIES
 
     family = FAMILIES[plan.family or plan.kind]
