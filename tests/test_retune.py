@@ -105,7 +105,7 @@ class Judge:
             sent = np.array(self.running.goals[-1])
             assert (np.abs(sent - steps) <= 0.5 + 1e-6).all()
             bus: Any = self.running.made.robot.body.bus
-            for goal, (low, high) in zip(sent, bus._limits, strict=True):
+            for goal, low, high in zip(sent, bus._lowest, bus._highest, strict=True):
                 assert low - 1 <= goal <= high + 1  # rounding; the bus clips that
             self.steps, self.speed = steps, speed
 
@@ -217,7 +217,7 @@ STATE = {
     "_next_s", "_until_s", "_search_until_s", "_redraw", "_left", "_shown", "_retuned_s",
     "_rng", "_droop_from", "_droop_to", "_droop_since_s", "_offset_rad", "_started", "_ready",
     "_part", "_at", "_keeper", "_counting", "_shift", "_heated", "_outside_s", "_last",
-    "_behaviour", "bus",
+    "_behaviour", "bus", "_nothing",
 }  # fmt: skip
 
 

@@ -128,7 +128,7 @@ class ParamAccess(Protocol):
 
 
 class PathGuard(Protocol):
-    """Which files an asker may name (``gazerig.config.confined.Confined``)."""
+    """Which files an asker may name (``gazerig.config.allowed_folder.AllowedFolder``)."""
 
     def file(self, given: str, kind: str = "") -> str:
         """Return a shipped name or a whole path; raise where it may not be named."""
