@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import pytest
 
-from gazerig.drivers.dynamixel.control_table import BAUD_RATES
 from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
 from gazerig.drivers.servo_bus.discovery import FoundServo, any_reply, ping
 from gazerig.drivers.servo_bus.registers import Registers
@@ -70,15 +69,29 @@ class Bench:
         return bytes(self.chain[servo_id].memory.bytes[:40])
 
 
-@each
-@pytest.mark.parametrize(("servo_id", "baud"), [(1, BAUD), (200, 57_600), (7, 115_200)])
+NUMBER = {"dynamixel": (1240, 53), "feetech": (777, 353)}
+"""Model number and firmware."""
+
+ANYWHERE = [
+    *((kind, *place) for kind in (DYNAMIXEL, FEETECH) for place in ((1, BAUD), (7, 115_200))),
+    *((DYNAMIXEL, 1, 57_600), (FEETECH, 200, 57_600)),
+    *((DYNAMIXEL, 200, baud) for baud in RATES if baud != 4_500_000),
+]
+
+
+@pytest.mark.parametrize(("kind", "servo_id", "baud"), ANYWHERE)
 def test_a_servo_gets_its_id_and_rate_for_good_wherever_it_was(kind, servo_id, baud):
     bench = Bench(ServoSpec(servo_id, MODELS[kind.name]), baud=baud, kind=kind)
     result = bench.assign()
-    assert (result.before.id, result.before.baud) == (servo_id, baud)
-    assert (result.now.id, result.now.baud) == (7, BAUD)
+    assert result.before == FoundServo(servo_id, *NUMBER[kind.name], baud, bench.model)
+    assert result.now == FoundServo(7, *NUMBER[kind.name], BAUD, bench.model)
     assert (f"id {servo_id} -> 7" in result.done) == (servo_id != 7)
     assert (f"baud rate {baud} -> {BAUD} bit/s" in result.done) == (baud != BAUD)
+    assert len(result.done) == (servo_id != 7) + (baud != BAUD)
+    (servo,) = bench.chain.servos
+    assert (servo.id, servo.torque) == (7, False)
+    rate = bench.registers().read(7, "baud_rate")
+    assert rate == kind.family.baud_rates.index(BAUD)
     bench.chain[7].restart()
     bench.sleep_until(bench.now + 1.0)
     bench.chain.refresh()
@@ -255,24 +268,6 @@ def test_any_reply_is_a_matter_of_answers_not_of_echoes():
 
 
 # --- Dynamixel servos, packet by packet
-
-
-def test_a_factory_fresh_servo_gets_its_id_and_rate():
-    bench = Bench()
-    result = bench.assign()
-    assert result.before == FoundServo(1, 1240, 53, 57_600, "xc330-m288")
-    assert result.now == FoundServo(7, 1240, 53, BAUD, "xc330-m288")
-    assert result.done == ("id 1 -> 7", f"baud rate 57600 -> {BAUD} bit/s")
-    (servo,) = bench.chain.servos
-    assert (servo.id, servo.memory.get("baud_rate")) == (7, BAUD_RATES.index(BAUD))
-    assert servo.memory.get("torque_enable") == 0
-
-
-@pytest.mark.parametrize("baud", [b for b in RATES if b != 4_500_000])
-def test_it_is_found_whatever_its_id_and_rate(baud):
-    bench = Bench(ServoSpec(200, "xc330-m288"), baud=baud)
-    assert bench.find() == FoundServo(200, 1240, 53, baud, "xc330-m288")
-    assert bench.assign().now.id == 7
 
 
 def test_the_likely_rates_are_asked_first():
