@@ -44,6 +44,16 @@ def test_answers_that_come_late_are_the_computer_s_not_a_plug_s(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
+def test_short_pauses_of_the_computer_cost_no_value(kind):
+    noisy = Noisy(kind)
+    noisy.start()
+    for ms in (3, 8, 8, 8):  # one after the other: an answer that comes costs no reserve
+        outcome = noisy.run(f"delay all {ms} count 1", 0.0, 40)
+        assert outcome.damaged == 0, outcome
+    assert noisy.run("delay all 18 count 1", 0.0, 40).damaged > 0
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_a_servo_that_is_silent_is_named_where_nothing_comes_late(kind):
     noisy = Noisy(kind)
     noisy.start()
