@@ -81,6 +81,18 @@ def test_far_motion_pulls_less_than_near_motion() -> None:
     assert total[0] == pytest.approx(4.0 * total[1]) and total[0] == pytest.approx(2.0)
 
 
+def test_what_spins_about_the_line_of_view_is_attended_to_and_what_spins_across_is_not() -> None:
+    """Eq 1's third term, in what the eye sees: about the line of view, however far."""
+    things = percept(0.0, *(body(n, "thing", (far, 0, 0)) for n, far in ((1, 1), (2, 4), (3, 1))))
+    spins = np.array([[0.0, 0, 0], [-6.0, 0, 0], [0, 6.0, 0]])
+    turning = replace(things.bodies, w_world_rad_s=spins)
+    params = BottomUpParams(smoothing_s=0.0, onset_salience=0.0)
+    found = BottomUp(params).step(turning, (0, 0, 0), 0.0)
+    expected = 6.0 / params.rotation_reference_rad_s
+    assert found.rotation == pytest.approx([0.0, expected, 0.0])
+    assert found.total == pytest.approx([0.0, expected, 0.0])
+
+
 def test_pulls_rise_with_the_time_constant() -> None:
     model = BottomUp(BottomUpParams(smoothing_s=0.1))
     seen = percept(0.0, body(1, "hand", (1, 0, 0), (0, 1, 0)))

@@ -5,15 +5,20 @@ from dataclasses import dataclass, field
 from math import degrees, inf, nan, pi, radians
 from typing import Any
 
+import numpy as np
 import pytest
 from desk import JOINTS
 from hypothesis import given
 from hypothesis import strategies as st
 
 from gazerig.config.schema import load_rig
+from gazerig.gaze.aversion import Aversion, AversionParams
+from gazerig.gaze.lids import LidParams, Lids
+from gazerig.gaze.top_down import TopDown, TopDownParams
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.session import leave
+from gazerig.robot.control.command_choices import Menus
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.commands import (
     Ask,
@@ -244,6 +249,29 @@ def test_a_jog_beyond_the_end_is_refused_with_the_joints_range(running: Running)
         running.order(Jog((("neck_yaw", pi),)))
     running.order(Jog((("neck_yaw", radians(70.04)),)))  # a slider's rounding
     assert running.go(0.1)[0].led == "somebody: jog neck_yaw 70.0"
+
+
+def blinks_in_two_minutes(lids: Lids) -> int:
+    for k in range(6000):
+        lids.step(0.02 * k, 0.0, None)
+    return lids.blinks
+
+
+@pytest.mark.parametrize("mode", ["talk", "listen", "think", "none"])
+def test_who_is_in_a_conversation_blinks_as_people_do_there(mode: str) -> None:
+    expected = {}
+    for name in ("rest", "conversation"):
+        lids = Lids(LidParams(), np.random.default_rng(1))
+        lids.mode("rest" if name == "conversation" else "conversation")
+        lids.mode(name)  # type: ignore[arg-type]
+        expected[name] = blinks_in_two_minutes(lids)
+    assert expected["conversation"] > expected["rest"] + 5
+    lids = Lids(LidParams(), np.random.default_rng(1))
+    menus = Menus(Aversion(AversionParams(), np.random.default_rng(2)), lids)
+    for asked in ("none" if mode != "none" else "talk", mode):
+        menus.choose(Ask("conversation", asked), TopDown(TopDownParams()), 0.0)
+    expected_of = "rest" if mode == "none" else "conversation"
+    assert blinks_in_two_minutes(lids) == expected[expected_of]
 
 
 def test_unknown_menus_are_refused_when_asked(running: Running) -> None:

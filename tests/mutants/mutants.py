@@ -1,0 +1,107 @@
+"""Mutants of gaze, perception, scanpath and drivers: one wrong line each, and who has to notice."""
+
+from typing import NamedTuple
+
+
+class Mutant(NamedTuple):
+    """One piece of text replaced by another.
+
+    file: from the root of the repository; old: stands there exactly once
+    effect: what is wrong then; tests: files test_NAME.py of which one has to fail
+    """
+
+    file: str
+    old: str
+    new: str
+    effect: str
+    tests: tuple[str, ...]
+
+
+MUTANTS = (
+    # ---- gaze: attention
+    Mutant("gaze/bottom_up.py", "        total += self.rotation\n", "",
+           "eq 1 without its third term, spin", ("attention",)),
+    Mutant("gaze/bottom_up.py", "raw.looming / (distance * par", "raw.looming / (par",
+           "far things that come nearer draw as much as near ones", ("attention",)),
+    Mutant("gaze/bottom_up.py", "np.exp((entered_s - t_s) / self._params.onset_s)",
+           "np.exp((entered_s - t_s) / 10.0)", "what appeared draws the gaze for ever",
+           ("attention", "habituation")),
+    Mutant("gaze/habituation.py", "habituation *= factor", "habituation *= 1.0",
+           "no inhibition of return", ("habituation",)),
+    Mutant("gaze/habituation.py", "id: left + risen for id", "id: left for id",
+           "interest that was lost never recovers", ("habituation",)),
+    Mutant("gaze/top_down.py", "/= self._params.stay_with_person", "/= 1.0",
+           "the gaze does not stay with a person", ("attention", "habituation")),
+    Mutant("gaze/field_of_view.py", "before = (along > 0.0) & ", "before = ",
+           "what is behind the eye hides things", ("attention",)),
+    # ---- gaze: eyes, head, lids
+    Mutant("gaze/saccade_trigger.py", "closing > 0.0 and least < error_rad / closing < most",
+           "least < error_rad / max(closing, 1e-9) < most * 10",
+           "no catch-up saccade for a target that comes across", ("shift", "oculomotor")),
+    Mutant("gaze/saccade_trigger.py", "or rested_s < self._refractory_s", "",
+           "saccades without a pause between them", ("shift", "oculomotor")),
+    Mutant("gaze/pursuit.py", "scale(error, 1.0 - exp(-par.gain_1_s * dt_s))",
+           "scale(error, par.gain_1_s * dt_s * dt_s)", "an error of pursuit is hardly made good",
+           ("pursuit", "oculomotor")),
+    Mutant("gaze/head.py", "delay_ms = -par.lead_ms if target.top_down", "delay_ms = 0.0 if target.top_down",
+           "the head does not lead for a top-down target", ("head", "oculomotor")),
+    Mutant("gaze/head.py", "peak = min(peak, par.recentre_speed_deg_s)", "pass",
+           "an eye that was left aside is relieved with a jerk", ("head", "oculomotor")),
+    Mutant("gaze/saccade.py", "return 0.45 - 0.20 * min(1.0, max(0.0, over))", "return 0.45",
+           "large saccades are not skewed", ("saccade",)),
+    Mutant("gaze/blink_statistics.py", "between = 60.0 / per_min - length_s",
+           "between = 60.0 / per_min", "the blink itself is not part of its interval", ("lids",)),
+    Mutant("gaze/blink_statistics.py", "return float(rng.random()) < 1.0 / (1.0 + against)",
+           "return shift_deg > 60.0", "no chance in blinks with gaze shifts", ("lids",)),
+    Mutant("gaze/lids.py", 'return par.blinks_per_min if self._mode == "rest" else par.conversation_per_min',
+           "return par.blinks_per_min", "a conversation does not change the rate of blinks", ("lids",)),
+    Mutant("robot/control/command_choices.py",
+           'self._lids.mode("rest" if mode == "none" else "conversation")', "pass",
+           "asking for a conversation does not reach the lids", ("commands",)),
+    Mutant("gaze/aversion.py", "looking = add(scale(ahead, cos(angle)), scale(aside, sin(angle)))",
+           "looking = add(scale(ahead, cos(angle)), scale(aside, -sin(angle)))",
+           "looks away to the opposite side", ("aversion",)),
+    # ---- scanpath
+    Mutant("gaze/scanpath.py", "lambda rng: max(law(rng) / tempo, floor_s)",
+           "lambda rng: max(law(rng), floor_s)", "rate_scale does nothing", ("scanpath_dwell", "scanpath")),
+    Mutant("gaze/scanpath_dwell.py", "log(mean_s) - 0.5 * sigma2", "log(mean_s)",
+           "log-normal dwells have their median at the mean", ("scanpath_dwell", "scanpath")),
+    Mutant("gaze/scanpath.py", "            if face.id == face_id", "            if True",
+           "the walk goes over the face of somebody else", ("scanpath", "scanpath_models", "attention")),
+    Mutant("gaze/scanpath_models.py", "self._at = (self._at + 1) % len(self._parts)",
+           "self._at = min(self._at + 1, len(self._parts) - 1)",
+           "the simple model stops at its last part", ("scanpath_models",)),
+    Mutant("gaze/scanpath_models.py", "return self._longest_s * (1.0 - self._rng.random())",
+           "return self._longest_s", "random looks have one length", ("scanpath_models",)),
+    # ---- perception
+    Mutant("robot/perception/perception.py", "self._mount.pose(*poses.head_pose(t_s))",
+           "self._mount.pose(*poses.head_pose(1e9))", "frames are placed by the newest pose of the head",
+           ("perception", "camera_poses")),
+    Mutant("robot/perception/tracker.py", "if track.sighting.kind != sighting.kind:", "if False:",
+           "a hand becomes a face", ("tracks", "perception")),
+    Mutant("robot/perception/tracker.py", "t_s - t.seen_s <= par.coast_ms / 1e3", "True",
+           "who has left stays in sight", ("tracks", "perception")),
+    Mutant("robot/perception/localisation.py", "    if not spread <= _MOST_SPREAD_M:", "    if False:",
+           "a depth that is two things at once is believed", ("camera_depth", "perception")),
+    Mutant("robot/perception/kalman.py", "kept = 1.0 if seen else exp(-dt_s / _STOPS_WITHIN_S)",
+           "kept = 1.0", "somebody out of sight walks on for ever", ("track_filter", "tracks")),
+    Mutant("robot/perception/hand_ownership.py", "return hypot(x, y), z", "return hypot(x, y), -z",
+           "the body that belongs to a face is above it", ("true_motion", "perception", "tracks",
+           "motion_room", "still_room")),
+    # ---- drivers
+    Mutant("drivers/servo_bus/poll_list.py", "min(2.0 * wait_s, AGAIN_LAST_S)", "AGAIN_FIRST_S",
+           "a dead servo is asked ten times a second for ever",
+           ("dynamixel_faults", "feetech_faults", "dynamixel_bus")),
+    Mutant("drivers/servo_bus/torque.py", "if abs(now - was) > JUMP_TURN * family.steps_per_turn:",
+           "if False:", "a jump at torque-on is not noticed",
+           ("dynamixel_bus", "dynamixel_listed_faults", "feetech_bus", "feetech_faults",
+            "bus_kinds_faults", "servo_bus_turn")),
+    Mutant("drivers/plausibility.py", "if len(odd) < AGREEING:", "if len(odd) < 0:",
+           "one position out of reach is believed at once", ("plausibility",)),
+    Mutant("drivers/dynamixel/protocol.py", ".replace(STUFFED, RAW)", "",
+           "stuffed bytes of an answer stay in it", ("dynamixel_packets",)),
+    Mutant("drivers/feetech/protocol.py", "raw[at + 2] == 0xFF:", "raw[at + 2] == 0xFE:",
+           "three FF in a row begin a packet of the wrong servo", ("feetech_packets",)),
+    Mutant("drivers/multi_bus.py", "if goal != goal:", "if False:",
+           "NaN goes to the buses before the one that refuses it", ("mixed_bus", "bus_kinds")),
+)  # fmt: skip

@@ -1,0 +1,84 @@
+"""Break the product on purpose, one line at a time: tests have to notice every time.
+
+    python tests/mutants/run.py            all mutants, one after the other
+    python tests/mutants/run.py scanpath   those with that word in file or effect
+
+By hand, as it takes minutes. Each of `MUTANTS` replaces one piece of text, which has to stand in
+its file exactly once, in a copy of the sources; the test files that it names run on the copy,
+and one of them has to fail. Before that they have to pass on the copy as it is. The guard has a
+hundred mutants of its own, which are cheap enough for the suite: tests/test_safety_mutants.py.
+Ends with 1 if a mutant survives.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+
+from mutants import MUTANTS, Mutant
+
+ROOT = Path(__file__).resolve().parents[2]
+COPIED = ("api", "config", "docs", "drivers", "gaze", "robot", "sim_mock", "tests")
+
+
+def copied(to: Path) -> None:
+    """Make a copy of sources and tests that runs by itself."""
+    for folder in COPIED:
+        shutil.copytree(ROOT / folder, to / folder, ignore=shutil.ignore_patterns("__pycache__"))
+    for file in ("Makefile", "pyproject.toml", "README.md", "CHANGELOG.md"):
+        shutil.copy(ROOT / file, to / file)
+    subprocess.run(["make", "-s", "links"], cwd=to, check=True)
+
+
+def passes(copy: Path, tests: Iterable[str]) -> bool:
+    """Return whether the tests pass on the copy."""
+    environ = {**os.environ, "PYTHONPATH": str(copy / ".links"), "PYTHONDONTWRITEBYTECODE": "1"}
+    files = [f"tests/test_{name}.py" for name in tests]
+    command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *files]
+    done = subprocess.run(command, cwd=copy, env=environ, capture_output=True, text=True)
+    if done.returncode not in (0, 1):
+        raise SystemExit(f"{' '.join(files)}: pytest ended with {done.returncode}\n{done.stdout}")
+    return done.returncode == 0
+
+
+def survives(mutant: Mutant, copy: Path) -> bool:
+    """Return whether no test notices."""
+    path = copy / mutant.file
+    source = path.read_text(encoding="utf-8")
+    found = source.count(mutant.old)
+    if found != 1:
+        raise SystemExit(
+            f"{mutant.file}: {mutant.old!r} stands there {found} times: mend mutants.py"
+        )
+    path.write_text(source.replace(mutant.old, mutant.new), encoding="utf-8")
+    try:
+        return passes(copy, mutant.tests)
+    finally:
+        path.write_text(source, encoding="utf-8")
+
+
+def main(words: list[str]) -> int:
+    """Try the mutants that have all the words; return how many survive."""
+    chosen = [m for m in MUTANTS if all(word in f"{m.file} {m.effect}" for word in words)]
+    with tempfile.TemporaryDirectory(prefix="mutants-") as name:
+        copy = Path(name)
+        copied(copy)
+        files = sorted({test for mutant in chosen for test in mutant.tests})
+        if not passes(copy, files):
+            raise SystemExit(f"these fail without a mutant already: {', '.join(files)}")
+        alive = 0
+        for mutant in chosen:
+            lives = survives(mutant, copy)
+            alive += lives
+            print(
+                f"{'SURVIVES' if lives else 'killed  '}  {mutant.file}: {mutant.effect}", flush=True
+            )
+    print(f"{len(chosen) - alive} of {len(chosen)} killed")
+    return alive
+
+
+if __name__ == "__main__":
+    raise SystemExit(min(1, main(sys.argv[1:])))
