@@ -49,6 +49,19 @@ def pytest_collection() -> Iterator[None]:
     gc.enable()
 
 
+_PTY = {"PtyBus", "PtyBuses", "TerminalLine", "commands_started", "hear", "pty"}
+"""Who imports one of these speaks over a pseudo-terminal, mostly with another process."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what needs a browser or pseudo-terminals; what is slow is marked where it stands."""
+    for item in items:
+        if "tab" in getattr(item, "fixturenames", ()):
+            item.add_marker("browser")
+        if _PTY & vars(getattr(item, "module", object)).keys():
+            item.add_marker("pty")
+
+
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
     """Return three workers for two processors: for a third of the time tests wait."""

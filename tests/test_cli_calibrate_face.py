@@ -216,6 +216,7 @@ def test_ctrl_c_parks_and_writes_nothing(rig: Path) -> None:
 # --- on the page
 
 
+@pytest.mark.slow
 def test_buttons_of_the_page_steer_side_by_side_with_keys(rig: Path) -> None:
     with socket.socket() as trial:
         trial.bind(("127.0.0.1", 0))

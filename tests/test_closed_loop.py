@@ -110,6 +110,7 @@ def overshoot_deg(seen: Seen) -> float:
     return float(seen.head_deg[after].max() - seen.facing_deg[-1])
 
 
+@pytest.mark.slow
 def test_the_step_is_of_40_deg_and_the_loop_sees_it_late(step: Seen) -> None:
     before = step.facing_deg[step.t_s < STEP_AT_S].max()
     assert 37.0 < step.facing_deg[-1] - before < 41.0
@@ -139,6 +140,7 @@ def test_the_gaze_rests_on_the_true_face_part_after_a_second(step: Seen) -> None
     assert np.percentile(step.off_deg[rests], 95) < 1.0
 
 
+@pytest.mark.slow
 def test_by_the_newest_pose_head_and_eyes_overshoot(step: Seen, step_by_newest: Seen) -> None:
     assert overshoot_deg(step_by_newest) > overshoot_deg(step) + 1.5
     settled = ARRIVED_S + 0.25
@@ -146,6 +148,7 @@ def test_by_the_newest_pose_head_and_eyes_overshoot(step: Seen, step_by_newest: 
     assert off[1] > 2.0 * off[0]
 
 
+@pytest.mark.slow
 def test_somebody_who_walks_past_is_followed(walk: Seen) -> None:
     walks = walk.t_s > 1.0 + 0.25
     assert walk.on_face[walks].all()

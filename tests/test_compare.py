@@ -116,6 +116,7 @@ def few_drawings(monkeypatch: pytest.MonkeyPatch) -> int:
     return 3
 
 
+@pytest.mark.slow
 def test_two_recordings_on_the_command_line(soft: Path, hard: Path, tmp_path: Path) -> None:
     out, runner = tmp_path / "both.html", CliRunner()
     done = runner.invoke(app, ["compare", str(soft), str(hard), "--out", str(tmp_path / "both")])

@@ -83,6 +83,7 @@ def run(place: Path) -> Iterator[Run]:
         run.end(signal.SIGKILL)
 
 
+@pytest.mark.slow
 def test_it_is_tuned_stopped_and_goes_on(run: Run) -> None:
     with run.connected() as rig:
         assert rig.status()["rig"] == str(run.file)

@@ -470,6 +470,7 @@ def test_a_stop_that_gets_lost_is_sent_again(at_the_rig: tuple[Rig, Person]) -> 
 
 
 # The last: the browser leaves the rig of the others.
+@pytest.mark.slow
 def test_without_the_token_there_is_one_line_and_with_it_the_page(tab: Any) -> None:
     with running("127.0.0.2") as (rig, url):
         person = Person(tab)

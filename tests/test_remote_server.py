@@ -718,6 +718,7 @@ def test_a_rig_that_does_not_answer_is_told_so_and_not_asked_again(
 # Leads of programs, and floods
 
 
+@pytest.mark.slow
 def test_a_program_leads_while_it_lives_and_is_named(
     rig: RobotClient, beat: Beat, monkeypatch: pytest.MonkeyPatch
 ) -> None:

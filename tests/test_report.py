@@ -63,6 +63,7 @@ def verdicts(run: GazeTrace) -> dict[str, MeasureResult]:
     return {finding.band.key: finding for finding in found(run)}
 
 
+@pytest.mark.slow
 def test_a_gaze_that_wanders_as_people_do_passes_on_the_face(walking: GazeTrace) -> None:
     seen = verdicts(walking)
     for key in ("on_parts", "eyes_share", "visit", "never_taken", "heat", "part_share", "rate",
@@ -209,6 +210,7 @@ def test_a_walk_drawn_from_the_matrix_passes_and_its_reverse_does_not() -> None:
     assert back["transitions"].value > 1.5 * forth["transitions"].value
 
 
+@pytest.mark.slow
 def test_the_whole_report_is_written(walking: GazeTrace, tmp_path: Path) -> None:
     told: list[tuple[str, float]] = []
     about = RunHeader(

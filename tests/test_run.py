@@ -28,6 +28,7 @@ def visitor(half: str) -> dict[str, Any]:
     return figures(half, "--seconds", "44", "--seed", "1")
 
 
+@pytest.mark.slow
 def test_summary_tells_all_it_promises(visitor: dict[str, Any]) -> None:
     promised = {
         "seconds", "wall_seconds", "ticks", "overruns", "faces_seen", "pictures", "fixations",
@@ -57,6 +58,7 @@ def bytes_sent(*words: str) -> str:
     return digest
 
 
+@pytest.mark.slow
 def test_e59_same_seed_same_bytes_in_another_process(half: str) -> None:
     words = (half, "--seconds", "12", "--seed", "1")
     done = gazerig("run", "--mock", "--fast", "--summary", "-", *words)
@@ -70,6 +72,7 @@ def test_e59_same_seed_same_bytes_in_another_process(half: str) -> None:
     assert bytes_sent(*short, "1") != bytes_sent(*short, "2")
 
 
+@pytest.mark.slow
 def test_boxing_shows_the_papers_five_behaviours_with_their_latencies(half: str) -> None:
     run = figures(half, "--scene", "boxing")
     seen = run["behaviours"]

@@ -41,6 +41,7 @@ def begun(*words: str) -> "subprocess.Popen[str]":
     return process
 
 
+@pytest.mark.slow
 @pytest.mark.own_timeouts
 def test_signals_park_and_switch_torque_off(tmp_path: Path) -> None:
     rig = rig_at(tmp_path / "rig.yaml", 100.0)

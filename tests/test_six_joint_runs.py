@@ -215,6 +215,7 @@ def quiet(words: str, share: float) -> None:
     """Tell nobody."""
 
 
+@pytest.mark.slow
 def test_a_report_of_reckoned_joints_says_so_everywhere(maker: Run, tmp_path: Path) -> None:
     out = tmp_path / "six.html"
     made = build.report(maker.ticks, RunHeader("six"), out, quiet)
