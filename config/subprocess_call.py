@@ -14,12 +14,13 @@ from typing import Any, ParamSpec, TypeVar
 
 from gazerig.config.load import ConfigError, ConfigFault
 from gazerig.config.renamed import report_once
+from gazerig.drivers import child_process
 
 P = ParamSpec("P")
 T = TypeVar("T")
 
 _LONGEST_S = 30.0
-_CHILD = "from gazerig.config.subprocess_call import serve; serve()"
+_MODULE = "gazerig.config.subprocess_call"
 
 
 def in_subprocess(work: Callable[P, T], /, *words: P.args, **named: P.kwargs) -> T:
@@ -31,15 +32,8 @@ def in_subprocess(work: Callable[P, T], /, *words: P.args, **named: P.kwargs) ->
     Raises:
         gazerig.config.load.ConfigError: as ``work`` does, or the process failed.
     """
-    # A session of its own: Ctrl-C is for this process, which ends it in order.
     try:
-        done = subprocess.run(
-            [sys.executable, "-P", "-c", _CHILD],
-            input=pickle.dumps((work, words, named)),
-            capture_output=True,
-            start_new_session=True,
-            timeout=_LONGEST_S,
-        )
+        done = child_process.run(_MODULE, pickle.dumps((work, words, named)), _LONGEST_S)
     except subprocess.TimeoutExpired:
         raise _failed(work, f"took more than {_LONGEST_S:g} s; is the disk well?") from None
     except OSError as error:
@@ -74,3 +68,7 @@ def _outcome(
 
 def _failed(work: Callable[..., Any], rule: str) -> ConfigError:
     return ConfigError([ConfigFault(f"process for {work.__name__}", None, "", "", rule)])
+
+
+if __name__ == "__main__":
+    serve()

@@ -14,7 +14,6 @@ import secrets
 import shutil
 import socket
 import subprocess
-import sys
 import tempfile
 import threading
 from collections import deque
@@ -24,6 +23,7 @@ from math import nan
 from operator import attrgetter
 from urllib.parse import urlsplit
 
+from gazerig.drivers import child_process
 from gazerig.robot.dashboard.inbox import MESSAGE_BYTES, TELL, Inbox, told
 from gazerig.robot.dashboard.stop_channel import StopListener
 from gazerig.robot.model.clock import RealClock
@@ -147,25 +147,18 @@ class PageProcess:
         self._folder = tempfile.mkdtemp(prefix="gazerig-page-")
         with theirs, their_stops:
             fds = theirs.fileno(), their_stops.fileno()
-            self._process = subprocess.Popen(
-                self._command(*fds),
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
+            self._process = child_process.start(
+                "gazerig.robot.dashboard.page_main",
+                *self._arguments(*fds),
                 stderr=self._errors_fd,
                 pass_fds=fds,
-                env={
-                    **_environment(),
-                    TOKEN_VARIABLE: self._token,
-                    FOLDER_VARIABLE: self._folder,
-                },
-                start_new_session=True,  # Ctrl-C in the terminal is the rig's, not the page's
+                variables={TOKEN_VARIABLE: self._token, FOLDER_VARIABLE: self._folder},
             )
         self._began_s = self._clock.now_s()
         self.join(ours, stops)
 
-    def _command(self, fd: int, stop_fd: int) -> list[str]:
-        arguments = [str(fd), str(stop_fd), str(os.getpid()), self._host, str(self._port)]
-        return [sys.executable, "-P", "-m", "gazerig.robot.dashboard.page_main", *arguments]
+    def _arguments(self, fd: int, stop_fd: int) -> list[str]:
+        return [str(fd), str(stop_fd), str(os.getpid()), self._host, str(self._port)]
 
     def join(self, link: socket.socket, stops: socket.socket | None = None) -> None:
         """Talk over these from now on; ``open`` makes them with a process at the other ends.
@@ -347,8 +340,3 @@ def _code(process: subprocess.Popen[bytes]) -> int | None:
         return process.wait(_CLOSE_PATIENCE_S)
     except subprocess.TimeoutExpired:
         return None
-
-
-def _environment() -> dict[str, str]:
-    """Return this process's environment with numerics in one thread."""
-    return {**os.environ, "OPENBLAS_NUM_THREADS": "1"}

@@ -3,8 +3,8 @@
 import os
 import select
 import subprocess
-import sys
 
+from gazerig.drivers import child_process
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.guardian import process
 from gazerig.robot.guardian.heartbeat import (
@@ -168,14 +168,14 @@ class Guardian:
     def _start(self) -> None:
         """Start the process; raises OSError where the system refuses."""
         self._ready = False
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", process.__name__, str(self._fd), encode(self.plans)],
+        self._process = child_process.start(
+            process.__name__,
+            str(self._fd),
+            encode(self.plans),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             bufsize=0,
             pass_fds=(self._fd,),
-            # Ctrl-C and a closed terminal are the program's.
-            start_new_session=True,
         )
 
     def _end_unfinished(self) -> None:

@@ -4,15 +4,14 @@ What the socket does not take stays in a queue until it does. Beyond the queue's
 what is handed over is lost, and the caller is told. Without the process all goes on.
 """
 
-import os
 import pickle
 import select
 import socket
 import subprocess
-import sys
 from collections import deque
 from typing import Any
 
+from gazerig.drivers import child_process
 from gazerig.robot.recording import writer_process as writer
 from gazerig.robot.recording.run_writer import WrittenFile
 
@@ -44,14 +43,12 @@ class WriterClient:
         """Start the process that writes to an open file; returns at once."""
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
-            self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", writer.__name__, str(theirs.fileno()), str(file_fd)],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
+            self._process = child_process.start(
+                writer.__name__,
+                str(theirs.fileno()),
+                str(file_fd),
                 stderr=subprocess.DEVNULL,
                 pass_fds=(theirs.fileno(), file_fd),
-                env=_environment(),
-                start_new_session=True,  # Ctrl-C in the terminal is the rig's
             )
         ours.setblocking(False)
         self._socket = ours
@@ -157,8 +154,3 @@ class WriterClient:
         self._queued = 0
         if self.done is None:
             self.failed = self.failed or why
-
-
-def _environment() -> dict[str, str]:
-    """Return this process's environment with numerics in one thread."""
-    return {**os.environ, "OPENBLAS_NUM_THREADS": "1"}

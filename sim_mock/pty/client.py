@@ -2,13 +2,13 @@
 
 import json
 import subprocess
-import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from gazerig.drivers import child_process
 from gazerig.sim_mock.devices import DynamixelLine, Emulated, packed
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
@@ -28,13 +28,12 @@ class _Served:
         links = [str(Path(self._folder.name) / f"tty{k or ''}") for k in range(len(buses))]
         linked = [{**bus, "link": link} for bus, link in zip(buses, links, strict=True)]
         settings = json.dumps({"buses": linked, "until_eof": True})
-        self._server = subprocess.Popen(
-            [sys.executable, "-P", "-m", "gazerig.sim_mock.pty.server", settings],
+        self._server = child_process.start(
+            # The servos must outlive their client's way out: they end when their input does.
+            "gazerig.sim_mock.pty.server",
+            settings,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            # Ctrl-C and timeouts go to a whole group: the servos must outlive their client's
-            # way out. They end when their standard input does.
-            start_new_session=True,
         )
         told = [self._hear() for _ in buses]
         if not all(told):

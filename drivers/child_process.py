@@ -1,0 +1,85 @@
+"""The one way in which this program starts a process of its own code.
+
+A child runs a module of this package with the same interpreter. It finds no module in the
+working folder (``-P``), is in a session of its own, as Ctrl-C in the terminal is for the program,
+which ends its children in order, and does its numerics in one thread beside the control loop's.
+A child ends when its end of a pipe or socket says so; whoever starts it waits for it or kills it.
+The camera's process alone is started by ``multiprocessing`` (drivers/camera/process.py), as
+frames go through memory that both share.
+"""
+
+import os
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from subprocess import DEVNULL
+
+_NO_VARIABLES: Mapping[str, str] = {}
+
+
+def start(
+    module: str,
+    *arguments: str,
+    stdin: int = DEVNULL,
+    stdout: int = DEVNULL,
+    stderr: int | None = None,
+    pass_fds: Sequence[int] = (),
+    variables: Mapping[str, str] = _NO_VARIABLES,
+    bufsize: int = -1,
+) -> subprocess.Popen[bytes]:
+    """Start a module of this package as a process.
+
+    Args:
+        module: full name; it is run as ``python -m`` does.
+        arguments: its command line.
+        stdin: PIPE to write to it, DEVNULL.
+        stdout: PIPE to read from it, DEVNULL.
+        stderr: a file descriptor; None: this process's.
+        pass_fds: file descriptors that it inherits under their numbers.
+        variables: added to its environment.
+        bufsize: of the pipes, as ``subprocess.Popen`` has it.
+
+    Raises:
+        OSError: it cannot be started.
+    """
+    return subprocess.Popen(
+        _command(module, arguments),
+        stdin=stdin,
+        stdout=stdout,
+        stderr=stderr,
+        pass_fds=tuple(pass_fds),
+        env=_environment(variables),
+        start_new_session=True,
+        bufsize=bufsize,
+    )
+
+
+def run(module: str, given: bytes, timeout_s: float) -> subprocess.CompletedProcess[bytes]:
+    """Run a module of this package to its end.
+
+    Args:
+        module: full name.
+        given: its standard input.
+        timeout_s: it is killed when it takes longer.
+
+    Raises:
+        OSError: it cannot be started.
+        subprocess.TimeoutExpired: it took too long.
+    """
+    return subprocess.run(
+        _command(module, ()),
+        input=given,
+        capture_output=True,
+        env=_environment({}),
+        start_new_session=True,
+        timeout=timeout_s,
+        check=False,
+    )
+
+
+def _command(module: str, arguments: Sequence[str]) -> list[str]:
+    return [sys.executable, "-P", "-m", module, *arguments]
+
+
+def _environment(variables: Mapping[str, str]) -> dict[str, str]:
+    return {**os.environ, "OPENBLAS_NUM_THREADS": "1", **variables}
