@@ -1,0 +1,202 @@
+"""What can go wrong on a bus of smart servos, whatever their make, and what the driver makes of it.
+
+What must be true of each: a read takes a bounded time; no value is delivered that was not
+true in its cycle (the rigs assert it in every tick); one bad servo does not blind the others.
+What faults only one make has is in test_dynamixel_listed_faults and test_feetech_faults.
+"""
+
+from functools import partial
+
+import pytest
+import sts_rig
+from copied import copied
+from dynamixel_rig import WAYS
+from dynamixel_rig import Rig as DynamixelRig
+from moving_bus import (
+    LONGEST_S,
+    live_through_answers_out_of_order,
+    live_through_duplicates,
+    live_through_everybody_late,
+    live_through_harmless,
+    live_through_missing_ids,
+)
+
+from gazerig.drivers.errors import BusLost, PortError, ServoMissing
+
+RIGS = {
+    **{f"dynamixel {way}": partial(DynamixelRig, *chosen) for way, chosen in WAYS.items()},
+    "feetech": sts_rig.Rig,
+}
+
+
+@pytest.fixture(scope="module")
+def started():
+    return {name: make().start() for name, make in RIGS.items()}
+
+
+@pytest.fixture(params=RIGS)
+def rig(request, started):
+    return copied(started[request.param])
+
+
+@pytest.fixture(params=RIGS)
+def make(request):
+    return RIGS[request.param]
+
+
+PASSING = [
+    "drop 2 0",
+    "drop 2 3",
+    "drop 2 8",
+    "drop 2 -1",
+    "corrupt 2 20",
+    "corrupt 2 70",
+    "corrupt 2 160",
+    "corrupt 2 180",
+    "truncate 2 0",
+    "truncate 2 5",
+    "truncate 2 11",
+    "delay 2 10",
+    "delay 2 60",
+    "wrong-id 2 3",
+    "wrong-id 2 77",
+    "refuse 2 BITS",
+    "short 2 2",
+    "long 2 2",
+    "lose 2",
+    "stall 2 30",
+    "stall 2 60",
+]
+
+
+@pytest.mark.parametrize("fault", PASSING)
+def test_a_passing_fault_costs_little_and_passes(rig, fault):
+    weak = rig.bus._family.weak_check
+    fault = fault.replace("BITS", "32" if weak else "7")
+    # One that is late or stalls keeps the line from all servos so long.
+    late_ms = int(fault.split()[2]) if fault.split()[0] in ("delay", "stall") else 0
+    for times in (1, 5):
+        rig.command(f"{fault} count {times}")
+        lost = 0
+        for _ in range(30):
+            heard = rig.heard()
+            lost += not (heard[0] and heard[2] and heard[3])
+        rig.until_all()
+        # An answer under another's id spoils that other's, and too long a block the header; on a
+        # line that was disturbed an answer that is not confirmed costs one more.
+        two = fault in ("wrong-id 2 3", "long 2 2")
+        assert lost <= times * (late_ms / 10.0 + 2.0 if late_ms else weak + two)
+        assert rig.heard() == [True] * 4
+    assert rig.longest_s < LONGEST_S
+    assert rig.bus.faults() == ()
+
+
+@pytest.mark.parametrize(
+    "fault",
+    ["noise before FFFF", "noise before FFFF0102", "noise before FFFFFD00",
+     "noise before FFFFFD00010200", "noise before", "noise after FF", "noise after", "fragment 1",
+     "fragment", "echo on", "delay 2 0.3", "stall 3 0.3"],
+)  # fmt: skip
+def test_what_is_harmless(rig, fault):
+    live_through_harmless(rig, fault)
+
+
+def test_answers_that_come_twice(rig):
+    live_through_duplicates(rig)
+
+
+@pytest.mark.parametrize("late_ms", [3, 15, 60, 80, 200])
+def test_all_late_is_never_taken_for_fresh(rig, late_ms):
+    live_through_everybody_late(rig, late_ms)
+
+
+def test_answers_out_of_order(rig):
+    live_through_answers_out_of_order(rig)
+
+
+@pytest.mark.parametrize("policy", ["silence", "skip", "timeout"])
+@pytest.mark.parametrize("missing", [(1,), (4,), (2, 3)])
+def test_silent_servos_cost_only_themselves(rig, policy, missing):
+    live_through_missing_ids(rig, policy, missing)
+
+
+def test_a_port_that_fails_is_opened_again(rig):
+    rig.command("unplug for 0.4")
+    assert rig.heard() == [False] * 4
+    assert rig.bus.events()[0].startswith("port lost: ")
+    rig.bus.write([2000] * 4)
+    began_s = rig.now_s
+    rig.until_all()
+    assert rig.now_s - began_s < 1.0
+    assert any(line.startswith("port back after 0.") for line in rig.bus.events())
+
+
+def test_a_port_that_stays_away_is_given_up(make):
+    rig = make(give_up_s=2.0).start()
+    rig.command("unplug")
+    began_s = rig.now_s
+    with pytest.raises(BusLost, match="has been gone for 2.0 s"):
+        for _ in range(1000):
+            rig.tick()
+    assert 2.0 <= rig.now_s - began_s <= 2.1
+    with pytest.raises(BusLost, match="they hold their place: cut|no bus watchdog: cut"):
+        rig.bus.disable_torque()
+    rig.command("plug")
+    rig.bus.disable_torque()
+    assert not any(servo.torque for servo in rig.chain.servos)
+
+
+def test_opening_is_forbidden(make):
+    rig = make()
+    rig.command("deny on")
+    with pytest.raises(PortError, match="Permission denied"):
+        rig.bus.open()
+
+
+@pytest.mark.parametrize("what", ["silence", "garbage"])
+@pytest.mark.parametrize(
+    "away",
+    [
+        partial(DynamixelRig, heed_baud=True, servo_baud=1_000_000, baud=57_600),
+        partial(sts_rig.Rig, baud=500_000),
+    ],
+    ids=["dynamixel", "feetech"],
+)
+def test_wrong_baud_rate(away, what):
+    rig = away()
+    rig.command(f"set wrong-baud {what}")
+    with pytest.raises(ServoMissing, match="no servo answers: check servo power, cable and baud"):
+        rig.bus.open()
+
+
+def test_a_babbling_node(rig):
+    rig.command("babble on for 0.5")
+    for _ in range(30):
+        rig.tick()
+    assert rig.longest_s < 0.5
+    rig.until_all()
+
+
+def test_lost_writes(rig):
+    rig.command("lose-writes 3")
+    for _ in range(4):
+        rig.tick([2500] * 4)
+    assert [servo.memory.get("goal_position") for servo in rig.chain.servos] == [2500] * 4
+
+
+def test_lost_writes_while_the_torque_comes_on_and_goes(make):
+    rig = make()
+    rig.bus.open()
+    rig.command("lose-writes 2")
+    rig.bus.enable_torque()
+    rig.command("lose-writes 2")
+    rig.bus.disable_torque()
+    assert not any(servo.torque for servo in rig.chain.servos)
+
+
+def test_a_blocked_write(rig):
+    rig.command("block on for 0.6")
+    assert rig.heard() == [False] * 4
+    assert "takes no bytes" in rig.bus.events()[0]
+    rig.until_all()
+    assert rig.longest_s < 0.3
