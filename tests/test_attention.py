@@ -11,7 +11,7 @@ import pytest
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.attention import Attention, AttentionParams
 from gazerig.gaze.bottom_up import BottomUp, BottomUpParams, motion_terms
-from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
+from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams, occluded
 from gazerig.gaze.idle import Idle, IdleParams
 from gazerig.gaze.top_down import Rule, TopDown, TopDownParams
 from gazerig.gaze.types import Bodies, GazeState, Percept, Salience, Target
@@ -91,6 +91,21 @@ def test_what_spins_about_the_line_of_view_is_attended_to_and_what_spins_across_
     expected = 6.0 / params.rotation_reference_rad_s
     assert found.rotation == pytest.approx([0.0, expected, 0.0])
     assert found.total == pytest.approx([0.0, expected, 0.0])
+
+
+def test_the_person_looked_at_last_counts_as_nearer() -> None:
+    faces = percept(0.0, body(1, "face", (1.0, 0, 0)), body(2, "face", (1.5, 0, 0))).bodies
+    params = TopDownParams(stay_with_person=2.0, nearness=1.0)
+    seen, eye = np.ones(2, bool), (0.0, 0.0, 0.0)
+    for favoured, expected in ((-1, [1.0, 1.0 / 1.5]), (2, [0.75, 1.0]), (1, [1.0, 1.0 / 3.0])):
+        found = TopDown(params).step(faces, seen, eye, favoured)
+        assert found is not None and found.nearness == pytest.approx(expected)
+
+
+def test_what_is_behind_the_eye_hides_nothing_before_it() -> None:
+    places, rows = np.array([[2.0, 0, 0], [-1.0, 0, 0], [1.0, 0, 0]]), np.array([0])
+    assert not occluded(places[:2], np.array([0.1, 0.3]), rows).any()
+    assert occluded(places[[0, 2]], np.array([0.1, 0.3]), rows).all()
 
 
 def test_pulls_rise_with_the_time_constant() -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from desk import JOINTS, LIDS
 
+from gazerig.gaze.blink_statistics import blink_pause_s
 from gazerig.gaze.head import Head, HeadParams
 from gazerig.gaze.lids import LidMode, LidParams, Lids, Side
 from gazerig.gaze.oculomotor import Oculomotor, OculomotorParams
@@ -50,6 +51,12 @@ def test_e50_blink_rate(mode: LidMode, rate: float, band: float, seed: int) -> N
     assert len(times) / 20.0 == pytest.approx(rate, abs=band)
     assert 0.5 <= gaps.std() / gaps.mean() <= 1.2
     assert gaps.min() >= 0.6
+
+
+def test_a_blink_is_part_of_its_interval() -> None:
+    fixed = LidParams(interval_distribution="fixed")
+    pause_s = blink_pause_s(fixed, 20.0, 0.4, np.random.default_rng(0))
+    assert pause_s == pytest.approx(60.0 / 20.0 - 0.4)
 
 
 def test_e51_blink_shape() -> None:
