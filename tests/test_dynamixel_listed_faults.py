@@ -240,6 +240,21 @@ def test_27_watchdog_trip(rig):
     assert [s.memory.get("bus_watchdog") for s in rig.chain.servos] == [10] * 4
 
 
+def test_27_a_watchdog_that_tripped_unnoticed_is_found_where_servos_were_read_without_torque():
+    rig = Rig()
+    rig.bus.open()
+    for _ in range(3):
+        rig.tick()
+    rig.bus.enable_torque()
+    rig.until_all()
+    # As where packets get lost on the way to one servo, and the host has sent them in time.
+    rig.chain[2].memory.set("bus_watchdog", 255)
+    for _ in range(600):
+        rig.tick([2000] * 4)
+    assert rig.errors().get("watchdog") == 1
+    assert any("watchdog of 1 servo stopped them" in line for line in rig.bus.events())
+
+
 def test_30_factory_defaults():
     rig = Rig(heed_baud=True)
     for servo in rig.chain.servos:

@@ -30,6 +30,11 @@ class LatchedFaultSupervisor(Supervisor):
         super().mark_all_for_recovery()
         self._due_s = -inf
 
+    def torque_enabled(self, entering: Collection[int]) -> None:
+        """Begin to look after servos under torque; some of them are outside their limits."""
+        super().torque_enabled(entering)
+        self._due_s = -inf  # from now on one is checked in turn
+
     def look_first(self) -> None:
         """Look at servos that have just been prepared."""
         self._find_alerts(self._ids)
