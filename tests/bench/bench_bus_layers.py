@@ -24,7 +24,8 @@ GOALS: Sequence[int] = [2048] * len(IDS)
 def layers(bus: SmartServoBus) -> dict[str, Cycle]:
     """Return cycles, each a layer deeper than the one before; the bus is open, its torque on."""
     reader, line, port = bus._reader, bus._line, bus._port
-    groups = [reader._group(bus._roll.group, reader._together) for _ in range(8)]
+    ids, turns = bus._poll_list.group, reader._together
+    groups = [reader._group(ids, turns.next()) for _ in range(8)]
     groups = [group for group in groups if group.columns.acceleration is None][:2]
     packet = bus._goals.packet(GOALS, bus._speeds)
 
