@@ -133,3 +133,11 @@ def test_checksums_of_many_are_right_where_each_is(bodies):
     for k, part in enumerate(right):
         bad = [*right[:k], part[:-1] + bytes([part[-1] ^ 0x10]), *right[k + 1 :]]
         assert not all_intact(bad, ())
+
+
+@pytest.mark.parametrize("stray", [b"\xff", b"\xff\xff", b"\x00\xff"])
+def test_a_stray_ff_before_an_answer_makes_it_no_other_servos(stray: bytes) -> None:
+    """FF FF FF 01 ...: the header is the last two of them, and 255 is no servo."""
+    answer = b"\xff\xff\x01\x02\x00\xfc"
+    (found,) = statuses(stray + answer)
+    assert found.id == 1 and found.intact

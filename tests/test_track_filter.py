@@ -32,3 +32,18 @@ def test_who_stopped_while_out_of_sight_is_not_said_to_rush_back(unseen: int) ->
 
 def test_who_went_on_out_of_sight_is_as_fast_as_before() -> None:
     assert walked(5, stops_after=5).state[4] == pytest.approx(1.8, abs=0.4)
+
+
+def test_who_is_out_of_sight_comes_to_rest() -> None:
+    """A speed of 1.8 m/s is down to a third after a second unseen, and goes at most 1.9 m."""
+    track = TrackFilter((0.0, 0.0, 0.0), FINE, 0.7, ProcessNoise(0.12, 10.0))
+    for k in range(1, 31):
+        track.predict(DT_S)
+        track.correct((0.0, 1.8 * k * DT_S, 0.0), FINE)
+    gone_m, speed_m_s = float(track.state[1]), float(track.state[4])
+    for _ in range(30):
+        track.predict(DT_S, seen=False)
+    assert track.state[4] == pytest.approx(speed_m_s * np.exp(-1.0), rel=0.01)
+    for _ in range(300):
+        track.predict(DT_S, seen=False)
+    assert track.state[1] - gone_m < 1.9
