@@ -90,7 +90,7 @@ class SmartServoBus(PortBus):
         line, log = self._line, self._log
         by_id = self._by_id = {setup.id: setup for setup in self._setups}
         self._link = LastingPort(
-            self._port, self._params.baud, self._params.give_up_s, log, self._trust_nobody
+            self._port, self._params.baud, self._params.give_up_s, log, self._reset_after_reconnect
         )
         self._poll_list = PollList(self._ids)
         self._health = Health(by_id, log)
@@ -130,7 +130,9 @@ class SmartServoBus(PortBus):
 
     def _take_whole(self, answer: GroupReply, now_s: float) -> bool:
         """Take an answer in which nothing is amiss; False where anything must be looked at."""
-        if self._family.weak_check and (self._disturbed(now_s) or self._reader.any_owing(now_s)):
+        if self._family.weak_check and (
+            self._disturbed(now_s) or self._reader.any_answer_owed(now_s)
+        ):
             return False
         return self._supervisor.at_ease and self._feedback.take_whole(answer)
 
@@ -161,8 +163,8 @@ class SmartServoBus(PortBus):
                 feedback.take(slot, one)
             else:
                 self._line.errors["implausible"] += 1
-        supervisor.note_out(self._poll_list.out, now_s)
-        self._health.note_silent(
+        supervisor.record_out(self._poll_list.out, now_s)
+        self._health.record_silent(
             self._poll_list.out, now_s, self._poll_list.garbling, self._line.lateness, bool(heard)
         )
 
@@ -183,7 +185,7 @@ class SmartServoBus(PortBus):
             BusLost: the port is gone.
         """
         disturbed = self._disturbed(now_s)
-        doubtful = [i for i in heard if disturbed or self._reader.owing(i, now_s)]
+        doubtful = [i for i in heard if disturbed or self._reader.answer_owed(i, now_s)]
         again = self._reader.again(doubtful) if doubtful else {}
         kept = {i: one for i, one in heard.items() if i not in doubtful}
         for servo_id in doubtful:
@@ -263,7 +265,7 @@ class SmartServoBus(PortBus):
             self._lose(lost)
             return self._nothing
         if self._poll_list.troubled:
-            self._mind_silence(now_s)
+            self._check_silence(now_s)
         return self._feedback.now
 
     def enable_torque(self) -> tuple[int, ...]:
@@ -350,8 +352,8 @@ class SmartServoBus(PortBus):
             f"power keep their torque, {rest}: {CUT} to free them"
         )
 
-    def _mind_silence(self, now_s: float) -> None:
-        """Give up where nobody has answered for too long.
+    def _check_silence(self, now_s: float) -> None:
+        """Give up where no servo has answered for too long.
 
         Raises:
             BusLost: so it is.
@@ -363,7 +365,7 @@ class SmartServoBus(PortBus):
                 "check servo power and the cable"
             )
 
-    def _trust_nobody(self) -> None:
+    def _reset_after_reconnect(self) -> None:
         """Begin anew with a port that was away."""
         self._poll_list = self._reader.poll_list = PollList(self._ids)
         self._line.starved = False

@@ -53,12 +53,12 @@ class Health:
         return True
 
     def name(self, servo_id: int, fault: str) -> None:
-        """Note a fault that stays until the servo has been restarted."""
+        """Record a fault that stays until the servo has been restarted."""
         self.faults[servo_id] = fault
         self._log.add(f"{servo_label(self._setups[servo_id])}: {fault}")
 
     def cleared(self, servo_id: int) -> None:
-        """Note that a servo's latched error is gone."""
+        """Record that a servo's latched error is gone."""
         if servo_id in self.latches:
             self.latches.discard(servo_id)
             del self.faults[servo_id]
@@ -74,11 +74,11 @@ class Health:
         return True
 
     def restarted(self, servo_id: int, now_s: float) -> None:
-        """Note that a servo had restarted and is well again."""
+        """Record that a servo had restarted and is well again."""
         self._restarts.setdefault(servo_id, []).append(now_s)
         self._log.add(f"{servo_label(self._setups[servo_id])} restarted: set up anew")
 
-    def note_silent(
+    def record_silent(
         self,
         out: Collection[int],
         now_s: float,
@@ -86,7 +86,7 @@ class Health:
         lateness: HostLateness,
         heard: bool,
     ) -> None:
-        """Note who is out now; speaks of those who have been so for a while, once.
+        """Record who is out now; speaks of those who have been so for a while, once.
 
         lateness: answers that came late: then it is this computer that is to blame, at first
         heard: anybody at all has answered
@@ -142,7 +142,7 @@ class Health:
         self._all_silent = False
 
     def stopped(self, count: int, asleep_s: float, now_s: float) -> None:
-        """Note that servos were stopped by their own watchdog and go on from where they are.
+        """Record that servos were stopped by their own watchdog and go on from where they are.
 
         asleep_s: for so long this computer has sent nothing; 0 where it has
         """

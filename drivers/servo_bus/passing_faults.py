@@ -85,7 +85,7 @@ class PassingFaultSupervisor(Supervisor):
         if sample.torque is not None:
             self._check_torque(servo_id, sample)
 
-    def note_out(self, out: Collection[int], now_s: float) -> None:
+    def record_out(self, out: Collection[int], now_s: float) -> None:
         """Record who is out of the group now; who is back after long may have restarted."""
         for servo_id in [i for i in self._out_since_s if i not in out]:
             since_s = self._out_since_s.pop(servo_id)

@@ -42,7 +42,7 @@ class PollList:
         return min(ready, key=waiting.__getitem__, default=None)
 
     def silent(self, servo_id: int, now_s: float) -> None:
-        """Note that a servo did not answer; one that is new to that is due at once."""
+        """Record that a servo did not answer; one that is new to that is due at once."""
         if servo_id in self._due_s:
             wait_s = self._wait_s.get(servo_id, AGAIN_FIRST_S)
             self._due_s[servo_id] = now_s + wait_s
@@ -52,7 +52,7 @@ class PollList:
         self._regroup()
 
     def damaged(self, servo_id: int, now_s: float) -> None:
-        """Note that a servo's answer arrived damaged."""
+        """Record that a servo's answer arrived damaged."""
         self._damaged[servo_id] = self._damaged.get(servo_id, 0) + 1
         self.troubled = True
         if self._damaged[servo_id] >= DAMAGED_IN_A_ROW or servo_id in self._due_s:
@@ -60,7 +60,7 @@ class PollList:
             self.silent(servo_id, now_s)
 
     def answered(self, servo_id: int) -> bool:
-        """Note a good answer; gives whether the servo had been out."""
+        """Record a good answer; return whether the servo had been out."""
         self.garbling.discard(servo_id)
         if self._damaged.pop(servo_id, None) is not None:
             self.troubled = bool(self._due_s or self._damaged)

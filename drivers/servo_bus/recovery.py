@@ -10,7 +10,7 @@ from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.servo_bus.faults import Health
 from gazerig.drivers.servo_bus.provisioning import Provisioning
-from gazerig.drivers.servo_bus.torque import find_ailing, insist, positions, switch_off, switch_on
+from gazerig.drivers.servo_bus.torque import find_faults, insist, positions, switch_off, switch_on
 from gazerig.drivers.servo_bus.transaction import Line
 from gazerig.drivers.servo_bus.turn import nearest_turn
 from gazerig.drivers.slow_entry import entry_speed_steps_s
@@ -124,7 +124,7 @@ class Recovery:
 
     def _without_latched(self, ids: tuple[int, ...]) -> tuple[int, ...]:
         """Leave out servos that have latched an error, as they take no torque."""
-        latched = find_ailing(self._line, ids) if self._family.faults_latch else {}
+        latched = find_faults(self._line, ids) if self._family.faults_latch else {}
         for servo_id, bits in latched.items():
             self._health.latched(servo_id, self._family.name_errors(bits))
         return tuple(i for i in ids if i not in latched)

@@ -9,7 +9,7 @@ from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.read_plan import ReadPlan
 from gazerig.drivers.servo_bus.read_windows import Sample
 from gazerig.drivers.servo_bus.recovery import Recovery
-from gazerig.drivers.servo_bus.torque import heal_tripped
+from gazerig.drivers.servo_bus.torque import rearm_tripped
 from gazerig.drivers.servo_bus.transaction import TRIES, Line
 from gazerig.drivers.slow_entry import SlowEntry
 from gazerig.drivers.types import ServoSetup
@@ -113,7 +113,7 @@ class Supervisor(ABC):
     def answers_again(self, servo_id: int) -> None:  # noqa: B027  # some have nothing to do
         """Look at a servo that had been out of the group."""
 
-    def note_out(self, out: Collection[int], now_s: float) -> None:  # noqa: B027
+    def record_out(self, out: Collection[int], now_s: float) -> None:  # noqa: B027
         """Record who is out of the group now."""
 
     # --- servos to be set up again
@@ -149,7 +149,7 @@ class Supervisor(ABC):
         ids = tuple(group)
         if not ids:
             return
-        healed = heal_tripped(self._line, ids, self._watchdog, self._recovery.clip)
+        healed = rearm_tripped(self._line, ids, self._watchdog, self._recovery.clip)
         self._rearmed.update(healed)
         self._line.errors["watchdog"] += len(healed)
         if healed:

@@ -1,4 +1,4 @@
-"""The one read of every tick: everybody in one exchange, and what to do about those who fail.
+"""The one read of every tick: all servos in one exchange, and what to do about those who fail.
 
 A servo that keeps silent or garbles costs only itself: those whose answers were lost with
 its own are asked again at once without it.
@@ -63,7 +63,7 @@ class Reader:
         self._prepared: dict[int, GroupRead] = {}
 
     def read(self, now_s: float) -> GroupReply | dict[int, ServoReply]:
-        """Read everybody who is asked now; who is not in the answer gave no good one.
+        """Read all servos that is asked now; who is not in the answer gave no good one.
 
         Raises:
             BusLost: the port is gone.
@@ -72,7 +72,7 @@ class Reader:
         if self._together.troubled:
             self._together.calm(now_s)
         if polled.troubled or not self._line.family.sync_read:
-            return self._with_care(now_s)
+            return self._read_troubled(now_s)
         group = self._group(polled.group, self._together.next())
         raw, at_s = self._line.exchange(group.request, group.reply_length)
         self._until_s = self._line.whole_s + self._line.most_s
@@ -83,7 +83,7 @@ class Reader:
         self._save(group, raw, at_s, heard, now_s, self._together)
         return heard
 
-    def owing(self, servo_id: int, now_s: float) -> bool:
+    def answer_owed(self, servo_id: int, now_s: float) -> bool:
         """Return whether a servo has left a question unanswered of late.
 
         The answer that comes now may be to that one where a packet says nothing of when or to
@@ -91,7 +91,7 @@ class Reader:
         """
         return now_s - self._unanswered_s.get(servo_id, -inf) <= OWED_S
 
-    def any_owing(self, now_s: float) -> bool:
+    def any_answer_owed(self, now_s: float) -> bool:
         """Return whether any servo has left a question unanswered of late."""
         unanswered_s = self._unanswered_s
         return bool(unanswered_s) and now_s - max(unanswered_s.values()) <= OWED_S
@@ -114,7 +114,7 @@ class Reader:
             heard |= {servo_id: ServoReply(sample, at_s) for servo_id, sample in samples.items()}
         return heard
 
-    def _with_care(self, now_s: float) -> dict[int, ServoReply]:
+    def _read_troubled(self, now_s: float) -> dict[int, ServoReply]:
         """Read the group, and one of those who are out of it."""
         heard: dict[int, ServoReply] = {}
         together, due = self.poll_list.group, self.poll_list.due(now_s)
@@ -202,7 +202,7 @@ class Reader:
     def _blame(
         self, damaged: Collection[int], silent: Collection[int], now_s: float, turns: WindowSchedule
     ) -> None:
-        """Note who failed; what still comes must not be taken for the next answer."""
+        """Record who failed; what still comes must not be taken for the next answer."""
         line, polled = self._line, self.poll_list
         if damaged:
             line.lateness.forget()  # noise looks late, too

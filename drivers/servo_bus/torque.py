@@ -121,7 +121,7 @@ def switch_on(line: Line, ids: Sequence[int], goals: Sequence[int], speeds: Sequ
     try:
         insist(line, ids, "torque_enable", [1] * len(ids))
     except ServoMissing:
-        ailing = find_ailing(line, ids)
+        ailing = find_faults(line, ids)
         if not ailing:
             raise
         named = ", ".join(
@@ -156,13 +156,13 @@ def switch_off(line: Line, ids: Sequence[int]) -> Released:
     return Released(holding, tuple(servo_id for servo_id in left if servo_id not in found))
 
 
-def find_ailing(line: Line, ids: Sequence[int]) -> dict[int, int]:
+def find_faults(line: Line, ids: Sequence[int]) -> dict[int, int]:
     """Return the error bits of the servos that answer and have any."""
     found = line.ask(ids, line.family.error_register)
     return {servo_id: bits for servo_id, bits in found.items() if bits}
 
 
-def heal_tripped(
+def rearm_tripped(
     line: Line, ids: Sequence[int], watchdog: int, clip: Callable[[int, int], int]
 ) -> tuple[int, ...]:
     """Return servos whose bus watchdog has tripped their present position as goal and arm it anew.

@@ -153,7 +153,7 @@ class Line:
                 return len(dropped)
 
     def _note_late(self, raw: bytes) -> None:
-        """Note answers that came after waiting for them had ended; noise is none."""
+        """Record answers that came after waiting for them had ended; noise is none."""
         if any(status.intact for status in self.family.codec.statuses(raw)):
             self.lateness.late_answer(self.port.now_s())
 
@@ -161,7 +161,7 @@ class Line:
         """Read the same bytes of several servos.
 
         A silent servo silences those behind it: they are asked again without it, and it
-        alone where it may be asked more than once. In the loop, where nobody answers at all
+        alone where it may be asked more than once. In the loop, where no servo answers at all
         that is the end of it.
         """
         values: dict[int, bytes] = {}
