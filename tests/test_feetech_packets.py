@@ -141,3 +141,7 @@ def test_a_stray_ff_before_an_answer_makes_it_no_other_servos(stray: bytes) -> N
     answer = b"\xff\xff\x01\x02\x00\xfc"
     (found,) = statuses(stray + answer)
     assert found.id == 1 and found.intact
+
+
+def test_a_stray_ff_is_not_counted_as_part_of_the_answer_awaited() -> None:
+    assert bytes_missing(b"\xff\xff\xff\x01\x02", 1, 0) == 2
