@@ -242,7 +242,7 @@ class Machine:
 
     # --- ticks
 
-    def wish(self, t_s: float) -> list[float]:
+    def desired(self, t_s: float) -> list[float]:
         """Return a wave through the middle of every range, well below its limits."""
         wave = []
         for i, limit in enumerate(self.limits):
@@ -267,8 +267,8 @@ class Machine:
         t_s = self.clock.now_s()
         joints = self.body.read(t_s)
         self.longest_s = max(self.longest_s, self.clock.now_s() - t_s)
-        wish = tuple(self.wish(t_s))
-        verdict = self.guard.check(wish, joints, 0.0, t_s)
+        desired = tuple(self.desired(t_s))
+        verdict = self.guard.check(desired, joints, 0.0, t_s)
         self._judge_command(verdict.command_rad, joints.rearmed, t_s)
         self.body.write(verdict.command_rad)
         self.said += self.body.bus.events()
@@ -278,7 +278,7 @@ class Machine:
         )
         return tuple(
             self.heard[i]
-            and abs(true[i] - wish[i]) <= NEAR_RAD
+            and abs(true[i] - desired[i]) <= NEAR_RAD
             and abs(joints.position_rad[i] - true[i]) <= NEAR_RAD
             for i in range(len(self.names))
         )

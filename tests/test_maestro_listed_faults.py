@@ -60,7 +60,7 @@ class Bench:
         channels = self.board.faults.reports()
         return [channels[setup.id]["position"] for setup in SETUPS]
 
-    def tick(self, wish):
+    def tick(self, desired):
         """Read and write once, as a loop does: goals go on from where servos are held."""
         slot_s = self.now_s = self.now_s + TICK_S
         readings = rows(self.bus.read(slot_s))
@@ -69,7 +69,7 @@ class Bench:
             if reading is not None and reading.rearmed:
                 self.goals[i] = float(reading.position_steps)
             if reading is not None:
-                step = wish[i] - self.goals[i]
+                step = desired[i] - self.goals[i]
                 self.goals[i] += max(-60.0, min(60.0, step))
         self.bus.write([round(goal) for goal in self.goals])
         return readings
@@ -78,14 +78,14 @@ class Bench:
 @pytest.mark.parametrize("fault", FAULTS)
 def test_a_fault_on_the_way(fault):
     bench = Bench()
-    wish = [5000.0, 7000.0, 6400.0, 5600.0]
+    desired = [5000.0, 7000.0, 6400.0, 5600.0]
     shafts = bench.board.positions_steps()
     for n in range(450):
         if n == 60:
             print(bench.board.faults.command(fault))
         if n == 110:
-            wish = wish[::-1]
-        readings = bench.tick(wish)
+            desired = desired[::-1]
+        readings = bench.tick(desired)
         for setup, goal, pulse, reading in zip(
             SETUPS, bench.goals, bench.pulses(), readings, strict=True
         ):
@@ -98,7 +98,7 @@ def test_a_fault_on_the_way(fault):
         # No jump: nothing moves faster than planned but for a moment of catching up.
         assert n < 2 or moved <= 600, n
         shafts = now
-    assert bench.pulses() == [round(place) for place in wish]
+    assert bench.pulses() == [round(place) for place in desired]
     assert [r.position_steps for r in readings] == bench.pulses()
     # One lost answer, and what else a look at all channels costs on the wire.
     assert bench.slowest_s < 2.0 * TIMEOUT_S + 0.01 or fault.startswith("block")
@@ -107,18 +107,18 @@ def test_a_fault_on_the_way(fault):
 @pytest.mark.parametrize("seed", range(4))
 def test_many_faults_in_a_row(seed):
     dice, bench = default_rng(seed), Bench(seed)
-    wish = [6000.0] * len(SETUPS)
+    desired = [6000.0] * len(SETUPS)
     for n in range(1500):
         if n % 75 == 20:
             bench.board.faults.command(FAULTS[int(dice.integers(len(FAULTS)))])
         if n % 40 == 0:
-            wish = [float(goal) for goal in dice.integers(LOW, HIGH, len(SETUPS))]
-        for reading in bench.tick(wish):
+            desired = [float(goal) for goal in dice.integers(LOW, HIGH, len(SETUPS))]
+        for reading in bench.tick(desired):
             assert reading is None or LOW <= reading.position_steps <= HIGH
         assert all(pulse == 0 or LOW <= pulse <= HIGH for pulse in bench.pulses())
     bench.board.faults.command("clear")
     for _ in range(300):
-        readings = bench.tick(wish)
+        readings = bench.tick(desired)
     for reading, pulse in zip(readings, bench.pulses(), strict=True):
         assert reading is not None and reading.torque is (pulse > 0)
         assert reading.position_steps == pulse or "again and again" in reading.fault

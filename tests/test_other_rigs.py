@@ -42,14 +42,14 @@ def test_it_looks_at_its_visitor_blinks_and_lets_go(name: str, tmp_path: Path) -
     made, ticks, _ = ran(rig, 8.0)
     robot = made.robot
     last = ticks[-1]
-    assert all(len(t.wish_rad) == len(rig.names) == len(t.joints.position_rad) for t in ticks)
+    assert all(len(t.desired_rad) == len(rig.names) == len(t.joints.position_rad) for t in ticks)
     assert last.gaze.saccades > 10 and last.gaze.blinks >= 1
     assert {t.target.kind for t in ticks[400:]} >= {"face"}
     # Both eyes' mean line of sight is on the point that is looked at.
     on = [t for t in ticks[600:] if t.target.kind == "face" and t.gaze.phase == "fixate"]
     eyes = np.array([(t.pose.eye_left_rad, t.pose.eye_right_rad) for t in on]).mean(axis=1)
-    wish = np.array([(t.gaze.eye_left_rad, t.gaze.eye_right_rad) for t in on]).mean(axis=1)
-    assert np.degrees(np.median(np.abs(eyes - wish))) < 0.6
+    desired = np.array([(t.gaze.eye_left_rad, t.gaze.eye_right_rad) for t in on]).mean(axis=1)
+    assert np.degrees(np.median(np.abs(eyes - desired))) < 0.6
     assert robot.park(made.park_rad, made.clock, made.loop)
     robot.stop()
     made.close()
@@ -79,17 +79,17 @@ def test_four_lids_follow_and_meet(maker: Ran) -> None:
     rig = load_rig("maker")
     _, ticks, _ = maker
     i = {name: k for k, name in enumerate(rig.names)}
-    wish = np.degrees([t.verdict.command_rad for t in ticks])
+    desired = np.degrees([t.verdict.command_rad for t in ticks])
     shut = np.flatnonzero([t.gaze.lid_left == 0.0 for t in ticks])
     assert len(shut) > 3  # some blink shuts all the way
     at = shut[len(shut) // 2]
     ends = rig.lid_joints
-    assert ticks[at].wish_rad[i["left_upper_lid"]] == pytest.approx(radians(ends.left_shut_deg))
+    assert ticks[at].desired_rad[i["left_upper_lid"]] == pytest.approx(radians(ends.left_shut_deg))
     assert ticks[at].gaze.lower_left == 0.0
     # Between blinks the lids go with the eyes: upper and lower the same way.
     open_ = [k for k, t in enumerate(ticks) if not t.gaze.blink and k > 600]
-    tilt = wish[open_, i["eyes_tilt"]]
-    upper, lower = wish[open_, i["left_upper_lid"]], wish[open_, i["left_lower_lid"]]
+    tilt = desired[open_, i["eyes_tilt"]]
+    upper, lower = desired[open_, i["left_upper_lid"]], desired[open_, i["left_lower_lid"]]
     assert np.ptp(tilt) > 2.0
     assert np.corrcoef(tilt, upper)[0, 1] > 0.6  # looks up: the upper lid opens
     assert np.corrcoef(tilt, lower)[0, 1] < -0.6  # and the lower one follows it up: less open

@@ -116,7 +116,7 @@ def looking(
     return Snapshot(
         t_s=t_s,
         measured_rad=joints,
-        wish_rad=joints,
+        desired_rad=joints,
         R_world_head=rows(R_world_head),
         p_world_head_m=rows(p_head),
         p_world_eyes_m=(rows(eyes[0]), rows(eyes[1])),

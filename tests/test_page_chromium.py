@@ -90,9 +90,9 @@ class Rig:
             self.orders += [o for o in tick.orders if not isinstance(o, Renew)]
             self.audience.note(tick)
 
-    def wish_deg(self) -> float:
+    def desired_deg(self) -> float:
         assert self.newest is not None
-        return degrees(self.newest.wish_rad[YAW])
+        return degrees(self.newest.desired_rad[YAW])
 
     def close(self) -> None:
         self._over.set()
@@ -292,7 +292,7 @@ def test_a_slider_moves_the_wish_of_its_joint(at_the_rig: tuple[Rig, Person]) ->
     rig, person = at_the_rig
     person.click(saying("joints"))
     person.click(beside("neck yaw", ".mantine-Slider-track"), 0.8)
-    wait_for(lambda: abs(rig.wish_deg() - 42.0) < 6.0, "the wish")  # 0.8 of -70..70
+    wait_for(lambda: abs(rig.desired_deg() - 42.0) < 6.0, "the wish")  # 0.8 of -70..70
     person.click(saying("let go: look freely"))
     wait_for(lambda: rig.orders[-1]._replace(who="") == LookAt(None), "the rig being let go")
 

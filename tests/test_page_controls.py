@@ -64,7 +64,7 @@ AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 SNAPSHOT = Snapshot(
     t_s=1.0,
     measured_rad=(0.1,) * 9,
-    wish_rad=(0.1,) * 9,
+    desired_rad=(0.1,) * 9,
     R_world_head=AHEAD,
     p_world_head_m=(0.03, 0.0, 0.14),
     p_world_eyes_m=((0.03, 0.031, 0.14), (0.03, -0.031, 0.14)),
@@ -491,9 +491,9 @@ def test_a_slider_jogs_and_then_follows_its_joint(server: viser.ViserServer) -> 
     touch(server, slider, 20.0)
     assert mouth.told == [(Jog((("neck_yaw", radians(20.0)),)), "5")]
 
-    def wished(t_s: float, wish_deg: float, stopped: str = "") -> float:
-        wish = tuple(radians(wish_deg) if i == yaw else 0.1 for i in range(9))
-        view.show(replace(SNAPSHOT, t_s=t_s, wish_rad=wish, stopped=stopped))
+    def wished(t_s: float, desired_deg: float, stopped: str = "") -> float:
+        desired = tuple(radians(desired_deg) if i == yaw else 0.1 for i in range(9))
+        view.show(replace(SNAPSHOT, t_s=t_s, desired_rad=desired, stopped=stopped))
         return float(slider.value)
 
     assert wished(1.1, 6.0) == 20.0  # not yet obeyed
@@ -506,7 +506,7 @@ def test_a_slider_jogs_and_then_follows_its_joint(server: viser.ViserServer) -> 
 
 
 def test_the_table_shows_wish_and_measured() -> None:
-    table = measured_table(replace(SNAPSHOT, wish_rad=(radians(12.34),) * 9))
+    table = measured_table(replace(SNAPSHOT, desired_rad=(radians(12.34),) * 9))
     assert table.count("12.3") == 9 and table.count("5.7") == 9 and "neck yaw" in table
 
 

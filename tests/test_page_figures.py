@@ -25,7 +25,7 @@ def looking(t_s: float, name: str = "face 1: nose", part: str | None = "N") -> S
     """A head at the origin that looks straight at a face a metre away."""
     face = SeenFace(1, (1.0, 0.0, 0.0), FACING, tuple((1.0, 0.0, 0.0) for _ in PARTS))
     return Snapshot(
-        t_s=t_s, measured_rad=(0.0,) * 9, wish_rad=(0.0,) * 9, R_world_head=AHEAD,
+        t_s=t_s, measured_rad=(0.0,) * 9, desired_rad=(0.0,) * 9, R_world_head=AHEAD,
         p_world_head_m=(0.0, 0.0, 0.0), p_world_eyes_m=((0.0, 0.03, 0.0), (0.0, -0.03, 0.0)),
         gaze_world=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)), lids=(0.8, 0.8),
         p_world_target_m=(1.0, 0.0, 0.0), target_name=name, why="", phase="fixate", level="ok",

@@ -53,7 +53,7 @@ def snapshot(t_s: float = 1.0) -> Snapshot:
     eyes = ((0.03, 0.031, 0.14), (0.03, -0.031, 0.14))
     sight = ((1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
     return Snapshot(
-        t_s=t_s, measured_rad=REST, wish_rad=REST, R_world_head=AHEAD,
+        t_s=t_s, measured_rad=REST, desired_rad=REST, R_world_head=AHEAD,
         p_world_head_m=(0.03, 0.0, 0.14), p_world_eyes_m=eyes, gaze_world=sight, lids=(0.8, 0.8),
         p_world_target_m=(1.0, 0.0, 0.14), target_name="thing <4>", why="slide <0.4>",
         phase="pursue", level="ok", reasons=(), faces=(), bodies=(), rate_hz=200.0,

@@ -47,7 +47,7 @@ def snapshot(
     return Snapshot(
         t_s=t_s,
         measured_rad=measured_rad,
-        wish_rad=measured_rad,
+        desired_rad=measured_rad,
         R_world_head=AHEAD,
         p_world_head_m=(0.03, 0.0, 0.14),
         p_world_eyes_m=((0.03, 0.031, 0.14), (0.03, -0.031, 0.14)),

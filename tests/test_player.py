@@ -141,14 +141,14 @@ ASKED = st.one_of(
 @given(st.lists(st.tuples(st.floats(0.0, 3.0), ASKED), max_size=20))
 def test_whatever_is_asked_it_stays_inside_and_never_runs_backwards_by_itself(asked: list) -> None:
     player, now_s = made(), 0.0
-    for wait_s, wish in asked:
+    for wait_s, desired in asked:
         before = player.state(now_s)
         now_s += wait_s
         after = player.state(now_s)
         assert before.at_s <= after.at_s <= 10.0
         assert after.at_s - before.at_s <= wait_s * before.speed + 1e-6
         try:
-            player.obey(wish, now_s)
+            player.obey(desired, now_s)
         except ValueError as error:
             assert str(error).startswith("there is no")
         assert 0.0 <= player.state(now_s).at_s <= 10.0

@@ -47,10 +47,10 @@ def foretold_and_true(name: str, point: Vec3, seconds: float = 5.0) -> tuple[Com
         gaze = oculomotor.step(
             target_at(point)._replace(at_s=t_s), kinematics.forward(state), t_s, DT_S
         )
-        wish = kinematics.inverse(gaze)
+        desired = kinematics.inverse(gaze)
         q = tuple(
             min(max(angle, one.low_rad), one.high_rad)
-            for angle, one in zip(wish, spans, strict=True)
+            for angle, one in zip(desired, spans, strict=True)
         )
     pose = kinematics.forward(JointState(q, (0.0,) * len(q), (0.0,) * len(q), ()))
     return reply, degrees(gaze_error(point, pose, not kinematics.one_pan).whole)

@@ -306,8 +306,8 @@ def test_looking_jogging_and_asking(rig: RobotClient, beat: Beat) -> None:
     rig.look_freely()
     assert rig.status()["why"] != "somebody chose this point"
     rig.jog("neck_yaw", 10.0, stay=True)
-    wish = dict(zip(rig.status()["joints_deg"], beat.ticks[-1].wish_rad, strict=True))
-    assert wish["neck_yaw"] == pytest.approx(radians(10.0))
+    desired = dict(zip(rig.status()["joints_deg"], beat.ticks[-1].desired_rad, strict=True))
+    assert desired["neck_yaw"] == pytest.approx(radians(10.0))
     rig.jog_free()
     menus = rig.menus()
     rig.ask("conversation", "talk")

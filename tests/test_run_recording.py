@@ -322,7 +322,7 @@ def test_any_float_comes_back(recorded: Recorded, odd: float) -> None:
     tick = recorded.ticks[-1]
     tick = tick._replace(
         joints=tick.joints._replace(measured_s=(odd,) * 9, temperature_c=(None, odd, *(30.0,) * 7)),
-        wish_rad=(odd, *tick.wish_rad[1:]),
+        desired_rad=(odd, *tick.desired_rad[1:]),
         target=tick.target._replace(salience=odd),
     )
     values = orjson.loads(orjson.dumps(moments.as_json(moments.flat(tick, None, odd, ()))))

@@ -44,17 +44,17 @@ def driven(
     """Let the joints follow their commands one tick behind."""
     verdicts: list[GuardResult] = []
     position = tuple(guard._motion.command)
-    for wish in wishes:
+    for desired in wishes:
         t_s += DT
-        verdicts.append(guard.check(wish, measured(t_s, position), 0.0, t_s))
+        verdicts.append(guard.check(desired, measured(t_s, position), 0.0, t_s))
         position = verdicts[-1].command_rad
     return verdicts
 
 
 def test_a_wish_inside_everything_passes_unchanged() -> None:
     wishes = [(0.05 * (1.0 - cos(2.0 * k * DT)),) * 9 for k in range(1, 400)]
-    for wish, verdict in zip(wishes, driven(ready(), wishes), strict=True):
-        assert verdict.command_rad == pytest.approx(wish, abs=1e-12)
+    for desired, verdict in zip(wishes, driven(ready(), wishes), strict=True):
+        assert verdict.command_rad == pytest.approx(desired, abs=1e-12)
         assert verdict.level == "ok" and verdict.reasons == () and verdict.why == ()
 
 
@@ -77,9 +77,9 @@ def test_whoever_commands_is_told_what_became_of_every_joint() -> None:
 def test_a_joint_can_always_stop_inside_its_range(wishes: list[float], ticks: list[float]) -> None:
     guard, t = ready(), 0.0
     command = (0.0,) * 9
-    for wish, dt in zip(wishes, ticks, strict=False):
+    for desired, dt in zip(wishes, ticks, strict=False):
         t += dt
-        command = guard.check((wish,) * 9, measured(t, command), 0.0, t).command_rad
+        command = guard.check((desired,) * 9, measured(t, command), 0.0, t).command_rad
     commands = []
     for dt in ticks * 10:  # now no wish is any good: all must come to rest
         t += dt
@@ -231,8 +231,8 @@ def test_going_gently_in_flight_brakes_within_the_joints_own_strength() -> None:
         if k == 15:
             guard.go_gently()
         position = (0.0,) * 6 + ((path[-1] if path else 0.0),) * 3
-        wish = (0.0,) * 6 + (0.8,) * 3
-        path.append(guard.check(wish, measured(t, position), 0.0, t).command_rad[6])
+        desired = (0.0,) * 6 + (0.8,) * 3
+        path.append(guard.check(desired, measured(t, position), 0.0, t).command_rad[6])
     speeds = np.diff(path) / DT
     assert np.abs(np.diff(speeds)).max() / DT <= NECK.accel_rad_s2 + 1e-6
     assert speeds[-1] <= radians(60.0) + 1e-9

@@ -39,11 +39,11 @@ class World:
         self.guard._gentle = [False] * 9
         return self
 
-    def tick(self, dt_s: float = DT, **wish_deg: float) -> GuardResult:
+    def tick(self, dt_s: float = DT, **desired_deg: float) -> GuardResult:
         self.t_s += dt_s
         joints = JointState(self.measured(self.path[-1]), (0.0,) * 9, (self.t_s,) * 9, ())
-        wish = tuple(radians(wish_deg.get(name, 0.0)) for name in JOINTS)
-        verdict = self.guard.check(wish, joints, 0.0, self.t_s)
+        desired = tuple(radians(desired_deg.get(name, 0.0)) for name in JOINTS)
+        verdict = self.guard.check(desired, joints, 0.0, self.t_s)
         self.path.append(verdict.command_rad)
         return verdict
 
@@ -141,8 +141,8 @@ def test_no_box_is_ever_touched(tick: float, pairs: tuple[CollisionParams, ...])
     for _ in range(1500):
         if rng.random() < 0.1:
             pitch, left, right = (float(a) for a in rng.uniform(-60.0, 50.0, 3))
-        wish = {"neck_pitch": pitch, "left_upper_lid": left, "right_upper_lid": right}
-        inside += bool(world.tick(tick * float(rng.uniform(0.2, 1.0)), **wish).reasons)
+        desired = {"neck_pitch": pitch, "left_upper_lid": left, "right_upper_lid": right}
+        inside += bool(world.tick(tick * float(rng.uniform(0.2, 1.0)), **desired).reasons)
     assert inside > 50 and not world.crossed()
 
 

@@ -30,8 +30,8 @@ class World:
         self.position = [0.0] * 9
         self.path = [0.0]
 
-    def tick(self, wish: float, *, stray: float | None = None, **said: object) -> GuardResult:
-        """One tick with the joint told to go to ``wish``; stray: where it is instead."""
+    def tick(self, desired: float, *, stray: float | None = None, **said: object) -> GuardResult:
+        """One tick with the joint told to go to ``desired``; stray: where it is instead."""
         self.t_s += DT
         at = list(self.position)
         if stray is not None:
@@ -41,7 +41,7 @@ class World:
             name: tuple(one if k == JOINT else self._usual(name) for k in range(9))
             for name, one in said.items()
         }
-        wishes = tuple(wish if k == JOINT else 0.0 for k in range(9))
+        wishes = tuple(desired if k == JOINT else 0.0 for k in range(9))
         verdict = self.guard.check(wishes, joints._replace(**columns), 0.0, self.t_s)
         self.position = list(verdict.command_rad)
         self.path.append(verdict.command_rad[JOINT])
@@ -232,8 +232,8 @@ def test_the_gravest_reasons_stand_by_themselves() -> None:
     fault = tuple("overload" if k == JOINT else "" for k in range(9))
     joints = JointState((0.0,) * 9, (0.0,) * 9, (DT,) * 9, (), (), fault)
     verdict = guard.check((0.5,) * 9, joints, 0.0, DT)
-    assert len(verdict.reasons) == 9 and verdict.gravest == (f"{NAME}: overload",)
-    assert World().tick(0.0).gravest == ()
+    assert len(verdict.reasons) == 9 and verdict.critical_reasons == (f"{NAME}: overload",)
+    assert World().tick(0.0).critical_reasons == ()
 
 
 def test_what_still_moves_with_a_fault_moves_slowly_and_the_others_as_they_should() -> None:

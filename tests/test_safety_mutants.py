@@ -73,7 +73,7 @@ class Bench:
         self.why = ""
         self.level = ""
 
-    def tick(self, wish: float | tuple[float, ...], age_s: float = 0.0, **said: Any) -> float:
+    def tick(self, desired: float | tuple[float, ...], age_s: float = 0.0, **said: Any) -> float:
         """One tick; said: a column for JOINT, or ``at`` and ``old_s`` for where it is."""
         self.t_s += DT
         at, old_s = said.pop("at", None), said.pop("old_s", 0.0)
@@ -88,7 +88,7 @@ class Bench:
             for name, one in said.items()
         }
         state = JointState(position, (0.0,) * 9, ages, ())._replace(**columns)
-        wishes = (wish,) * 9 if isinstance(wish, float) else wish
+        wishes = (desired,) * 9 if isinstance(desired, float) else desired
         verdict = self.guard.check(wishes, state, age_s, self.t_s)
         before = self.path[-1]
         if said.get("rearmed"):
@@ -125,10 +125,10 @@ def range_and_braking(m: ModuleType) -> None:
 def speed(m: ModuleType) -> None:
     for way in (1.0, -1.0):
         bench = Bench(m)
-        wish = 0.0
+        desired = 0.0
         for k in range(36):
-            wish += way * DT * min(k * 0.9 * ACCEL * DT, 1.02 * TOP)
-            bench.tick(wish)
+            desired += way * DT * min(k * 0.9 * ACCEL * DT, 1.02 * TOP)
+            bench.tick(desired)
             assert bench.why in ("", "too fast")
         bench = Bench(m)
         for k in range(70):
@@ -205,19 +205,19 @@ def not_finite(m: ModuleType) -> None:
 
 
 def stale_joints(m: ModuleType) -> None:
-    for wish in (0.0001, 0.5):
+    for desired in (0.0001, 0.5):
         for old_s, held in ((0.149, False), (0.151, True), (nan, True)):
             bench = Bench(m)
-            assert (bench.tick(wish, old_s=old_s) == 0.0) == held
+            assert (bench.tick(desired, old_s=old_s) == 0.0) == held
             assert (bench.why == "stale joints") == held
     assert Bench(m).tick(0.0001, at=nan) == 0.0
 
 
 def stale_picture(m: ModuleType) -> None:
-    for wish in (0.0001, 0.5):
+    for desired in (0.0001, 0.5):
         for age_s, held in ((1.499, False), (1.501, True), (inf, True), (nan, True)):
             bench = Bench(m)
-            assert (bench.tick(wish, age_s) == 0.0) == held
+            assert (bench.tick(desired, age_s) == 0.0) == held
             assert (bench.why == "stale picture") == held
             assert bench.path[-1][0] > 0.0
 
@@ -233,7 +233,7 @@ def hot(m: ModuleType) -> None:
         assert fastest == pytest.approx(share * TOP, rel=0.02)
         assert (bench.level == "hold") == (share == 0.0)
     bench = Bench(m)
-    for k in range(80):  # a wish inside the joint's limits and outside what heat leaves
+    for k in range(80):  # a desired inside the joint's limits and outside what heat leaves
         bench.tick(0.25 * ACCEL * DT * DT * min(k, 40) ** 2 / 2, temperature_c=64.0)
         assert bench.speed[JOINT] <= 0.28 * TOP + 1e-9
     bench = Bench(m)
@@ -310,10 +310,10 @@ def reckoned(m: ModuleType) -> None:
 
 
 def torque_off(m: ModuleType) -> None:
-    for wish, at in ((0.0001, -0.2), (0.5, -0.2), (0.0001, -0.02)):
+    for desired, at in ((0.0001, -0.2), (0.5, -0.2), (0.0001, -0.02)):
         bench = Bench(m)
         for _ in range(80):
-            bench.tick(wish, at=at, torque=False)
+            bench.tick(desired, at=at, torque=False)
             assert (bench.level, bench.why) == ("hold", "torque off")
         assert bench.path[-1][JOINT] == pytest.approx(at)
         bench.tick(0.5, at=at, torque=True)
@@ -322,9 +322,9 @@ def torque_off(m: ModuleType) -> None:
 
 def limp(m: ModuleType) -> None:
     for torque in (True, False):
-        for wish in (0.0, 0.5, nan):
+        for desired in (0.0, 0.5, nan):
             bench = Bench(m)
-            bench.tick(wish, fault="overload", torque=torque)
+            bench.tick(desired, fault="overload", torque=torque)
             assert (bench.level, bench.why) == ("limp", "overload")
     bench = Bench(m)
     for _ in range(60):
@@ -367,7 +367,7 @@ def slower_in_flight(m: ModuleType) -> None:
 def collision(m: ModuleType) -> None:
     pair = CollisionParams("neck_pitch", -20.0, -10.0, "left_upper_lid", 10.0, 20.0)
 
-    def wish(pitch: float, lid: float) -> tuple[float, ...]:
+    def desired(pitch: float, lid: float) -> tuple[float, ...]:
         angles = {PITCH: radians(pitch), LID: radians(lid)}
         return tuple(angles.get(k, 0.0) for k in range(9))
 
@@ -378,7 +378,9 @@ def collision(m: ModuleType) -> None:
         rng = np.random.default_rng(9)
         places = []
         for _ in range(80):
-            target = wish(*rng.choice([-40.0, -21.5, -15.0, -8.5, 0.0, 8.5, 15.0, 21.5, 40.0], 2))
+            target = desired(
+                *rng.choice([-40.0, -21.5, -15.0, -8.5, 0.0, 8.5, 15.0, 21.5, 40.0], 2)
+            )
             for _ in range(rng.integers(5, 70)):
                 bench.tick(target)
                 places.append(tuple(degrees(bench.path[-1][j]) for j in (PITCH, LID)))
@@ -475,8 +477,18 @@ MOTION, STUCK, HEALTH, COLLISIONS, LATE, GUARD = PARTS
 Mutation = tuple[str, str, str, Callable[[ModuleType], None]]
 MUTATIONS: tuple[Mutation, ...] = (
     # position, and the way to brake before its end
-    (MOTION, "wish + brake > self.high[i]", "wish + brake > self.high[i] + 0.1", range_and_braking),
-    (MOTION, "wish - brake < self.low[i]", "wish - brake < self.low[i] - 0.1", range_and_braking),
+    (
+        MOTION,
+        "desired + brake > self.high[i]",
+        "desired + brake > self.high[i] + 0.1",
+        range_and_braking,
+    ),
+    (
+        MOTION,
+        "desired - brake < self.low[i]",
+        "desired - brake < self.low[i] - 0.1",
+        range_and_braking,
+    ),
     (MOTION, "brake = 0.5 * wanted", "brake = 0.3 * wanted", range_and_braking),
     (
         MOTION,
@@ -491,7 +503,7 @@ MUTATIONS: tuple[Mutation, ...] = (
         range_and_braking,
     ),
     (MOTION, "2.0 * accel * max(", "2.2 * accel * max(", range_and_braking),
-    (GUARD, "if abs(wish - target) > _ROUNDING_RAD:", "if False:", range_and_braking),
+    (GUARD, "if abs(desired - target) > _ROUNDING_RAD:", "if False:", range_and_braking),
     # speed
     (MOTION, "-top <= wanted <= top and", "wanted <= top and", speed),
     (MOTION, "-top <= wanted <= top and", "-top <= wanted and", speed),
@@ -525,7 +537,7 @@ MUTATIONS: tuple[Mutation, ...] = (
     (GUARD, "since_s > 0.0 and isfinite(since_s)", "isfinite(since_s)", stopped_loop),
     (GUARD, "since_s > 0.0 and isfinite(since_s)", "since_s > 0.0", stopped_loop),
     # numbers and ages
-    (GUARD, "if not isfinite(wish):", "if False:", not_finite),
+    (GUARD, "if not isfinite(desired):", "if False:", not_finite),
     (GUARD, "near and at_s >= stale_s and", "near and", stale_joints),
     (GUARD, "        if not fresh:", "        if False:", stale_joints),
     (GUARD, "fresh = fresh and isfinite(position)", "pass", stale_joints),
@@ -568,7 +580,7 @@ MUTATIONS: tuple[Mutation, ...] = (
     (GUARD, "near = -far <= command[i] - position <= far and", "near =", not_moving),
     (GUARD, "if joints.measured and not joints.measured[i]:", "if False:", reckoned),
     (GUARD, "self._retreat[i] = back = position", "pass", not_moving),
-    (GUARD, "if self._retrying[i] else wish", "if False else wish", not_moving),
+    (GUARD, "if self._retrying[i] else desired", "if False else desired", not_moving),
     # torque and faults
     (GUARD, "        if not powered:", "        if False:", torque_off),
     (GUARD, "or False in joints.torque", "", torque_off),
@@ -596,7 +608,7 @@ MUTATIONS: tuple[Mutation, ...] = (
     ),
     (
         COLLISIONS,
-        "eager = _crosses(pair[keeper], motion, wish)",
+        "eager = _crosses(pair[keeper], motion, desired)",
         "eager = False",
         collision,
     ),

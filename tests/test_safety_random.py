@@ -61,9 +61,9 @@ class Trial:
         self.guard.reset(self.t_s, tuple(angles.tolist()))
         self.p, self.v = tuple(np.clip(angles, self.low, self.high).tolist()), (0.0,) * 9
 
-    def tick(self, wish: Row, joints: JointState, age_s: float, dt_s: float) -> None:
+    def tick(self, desired: Row, joints: JointState, age_s: float, dt_s: float) -> None:
         self.t_s += dt_s
-        verdict = self.guard.check(wish, joints, age_s, self.t_s)
+        verdict = self.guard.check(desired, joints, age_s, self.t_s)
         if True in joints.rearmed:
             anew = np.array(joints.rearmed) & np.isfinite(joints.position_rad)
             clipped = np.clip(joints.position_rad, self.low, self.high)
@@ -146,7 +146,7 @@ def sequence(trial: Trial, rng: np.random.Generator) -> None:
     words = np.where(faulty, "overload", "")
     ages = np.where(old, 1.0, 0.0)
     rows = (wishes, instead, places, ages, ~off, words, load, np.tile(heat, (n, 1)), volts, anew)
-    for k, (wish, other, place, age, *told, rearmed) in enumerate(
+    for k, (desired, other, place, age, *told, rearmed) in enumerate(
         zip(*[[tuple(row) for row in column.tolist()] for column in rows], strict=True)
     ):
         tick = float(ticks[k])
@@ -154,7 +154,7 @@ def sequence(trial: Trial, rng: np.random.Generator) -> None:
         at = tuple([b if o else a for a, b, o in zip(trial.p, place, other, strict=True)])
         since = tuple([t_s - one for one in age])
         joints = JointState(at, (0.0,) * 9, since, (), *told, rearmed)
-        trial.tick(wish, joints, inf if unseen[k] else 0.0, tick)
+        trial.tick(desired, joints, inf if unseen[k] else 0.0, tick)
 
 
 TICKS = (0.001, 0.004, 0.005, 0.005, 0.005, 0.02, 0.1)
@@ -206,7 +206,7 @@ def test_any_shape_of_wishes_keeps_the_limits(
     rng = np.random.default_rng(seed)
     trial = Trial(rig, boxes)
     trial.restart(rng.uniform(trial.low, trial.high))
-    for wish, tick in zip(wishes, ticks, strict=False):
+    for desired, tick in zip(wishes, ticks, strict=False):
         joints = JointState(trial.p, (0.0,) * 9, (trial.t_s + tick,) * 9, ())
-        trial.tick((wish,) * 9, joints, 0.0, tick)
+        trial.tick((desired,) * 9, joints, 0.0, tick)
     trial.judge()

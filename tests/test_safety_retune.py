@@ -41,13 +41,13 @@ class Watched:
         self.guard = Guard(params, limits(dice), JOINTS)
         self.guard.reset(0.0, (0.0,) * 9)
         self.p, self.v, self.t_s = np.zeros(9), np.zeros(9), 0.0
-        self.wish = np.zeros(9)
+        self.desired = np.zeros(9)
 
     def tick(self) -> None:
         before = np.array(self.guard.limits)
         self.t_s += DT_S
         joints = JointState(tuple(self.p), (0.0,) * 9, (self.t_s,) * 9, ())
-        verdict = self.guard.check(tuple(self.wish), joints, 0.0, self.t_s)
+        verdict = self.guard.check(tuple(self.desired), joints, 0.0, self.t_s)
         after = np.array(self.guard.limits)
         p = np.array(verdict.command_rad)
         v = (p - self.p) / DT_S
@@ -63,7 +63,7 @@ class Watched:
     def wander(self, ticks: int) -> None:
         for _ in range(ticks):
             if self.dice.random() < 0.1:
-                self.wish = self.dice.uniform(-1.5, 1.5, 9)
+                self.desired = self.dice.uniform(-1.5, 1.5, 9)
             self.tick()
 
 

@@ -36,7 +36,7 @@ class World:
         self._band = radians(band_deg)
         self._sent = deque([0.0] * (round(lag_s / DT) + 1), maxlen=round(lag_s / DT) + 1)
 
-    def tick(self, wish: float, silent: bool = False, dt_s: float = DT) -> str:
+    def tick(self, desired: float, silent: bool = False, dt_s: float = DT) -> str:
         self.t_s += dt_s
         goal = self._sent[0]
         if abs(goal - self.at) > self._band:
@@ -49,7 +49,7 @@ class World:
         one = [self._seen if k == self.joint else 0.0 for k in range(9)]
         ages = [self.answered_s if k == self.joint else self.t_s for k in range(9)]
         joints = JointState(tuple(one), (0.0,) * 9, tuple(ages), ())
-        wishes = tuple(wish if k == self.joint else 0.0 for k in range(9))
+        wishes = tuple(desired if k == self.joint else 0.0 for k in range(9))
         self.verdict = self.guard.check(wishes, joints, 0.0, self.t_s)
         self.path.append(self.verdict.command_rad[self.joint])
         self._sent.append(self.path[-1])
@@ -119,19 +119,19 @@ def test_it_tries_again_slowly_and_pushes_weakly_until_the_way_is_free() -> None
 def test_healthy_joints_are_left_alone(joint: int, lag_s: float, band_deg: float) -> None:
     world = World(joint, lag_s, band_deg)
     rng = np.random.default_rng(5)
-    wish = 0.0
+    desired = 0.0
     for k in range(1600):
         if k < 600:  # saccades, large and small, some there and back at once
-            wish = float(rng.uniform(-0.55, 0.55)) if rng.random() < 0.05 else wish
+            desired = float(rng.uniform(-0.55, 0.55)) if rng.random() < 0.05 else desired
         elif k < 1000:  # slow pursuit
-            wish = 0.3 * sin(0.6 * k * DT)
+            desired = 0.3 * sin(0.6 * k * DT)
         elif k < 1200:  # friction swallows it
-            wish = radians(0.4) * (k // 40 % 2)
+            desired = radians(0.4) * (k // 40 % 2)
         else:  # a tremor
-            wish = radians(5.0) * sin(40.0 * k * DT)
+            desired = radians(5.0) * sin(40.0 * k * DT)
         silent = rng.random() < 0.3 or 700 < k < 725
         dt_s = DT if k % 50 else 0.08  # now and then the loop is late
-        assert world.tick(wish, silent, dt_s) != "not moving"
+        assert world.tick(desired, silent, dt_s) != "not moving"
 
 
 def test_a_slow_start_is_no_jam() -> None:

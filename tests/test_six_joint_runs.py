@@ -160,7 +160,7 @@ def test_a_recording_without_names_is_of_the_joints_that_all_rigs_had(
 
 
 def test_words_for_numbers_come_back_for_any_number_of_joints(maker: Run) -> None:
-    odd = maker.ticks[9]._replace(wish_rad=(float("nan"),) * 6)
+    odd = maker.ticks[9]._replace(desired_rad=(float("nan"),) * 6)
     data = json.loads(json.dumps(as_json(flat(odd._replace(percept=None), None, 0.005, ()))))
     assert exact(from_json(data, {}).tick) == exact(odd)
 

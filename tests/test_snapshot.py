@@ -92,7 +92,7 @@ def test_joints_are_shown_a_hundred_times_a_second_as_wished_permitted_and_measu
     assert np.allclose(np.diff([row.t_s for row in rows]), 0.01)
     for row in rows:
         tick = by_time[row.t_s]
-        assert row[1:] == (tick.wish_rad, tick.verdict.command_rad, tick.joints.position_rad)
+        assert row[1:] == (tick.desired_rad, tick.verdict.command_rad, tick.joints.position_rad)
 
 
 def test_the_ghost_is_where_the_wish_is() -> None:
@@ -100,7 +100,7 @@ def test_the_ghost_is_where_the_wish_is() -> None:
     for shot in taken():
         assert shot.ghost is not None
         apart.append(degrees(angle_between(shot.ghost.gaze_world[0], shot.gaze_world[0])))
-        if shot.wish_rad == shot.measured_rad:
+        if shot.desired_rad == shot.measured_rad:
             assert shot.ghost.p_world_eyes_m == shot.p_world_eyes_m
     assert np.median(apart) < 1.0  # while the eyes rest
     assert max(apart) > 1.0  # while they jump, the servos lag behind
@@ -200,7 +200,7 @@ def maker_shown() -> tuple[tuple[Tick, ...], Snapshot]:
 def test_joints_of_servos_that_tell_nothing_are_shown_as_reckoned() -> None:
     ticks, shot = maker_shown()
     assert shot.joints == shot.reckoned == load_rig("maker").names == SIX
-    assert len(shot.measured_rad) == len(shot.wish_rad) == len(shot.permitted_rad) == 6
+    assert len(shot.measured_rad) == len(shot.desired_rad) == len(shot.commanded_rad) == 6
     assert shot.servos.temperature_c == shot.servos.voltage_v == (None,) * 6
     assert shot.servos.unanswered == (0,) * 6
     assert all(len(row.measured_rad) == 6 for row in shot.trail)

@@ -170,7 +170,7 @@ def test_the_neck_does_not_move_on_a_stale_picture(
     commands = {tick.verdict.command_rad[NECK] for tick in blind}
     assert len(commands) == 1
     assert all("neck_yaw: stale picture" in tick.verdict.reasons for tick in blind)
-    wishes = [degrees(tick.wish_rad[NECK][0]) for tick in blind]
+    wishes = [degrees(tick.desired_rad[NECK][0]) for tick in blind]
     assert max(wishes) - min(wishes) > 3.0  # it would have moved
     eyes = [degrees(tick.joints.position_rad[0]) for tick in blind]
     assert max(eyes) - min(eyes) > 3.0  # the eyes do search

@@ -50,14 +50,14 @@ def driven(rig: Rig, seed: int, missed: Iterator[int], seconds: float) -> Judge:
     """Drive a rig with wishes that jump inside and outside its range."""
     bench, judge = Bench(rig), Judge(rig)
     bench.start()
-    wish = restless(rig, seed)
+    desired = restless(rig, seed)
     centre = (0.0,) * len(rig.names)
     while bench.guard.gentle:
         bench.tick(centre)
     bench.shafts.clear()
     end_s = bench.shafts.now_s() + seconds
     while bench.shafts.now_s() < end_s:
-        bench.tick(wish(bench.shafts.now_s()), next(missed))
+        bench.tick(desired(bench.shafts.now_s()), next(missed))
     judge.take(bench.shafts)
     return judge
 
@@ -111,12 +111,12 @@ def test_joints_come_from_anywhere_slowly_at_start_and_at_resume(
     rigs: dict[str, Rig], name: str, seed: int, again: bool
 ) -> None:
     rig, rng = rigs[name], np.random.default_rng(seed)
-    wish = restless(rig, seed, 60.0)(0.0)
+    desired = restless(rig, seed, 60.0)(0.0)
     bench = Bench(rig, None if again else where_from(rig, rng))
     bench.start()
     if again:
         for _ in range(100):
-            bench.tick(wish)
+            bench.tick(desired)
         bench.stop()
         for joint, angle in where_from(rig, rng).items():
             bench.turn(joint, angle)
@@ -124,7 +124,7 @@ def test_joints_come_from_anywhere_slowly_at_start_and_at_resume(
     bench.shafts.angles_rad.clear()
     gentle = []
     for _ in range(300):
-        bench.tick(wish)
+        bench.tick(desired)
         gentle += [list(bench.guard._gentle)] * (len(bench.shafts.angles_rad) - len(gentle))
     angles = np.degrees(np.array(bench.shafts.angles_rad))
     speed = np.abs(angles[5:] - angles[:-5]) / 0.005 * np.array(gentle)[5:]
@@ -150,9 +150,9 @@ def test_a_maestros_pulse_outside_its_range_comes_inside_slowly(rigs: dict[str, 
     assert bench.shafts.truth()[rig.names.index(name)] > radians(joint.max_deg + 2.5)
     bench.start()
     bench.shafts.clear()
-    wish = tuple(radians(joint.min_deg) if each == name else 0.0 for each in rig.names)
+    desired = tuple(radians(joint.min_deg) if each == name else 0.0 for each in rig.names)
     for _ in range(200):
-        bench.tick(wish)
+        bench.tick(desired)
     seen = np.degrees(np.array(bench.shafts.angles_rad))[:, rig.names.index(name)]
     # A servo that hears a pulse every 20 ms goes in jumps; 100 ms tell its pace.
     assert (

@@ -273,13 +273,13 @@ class Bench:
         self.guard.reset(self.shafts.now_s(), goals)
         self._began_s = self.shafts.now_s()
 
-    def tick(self, wish_rad: JointAngles, missed_slots: int = 0) -> JointAngles:
+    def tick(self, desired_rad: JointAngles, missed_slots: int = 0) -> JointAngles:
         """Run one tick after some missed slots; return what was sent."""
         self.slot += 1 + missed_slots
         self.shafts.sleep_until(self._began_s + self.slot * self.period_s)
         t_s = self.shafts.now_s()
         joints = self.body.read(t_s)
-        self.verdict = self.guard.check(wish_rad, joints, 0.0, t_s)
+        self.verdict = self.guard.check(desired_rad, joints, 0.0, t_s)
         self.body.write(self.verdict.command_rad)
         return self.verdict.command_rad
 
@@ -300,11 +300,11 @@ def restless(rig: Rig, seed: int, holds_s: float = 0.6) -> Callable[[float], Joi
     ranges = [(limit.low_rad - over, limit.high_rad + over) for limit in limits(rig.joints)]
     until_s, wished = [-1.0] * len(ranges), [0.0] * len(ranges)
 
-    def wish(t_s: float) -> JointAngles:
+    def desired(t_s: float) -> JointAngles:
         for i, (low, high) in enumerate(ranges):
             if t_s >= until_s[i]:
                 until_s[i] = t_s + float(rng.uniform(0.05, holds_s))
                 wished[i] = float(rng.uniform(low, high))
         return tuple(wished)
 
-    return wish
+    return desired

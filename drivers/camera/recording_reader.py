@@ -21,7 +21,7 @@ _LARGEST = 1 << 30  # bytes of a message; more is damage
 _FIXED = 22  # bytes of a message before its data
 
 
-class _Place(NamedTuple):
+class _MessagePlace(NamedTuple):
     """Where a record's content lies in the file."""
 
     offset: int
@@ -32,7 +32,7 @@ class _Picture(NamedTuple):
     """When a picture was taken, and where in the file it and what belongs to it lie."""
 
     stamp_ns: int
-    places: dict[str, _Place]
+    places: dict[str, _MessagePlace]
 
 
 class Recording:
@@ -93,7 +93,7 @@ class Recording:
         """Free the file; safe to call twice."""
         self._file.close()
 
-    def _data(self, place: _Place) -> bytes:
+    def _data(self, place: _MessagePlace) -> bytes:
         """Read the data of a message."""
         self._file.seek(place.offset)
         content = self._file.read(place.length)
@@ -114,7 +114,7 @@ class Recording:
 
     def _indexed(self) -> bool:
         """Note where the pictures are; tell whether the file was closed as it should."""
-        waiting: dict[str, _Place] = {}
+        waiting: dict[str, _MessagePlace] = {}
         stamp_ns = -1
         for kind, place in self._records():
             if kind == Opcode.DATA_END:
@@ -131,12 +131,12 @@ class Recording:
                     self._add(stamp_ns, waiting)
         return False
 
-    def _add(self, stamp_ns: int, places: dict[str, _Place]) -> None:
+    def _add(self, stamp_ns: int, places: dict[str, _MessagePlace]) -> None:
         """Note a picture if it is later than the last one."""
         if not self._pictures or stamp_ns > self._pictures[-1].stamp_ns:
             self._pictures.append(_Picture(stamp_ns, places))
 
-    def _meet(self, kind: int, place: _Place) -> None:
+    def _meet(self, kind: int, place: _MessagePlace) -> None:
         """Read the records that say what the file is."""
         if kind == Opcode.CHUNK:
             raise CameraError(
@@ -153,7 +153,7 @@ class Recording:
             channel = Channel.read(self._content(place, place.length))
             self._channels[channel.id] = channel.topic
 
-    def _records(self) -> Iterator[tuple[int, _Place]]:
+    def _records(self) -> Iterator[tuple[int, _MessagePlace]]:
         """Walk over the records that are whole: kind and place of each."""
         end = self._path.stat().st_size
         offset = MAGIC_SIZE
@@ -165,10 +165,10 @@ class Recording:
                 raise CameraError(f"{self._path} is damaged after byte {offset}: copy it anew")
             if offset + _HEAD + length > end:
                 return
-            yield kind, _Place(offset + _HEAD, length)
+            yield kind, _MessagePlace(offset + _HEAD, length)
             offset += _HEAD + length
 
-    def _content(self, place: _Place, length: int) -> ReadDataStream:
+    def _content(self, place: _MessagePlace, length: int) -> ReadDataStream:
         """Read the beginning of a record's content."""
         self._file.seek(place.offset)
         return ReadDataStream(BytesIO(self._file.read(min(length, place.length))))

@@ -256,10 +256,10 @@ def _beyond(
     """Say which joints may go farther or faster than their servos were set up to."""
     more = [
         name
-        for name, wish, most in zip(joints, wanted, reach, strict=True)
-        if wish.low_rad < most.low_rad - 1e-6
-        or wish.high_rad > most.high_rad + 1e-6
-        or wish.speed_rad_s > most.speed_rad_s + 1e-6
+        for name, desired, most in zip(joints, wanted, reach, strict=True)
+        if desired.low_rad < most.low_rad - 1e-6
+        or desired.high_rad > most.high_rad + 1e-6
+        or desired.speed_rad_s > most.speed_rad_s + 1e-6
     ]
     if not more:
         return ()

@@ -184,7 +184,7 @@ class _Resimulator:
             if self._note is not None:
                 self._note(tick)
             if tick.verdict.level == "limp" and not tick.stopped and self._body is None:
-                return f"fault: {'; '.join(tick.verdict.gravest)}"
+                return f"fault: {'; '.join(tick.verdict.critical_reasons)}"
         return None
 
     def _tick(self, moment: TickRecord) -> Tick:
@@ -241,7 +241,7 @@ class _Decided(NamedTuple):
 
     target: str
     gaze: str
-    wish: str
+    desired: str
     command: str
     level: str
 
@@ -254,7 +254,7 @@ def _decided(tick: Tick) -> _Decided:
     return _Decided(
         repr(tick.target._replace(why="")),
         repr(gaze),
-        repr(tick.wish_rad),
+        repr(tick.desired_rad),
         repr(tick.verdict.command_rad),
         tick.verdict.level,
     )
@@ -277,7 +277,7 @@ def _short(was: Tick, now: Tick, name: str) -> str:
         return f"{now.verdict.level}, was {was.verdict.level}"
     if was.verdict.joints != now.verdict.joints:
         return f"joints {', '.join(now.verdict.joints)}, was {', '.join(was.verdict.joints)}"
-    then, again = was.wish_rad, now.wish_rad
+    then, again = was.desired_rad, now.desired_rad
     if name == "command":
         then, again = was.verdict.command_rad, now.verdict.command_rad
     rows = zip(now.verdict.joints, then, again, strict=True)

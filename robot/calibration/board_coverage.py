@@ -100,7 +100,7 @@ def coverage(views: Sequence[Held], params: ViewParams) -> Coverage:
             max(v.right - v.left, v.bottom - v.top) >= params.near_share for v in views
         ),
     }
-    missing = [wish for wish, there in wishes.items() if not there]
+    missing = [desired for desired, there in wishes.items() if not there]
     short = params.least_views - len(views)
     if short > 0:
         missing.append(f"show {short} more {'view' if short == 1 else 'views'}, each a new one")

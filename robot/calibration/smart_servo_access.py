@@ -231,9 +231,9 @@ class SingleServo:
             register, largest = driving.full_drive
             found[register] = value(largest)
         self._was = found | self._was
-        for name, wish in wanted.items():
-            if was[name] != wish:
-                self._put(name, wish)
+        for name, desired in wanted.items():
+            if was[name] != desired:
+                self._put(name, desired)
 
     def torque_is_on(self) -> bool:
         """Return whether the torque is on."""

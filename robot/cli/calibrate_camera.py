@@ -231,12 +231,12 @@ def _lens(job: _Job, eye: _Eye) -> LensCalibration:
             continue
         number = shot.number
         step = steps.take(shot)
-        lens, wish = None, step.coverage.missing[0] if step.coverage.missing else "enough"
+        lens, desired = None, step.coverage.missing[0] if step.coverage.missing else "enough"
         if step.coverage.enough and step.kept:
             lens, why = steps.tried()
-            wish = why or wish
+            desired = why or desired
         note = "kept" if step.kept else step.why
-        status(f"{step.coverage.views} views, {step.corners} corners ({note}): {wish}")
+        status(f"{step.coverage.views} views, {step.corners} corners ({note}): {desired}")
         if lens is not None:
             break
     i = lens.intrinsics

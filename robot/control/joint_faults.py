@@ -109,7 +109,7 @@ def _held(tick: Tick) -> list[tuple[str, str]]:
     """Return joint and reason of all joints that a fault holds in this tick."""
     found = []
     faults = tick.joints.fault
-    grave = set(tick.verdict.gravest)
+    grave = set(tick.verdict.critical_reasons)
     for i, (joint, why) in enumerate(zip(tick.verdict.joints, tick.verdict.why, strict=False)):
         if not why or f"{joint}: {why}" not in grave:
             continue

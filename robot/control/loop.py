@@ -207,20 +207,20 @@ class Robot:
         target = self._aversion.step(target, pose.p_world_head_m, t_s)
         gaze = self._oculomotor.step(target, pose, t_s, dt_s)
         self._settled = gaze.phase != "saccade"
-        wish = self._lead.pose_rad or self._kinematics.inverse(gaze)
+        desired = self._lead.pose_rad or self._kinematics.inverse(gaze)
         if self.stopped:
             self._stop.keep_released(self.body, joints, t_s)
-            verdict = at_rest(joints, wish, self.stopped, self.body.names)
+            verdict = at_rest(joints, desired, self.stopped, self.body.names)
         else:
             # What a person chose to look at is there whatever the camera shows.
             age_s = 0.0 if self._lead.active else percept.age_s(t_s) if percept is not None else inf
-            verdict = self._guard.check(wish, joints, age_s, t_s)
+            verdict = self._guard.check(desired, joints, age_s, t_s)
             self.body.write(verdict.command_rad)
         self._last = verdict.command_rad
         events = (*self._told, *self.body.bus.events(), *self.camera.events())
         self._told.clear()
         return Tick(
-            t_s, joints, pose, detections, percept, target, gaze, wish, verdict, events, orders,
+            t_s, joints, pose, detections, percept, target, gaze, desired, verdict, events, orders,
             self.stopped, self._lead.words,
         )  # fmt: skip
 
@@ -254,7 +254,7 @@ class Robot:
             # Parking goes home whatever the camera shows.
             self.body.write(self._guard.check(pose_rad, joints, 0.0, t_s).command_rad)
             errors = zip(pose_rad, joints.position_rad, strict=True)
-            if max(abs(wish - now) for wish, now in errors) < radians(2.0):
+            if max(abs(desired - now) for desired, now in errors) < radians(2.0):
                 return True
         return False
 
@@ -381,7 +381,7 @@ def run(
             return LoopCount(ticks, overruns, f"fault: {error}")
         watch(tick)
         if tick.verdict.level == "limp" and not tick.stopped:
-            return LoopCount(ticks, overruns, f"fault: {'; '.join(tick.verdict.gravest)}")
+            return LoopCount(ticks, overruns, f"fault: {'; '.join(tick.verdict.critical_reasons)}")
         last_s = t_s
         ticks += 1
         late = int((clock.now_s() - slots_s) / period) - slot

@@ -9,7 +9,7 @@ from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 
 
 class Tick(NamedTuple):
-    """Everything one tick knew and decided; wish, permitted and measured side by side.
+    """Everything one tick knew and decided; desired, commanded and measured side by side.
 
     events: what has happened on the bus and to the camera, in words
     orders: what people asked for, obeyed at the beginning of this tick
@@ -24,7 +24,7 @@ class Tick(NamedTuple):
     percept: Percept | None
     target: Target
     gaze: GazeCommand
-    wish_rad: JointAngles
+    desired_rad: JointAngles
     verdict: GuardResult
     events: tuple[str, ...] = ()
     orders: tuple[Command, ...] = ()
@@ -33,9 +33,9 @@ class Tick(NamedTuple):
 
 
 def at_rest(
-    joints: JointState, wish_rad: JointAngles, why: str, names: tuple[str, ...]
+    joints: JointState, desired_rad: JointAngles, why: str, names: tuple[str, ...]
 ) -> GuardResult:
     """Say that nothing is sent, as somebody stopped the robot."""
     reason = f"all: stopped ({why})"
     each = ("stopped",) * len(names)
-    return GuardResult(joints.position_rad, "limp", (reason,), wish_rad, each, (reason,), names)
+    return GuardResult(joints.position_rad, "limp", (reason,), desired_rad, each, (reason,), names)

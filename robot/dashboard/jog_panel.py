@@ -93,7 +93,7 @@ class JogPanel:
         for joint, slider in self._sliders.items():
             if (i := places.get(joint)) is None:
                 continue
-            self._note_held(joint, degrees(snapshot.wish_rad[i]), bool(snapshot.stopped))
+            self._note_held(joint, degrees(snapshot.desired_rad[i]), bool(snapshot.stopped))
             angle_deg = degrees(snapshot.measured_rad[i])
             if joint not in self._held and abs(slider.value - angle_deg) > _FOLLOWS_DEG:
                 put(slider, round(min(max(angle_deg, slider.min), slider.max), 1))
@@ -103,7 +103,7 @@ class JogPanel:
             if table != self._table:
                 self._measured.content = self._table = table
 
-    def _note_held(self, joint: str, wish_deg: float, stopped: bool) -> None:
+    def _note_held(self, joint: str, desired_deg: float, stopped: bool) -> None:
         """Forget a joint that was let go elsewhere, by a stop or another order."""
         held = self._held.get(joint)
         if held is None:
@@ -111,7 +111,7 @@ class JogPanel:
         angle_deg, at_s = held
         if stopped:
             del self._held[joint]
-        elif abs(wish_deg - angle_deg) < _SAME_DEG:
+        elif abs(desired_deg - angle_deg) < _SAME_DEG:
             self._held[joint] = (angle_deg, self._now_s)
         elif self._now_s - at_s > _FREE_AFTER_S:
             del self._held[joint]
@@ -128,13 +128,13 @@ def measured_table(snapshot: Snapshot) -> str:
         columns.append(MEASURED)
     if reckoned:
         columns.append(RECKONED)
-    joints = zip(snapshot.joints, snapshot.wish_rad, snapshot.measured_rad, strict=True)
+    joints = zip(snapshot.joints, snapshot.desired_rad, snapshot.measured_rad, strict=True)
     rows = "".join(
         _row(
             escape(joint.replace("_", " ")),
-            [degrees(wish), *_under(columns[1:], joint in reckoned, degrees(now))],
+            [degrees(desired), *_under(columns[1:], joint in reckoned, degrees(now))],
         )
-        for joint, wish, now in joints
+        for joint, desired, now in joints
     )
     head = "".join(f"<td style='{_RIGHT}'>{words}</td>" for words in columns)
     return (

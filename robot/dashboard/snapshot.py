@@ -157,7 +157,7 @@ def snapshot(
     return Snapshot(
         t_s=tick.t_s,
         measured_rad=tick.joints.position_rad,
-        wish_rad=tick.wish_rad,
+        desired_rad=tick.desired_rad,
         R_world_head=pose.R_world_head,
         p_world_head_m=pose.p_world_head_m,
         p_world_eyes_m=(pose.p_world_eye_left_m, pose.p_world_eye_right_m),
@@ -176,7 +176,7 @@ def snapshot(
         behaviour=behaviour,
         saliences=target.saliences,
         seeing=seeing,
-        permitted_rad=tick.verdict.command_rad,
+        commanded_rad=tick.verdict.command_rad,
         target_kind=target.kind,
         target_id=target.id,
         target_part=target.part,
@@ -237,8 +237,8 @@ def _bodies(tick: Tick) -> tuple[SeenBody, ...]:
 
 def _ghost(tick: Tick, rig: ShownRig) -> CommandedPose:
     """Return where the wish would have head and eyes."""
-    at_rest = (0.0,) * len(tick.wish_rad)
-    pose: GazeState = rig.kinematics.forward(JointState(tick.wish_rad, at_rest, at_rest, ()))
+    at_rest = (0.0,) * len(tick.desired_rad)
+    pose: GazeState = rig.kinematics.forward(JointState(tick.desired_rad, at_rest, at_rest, ()))
     return CommandedPose(
         pose.R_world_head,
         pose.p_world_head_m,
@@ -291,7 +291,7 @@ def _limits(rig: ShownRig) -> ServoLimits:
 
 
 def _trail(tick: Tick) -> Trail:
-    return Trail(tick.t_s, tick.wish_rad, tick.verdict.command_rad, tick.joints.position_rad)
+    return Trail(tick.t_s, tick.desired_rad, tick.verdict.command_rad, tick.joints.position_rad)
 
 
 def _seen(event: Event) -> SeenEvent:

@@ -1,4 +1,4 @@
-"""Values of the machine: joints as wished, permitted and measured, and what the page is shown.
+"""Values of the machine: joints as desired, commanded and measured, and what the page is shown.
 
 Radians, metres, seconds; joints in the order of JOINTS, those that the rig has.
 """
@@ -72,14 +72,14 @@ class JointState(NamedTuple):
 
 
 class JointOutcome(NamedTuple):
-    """What became of one joint's wish.
+    """What became of what was desired of one joint.
 
-    wish_rad: as it was asked for; permitted_rad: as it was sent
+    desired_rad: as it was asked for; commanded_rad: as it was sent
     reason: why they differ, "" where nothing stood in the way
     """
 
-    wish_rad: float
-    permitted_rad: float
+    desired_rad: float
+    commanded_rad: float
     reason: str
 
 
@@ -89,22 +89,22 @@ class GuardResult(NamedTuple):
     command_rad: permitted joint angles
     level: ok, limited (changed), hold (neck or all stand still), limp (torque must go)
     reasons: "joint: reason" for every joint that was changed, empty when ok
-    wish_rad: what was asked for
+    desired_rad: what was asked for
     why: one reason a joint, "" where it was not changed; empty when ok
-    gravest: those of the reasons that make the level what it is
+    critical_reasons: those of the reasons that make the level what it is
     joints: the names of the joints
     """
 
     command_rad: JointAngles
     level: Level
     reasons: tuple[str, ...]
-    wish_rad: JointAngles = ()
+    desired_rad: JointAngles = ()
     why: tuple[str, ...] = ()
-    gravest: tuple[str, ...] = ()
+    critical_reasons: tuple[str, ...] = ()
     joints: tuple[str, ...] = ()
 
     def applied(self, joint: str) -> JointOutcome:
-        """Return what became of one joint's wish.
+        """Return what became of what was desired of one joint.
 
         Raises:
             ValueError: there is no such joint; the message lists those there are.
@@ -112,7 +112,9 @@ class GuardResult(NamedTuple):
         if joint not in self.joints:
             raise ValueError(f"no joint {joint!r}; there is {', '.join(self.joints)}")
         i = self.joints.index(joint)
-        return JointOutcome(self.wish_rad[i], self.command_rad[i], self.why[i] if self.why else "")
+        return JointOutcome(
+            self.desired_rad[i], self.command_rad[i], self.why[i] if self.why else ""
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,11 +165,11 @@ class SeenCamera(NamedTuple):
 
 
 class Trail(NamedTuple):
-    """The joints of one tick: wished, permitted and measured."""
+    """The joints of one tick: desired, commanded and measured."""
 
     t_s: float
-    wish_rad: JointAngles
-    permitted_rad: JointAngles
+    desired_rad: JointAngles
+    commanded_rad: JointAngles
     measured_rad: JointAngles
 
 
@@ -251,7 +253,7 @@ SeenEvent = SeenSaccade | SeenFixation | SeenBlink
 class Snapshot:
     """One frozen look at the running rig, for people to watch.
 
-    joints: names of the joints; measured_rad, wish_rad, permitted_rad: their angles
+    joints: names of the joints; measured_rad, desired_rad, commanded_rad: their angles
     reckoned: joints whose servos tell nothing: what stands for a measurement is their goal
         moved by the speed they are known to have
     R_world_head, p_world_head_m: measured head frame
@@ -276,7 +278,7 @@ class Snapshot:
 
     t_s: float
     measured_rad: JointAngles
-    wish_rad: JointAngles
+    desired_rad: JointAngles
     R_world_head: Mat3
     p_world_head_m: Vec3
     p_world_eyes_m: tuple[Vec3, Vec3]
@@ -295,7 +297,7 @@ class Snapshot:
     behaviour: str = ""
     saliences: tuple[Salience, ...] = ()
     seeing: str = ""
-    permitted_rad: JointAngles = ()
+    commanded_rad: JointAngles = ()
     target_kind: str = ""
     target_id: int = -1
     target_part: str | None = None

@@ -107,9 +107,13 @@ def flat(
         tuple(tick.pose),
         (*target[:-1], saliences),
         tuple(tick.gaze),
-        tick.wish_rad,
+        tick.desired_rad,
         # Nearly always the very same value: written once.
-        (*verdict[:3], None if verdict.wish_rad == tick.wish_rad else verdict[3], *verdict[4:]),
+        (
+            *verdict[:3],
+            None if verdict.desired_rad == tick.desired_rad else verdict[3],
+            *verdict[4:],
+        ),
         tick.events,
         [as_recorded(order) for order in tick.orders],
         tick.stopped,
@@ -123,7 +127,7 @@ def as_json(values: Flat) -> Json:
     finite = _finite(values)
     if not finite:
         values = _worded(values)
-    (t_s, dt_s, percept, joints, pose, target, gaze, wish, verdict, events, orders, stopped,
+    (t_s, dt_s, percept, joints, pose, target, gaze, desired, verdict, events, orders, stopped,
      led, before) = values  # fmt: skip
     data: Json = {
         "t_s": t_s,
@@ -139,8 +143,8 @@ def as_json(values: Flat) -> Json:
             **_named(GazeCommand, gaze),
             "limited": [_named(Limited, one) for one in gaze[-1]],
         },
-        "wish_rad": wish,
-        "verdict": _named(GuardResult, verdict),
+        "wish_rad": desired,
+        "verdict": _as_filed(_named(GuardResult, verdict)),
         "events": events,
         "orders": orders,
         "stopped": stopped,
@@ -151,6 +155,19 @@ def as_json(values: Flat) -> Json:
     if not finite:
         data[_ODD] = True
     return data
+
+
+_FILED = {"desired_rad": "wish_rad", "critical_reasons": "gravest"}
+"""Fields that recordings know by an older name: what was recorded before stays readable."""
+
+
+def _as_filed(fields: Json) -> Json:
+    return {_FILED.get(name, name): value for name, value in fields.items()}
+
+
+def _from_file(data: Json) -> Json:
+    now = {filed: name for name, filed in _FILED.items()}
+    return {now.get(name, name): value for name, value in data.items()}
 
 
 def from_json(data: Json, percepts: Mapping[int, Percept]) -> TickRecord:
@@ -164,10 +181,10 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> TickRecord:
     if data.get(_ODD):
         data = _unworded(data)
     number = data["percept"]
-    wish = tuple(data["wish_rad"])
-    verdict = data["verdict"]
-    if verdict["wish_rad"] is None:
-        verdict["wish_rad"] = wish
+    desired = tuple(data["wish_rad"])
+    verdict = _from_file(data["verdict"])
+    if verdict["desired_rad"] is None:
+        verdict["desired_rad"] = desired
     verdict.setdefault("joints", _ONCE_ALL)
     target = _present_names(data["target"])
     saliences = [Salience(**_present_names(one)) for one in target["saliences"]]
@@ -180,7 +197,7 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> TickRecord:
         percepts[number] if number is not None else None,
         _made(Target, target),
         _made(GazeCommand, {**data["gaze"], "limited": _limited(data["gaze"])}),
-        wish,
+        desired,
         _made(GuardResult, verdict),
         tuple(data["events"]),
         tuple([order_from_json(order) for order in data["orders"]]),

@@ -54,7 +54,11 @@ class Collisions:
         return bool(self._pairs)
 
     def look(
-        self, motion: MotionLimiter, wish: JointAngles, position: JointAngles, held: Sequence[bool]
+        self,
+        motion: MotionLimiter,
+        desired: JointAngles,
+        position: JointAngles,
+        held: Sequence[bool],
     ) -> None:
         """Put up this tick's walls, and say who has to leave a box first.
 
@@ -68,7 +72,7 @@ class Collisions:
         self.still.clear()
         inside = []
         for k, pair in enumerate(self._pairs):
-            if not self._keep_out(k, pair, motion, wish, position):
+            if not self._keep_out(k, pair, motion, desired, position):
                 inside.append(pair)
         for pair in inside:
             self._lead_out(pair, motion, held)
@@ -79,7 +83,7 @@ class Collisions:
         k: int,
         pair: tuple[ForbiddenRange, ForbiddenRange],
         motion: MotionLimiter,
-        wish: JointAngles,
+        desired: JointAngles,
         position: JointAngles,
     ) -> bool:
         """Wall off the keeper of a pair; tell whether there is one."""
@@ -90,8 +94,8 @@ class Collisions:
                 return False
         elif _side(pair[1 - keeper], motion):
             other = pair[1 - keeper]
-            eager = _crosses(pair[keeper], motion, wish)
-            if eager and not _crosses(other, motion, wish) and _is_out(other, position):
+            eager = _crosses(pair[keeper], motion, desired)
+            if eager and not _crosses(other, motion, desired) and _is_out(other, position):
                 keeper = 1 - keeper
             elif not _is_out(pair[keeper], position):
                 # The keeper lags, or somebody has pushed it in: the other waits outside.
@@ -144,13 +148,13 @@ def _wall_off(span: ForbiddenRange, motion: MotionLimiter) -> None:
         motion.low[i] = max(motion.low[i], span.above)
 
 
-def _crosses(span: ForbiddenRange, motion: MotionLimiter, wish: JointAngles) -> bool:
+def _crosses(span: ForbiddenRange, motion: MotionLimiter, desired: JointAngles) -> bool:
     """Return whether a joint's way to its wish leads into its half of the box."""
     i = span.joint
-    if not isfinite(wish[i]):
+    if not isfinite(desired[i]):
         return False
     limit = motion.limits[i]
-    now, then = motion.command[i], min(max(wish[i], limit.low_rad), limit.high_rad)
+    now, then = motion.command[i], min(max(desired[i], limit.low_rad), limit.high_rad)
     return min(now, then) < span.above - _ROUNDING_RAD and (
         max(now, then) > span.below + _ROUNDING_RAD
     )

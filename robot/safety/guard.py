@@ -199,7 +199,7 @@ class Guard:
         return any(self._gentle)
 
     def check(
-        self, wish_rad: JointAngles, joints: JointState, picture_age_s: float, t_s: float
+        self, desired_rad: JointAngles, joints: JointState, picture_age_s: float, t_s: float
     ) -> GuardResult:
         """Return what may be sent now.
 
@@ -210,7 +210,7 @@ class Guard:
             self._rearm(joints)
         since_s = t_s - self._t_s
         if not (since_s > 0.0 and isfinite(since_s)):
-            return self._standstill(wish_rad)
+            return self._standstill(desired_rad)
         self._t_s = t_s
         if self._waiting or self._outside:
             self._change()
@@ -220,45 +220,45 @@ class Guard:
         self._soft = self._late.soft(t_s)
         self._health.step(joints, dt_s)
         if self._collisions:
-            self._collisions.look(self._motion, wish_rad, joints.position_rad, self._held)
+            self._collisions.look(self._motion, desired_rad, joints.position_rad, self._held)
         stale_s = t_s - self._params.joint_timeout_ms / 1e3
         blind = not picture_age_s <= self._params.frame_timeout_ms / 1e3
         usual = self._all_well(joints)
         far, command, watched = self._stuck.far_rad, self._motion.command, self._stuck.watched
-        columns = zip(wish_rad, joints.position_rad, joints.measured_s, strict=True)
+        columns = zip(desired_rad, joints.position_rad, joints.measured_s, strict=True)
         why: dict[int, str] = {}
         ranks: dict[int, int] = {}
-        for i, (wish, position, at_s) in enumerate(columns):
+        for i, (desired, position, at_s) in enumerate(columns):
             unseen = blind and self._neck[i]
             near = -far <= command[i] - position <= far and not watched[i]
             well = near and at_s >= stale_s and not unseen and (usual or self._well(i, joints))
-            if well and self._motion.follow(i, wish, dt_s):
+            if well and self._motion.follow(i, desired, dt_s):
                 continue  # nearly every wish is a good one and is passed on as it is
-            rank, reason = self._pass(i, wish, joints, at_s >= stale_s, unseen, dt_s)
+            rank, reason = self._pass(i, desired, joints, at_s >= stale_s, unseen, dt_s)
             if reason:
                 why[i], ranks[i] = reason, rank
-        return self._verdict(wish_rad, why, ranks)
+        return self._verdict(desired_rad, why, ranks)
 
-    def _standstill(self, wish_rad: JointAngles) -> GuardResult:
+    def _standstill(self, desired_rad: JointAngles) -> GuardResult:
         """Move nothing, as no time has passed."""
         why = ("time stands still",) * len(self._limits)
         reasons = ("all: time stands still",)
         command = tuple(self._motion.command)
-        return GuardResult(command, "hold", reasons, wish_rad, why, reasons, self._names)
+        return GuardResult(command, "hold", reasons, desired_rad, why, reasons, self._names)
 
     def _verdict(
-        self, wish_rad: JointAngles, why: dict[int, str], ranks: dict[int, int]
+        self, desired_rad: JointAngles, why: dict[int, str], ranks: dict[int, int]
     ) -> GuardResult:
         command = tuple(self._motion.command)
         if not why:
-            return GuardResult(command, "ok", (), wish_rad, joints=self._names)
+            return GuardResult(command, "ok", (), desired_rad, joints=self._names)
         worst = max(ranks.values())
         reasons = {i: f"{self._names[i]}: {reason}" for i, reason in why.items()}
         return GuardResult(
             command,
             _LEVELS[worst],
             tuple(reasons.values()),
-            wish_rad,
+            desired_rad,
             tuple([why.get(i, "") for i in range(len(command))]),
             tuple([reasons[i] for i in reasons if ranks[i] == worst]),
             self._names,
@@ -310,7 +310,7 @@ class Guard:
         self._gentle_until_s[i] = self._t_s + self._params.soft_start_ms / 1e3
 
     def _pass(
-        self, i: int, wish: float, joints: JointState, fresh: bool, unseen: bool, dt_s: float
+        self, i: int, desired: float, joints: JointState, fresh: bool, unseen: bool, dt_s: float
     ) -> tuple[int, str]:
         """Move one joint; give the rank of the level and the reason, if there is one."""
         position = joints.position_rad[i]
@@ -320,14 +320,14 @@ class Guard:
         self._held[i] = hold is not None
         if hold is None:
             self._retreat[i] = None
-            hold = self._outer_hold(i, wish, unseen)
+            hold = self._outer_hold(i, desired, unseen)
         if fault:  # what still moves, moves to its parking place
             self._slow_down(i)
         if hold is not None:
             self._stand(i, hold, dt_s)
             rank, reason = 2, hold.reason
         else:
-            reason = self._go(i, wish, position, dt_s)
+            reason = self._go(i, desired, position, dt_s)
             rank = 1 if reason else 0
         return (3, fault) if fault else (rank, reason)
 
@@ -350,7 +350,7 @@ class Guard:
             return _Hold("stale joints")
         return _Hold(strain, again="slowly") if strain else None
 
-    def _outer_hold(self, i: int, wish: float, unseen: bool) -> _Hold | None:
+    def _outer_hold(self, i: int, desired: float, unseen: bool) -> _Hold | None:
         """Say what else keeps a joint from its wish."""
         if i in self._waiting:
             return _Hold("new limits")
@@ -362,7 +362,7 @@ class Guard:
             limit = self._limits[i]
             end = limit.low_rad if self._motion.command[i] < limit.low_rad else limit.high_rad
             return _Hold("outside its new range", end, True, "slowly")
-        if not isfinite(wish):
+        if not isfinite(desired):
             return _Hold("not finite")
         return _Hold("stale picture") if unseen else None
 
@@ -401,24 +401,28 @@ class Guard:
             limit = self._limits[i]
             self._motion.seek(i, hold.goal, dt_s, limit.speed_rad_s, limit.accel_rad_s2)
 
-    def _go(self, i: int, wish: float, position: float, dt_s: float) -> str:
+    def _go(self, i: int, desired: float, position: float, dt_s: float) -> str:
         """Move a joint towards its wish as far as it may; give why it fell short."""
         motion, limit, share = self._motion, self._limits[i], self._health.share[i]
         began = motion.command[i]
-        target = min(max(wish, motion.low[i]), motion.high[i])
+        target = min(max(desired, motion.low[i]), motion.high[i])
         top, soft = share * limit.speed_rad_s, share * limit.accel_rad_s2
         if self._soft:
             soft = min(soft, self._late_accel)
         if self._gentle[i]:
             lead = self._stuck.lead_rad
-            pull = min(max(wish, position - lead), position + lead) if self._retrying[i] else wish
+            pull = (
+                min(max(desired, position - lead), position + lead)
+                if self._retrying[i]
+                else desired
+            )
             motion.seek(i, pull, dt_s, min(top, self._gentle_speed), min(soft, self._gentle_accel))
             if abs(target - motion.command[i]) < _NEAR_RAD and self._t_s >= self._gentle_until_s[i]:
                 self._gentle[i] = self._retrying[i] = False
-        elif self._soft or share < 1.0 or not motion.follow(i, wish, dt_s):
-            motion.chase(i, wish, dt_s, top, soft)
-        if abs(wish - target) > _ROUNDING_RAD:
-            outside = not limit.low_rad <= wish <= limit.high_rad
+        elif self._soft or share < 1.0 or not motion.follow(i, desired, dt_s):
+            motion.chase(i, desired, dt_s, top, soft)
+        if abs(desired - target) > _ROUNDING_RAD:
+            outside = not limit.low_rad <= desired <= limit.high_rad
             return "out of range" if outside else "self-collision"
         if self._gentle[i]:
             return "starting slowly"

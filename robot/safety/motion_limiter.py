@@ -84,7 +84,7 @@ class MotionLimiter:
         stop = p - 0.5 * v * v / self.limits[i].accel_rad_s2 if v < 0.0 else p
         return stop >= wall_rad - _ROUNDING_RAD
 
-    def follow(self, i: int, wish: float, dt_s: float) -> bool:
+    def follow(self, i: int, desired: float, dt_s: float) -> bool:
         """Go where the wish is, if that keeps every limit; else do nothing and say no.
 
         Who is still catching up would run past the wish: that is for ``chase``.
@@ -92,29 +92,29 @@ class MotionLimiter:
         limit = self.limits[i]
         accel = limit.accel_rad_s2
         p, v = self.command[i], self.speed[i]
-        wanted = (wish - p) / dt_s
+        wanted = (desired - p) / dt_s
         step, top = accel * dt_s, limit.speed_rad_s
         if not (-top <= wanted <= top and v - step <= wanted <= v + step):
             return False
         if not -step * dt_s <= self._wished[i] - p <= step * dt_s:
             return False
         brake = 0.5 * wanted * wanted / accel
-        if wish + brake > self.high[i] if wanted > 0.0 else wish - brake < self.low[i]:
+        if desired + brake > self.high[i] if wanted > 0.0 else desired - brake < self.low[i]:
             return False
-        self.command[i] = self._wished[i] = wish
+        self.command[i] = self._wished[i] = desired
         self.speed[i] = wanted
         return True
 
-    def chase(self, i: int, wish: float, dt_s: float, top: float, soft: float) -> None:
+    def chase(self, i: int, desired: float, dt_s: float, top: float, soft: float) -> None:
         """Catch up with a wish that moves and fall into its pace."""
-        target = min(max(wish, self.low[i]), self.high[i])
+        target = min(max(desired, self.low[i]), self.high[i])
         along = (target - self._wished[i]) / dt_s
         if not -top <= along <= top:  # it jumped, or is too fast: there is no pace to fall into
             along = 0.0
-        self.seek(i, wish, dt_s, top, soft, along)
+        self.seek(i, desired, dt_s, top, soft, along)
 
     def seek(
-        self, i: int, wish: float, dt_s: float, top: float, soft: float, along: float = 0.0
+        self, i: int, desired: float, dt_s: float, top: float, soft: float, along: float = 0.0
     ) -> None:
         """Go to a wish below a speed ``top``, gathering it with ``soft``, to end there.
 
@@ -126,7 +126,7 @@ class MotionLimiter:
         """
         top = min(top, self.limits[i].speed_rad_s)
         soft = min(soft, self.limits[i].accel_rad_s2)
-        target = min(max(wish, self.low[i]), self.high[i])
+        target = min(max(desired, self.low[i]), self.high[i])
         gap = target - along * dt_s - self.command[i]
         closing = reachable_speed(abs(gap), soft, dt_s)
         self._wished[i] = target

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 
 from gazerig.drivers.feetech.memory_table import FeetechModel
 from gazerig.sim_mock.feetech.packets import signed, unsigned
-from gazerig.sim_mock.feetech.tables import STS, FeetechRegister, Table
+from gazerig.sim_mock.feetech.tables import STS, EmulatedFeetechRegister, Table
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
 
 SIZE = 256
@@ -20,11 +20,11 @@ SPEED_UNIT_STEPS_S = 50
 """Unit of the register of the highest speed."""
 
 
-def _bytes_of(registers: Iterable[FeetechRegister]) -> frozenset[int]:
+def _bytes_of(registers: Iterable[EmulatedFeetechRegister]) -> frozenset[int]:
     return frozenset(r.address + i for r in registers for i in range(r.size))
 
 
-class FeetechMemory(ServoMemory[FeetechRegister]):
+class FeetechMemory(ServoMemory[EmulatedFeetechRegister]):
     """One servo's memory; ``bytes`` is what is read, the EEPROM's own content stands apart."""
 
     def __init__(
@@ -44,11 +44,11 @@ class FeetechMemory(ServoMemory[FeetechRegister]):
         self.factory_settings()
         self.keep("id", servo_id)
 
-    def _decode(self, register: FeetechRegister, data: bytes | bytearray) -> int:
+    def _decode(self, register: EmulatedFeetechRegister, data: bytes | bytearray) -> int:
         raw = int.from_bytes(data, self.table.order)
         return raw if register.sign is None else signed(raw, register.sign)
 
-    def _encode(self, register: FeetechRegister, value: int) -> bytes:
+    def _encode(self, register: EmulatedFeetechRegister, value: int) -> bytes:
         """Return sign and magnitude where the register has a sign."""
         raw = value if register.sign is None else unsigned(value, register.sign)
         return raw.to_bytes(register.size, self.table.order)

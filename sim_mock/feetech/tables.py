@@ -25,7 +25,7 @@ SERVO, WHEEL, PWM, STEP = 0, 1, 2, 3
 """Operating modes (33)."""
 
 
-class FeetechRegister(NamedTuple):
+class EmulatedFeetechRegister(NamedTuple):
     """One register; ``sign``: the bit its sign stands in, None where it has none."""
 
     name: str
@@ -35,91 +35,95 @@ class FeetechRegister(NamedTuple):
     sign: int | None = None
 
 
-def _with(registers: tuple[FeetechRegister, ...], **initial: int) -> tuple[FeetechRegister, ...]:
+def _with(
+    registers: tuple[EmulatedFeetechRegister, ...], **initial: int
+) -> tuple[EmulatedFeetechRegister, ...]:
     """Return registers with other start values."""
     return tuple(r._replace(initial=initial.get(r.name, r.initial)) for r in registers)
 
 
 _KEPT = (
-    FeetechRegister("id", 5, initial=1),
-    FeetechRegister("baud_rate", 6),
-    FeetechRegister("return_delay_time", 7, initial=250),  # [R]; 2 us
-    FeetechRegister("status_return_level", 8, initial=1),
-    FeetechRegister("min_position_limit", 9, 2),
-    FeetechRegister("max_position_limit", 11, 2, 4095),
-    FeetechRegister("temperature_limit", 13, initial=70),
-    FeetechRegister("max_voltage_limit", 14, initial=80),
-    FeetechRegister("min_voltage_limit", 15, initial=40),
-    FeetechRegister("max_torque", 16, 2, 1000),
-    FeetechRegister("phase", 18, initial=12),  # [R]: speeds in steps/s, speed 0 is the highest
-    FeetechRegister(
+    EmulatedFeetechRegister("id", 5, initial=1),
+    EmulatedFeetechRegister("baud_rate", 6),
+    EmulatedFeetechRegister("return_delay_time", 7, initial=250),  # [R]; 2 us
+    EmulatedFeetechRegister("status_return_level", 8, initial=1),
+    EmulatedFeetechRegister("min_position_limit", 9, 2),
+    EmulatedFeetechRegister("max_position_limit", 11, 2, 4095),
+    EmulatedFeetechRegister("temperature_limit", 13, initial=70),
+    EmulatedFeetechRegister("max_voltage_limit", 14, initial=80),
+    EmulatedFeetechRegister("min_voltage_limit", 15, initial=40),
+    EmulatedFeetechRegister("max_torque", 16, 2, 1000),
+    EmulatedFeetechRegister(
+        "phase", 18, initial=12
+    ),  # [R]: speeds in steps/s, speed 0 is the highest
+    EmulatedFeetechRegister(
         "unloading_condition", 19, initial=0x2C
     ),  # [R]: overheat, overcurrent, overload
-    FeetechRegister("led_alarm_condition", 20, initial=0x2F),  # [R]
-    FeetechRegister("position_p_gain", 21, initial=32),  # [R]
-    FeetechRegister("position_d_gain", 22, initial=32),  # [R]
-    FeetechRegister("position_i_gain", 23),
-    FeetechRegister("minimum_startup_force", 24, 2, 16),  # [R]
-    FeetechRegister("cw_dead_zone", 26, initial=1),
-    FeetechRegister("ccw_dead_zone", 27, initial=1),
+    EmulatedFeetechRegister("led_alarm_condition", 20, initial=0x2F),  # [R]
+    EmulatedFeetechRegister("position_p_gain", 21, initial=32),  # [R]
+    EmulatedFeetechRegister("position_d_gain", 22, initial=32),  # [R]
+    EmulatedFeetechRegister("position_i_gain", 23),
+    EmulatedFeetechRegister("minimum_startup_force", 24, 2, 16),  # [R]
+    EmulatedFeetechRegister("cw_dead_zone", 26, initial=1),
+    EmulatedFeetechRegister("ccw_dead_zone", 27, initial=1),
 )
 _STS_KEPT = (
     *_KEPT,
-    FeetechRegister("protection_current", 28, 2, 500),  # [R]; 6.5 mA
-    FeetechRegister("angular_resolution", 30, initial=1),
-    FeetechRegister("position_offset", 31, 2, sign=11),
-    FeetechRegister("operating_mode", 33),
-    FeetechRegister("protective_torque", 34, initial=20),
-    FeetechRegister("protection_time", 35, initial=200),
-    FeetechRegister("overload_torque", 36, initial=80),
-    FeetechRegister("velocity_p_gain", 37, initial=10),  # [R]
-    FeetechRegister("overcurrent_time", 38, initial=200),
-    FeetechRegister("velocity_i_gain", 39, initial=200),  # [A]
+    EmulatedFeetechRegister("protection_current", 28, 2, 500),  # [R]; 6.5 mA
+    EmulatedFeetechRegister("angular_resolution", 30, initial=1),
+    EmulatedFeetechRegister("position_offset", 31, 2, sign=11),
+    EmulatedFeetechRegister("operating_mode", 33),
+    EmulatedFeetechRegister("protective_torque", 34, initial=20),
+    EmulatedFeetechRegister("protection_time", 35, initial=200),
+    EmulatedFeetechRegister("overload_torque", 36, initial=80),
+    EmulatedFeetechRegister("velocity_p_gain", 37, initial=10),  # [R]
+    EmulatedFeetechRegister("overcurrent_time", 38, initial=200),
+    EmulatedFeetechRegister("velocity_i_gain", 39, initial=200),  # [A]
     # Set in the factory.
-    FeetechRegister("moving_threshold", 80, initial=1),  # [A]
-    FeetechRegister("dts", 81),
-    FeetechRegister("velocity_unit_factor", 82, initial=1),
-    FeetechRegister("hts", 83),
-    FeetechRegister("max_velocity_limit", 84),  # 50 steps/s, as the model is
-    FeetechRegister("max_acceleration", 85, initial=254),  # [R]
-    FeetechRegister("acceleration_factor", 86, initial=1),
+    EmulatedFeetechRegister("moving_threshold", 80, initial=1),  # [A]
+    EmulatedFeetechRegister("dts", 81),
+    EmulatedFeetechRegister("velocity_unit_factor", 82, initial=1),
+    EmulatedFeetechRegister("hts", 83),
+    EmulatedFeetechRegister("max_velocity_limit", 84),  # 50 steps/s, as the model is
+    EmulatedFeetechRegister("max_acceleration", 85, initial=254),  # [R]
+    EmulatedFeetechRegister("acceleration_factor", 86, initial=1),
 )
 _SCS_KEPT = (
     # What STS servos have there is assumed of these, too [A].
     *_with(_KEPT, max_position_limit=1023, unloading_condition=0x24, led_alarm_condition=0x25),
-    FeetechRegister("protective_torque", 37, initial=20),
-    FeetechRegister("protection_time", 38, initial=200),
-    FeetechRegister("overload_torque", 39, initial=80),
-    FeetechRegister("pwm_step", 78),
-    FeetechRegister("moving_threshold", 79, initial=1),  # [A]
-    FeetechRegister("dts", 80),
-    FeetechRegister("min_velocity_limit", 81),
-    FeetechRegister("max_velocity_limit", 82),  # 50 steps/s, as the model is
+    EmulatedFeetechRegister("protective_torque", 37, initial=20),
+    EmulatedFeetechRegister("protection_time", 38, initial=200),
+    EmulatedFeetechRegister("overload_torque", 39, initial=80),
+    EmulatedFeetechRegister("pwm_step", 78),
+    EmulatedFeetechRegister("moving_threshold", 79, initial=1),  # [A]
+    EmulatedFeetechRegister("dts", 80),
+    EmulatedFeetechRegister("min_velocity_limit", 81),
+    EmulatedFeetechRegister("max_velocity_limit", 82),  # 50 steps/s, as the model is
 )
 _RAM = (
-    FeetechRegister("torque_enable", 40),
-    FeetechRegister("acceleration", 41),
-    FeetechRegister("goal_position", 42, 2, sign=15),
-    FeetechRegister(
+    EmulatedFeetechRegister("torque_enable", 40),
+    EmulatedFeetechRegister("acceleration", 41),
+    EmulatedFeetechRegister("goal_position", 42, 2, sign=15),
+    EmulatedFeetechRegister(
         "goal_time", 44, 2
     ),  # where a duty drives the motor the duty, its sign in bit 10
-    FeetechRegister("goal_speed", 46, 2, sign=15),
+    EmulatedFeetechRegister("goal_speed", 46, 2, sign=15),
 )
 _FIXED = (
-    FeetechRegister("firmware_major", 0, initial=3),
-    FeetechRegister("firmware_minor", 1),
-    FeetechRegister("endianness", 2),
-    FeetechRegister("model_number", 3, 2),
-    FeetechRegister("registered_instruction", 64),
+    EmulatedFeetechRegister("firmware_major", 0, initial=3),
+    EmulatedFeetechRegister("firmware_minor", 1),
+    EmulatedFeetechRegister("endianness", 2),
+    EmulatedFeetechRegister("model_number", 3, 2),
+    EmulatedFeetechRegister("registered_instruction", 64),
 )
 _ABSENT_FROM_SCS = (
-    FeetechRegister("protection_current", 256, 2, 0xFFFF),
-    FeetechRegister("position_offset", 258, 2),
-    FeetechRegister("operating_mode", 260),
-    FeetechRegister("overcurrent_time", 261, initial=255),
-    FeetechRegister("torque_limit", 262, 2, 1000),
-    FeetechRegister("velocity_p_gain", 264, initial=10),
-    FeetechRegister("velocity_i_gain", 265, initial=200),
+    EmulatedFeetechRegister("protection_current", 256, 2, 0xFFFF),
+    EmulatedFeetechRegister("position_offset", 258, 2),
+    EmulatedFeetechRegister("operating_mode", 260),
+    EmulatedFeetechRegister("overcurrent_time", 261, initial=255),
+    EmulatedFeetechRegister("torque_limit", 262, 2, 1000),
+    EmulatedFeetechRegister("velocity_p_gain", 264, initial=10),
+    EmulatedFeetechRegister("velocity_i_gain", 265, initial=200),
 )
 
 
@@ -137,12 +141,12 @@ class Table(NamedTuple):
     baud_rates: bit/s by the value of their register
     """
 
-    kept: tuple[FeetechRegister, ...]
-    ram: tuple[FeetechRegister, ...]
+    kept: tuple[EmulatedFeetechRegister, ...]
+    ram: tuple[EmulatedFeetechRegister, ...]
     lock_at: int
     highest: Mapping[int, int]
-    fixed: tuple[FeetechRegister, ...] = _FIXED
-    absent: tuple[FeetechRegister, ...] = ()
+    fixed: tuple[EmulatedFeetechRegister, ...] = _FIXED
+    absent: tuple[EmulatedFeetechRegister, ...] = ()
     order: Literal["little", "big"] = "little"
     turn_steps: float = 4096.0
     last_step: int | None = None
@@ -152,7 +156,11 @@ class Table(NamedTuple):
 
 STS = Table(
     kept=_STS_KEPT,
-    ram=(*_RAM, FeetechRegister("torque_limit", 48, 2), FeetechRegister("lock", 55, initial=1)),
+    ram=(
+        *_RAM,
+        EmulatedFeetechRegister("torque_limit", 48, 2),
+        EmulatedFeetechRegister("lock", 55, initial=1),
+    ),
     lock_at=55,
     highest={5: HIGHEST_ID, 6: len(BAUD_RATES) - 1, 33: STEP},
 )
@@ -162,7 +170,7 @@ def _scs(travel_deg: float) -> Table:
     """Return the registers of a model."""
     return Table(
         kept=_SCS_KEPT,
-        ram=(*_RAM, FeetechRegister("lock", 48, initial=1)),
+        ram=(*_RAM, EmulatedFeetechRegister("lock", 48, initial=1)),
         lock_at=48,
         highest={5: HIGHEST_ID, 6: len(SCS_BAUD_RATES) - 1},
         absent=_ABSENT_FROM_SCS,

@@ -84,16 +84,16 @@ def gaze_step(faces: int, bodies: int, pictures: int) -> tuple[float, float]:
 def ruckig_step(times: int = 3000) -> float:
     """Return seconds of one step of a six-axis jerk-limited plan to a changing target."""
     axes = 6
-    plan, wish, out = Ruckig(axes, TICK_S), InputParameter(axes), OutputParameter(axes)
-    wish.max_velocity, wish.max_acceleration = [5.0] * axes, [50.0] * axes
-    wish.max_jerk = [1000.0] * axes
+    plan, desired, out = Ruckig(axes, TICK_S), InputParameter(axes), OutputParameter(axes)
+    desired.max_velocity, desired.max_acceleration = [5.0] * axes, [50.0] * axes
+    desired.max_jerk = [1000.0] * axes
     rng = np.random.default_rng(0)
     targets = rng.uniform(-0.5, 0.5, (times, axes)).tolist()
 
     def step(k: int) -> None:
-        wish.target_position = targets[k]
-        plan.update(wish, out)
-        out.pass_to_input(wish)
+        desired.target_position = targets[k]
+        plan.update(desired, out)
+        out.pass_to_input(desired)
 
     return per_call(step, times)
 
