@@ -143,7 +143,7 @@ def exact(tick: Tick) -> str:
 def test_every_tick_comes_back_bit_for_bit(recorded: Recorded) -> None:
     # A new field must be recorded too: add it to moment.flat, as_json and from_json.
     assert Tick._fields == (
-        "t_s", "joints", "pose", "detections", "percept", "target", "gaze", "wish_rad", "verdict",
+        "t_s", "joints", "pose", "detections", "percept", "target", "gaze", "desired_rad", "verdict",
         "events", "orders", "stopped", "led",
     )  # fmt: skip
     back = list(RunRecording(recorded.path).ticks())
