@@ -1,6 +1,6 @@
 """Feetech STS servos as a family of the servo bus."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from gazerig.drivers.feetech import protocol
@@ -57,7 +57,7 @@ SIGN_BITS = {"position": 15, "velocity": 15, "effort": 10}
 
 _SENSED = ("position", "velocity", "effort", "voltage", "temperature", "status")
 _ARMED = ("torque", "acceleration", "torque_limit")
-_SENSED_AT, _ARMED_AT = (REGISTERS[n].address for n in ("present_position", "torque_enable"))
+SENSED_AT, ARMED_AT = (REGISTERS[n].address for n in ("present_position", "torque_enable"))
 _END = REGISTERS["present_current"].address + REGISTERS["present_current"].size
 
 
@@ -66,8 +66,8 @@ def window(address: int) -> ReadWindow:
 
     address: 56 or below; from 40 or below torque and armed limits are told too
     """
-    armed = address <= _ARMED_AT
-    pad = (_ARMED_AT if armed else _SENSED_AT) - address
+    armed = address <= ARMED_AT
+    pad = (ARMED_AT if armed else SENSED_AT) - address
     layout = f"{pad}x" + ("BB6xH6x" if armed else "") + "HHHBBxB5x"
     fields = (*_ARMED, *_SENSED) if armed else _SENSED
     return ReadWindow(address, _END - address, layout, fields, "<", tuple(SIGN_BITS.items()))
@@ -81,15 +81,24 @@ def read_plan(
     Torque and the armed limits lie before it, so now and then the reading begins at 40 and tells
     them too.
     """
-    every = params.torque_every
-    armed, sensed = window(_ARMED_AT), (window(_SENSED_AT), window(_SENSED_AT - 1))
+    return plan_of(window, params.torque_every)
+
+
+def plan_of(window: Callable[[int], ReadWindow], every: int) -> ReadPlan:
+    """Return how servos of a series are read.
+
+    Args:
+        window: makes a window from its address.
+        every: so many readings also tell the torque.
+    """
+    armed, sensed = window(ARMED_AT), (window(SENSED_AT), window(SENSED_AT - 1))
     usual = [armed, *sensed * every][:every]
     if every == 1:
-        usual.append(window(_ARMED_AT - 1))
-    spare = [window(_SENSED_AT - more) for more in range(2, 7)]
-    second = [window(_SENSED_AT - more) for more in range(7, 11)]
+        usual.append(window(ARMED_AT - 1))
+    spare = [window(SENSED_AT - more) for more in range(2, 7)]
+    second = [window(SENSED_AT - more) for more in range(7, 11)]
     # Of servos asked alone: never as long as a reading of all, and never twice the same.
-    alone = [window(_ARMED_AT - more) for more in range(1, 11)]
+    alone = [window(ARMED_AT - more) for more in range(1, 11)]
     return ReadPlan(
         WindowSchedule(usual, spare),
         WindowSchedule(alone, alone),

@@ -11,7 +11,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from gazerig.drivers.feetech.family import FEETECH, SIGN_BITS, wanted_settings
+from gazerig.drivers.feetech.family import (
+    ARMED_AT,
+    FEETECH,
+    SENSED_AT,
+    SIGN_BITS,
+    plan_of,
+    wanted_settings,
+)
 from gazerig.drivers.feetech.memory_table import (
     REGISTERS,
     SCS_BAUD_RATES,
@@ -24,7 +31,7 @@ from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.feetech.protocol import GoalWrite
 from gazerig.drivers.servo_bus.family import Arming
 from gazerig.drivers.servo_bus.read_plan import ReadPlan
-from gazerig.drivers.servo_bus.read_windows import ReadWindow, WindowSchedule
+from gazerig.drivers.servo_bus.read_windows import ReadWindow
 
 if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.types import ServoSetup
@@ -52,7 +59,7 @@ SCS_REGISTERS: dict[str, FeetechRegister] = {
 }
 """Registers by name."""
 
-_SENSED_AT, _ARMED_AT, _END = 56, 40, 67
+_END = 67
 
 
 class ScsGoalWrite(GoalWrite):
@@ -66,8 +73,8 @@ def window(address: int) -> ReadWindow:
 
     address: 56 or below; from 40 or below the torque is told too
     """
-    armed = address <= _ARMED_AT
-    pad = (_ARMED_AT if armed else _SENSED_AT) - address
+    armed = address <= ARMED_AT
+    pad = (ARMED_AT if armed else SENSED_AT) - address
     layout = f"{pad}x" + ("B15x" if armed else "") + "HHHBBxBx"
     fields = ("position", "velocity", "effort", "voltage", "temperature", "status")
     told = ("torque", *fields) if armed else fields
@@ -78,16 +85,7 @@ def read_plan(
     setups: "Sequence[ServoSetup]", params: FeetechParams, firmware: Mapping[int, int] | None
 ) -> ReadPlan:
     """Return how servos are read: as STS servos, but one by one."""
-    armed, sensed = window(_ARMED_AT), (window(_SENSED_AT), window(_SENSED_AT - 1))
-    usual = [armed, *sensed * params.torque_every][: params.torque_every]
-    alone = [window(_ARMED_AT - more) for more in range(1, 11)]
-    second = [window(_SENSED_AT - more) for more in range(7, 11)]
-    return ReadPlan(
-        WindowSchedule(usual, [window(_SENSED_AT - more) for more in range(2, 7)]),
-        WindowSchedule(alone, alone),
-        WindowSchedule(second, second),
-        armed=armed,
-    )
+    return plan_of(window, params.torque_every)
 
 
 def scs_settings(setup: "ServoSetup") -> dict[str, int]:
