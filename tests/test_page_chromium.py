@@ -28,8 +28,8 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.run_observers import RunObservers
 from gazerig.robot.control.loop import LoopCount, Tick
-from gazerig.robot.dashboard.page_main import _HALF_WIDTH as HALF_WIDTH
-from gazerig.robot.dashboard.page_main import VIEWS
+from gazerig.robot.dashboard.page_view import _HALF_WIDTH as HALF_WIDTH
+from gazerig.robot.dashboard.page_view import VIEWS
 from gazerig.robot.model.commands import Ask, LookAt, Renew, Stop
 
 

@@ -33,7 +33,7 @@ from gazerig.robot.dashboard.inbox import (
 )
 from gazerig.robot.dashboard.jog_panel import MEASURED, RECKONED, JogPanel, measured_table
 from gazerig.robot.dashboard.outbox import Outbox
-from gazerig.robot.dashboard.page_main import News, drain
+from gazerig.robot.dashboard.page_feed import News, drain
 from gazerig.robot.dashboard.page_process import (
     CHOICES,
     EVERYBODY,

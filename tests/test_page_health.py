@@ -18,7 +18,8 @@ from gazerig.robot.dashboard.html import AMBER, RED
 from gazerig.robot.dashboard.joint_charts import JointCharts, JointSeries
 from gazerig.robot.dashboard.outbox import Outbox
 from gazerig.robot.dashboard.overlays import OverlayChoices, OverlayPanel
-from gazerig.robot.dashboard.page_main import News, PageView
+from gazerig.robot.dashboard.page_feed import News
+from gazerig.robot.dashboard.page_view import PageView
 from gazerig.robot.dashboard.panel import PanelView
 from gazerig.robot.dashboard.servo_health import (
     NO_FEEDBACK,

@@ -580,7 +580,7 @@ MUTATIONS: tuple[Mutation, ...] = (
     (GUARD, "near = -far <= command[i] - position <= far and", "near =", not_moving),
     (GUARD, "if joints.measured and not joints.measured[i]:", "if False:", reckoned),
     (GUARD, "self._retreat[i] = back = position", "pass", not_moving),
-    (GUARD, "if self._retrying[i]\n", "if False\n", not_moving),
+    (GUARD, "if self._retrying[i]:\n", "if False:\n", not_moving),
     # torque and faults
     (GUARD, "        if not powered:", "        if False:", torque_off),
     (GUARD, "or False in joints.torque", "", torque_off),

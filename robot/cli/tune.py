@@ -13,7 +13,8 @@ from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.robot.cli import lead as cli_lead
 from gazerig.robot.cli.lead import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
-from gazerig.robot.remote.client import JsonValue, ParamInfo, RobotClient
+from gazerig.robot.remote.client import RobotClient
+from gazerig.robot.remote.param_info import JsonValue, ParamInfo
 
 ctl = typer.Typer(
     name="ctl",

@@ -18,3 +18,11 @@ class JointLimit(NamedTuple):
     hottest_c: float = 70.0
     lowest_v: float = 0.0
     highest_v: float = inf
+
+    def within(self, reach: "JointLimit") -> "JointLimit":
+        """Return the part of this range and speed that a servo's own limits leave."""
+        return self._replace(
+            low_rad=min(max(self.low_rad, reach.low_rad), reach.high_rad),
+            high_rad=max(min(self.high_rad, reach.high_rad), reach.low_rad),
+            speed_rad_s=min(self.speed_rad_s, reach.speed_rad_s),
+        )

@@ -16,7 +16,7 @@ from functools import partial
 from math import radians
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.robot.model.commands import (
@@ -32,6 +32,13 @@ from gazerig.robot.model.commands import (
 )
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.remote.heartbeat import LeadHeartbeat
+from gazerig.robot.remote.param_info import (
+    JsonValue,
+    ParamDifference,
+    ParamInfo,
+    SavedFile,
+    differences,
+)
 from gazerig.robot.remote.socket_io import (
     ANSWER_BYTES,
     MalformedMessage,
@@ -48,9 +55,6 @@ _FILES_S = 40.0
 """For what reads or writes files, which the rig leaves to another process."""
 _WITH_FILES = {"save", "character"}
 
-JsonValue = float | int | bool | str | None | list["JsonValue"] | dict[str, "JsonValue"]
-"""A value as it comes over the wire: lists where the rig has tuples."""
-
 
 class NoRobotError(SetupError):
     """No rig runs, or not the one that is meant; the message says which do."""
@@ -62,47 +66,6 @@ class RequestRejected(SetupError):
 
 class ConnectionLost(DriverError):
     """The rig ended or does not answer; the message says which."""
-
-
-class ParamInfo(NamedTuple):
-    """One parameter of the rig, its rule and its default.
-
-    unit: "" for a bare number; says: what it is; low, high: None where there is no bound
-    choices: empty where any value of its kind may stand
-    kind: number, whole, bool, text, choice, list or mapping
-    live: when a change takes effect, "next tick", or "next start" with the reason
-    optional: null may stand here; length: of a list, None where it is free; items: their kind
-    """
-
-    key: str
-    group: str
-    unit: str
-    says: str
-    low: float | None
-    high: float | None
-    choices: tuple[Any, ...]
-    kind: str
-    default: JsonValue
-    live: str
-    optional: bool = False
-    length: int | None = None
-    items: str | None = None
-
-
-class ParamDifference(NamedTuple):
-    """One value that differs: from the file (``unsaved``) or from the default (``differs``)."""
-
-    key: str
-    old: JsonValue
-    new: JsonValue
-
-
-class SavedFile(NamedTuple):
-    """What was written; ``backup`` is None where nothing differed or the file is new."""
-
-    path: Path
-    backup: Path | None
-    changes: tuple[ParamDifference, ...]
 
 
 class RobotClient:
@@ -174,7 +137,7 @@ class RobotClient:
     def knobs(self, prefix: str = "") -> tuple[ParamInfo, ...]:
         """Return the rules and defaults of all keys that begin with ``prefix``."""
         found = cast(list[dict[str, Any]], self._asked("knobs", prefix=prefix))
-        return tuple(_knob(one) for one in found)
+        return tuple(ParamInfo.from_json(one) for one in found)
 
     def knob(self, key: str) -> ParamInfo:
         """Return one parameter's rule and default.
@@ -205,11 +168,11 @@ class RobotClient:
 
     def unsaved(self) -> tuple[ParamDifference, ...]:
         """Return what is in force and not in the rig's file."""
-        return _differences(self._asked("unsaved"))
+        return differences(self._asked("unsaved"))
 
     def differs(self) -> tuple[ParamDifference, ...]:
         """Return what differs from the defaults."""
-        return _differences(self._asked("differs"))
+        return differences(self._asked("differs"))
 
     def save(self, path: Path | str | None = None) -> SavedFile:
         """Write what is in force into the rig's own file, or another of this computer.
@@ -220,7 +183,7 @@ class RobotClient:
         whole = None if path is None else str(Path(path).expanduser().absolute())
         said = cast(dict[str, Any], self._asked("save", path=whole))
         backup = None if said["backup"] is None else Path(said["backup"])
-        return SavedFile(Path(said["path"]), backup, _differences(said["changes"]))
+        return SavedFile(Path(said["path"]), backup, differences(said["changes"]))
 
     def revert(self) -> tuple[str, ...]:
         """Put in force what the rig's file says."""
@@ -412,13 +375,3 @@ def _names(rigs: list[RobotClient]) -> str:
             except DriverError as error:
                 names.append(f"{rig.pid} ({error})")
     return ", ".join(names)
-
-
-def _knob(said: Mapping[str, Any]) -> ParamInfo:
-    named = {name: said[name] for name in ParamInfo._fields if name in said}
-    return ParamInfo(**{**named, "choices": tuple(named["choices"])})
-
-
-def _differences(said: object) -> tuple[ParamDifference, ...]:
-    rows = cast(list[dict[str, Any]], said)
-    return tuple(ParamDifference(row["key"], row["old"], row["new"]) for row in rows)

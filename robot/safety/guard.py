@@ -12,8 +12,9 @@ from typing import Literal, NamedTuple
 
 from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint_limit import JointLimit
-from gazerig.robot.model.types import GuardResult, JointAngles, JointState, Level
+from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 from gazerig.robot.safety.collisions import Collisions
+from gazerig.robot.safety.guard_verdict import standstill, verdict
 from gazerig.robot.safety.health import JointHealth
 from gazerig.robot.safety.late_ticks import LateTicks
 from gazerig.robot.safety.motion_limiter import MotionLimiter
@@ -21,7 +22,6 @@ from gazerig.robot.safety.stall_detector import StallDetector
 
 _NEAR_RAD = radians(1.0)
 _ROUNDING_RAD = 1e-9
-_LEVELS: tuple[Level, ...] = ("ok", "limited", "hold", "limp")
 
 
 class _Hold(NamedTuple):
@@ -123,14 +123,7 @@ class Guard:
         if self._reach is None:
             return self._wanted
         pairs = zip(self._wanted, self._reach(), strict=True)
-        return tuple(
-            wanted._replace(
-                low_rad=min(max(wanted.low_rad, reach.low_rad), reach.high_rad),
-                high_rad=max(min(wanted.high_rad, reach.high_rad), reach.low_rad),
-                speed_rad_s=min(wanted.speed_rad_s, reach.speed_rad_s),
-            )
-            for wanted, reach in pairs
-        )
+        return tuple(wanted.within(reach) for wanted, reach in pairs)
 
     def _begin(self, i: int, angle_rad: float) -> None:
         """Begin with one joint at a goal that is in force on the bus, at rest."""
@@ -203,14 +196,14 @@ class Guard:
     ) -> GuardResult:
         """Return what may be sent now.
 
-        wish_rad: any numbers at all
+        desired_rad: any numbers at all
         picture_age_s: age of the newest picture; infinity before the first
         """
         if True in joints.rearmed:
             self._rearm(joints)
         since_s = t_s - self._t_s
         if not (since_s > 0.0 and isfinite(since_s)):
-            return self._standstill(desired_rad)
+            return standstill(tuple(self._motion.command), desired_rad, self._names)
         self._t_s = t_s
         if self._waiting or self._outside:
             self._change()
@@ -226,43 +219,17 @@ class Guard:
         usual = self._all_well(joints)
         far, command, watched = self._stuck.far_rad, self._motion.command, self._stuck.watched
         columns = zip(desired_rad, joints.position_rad, joints.measured_s, strict=True)
-        why: dict[int, str] = {}
-        ranks: dict[int, int] = {}
+        short: dict[int, tuple[int, str]] = {}
         for i, (desired, position, at_s) in enumerate(columns):
             unseen = blind and self._neck[i]
             near = -far <= command[i] - position <= far and not watched[i]
             well = near and at_s >= stale_s and not unseen and (usual or self._well(i, joints))
             if well and self._motion.follow(i, desired, dt_s):
                 continue  # nearly every wish is a good one and is passed on as it is
-            rank, reason = self._pass(i, desired, joints, at_s >= stale_s, unseen, dt_s)
-            if reason:
-                why[i], ranks[i] = reason, rank
-        return self._verdict(desired_rad, why, ranks)
-
-    def _standstill(self, desired_rad: JointAngles) -> GuardResult:
-        """Move nothing, as no time has passed."""
-        why = ("time stands still",) * len(self._limits)
-        reasons = ("all: time stands still",)
-        command = tuple(self._motion.command)
-        return GuardResult(command, "hold", reasons, desired_rad, why, reasons, self._names)
-
-    def _verdict(
-        self, desired_rad: JointAngles, why: dict[int, str], ranks: dict[int, int]
-    ) -> GuardResult:
-        command = tuple(self._motion.command)
-        if not why:
-            return GuardResult(command, "ok", (), desired_rad, joints=self._names)
-        worst = max(ranks.values())
-        reasons = {i: f"{self._names[i]}: {reason}" for i, reason in why.items()}
-        return GuardResult(
-            command,
-            _LEVELS[worst],
-            tuple(reasons.values()),
-            desired_rad,
-            tuple([why.get(i, "") for i in range(len(command))]),
-            tuple([reasons[i] for i in reasons if ranks[i] == worst]),
-            self._names,
-        )
+            outcome = self._pass(i, desired, joints, at_s >= stale_s, unseen, dt_s)
+            if outcome[1]:
+                short[i] = outcome
+        return verdict(tuple(self._motion.command), desired_rad, short, self._names)
 
     def _all_well(self, joints: JointState) -> bool:
         """Return whether nothing but limits, ages and distances need be looked at."""
@@ -410,12 +377,9 @@ class Guard:
         if self._soft:
             soft = min(soft, self._late_accel)
         if self._gentle[i]:
-            lead = self._stuck.lead_rad
-            pull = (
-                min(max(desired, position - lead), position + lead)
-                if self._retrying[i]
-                else desired
-            )
+            pull, lead = desired, self._stuck.lead_rad
+            if self._retrying[i]:
+                pull = min(max(desired, position - lead), position + lead)
             motion.seek(i, pull, dt_s, min(top, self._gentle_speed), min(soft, self._gentle_accel))
             if abs(target - motion.command[i]) < _NEAR_RAD and self._t_s >= self._gentle_until_s[i]:
                 self._gentle[i] = self._retrying[i] = False

@@ -1,0 +1,182 @@
+"""The scene and the panels that browsers see, drawn from what the rig sends."""
+
+from collections.abc import Callable, Mapping
+from math import atan
+
+import viser
+
+from gazerig.robot.dashboard.control_tabs import ControlTabs
+from gazerig.robot.dashboard.head_model import FLOOR_M, HeadModel
+from gazerig.robot.dashboard.outbox import Outbox
+from gazerig.robot.dashboard.overlays import OverlayPanel
+from gazerig.robot.dashboard.page_feed import News
+from gazerig.robot.dashboard.page_process import CHOICES, EVERYBODY, KNOBS, REPLAY, VALUES, WORDS
+from gazerig.robot.dashboard.panel import PanelView
+from gazerig.robot.dashboard.people import PeopleView
+from gazerig.robot.dashboard.replay import ReplayView
+from gazerig.robot.model.types import Snapshot
+
+_HALF_WIDTH = 0.84  # tangent of half the horizontal field of view: 80 deg
+_FOV_STEP_RAD = 0.01
+# Name of the view: where the camera is and what it looks at.
+VIEWS = {
+    "both": ((0.80, -1.32, 0.54), (0.50, 0.0, 0.10)),
+    "rig": ((0.34, -0.11, 0.19), (0.0, 0.0, 0.11)),
+    "over its shoulder": ((-0.52, 0.22, 0.42), (0.60, 0.0, 0.16)),
+}
+
+
+class PageView:
+    """Scene and panels of one server."""
+
+    def __init__(
+        self,
+        server: viser.ViserServer,
+        teller: Outbox,
+        tell: Callable[[Mapping[str, object]], None],
+    ) -> None:
+        """Build the empty room.
+
+        teller: takes what people do to the rig; tell: shows what the stop button must know
+        """
+        self._server = server
+        self._teller = teller
+        self._tell = tell
+        server.initial_camera.position, server.initial_camera.look_at = VIEWS["both"]
+        server.on_client_connect(_greet)
+        _furnish(server)
+        self._head = HeadModel(server.scene)
+        self._people = PeopleView(server.scene)
+        self._panel = PanelView(server.gui)
+        self._layers = OverlayPanel(server.scene)
+        self._panel.depth = self._ask_depth
+        self._controls = ControlTabs(server, teller)
+        self._replay: ReplayView | None = None
+        self._newest: Snapshot | None = None
+        self._jpeg: bytes | None = None
+        self._drawn = self._watched = False
+        self._add_views()
+
+    def _ask_depth(self, on: bool) -> None:
+        self._teller.ask({"show": {"depth": on}}, EVERYBODY)
+
+    def _add_views(self) -> None:
+        buttons = self._server.gui.add_button_group("view", tuple(VIEWS), order=9)
+
+        @buttons.on_click
+        def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
+            if event.client is not None:
+                camera = event.client.camera
+                camera.position, camera.look_at = VIEWS[event.target.value]
+
+    def show(self, news: News) -> None:
+        """Draw the newest of what came; without a spectator it is kept until one comes."""
+        for kind, data in news.others:
+            self._take(kind, data)
+        self._panel.note(news.snapshots)
+        if news.snapshots:
+            self._newest = news.snapshots[-1]
+            self._tell(self._stop_state())
+        self._jpeg = news.jpeg or self._jpeg
+        watched = bool(self._server.get_clients())
+        if watched and not self._watched:  # who comes late may find a rig that stands still
+            self._panel.draw_all()
+        self._watched = watched
+        if watched or not self._drawn:
+            with self._server.atomic():  # a browser never sees half of a snapshot
+                self._draw()
+
+    def _stop_state(self) -> dict[str, object]:
+        """Return what the stop button must know: a recording can neither be stopped nor resumed.
+
+        blind: joints without feedback, which do not take hold where they are but jump
+        """
+        if self._replay is not None:
+            return {"recording": True}
+        shot = self._newest
+        stopped, blind = (shot.stopped, len(shot.reckoned)) if shot else ("", 0)
+        return {"stopped": stopped, "silent": False, "blind": blind}
+
+    def _take(self, kind: bytes, data: object) -> None:
+        """Take what the rig says beside snapshots and pictures."""
+        if kind == WORDS and isinstance(data, list):
+            who, words = data
+            self._controls.answered(who, words)
+        elif kind == KNOBS and isinstance(data, list):
+            self._controls.knobs(data)
+        elif isinstance(data, dict):
+            if kind == CHOICES:
+                self._controls.offer(data)
+            elif kind == VALUES:
+                self._controls.values(data)
+            elif kind == REPLAY:
+                self._show_replay(data)
+
+    def _show_replay(self, state: Mapping[str, object]) -> None:
+        if self._replay is None:
+            duration_s = state.get("duration_s")
+            assert isinstance(duration_s, int | float)  # the rig's side writes it first
+            self._controls.leave()
+            self._tell({"recording": True})
+            self._replay = ReplayView(
+                self._server.gui,
+                self._ask_replay,
+                float(duration_s),
+            )
+        self._replay.show(state)
+
+    def _ask_replay(self, client: int, asked: Mapping[str, object]) -> None:
+        self._teller.ask(asked, str(client))
+
+    def _draw(self) -> None:
+        if self._newest is not None:
+            self._head.show(self._newest)
+            self._people.show(self._newest)
+            self._layers.show(self._newest, self._panel.layers)
+            self._panel.show(self._newest)
+            if self._replay is None:
+                self._controls.show(self._newest)
+            self._drawn = True
+        if self._jpeg is not None:
+            self._panel.show_picture(self._jpeg)
+        self._newest = self._jpeg = None
+
+    def silent(self) -> None:
+        """Say that nothing comes any more, beside the last that came."""
+        self.show(News((), None, ended=False))
+        if self._drawn:
+            self._panel.silent()
+            self._tell({"stopped": "", "silent": True})
+
+
+def _greet(client: viser.ClientHandle) -> None:
+    """Show rig and person from side to side, whatever the shape the window has or is given."""
+
+    @client.camera.on_update
+    def _(camera: viser.CameraHandle) -> None:
+        fov_rad = 2.0 * atan(_HALF_WIDTH / camera.aspect)
+        if abs(camera.fov - fov_rad) > _FOV_STEP_RAD:
+            camera.fov = fov_rad
+
+
+def _furnish(server: viser.ViserServer) -> None:
+    server.gui.configure_theme(show_logo=False, show_share_button=False)
+    server.gui.main_panel.dock_right()
+    server.gui.main_panel.set_width(360)
+    # A room's picture as light would fade the scene in slowly, and shadows cost a browser
+    # without a graphics card, often on the rig's own computer, three quarters of its rate.
+    server.scene.configure_environment_map(None)
+    server.scene.configure_default_lights(cast_shadow=False)
+    server.scene.add_light_hemisphere(
+        "/sky", sky_color=(255, 255, 255), ground_color=(176, 168, 160), intensity=3.0
+    )
+    server.scene.add_grid(
+        "/floor",
+        cell_size=0.1,
+        section_size=0.5,
+        infinite_grid=True,
+        fade_distance=5.0,
+        plane_color=(240, 242, 245),
+        plane_opacity=1.0,
+        position=(0.0, 0.0, FLOOR_M),
+    )
