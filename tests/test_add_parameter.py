@@ -13,13 +13,13 @@ ROOT = Path(__file__).parents[1]
 TRY = """
 import json
 from gazerig.config.export import json_schema
-from gazerig.config.parameters import changed, knobs
+from gazerig.config.parameters import changed, parameters
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import Rig, load_rig
 from gazerig.gaze.saccade import SaccadeModel
 
 rig, key = load_rig("desk"), "gaze.saccade.rise_share"
-(knob,) = [one for one in knobs(rig, rig) if one.key == key]
+(knob,) = [one for one in parameters(rig, rig) if one.key == key]
 other = changed(rig, {key: 0.3})
 model = SaccadeModel(changed(rig, {"gaze.saccade.profile": "main_sequence"}).gaze.saccade)
 before = model.displacement_rad(0.1, 0.01)
@@ -66,8 +66,8 @@ def test_adding_a_parameter_takes_what_the_paper_says(tmp_path: Path) -> None:
         env={**os.environ, "PYTHONPATH": str(tmp_path)},
         capture_output=True,
         text=True,
-        check=True,
     )
+    assert found.returncode == 0, found.stderr
     made = json.loads(found.stdout)
     knob = made["knob"]
     assert (knob["low"], knob["high"], knob["default"], knob["unit"]) == (0.3, 0.5, 0.45, "")

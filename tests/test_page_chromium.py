@@ -32,6 +32,8 @@ from gazerig.robot.dashboard.page_view import _HALF_WIDTH as HALF_WIDTH
 from gazerig.robot.dashboard.page_view import VIEWS
 from gazerig.robot.model.commands import Ask, LookAt, Renew, Stop
 
+pytestmark = pytest.mark.own_timeouts
+
 
 def load_browser() -> ModuleType:
     """The browser's driver, which stands in another test file."""
@@ -311,7 +313,6 @@ def test_buttons_ask_and_the_picture_leads(at_the_rig: tuple[Rig, Person]) -> No
     wait_for(lambda: rig.newest.target.kind != "puppet", "the head being free")
 
 
-@pytest.mark.own_timeouts
 def test_a_target_is_dragged_through_the_scene(at_the_rig: tuple[Rig, Person]) -> None:
     rig, person = at_the_rig
     person.click(saying("lead"))
@@ -393,7 +394,9 @@ def test_what_is_in_force_is_saved_in_a_new_file_with_its_comments(
     person.click(saying("tuning"))
     wait_for(lambda: person.reads("not saved"), "the mark")
     file = tmp_path / "tuned at midnight.yaml"
-    rig.audience._page._hear._confined = AllowedFolder(tmp_path)  # as if the rig's file lay there
+    rig.audience._page._hear._handler._paths = AllowedFolder(
+        tmp_path
+    )  # as if the rig's file lay there
     person.click(beside("save as", "input"))
     person.type(str(file))
     person.press("\r", "Enter", 13)

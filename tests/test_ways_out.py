@@ -383,7 +383,7 @@ def test_a_reader_that_is_gone_is_one_line_for_a_quick_command() -> None:
     reads, writes = os.pipe()
     os.close(reads)
     done = subprocess.run(
-        [sys.executable, "-c", START, "get", "--help"],
+        [sys.executable, "-c", START, "ctl", "get", "--help"],
         stdout=writes, stderr=subprocess.PIPE, text=True, timeout=60, check=False,
     )  # fmt: skip
     os.close(writes)
