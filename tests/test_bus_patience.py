@@ -9,7 +9,7 @@ from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.dynamixel.read_plan import INDIRECT_MAP, direct_windows, indirect_windows
 from gazerig.drivers.event_log import MOST, EventLog, register_label
-from gazerig.drivers.serial.reopening import Reconnect
+from gazerig.drivers.serial.reconnect import Reconnect
 from gazerig.drivers.servo_bus.adaptive_timeout import (
     REFILL,
     RESERVE_S,

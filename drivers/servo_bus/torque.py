@@ -10,8 +10,10 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TypeVar
 
-from gazerig.drivers.errors import ServoFault, ServoMissing
+from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
 from gazerig.drivers.released import Released
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.transaction import Line
 
 TRIES = 3
@@ -23,6 +25,9 @@ JUMP_TURN = 0.25
 
 STILL_STEPS = 16
 """A limp joint held by a hand moves so far between two questions."""
+
+LEAST_S, MOST_S = 0.005, 0.02
+"""Patience for an answer beyond its time on the wire, where a raw port is released."""
 
 Value = TypeVar("Value")
 
@@ -154,6 +159,25 @@ def switch_off(line: Line, ids: Sequence[int]) -> Released:
             break
     holding = tuple(servo_id for servo_id in left if servo_id in found)
     return Released(holding, tuple(servo_id for servo_id in left if servo_id not in found))
+
+
+def disable_torque(port: BusPort, family: Family, baud: int, ids: Sequence[int]) -> tuple[int, ...]:
+    """Open a port and switch the torque off; return the ids that did not confirm it.
+
+    Args:
+        port: closed, or open already; it is left open.
+        family: make of the servos.
+        baud: bit/s.
+        ids: of the servos.
+
+    Raises:
+        PortError: the port cannot be opened.
+        BusLost: the port went away.
+    """
+    if not port.setBaudRate(baud):
+        raise PortError(f"{port.port_name} cannot run at {baud} bit/s")
+    released = switch_off(Line(port, family, LEAST_S, MOST_S, baud), ids)
+    return (*released.holding, *released.mute)
 
 
 def find_faults(line: Line, ids: Sequence[int]) -> dict[int, int]:

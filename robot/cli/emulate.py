@@ -5,7 +5,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import typer
 
@@ -137,23 +137,51 @@ def emulate(
             devices = {"": _boards(pca9685)}
         else:
             devices = _of_rig(rig or "", firmware)
-        if baud is not None and len(devices) > 1:
-            raise SetupError("--baud: the buses of this rig have rates of their own; see its file")
-        buses = [
-            BusSettings(
-                _at(one, baud, any_baud),
-                name if len(devices) > 1 else None,
-                wire_time,
-                turnaround_us,
-                _link(link, name),
-            )
-            for name, one in devices.items()
-        ]
-        served = ServerSettings(_chosen(buses, case or []), until_eof)
-        try:
-            run(served, _plain if sys.stdout.isatty() else say_line, heed_ctrl_c=True)
-        except ValueError as error:
-            raise SetupError(str(error)) from None
+        line = LineOptions(baud, any_baud, wire_time, turnaround_us, link)
+        _serve(ServerSettings(_chosen(_buses(devices, line), case or []), until_eof))
+
+
+class LineOptions(NamedTuple):
+    """The options that say how a line is opened and how it behaves, as they were given."""
+
+    baud: int | None
+    any_baud: bool
+    wire_time: bool
+    turnaround_us: float
+    link: Path | None
+
+
+def _buses(devices: Mapping[str, Emulated], line: LineOptions) -> list[BusSettings]:
+    """Return every bus with its terminal's settings.
+
+    Raises:
+        SetupError: one baud rate is given for several buses, or one that the servos do not know.
+    """
+    several = len(devices) > 1
+    if line.baud is not None and several:
+        raise SetupError("--baud: the buses of this rig have rates of their own; see its file")
+    return [
+        BusSettings(
+            _at(device, line.baud, line.any_baud),
+            name if several else None,
+            line.wire_time,
+            line.turnaround_us,
+            _link(line.link, name),
+        )
+        for name, device in devices.items()
+    ]
+
+
+def _serve(served: ServerSettings) -> None:
+    """Answer until Ctrl-C, or the end of standard input.
+
+    Raises:
+        SetupError: the settings do not fit the servos.
+    """
+    try:
+        run(served, _plain if sys.stdout.isatty() else say_line, heed_ctrl_c=True)
+    except ValueError as error:
+        raise SetupError(str(error)) from None
 
 
 def _see_what_fits(board: bool, firmware: int | None, device: int | None, crc: bool) -> None:

@@ -2,14 +2,11 @@
 
 import json
 from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from gazerig.drivers.maestro.params import Form, MaestroParams
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_models import HOBBY_KINDS, BusKind
-
-if TYPE_CHECKING:  # a guardian loads no more than one driver
-    pass
 
 
 class ReleasePlan(NamedTuple):
@@ -61,7 +58,7 @@ def releaser(plan: ReleasePlan) -> Releaser:
 
 
 def _smart(plan: ReleasePlan) -> Releaser:
-    from gazerig.drivers.servo_bus.release import disable_torque
+    from gazerig.drivers.servo_bus.torque import disable_torque
     from gazerig.drivers.servo_families import FAMILIES
 
     family = FAMILIES[plan.family or plan.kind]

@@ -26,6 +26,11 @@ DATA_LENGTH = 5
 DATA_LIMIT = 6
 ACCESS = 7
 
+NOT_STORED = (
+    "torque_enable", "bus_watchdog", "goal_pwm", "goal_current", "goal_velocity", "goal_position",
+)  # fmt: skip
+"""A backup (instruction 0x20) leaves out what moves the servo [assumed: no document tells]."""
+
 Fields = tuple[tuple[DynamixelRegister, int], ...]
 """Registers with the values to be written to them."""
 
@@ -208,3 +213,26 @@ def _window_registers(blocks: tuple[IndirectBlock, ...]) -> Iterator[DynamixelRe
 def in_eeprom(register: DynamixelRegister) -> bool:
     """True if a register is kept without power."""
     return register.address < EEPROM_END
+
+
+class Backup:
+    """The stored copy of a control table; it survives restarts and is empty at first."""
+
+    def __init__(self) -> None:
+        self._stored: dict[str, int] = {}
+
+    @property
+    def ready(self) -> bool:
+        """True if there is something to restore."""
+        return bool(self._stored)
+
+    def store(self, memory: DynamixelMemory) -> None:
+        """Copy the control table."""
+        names = [register.name for register in memory.writable()]
+        self._stored = {name: memory.get(name) for name in names if name not in NOT_STORED}
+
+    def recall(self, memory: DynamixelMemory, eeprom: bool) -> None:
+        """Put one area back, the EEPROM's or the RAM's."""
+        for name, value in self._stored.items():
+            if in_eeprom(memory.named(name)) == eeprom:
+                memory.set(name, value)

@@ -18,7 +18,6 @@ from gazerig.drivers.dynamixel.control_table import (
     SHADOW_OFF,
     DynamixelModel,
 )
-from gazerig.sim_mock.dynamixel.backup import Backup
 from gazerig.sim_mock.dynamixel.drive import TRIPPED, DynamixelDrive
 from gazerig.sim_mock.dynamixel.live_registers import (
     MOTION,
@@ -35,6 +34,7 @@ from gazerig.sim_mock.dynamixel.memory import (
     DATA_RANGE,
     INSTRUCTION_ERROR,
     RESULT_FAIL,
+    Backup,
     DynamixelMemory,
     in_eeprom,
 )
