@@ -174,7 +174,7 @@ def test_a_robot_that_looks_at_people_goes_on_looking(monkeypatch, kind):
             devices[0].faults.command(STRUCK[kind][k // 80])
         tick = head.tick(clock.now_s(), 0.01)
         missed += bool(tick.joints.missing)
-        for angle, limit in zip(tick.verdict.command_rad, bounds, strict=True):
+        for angle, limit in zip(tick.guard_result.command_rad, bounds, strict=True):
             assert limit.low_rad - 1e-9 <= angle <= limit.high_rad + 1e-9
     assert missed > 0
     assert tick.joints.missing == () and all(tick.joints.torque)

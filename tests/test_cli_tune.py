@@ -60,7 +60,7 @@ def serve(path: Path) -> None:
         print(line, file=sys.stderr, flush=True)
 
     about = {"rig": str(path), "pid": os.getpid()}
-    tuning = ParamStore(made.live, robot.order, str(path))
+    tuning = ParamStore(made.live, robot.command, str(path))
     live = LiveServer(robot, tuning, (ConfigError,), made.clock, about, say)
 
     def watch(tick: Tick) -> None:

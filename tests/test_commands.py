@@ -60,7 +60,7 @@ class Running:
 
     def order(self, order: Command) -> None:
         """Ask."""
-        self.made.robot.order(order)
+        self.made.robot.command(order)
 
 
 @pytest.fixture
@@ -157,10 +157,10 @@ def test_a_stop_takes_the_torque_off_within_one_tick_and_nothing_moves_after(
     running.order(Stop("the space bar"))
     ticks = running.go(1.0)
     first = ticks[0]
-    assert first.orders == (Stop("the space bar"),) and first.stopped == "the space bar"
+    assert first.commands == (Stop("the space bar"),) and first.stopped == "the space bar"
     assert not any(ticks[1].joints.torque)
-    assert {tick.verdict.level for tick in ticks} == {"limp"}
-    assert first.verdict.reasons == ("all: stopped (the space bar)",)
+    assert {tick.guard_result.level for tick in ticks} == {"limp"}
+    assert first.guard_result.reasons == ("all: stopped (the space bar)",)
     assert any("torque off" in event for event in first.events)
     later = [tick.joints.position_rad for tick in ticks[20:]]
     assert max(abs(a - b) for p in later for a, b in zip(p, later[0], strict=True)) < 0.02
@@ -174,13 +174,13 @@ def test_resume_goes_on_slowly_from_where_the_joints_are(running: Running) -> No
     running.order(Resume())
     ticks = running.go(3.0)
     assert not ticks[0].stopped and all(ticks[2].joints.torque)
-    start = ticks[0].verdict.command_rad
+    start = ticks[0].guard_result.command_rad
     assert start == pytest.approx(before.joints.position_rad, abs=radians(0.5))
     gentle = radians(load_rig("desk").guard.soft_start_speed_deg_s)
     for a, b in zip(ticks, ticks[1:100], strict=False):
-        for old, new in zip(a.verdict.command_rad, b.verdict.command_rad, strict=True):
+        for old, new in zip(a.guard_result.command_rad, b.guard_result.command_rad, strict=True):
             assert abs(new - old) <= gentle * (b.t_s - a.t_s) * 1.01 + 1e-9
-    assert ticks[-1].verdict.level in ("ok", "limited")
+    assert ticks[-1].guard_result.level in ("ok", "limited")
     assert ticks[-1].target.kind == "face"
 
 
@@ -194,11 +194,11 @@ def test_a_run_that_ends_stopped_does_not_park(running: Running) -> None:
 
 def test_a_stop_while_parking_is_obeyed_at_once(running: Running) -> None:
     robot, made = running.made.robot, running.made
-    robot.order(Jog((("neck_yaw", radians(50.0)),), stay=True))
+    robot.command(Jog((("neck_yaw", radians(50.0)),), stay=True))
     running.go(2.0)
     began_s = made.clock.now_s()
-    robot.order(LookAt(None))
-    robot.order(Stop("a hand"))
+    robot.command(LookAt(None))
+    robot.command(Stop("a hand"))
     assert not robot.park(made.park_rad, made.clock, made.loop)
     assert made.clock.now_s() - began_s < 0.011
     joints = robot.body.read(made.clock.now_s())
@@ -220,23 +220,23 @@ def test_the_head_looks_at_a_chosen_point_and_freely_again(running: Running) -> 
     ticks = running.go(2.0)
     assert ticks[0].target.kind == "puppet" and ticks[-1].target.p_world_m == point
     assert ticks[-1].gaze.gaze_point_world_m == pytest.approx(point, abs=0.02)
-    assert ticks[-1].verdict.level in ("ok", "limited")
+    assert ticks[-1].guard_result.level in ("ok", "limited")
     running.order(LookAt(None))
     assert running.go(1.0)[-1].target.kind == "face"
 
 
 def test_a_jogged_joint_goes_there_slowly_while_the_others_hold(running: Running) -> None:
-    held = running.ticks[-1].verdict.command_rad
+    held = running.ticks[-1].guard_result.command_rad
     running.order(Jog((("neck_yaw", radians(25.0)),), stay=True))
     ticks = running.go(2.0)
-    end = ticks[-1].verdict.command_rad
+    end = ticks[-1].guard_result.command_rad
     assert degrees(end[YAW]) == pytest.approx(25.0, abs=0.1)
     assert all(
         abs(a - b) < 1e-3 for i, (a, b) in enumerate(zip(end, held, strict=True)) if i != YAW
     )
     gentle = radians(load_rig("desk").guard.soft_start_speed_deg_s)
     steps = [
-        abs(b.verdict.command_rad[YAW] - a.verdict.command_rad[YAW]) / (b.t_s - a.t_s)
+        abs(b.guard_result.command_rad[YAW] - a.guard_result.command_rad[YAW]) / (b.t_s - a.t_s)
         for a, b in zip(ticks, ticks[1:], strict=False)
     ]
     assert max(steps) <= gentle * 1.01
@@ -286,7 +286,7 @@ def test_unknown_menus_are_refused_when_asked(running: Running) -> None:
 
 def replied(running: Running, order: Command, seconds: float = 0.006) -> str:
     """Ask, run on, and give why it was refused."""
-    ticket = running.made.robot.order(order)
+    ticket = running.made.robot.command(order)
     running.go(seconds)
     reply = ticket.wait(0.0)
     assert reply is not None
@@ -307,7 +307,7 @@ def test_another_resumes_only_who_confirms(running: Running) -> None:
     assert "stopped by browser 1: another may only" in replied(running, Resume("browser 2"))
     assert "stopped by browser 1: another may only" in replied(running, Resume())
     assert running.made.robot.stopped
-    ticket = running.made.robot.order(Resume("browser 2", confirmed=True))
+    ticket = running.made.robot.command(Resume("browser 2", confirmed=True))
     tick = running.go(0.006)[0]
     assert ticket.wait(0.0) is not None and not tick.stopped
     assert any("torque on again by browser 2" in event for event in tick.events)
@@ -336,11 +336,11 @@ def test_a_flood_of_resumes_beats_no_stop(running: Running, confirmed: bool) -> 
 
 def test_what_was_asked_for_before_a_stop_does_not_move_the_head_after(running: Running) -> None:
     tickets = [
-        running.made.robot.order(order)
+        running.made.robot.command(order)
         for order in (LookAt((1.0, 0.2, 0.3)), Jog((("neck_yaw", 0.2),)), Resume(confirmed=True))
     ]
     running.order(Stop("a hand"))
-    assert running.go(0.006)[0].orders == (Stop("a hand"),)
+    assert running.go(0.006)[0].commands == (Stop("a hand"),)
     replies = [ticket.wait(0.0) for ticket in tickets]
     assert all(reply is not None and "stopped since" in reply.refused for reply in replies)
     assert "resume first" in replied(running, LookAt((1.0, 0.2, 0.3)))
@@ -359,7 +359,7 @@ def test_a_lead_that_nobody_renews_lapses_and_is_named(running: Running) -> None
     assert "led by a show (process 7): jog neck_yaw 17.2" in words
     assert "a show (process 7): jog neck_yaw 17.2: not renewed, so the gaze leads again" in words
     gentle = radians(load_rig("desk").guard.soft_start_speed_deg_s)
-    yaw = [tick.verdict.command_rad[YAW] for tick in ticks]
+    yaw = [tick.guard_result.command_rad[YAW] for tick in ticks]
     assert max(abs(b - a) for a, b in zip(yaw, yaw[1:], strict=False)) <= gentle * 0.005 * 1.01
 
 
@@ -389,17 +389,17 @@ def test_orders_that_wait_are_bounded_and_a_stop_goes_before_them(running: Runni
     robot = running.made.robot
     with pytest.raises(ValueError, match="too many requests"):
         for _ in range(1000):
-            robot.order(Ask("lids", "awake"))
-    stop = robot.order(Stop("a hand"))
+            robot.command(Ask("lids", "awake"))
+    stop = robot.command(Stop("a hand"))
     tick = running.go(0.006)[0]
-    assert tick.orders[0] == Stop("a hand") and len(tick.orders) <= 9
+    assert tick.commands[0] == Stop("a hand") and len(tick.commands) <= 9
     assert stop.wait(0.0) is not None and tick.stopped
     for _ in range(1000):
-        robot.order(Stop("again"))
-    assert len(robot._orders) <= 128
+        robot.command(Stop("again"))
+    assert len(robot._commands) <= 128
 
 
 def test_one_change_of_parameters_a_tick(running: Running) -> None:
     for speed in (400.0, 410.0, 420.0):
         running.order(Tune((("gaze.saccade.max_speed_deg_s", speed),)))
-    assert [len(tick.orders) for tick in running.go(0.021)] == [1, 1, 1, 0]
+    assert [len(tick.commands) for tick in running.go(0.021)] == [1, 1, 1, 0]

@@ -60,7 +60,7 @@ def test_the_page_reaches_no_file_elsewhere(home: Path, tmp_path: Path) -> None:
     made = assemble(load_rig(str(rig)), RunOptions(True, True, 0, "visitor"))
     tuning = ParamStore(made.live, lambda _: None, str(rig), elsewhere=lambda do, *w: do(*w))
     hear = PageRequestHandler(
-        made.robot.order, tuning, refusals=(ConfigError,), paths=tuning.confined
+        made.robot.command, tuning, refusals=(ConfigError,), paths=tuning.confined
     )  # fmt: skip
     before = sorted(os.listdir(tmp_path))
     for asked in (

@@ -179,9 +179,9 @@ def test_what_is_looked_at_changes_only_with_the_gaze(face: Run) -> None:
 
 def test_what_hands_do_is_no_eye_movement(face: Run) -> None:
     ticks = list(face.ticks[1000:1600])
-    ticks[100] = ticks[100]._replace(orders=(Jog((("neck_yaw", 0.1),)),))
-    ticks[200] = ticks[200]._replace(orders=(Jog(()),))
-    ticks[300] = ticks[300]._replace(orders=(Stop("hand"),))
+    ticks[100] = ticks[100]._replace(commands=(Jog((("neck_yaw", 0.1),)),))
+    ticks[200] = ticks[200]._replace(commands=(Jog(()),))
+    ticks[300] = ticks[300]._replace(commands=(Stop("hand"),))
     ticks[300:400] = [tick._replace(stopped="hand") for tick in ticks[300:400]]
     trace = trace_of(ticks)
     assert (trace.movement[100:200] == 0).all() and (trace.movement[300:400] == 0).all()

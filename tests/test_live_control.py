@@ -16,9 +16,9 @@ from gazerig.robot.remote.live_server import LiveServer
 
 
 class Robot:
-    """Takes orders and does nothing."""
+    """Takes commands and does nothing."""
 
-    def order(self, order: Command) -> None:
+    def command(self, command: Command) -> None:
         raise ValueError("nothing moves here")
 
     def menus(self) -> dict[str, tuple[str, ...]]:

@@ -61,7 +61,7 @@ def test_every_goal_on_the_bus_is_inside_the_limits() -> None:
     rig = load_rig("desk")
     rig = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
     run_of = assemble(rig, RunOptions(mock=True, fast=True, seed=3, scene="visitor"))
-    commands = np.array([tick.verdict.command_rad for tick in ticks(run_of, 30.0)])
+    commands = np.array([tick.guard_result.command_rad for tick in ticks(run_of, 30.0)])
     speeds = np.diff(commands, axis=0) / 0.010
     for i, name in enumerate(JOINTS):
         limit = rig.joints[name].limit()
@@ -128,7 +128,7 @@ class SlowRobot:
     def tick(self, t_s: float, dt_s: float) -> Any:
         self.times.append((t_s, dt_s))
         self.clock.sleep_until(t_s + self.cost_s(len(self.times)))
-        return SimpleNamespace(verdict=GuardResult((), "ok", ()))
+        return SimpleNamespace(guard_result=GuardResult((), "ok", ()))
 
 
 def test_slots_are_absolute_and_overruns_are_skipped_not_caught_up() -> None:

@@ -124,7 +124,7 @@ def test_no_goal_is_faster_than_asked_nor_outside_the_range(
     moved = bench.control.pose({joint: angle})
     i, params = JOINTS.index(joint), RIG.joints[joint]
     low, high = radians(params.min_deg), radians(params.max_deg)
-    sent = [(s.t_s, s.verdict.command_rad[i]) for s in bench.steps]
+    sent = [(s.t_s, s.guard_result.command_rad[i]) for s in bench.steps]
     for (t0, a), (t1, b) in zip(sent, sent[1:], strict=False):
         assert low - 1e-9 <= b <= high + 1e-9
         assert degrees(abs(b - a)) <= 1.1 * speed * (t1 - t0) + 1e-6

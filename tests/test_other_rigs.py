@@ -72,14 +72,14 @@ def test_the_makers_eyes_have_no_neck_to_move(maker: Ran) -> None:
         assert tick.pose.eye_left_rad == tick.pose.eye_right_rad
         assert tick.joints.measured == (False,) * 6
         assert tick.joints.temperature_c == (None,) * 6
-        assert not any("not moving" in reason for reason in tick.verdict.reasons)
+        assert not any("not moving" in reason for reason in tick.guard_result.reasons)
 
 
 def test_four_lids_follow_and_meet(maker: Ran) -> None:
     rig = load_rig("maker")
     _, ticks, _ = maker
     i = {name: k for k, name in enumerate(rig.names)}
-    desired = np.degrees([t.verdict.command_rad for t in ticks])
+    desired = np.degrees([t.guard_result.command_rad for t in ticks])
     shut = np.flatnonzero([t.gaze.lid_left == 0.0 for t in ticks])
     assert len(shut) > 3  # some blink shuts all the way
     at = shut[len(shut) // 2]

@@ -61,7 +61,7 @@ class Rig:
     def __init__(self, host: str = "127.0.0.1") -> None:
         made = assemble(load_rig("desk"), RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
         self.made, self.robot = made, made.robot
-        self.tuning = ParamStore(made.live, self.robot.order, "desk")
+        self.tuning = ParamStore(made.live, self.robot.command, "desk")
         self.said: list[str] = []
         # Not fast: the page is for real time, of which these ticks are a slow imitation.
         options = RunOptions(page=f"{host}:{free_port()}")
@@ -89,7 +89,7 @@ class Rig:
             clock.sleep_until(clock.now_s() + TICK_S)
             tick = self.robot.tick(clock.now_s(), TICK_S)
             self.newest = tick
-            self.orders += [o for o in tick.orders if not isinstance(o, Renew)]
+            self.orders += [o for o in tick.commands if not isinstance(o, Renew)]
             self.audience.note(tick)
 
     def desired_deg(self) -> float:
@@ -247,7 +247,7 @@ def test_stop_takes_the_torque_off_until_it_is_asked_back(
     rig, person = at_the_rig
     person.click(STOP)
     wait_for(lambda: "somebody pressed STOP on the page (browser " in rig.robot.stopped, "the stop")
-    wait_for(lambda: rig.newest.verdict.level == "limp", "torque off")
+    wait_for(lambda: rig.newest.guard_result.level == "limp", "torque off")
     wait_for(lambda: person.reads("Torque is off", "Resume"), "the words")
     resumed(rig, person)
 
@@ -318,7 +318,7 @@ def test_a_target_is_dragged_through_the_scene(at_the_rig: tuple[Rig, Person]) -
     person.click(saying("lead"))
     person.run("window.drawScene = true")
     there = (0.7, 0.1, 0.3)
-    rig.robot.order(LookAt(there, stay=True))
+    rig.robot.command(LookAt(there, stay=True))
     wait_for(lambda: rig.newest.target.p_world_m == there, "the head being led")
     wait_for(lambda: person.reads("somebody chose this point"), "the page knowing of it")
     person.click(beside("drag a target", "input"))
@@ -418,7 +418,7 @@ def test_a_character_is_laid_over_the_rig(at_the_rig: tuple[Rig, Person]) -> Non
 
 def test_who_did_not_stop_is_asked_about_other_hands(at_the_rig: tuple[Rig, Person]) -> None:
     rig, person = at_the_rig
-    rig.robot.order(Stop("somebody tripped", "ana"))
+    rig.robot.command(Stop("somebody tripped", "ana"))
     wait_for(lambda: person.reads("Torque is off: somebody tripped"), "the words")
     resumed(rig, person, "Is nobody's hand in the mechanism?")
 
@@ -444,7 +444,7 @@ def test_on_a_phone_stop_is_at_the_top_and_nothing_covers_it(
 def test_names_are_words_and_never_run(at_the_rig: tuple[Rig, Person]) -> None:
     rig, person = at_the_rig
     evil = "<img src=x onerror='window.evil=1'><script>window.evil=1</script>"
-    shown = [rig.robot.order(Stop(evil, evil))]
+    shown = [rig.robot.command(Stop(evil, evil))]
     wait_for(lambda: person.reads("STOPPED: <img src=x"), "the words as they are")
     assert shown and person.run("window.evil === undefined") is True
     assert person.run("document.querySelectorAll('img[src=x]').length") == 0

@@ -122,7 +122,7 @@ def test_what_is_asked_is_heard_and_answered() -> None:
 
     with linked(hear) as (_, theirs):
         teller = Outbox(theirs)
-        assert teller.order(Ask("behaviour", "guard"), "7")
+        assert teller.command(Ask("behaviour", "guard"), "7")
         assert sent(theirs) == (WORDS, ["7", None])
         assert teller.ask({"pick": {"x": 0.5, "y": 0.5}}, "8:tuning")
         assert sent(theirs) == (WORDS, ["8:tuning", "refused: too far"])
@@ -145,7 +145,7 @@ def test_a_request_that_goes_wrong_leaves_ears_for_a_stop() -> None:
         assert (kind, who) == (WORDS, "7") and "a fault in this program" in words
         theirs.send(telling("7", b'{"do": no JSON'))
         theirs.send(TELL + b"7 no JSON either")
-        teller.order(Stop("a test"), "7")
+        teller.command(Stop("a test"), "7")
         wait_for(lambda: heard == ["stop"], "the stop")
 
 
@@ -161,7 +161,7 @@ def test_a_stop_does_not_wait_behind_what_takes_long() -> None:
     with linked(hear) as (_, theirs):
         teller = Outbox(theirs)
         teller.ask({"do": "revert"}, "7")
-        teller.order(Stop("a test"), "7")
+        teller.command(Stop("a test"), "7")
         wait_for(lambda: heard, "the stop")
         assert heard == ["stop"]
         done.set()
@@ -204,7 +204,7 @@ def test_only_the_same_change_by_the_same_person_is_overtaken() -> None:
 def test_answers_wait_until_the_page_has_room() -> None:
     with linked(lambda data: "x" * 15_000) as (page, theirs):
         for number in range(40):
-            Outbox(theirs).order(Ask("behaviour", str(number)), str(number))
+            Outbox(theirs).command(Ask("behaviour", str(number)), str(number))
         said = []
         wait_for(lambda: len(page._owed) > 0, "a full socket")
         for _ in range(40):
@@ -220,7 +220,7 @@ def test_a_rig_that_takes_nothing_holds_up_nobody() -> None:
         taken = [teller.ask({"pick": "x" * 10_000}, "7") for _ in range(300)]
         assert taken[0] and not taken[-1]
         assert not teller.ask({"pick": "x" * MESSAGE_BYTES}, "7")
-    assert not teller.order(Stop("a test"), "7")  # the rig is gone
+    assert not teller.command(Stop("a test"), "7")  # the rig is gone
 
 
 def test_words_menus_and_their_way() -> None:
@@ -429,8 +429,8 @@ class Mouth:
     def __init__(self) -> None:
         self.told: list[tuple[object, str]] = []
 
-    def order(self, order: Command, who: str) -> bool:
-        self.told.append((order, who))
+    def command(self, command: Command, who: str) -> bool:
+        self.told.append((command, who))
         return True
 
     def ask(self, data: Mapping[str, object], who: str) -> bool:

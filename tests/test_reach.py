@@ -104,8 +104,8 @@ def test_the_running_robot_replies_so_and_keeps_saying_it() -> None:
     robot.start(made.clock)
     try:
         point = (0.3, 2.0, 0.2)
-        look = robot.order(LookAt(point, stay=True))
-        far = robot.order(LookAt((-1.0, -0.5, 0.3), stay=True))
+        look = robot.command(LookAt(point, stay=True))
+        far = robot.command(LookAt((-1.0, -0.5, 0.3), stay=True))
         go(8.0)
         near, reply = look.wait(0.0), far.wait(0.0)
         assert near is not None and near.error_deg < 1.0 and not near.joints
@@ -114,7 +114,7 @@ def test_the_running_robot_replies_so_and_keeps_saying_it() -> None:
         assert reply.error_deg == pytest.approx(degrees(error), abs=3.0)
         axes = {one.axis for one in ticks[-1].gaze.limited}
         assert {"left eye yaw", "right eye yaw", "head yaw"} <= axes
-        jog = robot.order(Jog((("neck_yaw", 0.2), ("left_eye_pan", 0.1))))
+        jog = robot.command(Jog((("neck_yaw", 0.2), ("left_eye_pan", 0.1))))
         go(0.1)
         held = jog.wait(0.0)
         assert held is not None and not held.limited

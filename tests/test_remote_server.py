@@ -201,7 +201,7 @@ def errors() -> list[str]:
 
 @pytest.fixture
 def rig(folder: Path, beat: Beat, errors: list[str]) -> Iterator[RobotClient]:
-    tuning = SecondTuning(beat.robot.order)
+    tuning = SecondTuning(beat.robot.command)
     about = {"rig": "desk", "pid": os.getpid()}
     requests = RequestHandler(beat.robot, tuning, beat.pulse, about, (Broken,))
     server = RemoteServer(requests, errors.append)
@@ -280,7 +280,7 @@ def test_unknown_key_and_character(rig: RobotClient) -> None:
 
 def test_when_set_returns_the_loop_has_it(rig: RobotClient, beat: Beat) -> None:
     rig.set(RATE, 150.0)
-    assert any(Tune(((RATE, 150.0),)) in tick.orders for tick in beat.ticks)
+    assert any(Tune(((RATE, 150.0),)) in tick.commands for tick in beat.ticks)
     assert "tuned 1" in rig.status()["said"]
 
 
@@ -289,14 +289,14 @@ def test_the_first_tick_after_set_has_it(rig: RobotClient, beat: Beat) -> None:
     asking = threading.Thread(target=rig.set, args=(RATE, 140.0))
     try:
         asking.start()
-        while not beat.robot._orders:
+        while not beat.robot._commands:
             asking.join(timeout=0.002)
             assert asking.is_alive()
         held = len(beat.ticks)
     finally:
         beat.hold.clear()
     asking.join()
-    assert beat.ticks[held].orders == (Tune(((RATE, 140.0),)),)
+    assert beat.ticks[held].commands == (Tune(((RATE, 140.0),)),)
 
 
 def test_looking_jogging_and_asking(rig: RobotClient, beat: Beat) -> None:
@@ -487,7 +487,7 @@ def test_two_programs_at_once(rig: RobotClient, beat: Beat) -> None:
     for thread in threads:
         thread.join()
     assert not refused
-    orders = [order for tick in beat.ticks[before:] for order in tick.orders]
+    orders = [order for tick in beat.ticks[before:] for order in tick.commands]
     given = sorted(
         float(str(change[1]))
         for order in orders

@@ -48,7 +48,7 @@ def ticks_of(seconds: float, asked: Sequence[tuple[float, Ask]] = ()) -> list[Ti
 
     def over(s: float) -> str | None:
         while left and s >= left[0][0]:
-            made.robot.order(left.pop(0)[1])
+            made.robot.command(left.pop(0)[1])
         return "over" if s > seconds else None
 
     made.robot.start(made.clock)
@@ -160,7 +160,9 @@ def test_saccades_blinks_and_orders_can_be_stepped_to(
 
 def test_a_guard_that_holds_is_an_event_once(ticks: list[Tick]) -> None:
     held = [
-        tick._replace(verdict=tick.verdict._replace(level="hold", reasons=("all: old picture",)))
+        tick._replace(
+            guard_result=tick.guard_result._replace(level="hold", reasons=("all: old picture",))
+        )
         for tick in ticks[810:820]
     ]
     marks = SnapshotIndex([*ticks[800:810], *held, *ticks[820:830]], (), RATE_HZ).marks

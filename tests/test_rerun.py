@@ -73,7 +73,7 @@ def recorded(
         seen.append(tick)
         at(len(seen), made)
         for order in (asked or {}).get(len(seen), ()):
-            robot.order(order)
+            robot.command(order)
 
     made.clock.sleep_until(start_s)
     robot.start(made.clock)
@@ -185,7 +185,7 @@ def test_another_character_is_followed_by_the_servos(once: Once, tmp_path: Path)
     behind = [
         abs(now - sent)
         for tick in seen[-20:]
-        for now, sent in zip(tick.joints.position_rad, tick.verdict.command_rad, strict=True)
+        for now, sent in zip(tick.joints.position_rad, tick.guard_result.command_rad, strict=True)
     ]
     assert max(behind) < 0.3
 
@@ -241,7 +241,7 @@ def test_a_fault_that_ended_a_run_ends_nothing_here(tmp_path: Path) -> None:
             made.robot.body.bus._port.chain[7].fail("overload")  # type: ignore[attr-defined]
 
     ticks = recorded(path, 2.0, at=fail)
-    assert ticks[-1].verdict.level == "limp"
+    assert ticks[-1].guard_result.level == "limp"
     recording = RunRecording(path)
     assert recording.end.stopped_by.startswith("fault")
     found = rerun(recording)

@@ -45,7 +45,7 @@ class Running(NamedTuple):
 
     def tune(self, changes: dict[str, Value]) -> None:
         base = self.rig
-        self.made.robot.order(self.made.live.prepare(base, changed(base, changes)))
+        self.made.robot.command(self.made.live.prepare(base, changed(base, changes)))
 
 
 def started(scene: str = "visitor", rig: Rig = RIG) -> Running:
@@ -359,7 +359,7 @@ def test_a_tune_of_nothing_different_touches_nothing() -> None:
     quiet.go(200)
     tuned.go(100)
     same = {key: value_of(RIG, key) for key in ("gaze.lids.blinks_per_min", "guard.soft_start_ms")}
-    tuned.made.robot.order(Tune(tuple(same.items())))
+    tuned.made.robot.command(Tune(tuple(same.items())))
     tuned.go(100)
     assert tuned.goals == quiet.goals
     assert tuned.ticks[100].events == tuple(f"tuned: {key} = {same[key]}" for key in same)
@@ -370,7 +370,7 @@ def test_a_tune_is_in_force_at_the_very_next_tick_and_in_its_record() -> None:
     running.go(10)
     running.tune({"loop.park_s": 1.5, "bus.port": "/dev/ttyACM0"})
     tick = running.go(1)
-    assert tick.orders == (Tune((("bus.port", "/dev/ttyACM0"), ("loop.park_s", 1.5))),)
+    assert tick.commands == (Tune((("bus.port", "/dev/ttyACM0"), ("loop.park_s", 1.5))),)
     assert running.made.loop.park_s == 1.5
     assert tick.events[1] == "tuned: loop.park_s = 1.5"
     assert "next start: the servo bus is opened with it" in tick.events[0]
@@ -380,10 +380,10 @@ def test_an_order_that_crossed_processes_is_checked_in_its_tick() -> None:
     running = started()
     running.go(10)
     order = from_json(json.loads(json.dumps(as_json(Tune((("gaze.lids.close_ms", 90.0),))))))
-    running.made.robot.order(order)
+    running.made.robot.command(order)
     running.go(1)
     assert running.rig.gaze.lids.close_ms == 90.0
-    running.made.robot.order(Tune((("gaze.lids.close_ms", 9000.0), ("gaze.lid.x", 1))))
+    running.made.robot.command(Tune((("gaze.lids.close_ms", 9000.0), ("gaze.lid.x", 1))))
     tick = running.go(1)
     assert running.rig.gaze.lids.close_ms == 90.0
     assert "not tuned: gaze.lids.close_ms: 9000.0 is above 500 (unit ms)" in tick.events
@@ -394,9 +394,11 @@ def test_orders_of_a_run_do_it_again_bit_for_bit() -> None:
     def play() -> list[list[int]]:
         running = started("boxing")
         running.go(50)
-        running.made.robot.order(Tune((("joints.neck_yaw.max_deg", 5.0), ("gaze.head.align", 1.0))))
+        running.made.robot.command(
+            Tune((("joints.neck_yaw.max_deg", 5.0), ("gaze.head.align", 1.0)))
+        )
         running.go(100)
-        running.made.robot.order(Tune((("gaze.scanpath.model", "random"),)))
+        running.made.robot.command(Tune((("gaze.scanpath.model", "random"),)))
         running.go(100)
         return running.goals
 
@@ -406,23 +408,27 @@ def test_orders_of_a_run_do_it_again_bit_for_bit() -> None:
 def test_a_joint_outside_its_new_range_is_led_inside_slowly() -> None:
     running = started()
     jog(running, "neck_yaw", 40.0, 300)
-    assert running.ticks[-1].verdict.command_rad[6] == pytest.approx(np.radians(40.0), abs=1e-3)
+    assert running.ticks[-1].guard_result.command_rad[6] == pytest.approx(
+        np.radians(40.0), abs=1e-3
+    )
     running.tune({"joints.neck_yaw.max_deg": 20.0, "joints.neck_yaw.min_deg": -20.0})
     judge = Judge(running)
-    first = running.ticks[-1].verdict.command_rad[6]
+    first = running.ticks[-1].guard_result.command_rad[6]
     judge.go(1)
-    verdict = running.ticks[-1].verdict
+    verdict = running.ticks[-1].guard_result
     assert abs(verdict.command_rad[6] - first) < np.radians(60.0) * DT_S
     assert "neck_yaw: outside its new range" in verdict.reasons
     judge.go(300)
-    assert running.ticks[-1].verdict.command_rad[6] == pytest.approx(np.radians(20.0), abs=1e-3)
-    speeds = np.diff([t.verdict.command_rad[6] for t in running.ticks[-300:]]) / DT_S
+    assert running.ticks[-1].guard_result.command_rad[6] == pytest.approx(
+        np.radians(20.0), abs=1e-3
+    )
+    speeds = np.diff([t.guard_result.command_rad[6] for t in running.ticks[-300:]]) / DT_S
     assert np.abs(speeds).max() <= np.radians(60.0) + 1e-6
 
 
 def jog(running: Running, joint: str, deg: float, ticks: int) -> None:
     """Send one joint somewhere by hand, beyond its range as well."""
-    running.made.robot.order_again(Jog(((joint, float(np.radians(deg))),), stay=True))
+    running.made.robot.replay_command(Jog(((joint, float(np.radians(deg))),), stay=True))
     running.go(ticks)
 
 
@@ -434,14 +440,14 @@ def test_a_wider_range_waits_until_the_servos_are_set_up_anew() -> None:
         running.ticks[-1].events
     )
     jog(running, "neck_yaw", 80.0, 500)
-    held = np.degrees(running.ticks[-1].verdict.command_rad[6])
+    held = np.degrees(running.ticks[-1].guard_result.command_rad[6])
     assert held == pytest.approx(70.0, abs=0.1)
-    running.made.robot.order(Stop("test"))
+    running.made.robot.command(Stop("test"))
     running.go(401)
-    running.made.robot.order(Resume())
+    running.made.robot.command(Resume())
     running.go(200)
     jog(running, "neck_yaw", 80.0, 800)
-    assert np.degrees(running.ticks[-1].verdict.command_rad[6]) == pytest.approx(73.0, abs=0.1)
+    assert np.degrees(running.ticks[-1].guard_result.command_rad[6]) == pytest.approx(73.0, abs=0.1)
     measured = np.degrees(running.ticks[-1].joints.position_rad[6])
     assert measured == pytest.approx(73.0, abs=1.0)
     assert max(goals[6] for goals in running.goals) > 2844  # the old end in steps
@@ -467,8 +473,8 @@ def test_a_changed_zero_moves_the_joint_without_a_jump(changes: dict[str, Value]
     assert np.abs(np.subtract(running.goals[-1], before)).max() <= 30
     judge.go(500)
     tick = running.ticks[-1]
-    assert tick.verdict.level in ("ok", "limited")
-    off = np.subtract(tick.verdict.command_rad, tick.joints.position_rad)
+    assert tick.guard_result.level in ("ok", "limited")
+    off = np.subtract(tick.guard_result.command_rad, tick.joints.position_rad)
     assert np.degrees(np.abs(off)).max() < 4.0
 
 
@@ -480,7 +486,7 @@ def test_another_rate_goes_on_from_the_last_slot() -> None:
     def watch(tick: Tick) -> None:
         times.append(tick.t_s)
         if len(times) == 100:
-            made.robot.order(Tune((("loop.rate_hz", 50.0),)))
+            made.robot.command(Tune((("loop.rate_hz", 50.0),)))
 
     run(made.robot, made.clock, lambda: made.loop, lambda s: "over" if s > 1.5 else None, watch)
     gaps = np.diff(times)

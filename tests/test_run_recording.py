@@ -125,7 +125,7 @@ def ordered(number: int, made: Assembly) -> None:
         160: Tune((("gaze.saccade.profile", "min_jerk"), ("loop.park_s", 3.5))),
     }
     if number in orders:
-        made.robot.order(orders[number])
+        made.robot.command(orders[number])
 
 
 @pytest.fixture(scope="module")
@@ -143,16 +143,16 @@ def exact(tick: Tick) -> str:
 def test_every_tick_comes_back_bit_for_bit(recorded: Recorded) -> None:
     # A new field must be recorded too: add it to moment.flat, as_json and from_json.
     assert Tick._fields == (
-        "t_s", "joints", "pose", "detections", "percept", "target", "gaze", "desired_rad", "verdict",
-        "events", "orders", "stopped", "led",
+        "t_s", "joints", "pose", "detections", "percept", "target", "gaze", "desired_rad",
+        "guard_result", "events", "commands", "stopped", "led",
     )  # fmt: skip
     back = list(RunRecording(recorded.path).ticks())
     assert len(back) == len(recorded.ticks) == 299
     for was, now in zip(recorded.ticks, back, strict=True):
         assert exact(now) == exact(was)
         assert now.detections is None
-        assert type(now.joints.missing) is tuple and type(now.verdict.reasons) is tuple
-    assert {type(order) for tick in back for order in tick.orders} == {
+        assert type(now.joints.missing) is tuple and type(now.guard_result.reasons) is tuple
+    assert {type(order) for tick in back for order in tick.commands} == {
         Ask, LookAt, Jog, Stop, Resume, Tune
     }  # fmt: skip
     assert any(tick.stopped for tick in back)

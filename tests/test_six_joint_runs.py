@@ -111,7 +111,7 @@ def messages(path: Path, *topics: str) -> Iterator[tuple[str, dict[str, Any]]]:
 def test_six_joints_come_back_bit_for_bit_with_their_names(maker: Run) -> None:
     assert list(map(exact, maker.recording.ticks())) == list(map(exact, maker.ticks))
     for tick in maker.recording.ticks():
-        assert tick.verdict.joints == SIX and tick.joints.measured == (False,) * 6
+        assert tick.guard_result.joints == SIX and tick.joints.measured == (False,) * 6
     shut = min(tick.pose.lower_left for tick in maker.ticks)
     assert shut < 0.9  # lower lids move, and are kept
 
@@ -152,9 +152,12 @@ def test_a_recording_without_names_is_of_the_joints_that_all_rigs_had(
     ticks = list(old.ticks())
     assert len(ticks) == len(desk.ticks)
     for tick, was in zip(ticks, desk.ticks, strict=True):
-        assert tick.verdict.joints == JOINTS and tick.joints.measured == ()
+        assert tick.guard_result.joints == JOINTS and tick.joints.measured == ()
         assert tick.pose.lower_left == tick.gaze.lower_right == 1.0
-        assert tick.verdict == was.verdict and tick.joints.position_rad == was.joints.position_rad
+        assert (
+            tick.guard_result == was.guard_result
+            and tick.joints.position_rad == was.joints.position_rad
+        )
     again = rerun(old)
     assert again.same and again.tx_same, again.differs
 
@@ -200,7 +203,7 @@ def test_figures_and_status_say_what_is_reckoned(maker: Run, desk: Run) -> None:
         words = pulse.words()
         assert words["reckoned"] == reckoned
         joints_deg = words["joints_deg"]
-        assert isinstance(joints_deg, dict) and tuple(joints_deg) == ticks[0].verdict.joints
+        assert isinstance(joints_deg, dict) and tuple(joints_deg) == ticks[0].guard_result.joints
 
 
 class _Still:
@@ -314,7 +317,7 @@ def test_absent_lids_count_for_nothing() -> None:
 def test_a_run_without_lids_has_no_blinks(maker: Run) -> None:
     bare = [
         tick._replace(
-            verdict=tick.verdict._replace(joints=("eyes_pan", "eyes_tilt")),
+            guard_result=tick.guard_result._replace(joints=("eyes_pan", "eyes_tilt")),
             joints=tick.joints._replace(measured=(True, True)),
         )
         for tick in maker.ticks[:60]
@@ -339,7 +342,7 @@ def test_tables_have_the_columns_of_the_joints_and_say_what_they_rest_on(
         samples, *_, beside = write_csv(trace, labels, stretches_of(trace, labels), tmp_path / name)
         with samples.open(newline="") as file:
             rows = list(csv.DictReader(file))
-        assert tuple(rows[0]) == columns(ticks[0].verdict.joints)
+        assert tuple(rows[0]) == columns(ticks[0].guard_result.joints)
         assert [column for column in rows[0] if column.endswith("lid")] == lids
         assert ("head_yaw_deg" in rows[0]) == (name == "nine")
         assert float(rows[300][lids[-1]]) == pytest.approx(

@@ -92,7 +92,11 @@ def test_joints_are_shown_a_hundred_times_a_second_as_wished_permitted_and_measu
     assert np.allclose(np.diff([row.t_s for row in rows]), 0.01)
     for row in rows:
         tick = by_time[row.t_s]
-        assert row[1:] == (tick.desired_rad, tick.verdict.command_rad, tick.joints.position_rad)
+        assert row[1:] == (
+            tick.desired_rad,
+            tick.guard_result.command_rad,
+            tick.joints.position_rad,
+        )
 
 
 def test_the_ghost_is_where_the_wish_is() -> None:
@@ -145,8 +149,8 @@ def test_servos_come_with_their_limits_and_their_silences() -> None:
 def test_the_gravest_verdict_between_two_snapshots_is_kept() -> None:
     ticks = visit()[2]
     snapshots = SnapshotBuilder(RATE_HZ)
-    calm = [tick for tick in ticks if tick.verdict.level == "ok"][:4]
-    short = calm[1]._replace(verdict=calm[1].verdict._replace(level="hold"))
+    calm = [tick for tick in ticks if tick.guard_result.level == "ok"][:4]
+    short = calm[1]._replace(guard_result=calm[1].guard_result._replace(level="hold"))
     for tick in (calm[0], short, calm[2]):
         snapshots.note(tick)
     shot = snapshots.take(SnapshotTexts())
@@ -229,6 +233,6 @@ def test_a_snapshot_of_six_joints_survives_the_way() -> None:
 
 def test_joints_whose_names_nobody_knows_are_numbered() -> None:
     tick = visit()[2][-1]
-    nameless = tick._replace(verdict=tick.verdict._replace(joints=()))
+    nameless = tick._replace(guard_result=tick.guard_result._replace(joints=()))
     assert snapshot(nameless, 200.0, "", "").joints[:2] == ("joint 1", "joint 2")
     assert snapshot(nameless, 200.0, "", "", rig=shown_rig()).joints == JOINTS

@@ -167,9 +167,9 @@ def test_the_neck_does_not_move_on_a_stale_picture(
     rig, ticks = request.getfixturevalue(name)
     blind_s = last_picture_s(ticks) + rig.guard.frame_timeout_ms / 1e3
     blind = between(ticks, blind_s + 0.02, BACK_S)
-    commands = {tick.verdict.command_rad[NECK] for tick in blind}
+    commands = {tick.guard_result.command_rad[NECK] for tick in blind}
     assert len(commands) == 1
-    assert all("neck_yaw: stale picture" in tick.verdict.reasons for tick in blind)
+    assert all("neck_yaw: stale picture" in tick.guard_result.reasons for tick in blind)
     wishes = [degrees(tick.desired_rad[NECK][0]) for tick in blind]
     assert max(wishes) - min(wishes) > 3.0  # it would have moved
     eyes = [degrees(tick.joints.position_rad[0]) for tick in blind]
@@ -226,7 +226,8 @@ def test_it_goes_on_with_the_first_new_pictures(
     last = back[-1]
     assert angle_between(look(last), sub(last.target.p_world_m, last.pose.p_world_head_m)) < 0.05
     fastest = max(
-        abs(b.verdict.command_rad[NECK][0] - a.verdict.command_rad[NECK][0]) / (b.t_s - a.t_s)
+        abs(b.guard_result.command_rad[NECK][0] - a.guard_result.command_rad[NECK][0])
+        / (b.t_s - a.t_s)
         for a, b in pairwise(between(ticks, BACK_S, END_S))
     )
     assert 0.0 < fastest <= radians(rig.joints["neck_yaw"].max_speed_deg_s) + 1e-6

@@ -150,12 +150,12 @@ def test_a_stop_while_unplugged_is_carried_out_at_once_when_it_is_back(machine: 
     machine.go(1.0)
     held = machine.holding()
     machine.command("unplug")
-    machine.made.robot.order(Stop("a hand", "the space bar"))
+    machine.made.robot.command(Stop("a hand", "the space bar"))
     ticks = machine.go(7.0)  # longer than the bus's patience
     assert machine.ended == "seconds" and ticks[-1].stopped == "a hand"
     assert machine.said("the stop is remembered, torque is NOT YET off")
     assert any(machine.holding())
-    ticket = machine.made.robot.order(Resume("the space bar"))
+    ticket = machine.made.robot.command(Resume("the space bar"))
     machine.go(0.1)
     reply = ticket.wait(0.0)
     assert reply is not None and reply.refused.startswith("still stopped: ")
@@ -165,7 +165,7 @@ def test_a_stop_while_unplugged_is_carried_out_at_once_when_it_is_back(machine: 
     assert machine.said("torque switched off, as was asked for while the port was gone")
     machine.go(4.0)
     assert not any(machine.holding()) and machine.ticks[-1].stopped
-    machine.made.robot.order(Resume("the space bar"))
+    machine.made.robot.command(Resume("the space bar"))
     machine.go(2.0)
     assert machine.holding() == held and not machine.ticks[-1].stopped
     machine.made.robot.stop()
@@ -175,7 +175,7 @@ def test_a_stop_while_unplugged_is_carried_out_at_once_when_it_is_back(machine: 
 @pytest.mark.parametrize("machine", ["desk", "feetech"], indirect=True)
 def test_torque_that_comes_on_after_a_stop_is_taken_off_again(machine: Machine) -> None:
     machine.go(0.5)
-    machine.made.robot.order(Stop("a hand"))
+    machine.made.robot.command(Stop("a hand"))
     machine.go(0.5)
     machine.made.robot.body.bus.enable_torque()  # somebody else on the line
     assert all(machine.holding())

@@ -119,7 +119,7 @@ class EventDetector:
         t_s = tick.t_s
         way = cyclopean(tick)
         jump = self._saccades.note(t_s, way)
-        names, pose = tick.verdict.joints, tick.pose
+        names, pose = tick.guard_result.joints, tick.pose
         lids = openings(pose.lid_left, pose.lid_right, names, UPPER)
         blink = self._blinks.note(t_s, *lids) if lids is not None else None
         if jump is None:

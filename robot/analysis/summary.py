@@ -47,7 +47,7 @@ class Summary:
         if self._fixates(tick, dt_s):
             self._errors_mdeg[round(1000.0 * degrees(gaze_error_rad(tick)))] += 1
         self._events.extend((tick.t_s - self._first_s, event) for event in tick.events)
-        for reason in tick.verdict.reasons:
+        for reason in tick.guard_result.reasons:
             self._limited[reason.partition(": ")[2]] += 1
 
     def _fixates(self, tick: Tick, dt_s: float) -> bool:

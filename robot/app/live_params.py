@@ -134,30 +134,30 @@ class LiveParams:
         return self.camera.horizontal_field_deg
 
     def prepare(self, base: Rig, rig: Rig) -> Tune:
-        """Make the order that turns one rig into another that was checked; from any thread.
+        """Make the command that turns one rig into another that was checked; from any thread.
 
-        Its tick then need not check it. base: in force when the order comes
+        Its tick then need not check it. base: in force when the command comes
 
         Raises:
             gazerig.config.load.ConfigError: the walk that the rig names is at fault.
         """
-        order = Tune(tuple(differences(base, rig).items()))
-        self._ready[id(order.changes)] = _ready(order, base, rig)
-        return order
+        command = Tune(tuple(differences(base, rig).items()))
+        self._ready[id(command.changes)] = _ready(command, base, rig)
+        return command
 
-    def __call__(self, order: Tune, t_s: float) -> tuple[str, ...]:
+    def __call__(self, command: Tune, t_s: float) -> tuple[str, ...]:
         """Put a change in force, from this tick on; say what was done.
 
         A change that nobody has prepared is checked here; a wrong one changes nothing.
         """
-        ready = self._ready.pop(id(order.changes), None)
-        if ready is None or ready.changes is not order.changes or ready.base is not self.rig:
+        ready = self._ready.pop(id(command.changes), None)
+        if ready is None or ready.changes is not command.changes or ready.base is not self.rig:
             try:
-                ready = _ready(order, self.rig, changed(self.rig, dict(order.changes)))
+                ready = _ready(command, self.rig, changed(self.rig, dict(command.changes)))
             except ConfigError as error:
                 return tuple(f"not tuned: {line}" for line in str(error).splitlines())
         said = self._put(ready.rig, ready.walk or self._walk)
-        return (*(_told(key, value) for key, value in order.changes), *said)
+        return (*(_told(key, value) for key, value in command.changes), *said)
 
     def _put(self, rig: Rig, walk: Walk) -> tuple[str, ...]:
         """Hand the parameters that differ to their parts."""
@@ -239,7 +239,7 @@ def _with_servo(joint: JointParams, first: JointParams) -> JointParams:
     return replace(joint, **kept)
 
 
-def _ready(order: Tune, base: Rig, rig: Rig) -> _Ready:
+def _ready(command: Tune, base: Rig, rig: Rig) -> _Ready:
     """Put a checked change together, with the face walk where it is another one.
 
     Raises:
@@ -247,7 +247,7 @@ def _ready(order: Tune, base: Rig, rig: Rig) -> _Ready:
     """
     name = rig.gaze.scanpath.transition_matrix
     walk = load_walk(name) if name != base.gaze.scanpath.transition_matrix else None
-    return _Ready(order.changes, base, rig, walk)
+    return _Ready(command.changes, base, rig, walk)
 
 
 def _beyond(

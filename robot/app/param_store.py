@@ -4,7 +4,7 @@ Three rigs matter: the one that its files make (with the options of the command 
 one in force, and the one of defaults. What a person changes lies over the files until it is
 saved, whichever character is chosen and however often the files are edited meanwhile.
 
-Everything may be called from any thread. Changes reach the running parts as one order,
+Everything may be called from any thread. Changes reach the running parts as one command,
 checked as a whole beforehand.
 """
 
@@ -73,7 +73,7 @@ class ParamStore:
     def __init__(
         self,
         live_params: LiveParams,
-        order: CommandTaker,
+        command: CommandTaker,
         rig: str,
         character: str | None = None,
         profile: str | None = None,
@@ -82,7 +82,7 @@ class ParamStore:
     ) -> None:
         """Take a rig as it was assembled, and the names of the files it was made of.
 
-        order: takes orders for the next tick, as gazerig.robot.control.loop.Robot.order
+        command: takes commands for the next tick, as gazerig.robot.control.loop.Robot.command
         now: the time in the name of a backup
         elsewhere: calls a function that reads or writes rig files, so that the control loop
             does not feel it
@@ -90,7 +90,7 @@ class ParamStore:
         Raises:
             gazerig.config.load.ConfigError: the files have changed since, and are at fault now.
         """
-        self._live_params, self._order = live_params, order
+        self._live_params, self._command = live_params, command
         self._profile, self._now, self._elsewhere = profile, now, elsewhere
         self._changing = threading.Lock()
         self._defaults = _defaults(live_params.rig)
@@ -263,7 +263,7 @@ class ParamStore:
         before = self._state
         found = differences(before.rig, rig)
         if found:
-            self._order(self._live_params.prepare(before.rig, rig))
+            self._command(self._live_params.prepare(before.rig, rig))
         elif state == before:
             return ()
         self._state = state._replace(

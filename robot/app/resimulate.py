@@ -1,4 +1,4 @@
-"""A recorded run done again: the same percepts, times, orders and dice, the models of now.
+"""A recorded run done again: the same percepts, times, commands and dice, the models of now.
 
 With the configuration and code of then every command comes out the same to the bit; the
 joints are then fed as recorded. With anything changed the recorded joints would belong to
@@ -127,7 +127,7 @@ class _Resimulator:
         first = next(moments, None)
         if first is None:
             raise SetupError(f"{recording.path} holds no tick: there is nothing to run again")
-        self._see_joints(first.tick.verdict.joints)
+        self._see_joints(first.tick.guard_result.joints)
         if recording.note:
             self._notes.append(recording.note)
         began_s = self._start(first)
@@ -183,8 +183,8 @@ class _Resimulator:
             self._compared.note(moment.tick, tick)
             if self._note is not None:
                 self._note(tick)
-            if tick.verdict.level == "limp" and not tick.stopped and self._body is None:
-                return f"fault: {'; '.join(tick.verdict.critical_reasons)}"
+            if tick.guard_result.level == "limp" and not tick.stopped and self._body is None:
+                return f"fault: {'; '.join(tick.guard_result.critical_reasons)}"
         return None
 
     def _tick(self, moment: TickRecord) -> Tick:
@@ -193,11 +193,11 @@ class _Resimulator:
         if self._body is not None:
             self._body.play(moment)
         self._perception.percept = was.percept
-        for order in was.orders:
+        for command in was.commands:
             try:
-                self._made.robot.order_again(order)
+                self._made.robot.replay_command(command)
             except ValueError as error:
-                self._notes.append(f"an order could not be given again: {error}")
+                self._notes.append(f"a command could not be given again: {error}")
         tick = self._made.robot.tick(was.t_s, moment.dt_s)
         # What happened on the bus and to the camera happened to the machine of then.
         return tick if self._body is None else tick._replace(events=was.events)
@@ -248,15 +248,16 @@ class _Decided(NamedTuple):
 
 def _decided(tick: Tick) -> _Decided:
     gaze = tick.gaze._replace(limited=())  # told since later versions
-    if _LOWER_LIDS.isdisjoint(tick.verdict.joints):  # what is asked of absent lids moves nothing
+    # What is asked of absent lids moves nothing.
+    if _LOWER_LIDS.isdisjoint(tick.guard_result.joints):
         gaze = gaze._replace(lower_left=1.0, lower_right=1.0)
     # The reason's words may be put better one day; what they stand for is in the pulls.
     return _Decided(
         repr(tick.target._replace(why="")),
         repr(gaze),
         repr(tick.desired_rad),
-        repr(tick.verdict.command_rad),
-        tick.verdict.level,
+        repr(tick.guard_result.command_rad),
+        tick.guard_result.level,
     )
 
 
@@ -274,13 +275,15 @@ def _short(was: Tick, now: Tick, name: str) -> str:
     if name == "gaze":
         return f"{now.gaze.phase}, was {was.gaze.phase}"
     if name == "level":
-        return f"{now.verdict.level}, was {was.verdict.level}"
-    if was.verdict.joints != now.verdict.joints:
-        return f"joints {', '.join(now.verdict.joints)}, was {', '.join(was.verdict.joints)}"
+        return f"{now.guard_result.level}, was {was.guard_result.level}"
+    if was.guard_result.joints != now.guard_result.joints:
+        return (
+            f"joints {', '.join(now.guard_result.joints)}, was {', '.join(was.guard_result.joints)}"
+        )
     then, again = was.desired_rad, now.desired_rad
     if name == "command":
-        then, again = was.verdict.command_rad, now.verdict.command_rad
-    rows = zip(now.verdict.joints, then, again, strict=True)
+        then, again = was.guard_result.command_rad, now.guard_result.command_rad
+    rows = zip(now.guard_result.joints, then, again, strict=True)
     joint, old, new = next(row for row in rows if repr(row[1]) != repr(row[2]))
     return f"{joint} {new:.6f} rad, was {old:.6f}"
 

@@ -91,9 +91,9 @@ class RunObservers:
         self.join(self._observers)
 
     def _made_page(self, address: tuple[str, int]) -> PageProcess:
-        order, steer = self._made.robot.order, self._steer
+        command, steer = self._made.robot.command, self._steer
         hear = PageRequestHandler(
-            order if steer is None else only_stops(order),
+            command if steer is None else only_stops(command),
             params=self._tuning,
             point=self._picking.point,
             steer=steer.press if steer is not None else None,
@@ -229,11 +229,11 @@ class RunObservers:
 
     def _keep_shown(self, tick: Tick) -> None:
         """Show the rig as it is built now: limits and the field of view can be tuned."""
-        if any(isinstance(order, Tune) for order in tick.orders):
+        if any(isinstance(command, Tune) for command in tick.commands):
             self._snapshots.rig = self._made.shown()
 
 
-def only_stops(order: CommandTaker) -> CommandTaker:
+def only_stops(command: CommandTaker) -> CommandTaker:
     """Return what takes stop and resume alone; of the rest, it raises ValueError."""
 
     def take(asked: Command) -> Ticket | None:
@@ -241,6 +241,6 @@ def only_stops(order: CommandTaker) -> CommandTaker:
             raise ValueError(
                 f"the buttons of {STEER!r} lead the head now; besides them only stop and resume go"
             )
-        return order(asked)
+        return command(asked)
 
     return take

@@ -58,7 +58,7 @@ def compose(options: RunOptions) -> ComposedRun:
         substitutes = Substitutes(body=recorder.recorded)
     made = assemble(rig, options, substitutes)
     names = (options.rig, options.character, options.profile)
-    return ComposedRun(options, made, ParamStore(made.live, made.robot.order, *names), recorder)
+    return ComposedRun(options, made, ParamStore(made.live, made.robot.command, *names), recorder)
 
 
 def run_info(rig: Rig, options: RunOptions) -> RunInfo:

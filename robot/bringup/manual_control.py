@@ -213,17 +213,17 @@ class ManualControl:
                 self._guard.go_gently()
             step = self._step(desired, last_s)
             last_s = step.t_s
-            notes.add(step.verdict)
+            notes.add(step.guard_result)
             events += self.body.bus.events()
             ended = done(step) or self._stopped()
-            ended = "limp" if step.verdict.level == "limp" else ended
+            ended = "limp" if step.guard_result.level == "limp" else ended
             if ended is None and step.t_s - start_s >= longest_s:
                 ended = "not there in time"
             if ended is not None:
                 break
-        self._goal = step.verdict.command_rad
+        self._goal = step.guard_result.command_rad
         applied = outcome(step, step.desired_rad if ends_on is None else ends_on, notes)
-        level = step.verdict.level
+        level = step.guard_result.level
         events += self._said
         self._said.clear()
         return MoveResult(ended, step.t_s - start_s, applied, level, tuple(events), step)
@@ -234,9 +234,9 @@ class ManualControl:
         joints = self.body.read(t_s)
         wanted = desired(joints, t_s, t_s - last_s)
         # No camera is used here, so no picture can be too old.
-        verdict = self._guard.check(wanted, joints, 0.0, t_s)
-        self.body.write(verdict.command_rad)
-        step = Step(t_s, wanted, verdict, joints)
+        guard_result = self._guard.check(wanted, joints, 0.0, t_s)
+        self.body.write(guard_result.command_rad)
+        step = Step(t_s, wanted, guard_result, joints)
         if self._watch is not None:
             try:
                 self._watch(step)

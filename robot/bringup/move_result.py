@@ -47,7 +47,7 @@ class Step(NamedTuple):
 
     t_s: float
     desired_rad: JointAngles
-    verdict: GuardResult
+    guard_result: GuardResult
     joints: JointState
 
 
@@ -92,9 +92,9 @@ class GuardReasons:
     def __init__(self) -> None:
         self._by_joint: dict[str, dict[str, None]] = {}
 
-    def add(self, verdict: GuardResult) -> None:
+    def add(self, guard_result: GuardResult) -> None:
         """Add what a guard result says, but for how goals are approached."""
-        for line in verdict.reasons:
+        for line in guard_result.reasons:
             joint, _, reason = line.partition(": ")
             if reason not in PASSING:
                 self._by_joint.setdefault(joint, {})[reason] = None
@@ -106,9 +106,16 @@ class GuardReasons:
 
 def outcome(step: Step, desired: JointAngles, notes: GuardReasons) -> tuple[JointResult, ...]:
     """Return every joint's part of how a movement ended."""
-    verdict, joints = step.verdict, step.joints
-    told = joints.measured or (True,) * len(verdict.joints)
-    rows = zip(verdict.joints, desired, verdict.command_rad, joints.position_rad, told, strict=True)
+    guard_result, joints = step.guard_result, step.joints
+    told = joints.measured or (True,) * len(guard_result.joints)
+    rows = zip(
+        guard_result.joints,
+        desired,
+        guard_result.command_rad,
+        joints.position_rad,
+        told,
+        strict=True,
+    )
     return tuple(
         JointResult(name, degrees(asked), degrees(let), degrees(at), notes.of(name), not tells)
         for name, asked, let, at, tells in rows
@@ -119,7 +126,7 @@ def standing(
     step: Step, desired: JointAngles, moving: Iterable[int], near_rad: float
 ) -> str | None:
     """Return how joints that stand have ended: where they were sent, or where they are kept."""
-    joints, command = step.joints, step.verdict.command_rad
+    joints, command = step.joints, step.guard_result.command_rad
     held = False
     for i in moving:
         at = joints.position_rad[i]
@@ -128,7 +135,8 @@ def standing(
         if abs(at - desired[i]) <= near_rad:
             continue
         passing = any(
-            f"{step.verdict.joints[i]}: {reason}" in step.verdict.reasons for reason in PASSING
+            f"{step.guard_result.joints[i]}: {reason}" in step.guard_result.reasons
+            for reason in PASSING
         )
         if passing or abs(at - command[i]) > near_rad:
             return None

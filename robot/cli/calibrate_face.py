@@ -135,7 +135,7 @@ def _steered(
     steer = SteeringButtons(BUTTONS, keys.press, lambda: shown(steering))
     audience = RunObservers(made, options, say, steer=steer)
     door = StopOnlyServer(
-        made.robot.order,
+        made.robot.command,
         made.clock,
         {"rig": rig.name, "pid": os.getpid(), "does": "calibrate"},
         say,

@@ -189,7 +189,7 @@ class _StatusLine:
         self._shown = ""
 
     def show(self, step: Step) -> None:
-        reasons = [r for r in step.verdict.reasons if r.partition(": ")[2] not in PASSING]
+        reasons = [r for r in step.guard_result.reasons if r.partition(": ")[2] not in PASSING]
         line = ", ".join(reasons) or "on the way"
         if line != self._shown:
             self._shown = line

@@ -1,4 +1,4 @@
-"""What can be chosen from menus while the robot runs, and orders refused as they come in."""
+"""What can be chosen from menus while the robot runs, and commands refused as they come in."""
 
 from collections.abc import Callable, Mapping, Sequence
 from math import degrees, radians
@@ -36,43 +36,43 @@ class Menus:
             "lids": tuple(LID_COMMANDS),
         }
 
-    def choose(self, order: Ask, top_down: TopDown, t_s: float) -> None:
+    def choose(self, command: Ask, top_down: TopDown, t_s: float) -> None:
         """Put a choice in force that ``refuse_unknown`` let through."""
-        if order.menu == "behaviour":
-            top_down.behave(order.choice)
-        elif order.menu == "conversation":
-            mode = next(mode for mode in MODES if mode == order.choice)
+        if command.menu == "behaviour":
+            top_down.behave(command.choice)
+        elif command.menu == "conversation":
+            mode = next(mode for mode in MODES if mode == command.choice)
             self._aversion.converse(mode, t_s)
             self._lids.mode("rest" if mode == "none" else "conversation")
         else:
-            LID_COMMANDS[order.choice](self._lids, t_s)
+            LID_COMMANDS[command.choice](self._lids, t_s)
 
 
-def refuse_unknown(order: Ask, menus: Mapping[str, Sequence[str]]) -> None:
+def refuse_unknown(command: Ask, menus: Mapping[str, Sequence[str]]) -> None:
     """Refuse what is on no menu.
 
     Raises:
         ValueError: with what there is.
     """
-    if order.menu not in menus:
-        raise ValueError(f"nothing called {order.menu!r} to choose; there is {', '.join(menus)}")
-    if order.choice not in menus[order.menu]:
-        there = ", ".join(menus[order.menu])
-        raise ValueError(f"no {order.menu} {order.choice!r}; there is {there}")
+    if command.menu not in menus:
+        raise ValueError(f"nothing called {command.menu!r} to choose; there is {', '.join(menus)}")
+    if command.choice not in menus[command.menu]:
+        there = ", ".join(menus[command.menu])
+        raise ValueError(f"no {command.menu} {command.choice!r}; there is {there}")
 
 
-def refuse_absent(order: Jog, joints: Sequence[str]) -> None:
+def refuse_absent(command: Jog, joints: Sequence[str]) -> None:
     """Refuse joints that the rig does not have.
 
     Raises:
         ValueError: with those there are.
     """
-    for name, _ in order.angles_rad:
+    for name, _ in command.angles_rad:
         if name not in joints:
             raise ValueError(f"this rig has no joint {name!r}; there is {', '.join(joints)}")
 
 
-def refuse_out_of_range(order: Jog, joints: Sequence[str], limits: Sequence[JointLimit]) -> None:
+def refuse_out_of_range(command: Jog, joints: Sequence[str], limits: Sequence[JointLimit]) -> None:
     """Refuse angles outside the joints' ranges in force.
 
     Raises:
@@ -80,7 +80,7 @@ def refuse_out_of_range(order: Jog, joints: Sequence[str], limits: Sequence[Join
     """
     ranges = dict(zip(joints, limits, strict=True))
     outside = []
-    for name, angle in order.angles_rad:
+    for name, angle in command.angles_rad:
         low, high = ranges[name][:2] if name in ranges else (angle, angle)
         if not low - _NEAR_END_RAD <= angle <= high + _NEAR_END_RAD:
             outside.append(

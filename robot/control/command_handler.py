@@ -142,7 +142,7 @@ class PathGuard(Protocol):
 class Commandable(Protocol):
     """A robot that takes commands, as ``gazerig.robot.control.loop.Robot`` does."""
 
-    def order(self, order: Command) -> Ticket | None:
+    def command(self, command: Command) -> Ticket | None:
         """Ask for something from the next tick on; raises ValueError with the rule."""
         ...
 
@@ -245,7 +245,7 @@ class CommandHandler:
         """
         if isinstance(command, Tune):
             raise ValueError("parameters are changed by the request set, which checks them")
-        return CommandGiven(command, self._robot.order(command))
+        return CommandGiven(command, self._robot.command(command))
 
     def _of_params(self, request: object) -> Outcome:
         match request:

@@ -14,9 +14,9 @@ as that takes longest."""
 
 
 class QueuedCommand(NamedTuple):
-    """An order, and where its reply goes."""
+    """A command, and where its reply goes."""
 
-    order: Command
+    command: Command
     ticket: Ticket
 
 
@@ -24,29 +24,29 @@ class CommandQueue:
     """What was asked for since the last tick."""
 
     def __init__(self) -> None:
-        self._orders: deque[QueuedCommand] = deque()
+        self._commands: deque[QueuedCommand] = deque()
         self._stops: deque[QueuedCommand] = deque()
 
     def __len__(self) -> int:
-        """Return how many orders wait."""
-        return len(self._orders) + len(self._stops)
+        """Return how many commands wait."""
+        return len(self._commands) + len(self._stops)
 
-    def add(self, order: Command) -> Ticket:
-        """Queue an order; may be called from any thread.
+    def add(self, command: Command) -> Ticket:
+        """Queue a command; may be called from any thread.
 
         Raises:
             ValueError: too many wait already. A stop is never refused.
         """
-        waiting = QueuedCommand(order, Ticket())
-        if isinstance(order, Stop):
+        waiting = QueuedCommand(command, Ticket())
+        if isinstance(command, Stop):
             if len(self._stops) >= MAX_WAITING:
                 with suppress(IndexError):  # taken up in this moment
                     return self._stops[-1].ticket  # as good as one more
             self._stops.append(waiting)
             return waiting.ticket
-        if len(self._orders) >= MAX_WAITING:
-            raise ValueError(f"too many requests: {MAX_WAITING} orders wait already, ask again")
-        self._orders.append(waiting)
+        if len(self._commands) >= MAX_WAITING:
+            raise ValueError(f"too many requests: {MAX_WAITING} commands wait already, ask again")
+        self._commands.append(waiting)
         return waiting.ticket
 
     def stops(self) -> list[QueuedCommand]:
@@ -60,22 +60,22 @@ class CommandQueue:
 
     def take(self) -> list[QueuedCommand]:
         """Take what is to be obeyed in this tick, stops first."""
-        if not self._orders and not self._stops:
+        if not self._commands and not self._stops:
             return []
         taken = self.stops()
         tunes, most = 0, len(taken) + MAX_PER_TICK
-        while self._orders and len(taken) < most:
-            tunes += isinstance(self._orders[0].order, Tune)
+        while self._commands and len(taken) < most:
+            tunes += isinstance(self._commands[0].command, Tune)
             if tunes > 1:
                 break
-            taken.append(self._orders.popleft())
+            taken.append(self._commands.popleft())
         return taken
 
     def _drop_leads(self) -> None:
         """Refuse what was asked for before a stop and would move the head; keep the rest."""
-        for _ in range(len(self._orders)):
-            waiting = self._orders.popleft()
-            if isinstance(waiting.order, LookAt | Jog | Resume):
+        for _ in range(len(self._commands)):
+            waiting = self._commands.popleft()
+            if isinstance(waiting.command, LookAt | Jog | Resume):
                 waiting.ticket.answer(CommandReply("it has been stopped since"))
             else:
-                self._orders.append(waiting)
+                self._commands.append(waiting)

@@ -20,7 +20,7 @@ def reckoned_joints(tick: Tick) -> tuple[str, ...]:
     told = tick.joints.measured
     if not told:
         return ()
-    return tuple([n for n, tells in zip(tick.verdict.joints, told, strict=True) if not tells])
+    return tuple([n for n, tells in zip(tick.guard_result.joints, told, strict=True) if not tells])
 
 
 def basis_of(

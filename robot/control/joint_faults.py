@@ -58,8 +58,8 @@ class JointFaults:
         """Look at one tick."""
         if self._first_s is None:
             self._first_s = tick.t_s
-        verdict = tick.verdict
-        held = verdict.level in ("hold", "limp") and not tick.stopped
+        guard_result = tick.guard_result
+        held = guard_result.level in ("hold", "limp") and not tick.stopped
         if not held and not self._running:
             return
         for joint, reason in _held(tick) if held else ():
@@ -109,8 +109,10 @@ def _held(tick: Tick) -> list[tuple[str, str]]:
     """Return joint and reason of all joints that a fault holds in this tick."""
     found = []
     faults = tick.joints.fault
-    grave = set(tick.verdict.critical_reasons)
-    for i, (joint, why) in enumerate(zip(tick.verdict.joints, tick.verdict.why, strict=False)):
+    grave = set(tick.guard_result.critical_reasons)
+    for i, (joint, why) in enumerate(
+        zip(tick.guard_result.joints, tick.guard_result.why, strict=False)
+    ):
         if not why or f"{joint}: {why}" not in grave:
             continue
         if why in FAULTS or (faults and why == faults[i]):

@@ -91,7 +91,7 @@ class Robot:
         self._menus = Menus(aversion, lids)
         self._guard = guard
         self._settled = True
-        self._orders = CommandQueue()
+        self._commands = CommandQueue()
         self._lead = Lead()
         self._last: JointAngles = ()
         # The models lead again: they begin where this tick finds head and eyes.
@@ -105,33 +105,33 @@ class Robot:
         """Return why somebody stopped the robot, "" while it moves."""
         return self._stop.why
 
-    def order(self, order: Command) -> Ticket:
+    def command(self, command: Command) -> Ticket:
         """Ask for something, from the next tick on; may be called from any thread.
 
         Returns:
-            Where the reply comes, once the loop has taken the order up.
+            Where the reply comes, once the loop has taken the command up.
 
         Raises:
-            ValueError: it cannot be done, or too many orders wait; the message says which,
+            ValueError: it cannot be done, or too many commands wait; the message says which,
                 and what there is.
         """
-        check(order)
-        if isinstance(order, Jog):
-            refuse_out_of_range(order, self.body.names, self._guard.limits)
-        return self.order_again(order)
+        check(command)
+        if isinstance(command, Jog):
+            refuse_out_of_range(command, self.body.names, self._guard.limits)
+        return self.replay_command(command)
 
-    def order_again(self, order: Command) -> Ticket:
+    def replay_command(self, command: Command) -> Ticket:
         """Ask for what was accepted in a recorded run, whatever the ranges are now.
 
         Raises:
-            ValueError: as ``order``.
+            ValueError: as ``command``.
         """
-        check(order)
-        if isinstance(order, Ask):
-            refuse_unknown(order, self.menus())
-        if isinstance(order, Jog):
-            refuse_absent(order, self.body.names)
-        return self._orders.add(order)
+        check(command)
+        if isinstance(command, Ask):
+            refuse_unknown(command, self.menus())
+        if isinstance(command, Jog):
+            refuse_absent(command, self.body.names)
+        return self._commands.add(command)
 
     def ask(self, menu: str, choice: str) -> None:
         """Ask for a behaviour, a mode of conversation or a wink, from the next tick on.
@@ -141,7 +141,7 @@ class Robot:
         Raises:
             ValueError: there is no such menu or choice; the message lists what there is.
         """
-        self.order(Ask(menu, choice))
+        self.command(Ask(menu, choice))
 
     def menus(self) -> dict[str, tuple[str, ...]]:
         """Return what ``ask`` takes: menu -> choices, the present one first."""
@@ -193,7 +193,7 @@ class Robot:
         Raises:
             DriverError: bus or camera are gone.
         """
-        orders = self._obey(t_s)
+        commands = self._obey(t_s)
         joints = self.body.read(t_s)
         pose = self._kinematics.forward(joints)
         self._poses.remember(t_s, pose.head_rad)
@@ -210,17 +210,17 @@ class Robot:
         desired = self._lead.pose_rad or self._kinematics.inverse(gaze)
         if self.stopped:
             self._stop.keep_released(self.body, joints, t_s)
-            verdict = at_rest(joints, desired, self.stopped, self.body.names)
+            guard_result = at_rest(joints, desired, self.stopped, self.body.names)
         else:
             # What a person chose to look at is there whatever the camera shows.
             age_s = 0.0 if self._lead.active else percept.age_s(t_s) if percept is not None else inf
-            verdict = self._guard.check(desired, joints, age_s, t_s)
-            self.body.write(verdict.command_rad)
-        self._last = verdict.command_rad
+            guard_result = self._guard.check(desired, joints, age_s, t_s)
+            self.body.write(guard_result.command_rad)
+        self._last = guard_result.command_rad
         events = (*self._told, *self.body.bus.events(), *self.camera.events())
         self._told.clear()
         return Tick(
-            t_s, joints, pose, detections, percept, target, gaze, desired, verdict, events, orders,
+            t_s, joints, pose, detections, percept, target, gaze, desired, guard_result, events, commands,
             self.stopped, self._lead.words,
         )  # fmt: skip
 
@@ -233,7 +233,7 @@ class Robot:
     ) -> bool:
         """Move slowly to the parking pose; tell whether it was reached in time.
 
-        Somebody's stop ends it: the torque is off then. Other orders wait for nothing any more.
+        Somebody's stop ends it: the torque is off then. Other commands wait for nothing any more.
 
         again: asked at every step, tells whether the rest is to be skipped
         """
@@ -246,9 +246,9 @@ class Robot:
             # A bus that is slow to answer must not make it longer.
             if t_s > end_s or (again is not None and again()):
                 return False
-            if stops := self._orders.stops():
+            if stops := self._commands.stops():
                 for stop in stops:
-                    stop.ticket.answer(self._obey_one(stop.order, t_s))
+                    stop.ticket.answer(self._obey_one(stop.command, t_s))
                 return False
             joints = self.body.read(t_s)
             # Parking goes home whatever the camera shows.
@@ -267,52 +267,52 @@ class Robot:
 
     def _obey(self, t_s: float) -> tuple[Command, ...]:
         """Put in force what was asked for, and end a lead that nobody renews."""
-        taken = self._orders.take()
-        for order, ticket in taken:
-            ticket.answer(self._obey_one(order, t_s))
+        taken = self._commands.take()
+        for command, ticket in taken:
+            ticket.answer(self._obey_one(command, t_s))
         if self._lead.lapsed(t_s):
             self._told.append(f"{self._lead.words}: not renewed, so the gaze leads again")
             self._let_lead(self._lead.end)
-        return tuple([order for order, _ in taken])
+        return tuple([command for command, _ in taken])
 
-    def _obey_one(self, order: Command, t_s: float) -> CommandReply:
-        """Put one order in force; return what became of it."""
-        match order:
+    def _obey_one(self, command: Command, t_s: float) -> CommandReply:
+        """Put one command in force; return what became of it."""
+        match command:
             case Ask():
-                self._menus.choose(order, self.attention.top_down, t_s)
+                self._menus.choose(command, self.attention.top_down, t_s)
             case LookAt() | Jog() if self.stopped:
                 return CommandReply(f"stopped ({self.stopped}): resume first")
             case LookAt():
-                return self._look(order, t_s)
+                return self._look(command, t_s)
             case Jog():
-                return self._jog(order, t_s)
+                return self._jog(command, t_s)
             case Renew():
-                if not self._lead.renew(order, t_s):
-                    return CommandReply(f"{order.who or 'you'} lead nothing now")
+                if not self._lead.renew(command, t_s):
+                    return CommandReply(f"{command.who or 'you'} lead nothing now")
             case Stop():
                 self._lead.end()
-                self._stop.halt(order, self.body, t_s)
+                self._stop.halt(command, self.body, t_s)
             case Resume():
-                return self._resume(order, t_s)
+                return self._resume(command, t_s)
             case Tune():
-                self._told += self._tune(order, t_s)
+                self._told += self._tune(command, t_s)
         return CommandReply()
 
-    def _look(self, order: LookAt, t_s: float) -> CommandReply:
+    def _look(self, command: LookAt, t_s: float) -> CommandReply:
         """Look at a point that a person chose, or freely again."""
-        self._let_lead(lambda: self._lead.look(order, t_s))
+        self._let_lead(lambda: self._lead.look(command, t_s))
         target = self._lead.puppet(t_s)
         if target is None:
             return CommandReply()
         return look_reply(target, self._oculomotor, self._kinematics, self._guard.limits)
 
-    def _jog(self, order: Jog, t_s: float) -> CommandReply:
+    def _jog(self, command: Jog, t_s: float) -> CommandReply:
         """Hold all joints but those given; without any, let the models lead again."""
-        self._let_lead(lambda: self._lead.jog(order, self.body.names, self._last, t_s))
-        if order.angles_rad:
+        self._let_lead(lambda: self._lead.jog(command, self.body.names, self._last, t_s))
+        if command.angles_rad:
             # A slider can be torn from end to end in no time.
             self._guard.go_gently()
-        return jog_reply(order, self.body.names, self._guard.limits)
+        return jog_reply(command, self.body.names, self._guard.limits)
 
     def _let_lead(self, change: Callable[[], None]) -> None:
         """Change who leads; the models begin gently where they take joints over."""
@@ -324,11 +324,11 @@ class Robot:
         if self._lead.words and not words:
             self._told.append(f"led by {self._lead.words}")
 
-    def _resume(self, order: Resume, t_s: float) -> CommandReply:
+    def _resume(self, command: Resume, t_s: float) -> CommandReply:
         """Put the torque on where the joints are; a servo that refuses leaves it off."""
         if not self.stopped:
             return CommandReply()
-        resumed = self._stop.resume(order, self.body, t_s)
+        resumed = self._stop.resume(command, self.body, t_s)
         if isinstance(resumed, CommandReply):
             return resumed
         self._guard.reset(t_s, resumed)
@@ -380,8 +380,10 @@ def run(
         except DriverError as error:
             return LoopCount(ticks, overruns, f"fault: {error}")
         watch(tick)
-        if tick.verdict.level == "limp" and not tick.stopped:
-            return LoopCount(ticks, overruns, f"fault: {'; '.join(tick.verdict.critical_reasons)}")
+        if tick.guard_result.level == "limp" and not tick.stopped:
+            return LoopCount(
+                ticks, overruns, f"fault: {'; '.join(tick.guard_result.critical_reasons)}"
+            )
         last_s = t_s
         ticks += 1
         late = int((clock.now_s() - slots_s) / period) - slot

@@ -58,11 +58,11 @@ def look_reply(
     return CommandReply("", target.p_world_m, met, tuple(joints), error.whole)
 
 
-def jog_reply(order: Jog, joints: Sequence[str], limits: Sequence[JointLimit]) -> CommandReply:
+def jog_reply(command: Jog, joints: Sequence[str], limits: Sequence[JointLimit]) -> CommandReply:
     """Return how far joints that are put at angles will go."""
     spans = {name: limit[:2] for name, limit in zip(joints, limits, strict=True)}
     found = []
-    for name, asked in order.angles_rad:
+    for name, asked in command.angles_rad:
         low, high = spans[name]
         done = min(max(asked, low), high)
         reason = _AT_END if abs(done - asked) > _SAME_RAD else ""

@@ -29,11 +29,11 @@ class StopControl:
         """Return why somebody stopped the robot, "" while it moves."""
         return self._latch.why
 
-    def halt(self, order: Stop, body: Body, t_s: float) -> None:
+    def halt(self, command: Stop, body: Body, t_s: float) -> None:
         """Take the torque off at once."""
-        if self._latch.stop(order, t_s):
-            by = f" by {order.who}" if order.who else ""
-            self._told.append(f"stopped{by}: {order.why}; torque off")
+        if self._latch.stop(command, t_s):
+            by = f" by {command.who}" if command.who else ""
+            self._told.append(f"stopped{by}: {command.why}; torque off")
         self._release(body, t_s)
 
     def keep_released(self, body: Body, joints: JointState, t_s: float) -> None:
@@ -46,10 +46,10 @@ class StopControl:
             self._told.append(f"stopped, but {', '.join(holding)} still held: torque off again")
             self._release(body, t_s)
 
-    def resume(self, order: Resume, body: Body, t_s: float) -> JointAngles | CommandReply:
+    def resume(self, command: Resume, body: Body, t_s: float) -> JointAngles | CommandReply:
         """Put the torque on where the joints are; return the goals in force, or why not."""
-        by = f" by {order.who}" if order.who else ""
-        if refusal := self._latch.refusal(order, t_s):
+        by = f" by {command.who}" if command.who else ""
+        if refusal := self._latch.refusal(command, t_s):
             if refusal != self._refused:  # a flood of them is one line
                 self._told.append(f"resume{by} refused: {refusal}")
             self._refused = refusal

@@ -12,7 +12,7 @@ class Tick(NamedTuple):
     """Everything one tick knew and decided; desired, commanded and measured side by side.
 
     events: what has happened on the bus and to the camera, in words
-    orders: what people asked for, obeyed at the beginning of this tick
+    commands: what people asked for, obeyed at the beginning of this tick
     stopped: why somebody stopped the robot, "" while it moves
     led: who leads gaze or joints and with what, "" while nobody does
     """
@@ -25,9 +25,9 @@ class Tick(NamedTuple):
     target: Target
     gaze: GazeCommand
     desired_rad: JointAngles
-    verdict: GuardResult
+    guard_result: GuardResult
     events: tuple[str, ...] = ()
-    orders: tuple[Command, ...] = ()
+    commands: tuple[Command, ...] = ()
     stopped: str = ""
     led: str = ""
 

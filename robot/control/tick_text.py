@@ -58,12 +58,12 @@ def lead_words(tick: Tick) -> str:
     return f"{words}; {error:.0f} deg beside it: {', '.join(ends)}"
 
 
-def verdict_words(verdict: GuardResult) -> str:
+def guard_text(guard_result: GuardResult) -> str:
     """Say what the guard made of the wish, e.g. "limited (neck_yaw: too fast, +2)"."""
-    if not verdict.reasons:
-        return verdict.level
-    more = f", +{len(verdict.reasons) - 1}" if len(verdict.reasons) > 1 else ""
-    return f"{verdict.level} ({verdict.reasons[0]}{more})"
+    if not guard_result.reasons:
+        return guard_result.level
+    more = f", +{len(guard_result.reasons) - 1}" if len(guard_result.reasons) > 1 else ""
+    return f"{guard_result.level} ({guard_result.reasons[0]}{more})"
 
 
 def health_words(health: BusHealth) -> str:

@@ -111,12 +111,12 @@ class LeadView:
         async def _(event: viser.TransformControlsEvent) -> None:
             x, y, z = map(float, event.target.position)
             if event.client_id is not None and event.phase != "start":
-                self._teller.order(LookAt((x, y, z)), str(event.client_id))
+                self._teller.command(LookAt((x, y, z)), str(event.client_id))
 
         @free.on_click
         async def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
             put(self._drag, False)
-            self._teller.order(LookAt(None), str(event.client_id))
+            self._teller.command(LookAt(None), str(event.client_id))
 
     def offer(self, name: str, choices: Sequence[str]) -> None:
         """Add a menu as a row of buttons."""
@@ -131,7 +131,7 @@ class LeadView:
             if name == STEER:
                 self._teller.ask({"steer": choice}, who)
             else:
-                self._teller.order(Ask(name, choice), who)
+                self._teller.command(Ask(name, choice), who)
 
         self._menus[name] = group
 

@@ -47,7 +47,7 @@ class JogPanel:
         @free.on_click
         async def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
             self._held.clear()
-            self._teller.order(LookAt(None), str(event.client_id))
+            self._teller.command(LookAt(None), str(event.client_id))
 
     def values(self, in_force: Mapping[str, object]) -> None:
         """Make the sliders, and keep their ends where the joints' limits are."""
@@ -82,7 +82,7 @@ class JogPanel:
 
     def _jog(self, joint: str, angle_deg: float, who: str) -> None:
         self._held[joint] = (angle_deg, self._now_s)
-        self._teller.order(Jog(((joint, radians(angle_deg)),)), who)
+        self._teller.command(Jog(((joint, radians(angle_deg)),)), who)
 
     def show(self, snapshot: Snapshot) -> None:
         """Write the measured angles; sliders that nobody holds follow them."""

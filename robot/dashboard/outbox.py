@@ -33,12 +33,12 @@ class Outbox:
         self.name: Callable[[str], str] = _unnamed
         self.leads: Callable[[str], object] = _unnamed
 
-    def order(self, order: Command, who: str) -> bool:
-        """Return an order; False where the rig does not take it now."""
-        if isinstance(order, LookAt | Jog):
+    def command(self, command: Command, who: str) -> bool:
+        """Return a command; False where the rig does not take it now."""
+        if isinstance(command, LookAt | Jog):
             self.leads(self.name(who))
-            order = order._replace(who=self.name(who))
-        return self.ask(as_json(order), who)
+            command = command._replace(who=self.name(who))
+        return self.ask(as_json(command), who)
 
     def ask(self, data: Mapping[str, object], who: str) -> bool:
         """Ask for anything; ``who`` comes back with the answer."""

@@ -18,11 +18,11 @@ from gazerig.drivers.types import BusHealth, Detections
 from gazerig.gaze.angles import rotate_back, sub
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.control.tick_text import (
+    guard_text,
     health_words,
     lead_words,
     seeing_words,
     target_name,
-    verdict_words,
 )
 from gazerig.robot.dashboard.camera_overlay import draw_detections, encode, ground
 from gazerig.robot.dashboard.page_process import PageProcess
@@ -192,7 +192,7 @@ class Publisher:
             f"{rate_hz:5.1f} Hz",
             f"{target_name(tick.target)} - {tick.target.why}",
             *([f"led by {lead_words(tick)}"] if tick.led else []),
-            verdict_words(tick.verdict),
+            guard_text(tick.guard_result),
             health_words(self._health()),
         ]
         return " | ".join(parts)

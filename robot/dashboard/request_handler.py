@@ -1,4 +1,4 @@
-"""What people ask for on the page, handed to the rig: orders, tuning, clicks in the picture."""
+"""What people ask for on the page, handed to the rig: commands, tuning, clicks in the picture."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -36,7 +36,7 @@ class PageRequestHandler:
 
     def __init__(
         self,
-        order: CommandTaker,
+        command: CommandTaker,
         params: ParamAccess | None = None,
         point: Point | None = None,
         steer: Callable[[str], str | None] | None = None,
@@ -54,7 +54,7 @@ class PageRequestHandler:
         paths: which files may be named; None: any
         """
         self._handler = CommandHandler(
-            _Taking(order), params, refusals=refusals, saved=saved, paths=paths
+            _Taking(command), params, refusals=refusals, saved=saved, paths=paths
         )
         self._point = point
         self._steer = steer
@@ -140,9 +140,9 @@ class _Taking:
     def __init__(self, take: CommandTaker) -> None:
         self._take = take
 
-    def order(self, order: Command) -> Ticket | None:
+    def command(self, command: Command) -> Ticket | None:
         """Hand on a command."""
-        return self._take(order)
+        return self._take(command)
 
     def menus(self) -> dict[str, tuple[str, ...]]:
         """Return none: the page is sent them."""

@@ -106,8 +106,8 @@ class SnapshotBuilder:
             if tick.t_s - self._trail_s >= _TRAIL_S:
                 self._trail_s = tick.t_s
                 trail.append(_trail(tick))
-            if _GRAVITY[tick.verdict.level] > _GRAVITY[worst]:
-                worst = tick.verdict.level
+            if _GRAVITY[tick.guard_result.level] > _GRAVITY[worst]:
+                worst = tick.guard_result.level
         if self._newest is None:
             return None
         timing = self._timed(self._newest.t_s)
@@ -167,8 +167,8 @@ def snapshot(
         target_name=target_name(target),
         why=target.why,
         phase="blink" if tick.gaze.blink else tick.gaze.phase,
-        level=tick.verdict.level,
-        reasons=tick.verdict.reasons,
+        level=tick.guard_result.level,
+        reasons=tick.guard_result.reasons,
         faces=_faces(tick),
         bodies=_bodies(tick),
         rate_hz=rate_hz,
@@ -176,7 +176,7 @@ def snapshot(
         behaviour=behaviour,
         saliences=target.saliences,
         seeing=seeing,
-        commanded_rad=tick.verdict.command_rad,
+        commanded_rad=tick.guard_result.command_rad,
         target_kind=target.kind,
         target_id=target.id,
         target_part=target.part,
@@ -187,7 +187,7 @@ def snapshot(
         camera=_camera(tick, rig) if rig is not None else None,
         field_deg=_field_deg(rig.field) if rig is not None else None,
         servos=_servos(tick, rig),
-        worst=tick.verdict.level,
+        worst=tick.guard_result.level,
         trail=(_trail(tick),),
         joints=joints,
         reckoned=_reckoned(tick.joints, joints),
@@ -197,7 +197,7 @@ def snapshot(
 
 def joint_names(tick: Tick, rig: ShownRig | None = None) -> tuple[str, ...]:
     """Return a name a joint; a recording may know none, then they are numbered."""
-    names = tick.verdict.joints or (rig.kinematics.names if rig is not None else ())
+    names = tick.guard_result.joints or (rig.kinematics.names if rig is not None else ())
     count = len(tick.joints.position_rad)
     return names if len(names) == count else tuple(f"joint {i + 1}" for i in range(count))
 
@@ -291,7 +291,9 @@ def _limits(rig: ShownRig) -> ServoLimits:
 
 
 def _trail(tick: Tick) -> Trail:
-    return Trail(tick.t_s, tick.desired_rad, tick.verdict.command_rad, tick.joints.position_rad)
+    return Trail(
+        tick.t_s, tick.desired_rad, tick.guard_result.command_rad, tick.joints.position_rad
+    )
 
 
 def _seen(event: Event) -> SeenEvent:

@@ -1,6 +1,6 @@
 """What people ask of a running robot, from the page, another program or the command line.
 
-An order is plain data: it crosses processes as JSON, is obeyed at the next tick, and a
+A command is plain data: it crosses processes as JSON, is obeyed at the next tick, and a
 recording of a run holds it, so that the run can be done again.
 """
 
@@ -89,7 +89,7 @@ MAX_COORDINATE_M = 1000.0
 MAX_ANGLE_RAD = 2.0 * pi
 """No joint is sent farther than a turn to either side."""
 MAX_WORDS = 200
-"""Longest name or reason that an order may carry, in characters."""
+"""Longest name or reason that a command may carry, in characters."""
 
 COMMANDS: dict[str, type[Command]] = {
     "ask": Ask, "look_at": LookAt, "jog": Jog, "renew": Renew, "stop": Stop, "resume": Resume,
@@ -123,13 +123,13 @@ def from_json(data: object) -> Command:
     needed = set(kind._fields).difference(kind._field_defaults)
     if not needed <= set(fields) <= set(kind._fields):
         raise ValueError(f"{name} takes {', '.join(kind._fields)}; given {', '.join(fields)}")
-    order = kind(**fields)  # type: ignore[arg-type]
-    check(order)
-    return order
+    command = kind(**fields)  # type: ignore[arg-type]
+    check(command)
+    return command
 
 
 def from_recording(data: dict[str, object]) -> Command:
-    """Read an order of a recorded run.
+    """Read a command of a recorded run.
 
     Those of runs made before leads could lapse and stops be guarded say nothing of it: they
     stayed, and whoever asked could resume.
@@ -142,21 +142,21 @@ def from_recording(data: dict[str, object]) -> Command:
     return from_json({**old.get(name if isinstance(name, str) else "", {}), **data})
 
 
-def signed(order: Command, who: str) -> Command:
-    """Return an order with who asks for it; orders that do not tell stay as they are."""
-    match order:
+def signed(command: Command, who: str) -> Command:
+    """Return a command with who asks for it; commands that do not tell stay as they are."""
+    match command:
         case LookAt() | Jog() | Renew() | Stop() | Resume():
-            return order._replace(who=who[:MAX_WORDS])
-    return order
+            return command._replace(who=who[:MAX_WORDS])
+    return command
 
 
-def check(order: Command) -> None:
-    """See that an order's values can be meant.
+def check(command: Command) -> None:
+    """See that a command's values can be meant.
 
     Raises:
         ValueError: with the rule.
     """
-    match order:
+    match command:
         case Ask(menu, choice):
             if not isinstance(menu, str) or not isinstance(choice, str):
                 raise ValueError("menu and choice are names")

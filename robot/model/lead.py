@@ -1,7 +1,7 @@
 """Who leads the head in place of what attracts it: a point to look at, or joints held by hand.
 
 A lead needs a heartbeat unless it is to stay: without one the gaze leads again. Pure: times
-are those of the ticks and heartbeats are orders, so a recorded run lapses as it did.
+are those of the ticks and heartbeats are commands, so a recorded run lapses as it did.
 """
 
 from math import degrees
@@ -37,35 +37,35 @@ class Lead:
         """True while anybody leads."""
         return bool(self.words)
 
-    def look(self, order: LookAt, t_s: float) -> None:
+    def look(self, command: LookAt, t_s: float) -> None:
         """Lead the gaze to a point, or let it be free; joints are no longer held."""
-        self.point = order.p_world_m
+        self.point = command.p_world_m
         self._shifts += 1
         self.pose_rad = ()
         self._jogged.clear()
-        self._take(order, t_s)
+        self._take(command, t_s)
 
-    def jog(self, order: Jog, names: tuple[str, ...], now_rad: JointAngles, t_s: float) -> None:
+    def jog(self, command: Jog, names: tuple[str, ...], now_rad: JointAngles, t_s: float) -> None:
         """Hold all joints but those given; without any, the models move them again.
 
         now_rad: where the joints are held that nobody has jogged yet
         """
-        if not order.angles_rad:
+        if not command.angles_rad:
             self.pose_rad = ()
             self._jogged.clear()
             self._describe()
             return
-        if order.who != self._who:
+        if command.who != self._who:
             self.point = None
         angles = dict(zip(names, self.pose_rad or now_rad, strict=True))
-        angles.update(order.angles_rad)
+        angles.update(command.angles_rad)
         self.pose_rad = tuple(angles[name] for name in names)
-        self._jogged.update(order.angles_rad)
-        self._take(order, t_s)
+        self._jogged.update(command.angles_rad)
+        self._take(command, t_s)
 
-    def renew(self, order: Renew, t_s: float) -> bool:
+    def renew(self, command: Renew, t_s: float) -> bool:
         """Take a heartbeat; True if it is of the one who leads."""
-        mine = self.active and order.who == self._who
+        mine = self.active and command.who == self._who
         if mine:
             self._renewed_s = t_s
         return mine
@@ -98,8 +98,8 @@ class Lead:
             self._shifts, "somebody chose this point",
         )  # fmt: skip
 
-    def _take(self, order: LookAt | Jog, t_s: float) -> None:
-        self._who, self._stay, self._renewed_s = order.who, order.stay, t_s
+    def _take(self, command: LookAt | Jog, t_s: float) -> None:
+        self._who, self._stay, self._renewed_s = command.who, command.stay, t_s
         self._describe()
 
     def _describe(self) -> None:

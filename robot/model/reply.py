@@ -1,4 +1,4 @@
-"""What became of an order: refused, done, or done as far as the joints reach."""
+"""What became of a command: refused, done, or done as far as the joints reach."""
 
 import threading
 from collections.abc import Callable, Mapping
@@ -39,11 +39,11 @@ class JointReply(NamedTuple):
 
 
 class CommandReply(NamedTuple):
-    """What the robot made of one order when it took it up.
+    """What the robot made of one command when it took it up.
 
     refused: why nothing was done, "" where something was
     asked_m: the point to look at; done_m: the point as far away that the eyes will rest on;
-        None for other orders
+        None for other commands
     joints: those that cannot do what was asked; of a jog, all that were asked for
     error_rad: angle between the point and the line of sight once head and eyes are there, of
         the worse eye, or of their mean where one linkage turns both
@@ -127,7 +127,7 @@ def _point(data: Any) -> Vec3 | None:
 
 
 class Ticket:
-    """Where the reply to one order comes; made by one thread, answered by the loop's."""
+    """Where the reply to one command comes; made by one thread, answered by the loop's."""
 
     def __init__(self) -> None:
         self._answered = threading.Event()
@@ -139,9 +139,9 @@ class Ticket:
         self._answered.set()
 
     def wait(self, within_s: float) -> CommandReply | None:
-        """Wait for the reply; None where the loop has not taken the order up in that time."""
+        """Wait for the reply; None where the loop has not taken the command up in that time."""
         return self._reply if self._answered.wait(within_s) else None
 
 
 CommandTaker = Callable[[Command], Ticket | None]
-"""Takes an order for the next tick, as Robot.order does; None: nobody will reply to it."""
+"""Takes a command for the next tick, as Robot.command does; None: nobody will reply to it."""

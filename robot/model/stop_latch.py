@@ -24,15 +24,15 @@ class StopLatch:
         self._stopped_s = 0.0
         self._asked_s: dict[tuple[str, bool], float] = {}
 
-    def stop(self, order: Stop, t_s: float) -> bool:
+    def stop(self, command: Stop, t_s: float) -> bool:
         """Stop, or hold a stop anew; True if it is a new one."""
         new = not self.why
         if new:
             self._stoppers.clear()
         if len(self._stoppers) < _MAX_ASKERS:
-            self._stoppers.add(order.who)
+            self._stoppers.add(command.who)
         self._stopped_s = t_s
-        self.why = order.why or "stopped"
+        self.why = command.why or "stopped"
         return new
 
     @property
@@ -40,9 +40,9 @@ class StopLatch:
         """Return who stopped, "" where nobody said."""
         return " and ".join(sorted(filter(None, self._stoppers)))
 
-    def refusal(self, order: Resume, t_s: float) -> str:
+    def refusal(self, command: Resume, t_s: float) -> str:
         """Return why a resume is not obeyed, "" where it is; each call counts as an attempt."""
-        asker = (order.who, order.confirmed)
+        asker = (command.who, command.confirmed)
         last_s = self._asked_s.pop(asker, None)
         self._asked_s[asker] = t_s
         while len(self._asked_s) > _MAX_ASKERS:
@@ -52,7 +52,7 @@ class StopLatch:
         left_s = self._stopped_s + MIN_HOLD_S - t_s
         if left_s > 0.0:
             return f"a stop holds at least {MIN_HOLD_S:g} s: ask again in {left_s:.1f} s"
-        if not order.confirmed and self._stoppers != {order.who}:
+        if not command.confirmed and self._stoppers != {command.who}:
             by = f"stopped by {self.by}" if self.by else "somebody else stopped it"
             return f"{by}: another may only resume who confirms that no hand is in the mechanism"
         return ""

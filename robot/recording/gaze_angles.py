@@ -72,7 +72,7 @@ class GazeAngles(NamedTuple):
     planned_deg: (n, 2) cyclopean x and y that were wished for
     movement: (n,) index in MOVEMENTS, as planned; blink: (n,) whether one was planned
     looked_at: (n,) index in names, as planned
-    messages: what happened and was asked for, (time_s, words) in order
+    messages: what happened and was asked for, (time_s, words) in command
     joints: names of the rig's joints; reckoned: those whose servos tell nothing
     """
 
@@ -146,7 +146,7 @@ class GazeAnglesBuilder:
         planned = _degrees(sub(tick.gaze.gaze_point_world_m, pose.p_world_head_m))
         lids = (pose.lid_left, pose.lid_right, pose.lower_left, pose.lower_right)
         head = tuple(map(degrees, pose.head_rad))
-        self._joints = tick.verdict.joints
+        self._joints = tick.guard_result.joints
         self._reckoned.update(dict.fromkeys(reckoned_joints(tick)))
         if missing:
             lost_left, lost_right = not _LEFT.isdisjoint(missing), not _RIGHT.isdisjoint(missing)
@@ -184,15 +184,15 @@ class GazeAnglesBuilder:
     def _note_orders(self, tick: Tick, time_s: float) -> None:
         """Keep what was said and asked for, and whether the joints are moved by hand."""
         self._messages += [(time_s, event) for event in tick.events]
-        for order in tick.orders:
-            if isinstance(order, Renew):
+        for command in tick.commands:
+            if isinstance(command, Renew):
                 continue
-            self._messages.append((time_s, order_words(order)))
-            if isinstance(order, Jog):
-                self._jogged = bool(order.angles_rad)
-            elif isinstance(order, Stop):
+            self._messages.append((time_s, command_text(command)))
+            if isinstance(command, Jog):
+                self._jogged = bool(command.angles_rad)
+            elif isinstance(command, Stop):
                 self._jogged = False
-        if self._led and not tick.led:  # by a lapse, which no order tells
+        if self._led and not tick.led:  # by a lapse, which no command tells
             self._jogged = False
         self._led = tick.led
 
@@ -220,15 +220,15 @@ def target_words(target: Target) -> str:
     return target.kind if target.id < 0 else f"{target.kind} {target.id}"
 
 
-def order_words(order: Command) -> str:
+def command_text(command: Command) -> str:
     """Say in words what was asked for, e.g. "asked: stop why=space bar"."""
-    usual = order._field_defaults
+    usual = command._field_defaults
     given = " ".join(
         f"{name}={value}"
-        for name, value in order._asdict().items()
+        for name, value in command._asdict().items()
         if name not in usual or value != usual[name]
     )
-    return f"asked: {type(order).__name__.lower()} {given}".rstrip()
+    return f"asked: {type(command).__name__.lower()} {given}".rstrip()
 
 
 def _degrees(way: Vec3) -> Angles2:

@@ -14,13 +14,13 @@ from dataclasses import replace
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.control.event_text import drawn_together
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.tick_text import seeing_words, verdict_words
+from gazerig.robot.control.tick_text import guard_text, seeing_words
 from gazerig.robot.dashboard.page_process import pack, unpack
 from gazerig.robot.dashboard.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts
 from gazerig.robot.model.commands import Ask, Renew
 from gazerig.robot.model.types import SeenEvent, Trail
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
-from gazerig.robot.recording.gaze_angles import order_words
+from gazerig.robot.recording.gaze_angles import command_text
 from gazerig.robot.recording.playback_clock import Mark
 
 SNAPSHOT_EVERY_S = 0.02
@@ -171,21 +171,21 @@ class Noticing:
         if tick.gaze.blinks > self._blinks:
             found.append(Mark(at_s, "blink", "blink"))
         self._saccades, self._blinks = tick.gaze.saccades, tick.gaze.blinks
-        for order in tick.orders:
-            if isinstance(order, Renew):
+        for command in tick.commands:
+            if isinstance(command, Renew):
                 continue
-            found.append(Mark(at_s, "event", order_words(order)))
-            if isinstance(order, Ask):
-                self._heed(order)
+            found.append(Mark(at_s, "event", command_text(command)))
+            if isinstance(command, Ask):
+                self._heed(command)
         found += [Mark(at_s, "event", words) for words in drawn_together(tick.events)]
-        grave = tick.verdict.level if tick.verdict.level in _GRAVE else ""
+        grave = tick.guard_result.level if tick.guard_result.level in _GRAVE else ""
         if grave and grave != self._grave:
-            found.append(Mark(at_s, "event", f"guard: {verdict_words(tick.verdict)}"))
+            found.append(Mark(at_s, "event", f"guard: {guard_text(tick.guard_result)}"))
         self._grave = grave
         return found
 
-    def _heed(self, order: Ask) -> None:
-        if order.menu == "behaviour":
-            self.behaviour = order.choice
-        elif order.menu == "conversation":
-            self.conversation = order.choice
+    def _heed(self, command: Ask) -> None:
+        if command.menu == "behaviour":
+            self.behaviour = command.choice
+        elif command.menu == "conversation":
+            self.conversation = command.choice

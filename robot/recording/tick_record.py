@@ -24,7 +24,7 @@ from gazerig.gaze.types import (
 )
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import as_recorded
-from gazerig.robot.model.commands import from_recording as order_from_json
+from gazerig.robot.model.commands import from_recording as command_from_json
 from gazerig.robot.model.types import JOINTS, GuardResult, JointAngles, JointState
 
 Json = dict[str, Any]
@@ -98,7 +98,7 @@ def flat(
     """
     target = tick.target
     saliences = [tuple(salience) for salience in target.saliences]
-    verdict = tick.verdict
+    guard_result = tick.guard_result
     return (
         tick.t_s,
         dt_s,
@@ -110,12 +110,12 @@ def flat(
         tick.desired_rad,
         # Nearly always the very same value: written once.
         (
-            *verdict[:3],
-            None if verdict.desired_rad == tick.desired_rad else verdict[3],
-            *verdict[4:],
+            *guard_result[:3],
+            None if guard_result.desired_rad == tick.desired_rad else guard_result[3],
+            *guard_result[4:],
         ),
         tick.events,
-        [as_recorded(order) for order in tick.orders],
+        [as_recorded(command) for command in tick.commands],
         tick.stopped,
         tick.led,
         [(_HEARD_NAMES[type(one)], _plain(one)) for one in before],
@@ -127,7 +127,7 @@ def as_json(values: Flat) -> Json:
     finite = _finite(values)
     if not finite:
         values = _worded(values)
-    (t_s, dt_s, percept, joints, pose, target, gaze, desired, verdict, events, orders, stopped,
+    (t_s, dt_s, percept, joints, pose, target, gaze, desired, guard_result, events, commands, stopped,
      led, before) = values  # fmt: skip
     data: Json = {
         "t_s": t_s,
@@ -144,9 +144,9 @@ def as_json(values: Flat) -> Json:
             "limited": [_named(Limited, one) for one in gaze[-1]],
         },
         "wish_rad": desired,
-        "verdict": _as_filed(_named(GuardResult, verdict)),
+        "verdict": _as_filed(_named(GuardResult, guard_result)),
         "events": events,
-        "orders": orders,
+        "orders": commands,
         "stopped": stopped,
         "led": led,
     }
@@ -182,10 +182,10 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> TickRecord:
         data = _unworded(data)
     number = data["percept"]
     desired = tuple(data["wish_rad"])
-    verdict = _from_file(data["verdict"])
-    if verdict["desired_rad"] is None:
-        verdict["desired_rad"] = desired
-    verdict.setdefault("joints", _ONCE_ALL)
+    guard_result = _from_file(data["verdict"])
+    if guard_result["desired_rad"] is None:
+        guard_result["desired_rad"] = desired
+    guard_result.setdefault("joints", _ONCE_ALL)
     target = _present_names(data["target"])
     saliences = [Salience(**_present_names(one)) for one in target["saliences"]]
     target["saliences"] = tuple(saliences)
@@ -198,9 +198,9 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> TickRecord:
         _made(Target, target),
         _made(GazeCommand, {**data["gaze"], "limited": _limited(data["gaze"])}),
         desired,
-        _made(GuardResult, verdict),
+        _made(GuardResult, guard_result),
         tuple(data["events"]),
-        tuple([order_from_json(order) for order in data["orders"]]),
+        tuple([command_from_json(command) for command in data["orders"]]),
         data["stopped"],
         data.get("led", ""),
     )

@@ -76,7 +76,7 @@ class Pulse:
         tick = self._newest
         if tick is None:
             return {"ticks": 0, "stopped": "", "said": []}
-        measured = zip(tick.verdict.joints, tick.joints.position_rad, strict=True)
+        measured = zip(tick.guard_result.joints, tick.joints.position_rad, strict=True)
         return {
             "ticks": self._ticks,
             "t_s": tick.t_s,
@@ -93,8 +93,8 @@ class Pulse:
                 }
                 for one in tick.gaze.limited
             ],
-            "level": tick.verdict.level,
-            "reasons": list(tick.verdict.reasons),
+            "level": tick.guard_result.level,
+            "reasons": list(tick.guard_result.reasons),
             "target": target_name(tick.target),
             "why": tick.target.why,
             "phase": tick.gaze.phase,

@@ -21,21 +21,21 @@ class StopOnlyServer:
     """The remote control of a head that can be stopped and resumed, and told nothing else.
 
     Args:
-        order: takes orders for the next tick.
+        command: takes commands for the next tick.
         clock: that of the loop; about: what does not change, as {"rig": name, "pid": process}
         say: writes a line on the terminal.
     """
 
     def __init__(
         self,
-        order: CommandTaker,
+        command: CommandTaker,
         clock: Clock,
         about: Mapping[str, object],
         say: Callable[[str], None],
     ) -> None:
         self._say = say
         self._pulse = Pulse(clock)
-        only = _OnlyStops(order)
+        only = _OnlyStops(command)
         requests = RequestHandler(only, None, self._pulse, about, fixed=_FIXED)
         self._server = RemoteServer(requests, say)
 
@@ -58,18 +58,18 @@ class StopOnlyServer:
 class _OnlyStops:
     """A robot that takes stop and resume alone."""
 
-    def __init__(self, order: CommandTaker) -> None:
-        self._order = order
+    def __init__(self, command: CommandTaker) -> None:
+        self._command = command
 
-    def order(self, order: Command) -> Ticket | None:
+    def command(self, command: Command) -> Ticket | None:
         """Hand on a stop or the end of one.
 
         Raises:
             ValueError: it is anything else.
         """
-        if not isinstance(order, Stop | Resume):
+        if not isinstance(command, Stop | Resume):
             raise ValueError("it is being calibrated: besides stop and resume nothing goes")
-        return self._order(order)
+        return self._command(command)
 
     def menus(self) -> dict[str, tuple[str, ...]]:
         """Offer nothing."""

@@ -151,9 +151,13 @@ class GazeTraceBuilder:
 
     def note(self, tick: Tick) -> None:
         """Take a tick; what happens while somebody has stopped the robot does not count."""
-        for order in tick.orders:
-            if isinstance(order, Ask) and order.menu == "conversation" and order.choice in MODES:
-                self._mode = MODES.index(order.choice)
+        for command in tick.commands:
+            if (
+                isinstance(command, Ask)
+                and command.menu == "conversation"
+                and command.choice in MODES
+            ):
+                self._mode = MODES.index(command.choice)
         for event in self._events.note(tick):
             if isinstance(event, SaccadeEvent):
                 self._saccades.append(event)
@@ -161,7 +165,7 @@ class GazeTraceBuilder:
                 self._fixations.append(event)
             else:
                 self._blinks.append(event)
-        self._names = tick.verdict.joints
+        self._names = tick.guard_result.joints
         self._reckoned.update(dict.fromkeys(reckoned_joints(tick)))
         lids = openings(tick.gaze.lid_left, tick.gaze.lid_right, self._names, UPPER)
         asked = self._asked_lids.note(tick.t_s, *lids) if lids is not None else None
@@ -189,7 +193,7 @@ class GazeTraceBuilder:
 
 def row_of(tick: Tick, mode: int) -> TraceRow:
     """Return the columns of one tick."""
-    pose, target, names = tick.pose, tick.target, tick.verdict.joints
+    pose, target, names = tick.pose, tick.target, tick.guard_result.joints
     head, left, right = pose.p_world_head_m, pose.p_world_eye_left_m, pose.p_world_eye_right_m
     sight_left, sight_right = line_of_sight(pose, True), line_of_sight(pose, False)
     way = cyclopean(tick)

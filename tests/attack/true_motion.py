@@ -72,7 +72,7 @@ def all_around(seed: int) -> Callable[[Assembly, float], None]:
         yaw, pitch, far = rng.uniform(-1.6, 1.6), rng.uniform(-1.0, 1.0), rng.choice([0.25, 1, 3])
         level = far * np.cos(pitch)
         place = level * np.cos(yaw), level * np.sin(yaw), 0.12 + far * np.sin(pitch)
-        made.robot.order(LookAt((float(place[0]), float(place[1]), float(place[2]))))
+        made.robot.command(LookAt((float(place[0]), float(place[1]), float(place[2]))))
 
     return order
 

@@ -87,7 +87,7 @@ class Bench:
             load_rig("desk"), RunOptions(mock=True, fast=False, seed=0, scene="visitor")
         )
         robot = made.robot
-        tuning = ParamStore(made.live, robot.order, "desk")
+        tuning = ParamStore(made.live, robot.command, "desk")
         options = RunOptions(page="127.0.0.1:8700" if page else None)
         self.audience = RunObservers(made, options, lambda _: None, lambda _: None, tuning)
         self.page = self.audience._page
@@ -109,9 +109,9 @@ class Bench:
     def _note(self, tick: Tick) -> None:
         self.audience.note(tick)
         self.times.append(tick.t_s)
-        if tick.orders:  # the goals of this tick are written
+        if tick.commands:  # the goals of this tick are written
             now_s = time.monotonic()
-            self.obeyed += [(now_s, order) for order in tick.orders]
+            self.obeyed += [(now_s, order) for order in tick.commands]
 
     def url(self) -> str:
         assert self.page is not None
