@@ -38,7 +38,7 @@ class _Patience:
         """Return whether to read it now."""
         return now_s >= self._due_s
 
-    def note(self, feedback: Feedback, now_s: float) -> None:
+    def update(self, feedback: Feedback, now_s: float) -> None:
         """Note what it gave."""
         if len(feedback.missing) < len(feedback.at_s):
             self._in_vain = 0
@@ -110,7 +110,7 @@ class MixedBus:
             except BusLost as error:  # the others are read all the same, and may come back
                 lost.append(error)
                 continue
-            patience.note(told[i], now_s)
+            patience.update(told[i], now_s)
         if lost:
             raise lost[0]
         return self._together(told)

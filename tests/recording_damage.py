@@ -44,7 +44,7 @@ def recorded(path: Path, seconds: float = 0.5) -> bytes:
     made.robot.start(made.clock)
     stop = recorder.timed(lambda s: "seconds" if s >= seconds else None)
     try:
-        run(made.robot, made.clock, made.loop, stop, recorder.note)
+        run(made.robot, made.clock, made.loop, stop, recorder.record)
         made.robot.stop()
     finally:
         made.close()

@@ -40,7 +40,7 @@ def scored(
 ) -> dict[str, dict[str, float | int | None]]:
     score = BehaviourScore(events, 10.0)
     for slot in range(round(seconds * 200) + 1):
-        score.note(tick(first_s + slot * 0.005, *looks(slot * 0.005)))
+        score.update(tick(first_s + slot * 0.005, *looks(slot * 0.005)))
     return score.figures()
 
 
@@ -125,7 +125,7 @@ class Lived:
         wanted = self._scene.behaviour(self.scene_s[-1])
         if wanted is not None and wanted != self._top_down.behaviour:
             self._top_down.behave(wanted)
-        self.score.note(new)
+        self.score.update(new)
 
     def within(self, start_s: float, end_s: float) -> list[Tick]:
         pairs = zip(self.scene_s, self.ticks, strict=True)

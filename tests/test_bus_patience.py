@@ -26,20 +26,20 @@ def test_patience_begins_long_and_becomes_twice_the_worst_delay():
     timeout = AdaptiveTimeout(0.001, 0.02)
     assert timeout.seconds == 0.02
     for _ in range(WINDOW):
-        timeout.note(0.002)
+        timeout.update(0.002)
     assert timeout.seconds == 0.004
     for _ in range(3 * WINDOW):
-        timeout.note(0.0001)
+        timeout.update(0.0001)
     assert timeout.seconds == 0.001
     for expected in (0.001, 0.001, 0.006, 0.006):
-        timeout.note(0.003)
+        timeout.update(0.003)
         assert timeout.seconds == expected
 
 
 def test_answers_after_the_end_lengthen_patience():
     timeout = AdaptiveTimeout(0.001, 0.02)
     for _ in range(2 * WINDOW):
-        timeout.note(0.0)
+        timeout.update(0.0)
     for expected in (0.001, 0.001, 0.002, 0.002, 0.002, 0.004):
         timeout.missed()
         assert timeout.seconds == expected or expected == 0.004
@@ -49,7 +49,7 @@ def test_answers_after_the_end_lengthen_patience():
 def test_patience_keeps_to_its_bounds(delays):
     timeout = AdaptiveTimeout(0.001, 0.02)
     for late_s in delays:
-        timeout.note(late_s)
+        timeout.update(late_s)
         assert 0.001 <= timeout.seconds <= 0.02
 
 
@@ -57,14 +57,14 @@ def settled(least_s=0.001, most_s=0.02):
     """A time-out of a bus that answers at once."""
     timeout = AdaptiveTimeout(least_s, most_s)
     for _ in range(2 * WINDOW):
-        timeout.note(0.0)
+        timeout.update(0.0)
     return timeout
 
 
 def test_the_reserve_covers_a_pause_and_a_success_costs_nothing_of_it():
     timeout = settled()
     assert timeout.with_reserve(5.0) == pytest.approx(0.001 + RESERVE_S)
-    timeout.note(0.009)
+    timeout.update(0.009)
     assert timeout.seconds == 0.001
     assert timeout.with_reserve(5.0) == pytest.approx(0.001 + RESERVE_S)
 

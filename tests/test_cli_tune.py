@@ -64,7 +64,7 @@ def serve(path: Path) -> None:
     live = LiveServer(robot, tuning, (ConfigError,), made.clock, about, say)
 
     def watch(tick: Tick) -> None:
-        live.note(tick)
+        live.update(tick)
         for event in tick.events:
             say(event)
         time.sleep(PACE_S)

@@ -89,7 +89,13 @@ def record(path: Path, seconds: float, saccade: str) -> None:
     recorder = Recorder(path, info, patient=True)
     recorder.open()
     made.robot.start(made.clock)
-    run(made.robot, made.clock, made.loop, lambda s: "over" if s > seconds else None, recorder.note)
+    run(
+        made.robot,
+        made.clock,
+        made.loop,
+        lambda s: "over" if s > seconds else None,
+        recorder.record,
+    )
     made.robot.stop()
     recorder.close("seconds")
     made.close()

@@ -41,5 +41,5 @@ def test_the_planner_asks_once_for_each_change() -> None:
         lambda t: None if t < 1 else "guard" if t < 2 else "wait", lambda *a: asked.append(a)
     )
     for k in range(40):
-        plan.note(100.0 + 0.1 * k)
+        plan.update(100.0 + 0.1 * k)
     assert asked == [("behaviour", "guard"), ("behaviour", "wait")]

@@ -108,7 +108,7 @@ def ticks(made: Assembly, steered: FaceSteering, seconds: float) -> Tick:
         made.clock.sleep_until(start_s + slot / 200)
         t_s = made.clock.now_s()
         tick = made.robot.tick(t_s, t_s - last_s)
-        assert steered.note(tick) is None
+        assert steered.update(tick) is None
         last_s = t_s
     assert tick is not None
     return tick
@@ -158,15 +158,15 @@ def test_an_enter_is_dropped_with_a_reason_where_the_eyes_never_come(
     steered.press("enter", tick.t_s)
     # Eyes that are measured elsewhere, whatever was asked of them.
     aside = tick.pose._replace(eye_left_rad=(0.3, 0.0))
-    assert steered.note(tick._replace(t_s=tick.t_s + 0.1, pose=aside)) is None
-    why = steered.note(tick._replace(t_s=tick.t_s + WAIT_S + 0.1, pose=aside))
+    assert steered.update(tick._replace(t_s=tick.t_s + 0.1, pose=aside)) is None
+    why = steered.update(tick._replace(t_s=tick.t_s + WAIT_S + 0.1, pose=aside))
     assert why is not None and "not taken" in why and steered.state.part == "N"
 
 
 def test_eyes_in_a_saccade_are_not_on_the_part(made: Assembly, steered: FaceSteering) -> None:
     made.robot.start(made.clock)
     tick = ticks(made, steered, 1.5)
-    steered.note(tick._replace(gaze=tick.gaze._replace(phase="fixate")))
+    steered.update(tick._replace(gaze=tick.gaze._replace(phase="fixate")))
     assert steered.aimed
-    steered.note(tick._replace(gaze=tick.gaze._replace(phase="saccade")))
+    steered.update(tick._replace(gaze=tick.gaze._replace(phase="saccade")))
     assert steered.error_deg == inf and not steered.aimed

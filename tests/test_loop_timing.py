@@ -10,7 +10,7 @@ from gazerig.robot.model.types import LoopFigures
 def timed(times_s: list[float], rate_hz: float = 200.0) -> LoopFigures:
     timing = LoopTiming(rate_hz)
     for t_s in times_s:
-        timing.note(t_s)
+        timing.update(t_s)
     figures = timing.figures()
     assert figures is not None
     return figures
@@ -60,12 +60,12 @@ def test_what_is_long_past_counts_only_as_ever() -> None:
 def test_the_first_tick_and_a_clock_set_back_give_nothing() -> None:
     timing = LoopTiming(200.0)
     assert timing.figures() is None
-    timing.note(5.0)
+    timing.update(5.0)
     assert timing.figures() is None
-    timing.note(5.005)
+    timing.update(5.005)
     assert timing.figures() is not None
-    timing.note(0.0)
+    timing.update(0.0)
     assert timing.figures() is None
-    timing.note(0.005)
+    timing.update(0.005)
     figures = timing.figures()
     assert figures is not None and figures.overruns_ever == 0

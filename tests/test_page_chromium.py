@@ -90,7 +90,7 @@ class Rig:
             tick = self.robot.tick(clock.now_s(), TICK_S)
             self.newest = tick
             self.orders += [o for o in tick.commands if not isinstance(o, Renew)]
-            self.audience.note(tick)
+            self.audience.update(tick)
 
     def desired_deg(self) -> float:
         assert self.newest is not None

@@ -41,21 +41,21 @@ def test_stretches_join_end_to_end_and_are_forgotten() -> None:
     timeline = Timeline()
     for k in range(1000):
         t_s = 0.05 * k
-        timeline.note(looking(t_s, "face 1: nose" if t_s < 40.0 else "hand <7>", None))
+        timeline.update(looking(t_s, "face 1: nose" if t_s < 40.0 else "hand <7>", None))
     (face, hand) = timeline.stretches("target")
     assert face == (0.0, pytest.approx(39.95), "face 1")
     assert hand == (pytest.approx(39.95), pytest.approx(49.95), "hand <7>")
     for k in range(1000, 1700):
-        timeline.note(looking(0.05 * k, "hand <7>", None))
+        timeline.update(looking(0.05 * k, "hand <7>", None))
     assert [what for _, _, what in timeline.stretches("target")] == ["hand <7>"]
 
 
 def test_strip_shows_targets_saccades_blinks_and_the_guard_and_runs_no_markup() -> None:
     timeline = Timeline()
-    timeline.note(looking(0.0, "hand <7>", None))
-    timeline.note(replace(looking(10.0, "hand <7>", None), worst="hold"))
+    timeline.update(looking(0.0, "hand <7>", None))
+    timeline.update(replace(looking(10.0, "hand <7>", None), worst="hold"))
     jump, shut = SeenSaccade(4.0, 0.05, 12.0, 300.0), SeenBlink(6.0, 0.3)
-    timeline.note(replace(looking(20.0), events=(jump, shut)))
+    timeline.update(replace(looking(20.0), events=(jump, shut)))
     drawn = timeline.drawing()
     for said in ("hand &lt;7&gt;", "12.0 deg, 50 ms", "blink, 300 ms", "<title>hold</title>"):
         assert said in drawn
@@ -65,18 +65,18 @@ def test_strip_shows_targets_saccades_blinks_and_the_guard_and_runs_no_markup() 
 
 def test_what_is_older_than_the_strip_is_not_drawn() -> None:
     timeline = Timeline()
-    timeline.note(replace(looking(0.0), events=(SeenBlink(0.0, 0.31),)))
+    timeline.update(replace(looking(0.0), events=(SeenBlink(0.0, 0.31),)))
     assert "310 ms" in timeline.drawing()
-    timeline.note(looking(STRIP_S + 0.1))
+    timeline.update(looking(STRIP_S + 0.1))
     assert "310 ms" not in timeline.drawing()
 
 
 def test_strip_says_when_somebody_stopped_the_rig_and_starts_anew_with_the_clock() -> None:
     timeline = Timeline()
-    timeline.note(looking(50.0))
-    timeline.note(replace(looking(51.0), stopped="space bar"))
+    timeline.update(looking(50.0))
+    timeline.update(replace(looking(51.0), stopped="space bar"))
     assert [what for _, _, what in timeline.stretches("guard")] == ["ok", "stopped"]
-    timeline.note(looking(0.0))
+    timeline.update(looking(0.0))
     assert timeline.stretches("guard") == ((0.0, 0.0, "ok"),)
 
 
@@ -92,7 +92,7 @@ def circles(drawn: str) -> np.ndarray:
 def test_a_dot_a_saccade_in_both_pictures_the_newest_marked() -> None:
     sequence = MainSequenceChart()
     for size in (4.0, 8.0):
-        sequence.note(SeenSaccade(0.0, 0.04, size, 25.0 * size))
+        sequence.update(SeenSaccade(0.0, 0.04, size, 25.0 * size))
     drawn = sequence.drawing()
     speeds, lengths = circles(drawn)[:2], circles(drawn)[2:]
     assert "2 saccades" in drawn
@@ -104,7 +104,7 @@ def test_a_dot_a_saccade_in_both_pictures_the_newest_marked() -> None:
 def test_a_saccade_like_peoples_lies_in_their_range() -> None:
     def inside(speed_deg_s: float) -> bool:
         sequence = MainSequenceChart()
-        sequence.note(SeenSaccade(0.0, 0.045, 10.0, speed_deg_s))
+        sequence.update(SeenSaccade(0.0, 0.045, 10.0, speed_deg_s))
         drawn = sequence.drawing()
         (outline,) = re.findall(r"<polygon points='([^']+)'", drawn)[:1]
         band = np.array([pair.split(",") for pair in outline.split()], float)
@@ -120,7 +120,7 @@ def test_a_saccade_like_peoples_lies_in_their_range() -> None:
 def test_only_the_newest_saccades_are_drawn_but_all_are_counted() -> None:
     sequence = MainSequenceChart()
     for _ in range(KEPT + 50):
-        sequence.note(SeenSaccade(0.0, 0.04, 5.0, 200.0))
+        sequence.update(SeenSaccade(0.0, 0.04, 5.0, 200.0))
     drawn = sequence.drawing()
     assert len(circles(drawn)) == 2 * KEPT
     assert f"{KEPT + 50} saccades" in drawn
@@ -133,7 +133,7 @@ def test_shares_are_of_the_time_on_parts() -> None:
     dwell = DwellChart()
     assert dwell.shares() == {}
     for part, seconds in (("LE", 0.3), ("LE", 0.3), ("M", 0.2), (None, 5.0)):
-        dwell.note(SeenFixation(0.0, seconds, part))
+        dwell.update(SeenFixation(0.0, seconds, part))
     shares = dwell.shares()
     assert shares["LE"] == pytest.approx(0.75) and shares["M"] == pytest.approx(0.25)
     assert sum(shares.values()) == pytest.approx(1.0)
@@ -144,7 +144,7 @@ def test_shares_are_of_the_time_on_parts() -> None:
 def test_rests_are_counted_by_length_and_the_long_ones_together() -> None:
     dwell = DwellChart()
     for seconds in (0.05, 0.25, 0.27, 99.0):
-        dwell.note(SeenFixation(0.0, seconds, "N"))
+        dwell.update(SeenFixation(0.0, seconds, "N"))
     drawn = dwell.drawing()
     for said in ("1 of 0 ms", "2 of 200 ms", f"1 of {1e3 * BIN_S * (BINS - 1):.0f} ms"):
         assert said in drawn
@@ -175,7 +175,7 @@ def test_a_face_that_moves_is_met_where_it_is_by_now() -> None:
 def test_the_map_is_brightest_where_the_gaze_was() -> None:
     heat = GazeMap()
     for k in range(51):
-        heat.note(looking(0.04 * k))
+        heat.update(looking(0.04 * k))
     assert heat.seconds == pytest.approx(2.0)
     picture = heat.picture().astype(int)
     assert picture.shape == (HIGH_PX, WIDE_PX, 3)
@@ -188,7 +188,7 @@ def test_the_map_is_brightest_where_the_gaze_was() -> None:
 def test_a_pause_adds_no_time() -> None:
     heat = GazeMap()
     for t_s in (0.0, 5.0, 1.0):
-        heat.note(looking(t_s))
+        heat.update(looking(t_s))
     assert heat.seconds == 0.0
 
 

@@ -188,7 +188,7 @@ def test_panel_takes_snapshots_and_fills_its_tabs(
     panel = PanelView(server.gui)
     shots = tuple(made(snapshot(0.04 * k)) for k in range(51))
     for shot in shots:
-        panel.note((shot,))
+        panel.update((shot,))
         panel.show(shot)
     said = " ".join(html.content for html in handles(server, viser.GuiHtmlHandle))
     for words in (
@@ -198,7 +198,7 @@ def test_panel_takes_snapshots_and_fills_its_tabs(
     plots = panel._traces_view._plots
     assert len(plots) == 3
     assert all(len(plot.plot.data[0]) > 40 for plot in plots)
-    panel.note((made(snapshot(0.0)),))
+    panel.update((made(snapshot(0.0)),))
     for _ in range(26):
         panel.show(made(snapshot(0.0)))
     again = " ".join(html.content for html in handles(server, viser.GuiHtmlHandle))
@@ -213,7 +213,7 @@ def test_what_nobody_measured_is_drawn_and_named_otherwise(server: viser.ViserSe
 
     def shown(t_s: float, reckoned: tuple[str, ...]) -> list[bool]:
         shot = of_six(snapshot(t_s), reckoned)
-        panel.note((shot,))
+        panel.update((shot,))
         panel._shown = 0
         panel.show(shot)
         named = [plot.plot.series[3]["label"] == "reckoned, not measured" for plot in view._plots]

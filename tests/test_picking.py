@@ -38,7 +38,7 @@ def looking(
     mount = CameraMount(CAMERA)
     picking = ClickToLook(mount, poses, lambda: CAMERA)
     found = Detections(1.0, 1, WIDTH, HEIGHT, (), (), None, depth, None)
-    picking.note(cast(Tick, SimpleNamespace(detections=found, percept=percept)))
+    picking.update(cast(Tick, SimpleNamespace(detections=found, percept=percept)))
     return picking, mount, poses
 
 
@@ -63,7 +63,7 @@ def test_without_a_picture_there_is_nothing_to_pick() -> None:
     )
     picking = ClickToLook(CameraMount(CAMERA), PoseHistory(kinematics), lambda: CAMERA)
     assert picking.point(0.5, 0.5) is None
-    picking.note(cast(Tick, SimpleNamespace(detections=None, percept=None)))
+    picking.update(cast(Tick, SimpleNamespace(detections=None, percept=None)))
     assert picking.point(0.5, 0.5) is None
 
 

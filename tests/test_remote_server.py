@@ -174,7 +174,7 @@ class Beat:
             self.clock.sleep_until(slot * 0.005)
             tick = self.robot.tick(slot * 0.005, 0.005)
             self.ticks.append(tick)
-            self.pulse.note(tick)
+            self.pulse.update(tick)
 
 
 @pytest.fixture

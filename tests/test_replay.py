@@ -468,7 +468,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made.robot.start(made.clock)
     try:
         over = recorder.timed(lambda s: "seconds" if s > 2.0 else None)
-        run(made.robot, made.clock, made.loop, over, recorder.note)
+        run(made.robot, made.clock, made.loop, over, recorder.record)
     finally:
         made.robot.stop()
         made.close()

@@ -48,7 +48,7 @@ def looked(scene: str, seconds: float, rig: Rig = RIG, **choice: str) -> GazeTra
     made, gathering = assemble(rig, RunOptions(True, True, 0, scene, **choice)), GazeTraceBuilder()  # type: ignore[arg-type]
     made.robot.start(made.clock)
     over: Callable[[float], str | None] = lambda s: "over" if s > seconds else None  # noqa: E731
-    run(made.robot, made.clock, made.loop, over, gathering.note)
+    run(made.robot, made.clock, made.loop, over, gathering.update)
     made.robot.stop()
     made.close()
     return gathering.gathered()

@@ -40,7 +40,7 @@ def ticks() -> list[Tick]:
 def gathered(ticks: list[Tick]) -> GazeTrace:
     gathering = GazeTraceBuilder()
     for tick in ticks:
-        gathering.note(tick)
+        gathering.update(tick)
     return gathering.gathered()
 
 
@@ -50,7 +50,7 @@ def at(yaw_deg: float) -> Vec3:
 
 def jumps(yaw_deg: np.ndarray, rate_hz: float) -> list[Jump]:
     finder = SaccadeFinder()
-    found = (finder.note(k / rate_hz, at(float(yaw))) for k, yaw in enumerate(yaw_deg))
+    found = (finder.update(k / rate_hz, at(float(yaw))) for k, yaw in enumerate(yaw_deg))
     return [jump for jump in found if jump is not None]
 
 
@@ -109,7 +109,7 @@ def test_noise_and_a_gap_make_no_saccade() -> None:
     assert jumps(noise, 200.0) == []
     finder = SaccadeFinder()
     times = [*np.arange(0.0, 1.0, 0.005), *np.arange(1.2, 2.0, 0.005)]
-    assert not any(finder.note(t, at(0.0 if t < 1.1 else 15.0)) for t in times)
+    assert not any(finder.update(t, at(0.0 if t < 1.1 else 15.0)) for t in times)
 
 
 def test_an_eye_that_swings_back_has_landed_where_it_turned() -> None:
@@ -125,7 +125,7 @@ def test_an_eye_that_swings_back_has_landed_where_it_turned() -> None:
 
 def blinks(openings: list[tuple[float, float, float]]) -> list[BlinkEvent]:
     finder = BlinkFinder()
-    return [blink for row in openings if (blink := finder.note(*row)) is not None]
+    return [blink for row in openings if (blink := finder.update(*row)) is not None]
 
 
 def test_a_blink_is_found_with_its_phases() -> None:
@@ -193,17 +193,17 @@ def test_what_is_not_measured_or_stopped_makes_no_events(ticks: list[Tick]) -> N
         tick._replace(joints=tick.joints._replace(missing=("left_eye_pan",))) for tick in ticks
     ]
     events = EventDetector()
-    found = [event for tick in missing[:4000] for event in events.note(tick)]
+    found = [event for tick in missing[:4000] for event in events.update(tick)]
     assert not any(isinstance(event, SaccadeEvent | FixationEvent) for event in found)
     events = EventDetector()
     stopped = [tick._replace(stopped="somebody did") for tick in ticks[:4000]]
-    assert [event for tick in stopped for event in events.note(tick)] == []
+    assert [event for tick in stopped for event in events.update(tick)] == []
 
 
 def test_events_come_soon(ticks: list[Tick]) -> None:
     events = EventDetector()
     late_s = []
     for tick in ticks:
-        late_s += [tick.t_s - e.end_s for e in events.note(tick) if isinstance(e, SaccadeEvent)]
+        late_s += [tick.t_s - e.end_s for e in events.update(tick) if isinstance(e, SaccadeEvent)]
     assert len(late_s) > 80
     assert max(late_s) < 0.2 and median(late_s) < 0.03

@@ -69,7 +69,7 @@ def recorded(
     seen: list[Tick] = []
 
     def watch(tick: Tick) -> None:
-        recorder.note(tick)
+        recorder.record(tick)
         seen.append(tick)
         at(len(seen), made)
         for order in (asked or {}).get(len(seen), ()):
@@ -111,11 +111,11 @@ def again(once: Once, tmp_path_factory: pytest.TempPathFactory) -> Again:
     recorder.open()
     seen: list[Tick] = []
 
-    def note(tick: Tick) -> None:
+    def on_tick(tick: Tick) -> None:
         seen.append(tick)
-        recorder.note(tick)
+        recorder.record(tick)
 
-    found = rerun(once.recording, note=note)
+    found = rerun(once.recording, on_tick=on_tick)
     recorder.close("seconds")
     return Again(found, seen, path)
 
@@ -176,7 +176,7 @@ def test_another_character_is_followed_by_the_servos(once: Once, tmp_path: Path)
     bold = tmp_path / "bold.yaml"
     bold.write_text("gaze:\n  saccade:\n    profile: main_sequence\n  scanpath:\n    tempo: 4.0\n")
     seen: list[Tick] = []
-    found = rerun(once.recording, character=str(bold), note=seen.append)
+    found = rerun(once.recording, character=str(bold), on_tick=seen.append)
     assert found.joints == "emulated" and not found.same
     assert len(seen) == found.ticks == 419
     assert found.agreeing < found.ticks and found.differs

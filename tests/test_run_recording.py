@@ -90,7 +90,7 @@ def record(
 
     def watch(tick: Tick) -> None:
         at(len(seen), made)
-        recorder.note(with_picture(tick, len(seen)))
+        recorder.record(with_picture(tick, len(seen)))
         seen.append(tick)
 
     made.robot.start(made.clock)
@@ -240,7 +240,7 @@ def test_a_picture_larger_than_a_message_arrives_whole(tmp_path: Path) -> None:
     made.robot.start(made.clock)
     noise = np.random.default_rng(0).integers(0, 255, (900, 1200, 3), np.uint8)
     found = Detections(0.001, 1, 1200, 900, picture=noise)
-    recorder.note(made.robot.tick(0.005, 0.005)._replace(detections=found))
+    recorder.record(made.robot.tick(0.005, 0.005)._replace(detections=found))
     recorder.close("seconds")
     ((at_s, jpeg),) = RunRecording(path).pictures()
     assert at_s == 0.001 and len(jpeg) > 2 * PIECE_BYTES
@@ -456,7 +456,7 @@ def test_a_full_disk_ends_the_recording_and_not_the_run(small_disk: None, tmp_pa
     goes_on = 0
     for number in range(1, 2001):
         made.clock.sleep_until(0.005 * number)
-        recorder.note(made.robot.tick(0.005 * number, 0.005))
+        recorder.record(made.robot.tick(0.005 * number, 0.005))
         said += recorder.events()
         goes_on += bool(said)
         if goes_on == 100:
@@ -521,7 +521,7 @@ def test_a_writer_that_stops_delays_nothing_and_loses_nothing(tmp_path: Path) ->
     for number in range(1, 401):
         made.clock.sleep_until(0.005 * number)
         seen.append(made.robot.tick(0.005 * number, 0.005))
-        recorder.note(seen[-1])  # would never return if it waited
+        recorder.record(seen[-1])  # would never return if it waited
     process.send_signal(18)  # SIGCONT
     assert recorder.close("seconds").startswith("400 ticks")
     assert recorder.lost == 0
@@ -543,7 +543,7 @@ def test_what_the_queue_cannot_hold_is_lost_and_counted(
     process.send_signal(19)
     for number in range(1, 401):
         made.clock.sleep_until(0.005 * number)
-        recorder.note(made.robot.tick(0.005 * number, 0.005))
+        recorder.record(made.robot.tick(0.005 * number, 0.005))
     process.send_signal(18)
     said = recorder.close("seconds")
     assert recorder.lost > 0
@@ -566,7 +566,7 @@ def test_a_writer_that_dies_is_told_once_and_the_run_goes_on(tmp_path: Path) -> 
     said: list[str] = []
     for number in range(1, 200):
         made.clock.sleep_until(0.005 * number)
-        recorder.note(made.robot.tick(0.005 * number, 0.005))
+        recorder.record(made.robot.tick(0.005 * number, 0.005))
         said += recorder.events()
     assert said == ["recording stopped (its writer has died); the run goes on without it"]
     assert "not whole: its writer has died" in recorder.close("seconds")

@@ -36,7 +36,7 @@ for number in range(1, 100000):
     t_s = 0.005 * number
     wall.sleep_until(start_s + t_s)
     made.clock.sleep_until(t_s)
-    recorder.note(made.robot.tick(t_s, 0.005))
+    recorder.record(made.robot.tick(t_s, 0.005))
     print(wall.now_s(), t_s, flush=True)
 """
 """A rig that goes on until it is killed, and says when each tick was handed over."""

@@ -73,7 +73,7 @@ def recorded(path: Path, rig: Rig, seconds: float) -> Run:
     seen: list[Tick] = []
 
     def watch(tick: Tick) -> None:
-        recorder.note(tick)
+        recorder.record(tick)
         seen.append(tick)
 
     made.robot.start(made.clock)
@@ -190,15 +190,15 @@ def test_another_rig_follows_and_is_not_fed_with_joints_of_others(maker: Run, de
 def gathered(ticks: list[Tick]) -> GazeTrace:
     gathering = GazeTraceBuilder()
     for tick in ticks:
-        gathering.note(tick)
+        gathering.update(tick)
     return gathering.gathered()
 
 
 def test_figures_and_status_say_what_is_reckoned(maker: Run, desk: Run) -> None:
     for ticks, reckoned in ((maker.ticks, list(SIX)), (desk.ticks, [])):
         summary, pulse = Summary(), Pulse(_Still())
-        summary.note(ticks[0])
-        pulse.note(ticks[0])
+        summary.update(ticks[0])
+        pulse.update(ticks[0])
         assert summary.figures()["reckoned"] == reckoned
         words = pulse.words()
         assert words["reckoned"] == reckoned

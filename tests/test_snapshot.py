@@ -57,7 +57,7 @@ def taken() -> tuple[Snapshot, ...]:
     snapshots = SnapshotBuilder(RATE_HZ, shown_rig())
     out = []
     for number, tick in enumerate(visit()[2]):
-        snapshots.note(tick)
+        snapshots.update(tick)
         if number % TICKS_BETWEEN == TICKS_BETWEEN - 1:
             shot = snapshots.take(SnapshotTexts("bus ok", "wait", "seeing", "shy", "listen"))
             assert shot is not None
@@ -71,7 +71,7 @@ def test_nothing_is_shown_before_the_first_tick() -> None:
 
 def test_every_eye_movement_is_shown_once() -> None:
     finder = EventDetector()
-    found = [event for tick in visit()[2] for event in finder.note(tick)]
+    found = [event for tick in visit()[2] for event in finder.update(tick)]
     seen = [event for shot in taken() for event in shot.events]
     kinds = ((SaccadeEvent, SeenSaccade), (FixationEvent, SeenFixation), (BlinkEvent, SeenBlink))
     for kind, shown in kinds:
@@ -137,7 +137,7 @@ def test_servos_come_with_their_limits_and_their_silences() -> None:
     snapshots = SnapshotBuilder(RATE_HZ, shown_rig())
     silent = ticks[3].joints._replace(missing=("neck_yaw",))
     for tick in (*ticks[:3], ticks[3]._replace(joints=silent)):
-        snapshots.note(tick)
+        snapshots.update(tick)
     shot = snapshots.take(SnapshotTexts())
     assert shot is not None and shot.servos.limits is not None
     assert shot.servos.unanswered == tuple(int(name == "neck_yaw") for name in JOINTS)
@@ -152,10 +152,10 @@ def test_the_gravest_verdict_between_two_snapshots_is_kept() -> None:
     calm = [tick for tick in ticks if tick.guard_result.level == "ok"][:4]
     short = calm[1]._replace(guard_result=calm[1].guard_result._replace(level="hold"))
     for tick in (calm[0], short, calm[2]):
-        snapshots.note(tick)
+        snapshots.update(tick)
     shot = snapshots.take(SnapshotTexts())
     assert shot is not None and (shot.level, shot.worst) == ("ok", "hold")
-    snapshots.note(calm[3])
+    snapshots.update(calm[3])
     after = snapshots.take(SnapshotTexts())
     assert after is not None and after.worst == "ok"
 
@@ -164,11 +164,11 @@ def test_a_clock_set_back_begins_anew() -> None:
     ticks = visit()[2]
     snapshots = SnapshotBuilder(RATE_HZ)
     for tick in (*ticks[:300], *ticks[:300]):
-        snapshots.note(tick)
+        snapshots.update(tick)
     shot = snapshots.take(SnapshotTexts())
     once = SnapshotBuilder(RATE_HZ)
     for tick in ticks[:300]:
-        once.note(tick)
+        once.update(tick)
     alone = once.take(SnapshotTexts())
     assert shot is not None and alone is not None
     assert shot.timing == alone.timing
@@ -195,7 +195,7 @@ def maker_shown() -> tuple[tuple[Tick, ...], Snapshot]:
     _, made, ticks = visit("maker", 2.0)
     snapshots = SnapshotBuilder(RATE_HZ, made.shown())
     for tick in ticks:
-        snapshots.note(tick)
+        snapshots.update(tick)
     shot = snapshots.take(SnapshotTexts())
     assert shot is not None
     return ticks, shot

@@ -295,7 +295,7 @@ def test_an_observer_that_raises_is_left_out_once_and_the_run_goes_on(
     def broken(self: Summary, tick: object) -> None:
         raise RuntimeError("plug-in")
 
-    monkeypatch.setattr(Summary, "note", broken)
+    monkeypatch.setattr(Summary, "update", broken)
     said: list[str] = []
     figures = ran("desk", said, 1.0)
     assert figures["stopped_by"] == "seconds" and figures["ticks"] >= 199 and on(devices[0]) == 0

@@ -32,7 +32,7 @@ class RateWatch:
             return None
         return 1.0 / median(self._intervals_s)
 
-    def note(self, captured_s: float, away_s: float) -> str:
+    def update(self, captured_s: float, away_s: float) -> str:
         """Take a picture's time and how long nobody waited before it; give a line or ""."""
         before_s, self._before_s = self._before_s, captured_s
         if before_s is None or captured_s <= before_s:

@@ -145,7 +145,7 @@ class Webcam:
     def _watch_rate(self, captured_s: float, came_s: float) -> None:
         """Compare the times of pictures with the rate that the camera states."""
         away_s = 0.0 if self._left_s is None else came_s - self._left_s
-        line = self._rate.note(captured_s, away_s)
+        line = self._rate.update(captured_s, away_s)
         if line:
             self._events.append(line)
 

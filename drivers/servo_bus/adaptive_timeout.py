@@ -58,7 +58,7 @@ class AdaptiveTimeout:
             left_s = min(RESERVE_S, REFILL * (now_s - self._empty_s)) - beyond_s
             self._empty_s = now_s - max(0.0, left_s) / REFILL
 
-    def note(self, late_s: float) -> None:
+    def update(self, late_s: float) -> None:
         """Record by how much an answer came later than its bytes take."""
         worst_s = self._worst_s
         if late_s > worst_s[0]:
@@ -72,7 +72,7 @@ class AdaptiveTimeout:
 
     def missed(self) -> None:
         """Record that an answer came after waiting had ended."""
-        self.note(self.seconds)
+        self.update(self.seconds)
 
     def _turn(self) -> None:
         """Forget the window before the last."""

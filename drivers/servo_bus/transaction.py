@@ -119,7 +119,7 @@ class Line:
         self._owed = not raw or (self._owed and (self._unheard or waited))
         self._unheard = not raw
         if len(raw) == length:
-            timeout.note(at_s - whole_s)
+            timeout.update(at_s - whole_s)
         else:
             timeout.waited_in_vain(at_s - whole_s - prompt_s, at_s)
         return raw, at_s

@@ -87,7 +87,7 @@ class _Watch:
         self._on_s = 0.0
         self._off_s = 0.0
 
-    def note(self, on: bool, since_s: float, dt_s: float) -> None:
+    def update(self, on: bool, since_s: float, dt_s: float) -> None:
         """Count one tick, ``since_s`` after the event's start."""
         self._on = on
         if not on:
@@ -117,7 +117,7 @@ class BehaviourScore:
         self._last_s = 0.0
         self._round = 0
 
-    def note(self, tick: Tick) -> None:
+    def update(self, tick: Tick) -> None:
         """Count one tick; the first one is the scene's beginning."""
         if self._first_s is None:
             self._first_s = self._last_s = tick.t_s
@@ -130,7 +130,7 @@ class BehaviourScore:
         for i, event in enumerate(self._events):
             if event.start_s <= phase_s < event.end_s:
                 watch = self._watches.setdefault(i, _Watch())
-                watch.note(_looks_at(tick, event), phase_s - event.start_s, dt_s)
+                watch.update(_looks_at(tick, event), phase_s - event.start_s, dt_s)
             elif i in self._watches:
                 self._over(i)
 

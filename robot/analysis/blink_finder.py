@@ -57,7 +57,7 @@ class BlinkFinder:
         self._shut_s: float | None = None
         self._back_s: float | None = None
 
-    def note(self, t_s: float, left: float, right: float) -> BlinkEvent | None:
+    def update(self, t_s: float, left: float, right: float) -> BlinkEvent | None:
         """Take both openings, 0 shut .. 1 open; give the blink that is over now, if any."""
         opening = left if left > right else right  # a wink is no blink
         trace = self._trace

@@ -108,7 +108,7 @@ class EventDetector:
         """Return whether the measured gaze is jumping, as known some 10 ms late."""
         return self._saccades.under_way
 
-    def note(self, tick: Tick) -> tuple[Event, ...]:
+    def update(self, tick: Tick) -> tuple[Event, ...]:
         """Take a tick; give the events that are over now, in the order of their beginning."""
         if tick.stopped or (
             tick.joints.missing and not _EYE_JOINTS.isdisjoint(tick.joints.missing)
@@ -118,13 +118,13 @@ class EventDetector:
         self._note_command(tick)
         t_s = tick.t_s
         way = cyclopean(tick)
-        jump = self._saccades.note(t_s, way)
+        jump = self._saccades.update(t_s, way)
         names, pose = tick.guard_result.joints, tick.pose
         lids = openings(pose.lid_left, pose.lid_right, names, UPPER)
-        blink = self._blinks.note(t_s, *lids) if lids is not None else None
+        blink = self._blinks.update(t_s, *lids) if lids is not None else None
         if jump is None:
             if not self._saccades.under_way:
-                self._rest.note(tick, way)
+                self._rest.update(tick, way)
             return () if blink is None else (blink,)
         return self._landed(jump, blink)
 
@@ -155,7 +155,7 @@ class EventDetector:
         if self._flight is None:
             self._flight = _Flight(tick.t_s, way)
             return
-        self._flight.note(tick.t_s, way)
+        self._flight.update(tick.t_s, way)
         if not flying:
             self._commands.append(self._flight.command)
             self._flight = None
@@ -181,7 +181,7 @@ class _Flight:
         self._start = self._last = way
         self._peak_rad_s = 0.0
 
-    def note(self, t_s: float, way: Vec3) -> None:
+    def update(self, t_s: float, way: Vec3) -> None:
         """Take where the command points at ``t_s``."""
         if t_s > self._last_s:
             speed = angle_between(self._last, way) / (t_s - self._last_s)
@@ -209,7 +209,7 @@ class _Rest:
         self._faces: Counter[int] = Counter()
         self._kinds: Counter[tuple[str, str | None]] = Counter()
 
-    def note(self, tick: Tick, way: Vec3) -> None:
+    def update(self, tick: Tick, way: Vec3) -> None:
         """Look up now and then what the gaze is on."""
         t_s = tick.t_s
         if self._start_s is None:

@@ -20,7 +20,7 @@ class GazeOnFace:
         self.seconds: list[float] = []
         self._last_s: float | None = None
 
-    def note(self, tick: Tick) -> None:
+    def update(self, tick: Tick) -> None:
         """Add the tick's point where a face is the target and the eyes are not jumping."""
         before, self._last_s = self._last_s, tick.t_s
         if before is None or tick.target.kind != "face" or tick.gaze.phase == "saccade":

@@ -101,7 +101,7 @@ class SaccadeFinder:
         self._settles_s: float | None = None
         self.under_way = False
 
-    def note(self, t_s: float, way: Vec3) -> Jump | None:
+    def update(self, t_s: float, way: Vec3) -> Jump | None:
         """Take a unit direction in the world; give the saccade that is over now, if any."""
         samples = self._samples
         if samples:

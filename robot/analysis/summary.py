@@ -33,7 +33,7 @@ class Summary:
         self._last: Tick | None = None
         self._gaze: Vec3 | None = None
 
-    def note(self, tick: Tick) -> None:
+    def update(self, tick: Tick) -> None:
         """Count one tick."""
         if self._first_s is None or self._last is None:
             self._first_s = tick.t_s

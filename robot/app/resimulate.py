@@ -64,14 +64,14 @@ def rerun(
     rig: Rig | str | None = None,
     character: str | None = None,
     joints: str | None = None,
-    note: Callable[[Tick], None] | None = None,
+    on_tick: Callable[[Tick], None] | None = None,
 ) -> Resimulation:
     """Do a recorded run again.
 
     rig: another rig, by name or path or as it is; None: as recorded
     character: laid over it, by name or path
     joints: "recorded" (the default where nothing is changed) or "emulated"
-    note: gets every tick of the new run, to be recorded or reported on
+    on_tick: gets every tick of the new run, to be recorded or reported on
 
     Raises:
         gazerig.config.load.ConfigError: the rig or character is at fault.
@@ -83,7 +83,7 @@ def rerun(
         with_rig = _rig(recording, rig, character, Path(folder))
         # The scene is not looked at: what it showed is in the recording.
         options = RunOptions(mock=True, fast=True, seed=recording.info.seed, scene="visitor")
-        again = _Resimulator(with_rig, options, fed, note)
+        again = _Resimulator(with_rig, options, fed, on_tick)
         try:
             return again.whole(recording)
         finally:
@@ -94,10 +94,10 @@ class _Resimulator:
     """One run being done again."""
 
     def __init__(
-        self, rig: Rig, options: RunOptions, joints: Joints, note: Callable[[Tick], None] | None
+        self, rig: Rig, options: RunOptions, joints: Joints, on_tick: Callable[[Tick], None] | None
     ) -> None:
         self._joints = joints
-        self._note = note
+        self._on_tick = on_tick
         self._compared = _Compared()
         self._notes: list[str] = []
         self._body: PlaybackBody | None = None
@@ -180,9 +180,9 @@ class _Resimulator:
                 tick = self._tick(moment)
             except DriverError as error:
                 return f"fault: {error}"
-            self._compared.note(moment.tick, tick)
-            if self._note is not None:
-                self._note(tick)
+            self._compared.update(moment.tick, tick)
+            if self._on_tick is not None:
+                self._on_tick(tick)
             if tick.guard_result.level == "limp" and not tick.stopped and self._body is None:
                 return f"fault: {'; '.join(tick.guard_result.critical_reasons)}"
         return None
@@ -214,13 +214,13 @@ class _Compared:
         self._differs = ""
         self._was, self._is = Summary(), Summary()
 
-    def note(self, was: Tick, now: Tick) -> None:
+    def update(self, was: Tick, now: Tick) -> None:
         """Compare a tick with its likeness."""
         if self.ticks == 0:
             self._began_s = was.t_s
         self.ticks += 1
-        self._was.note(was)
-        self._is.note(now)
+        self._was.update(was)
+        self._is.update(now)
         differs = _difference(was, now)
         if not differs:
             self._agreeing += 1

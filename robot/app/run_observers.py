@@ -123,18 +123,18 @@ class RunObservers:
     def join(self, observers: Observers) -> None:
         """Have all of them told of ticks; each is left out by itself where it fails."""
         if self._shown:
-            observers.add("page and status line", self._onlooker.note)
+            observers.add("page and status line", self._onlooker.update)
         if self._page is not None:
-            observers.add("picking a point on the page", self._picking.note)
+            observers.add("picking a point on the page", self._picking.update)
             observers.add("the page's limits", self._keep_shown)
         if self._live is not None:
-            observers.add("the remote control", self._live.note)
+            observers.add("the remote control", self._live.update)
         if self._recorder is not None:
-            observers.add("the recording", self._recorder.note)
+            observers.add("the recording", self._recorder.record)
 
-    def note(self, tick: Tick) -> None:
+    def update(self, tick: Tick) -> None:
         """Tell all of a tick; called by the loop where they have not joined others."""
-        self._observers.note(tick)
+        self._observers.update(tick)
 
     def timed(self, stop: Callable[[float], str | None]) -> Callable[[float], str | None]:
         """Return the loop's ``stop`` as the recording needs it."""

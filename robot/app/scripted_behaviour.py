@@ -18,7 +18,7 @@ class ScriptedBehaviour:
         self._first_s: float | None = None
         self._asked: str | None = None
 
-    def note(self, t_s: float) -> None:
+    def update(self, t_s: float) -> None:
         """Look at the plan for this tick."""
         if self._first_s is None:
             self._first_s = t_s

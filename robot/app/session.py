@@ -132,8 +132,8 @@ class _Session:
 
     def _all_observers(self) -> Observers:
         observers = Observers(self._say)
-        observers.add("the summary", self._summary.note)
-        observers.add("the watch for faults", self._faults.note)
+        observers.add("the summary", self._summary.update)
+        observers.add("the watch for faults", self._faults.update)
         self._audience.join(observers)
         _observe_scene(observers, self._made, self._score, self._face_gaze)
         observers.add("the log", self._log)
@@ -178,7 +178,7 @@ class _Session:
                 audience.open()
                 count = run_loop(
                     made.robot, made.clock, lambda: made.loop, audience.timed(self._stop),
-                    self._observers.note,
+                    self._observers.update,
                 )  # fmt: skip
                 leaving.cause = count.stopped_by
         finally:
@@ -207,10 +207,10 @@ def _observe_scene(
     """Add what a scene plans and scores, and the heat map, where there are any."""
     if made.scene is not None and score is not None:
         planner = ScriptedBehaviour(made.scene.behaviour, made.robot.ask)
-        observers.add("the scene's planner", lambda tick: planner.note(tick.t_s))
-        observers.add("the scene's score", score.note)
+        observers.add("the scene's planner", lambda tick: planner.update(tick.t_s))
+        observers.add("the scene's score", score.update)
     if face_gaze is not None:
-        observers.add("the heat map", face_gaze.note)
+        observers.add("the heat map", face_gaze.update)
 
 
 def _never_raising(say: Callable[[str], None]) -> Callable[[str], None]:

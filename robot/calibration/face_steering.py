@@ -90,7 +90,7 @@ class FaceSteering:
     def press(self, key: Key, t_s: float) -> str | None:
         """Do what a key asks for; return what stands against it.
 
-        An Enter counts as soon as the eyes are on the part, see ``note``.
+        An Enter counts as soon as the eyes are on the part, see ``update``.
         """
         if key != "end" and self.face is None:
             return "no face is seen: keys wait until one is"
@@ -102,7 +102,7 @@ class FaceSteering:
         self.error_deg = inf
         return None
 
-    def note(self, tick: Tick) -> str | None:
+    def update(self, tick: Tick) -> str | None:
         """See where the eyes are; return why a waiting Enter was dropped."""
         self.error_deg = self._off_deg(tick)
         if tick.target.kind != "part" or tick.gaze.phase == "saccade":

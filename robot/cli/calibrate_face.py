@@ -171,7 +171,7 @@ def _run(
         closed_last.callback(door.close)
         door.open()
         with keys:
-            count = run_loop(made.robot, made.clock, made.loop, sitting.over, sitting.note)
+            count = run_loop(made.robot, made.clock, made.loop, sitting.over, sitting.update)
         leaving.cause = count.stopped_by
         audience.tell("over: the head parks; whether to write it is asked at the terminal")
     return count
@@ -210,11 +210,11 @@ class _Sitting:
             self._tell(steering.press(key, now_s))
         return None
 
-    def note(self, tick: Tick) -> None:
+    def update(self, tick: Tick) -> None:
         """See what the tick did, and say what a person should know."""
-        self._audience.note(tick)
-        self._door.note(tick)
-        self._tell(self._steering.note(tick))
+        self._audience.update(tick)
+        self._door.update(tick)
+        self._tell(self._steering.update(tick))
         for event in drawn_together(tick.events):
             say(event)
         self._say_what_is_due(tick.t_s)

@@ -247,14 +247,14 @@ def _rerun(file: Path, rig: str | None, character: str | None, joints: str | Non
     with used(file), _progress("running again", recording.duration_s) as read:
         told, start_s = 0, 0.0
 
-        def note(tick: Tick) -> None:
+        def on_tick(tick: Tick) -> None:
             nonlocal told, start_s
             start_s = tick.t_s if told == 0 else start_s
             told += 1
             if told % 100 == 0:
                 read(tick.t_s - start_s)
 
-        result = rerun(recording, rig=rig, character=character, joints=joints, note=note)
+        result = rerun(recording, rig=rig, character=character, joints=joints, on_tick=on_tick)
     for line in result.notes:
         say(line)
     say(agreement(result))

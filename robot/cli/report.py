@@ -189,9 +189,9 @@ def _run(
     planner = ScriptedBehaviour(scene.behaviour, made.robot.ask) if scene is not None else None
 
     def watch(tick: Tick) -> None:
-        gathering.note(tick)
+        gathering.update(tick)
         if planner is not None:
-            planner.note(tick.t_s)
+            planner.update(tick.t_s)
 
     try:
         if conversation is not None:

@@ -54,7 +54,7 @@ class JointFaults:
         self._counted: dict[tuple[str, str], tuple[int, float]] = {}
         self._first_s: float | None = None
 
-    def note(self, tick: Tick) -> None:
+    def update(self, tick: Tick) -> None:
         """Look at one tick."""
         if self._first_s is None:
             self._first_s = tick.t_s

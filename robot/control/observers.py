@@ -8,7 +8,7 @@ from gazerig.robot.control.tick import Tick
 
 class _Observer(NamedTuple):
     name: str
-    note: Callable[[Tick], object]
+    update: Callable[[Tick], object]
 
 
 class Observers:
@@ -22,15 +22,15 @@ class Observers:
         self._say = say
         self._observers: tuple[_Observer, ...] = ()
 
-    def add(self, name: str, note: Callable[[Tick], object]) -> None:
+    def add(self, name: str, update: Callable[[Tick], object]) -> None:
         """Call one more with every tick, under a name that people know it by."""
-        self._observers = (*self._observers, _Observer(name, note))
+        self._observers = (*self._observers, _Observer(name, update))
 
-    def note(self, tick: Tick) -> None:
+    def update(self, tick: Tick) -> None:
         """Tell all of a tick; called by the loop."""
         for observer in self._observers:
             try:
-                observer.note(tick)
+                observer.update(tick)
             except Exception as error:
                 self._observers = tuple([one for one in self._observers if one is not observer])
                 self._say(left_out(observer.name, error))

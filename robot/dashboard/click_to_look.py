@@ -33,7 +33,7 @@ class ClickToLook:
         self._camera = camera
         self._tick: Tick | None = None
 
-    def note(self, tick: Tick) -> None:
+    def update(self, tick: Tick) -> None:
         """Leave the newest tick; called by the loop."""
         self._tick = tick
 

@@ -43,7 +43,7 @@ class DwellChart:
         self._bins: dict[str, Counter[int]] = {part: Counter() for part in PARTS}
         self._counts: Counter[str] = Counter()
 
-    def note(self, fixation: SeenFixation) -> None:
+    def update(self, fixation: SeenFixation) -> None:
         """Take in a fixation; one that lay on no face part is left out."""
         part = fixation.part
         if part is None:

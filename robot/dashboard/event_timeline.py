@@ -57,7 +57,7 @@ class Timeline:
         for stretches in self._rows.values():
             stretches.clear()
 
-    def note(self, snapshot: Snapshot) -> None:
+    def update(self, snapshot: Snapshot) -> None:
         """Take in a snapshot; one from before the last begins anew."""
         t_s = snapshot.t_s
         if self._now_s is not None and t_s < self._now_s:

@@ -39,7 +39,7 @@ class GazeMap:
         self._time: Floats = np.zeros((HIGH_PX, WIDE_PX))
         self._last_s: float | None = None
 
-    def note(self, snapshot: Snapshot) -> None:
+    def update(self, snapshot: Snapshot) -> None:
         """Add the time since the last snapshot where a face is looked at and no eye jumps."""
         last_s, self._last_s = self._last_s, snapshot.t_s
         if last_s is None or not 0.0 < snapshot.t_s - last_s <= _LONGEST_GAP_S:

@@ -23,7 +23,7 @@ class LoopTiming:
         self._last_s: float | None = None
         self._overruns = 0
 
-    def note(self, t_s: float) -> None:
+    def update(self, t_s: float) -> None:
         """Note the time at which a tick began; a time before the last begins anew."""
         last_s, self._last_s = self._last_s, t_s
         if last_s is None or t_s <= last_s:

@@ -44,7 +44,7 @@ class MainSequenceChart:
         self._seen: deque[SeenSaccade] = deque(maxlen=KEPT)
         self.count = 0
 
-    def note(self, saccade: SeenSaccade) -> None:
+    def update(self, saccade: SeenSaccade) -> None:
         """Take in a saccade."""
         self._seen.append(saccade)
         self.count += 1

@@ -73,7 +73,7 @@ class PageView:
         """Draw the newest of what came; without a spectator it is kept until one comes."""
         for kind, data in news.others:
             self._take(kind, data)
-        self._panel.note(news.snapshots)
+        self._panel.update(news.snapshots)
         if news.snapshots:
             self._newest = news.snapshots[-1]
             self._tell(self._stop_state())

@@ -75,7 +75,7 @@ class PanelView:
         )
         self._dwell, self._map = DwellChart(), GazeMap()
 
-    def note(self, snapshots: tuple[Snapshot, ...]) -> None:
+    def update(self, snapshots: tuple[Snapshot, ...]) -> None:
         """Remember every snapshot for traces and figures, also those that are not drawn.
 
         One from before the last, of a rig or recording that begins anew, begins all anew.
@@ -85,13 +85,13 @@ class PanelView:
                 self._begin()
             self._last_s = snapshot.t_s
             self._traces.add(snapshot)
-            self._timeline.note(snapshot)
-            self._map.note(snapshot)
+            self._timeline.update(snapshot)
+            self._map.update(snapshot)
             for event in snapshot.events:
                 if isinstance(event, SeenSaccade):
-                    self._sequence.note(event)
+                    self._sequence.update(event)
                 elif isinstance(event, SeenFixation):
-                    self._dwell.note(event)
+                    self._dwell.update(event)
 
     def show(self, snapshot: Snapshot) -> None:
         """Draw the newest words and, less often, traces, strip and figures."""

@@ -97,12 +97,12 @@ class Publisher:
         """Begin to look."""
         self._thread.start()
 
-    def note(self, tick: Tick) -> None:
+    def update(self, tick: Tick) -> None:
         """Leave the newest tick; called by the loop."""
         self._slot = tick
         self._ticks += 1
         if self._page is not None:
-            self._snapshots.note(tick)
+            self._snapshots.update(tick)
 
     def stop(self) -> None:
         """Stop looking."""
@@ -117,7 +117,7 @@ class Publisher:
             if tick is None:
                 continue
             round_number += 1
-            rate.note(tick.t_s, self._ticks)
+            rate.update(tick.t_s, self._ticks)
             with self._spared("the page's figures"):
                 if self._page is not None:
                     shot = self._snapshots.take(self._said(tick))
@@ -205,7 +205,7 @@ class _Rate:
         self.hz = 0.0
         self._from: tuple[float, int] | None = None
 
-    def note(self, t_s: float, ticks: int) -> None:
+    def update(self, t_s: float, ticks: int) -> None:
         if self._from is None:
             self._from = (t_s, ticks)
         elif t_s - self._from[0] >= 1.0:

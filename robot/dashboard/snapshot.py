@@ -87,7 +87,7 @@ class SnapshotBuilder:
         self._events = EventDetector()
         self._unanswered: Counter[str] = Counter()
 
-    def note(self, tick: Tick) -> None:
+    def update(self, tick: Tick) -> None:
         """Lay a tick down."""
         self._ticks.append(tick)
 
@@ -102,7 +102,7 @@ class SnapshotBuilder:
                 self._begin()
             self._newest = tick
             self._count(tick)
-            events += map(_seen, self._events.note(tick))
+            events += map(_seen, self._events.update(tick))
             if tick.t_s - self._trail_s >= _TRAIL_S:
                 self._trail_s = tick.t_s
                 trail.append(_trail(tick))
@@ -129,7 +129,7 @@ class SnapshotBuilder:
         )
 
     def _count(self, tick: Tick) -> None:
-        self._timing.note(tick.t_s)
+        self._timing.update(tick.t_s)
         if tick.joints.missing:
             self._unanswered.update(tick.joints.missing)
 

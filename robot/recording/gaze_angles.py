@@ -117,7 +117,7 @@ def trace_of(ticks: Iterable[Tick]) -> GazeAngles:
     """
     tracing = GazeAnglesBuilder()
     for tick in ticks:
-        tracing.note(tick)
+        tracing.update(tick)
     return tracing.trace()
 
 
@@ -137,7 +137,7 @@ class GazeAnglesBuilder:
         self._joints: tuple[str, ...] = ()
         self._reckoned: dict[str, None] = {}
 
-    def note(self, tick: Tick) -> None:
+    def update(self, tick: Tick) -> None:
         """Add a tick."""
         if self._start_s is None:
             self._start_s = tick.t_s

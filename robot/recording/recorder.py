@@ -108,7 +108,7 @@ class Recorder:
 
         return noted
 
-    def note(self, tick: Tick) -> None:
+    def record(self, tick: Tick) -> None:
         """Record a tick; called by the loop."""
         before = tuple(
             [h for h in self._heard if not (type(h) is MeasuredJoints and h.joints is tick.joints)]

@@ -133,9 +133,9 @@ class SnapshotIndex:
         for number, tick in enumerate(ticks):
             self._start_s = tick.t_s if number == 0 else self._start_s
             at_s = tick.t_s - self._start_s
-            self.marks += noticing.note(tick, at_s)
+            self.marks += noticing.update(tick, at_s)
             self.duration_s = at_s
-            snapshots.note(tick)
+            snapshots.update(tick)
             if at_s < due_s - 1e-9:
                 continue
             due_s = max(due_s + SNAPSHOT_EVERY_S, at_s)
@@ -163,7 +163,7 @@ class Noticing:
         self._saccades, self._blinks = 0, 0
         self._grave = ""
 
-    def note(self, tick: Tick, at_s: float) -> list[Mark]:
+    def update(self, tick: Tick, at_s: float) -> list[Mark]:
         """Return what begins in this tick."""
         found = []
         if tick.gaze.saccades > self._saccades:

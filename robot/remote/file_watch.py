@@ -61,7 +61,7 @@ class Settling:
         self._same = 0
         self._missing = 0
 
-    def note(self, now: FileState | None) -> bool:
+    def update(self, now: FileState | None) -> bool:
         """Take a look; tell whether the file should be read, to find it new or missing."""
         self._same = self._same + 1 if now == self._last else 0
         self._last = now
@@ -133,7 +133,7 @@ class FileWatch:
             self._watched = {
                 path: self._watched.get(path) or Settling(look(path)) for path in files
             }
-            new = [path for path, settling in self._watched.items() if settling.note(look(path))]
+            new = [path for path, settling in self._watched.items() if settling.update(look(path))]
         # Not under the lock: who is told may be waiting for a thread that saves.
         for path in new:
             self._changed(path)

@@ -61,9 +61,9 @@ class LiveServer:
             self._say(f"gazerig ctl set and stop will not find this rig: {error}")
         self._watch.start()
 
-    def note(self, tick: Tick) -> None:
+    def update(self, tick: Tick) -> None:
         """Leave the newest tick; called by the loop."""
-        self._pulse.note(tick)
+        self._pulse.update(tick)
 
     def saved(self, path: Path) -> None:
         """Take note that this program itself has written a file."""

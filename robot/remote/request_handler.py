@@ -51,7 +51,7 @@ class Pulse:
         self._said: deque[str] = deque(maxlen=_WORDS)
         self._never = threading.Event()
 
-    def note(self, tick: Tick) -> None:
+    def update(self, tick: Tick) -> None:
         """Leave the newest tick; called by the loop."""
         self._newest = tick
         self._ticks += 1

@@ -46,9 +46,9 @@ class StopOnlyServer:
         except SetupError as error:  # the head goes on without
             self._say(f"gazerig stop will not find this rig: {error}")
 
-    def note(self, tick: Tick) -> None:
+    def update(self, tick: Tick) -> None:
         """Leave the newest tick; called by the loop."""
-        self._pulse.note(tick)
+        self._pulse.update(tick)
 
     def close(self) -> None:
         """Hang up on all programs."""

@@ -149,7 +149,7 @@ class GazeTraceBuilder:
         self._names: tuple[str, ...] = ()
         self._reckoned: dict[str, None] = {}
 
-    def note(self, tick: Tick) -> None:
+    def update(self, tick: Tick) -> None:
         """Take a tick; what happens while somebody has stopped the robot does not count."""
         for command in tick.commands:
             if (
@@ -158,7 +158,7 @@ class GazeTraceBuilder:
                 and command.choice in MODES
             ):
                 self._mode = MODES.index(command.choice)
-        for event in self._events.note(tick):
+        for event in self._events.update(tick):
             if isinstance(event, SaccadeEvent):
                 self._saccades.append(event)
             elif isinstance(event, FixationEvent):
@@ -168,7 +168,7 @@ class GazeTraceBuilder:
         self._names = tick.guard_result.joints
         self._reckoned.update(dict.fromkeys(reckoned_joints(tick)))
         lids = openings(tick.gaze.lid_left, tick.gaze.lid_right, self._names, UPPER)
-        asked = self._asked_lids.note(tick.t_s, *lids) if lids is not None else None
+        asked = self._asked_lids.update(tick.t_s, *lids) if lids is not None else None
         if asked is not None:
             self._asked_blinks.append(asked)
         if self._last_s is not None:

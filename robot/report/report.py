@@ -88,7 +88,7 @@ def read(ticks: Iterable[Tick], about: RunHeader, progress: Progress) -> GazeTra
     gathering, first_s = GazeTraceBuilder(), None
     progress(READING, 0.0)
     for count, tick in enumerate(ticks):
-        gathering.note(tick)
+        gathering.update(tick)
         first_s = tick.t_s if first_s is None else first_s
         if about.duration_s and count % _TOLD_EVERY == 0:
             progress(READING, min(1.0, (tick.t_s - first_s) / about.duration_s))

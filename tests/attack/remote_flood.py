@@ -55,15 +55,17 @@ def flooded(what: str, seconds: float, programs: int) -> tuple[float, int, float
     command = [sys.executable, "-c", FLOOD.format(FLOODS[what])]
     others = [subprocess.Popen(command) for _ in range(programs if FLOODS[what] else 0)]
     try:
-        run(robot, made.clock, made.loop, lambda s: "s" if s > 1.5 else None, live.note)
+        run(robot, made.clock, made.loop, lambda s: "s" if s > 1.5 else None, live.update)
         began_s = RealClock().now_s()
-        count = run(robot, made.clock, made.loop, lambda s: "s" if s > seconds else None, live.note)
+        count = run(
+            robot, made.clock, made.loop, lambda s: "s" if s > seconds else None, live.update
+        )
         rate = count.ticks / (RealClock().now_s() - began_s)
         stop = [sys.executable, "-c", _STOP]
         with subprocess.Popen(stop, stdout=subprocess.PIPE, text=True) as stopper:
             run(
                 robot, made.clock, made.loop,
-                lambda s: "s" if stopper.poll() is not None or s > 20.0 else None, live.note,
+                lambda s: "s" if stopper.poll() is not None or s > 20.0 else None, live.update,
             )  # fmt: skip
             took_ms = float(stopper.communicate()[0] or "nan")
     finally:

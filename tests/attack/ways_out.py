@@ -45,10 +45,10 @@ LONGEST_S = 20.0
 # Broken on purpose, from outside: what a plug-in, a small machine or a bug of ours would do.
 BROKEN = {
     "observer raises": "import gazerig.robot.analysis.summary as m\n"
-    "def note(self, tick):\n    raise RuntimeError('plug-in')\nm.Summary.note = note\n",
+    "def update(self, tick):\n    raise RuntimeError('plug-in')\nm.Summary.update = update\n",
     "MemoryError in the loop": "import gazerig.robot.control.loop as m\n"
     "tick, n = m.Robot.tick, []\n"
-    "def note(self, *words):\n    n.append(0)\n"
+    "def update(self, *words):\n    n.append(0)\n"
     "    if len(n) > 200:\n        raise MemoryError\n"
     "    return tick(self, *words)\nm.Robot.tick = note\n",
 }

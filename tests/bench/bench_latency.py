@@ -39,7 +39,7 @@ class Stamps:
     sent_s: dict[float, float] = field(default_factory=dict)
     last_write_s: float = 0.0
 
-    def note(self, tick: Tick) -> None:
+    def update(self, tick: Tick) -> None:
         """Note a tick; its goals have just been sent."""
         if tick.percept is not None:
             self.sent_s.setdefault(tick.percept.captured_s, self.last_write_s)
@@ -69,7 +69,7 @@ def measured(film: Path, motion: bool) -> Stamps:
     stamps = stamped(made)
     made.robot.start(made.clock)
     try:
-        run(made.robot, made.clock, made.loop, ended, stamps.note)
+        run(made.robot, made.clock, made.loop, ended, stamps.update)
     finally:
         made.robot.stop()
         made.close()

@@ -107,7 +107,7 @@ class Bench:
         self.count = count.overruns
 
     def _note(self, tick: Tick) -> None:
-        self.audience.note(tick)
+        self.audience.update(tick)
         self.times.append(tick.t_s)
         if tick.commands:  # the goals of this tick are written
             now_s = time.monotonic()

@@ -58,7 +58,7 @@ def jitter(path: Path, seconds: float) -> None:
         on = int(tick.t_s - began[0]) % 2 == 1
         start_s = time.thread_time()
         if on:
-            recording.note(tick)
+            recording.record(tick)
         now_s = time.thread_time()
         rows.append((on, tick.t_s, now_s - start_s, now_s - before[0]))
         before[0] = now_s
@@ -97,7 +97,7 @@ def volume(path: Path, seconds: float) -> None:
     robot.start(assembly.clock)
     start_s = time.monotonic()
     stop = recording.timed(lambda s: "seconds" if s >= seconds else None)
-    count = run(robot, assembly.clock, assembly.loop, stop, recording.note)
+    count = run(robot, assembly.clock, assembly.loop, stop, recording.record)
     leave(assembly, count, lambda line: None)
     print(recording.close("seconds", assembly.sent_digest()))
     print(f"recorded in {time.monotonic() - start_s:.1f} s")

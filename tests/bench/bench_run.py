@@ -52,7 +52,7 @@ def real_time_loop(seconds: float) -> None:
 
     def watch(tick: Any) -> None:
         starts.append(tick.t_s)
-        summary.note(tick)
+        summary.update(tick)
 
     count = run(
         made.robot,
@@ -94,7 +94,7 @@ def simulated_speed() -> None:
             made.clock,
             made.loop,
             lambda s: "seconds" if s >= 60.0 else None,
-            summary.note,
+            summary.update,
         )
         speeds.append(60.0 / (time.monotonic() - began))
         made.robot.stop()
