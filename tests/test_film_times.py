@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gazerig.drivers.camera.frame_analysis import look
+from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.camera.video_timestamps import FilmTimes, at_a_rate, by_table, rising
 from gazerig.drivers.errors import CameraError
@@ -135,7 +135,7 @@ def test_odd_stills_become_plain_pictures(tmp_path, pixels):
     cv2.imwrite(str(file), pixels)
     for detector in (NoFaces(), face_detector(FaceDetectorParams())):
         film = opened(file)
-        found = look(film.shot(1), detector)
+        found = FrameAnalyzer(detector).look(film.shot(1))
         assert found.faces == ()
         assert (found.height_px, found.width_px) == pixels.shape[:2]
         assert found.picture.shape == (*pixels.shape[:2], 3) and found.picture.dtype == np.uint8

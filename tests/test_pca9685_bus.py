@@ -10,13 +10,14 @@ from smbus2 import i2c_msg
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
+from gazerig.drivers.hobby_board.release import stop_pulses
 from gazerig.drivers.i2c import port as i2c_port
 from gazerig.drivers.i2c.bridge import ASK_STATUS, Part, commands, read, write
 from gazerig.drivers.i2c.port import I2cPort, explain, port_of
+from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
 from gazerig.drivers.pca9685.probe import probe
 from gazerig.drivers.pca9685.registers import AWAKE, MODE1, PRESCALE, counts_of, prescale_of, pulse
-from gazerig.drivers.pca9685.release import stop_pulses
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.serial.port_owner import refuse_owner
 from gazerig.drivers.types import ServoSetup
@@ -337,10 +338,15 @@ def test_a_guardian_stops_pulses_whatever_the_board_was_set_to(world):
     world.held()
     bus = EmulatedSMBus(world.device.body)
     bus.write_byte_data(0x40, MODE1, 0x01)
-    assert stop_pulses(world.port, QUICK, (0, 1, 5)) == ()
+
+    def left() -> tuple[int, ...]:
+        board = Pca9685Board(world.port, QUICK)
+        return stop_pulses(world.port, QUICK.baud, board, (0, 1, 5))
+
+    assert left() == ()
     assert world.widths() == [0, 0, 0]
     world.command("absent on")
-    assert stop_pulses(world.port, QUICK, (0, 1, 5)) == (0, 1, 5)
+    assert left() == (0, 1, 5)
 
 
 def test_a_lost_write_is_seen_and_the_way_goes_on(world):

@@ -3,7 +3,7 @@
 import threading
 from collections.abc import Callable
 
-from gazerig.drivers.camera.frame_analysis import Motion, look
+from gazerig.drivers.camera.frame_analysis import FrameAnalyzer, Motion
 from gazerig.drivers.camera.params import CameraCareParams
 from gazerig.drivers.camera.source import PictureSource, Shot
 from gazerig.drivers.errors import CameraError
@@ -34,10 +34,9 @@ class CameraWatch:
         tell: takes a line about what has happened, at once
         """
         self._source = source
-        self._detector = detector
+        self._frames = FrameAnalyzer(detector, motion)
         self._now_s = now_s
         self._care = care
-        self._motion = motion
         self._counted = 0  # pictures of the source before it was last opened
         self._number = 0
         self._tell = tell
@@ -61,7 +60,7 @@ class CameraWatch:
         if shot is None:
             return None
         self._number = self._counted + shot.number
-        found = look(shot._replace(number=self._number), self._detector, self._motion)
+        found = self._frames.look(shot._replace(number=self._number))
         for line in self._source.events():
             self._tell(line)
         return found
@@ -71,17 +70,8 @@ class CameraWatch:
         detector: Callable[[], FaceDetector] | None,
         motion: Callable[[Motion | None], Motion | None] | None,
     ) -> None:
-        """Look otherwise from the next picture on.
-
-        detector: makes another one; motion: gives what finds motion from what did; None: as is
-
-        Raises:
-            SetupError: the detector cannot be made; the old one goes on.
-        """
-        if motion is not None:
-            self._motion = motion(self._motion)
-        if detector is not None:
-            self._detector = detector()
+        """Look otherwise from the next picture on, as in FrameAnalyzer."""
+        self._frames.retune(detector, motion)
 
     def close(self) -> None:
         """Free the source; safe to call twice."""

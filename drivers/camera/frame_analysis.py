@@ -9,19 +9,49 @@ Motion = Callable[[Shot], tuple[MovingBlob, ...]]
 """Finds what moves, from one picture to the next."""
 
 
-def look(shot: Shot, detector: FaceDetector, motion: Motion | None = None) -> Detections:
-    """Find the faces of a picture, unless the camera itself has, and what moves in it."""
-    faces = shot.faces if shot.faces is not None else detector.find(shot.picture)
-    blobs = motion(shot) if motion is not None else ()
-    height, width = shot.picture.shape[:2]
-    return Detections(
-        shot.captured_s,
-        shot.number,
-        width,
-        height,
-        faces,
-        blobs,
-        shot.picture,
-        shot.depth_m,
-        shot.lens,
-    )
+class FrameAnalyzer:
+    """Looks at one picture after another, with detectors that may be changed in between.
+
+    Args:
+        detector: finds faces.
+        motion: finds what moves; None: nothing does.
+    """
+
+    def __init__(self, detector: FaceDetector, motion: Motion | None = None) -> None:
+        self._detector, self._motion = detector, motion
+
+    def look(self, shot: Shot) -> Detections:
+        """Find the faces of a picture, unless the camera itself has, and what moves in it."""
+        faces = shot.faces if shot.faces is not None else self._detector.find(shot.picture)
+        blobs = self._motion(shot) if self._motion is not None else ()
+        height, width = shot.picture.shape[:2]
+        return Detections(
+            shot.captured_s,
+            shot.number,
+            width,
+            height,
+            faces,
+            blobs,
+            shot.picture,
+            shot.depth_m,
+            shot.lens,
+        )
+
+    def retune(
+        self,
+        detector: Callable[[], FaceDetector] | None,
+        motion: Callable[[Motion | None], Motion | None] | None,
+    ) -> None:
+        """Look otherwise from the next picture on.
+
+        Args:
+            detector: makes another one; None: as it is.
+            motion: returns what finds motion from what did; None: as it is.
+
+        Raises:
+            SetupError: the detector cannot be made; the old one goes on.
+        """
+        if motion is not None:
+            self._motion = motion(self._motion)
+        if detector is not None:
+            self._detector = detector()

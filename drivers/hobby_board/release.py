@@ -3,7 +3,9 @@
 from collections.abc import Sequence
 from typing import Protocol
 
+from gazerig.drivers.errors import PortError
 from gazerig.drivers.released import Released
+from gazerig.drivers.serial.port import BusPort
 
 TRIES = 3
 """So often is asked or told again what must not fail."""
@@ -39,3 +41,24 @@ def switch_off(board: Stoppable, channels: Sequence[int]) -> Released:
             break
     holding = tuple(channel for channel in left if channel in heard)
     return Released(holding, tuple(channel for channel in left if channel not in heard))
+
+
+def stop_pulses(
+    port: BusPort, baud: int, board: Stoppable, channels: Sequence[int]
+) -> tuple[int, ...]:
+    """Open a board's port and stop the pulses; return the channels that did not confirm it.
+
+    Args:
+        port: closed, or open already; it is left open.
+        baud: bit/s.
+        board: speaks over this port.
+        channels: those of the rig; others are left as they are, unless theirs do not stop.
+
+    Raises:
+        PortError: the port cannot be opened.
+        BusLost: the port went away.
+    """
+    if not port.setBaudRate(baud):
+        raise PortError(f"{port.port_name} cannot run at {baud} bit/s")
+    released = switch_off(board, channels)
+    return (*released.holding, *released.mute)

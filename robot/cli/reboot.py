@@ -7,8 +7,9 @@ import typer
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import ServoFault, SetupError
+from gazerig.drivers.hobby_board.release import stop_pulses
 from gazerig.drivers.maestro.line import MaestroLink
-from gazerig.drivers.pca9685.release import stop_pulses
+from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.serial.port import BusPort
 from gazerig.robot.app.bus_wiring import bus_names, joints_on
 from gazerig.robot.bringup import servo_reboot
@@ -126,7 +127,8 @@ def _pca9685(rig: Rig, bus: str, line: BusPort, yes: bool) -> None:
         ServoFault: some do not stop.
     """
     ids = tuple(rig.joints[joint].id for joint in joints_on(rig, bus))
-    left = stop_pulses(line, rig.bus_named(bus).pca9685, ids)
+    params = rig.bus_named(bus).pca9685
+    left = stop_pulses(line, params.baud, Pca9685Board(line, params), ids)
     if left:
         raise ServoFault(
             f"{line.port_name}: channels {', '.join(map(str, left))} do not confirm that their "

@@ -6,7 +6,7 @@ It does not blur, distort, drop or reorder pictures, and its delay is constant.
 from collections.abc import Callable
 from typing import Protocol
 
-from gazerig.drivers.camera.frame_analysis import Motion, look
+from gazerig.drivers.camera.frame_analysis import FrameAnalyzer, Motion
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import Detections, FaceDetector
 
@@ -62,10 +62,9 @@ class FilmCamera:
         if not delay_s >= 0.0:
             raise ValueError(f"detections cannot come before their picture: delay {delay_s} s")
         self._video = video
-        self._detector = detector
+        self._frames = FrameAnalyzer(detector, motion)
         self._delay_s = delay_s
         self._start_s = start_s
-        self._motion = motion
         self._newest: Detections | None = None
         self.pictures = 0
         self.pictures_with_face = 0
@@ -95,17 +94,8 @@ class FilmCamera:
         detector: Callable[[], FaceDetector] | None,
         motion: Callable[[Motion | None], Motion | None] | None,
     ) -> bool:
-        """Look otherwise from the next picture on; always possible.
-
-        detector: makes another one; motion: gives what finds motion from what did; None: as is
-
-        Raises:
-            SetupError: the detector cannot be made; the old one goes on.
-        """
-        if motion is not None:
-            self._motion = motion(self._motion)
-        if detector is not None:
-            self._detector = detector()
+        """Look otherwise from the next picture on, as in FrameAnalyzer; always possible."""
+        self._frames.retune(detector, motion)
         return True
 
     def events(self) -> tuple[str, ...]:
@@ -123,7 +113,7 @@ class FilmCamera:
     def _look(self, number: int) -> None:
         """Find the faces of one picture, and what moves in it."""
         shot = self._video.shot(number)._replace(captured_s=self._captured_s(number))
-        found = look(shot, self._detector, self._motion)
+        found = self._frames.look(shot)
         self.pictures += 1
         self.pictures_with_face += bool(found.faces)
         self._newest = found
