@@ -1,6 +1,5 @@
 """calibrate face as it is typed: keys, scripts, what is written and what is not."""
 
-import re
 import socket
 from datetime import datetime
 from pathlib import Path
@@ -200,6 +199,8 @@ def test_keys_typed_move_the_gaze_and_are_written(rig: Path) -> None:
     assert load_rig(str(rig)).face_parts_mm == {"N": (0.0, 5.0, 0.0)}
 
 
+# Parking takes a bounded time, in which a starved machine does not come all the way.
+@pytest.mark.own_timeouts
 def test_ctrl_c_parks_and_writes_nothing(rig: Path) -> None:
     before = rig.read_bytes()
     with sitting_at(rig, "--no-page") as sitting:
@@ -208,8 +209,7 @@ def test_ctrl_c_parks_and_writes_nothing(rig: Path) -> None:
         sitting.reads("5 mm left")
         sitting.types(b"\x03")
         assert sitting.ends() == 1, sitting.said
-    # Parking takes a bounded time, in which a busy machine may not come all the way.
-    assert re.search("stopped by SIGINT: (not )?parked, torque off", sitting.said)
+    assert "stopped by SIGINT: parked, torque off" in sitting.said
     assert "nothing written" in sitting.said and rig.read_bytes() == before
 
 
@@ -217,6 +217,7 @@ def test_ctrl_c_parks_and_writes_nothing(rig: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.own_timeouts
 def test_buttons_of_the_page_steer_side_by_side_with_keys(rig: Path) -> None:
     with socket.socket() as trial:
         trial.bind(("127.0.0.1", 0))
@@ -238,9 +239,7 @@ def test_buttons_of_the_page_steer_side_by_side_with_keys(rig: Path) -> None:
         sitting.reads("0 mm across, 5 mm down")
         sitting.enters(lambda: visitor.ask({"steer": "enter"}), "3/8")
         visitor.ask({"steer": "end"})
-        # Parking takes a bounded time, in which a busy machine may not come all the way.
-        assert sitting.reads_one_of("stopped by you: parked", "stopped by you: not parked")
-        sitting.reads("torque off")
+        sitting.reads("stopped by you: parked, torque off")
         assert sitting.ends() == 0, sitting.said
     found = load_rig(str(rig)).face_parts_mm
     usual = {part: tuple(v * 1e3 for v in PARTS_FACE_M[part]) for part in ("N", "LE")}

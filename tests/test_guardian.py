@@ -31,6 +31,7 @@ PLAN = ReleasePlan("feetech", "/tmp/no such port", 1_000_000, (1, 2))
 # --- a loop that dies, in a process of its own
 
 
+@pytest.mark.own_timeouts
 @pytest.mark.parametrize("kind", ["feetech", "maestro", "pca9685"])
 def test_a_loop_that_hangs_and_dies_leaves_limp_servos(kind):
     with driven(kind) as it:
@@ -51,6 +52,7 @@ def test_a_loop_that_hangs_and_dies_leaves_limp_servos(kind):
         assert it.limp_after_s(it.strike(signal.SIGKILL), PATIENCE_S) is not None
 
 
+@pytest.mark.own_timeouts
 def test_a_dynamixel_without_its_watchdog_is_guarded_too():
     with driven("dynamixel", watchdog=False) as it:
         assert all(it.holding())

@@ -21,8 +21,11 @@ from gazerig.robot.remote.socket_io import folder, sockets
 RATE = "loop.rate_hz"
 ROOT = Path(__file__).parents[1]
 
+pytestmark = pytest.mark.own_timeouts
+"""A client waits for its answer, and the park for the servos, only for a bounded time."""
 
-@pytest.fixture(scope="module")
+
+@pytest.fixture
 def place() -> Iterator[Path]:
     """A folder for the rig's file and its socket; pytest's own are too long for a socket."""
     found = Path(tempfile.mkdtemp(prefix="gz-", dir="/tmp"))
@@ -75,7 +78,7 @@ class Run:
         return self.process.wait(timeout=30.0)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def run(place: Path) -> Iterator[Run]:
     run = Run(place)
     yield run
@@ -104,8 +107,10 @@ def test_it_is_tuned_stopped_and_goes_on(run: Run) -> None:
 
 
 def test_the_file_edited_by_hand_is_taken_or_refused_whole(run: Run) -> None:
-    good = run.file.read_text(encoding="utf-8")
     with run.connected() as rig:
+        rig.set(RATE, 150.0)
+        rig.save()
+        good = run.file.read_text(encoding="utf-8")
         run.file.write_text(good.replace("rate_hz: 150.0", "rate_hz: 5e5") + "x: 1\n")
         assert run.hears("refused; the values from before stay")
         assert "above 1000" in run.words() and "x: unknown" in run.words()

@@ -343,6 +343,8 @@ def test_a_run_without_faults_has_none(devices: list[Device]) -> None:
 # --- programs of their own
 
 
+# Parking takes a bounded time, in which a starved machine does not come all the way.
+@pytest.mark.own_timeouts
 @pytest.mark.parametrize(
     ("rig", "command", "way"),
     [
