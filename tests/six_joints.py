@@ -10,25 +10,25 @@ SIX = (
     "right_lower_lid",
 )  # fmt: skip
 WISH_RAD = tuple(radians(10.0 + i) for i in range(6))
-RECKONED_RAD = tuple(radians(20.0 + i) for i in range(6))
+ESTIMATED_RAD = tuple(radians(20.0 + i) for i in range(6))
 TELLS_NOTHING = Servos(
     (None,) * 6, (None,) * 6, (0.0,) * 6, (True,) * 6, ("",) * 6, (0.0,) * 6, (0,) * 6
 )
 
 
-def of_six(shot: Snapshot, reckoned: tuple[str, ...] = SIX) -> Snapshot:
-    """Show the same of such a rig; reckoned: which of its servos tell nothing."""
+def of_six(shot: Snapshot, estimated: tuple[str, ...] = SIX) -> Snapshot:
+    """Show the same of such a rig; estimated: which of its servos tell nothing."""
     ghost = shot.ghost
     return replace(
         shot,
         joints=SIX,
-        reckoned=reckoned,
+        estimated=estimated,
         desired_rad=WISH_RAD,
         commanded_rad=WISH_RAD,
-        measured_rad=RECKONED_RAD,
+        measured_rad=ESTIMATED_RAD,
         lids=(0.9, 0.5),
         lower_lids=(0.75, 0.25),
         servos=TELLS_NOTHING,
         ghost=ghost._replace(lower_lids=(0.75, 0.25)) if ghost is not None else None,
-        trail=(Trail(shot.t_s, WISH_RAD, WISH_RAD, RECKONED_RAD),),
+        trail=(Trail(shot.t_s, WISH_RAD, WISH_RAD, ESTIMATED_RAD),),
     )

@@ -31,7 +31,7 @@ from gazerig.robot.dashboard.inbox import (
     told,
     urgent,
 )
-from gazerig.robot.dashboard.jog_panel import MEASURED, RECKONED, JogPanel, measured_table
+from gazerig.robot.dashboard.jog_panel import ESTIMATED, MEASURED, JogPanel, measured_table
 from gazerig.robot.dashboard.outbox import Outbox
 from gazerig.robot.dashboard.page_feed import News, drain
 from gazerig.robot.dashboard.page_process import (
@@ -511,13 +511,13 @@ def test_the_table_shows_wish_and_measured() -> None:
 
 
 def test_what_nobody_measured_has_a_column_of_its_own() -> None:
-    assert RECKONED not in measured_table(SNAPSHOT)
+    assert ESTIMATED not in measured_table(SNAPSHOT)
     table = measured_table(of_six(SNAPSHOT))
-    assert f">{RECKONED}</td>" in table and f">{MEASURED}</td>" not in table
+    assert f">{ESTIMATED}</td>" in table and f">{MEASURED}</td>" not in table
     assert "eyes pan" in table and "20.0" in table and "neck" not in table
     mixed = measured_table(of_six(SNAPSHOT, SIX[:1]))
     lines = mixed.split("<tr>")
-    assert mixed.index(f">{MEASURED}<") < mixed.index(f">{RECKONED}<")
+    assert mixed.index(f">{MEASURED}<") < mixed.index(f">{ESTIMATED}<")
     cells = [line.split("<td style='text-align:right'>")[1:] for line in lines[1:]]
     assert [cell.partition("<")[0] for cell in cells[0]] == ["10.0", "", "20.0"]
     assert [cell.partition("<")[0] for cell in cells[1]] == ["11.0", "21.0", ""]

@@ -211,27 +211,27 @@ def test_what_nobody_measured_is_drawn_and_named_otherwise(server: viser.ViserSe
     panel = PanelView(server.gui)
     view = panel._traces_view
 
-    def shown(t_s: float, reckoned: tuple[str, ...]) -> list[bool]:
-        shot = of_six(snapshot(t_s), reckoned)
+    def shown(t_s: float, estimated: tuple[str, ...]) -> list[bool]:
+        shot = of_six(snapshot(t_s), estimated)
         panel.update((shot,))
         panel._shown = 0
         panel.show(shot)
-        named = [plot.plot.series[3]["label"] == "reckoned, not measured" for plot in view._plots]
+        named = [plot.plot.series[3]["label"] == "estimated, not measured" for plot in view._plots]
         assert named == ["dash" in plot.plot.series[3] for plot in view._plots]
         assert named == ["no feedback" in plot.title.content for plot in view._plots]
         return named
 
     assert shown(1.0, SIX) == [True, True, True]
-    assert "> measured<" not in view._key.content and "reckoned" in view._key.content
+    assert "> measured<" not in view._key.content and "estimated" in view._key.content
     assert "no measurements" in panel._of_what.content
     before = view._plots
     assert shown(1.1, SIX) == [True, True, True]
     assert view._plots is before  # what stays as it is is not made anew
     assert shown(1.2, ("left_lower_lid",)) == [False, False, True]
-    assert "> measured<" in view._key.content and "reckoned" in view._key.content
+    assert "> measured<" in view._key.content and "estimated" in view._key.content
     assert panel._of_what.content == ""
     assert shown(1.3, ()) == [False, False, False]
-    assert "reckoned" not in view._key.content
+    assert "estimated" not in view._key.content
 
 
 class Nobody:

@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 from desk import JOINTS
-from six_joints import RECKONED_RAD, SIX, WISH_RAD, of_six
+from six_joints import ESTIMATED_RAD, SIX, WISH_RAD, of_six
 
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.angles import rotation
@@ -169,10 +169,10 @@ def test_traces_take_the_joints_of_the_rig_that_is_shown() -> None:
     traces.add(moving(1.0))
     traces.add(of_six(snapshot(2.0)))
     ago_s, angles_deg = traces.table(30.0)
-    assert traces.joints == SIX and traces.reckoned == set(SIX)
+    assert traces.joints == SIX and traces.estimated == set(SIX)
     assert len(ago_s) == 1 and angles_deg.shape == (1, 3, 6)
     assert angles_deg[0, 0] == pytest.approx(np.degrees(WISH_RAD))
-    assert angles_deg[0, 2] == pytest.approx(np.degrees(RECKONED_RAD))
+    assert angles_deg[0, 2] == pytest.approx(np.degrees(ESTIMATED_RAD))
 
 
 def test_status_says_how_many_joints_nobody_measures() -> None:

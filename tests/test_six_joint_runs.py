@@ -170,7 +170,7 @@ def test_words_for_numbers_come_back_for_any_number_of_joints(maker: Run) -> Non
 
 def test_a_run_of_six_joints_is_done_again_to_the_bit(maker: Run) -> None:
     seen: list[Tick] = []
-    found = rerun(maker.recording, note=seen.append)
+    found = rerun(maker.recording, on_tick=seen.append)
     assert found.same and found.tx_same and found.notes == ()
     assert list(map(exact, seen)) == list(map(exact, maker.ticks))
     assert rerun(maker.recording, joints="emulated").same
@@ -194,14 +194,15 @@ def gathered(ticks: list[Tick]) -> GazeTrace:
     return gathering.gathered()
 
 
-def test_figures_and_status_say_what_is_reckoned(maker: Run, desk: Run) -> None:
-    for ticks, reckoned in ((maker.ticks, list(SIX)), (desk.ticks, [])):
+def test_figures_and_status_say_what_is_estimated(maker: Run, desk: Run) -> None:
+    for ticks, estimated in ((maker.ticks, list(SIX)), (desk.ticks, [])):
         summary, pulse = Summary(), Pulse(_Still())
         summary.update(ticks[0])
         pulse.update(ticks[0])
-        assert summary.figures()["reckoned"] == reckoned
+        figures = summary.figures()
+        assert figures["estimated"] == figures["reckoned"] == estimated
         words = pulse.words()
-        assert words["reckoned"] == reckoned
+        assert words["estimated"] == words["reckoned"] == estimated
         joints_deg = words["joints_deg"]
         assert isinstance(joints_deg, dict) and tuple(joints_deg) == ticks[0].guard_result.joints
 
@@ -219,16 +220,16 @@ def quiet(words: str, share: float) -> None:
 
 
 @pytest.mark.slow
-def test_a_report_of_reckoned_joints_says_so_everywhere(maker: Run, tmp_path: Path) -> None:
+def test_a_report_of_estimated_joints_says_so_everywhere(maker: Run, tmp_path: Path) -> None:
     out = tmp_path / "six.html"
     made = build.report(maker.ticks, RunHeader("six"), out, quiet)
     rows = {row["key"]: row for row in json.loads(made.data.read_text())}
-    assert {row["basis"] for row in rows.values()} == {"reckoned"}
+    assert {row["basis"] for row in rows.values()} == {"estimated"}
     page = unescape(out.read_text(encoding="utf-8"))
     assert "Nothing here is measured: the servos of this rig tell nothing" in page
     assert "not measured" in page.partition("Saccades <span")[2][:120]
     assert "measured from the servos" not in page
-    assert "{measured}" not in page and "line of sight of each eye, reckoned" in page
+    assert "{measured}" not in page and "line of sight of each eye, estimated" in page
     for key in ("head_slope", "head_share", "head_after", "head_peak", "vor", "vergence",
                 "vergence_ok", "unasked"):  # fmt: skip
         assert key not in rows, key
@@ -246,20 +247,20 @@ def test_a_report_of_measured_joints_claims_it(desk: Run) -> None:
     assert np.isnan(run.column("lower_lid")).all() and np.isfinite(run.column("lid")).all()
 
 
-def test_a_measured_run_beside_a_reckoned_one_is_warned_of(
+def test_a_measured_run_beside_a_estimated_one_is_warned_of(
     maker: Run, desk: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawings = [d for d in build.DRAWINGS if d.key in ("overview", "vor", "blink_shape")]
     monkeypatch.setattr(build, "DRAWINGS", tuple(drawings))
     abouts = RunHeader("desk"), RunHeader("maker")
     made = compare((desk.ticks, maker.ticks), abouts, tmp_path / "both.html", quiet)
-    assert made.warning.startswith("desk is measured and maker is reckoned")
+    assert made.warning.startswith("desk is measured and maker is estimated")
     page = unescape(made.page.read_text(encoding="utf-8"))
     assert made.warning in page and "maker: Nothing here is measured" in page
     assert "maker: This rig has no neck" in page
     assert len(made.pictures) == 3  # the desk rig has a neck to draw
     rows = json.loads(made.data.read_text())
-    assert {tuple(row["basis"]) for row in rows} == {("measured", "reckoned")}
+    assert {tuple(row["basis"]) for row in rows} == {("measured", "estimated")}
     assert not {"vor", "vergence"} & {row["key"] for row in rows}
     alike = compare((desk.ticks, desk.ticks), abouts, tmp_path / "same.html", quiet)
     assert alike.warning == "" and "not measured" not in alike.page.read_text("utf-8")
@@ -287,10 +288,10 @@ def test_what_cannot_be_told_says_why(names: tuple[str, ...], key: str, words: s
 
 def test_a_rig_of_both_kinds_of_servos_is_measured_in_parts() -> None:
     eyes = JointBasis(JOINTS, tuple(name for name in JOINTS if "eye" in name))
-    assert eyes.basis("Saccades") == "partly reckoned" and eyes.basis("Lids") == "measured"
-    assert eyes.whole_basis == "partly reckoned" and eyes.left_out("unasked")
+    assert eyes.basis("Saccades") == "partly estimated" and eyes.basis("Lids") == "measured"
+    assert eyes.whole_basis == "partly estimated" and eyes.left_out("unasked")
     lids = JointBasis(JOINTS, ("left_upper_lid", "right_upper_lid"))
-    assert lids.basis("Lids") == "reckoned" and lids.basis("On the face") == "measured"
+    assert lids.basis("Lids") == "estimated" and lids.basis("On the face") == "measured"
     assert not lids.left_out("unasked")
 
 
@@ -300,9 +301,9 @@ def test_hobby_eyes_on_a_neck_that_tells_its_place(tmp_path: Path) -> None:
     mixed = recorded(tmp_path / "mixed.mcap", load_rig(str(file)), 1.0)
     seen = gathered(list(mixed.recording.ticks())).joints
     assert seen == JointBasis((*SIX, "neck_yaw", "neck_pitch"), SIX)
-    assert seen.basis("Eyes and head") == "partly reckoned" and seen.basis("Lids") == "reckoned"
+    assert seen.basis("Eyes and head") == "partly estimated" and seen.basis("Lids") == "estimated"
     trace = trace_of(mixed.ticks)
-    assert trace.basis("head") == "measured" and trace.basis("left") == "partly reckoned"
+    assert trace.basis("head") == "measured" and trace.basis("left") == "partly estimated"
     assert {"head_yaw_deg", "head_pitch_deg"} < set(columns(trace.joints))
     assert "head_roll_deg" not in columns(trace.joints)
     assert rerun(mixed.recording).same
@@ -350,11 +351,12 @@ def test_tables_have_the_columns_of_the_joints_and_say_what_they_rest_on(
         )
         assert "" not in {row["x_deg"] for row in rows}
         said = json.loads(beside.read_text())
-        assert set(said["basis"].values()) == {"reckoned" if name == "six" else "measured"}
-        assert said["reckoned_joints"] == (list(SIX) if name == "six" else [])
+        assert set(said["basis"].values()) == {"estimated" if name == "six" else "measured"}
+        expected = list(SIX) if name == "six" else []
+        assert said["estimated_joints"] == said["reckoned_joints"] == expected
 
 
-def test_a_data_set_says_that_its_gaze_is_reckoned(maker: Run, tmp_path: Path) -> None:
+def test_a_data_set_says_that_its_gaze_is_estimated(maker: Run, tmp_path: Path) -> None:
     trace = trace_of(maker.ticks)
     labels = labels_of(trace)
     about = Subject("maker", "visitor", 200.0, STARTED, "gazerig")
@@ -363,7 +365,8 @@ def test_a_data_set_says_that_its_gaze_is_reckoned(maker: Run, tmp_path: Path) -
     for eye, more in wanted.items():
         (path,) = tmp_path.rglob(f"*eye{eye}_physio.json")
         said = json.loads(path.read_text())
-        assert said["GazeBasis"] == "reckoned" and said["ReckonedJoints"] == list(SIX)
+        assert said["GazeBasis"] == "estimated"
+        assert said["EstimatedJoints"] == said["ReckonedJoints"] == list(SIX)
         assert "not measured" in said["EyeTrackingMethod"]
         assert said["Columns"] == ["timestamp", "x_coordinate", "y_coordinate", *more]
         with gzip.open(path.with_name(path.name.replace(".json", ".tsv.gz")), "rt") as table:
@@ -387,5 +390,5 @@ def test_a_linkage_without_an_answer_loses_both_eyes(maker: Run) -> None:
 def test_the_page_shows_a_recording_of_them(maker: Run) -> None:
     frames = SnapshotIndex(iter(maker.ticks[:100]), (), 200.0)
     shot = unpack(frames.message(len(frames) - 1))
-    assert shot.joints == shot.reckoned == SIX and shot.lower_lids is not None
+    assert shot.joints == shot.estimated == SIX and shot.lower_lids is not None
     frames.close()

@@ -201,18 +201,18 @@ def maker_shown() -> tuple[tuple[Tick, ...], Snapshot]:
     return ticks, shot
 
 
-def test_joints_of_servos_that_tell_nothing_are_shown_as_reckoned() -> None:
+def test_joints_of_servos_that_tell_nothing_are_shown_as_estimated() -> None:
     ticks, shot = maker_shown()
-    assert shot.joints == shot.reckoned == load_rig("maker").names == SIX
+    assert shot.joints == shot.estimated == load_rig("maker").names == SIX
     assert len(shot.measured_rad) == len(shot.desired_rad) == len(shot.commanded_rad) == 6
     assert shot.servos.temperature_c == shot.servos.voltage_v == (None,) * 6
     assert shot.servos.unanswered == (0,) * 6
     assert all(len(row.measured_rad) == 6 for row in shot.trail)
     one = ticks[-1].joints._replace(measured=(True, False, True, True, True, False))
     mixed = snapshot(ticks[-1]._replace(joints=one), 200.0, "", "")
-    assert mixed.reckoned == ("eyes_tilt", "right_lower_lid")
+    assert mixed.estimated == ("eyes_tilt", "right_lower_lid")
     measured = snapshot(visit()[2][-1], 200.0, "", "")
-    assert measured.joints == JOINTS and measured.reckoned == ()
+    assert measured.joints == JOINTS and measured.estimated == ()
 
 
 def test_lower_lids_are_shown_where_there_are_any() -> None:

@@ -139,6 +139,6 @@ def test_the_shipped_rods_give_every_joint_its_whole_range() -> None:
         assert 2000 <= setup.min_steps < setup.max_steps <= 10000, name
         own = setup.own_speed_steps_s
         assert own is not None
-        # What the joint may do at its steepest is near what its servo can, so that a reckoned
+        # What the joint may do at its steepest is near what its servo can, so that an estimated
         # place is seldom behind its goal for long.
         assert setup.max_speed_steps_s < 1.25 * own, name

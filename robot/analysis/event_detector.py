@@ -1,7 +1,7 @@
 """What the eyes do, found tick by tick as an eye tracker finds it: saccades, fixations, blinks.
 
 All is as the servos say: the mean of both lines of sight in space, and the opening of the upper
-lids. Of servos that tell nothing it is reckoned from their goals. What was commanded stands
+lids. Of servos that tell nothing it is estimated from their goals. What was commanded stands
 beside it, so that what the servos make of a saccade can be told.
 """
 

@@ -109,7 +109,7 @@ def _export(
     file: Path, bids: bool, out: Path | None, subject: str | None, task: str | None, force: bool
 ) -> None:
     """Write one kind of export and say what was written."""
-    from gazerig.robot.control.feedback_basis import RECKONED
+    from gazerig.robot.control.feedback_basis import ESTIMATED
     from gazerig.robot.recording.export_bids import DatasetDescription, write_bids
     from gazerig.robot.recording.export_csv import csv_files, write_csv
     from gazerig.robot.recording.gaze_angles import trace_of
@@ -147,8 +147,8 @@ def _export(
         + ", ".join(f"{n} {kind}s" for kind, n in found.items())
         + f"; labels are the plan's, {1e3 * labels.lag_s:.0f} ms later, as the eyes follow it"
     )
-    if trace.reckoned:
-        say(f"{', '.join(trace.reckoned)}: {RECKONED}")
+    if trace.estimated:
+        say(f"{', '.join(trace.estimated)}: {ESTIMATED}")
 
 
 _EVENTS = ("saccade", "fixation", "pursuit", "blink")

@@ -1,4 +1,4 @@
-"""What is measured and what is only reckoned: joints whose servos tell nothing.
+"""What is measured and what is only estimated: joints whose servos tell nothing.
 
 A hobby servo takes a place and gives none back. What stands for its place is its goal, moved
 by the speed that it is known to have: nobody sees it stick, slip or swing.
@@ -9,13 +9,13 @@ from typing import Literal
 
 from gazerig.robot.control.tick import Tick
 
-Basis = Literal["measured", "partly reckoned", "reckoned"]
+Basis = Literal["measured", "partly estimated", "estimated"]
 
-RECKONED = "reckoned from commands and known servo speeds, not measured"
-PARTLY = "in part reckoned from commands and known servo speeds, not measured"
+ESTIMATED = "estimated from commands and known servo speeds, not measured"
+PARTLY = "in part estimated from commands and known servo speeds, not measured"
 
 
-def reckoned_joints(tick: Tick) -> tuple[str, ...]:
+def estimated_joints(tick: Tick) -> tuple[str, ...]:
     """Return the joints whose servos tell nothing."""
     told = tick.joints.measured
     if not told:
@@ -24,14 +24,14 @@ def reckoned_joints(tick: Tick) -> tuple[str, ...]:
 
 
 def basis_of(
-    joints: Collection[str], reckoned: Collection[str], counts: Callable[[str], bool]
+    joints: Collection[str], estimated: Collection[str], counts: Callable[[str], bool]
 ) -> Basis:
     """Return what a figure rests on.
 
     joints: the rig's; counts: whether the figure rests on a joint of this name
     """
-    hidden = [counts(name) for name in reckoned]
+    hidden = [counts(name) for name in estimated]
     if not any(hidden):
         return "measured"
     whole = sum(hidden) == sum(counts(name) for name in joints)
-    return "reckoned" if whole else "partly reckoned"
+    return "estimated" if whole else "partly estimated"

@@ -17,7 +17,7 @@ _FOLLOWS_DEG = 0.15
 _FREE_AFTER_S = 0.5
 """A jogged joint whose wish is another for this long is no longer jogged."""
 _SAME_DEG = 0.3
-MEASURED, RECKONED = "measured", "reckoned (not measured)"
+MEASURED, ESTIMATED = "measured", "estimated (not measured)"
 _RIGHT = "text-align:right"
 _TABLE_EVERY = 5  # with every fifth picture, some 5 times a second: figures are to be read
 
@@ -120,19 +120,19 @@ class JogPanel:
 def measured_table(snapshot: Snapshot) -> str:
     """List every joint's wish and measured angle in degrees, as HTML.
 
-    What nobody measures stands in a column of its own: a reckoned angle looks like any other.
+    What nobody measures stands in a column of its own: an estimated angle looks like any other.
     """
-    reckoned = frozenset(snapshot.reckoned)
+    estimated = frozenset(snapshot.estimated)
     columns = ["wish"]
-    if not reckoned.issuperset(snapshot.joints):
+    if not estimated.issuperset(snapshot.joints):
         columns.append(MEASURED)
-    if reckoned:
-        columns.append(RECKONED)
+    if estimated:
+        columns.append(ESTIMATED)
     joints = zip(snapshot.joints, snapshot.desired_rad, snapshot.measured_rad, strict=True)
     rows = "".join(
         _row(
             escape(joint.replace("_", " ")),
-            [degrees(desired), *_under(columns[1:], joint in reckoned, degrees(now))],
+            [degrees(desired), *_under(columns[1:], joint in estimated, degrees(now))],
         )
         for joint, desired, now in joints
     )
@@ -144,9 +144,9 @@ def measured_table(snapshot: Snapshot) -> str:
     )
 
 
-def _under(columns: Sequence[str], reckoned: bool, angle_deg: float) -> list[float | None]:
+def _under(columns: Sequence[str], estimated: bool, angle_deg: float) -> list[float | None]:
     """Put an angle under what it is."""
-    kind = RECKONED if reckoned else MEASURED
+    kind = ESTIMATED if estimated else MEASURED
     return [angle_deg if column == kind else None for column in columns]
 
 

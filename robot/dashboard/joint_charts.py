@@ -22,7 +22,7 @@ MOST_POINTS = 600
 _LEAST_SPAN_DEG = 10.0
 _WISHES = (("wish", GREY, 1.5), ("permitted", AMBER, 1.5))
 _MEASURED = ("measured", BLUE, 2.0)
-_RECKONED = ("reckoned, not measured", PALE_BLUE, 2.0)
+_ESTIMATED = ("estimated, not measured", PALE_BLUE, 2.0)
 _DASH_PX = (6.0, 4.0)
 
 
@@ -92,20 +92,20 @@ def groups_of(joints: Iterable[str]) -> dict[str, tuple[ChartGroup, ...]]:
 class JointSeries:
     """The joints of the last half minute.
 
-    joints: their names; reckoned: those that nobody measures
+    joints: their names; estimated: those that nobody measures
     """
 
     def __init__(self) -> None:
         self._rows: deque[Trail] = deque()
         self.joints: tuple[str, ...] = ()
-        self.reckoned: frozenset[str] = frozenset()
+        self.estimated: frozenset[str] = frozenset()
 
     def add(self, snapshot: Snapshot) -> None:
         """Add what a snapshot brings and forget what has become too old."""
         if snapshot.joints != self.joints:  # of another rig the rows would not fit
             self._rows.clear()
             self.joints = snapshot.joints
-        self.reckoned = frozenset(snapshot.reckoned)
+        self.estimated = frozenset(snapshot.estimated)
         for row in snapshot.trail:
             if self._rows and row.t_s < self._rows[-1].t_s:  # the rig's clock was started anew
                 self._rows.clear()
@@ -169,34 +169,34 @@ class JointCharts:
         if self._what.options != tuple(menu):
             self._what.options = tuple(menu)
         groups = menu.get(self._what.value) or next(iter(menu.values()))
-        self._make(tuple((g, not traces.reckoned.isdisjoint(g.joints)) for g in groups))
+        self._make(tuple((g, not traces.estimated.isdisjoint(g.joints)) for g in groups))
         for (_, plot), group in zip(self._plots, groups, strict=True):
             plot.data = _columns(ago_s, mean_deg(angles_deg, group, traces.joints))
 
     def _make(self, wanted: tuple[tuple[ChartGroup, bool], ...]) -> None:
-        """Make the plots anew where other groups are wanted, or they are reckoned now."""
+        """Make the plots anew where other groups are wanted, or they are estimated now."""
         if wanted == self._drawn:
             return
         for plot in self._plots:
             plot.remove()
-        self._key.content = _key([reckoned for _, reckoned in wanted])
+        self._key.content = _key([estimated for _, estimated in wanted])
         with self._place:
             self._plots = [
-                self._add(group.title, reckoned, 4 + 2 * row)
-                for row, (group, reckoned) in enumerate(wanted)
+                self._add(group.title, estimated, 4 + 2 * row)
+                for row, (group, estimated) in enumerate(wanted)
             ]
         self._drawn = wanted
 
-    def _add(self, title: str, reckoned: bool, order: int) -> _Plot:
+    def _add(self, title: str, estimated: bool, order: int) -> _Plot:
         lines = [
             uplot.Series(label=name, stroke=colour, width=width, points={"show": False})
             for name, colour, width in _WISHES
         ]
-        lines.append(_result(reckoned))
+        lines.append(_result(estimated))
         # Nothing is seen of the last line: it keeps the scale from following the noise.
         room = uplot.Series(label="", stroke="transparent", width=0, points={"show": False})
         return _Plot(
-            self._gui.add_html(_title(title, reckoned), order=order),
+            self._gui.add_html(_title(title, estimated), order=order),
             self._gui.add_uplot(
                 tuple(np.zeros(1) for _ in range(len(lines) + 2)),
                 (uplot.Series(label="s"), *lines, room),
@@ -211,11 +211,11 @@ class JointCharts:
         )
 
 
-def _result(reckoned: bool) -> uplot.Series:
+def _result(estimated: bool) -> uplot.Series:
     """Return the line of what came of the wish: dashed and pale where nobody measured it."""
-    name, colour, width = _RECKONED if reckoned else _MEASURED
+    name, colour, width = _ESTIMATED if estimated else _MEASURED
     line = uplot.Series(label=name, stroke=colour, width=width, points={"show": False})
-    if reckoned:
+    if estimated:
         line["dash"] = _DASH_PX
     return line
 
@@ -230,18 +230,18 @@ def _columns(ago_s: Floats, angles_deg: Floats) -> tuple[Floats, ...]:
     return (ago_s, *(np.ascontiguousarray(column) for column in angles_deg.T), room)
 
 
-def _title(words: str, reckoned: bool) -> str:
-    said = f"{words}, degrees{'; no feedback' if reckoned else ''}"
+def _title(words: str, estimated: bool) -> str:
+    said = f"{words}, degrees{'; no feedback' if estimated else ''}"
     return f"<div style='padding:4px 12px 0;font-size:12px;opacity:.85'>{said}</div>"
 
 
-def _key(reckoned: Sequence[bool]) -> str:
+def _key(estimated: Sequence[bool]) -> str:
     """Name the lines that there are."""
     shown = [(*line, "&#8212;") for line in _WISHES]
-    if not all(reckoned):
+    if not all(estimated):
         shown.append((*_MEASURED, "&#8212;"))
-    if any(reckoned):
-        shown.append((*_RECKONED, "- -"))
+    if any(estimated):
+        shown.append((*_ESTIMATED, "- -"))
     names = "".join(
         f"<span style='margin-right:12px;white-space:nowrap'>"
         f"<span style='color:{colour};font-weight:700'>{mark}</span> {name}</span>"

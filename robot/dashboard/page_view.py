@@ -94,7 +94,7 @@ class PageView:
         if self._replay is not None:
             return {"recording": True}
         shot = self._newest
-        stopped, blind = (shot.stopped, len(shot.reckoned)) if shot else ("", 0)
+        stopped, blind = (shot.stopped, len(shot.estimated)) if shot else ("", 0)
         return {"stopped": stopped, "silent": False, "blind": blind}
 
     def _take(self, kind: bytes, data: object) -> None:

@@ -161,12 +161,12 @@ class PanelView:
 
 def of_what(snapshot: Snapshot) -> str:
     """Say that the eyes' movements are no measurements where they are none, "" elsewhere."""
-    if not any("eye" in joint for joint in snapshot.reckoned):
+    if not any("eye" in joint for joint in snapshot.estimated):
         return ""
     return frame(
         note(
             "The eyes' servos give no feedback: these are the movements the eyes should make, "
-            "reckoned from their goals, and no measurements."
+            "estimated from their goals, and no measurements."
         )
     )
 

@@ -34,7 +34,7 @@ def health(snapshot: Snapshot) -> str:
     return frame(
         f"<div style='min-height:3em'>{pill(f'guard: {level}', LEVELS[level])}{said}</div>"
         + heading("servos")
-        + servo_table(snapshot.servos, snapshot.joints, snapshot.reckoned)
+        + servo_table(snapshot.servos, snapshot.joints, snapshot.estimated)
         + heading("loop and picture")
         + _timing(snapshot.timing)
         + _picture(snapshot.picture_age_s)
@@ -43,21 +43,21 @@ def health(snapshot: Snapshot) -> str:
     )
 
 
-def servo_table(servos: Servos, joints: tuple[str, ...], reckoned: tuple[str, ...] = ()) -> str:
+def servo_table(servos: Servos, joints: tuple[str, ...], estimated: tuple[str, ...] = ()) -> str:
     """Return a row a joint: temperature, load, voltage, ticks without an answer, faults.
 
-    reckoned: joints whose servos tell nothing
+    estimated: joints whose servos tell nothing
     """
     if not servos.age_s:
         return note("nothing is known of the servos yet")
     names = ("", "&deg;C", "load", "V", "silent", "")
     head = "".join(f"<th style='font-weight:400;opacity:.7;{_RIGHT}'>{name}</th>" for name in names)
-    rows = "".join(_row(servos, i, name, name in reckoned) for i, name in enumerate(joints))
+    rows = "".join(_row(servos, i, name, name in estimated) for i, name in enumerate(joints))
     explained = (
         "amber: the guard slows the joint down; red: it stands still, or the servo is silent or "
         "at fault. silent: ticks without an answer"
     )
-    if reckoned:
+    if estimated:
         explained += (
             f". {NO_FEEDBACK}: the servo tells nothing, neither where it is nor how it does; a "
             "joint that jams or a rod that came off is not noticed"
@@ -65,7 +65,7 @@ def servo_table(servos: Servos, joints: tuple[str, ...], reckoned: tuple[str, ..
     return f"<table style='{_TABLE}'><tr>{head}</tr>{rows}</table>{note(explained)}"
 
 
-def _row(servos: Servos, i: int, joint: str, reckoned: bool) -> str:
+def _row(servos: Servos, i: int, joint: str, estimated: bool) -> str:
     silent = servos.unanswered[i] if servos.unanswered else None
     late: Strain = "over" if servos.age_s[i] > _OLD_S else ""
     figures = f"<td colspan='3' style='{_NOTHING}'>{NO_FEEDBACK}</td>"
@@ -74,7 +74,7 @@ def _row(servos: Servos, i: int, joint: str, reckoned: bool) -> str:
     more = f"<div style='color:{colour};font-weight:600;font-size:11px'>{escape(said)}</div>"
     return (
         f"<tr style='border-top:1px solid #8882'><td>{escape(joint.replace('_', ' '))}"
-        f"{more if said else ''}</td>{figures if reckoned else _figures(servos, i)}"
+        f"{more if said else ''}</td>{figures if estimated else _figures(servos, i)}"
         f"{_cell('-' if silent is None else str(silent), late)}<td></td></tr>"
     )
 

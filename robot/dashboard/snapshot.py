@@ -190,7 +190,7 @@ def snapshot(
         worst=tick.guard_result.level,
         trail=(_trail(tick),),
         joints=joints,
-        reckoned=_reckoned(tick.joints, joints),
+        estimated=_estimated(tick.joints, joints),
         lower_lids=_lower_lids(pose, joints),
     )
 
@@ -202,7 +202,7 @@ def joint_names(tick: Tick, rig: ShownRig | None = None) -> tuple[str, ...]:
     return names if len(names) == count else tuple(f"joint {i + 1}" for i in range(count))
 
 
-def _reckoned(joints: JointState, names: tuple[str, ...]) -> tuple[str, ...]:
+def _estimated(joints: JointState, names: tuple[str, ...]) -> tuple[str, ...]:
     """Return the joints whose place is told by nobody; where nothing is said of it, none."""
     if not joints.measured:
         return ()

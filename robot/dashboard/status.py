@@ -98,16 +98,16 @@ def _old_picture(age_s: float | None) -> str:
 
 def _without_feedback(snapshot: Snapshot) -> str:
     """Say of how many joints nobody knows where they are, "" where all are measured."""
-    reckoned = snapshot.reckoned
-    if not reckoned:
+    estimated = snapshot.estimated
+    if not estimated:
         return ""
     torque = dict(zip(snapshot.joints, snapshot.servos.torque, strict=False))
-    limp = sum(not torque.get(joint, True) for joint in reckoned)
+    limp = sum(not torque.get(joint, True) for joint in estimated)
     where = "shown where they should be"
     if limp:  # a finger moves them, and nobody sees it
-        where += f"; {'all' if limp == len(reckoned) else limp} without torque: may be anywhere"
+        where += f"; {'all' if limp == len(estimated) else limp} without torque: may be anywhere"
     return (
-        f"<div style='color:{AMBER}'>{len(reckoned)} of "
+        f"<div style='color:{AMBER}'>{len(estimated)} of "
         f"{counted(len(snapshot.joints), 'joint')} without feedback: {where}</div>"
     )
 

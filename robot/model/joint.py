@@ -31,7 +31,7 @@ class JointParams:
         "measured places of a push rod, each [joint angle, servo position]; they take the place of sign, ratio and zero_step"] = ()
     bus: Annotated[str, "name of its bus under buses; empty: the one under bus"] = ""
     servo_speed_deg_s: Annotated[float | None, Bounds(10, 5000),
-        "how fast a hobby servo turns its own shaft (0.12 s for 60 deg is 500): its place is reckoned with it, as it tells none; "
+        "how fast a hobby servo turns its own shaft (0.12 s for 60 deg is 500): its place is estimated from it, as it has no feedback; "
         "null: as fast as max_speed_deg_s"] = None
     gains: Annotated[tuple[int, int, int] | None, Bounds(0, 16383), "the servo's Position P, I and D Gain; null: left as they are"] = None
     torque_limit: Annotated[float | None, Bounds(0.05, 1),

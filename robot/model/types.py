@@ -254,7 +254,7 @@ class Snapshot:
     """One frozen look at the running rig, for people to watch.
 
     joints: names of the joints; measured_rad, desired_rad, commanded_rad: their angles
-    reckoned: joints whose servos tell nothing: what stands for a measurement is their goal
+    estimated: joints whose servos tell nothing: what stands for a measurement is their goal
         moved by the speed they are known to have
     R_world_head, p_world_head_m: measured head frame
     p_world_eyes_m: left and right eye centres; gaze_world: their unit lines of sight
@@ -315,5 +315,5 @@ class Snapshot:
     trail: tuple[Trail, ...] = ()
     events: tuple[SeenEvent, ...] = ()
     joints: tuple[str, ...] = ()
-    reckoned: tuple[str, ...] = ()
+    estimated: tuple[str, ...] = ()
     lower_lids: tuple[float, float] | None = None

@@ -21,7 +21,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_input import read_limited
 from gazerig.drivers.file_output import make_folder, output_file, write_file
 from gazerig.gaze.types import PART_NAMES, Floats
-from gazerig.robot.control.feedback_basis import PARTLY, RECKONED, Basis
+from gazerig.robot.control.feedback_basis import ESTIMATED, PARTLY, Basis
 from gazerig.robot.recording.gaze_angles import GazeAngles
 from gazerig.robot.recording.gaze_labels import LabelledInterval, Labels
 
@@ -35,8 +35,8 @@ _GENERATOR = "gazerig"
 _LARGEST_TEXT = 1_000_000  # bytes; of a data set's own small files
 _METHODS: dict[Basis, str] = {
     "measured": "servo encoders",
-    "partly reckoned": f"servo encoders, {PARTLY}",
-    "reckoned": RECKONED,
+    "partly estimated": f"servo encoders, {PARTLY}",
+    "estimated": ESTIMATED,
 }
 
 
@@ -158,7 +158,7 @@ def _write_frame(root: Path, subject: str, about: DatasetDescription) -> Iterato
         "have measured is taken from the angles of their servos: lines of sight in space, x + to\n"
         "the robot's own left and y + up, in degrees. Events are what the robot's models did, as\n"
         "they say themselves, moved by the lag of its eyes; amplitudes and speeds are those of\n"
-        "the samples. GazeBasis tells samples that were measured from those that were reckoned\n"
+        "the samples. GazeBasis tells samples that were measured from those that were estimated\n"
         "from commands, as the servos of some robots tell nothing.\n"
     )
     columns = {"species": {"Description": "what the participant is"}}
@@ -200,7 +200,8 @@ def _write_eye(
         "SampleCoordinateSystem": "gaze-in-world",
         "EyeTrackingMethod": _METHODS[basis],
         "GazeBasis": basis,
-        "ReckonedJoints": list(trace.reckoned),
+        "EstimatedJoints": list(trace.estimated),
+        "ReckonedJoints": list(trace.estimated),  # the key until this version
         "Manufacturer": "gazerig",
         "ManufacturersModelName": about.subject,
         "DeviceSerialNumber": _MISSING,

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from gazerig.drivers.file_output import output_text, refuse_existing, write_file
-from gazerig.robot.control.feedback_basis import RECKONED
+from gazerig.robot.control.feedback_basis import ESTIMATED
 from gazerig.robot.recording.gaze_angles import MOVEMENTS, GazeAngles
 from gazerig.robot.recording.gaze_labels import LabelledInterval, Labels
 
@@ -89,9 +89,10 @@ def _rests_on(trace: GazeAngles) -> dict[str, object]:
     }
     return {
         "joints": list(trace.joints),
-        "reckoned_joints": list(trace.reckoned),
+        "estimated_joints": list(trace.estimated),
+        "reckoned_joints": list(trace.estimated),  # the key until this version
         "basis": {key: trace.basis(of) for key, of in (gaze | there).items()},
-        "reckoned": RECKONED,
+        "estimated": ESTIMATED,
     }
 
 

@@ -9,7 +9,7 @@ y  pitch above the level, + up
 unit lines of sight. These are angles of Fick: a turn in x of 1 deg moves the gaze by
 cos(y) deg. Where a servo that an angle rests on gave no fresh answer in a tick, the angle is
 NaN: the eye was lost, as an eye tracker says it. So is what the rig has no joint for. Angles of
-servos that tell nothing are reckoned: their goals, moved by the speeds they are known to have.
+servos that tell nothing are estimated: their goals, moved by the speeds they are known to have.
 """
 
 from array import array
@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from gazerig.gaze.angles import add, angle_between, sub, yaw_pitch
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Angles2, Floats, GazeState, Target, Vec3
-from gazerig.robot.control.feedback_basis import Basis, basis_of, reckoned_joints
+from gazerig.robot.control.feedback_basis import Basis, basis_of, estimated_joints
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Command, Jog, Renew, Stop
 
@@ -73,7 +73,7 @@ class GazeAngles(NamedTuple):
     movement: (n,) index in MOVEMENTS, as planned; blink: (n,) whether one was planned
     looked_at: (n,) index in names, as planned
     messages: what happened and was asked for, (time_s, words) in command
-    joints: names of the rig's joints; reckoned: those whose servos tell nothing
+    joints: names of the rig's joints; estimated: those whose servos tell nothing
     """
 
     start_s: float
@@ -91,7 +91,7 @@ class GazeAngles(NamedTuple):
     messages: tuple[tuple[float, str], ...]
     lower_lids: Floats
     joints: tuple[str, ...]
-    reckoned: tuple[str, ...]
+    estimated: tuple[str, ...]
 
     @property
     def rate_hz(self) -> float:
@@ -100,7 +100,7 @@ class GazeAngles(NamedTuple):
 
     def basis(self, of: str) -> Basis:
         """Return whether "left", "right" or "cyclopean" gaze, "head" or "lids" are measured."""
-        return basis_of(self.joints, self.reckoned, _RESTS_ON[of].__contains__)
+        return basis_of(self.joints, self.estimated, _RESTS_ON[of].__contains__)
 
 
 def in_space(pose: GazeState) -> InSpace:
@@ -135,7 +135,7 @@ class GazeAnglesBuilder:
         self._jogged = False
         self._led = ""
         self._joints: tuple[str, ...] = ()
-        self._reckoned: dict[str, None] = {}
+        self._estimated: dict[str, None] = {}
 
     def update(self, tick: Tick) -> None:
         """Add a tick."""
@@ -147,7 +147,7 @@ class GazeAnglesBuilder:
         lids = (pose.lid_left, pose.lid_right, pose.lower_left, pose.lower_right)
         head = tuple(map(degrees, pose.head_rad))
         self._joints = tick.guard_result.joints
-        self._reckoned.update(dict.fromkeys(reckoned_joints(tick)))
+        self._estimated.update(dict.fromkeys(estimated_joints(tick)))
         if missing:
             lost_left, lost_right = not _LEFT.isdisjoint(missing), not _RIGHT.isdisjoint(missing)
             cyclopean = _LOST if lost_left or lost_right else cyclopean
@@ -178,7 +178,7 @@ class GazeAnglesBuilder:
         return GazeAngles(
             self._start_s, a[:, 0], a[:, 1:3], a[:, 3:5], a[:, 5:7], a[:, 7:10], a[:, 10:12],
             a[:, 14:16], codes[:, 0], codes[:, 1] > 0, codes[:, 2], tuple(self._numbers),
-            tuple(self._messages), a[:, 12:14], self._joints, tuple(self._reckoned),
+            tuple(self._messages), a[:, 12:14], self._joints, tuple(self._estimated),
         )  # fmt: skip
 
     def _note_orders(self, tick: Tick, time_s: float) -> None:

@@ -23,7 +23,7 @@ from gazerig.robot.control.command_handler import (
     ParamsSaved,
     as_changes,
 )
-from gazerig.robot.control.feedback_basis import reckoned_joints
+from gazerig.robot.control.feedback_basis import estimated_joints
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.control.tick_text import lead_words, target_name
 from gazerig.robot.model.clock import Clock
@@ -99,7 +99,8 @@ class Pulse:
             "why": tick.target.why,
             "phase": tick.gaze.phase,
             "joints_deg": {name: round(degrees(angle), 2) for name, angle in measured},
-            "reckoned": list(reckoned_joints(tick)),
+            "estimated": list(estimated_joints(tick)),
+            "reckoned": list(estimated_joints(tick)),  # the key until this version
             "said": list(self._said),
         }
 

@@ -37,7 +37,7 @@ COMPARING = "comparing"
 class Comparison(NamedTuple):
     """What was found, and the files that say so.
 
-    warning: that one run is measured and the other reckoned, "" where both are alike
+    warning: that one run is measured and the other estimated, "" where both are alike
     """
 
     differences: tuple[MeasureDifference, ...]

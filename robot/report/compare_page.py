@@ -137,7 +137,7 @@ def banners(abouts: tuple[RunHeader, RunHeader], runs: Sequence[GazeTrace]) -> t
 
 
 def mixed(abouts: tuple[RunHeader, RunHeader], runs: Sequence[GazeTrace]) -> str:
-    """Warn of a measured run beside a reckoned one, "" where both rest on the same."""
+    """Warn of a measured run beside an estimated one, "" where both rest on the same."""
     first, second = (run.joints.whole_basis for run in runs)
     if first == second:
         return ""

@@ -23,7 +23,7 @@ from gazerig.robot.analysis.event_detector import (
 from gazerig.robot.analysis.gaze_on_face import on_face
 from gazerig.robot.analysis.lid_opening import LOWER, UPPER, openings
 from gazerig.robot.analysis.summary import cyclopean
-from gazerig.robot.control.feedback_basis import reckoned_joints
+from gazerig.robot.control.feedback_basis import estimated_joints
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Ask
 from gazerig.robot.report.joint_basis import JointBasis, joints_of
@@ -86,7 +86,7 @@ class GazeTrace:
     """A whole run: columns (one value a tick), and events in the order of their beginning.
 
     asked_blinks: as the models commanded them; kinds: seconds per kind of target
-    joints: of the rig, and which of them are reckoned
+    joints: of the rig, and which of them are estimated
     """
 
     rows: Floats
@@ -147,7 +147,7 @@ class GazeTraceBuilder:
         self._mode = 0
         self._last_s: float | None = None
         self._names: tuple[str, ...] = ()
-        self._reckoned: dict[str, None] = {}
+        self._estimated: dict[str, None] = {}
 
     def update(self, tick: Tick) -> None:
         """Take a tick; what happens while somebody has stopped the robot does not count."""
@@ -166,7 +166,7 @@ class GazeTraceBuilder:
             else:
                 self._blinks.append(event)
         self._names = tick.guard_result.joints
-        self._reckoned.update(dict.fromkeys(reckoned_joints(tick)))
+        self._estimated.update(dict.fromkeys(estimated_joints(tick)))
         lids = openings(tick.gaze.lid_left, tick.gaze.lid_right, self._names, UPPER)
         asked = self._asked_lids.update(tick.t_s, *lids) if lids is not None else None
         if asked is not None:
@@ -187,7 +187,7 @@ class GazeTraceBuilder:
             tuple(self._blinks),
             tuple(self._asked_blinks),
             dict(self._kinds),
-            joints_of(self._names, self._reckoned),
+            joints_of(self._names, self._estimated),
         )
 
 

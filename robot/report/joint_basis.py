@@ -14,11 +14,11 @@ class JointBasis:
     """The joints of a run.
 
     names: in their order; empty where nobody says, and then nothing is left out
-    reckoned: those whose servos tell nothing
+    estimated: those whose servos tell nothing
     """
 
     names: tuple[str, ...] = ()
-    reckoned: tuple[str, ...] = ()
+    estimated: tuple[str, ...] = ()
 
     def has(self, *names: str) -> bool:
         """Return whether any of some joints is there."""
@@ -37,13 +37,13 @@ class JointBasis:
     def basis(self, group: str) -> Basis:
         """Return what a section of the report rests on: its lids, or eyes and neck."""
         lids = group == LIDS
-        return basis_of(self.names, self.reckoned, lambda name: name.endswith("_lid") == lids)
+        return basis_of(self.names, self.estimated, lambda name: name.endswith("_lid") == lids)
 
     @property
     def whole_basis(self) -> Basis:
         """Return what the whole report rests on."""
         each = {self.basis(group) for group in GROUPS if group != LIDS or self.has(*UPPER)}
-        return each.pop() if len(each) == 1 else "partly reckoned"
+        return each.pop() if len(each) == 1 else "partly estimated"
 
     def left_out(self, key: str) -> str:
         """Return why a measure or a figure can say nothing of these joints, "" where it can."""
@@ -65,9 +65,9 @@ def _no_neck(joints: JointBasis) -> bool:
     return not joints.has("neck_yaw", "neck_pitch", "neck_roll")
 
 
-def _eyes_reckoned(joints: JointBasis) -> bool:
-    return any("eye" in name for name in joints.reckoned) and all(
-        name in joints.reckoned for name in joints.names if "eye" in name
+def _eyes_estimated(joints: JointBasis) -> bool:
+    return any("eye" in name for name in joints.estimated) and all(
+        name in joints.estimated for name in joints.names if "eye" in name
     )
 
 
@@ -95,13 +95,13 @@ _RULES: tuple[tuple[Sequence[str], Callable[[JointBasis], bool], str], ...] = (
     ),
     (
         ("unasked",),
-        _eyes_reckoned,
-        "Saccades that nobody asked for are left out: a reckoned eye does as it is told, whatever "
+        _eyes_estimated,
+        "Saccades that nobody asked for are left out: an estimated eye does as it is told, whatever "
         "the real one does.",
     ),
 )
 
 
-def joints_of(names: Iterable[str], reckoned: Iterable[str]) -> JointBasis:
+def joints_of(names: Iterable[str], estimated: Iterable[str]) -> JointBasis:
     """Gather what ticks say of their joints."""
-    return JointBasis(in_order(names), in_order(reckoned))
+    return JointBasis(in_order(names), in_order(estimated))

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import jinja2
 
-from gazerig.robot.control.feedback_basis import RECKONED, Basis
+from gazerig.robot.control.feedback_basis import ESTIMATED, Basis
 from gazerig.robot.report.gaze_trace import GazeTrace
 from gazerig.robot.report.joint_basis import JointBasis
 from gazerig.robot.report.norm_bands import BANDS, GROUPS, NormBand
@@ -103,17 +103,17 @@ def left_out(joints: JointBasis, group: str) -> tuple[str, ...]:
 
 def banner(joints: JointBasis) -> str:
     """Return what a reader must know first where servos tell nothing, "" where all measure."""
-    if not joints.reckoned:
+    if not joints.estimated:
         return ""
-    if joints.whole_basis == "reckoned":
+    if joints.whole_basis == "estimated":
         return (
             "Nothing here is measured: the servos of this rig tell nothing. Where this page speaks "
-            f"of what was found, it is {RECKONED}. Real eyes may lag, stick or swing, and the "
+            f"of what was found, it is {ESTIMATED}. Real eyes may lag, stick or swing, and the "
             "verdicts would not know."
         )
     return (
-        f"Not all of this is measured: the servos of {', '.join(joints.reckoned)} tell nothing. "
-        f"What rests on them is {RECKONED}; sections that do so say it."
+        f"Not all of this is measured: the servos of {', '.join(joints.estimated)} tell nothing. "
+        f"What rests on them is {ESTIMATED}; sections that do so say it."
     )
 
 

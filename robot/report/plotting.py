@@ -44,7 +44,7 @@ class Shown(NamedTuple):
 class Drawing(NamedTuple):
     """One figure: its key (the file's name), the section it stands in, title and caption.
 
-    caption: "{measured}" in it becomes what the runs' figures are: measured, or reckoned
+    caption: "{measured}" in it becomes what the runs' figures are: measured, or estimated
     """
 
     key: str
@@ -61,7 +61,7 @@ def caption_of(drawing: Drawing, runs: Sequence[Shown]) -> str:
 
 
 def basis_words(runs: Sequence[Shown], group: str) -> str:
-    """Tell in a word or some what runs together rest on, e.g. "measured or reckoned"."""
+    """Tell in a word or some what runs together rest on, e.g. "measured or estimated"."""
     return " or ".join(dict.fromkeys(shown.run.joints.basis(group) for shown in runs))
 
 

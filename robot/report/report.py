@@ -133,7 +133,7 @@ def drawn(runs: Sequence[Shown], progress: Progress) -> tuple[Picture, ...]:
 def _numbers(finding: MeasureResult, run: GazeTrace) -> dict[str, object]:
     """Return a finding as plain JSON; what is not known is null.
 
-    basis: "measured", "partly reckoned" or "reckoned"
+    basis: "measured", "partly estimated" or "estimated"
     """
     band = finding.band
     return {
