@@ -1,7 +1,6 @@
 """The machine of a recorded run: gives the models what the real one gave them, in order."""
 
 from collections import deque
-from collections.abc import Mapping, Sequence
 from typing import TypeVar
 
 from gazerig.drivers.errors import SetupError
@@ -9,12 +8,11 @@ from gazerig.drivers.types import Detections
 from gazerig.gaze.types import Percept
 from gazerig.robot.control.body import Body
 from gazerig.robot.model.frames import CameraMount, PoseHistory
-from gazerig.robot.model.joint import JointParams
-from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.model.types import JointAngles, JointState
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
+from gazerig.robot.recording.forwarding_body import ForwardingBody
 from gazerig.robot.recording.tick_record import (
     BodyRecord,
     MeasuredJoints,
@@ -26,16 +24,14 @@ from gazerig.robot.recording.tick_record import (
 H = TypeVar("H", bound=BodyRecord)
 
 
-class PlaybackBody(Body):
+class PlaybackBody(ForwardingBody):
     """A body that does what it is told, and says what the recorded one said.
 
     The body behind it sees every call, so that its bus carries the bytes of the first run.
     """
 
     def __init__(self, body: Body) -> None:
-        # Not set up as a body of its own: it has no joints, only the other's.
-        self.bus, self.names = body.bus, body.names
-        self._body = body
+        super().__init__(body)
         self._moment: TickRecord | None = None
         self._said: deque[BodyRecord] = deque()
         self._newest: JointState | None = None
@@ -53,16 +49,6 @@ class PlaybackBody(Body):
         self._said.clear()
         self._newest = None
 
-    def retune(
-        self, joints: Mapping[str, JointParams], gentle_deg_s: float
-    ) -> dict[int, tuple[float, float]]:
-        """Count angles otherwise from now on."""
-        return self._body.retune(joints, gentle_deg_s)
-
-    def reach(self) -> tuple[JointLimit, ...]:
-        """Return the ranges and speeds that servos keep to as they were set up."""
-        return self._body.reach()
-
     def start(self) -> JointAngles:
         """Start the body behind; give the recorded goals."""
         goals = self._body.start()
@@ -77,18 +63,6 @@ class PlaybackBody(Body):
             self._newest = said.joints
         return self._newest if self._newest is not None else joints
 
-    def write(self, command_rad: JointAngles) -> None:
-        """Send one goal to every servo."""
-        self._body.write(command_rad)
-
-    def angles(self, steps: Sequence[float]) -> JointAngles:
-        """Return the joint angles of servo positions."""
-        return self._body.angles(steps)
-
-    def let_go(self) -> None:
-        """Torque off at once."""
-        self._body.let_go()
-
     def take_hold(self) -> JointAngles:
         """Torque on again; give the recorded goals.
 
@@ -102,10 +76,6 @@ class PlaybackBody(Body):
         goals = self._body.take_hold()
         said = self._next(TorqueEnabled)
         return said.goals_rad if said is not None else goals
-
-    def stop(self) -> None:
-        """Torque off and close the bus."""
-        self._body.stop()
 
     def _next(self, kind: type[H]) -> H | None:
         """Return the next thing of a kind; what comes before it was not asked for."""
