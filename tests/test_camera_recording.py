@@ -175,6 +175,7 @@ def test_damaged_lengths_are_named(file):
         (lambda p: None, "no recording at"),
         (lambda p: p.mkdir(), "is not a file"),
         (lambda p: p.touch(), "is no recording"),
+        (lambda p: p.write_text("short"), "is no recording"),
         (lambda p: p.write_text("hello world, this is text"), "is no recording"),
         (lambda p: write(p, []), "holds no picture"),
     ],

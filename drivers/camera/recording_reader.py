@@ -4,20 +4,21 @@ import struct
 from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import NamedTuple
 
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Channel, Header, Message
-from mcap.stream_reader import MAGIC_SIZE, read_magic
 
 from gazerig.drivers.camera import recording_format as fmt
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
+from gazerig.drivers.mcap_file import MAGIC, open_mcap
 
 _HEAD = 9  # bytes of a record before its content: kind and length
 _LARGEST = 1 << 30  # bytes of a message; more is damage
+_CURE = "make one with gazerig record-camera; films go to --video"
 _FIXED = 22  # bytes of a message before its data
 
 
@@ -49,7 +50,7 @@ class Recording:
             CameraError: it is absent, no recording, or holds no picture.
         """
         self._path = path
-        self._file = _open(path)
+        self._file = open_mcap(path, CameraError, _CURE)
         try:
             self._channels: dict[int, str] = {}
             self._pictures: list[_Picture] = []
@@ -156,7 +157,7 @@ class Recording:
     def _records(self) -> Iterator[tuple[int, _MessagePlace]]:
         """Walk over the records that are whole: kind and place of each."""
         end = self._path.stat().st_size
-        offset = MAGIC_SIZE
+        offset = len(MAGIC)
         while offset + _HEAD <= end:
             self._file.seek(offset)
             head = self._file.read(_HEAD)
@@ -172,23 +173,3 @@ class Recording:
         """Read the beginning of a record's content."""
         self._file.seek(place.offset)
         return ReadDataStream(BytesIO(self._file.read(min(length, place.length))))
-
-
-def _open(path: Path) -> BinaryIO:
-    """Open a file that begins as MCAP files do."""
-    if not path.exists():
-        raise CameraError(f"no recording at {path}: check the path")
-    if not path.is_file():
-        raise CameraError(f"{path} is not a file: name a recording in it")
-    try:
-        file = path.open("rb")
-    except OSError as error:
-        raise CameraError(f"cannot read {path} ({error.strerror}): check its rights") from error
-    try:
-        read_magic(ReadDataStream(file))
-    except McapError as error:
-        file.close()
-        raise CameraError(
-            f"{path} is no recording: make one with gazerig record-camera; films go to --video"
-        ) from error
-    return file

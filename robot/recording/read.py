@@ -18,6 +18,7 @@ from mcap.records import Channel, Chunk, DataEnd, Header, Metadata
 from zstandard import ZstdError
 
 from gazerig.drivers.errors import DriverError, SetupError
+from gazerig.drivers.mcap_file import MAGIC, open_mcap
 from gazerig.gaze.types import Percept
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.recording import run_format as fmt
@@ -25,7 +26,7 @@ from gazerig.robot.recording.chunk_reader import LARGEST_BYTES, unpacked
 from gazerig.robot.recording.run_info import FORMAT, PROFILE, RunEnd, RunInfo, end_of, info_of
 from gazerig.robot.recording.tick_record import TickRecord, from_json, percept_from_json
 
-_MAGIC = b"\x89MCAP0\r\n"
+_CURE = "make one with gazerig run --record"
 _CAMERA = "gazerig-camera-"
 _RUN = PROFILE.rstrip("0123456789")
 _HEAD = 9  # bytes of a record before its content: kind and length
@@ -75,7 +76,7 @@ class RunRecording:
         self.end = RunEnd()
         self._chunks: list[_ChunkIndex] = []
         found: RunInfo | None = None
-        with _opened(self.path) as file:
+        with open_mcap(self.path, BadRecording, _CURE) as file:
             for kind, offset, length in self._records(file):
                 if kind == Opcode.HEADER:
                     with _damage(self.path):
@@ -169,7 +170,7 @@ class RunRecording:
     def _messages(self, wanted: set[str]) -> Iterator[tuple[str, memoryview]]:
         """Return topic and data of the messages of some topics, in the order of the file."""
         topics: dict[int, str] = {}
-        with _opened(self.path) as file:
+        with open_mcap(self.path, BadRecording, _CURE) as file:
             for place in self._chunks:
                 with _damage(self.path):
                     chunk = Chunk.read(_content(file, place.offset, place.length))
@@ -220,8 +221,8 @@ class RunRecording:
         """Walk over the records that are whole: kind, offset and length of each."""
         end = file.seek(0, 2)
         # Whoever wrote these bytes had written all that comes before.
-        closed = end > 2 * len(_MAGIC) and _bytes(file, end - len(_MAGIC), len(_MAGIC)) == _MAGIC
-        offset = len(_MAGIC)
+        closed = end > 2 * len(MAGIC) and _bytes(file, end - len(MAGIC), len(MAGIC)) == MAGIC
+        offset = len(MAGIC)
         while offset + _HEAD <= end:
             head = _bytes(file, offset, _HEAD)
             kind, length = head[0], int.from_bytes(head[1:], "little")
@@ -290,22 +291,6 @@ def _damage(path: Path) -> Iterator[None]:
     except DAMAGE as error:
         what = " ".join(str(error).split())[:80]
         raise BadRecording(f"{path} is damaged ({what}): copy it anew") from None
-
-
-def _opened(path: Path) -> BinaryIO:
-    """Open a file that begins as MCAP files do."""
-    if not path.exists():
-        raise BadRecording(f"no recording at {path}: check the path")
-    if not path.is_file():
-        raise BadRecording(f"{path} is not a file: name a recording in it")
-    try:
-        file = path.open("rb")
-    except OSError as error:
-        raise BadRecording(f"cannot read {path} ({error.strerror}): check its rights") from None
-    if file.read(len(_MAGIC)) != _MAGIC:
-        file.close()
-        raise BadRecording(f"{path} is no recording: make one with gazerig run --record")
-    return file
 
 
 def _bytes(file: BinaryIO, offset: int, length: int) -> bytes:
