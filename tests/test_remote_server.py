@@ -365,7 +365,7 @@ def test_a_servo_that_refuses_torque_is_named(
 
     rig.stop("test")
     with monkeypatch.context() as patch:
-        patch.setattr(beat.robot.body, "take_hold", refuse)
+        patch.setattr(beat.robot.body, "enable_torque", refuse)
         with pytest.raises(RequestRejected, match="still stopped: neck_yaw: overload"):
             rig.resume()
     rig.resume()

@@ -274,8 +274,8 @@ def test_a_refused_resumption_is_refused_again() -> None:
         )
     )
     with pytest.raises(SetupError, match="servo 7 is mute"):
-        body.take_hold()
-    assert body.take_hold() == goals
+        body.enable_torque()
+    assert body.enable_torque() == goals
     assert body.read(0.005) is other
     assert body.read(0.005) is tick.joints
     assert body.read(0.010) is tick.joints  # more readings than there were

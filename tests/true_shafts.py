@@ -285,11 +285,11 @@ class Bench:
 
     def stop(self) -> None:
         """Torque off."""
-        self.body.let_go()
+        self.body.disable_torque()
 
     def resume(self) -> None:
         """Torque on again where the joints are."""
-        goals = self.body.take_hold()
+        goals = self.body.enable_torque()
         self._began_s, self.slot = self.shafts.now_s(), 0
         self.guard.reset(self._began_s, goals)
 

@@ -21,7 +21,7 @@ from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.models import channel_label
 from gazerig.drivers.hobby_board.release import TRIES, switch_off
 from gazerig.drivers.hobby_board.silence import Silence
-from gazerig.drivers.hobby_board.start import take_on
+from gazerig.drivers.hobby_board.start import enable_channels
 from gazerig.drivers.hobby_board.supervisor import BoardSupervisor
 from gazerig.drivers.port_bus import CUT, PortBus
 from gazerig.drivers.released import Released
@@ -155,7 +155,7 @@ class HobbyBoardBus(PortBus):
             if not self._told:
                 self._told = True
                 self._log.add(UNMEASURED)
-            take_on(self._board, self._channels, self._log)
+            enable_channels(self._board, self._channels, self._log)
         except ServoMissing:
             self.disable_torque()
             raise

@@ -97,13 +97,13 @@ class Channel:
         """Note that it holds its goal and follows others."""
         self.held = self._placed = True
 
-    def let_go(self) -> None:
+    def release(self) -> None:
         """Note that it follows no goals any more; its pulses may go on."""
         self.held = self.entering = self.rearmed = False
 
     def stop(self) -> None:
         """Note that it gives no pulses: its servo is limp."""
-        self.let_go()
+        self.release()
         self.on = False
         self.ramp.stop()
 

@@ -34,7 +34,7 @@ def every_pulse(board: Board, setups: Sequence[ServoSetup]) -> tuple[int, ...]:
     raise ServoMissing(f"{where}: answers get lost: {board.texts.noise}")
 
 
-def take_on(board: Board, channels: Sequence[Channel], log: EventLog) -> None:
+def enable_channels(board: Board, channels: Sequence[Channel], log: EventLog) -> None:
     """Take hold of every channel, those without pulses one after another.
 
     Raises:

@@ -61,7 +61,7 @@ class BoardSupervisor:
         self.engaged = False
         self._pending.clear()
         for channel in self._channels:
-            channel.let_go()
+            channel.release()
 
     def mark_all_for_recovery(self) -> None:
         """Trust no channel to be as it was left: each is taken hold of anew."""
@@ -247,7 +247,7 @@ class BoardSupervisor:
 
     def _drop(self, channel: Channel) -> None:
         if channel.held:
-            channel.let_go()
+            channel.release()
             self._pending.append(channel)
 
     def _give_up(self) -> None:

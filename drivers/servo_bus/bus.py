@@ -25,7 +25,7 @@ from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.servo_bus.supervisor import Supervisor
 from gazerig.drivers.servo_bus.sync_read import GroupReply, Reader, ServoReply
 from gazerig.drivers.servo_bus.torque import switch_off
-from gazerig.drivers.servo_bus.transaction import Line
+from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import Feedback, ServoSetup
 
 RESTART_S = 0.1
@@ -47,7 +47,7 @@ class SmartServoBus(PortBus):
         ValueError: more servos than one packet of goals can hold, or a range beyond one turn.
     """
 
-    _line: Line
+    _line: Transactions
     _supervisor: Supervisor
 
     def __init__(
@@ -71,7 +71,7 @@ class SmartServoBus(PortBus):
         self._goals = family.goals(self._ids)
         self._nothing = Feedback.of_none(len(self._ids))
         self._log = EventLog()
-        self._line = Line(
+        self._line = Transactions(
             port,
             family,
             params.prompt_timeout_ms / 1000.0,

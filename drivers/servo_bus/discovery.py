@@ -13,7 +13,7 @@ from gazerig.drivers.event_log import EventLog, servo_label
 from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort
 from gazerig.drivers.servo_bus.family import Family, Identity, Status
 from gazerig.drivers.servo_bus.registers import REPLY_S, Registers, transact
-from gazerig.drivers.servo_bus.transaction import Line
+from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import ServoSetup
 
 FIND_QUIET_S = 0.04
@@ -221,7 +221,7 @@ def _found(family: Family, status: Status, baud: int) -> FoundServo | None:
     return FoundServo(status.id, *identity, baud, family.model_name(identity.model_number))
 
 
-def identities(line: Line) -> dict[int, Identity]:
+def identities(line: Transactions) -> dict[int, Identity]:
     """Ask all servos of a bus who is there, expected or not."""
     quiet_s = min(line.family.quiet_s, FIND_QUIET_S)
     found, _ = scan_ids(line.port, line.family, line.baud, quiet_s)
@@ -229,7 +229,7 @@ def identities(line: Line) -> dict[int, Identity]:
 
 
 def find(
-    line: Line, registers: Registers, setups: Sequence[ServoSetup], log: EventLog
+    line: Transactions, registers: Registers, setups: Sequence[ServoSetup], log: EventLog
 ) -> dict[int, int]:
     """Find every servo and check its model and firmware; return the firmware of each.
 

@@ -12,7 +12,7 @@ from gazerig.drivers.event_log import EventLog, register_label, servo_label
 from gazerig.drivers.servo_bus.family import Register
 from gazerig.drivers.servo_bus.read_plan import AddressMap
 from gazerig.drivers.servo_bus.registers import Registers
-from gazerig.drivers.servo_bus.transaction import Line
+from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import ServoSetup
 
 
@@ -38,7 +38,7 @@ class Provisioning:
 
     def __init__(
         self,
-        line: Line,
+        line: Transactions,
         registers: Registers,
         setups: Sequence[ServoSetup],
         log: EventLog,

@@ -11,7 +11,7 @@ from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.servo_bus.faults import Health
 from gazerig.drivers.servo_bus.provisioning import Provisioning
 from gazerig.drivers.servo_bus.torque import find_faults, insist, positions, switch_off, switch_on
-from gazerig.drivers.servo_bus.transaction import Line
+from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.servo_bus.turn import nearest_turn
 from gazerig.drivers.slow_entry import entry_speed_steps_s
 from gazerig.drivers.types import ServoSetup
@@ -33,7 +33,7 @@ class Recovery:
 
     def __init__(
         self,
-        line: Line,
+        line: Transactions,
         provisioning: Provisioning,
         setups: Mapping[int, ServoSetup],
         watchdog: int,

@@ -10,7 +10,7 @@ from gazerig.drivers.servo_bus.read_plan import ReadPlan
 from gazerig.drivers.servo_bus.read_windows import Sample
 from gazerig.drivers.servo_bus.recovery import Recovery
 from gazerig.drivers.servo_bus.torque import rearm_tripped
-from gazerig.drivers.servo_bus.transaction import TRIES, Line
+from gazerig.drivers.servo_bus.transaction import TRIES, Transactions
 from gazerig.drivers.slow_entry import SlowEntry
 from gazerig.drivers.types import ServoSetup
 
@@ -36,7 +36,7 @@ class Supervisor(ABC):
 
     def __init__(
         self,
-        line: Line,
+        line: Transactions,
         setups: Mapping[int, ServoSetup],
         recovery: Recovery,
         health: Health,

@@ -12,7 +12,7 @@ from gazerig.drivers.servo_bus.poll_list import PollList, silent_ones
 from gazerig.drivers.servo_bus.read_plan import ReadPlan
 from gazerig.drivers.servo_bus.read_windows import ReadWindow, Sample, WindowSchedule
 from gazerig.drivers.servo_bus.sync_packets import GroupRead, SyncRead, Values
-from gazerig.drivers.servo_bus.transaction import Line
+from gazerig.drivers.servo_bus.transaction import Transactions
 
 MOST_GROUPS = 64
 """So many prepared exchanges are kept."""
@@ -51,7 +51,7 @@ class Reader:
         plan: how they are read.
     """
 
-    def __init__(self, line: Line, polled: PollList, plan: ReadPlan) -> None:
+    def __init__(self, line: Transactions, polled: PollList, plan: ReadPlan) -> None:
         self._line = line
         self.poll_list = polled
         self._together, self._alone, self._second = plan.together, plan.alone, plan.second

@@ -14,7 +14,7 @@ from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
 from gazerig.drivers.released import Released
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.family import Family
-from gazerig.drivers.servo_bus.transaction import Line
+from gazerig.drivers.servo_bus.transaction import Transactions
 
 TRIES = 3
 TRIPPED = 255
@@ -32,7 +32,7 @@ LEAST_S, MOST_S = 0.005, 0.02
 Value = TypeVar("Value")
 
 
-def positions(line: Line, ids: Sequence[int]) -> tuple[int, ...]:
+def positions(line: Transactions, ids: Sequence[int]) -> tuple[int, ...]:
     """Read every position, as the servos count.
 
     Raises:
@@ -43,7 +43,7 @@ def positions(line: Line, ids: Sequence[int]) -> tuple[int, ...]:
     return tuple(found[servo_id] for servo_id in ids)
 
 
-def insist(line: Line, ids: Sequence[int], name: str, values: Sequence[int]) -> None:
+def insist(line: Transactions, ids: Sequence[int], name: str, values: Sequence[int]) -> None:
     """Write a register and read it back until every servo has its value.
 
     Raises:
@@ -58,14 +58,14 @@ def insist(line: Line, ids: Sequence[int], name: str, values: Sequence[int]) -> 
     )
 
 
-def _send_goals(line: Line, wanted: Mapping[int, tuple[int, int]]) -> None:
+def _send_goals(line: Transactions, wanted: Mapping[int, tuple[int, int]]) -> None:
     goals = [goal for goal, _ in wanted.values()]
     speeds = [speed for _, speed in wanted.values()]
     line.send(line.family.goals(tuple(wanted)).packet(goals, speeds))
 
 
 def _ask_goals(
-    line: Line, present: Mapping[int, tuple[int, int]], ids: Sequence[int]
+    line: Transactions, present: Mapping[int, tuple[int, int]], ids: Sequence[int]
 ) -> dict[int, tuple[int, int]]:
     """Read goals and their speeds; one that went with a limp servo's place counts as its own.
 
@@ -84,7 +84,7 @@ def _ask_goals(
 
 
 def _until(
-    line: Line,
+    line: Transactions,
     wanted: Mapping[int, Value],
     send: Callable[[Mapping[int, Value]], None],
     ask: Callable[[Sequence[int]], Mapping[int, Value]],
@@ -106,7 +106,9 @@ def _until(
     )
 
 
-def switch_on(line: Line, ids: Sequence[int], goals: Sequence[int], speeds: Sequence[int]) -> None:
+def switch_on(
+    line: Transactions, ids: Sequence[int], goals: Sequence[int], speeds: Sequence[int]
+) -> None:
     """Set the goals, then the torque, and see that every position is still the same.
 
     Raises:
@@ -144,7 +146,7 @@ def switch_on(line: Line, ids: Sequence[int], goals: Sequence[int], speeds: Sequ
         _until(line, wanted, send, partial(_ask_goals, line, {}), "goal_position")
 
 
-def switch_off(line: Line, ids: Sequence[int]) -> Released:
+def switch_off(line: Transactions, ids: Sequence[int]) -> Released:
     """Take the torque away, watchdog first, and see that it is gone."""
     left = tuple(ids)
     found: dict[int, int] = {}
@@ -176,18 +178,18 @@ def disable_torque(port: BusPort, family: Family, baud: int, ids: Sequence[int])
     """
     if not port.setBaudRate(baud):
         raise PortError(f"{port.port_name} cannot run at {baud} bit/s")
-    released = switch_off(Line(port, family, LEAST_S, MOST_S, baud), ids)
+    released = switch_off(Transactions(port, family, LEAST_S, MOST_S, baud), ids)
     return (*released.holding, *released.mute)
 
 
-def find_faults(line: Line, ids: Sequence[int]) -> dict[int, int]:
+def find_faults(line: Transactions, ids: Sequence[int]) -> dict[int, int]:
     """Return the error bits of the servos that answer and have any."""
     found = line.ask(ids, line.family.error_register)
     return {servo_id: bits for servo_id, bits in found.items() if bits}
 
 
 def rearm_tripped(
-    line: Line, ids: Sequence[int], watchdog: int, clip: Callable[[int, int], int]
+    line: Transactions, ids: Sequence[int], watchdog: int, clip: Callable[[int, int], int]
 ) -> tuple[int, ...]:
     """Return servos whose bus watchdog has tripped their present position as goal and arm it anew.
 
@@ -207,7 +209,7 @@ def rearm_tripped(
     return healed
 
 
-def _raise_missing(line: Line, missing: Sequence[int]) -> None:
+def _raise_missing(line: Transactions, missing: Sequence[int]) -> None:
     if missing:
         named = ", ".join(line.label(servo_id) for servo_id in missing)
         raise ServoMissing(f"{line.port.port_name}: no answer from {named}: check its cable")

@@ -16,7 +16,7 @@ _ROOM = 4096
 _BACKLOG_S = 0.05
 
 
-class Line:
+class Transactions:
     """A port with the time-outs of one bus; every method may raise BusLost.
 
     What is asked and written here goes through sync read and sync write even for a single

@@ -46,7 +46,7 @@ class Body:
         self.bus = bus
         self.names = in_order(joints)
         self._park_rad = dict(park_rad or {})
-        self._let_go = False
+        self._torque_off = False
         self._gentle_deg_s = gentle_deg_s
         self._set_up = tuple(joints[name] for name in self.names)
         self._take(self._set_up)
@@ -99,7 +99,7 @@ class Body:
         """
         self.bus.open()
         try:
-            return self.take_hold()
+            return self.enable_torque()
         except BaseException:
             self.stop()
             raise
@@ -114,7 +114,7 @@ class Body:
         try:
             feedback = self.bus.read(t_s)
         except BusLost:
-            if not self._let_go:
+            if not self._torque_off:
                 raise
             feedback = self._nothing
         if feedback.missing:
@@ -146,16 +146,16 @@ class Body:
         """Return the joint angles of servo positions."""
         return tuple([angle(step) for angle, step in zip(self._to_rad, steps, strict=True)])
 
-    def let_go(self) -> None:
+    def disable_torque(self) -> None:
         """Torque off at once; the bus stays open and readings go on.
 
         Raises:
             BusLost: the port is gone; the torque is taken off when it is back.
         """
-        self._let_go = True
+        self._torque_off = True
         self.bus.disable_torque()
 
-    def take_hold(self) -> JointAngles:
+    def enable_torque(self) -> JointAngles:
         """Torque on again where the joints are; give the goals in force.
 
         Raises:
@@ -163,7 +163,7 @@ class Body:
             BusLost: the port is gone.
         """
         goals = self.bus.enable_torque()
-        self._let_go = False
+        self._torque_off = False
         self._set_up = self._joints
         return self.angles(goals)
 

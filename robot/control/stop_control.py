@@ -55,7 +55,7 @@ class StopControl:
             self._refused = refusal
             return CommandReply(refusal)
         try:
-            goals = body.take_hold()
+            goals = body.enable_torque()
         except (SetupError, ServoFault, BusLost) as error:
             self._told.append(f"still stopped: {error}")
             return CommandReply(self._told[-1])
@@ -68,6 +68,6 @@ class StopControl:
         """Take the torque off; where the bus is gone it does so itself when it is back."""
         self._released_s = t_s
         try:
-            body.let_go()
+            body.disable_torque()
         except DriverError as error:
             self._told.append(f"the stop is remembered, torque is NOT YET off: {error}")

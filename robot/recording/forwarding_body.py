@@ -34,13 +34,13 @@ class ForwardingBody(Body):
         """Return the joint angles of servo positions."""
         return self._body.angles(steps)
 
-    def let_go(self) -> None:
+    def disable_torque(self) -> None:
         """Torque off at once.
 
         Raises:
             BusLost: the port is gone.
         """
-        self._body.let_go()
+        self._body.disable_torque()
 
     def stop(self) -> None:
         """Torque off and close the bus."""

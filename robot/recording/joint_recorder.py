@@ -37,7 +37,7 @@ class JointRecorder(ForwardingBody):
         self._note(MeasuredJoints(t_s, joints))
         return joints
 
-    def take_hold(self) -> JointAngles:
+    def enable_torque(self) -> JointAngles:
         """Torque on again; note the goals, or why there are none.
 
         Raises:
@@ -45,7 +45,7 @@ class JointRecorder(ForwardingBody):
             BusLost: the port is gone.
         """
         try:
-            goals = self._body.take_hold()
+            goals = self._body.enable_torque()
         except (SetupError, ServoFault) as error:
             self._note(TorqueRefused(str(error)))
             raise

@@ -63,7 +63,7 @@ class PlaybackBody(ForwardingBody):
             self._newest = said.joints
         return self._newest if self._newest is not None else joints
 
-    def take_hold(self) -> JointAngles:
+    def enable_torque(self) -> JointAngles:
         """Torque on again; give the recorded goals.
 
         Raises:
@@ -73,7 +73,7 @@ class PlaybackBody(ForwardingBody):
         if refused is not None:
             self._said.remove(refused)
             raise SetupError(refused.why)
-        goals = self._body.take_hold()
+        goals = self._body.enable_torque()
         said = self._next(TorqueEnabled)
         return said.goals_rad if said is not None else goals
 
