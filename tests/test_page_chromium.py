@@ -346,7 +346,7 @@ def test_a_parameter_is_found_changed_marked_and_put_back(
 ) -> None:
     rig, person = at_the_rig
     key = "ranges.neck_yaw_deg"
-    (label,) = (k.key for k in rig.tuning.knobs() if k.key == key)
+    (label,) = (k.key for k in rig.tuning.parameters() if k.key == key)
     person.click(saying("tuning"))
     person.run(f"{beside('find', 'input')}.select()")
     person.click(beside("find", "input"))

@@ -285,7 +285,7 @@ class OneKnob:
         self.value = 1.0
         return ()
 
-    def knobs(self) -> tuple[PageParam, ...]:
+    def parameters(self) -> tuple[PageParam, ...]:
         return tuple(KNOB._replace(key=f"a.{n}") for n in range(100))
 
     def values(self) -> dict[str, Value]:

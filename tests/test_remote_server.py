@@ -87,7 +87,7 @@ class SecondTuning:
         self._now = dict(self._file)
         self.version = 0
 
-    def knobs(self) -> tuple[Knob, ...]:
+    def parameters(self) -> tuple[Knob, ...]:
         return tuple(
             Knob(
                 key, key.rpartition(".")[0], "Hz", "a rate", 1.0, 1000.0, (), "number", 17.0, "now"
@@ -239,7 +239,8 @@ def hung_up(end: socket.socket) -> bool:
 def test_values_rules_and_changes(rig: RobotClient) -> None:
     assert rig.get() == {RATE: 200.0, BLINKS: 17.0}
     assert rig.get("gaze.") == {BLINKS: 17.0}
-    assert rig.knob(RATE).high == 1000.0 and rig.knob(RATE).group == "loop"
+    assert rig.parameter(RATE).high == 1000.0 and rig.parameter(RATE).group == "loop"
+    assert rig._asked("knobs", prefix=RATE) == rig._asked("parameters", prefix=RATE) != []
     assert rig.set(RATE, 100.0) == ("taken",)
     assert rig.get(RATE) == {RATE: 100.0}
     assert rig.unsaved() == rig.differs() == ((RATE, 200.0, 100.0),)
@@ -271,7 +272,7 @@ def test_what_has_no_json_is_refused_before_it_is_sent(rig: RobotClient, value: 
 
 def test_unknown_key_and_character(rig: RobotClient) -> None:
     with pytest.raises(RequestRejected, match="unknown key"):
-        rig.knob("loop.rate")
+        rig.parameter("loop.rate")
     assert rig.characters() == ("bold", "shy")
     rig.character("shy")
     with pytest.raises(RequestRejected, match="no character 'brave'"):

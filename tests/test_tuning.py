@@ -266,10 +266,10 @@ def test_options_of_the_command_line_stay_and_are_never_saved(mine: Path) -> Non
 
 def test_knobs_follow_what_entries_there_are() -> None:
     bench = Bench("desk")
-    before = len(bench.tuning.knobs())
+    before = len(bench.tuning.parameters())
     rule: dict[str, Any] = {"look_at": "hand", "salience": 1.0}
     bench.tuning.set({"gaze.top_down.rules.fetch": rule})
-    assert len(bench.tuning.knobs()) == before + 3
+    assert len(bench.tuning.parameters()) == before + 3
     assert "fetch" in bench.made.robot.menus()["behaviour"]
 
 
@@ -292,7 +292,7 @@ def test_a_dragged_slider_reads_no_file_and_makes_no_knob_anew(
     mine: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bench = Bench(str(mine))
-    knobs, files = bench.tuning.knobs(), bench.tuning.files()
+    knobs, files = bench.tuning.parameters(), bench.tuning.files()
 
     def read(*words: object) -> None:
         raise AssertionError(f"read: {words}")
@@ -301,7 +301,7 @@ def test_a_dragged_slider_reads_no_file_and_makes_no_knob_anew(
     monkeypatch.setattr("gazerig.config.rig_files.load_rig", read)
     for step in range(3):
         bench.tuning.set({"gaze.lids.close_ms": 90.0 + step})
-        assert bench.tuning.files() == files and bench.tuning.knobs() is knobs
+        assert bench.tuning.files() == files and bench.tuning.parameters() is knobs
         assert bench.tuning.values() == values(bench.made.live.rig)
         assert [change.key for change in bench.tuning.unsaved()] == ["gaze.lids.close_ms"]
 

@@ -29,7 +29,7 @@ from gazerig.config.parameters import (
     values,
     values_after,
 )
-from gazerig.config.parameters import parameters as knobs_of
+from gazerig.config.parameters import parameters as described
 from gazerig.config.renamed import renamed_key
 from gazerig.config.rig_files import RigFiles, RigLayers, read_all, save_copy, save_over
 from gazerig.config.save import SaveResult, ValueChange, rig_file
@@ -99,7 +99,7 @@ class ParamStore:
         whole, found = live_params.rig, values(live_params.rig)
         self._options = differences(read, whole)
         self._state = _ParamState(whole, whole, rig, character, files, found, found, 0)
-        self._knobs = knobs_of(whole, self._defaults)
+        self._described = described(whole, self._defaults)
         # A shipped rig's own folder is the package's, where nobody has files.
         at_home = rig in shipped_names("rigs")
         self.confined = AllowedFolder(Path.cwd() if at_home else self.path.parent)
@@ -128,12 +128,12 @@ class ParamStore:
         """Return the files in use: the rig's, and those laid over it."""
         return self._state.files.paths
 
-    def knobs(self) -> tuple[Parameter, ...]:
+    def parameters(self) -> tuple[Parameter, ...]:
         """Return all parameters in the order of the file."""
-        state, made = self._state, self._knobs
+        state, made = self._state, self._described
         # All but which entries there are stays as it is.
         if [knob.key for knob in made] != list(state.values):
-            made = self._knobs = knobs_of(state.rig, self._defaults)
+            made = self._described = described(state.rig, self._defaults)
         return made
 
     def values(self) -> dict[str, Value]:

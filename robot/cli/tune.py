@@ -53,7 +53,7 @@ def complete_pair(context: typer.Context, incomplete: str) -> list[str]:
         return complete_key(incomplete)
     try:
         with RobotClient.connect() as rig:
-            knob = rig.knob(given[-1])
+            knob = rig.parameter(given[-1])
     except DriverError:
         return []
     values = ("true", "false") if knob.kind == "bool" else tuple(map(_written, knob.choices))
@@ -102,7 +102,7 @@ def get(
     """Show the running rig's parameters: value, unit, default; * marks what is not saved."""
     with clear_errors(), RobotClient.connect(pid) as rig:
         values = rig.get(prefix)
-        found = [knob for knob in rig.knobs() if knob.key in values]
+        found = [knob for knob in rig.parameters() if knob.key in values]
         if differs:
             other = {change.key for change in rig.differs()}
             found = [knob for knob in found if knob.key in other]

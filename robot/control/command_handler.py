@@ -17,7 +17,7 @@ from gazerig.robot.model.reply import Ticket
 QUESTIONS = (
     "status",
     "menus",
-    'knobs, "prefix"',
+    'parameters, "prefix"',
     'get, "prefix"',
     "unsaved",
     "differs",
@@ -90,7 +90,7 @@ class ParamAccess(Protocol):
         """Count the changes."""
         ...
 
-    def knobs(self) -> Iterable[DescribedParam]:
+    def parameters(self) -> Iterable[DescribedParam]:
         """Return all parameters."""
         ...
 
@@ -249,7 +249,7 @@ class CommandHandler:
 
     def _of_params(self, request: object) -> Outcome:
         match request:
-            case {"do": "knobs", "prefix": str(prefix), **rest} if not rest:
+            case {"do": "parameters" | "knobs", "prefix": str(prefix), **rest} if not rest:
                 found = [words for key, words in self._all_described() if key.startswith(prefix)]
                 return Answered(found)
             case {"do": "get", "prefix": str(prefix), **rest} if not rest:
@@ -279,9 +279,9 @@ class CommandHandler:
         """Return key and plain values of every parameter; writing them all takes 4 ms."""
         if self._params is None:
             return []
-        knobs = self._params.knobs()
-        if knobs is not self._described[0]:
-            self._described = knobs, [(knob.key, plain(knob._asdict())) for knob in knobs]
+        found = self._params.parameters()
+        if found is not self._described[0]:
+            self._described = found, [(one.key, plain(one._asdict())) for one in found]
         return self._described[1]
 
     def _set(self, changes: Mapping[str, object]) -> Outcome:

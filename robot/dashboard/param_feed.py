@@ -21,7 +21,7 @@ class Fed(Protocol):
         """Count the changes."""
         ...
 
-    def knobs(self) -> Iterable[DescribedParam]:
+    def parameters(self) -> Iterable[DescribedParam]:
         """Return all parameters."""
         ...
 
@@ -81,7 +81,7 @@ class ParamFeed:
         first = self._version is None
         self._version = self._tuning.version  # before reading: a change meanwhile is seen next
         if first:
-            knobs = [plain(knob._asdict()) for knob in self._tuning.knobs()]
+            knobs = [plain(knob._asdict()) for knob in self._tuning.parameters()]
             for start in range(0, len(knobs), _PIECE):
                 self._due.append(KNOBS + json.dumps(knobs[start : start + _PIECE]).encode())
         now = dict(self._tuning.values())

@@ -134,20 +134,20 @@ class RobotClient:
         """Return the values in force of all keys that begin with ``prefix``."""
         return cast(dict[str, JsonValue], self._asked("get", prefix=prefix))
 
-    def knobs(self, prefix: str = "") -> tuple[ParamInfo, ...]:
+    def parameters(self, prefix: str = "") -> tuple[ParamInfo, ...]:
         """Return the rules and defaults of all keys that begin with ``prefix``."""
-        found = cast(list[dict[str, Any]], self._asked("knobs", prefix=prefix))
+        found = cast(list[dict[str, Any]], self._asked("parameters", prefix=prefix))
         return tuple(ParamInfo.from_json(one) for one in found)
 
-    def knob(self, key: str) -> ParamInfo:
+    def parameter(self, key: str) -> ParamInfo:
         """Return one parameter's rule and default.
 
         Raises:
             Refused: there is no such key.
         """
-        for knob in self.knobs(key):
-            if knob.key == key:
-                return knob
+        for found in self.parameters(key):
+            if found.key == key:
+                return found
         raise RequestRejected(f"{key}: unknown key; gazerig ctl get lists all")
 
     def set(self, key: str, value: Value) -> tuple[str, ...]:

@@ -24,7 +24,7 @@ FLOODS = {
     "nothing": "",
     "set": "rig.set('gaze.saccade.max_speed_deg_s', 300.0 + n % 200)",
     "get": "rig.get('')",
-    "knobs": "rig.knobs('')",
+    "parameters": "rig.parameters('')",
     "status": "rig.status()",
     "look": "rig.look_at(1.0, 0.001 * (n % 200), 0.2, stay=True)",
     "resume": "rig.resume(confirmed=True)",
