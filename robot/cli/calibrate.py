@@ -28,6 +28,7 @@ from gazerig.robot.cli.ports import MockOption, PortOption, rig_ports
 from gazerig.robot.cli.prompts import Lines
 from gazerig.robot.cli.rig_writer import refuse_unwritable, write_found
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals
+from gazerig.robot.cli.write_options import AllYesOption, DryRunOption, OutOption
 
 
 def calibrate_joints(
@@ -60,13 +61,9 @@ def calibrate_joints(
     more: Annotated[
         int, typer.Option(min=0, max=5, help="Push rods: places between each two you mark.")
     ] = 1,
-    out: Annotated[
-        Path | None, typer.Option(help="Copy a shipped rig to this file and write there.")
-    ] = None,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Show what would change, write nothing.")
-    ] = False,
-    yes: Annotated[bool, typer.Option("--yes", help="Answer every yes or no with yes.")] = False,
+    out: OutOption = None,
+    dry_run: DryRunOption = False,
+    yes: AllYesOption = False,
     answers: Annotated[
         Path | None, typer.Option(help="File with one answer a line; empty is Enter.")
     ] = None,
@@ -80,16 +77,15 @@ def calibrate_joints(
     with clear_errors(rig, port, mock), signals() as stopped:
         loaded = load_rig(rig)
         names = _names(loaded, joint)
-        if dry_run and (clear_offset or set_middle):
-            option = "--clear-offset" if clear_offset else "--set-middle"
-            raise SetupError(f"--dry-run and {option} exclude each other: that is a write")
-        if not dry_run:
-            refuse_unwritable(rig, out)
-            if out is None:
-                _refuse_long_lists(rig, loaded, names)
         search = StopSearchParams(strength=strength)
         span_us = _span(pulses)
         how = CalibrationOptions(by, margin, zero, search, clear_offset, set_middle, span_us, more)
+        if dry_run:
+            _refuse_writes(how)
+        else:
+            refuse_unwritable(rig, out)
+            if out is None:
+                _refuse_long_lists(rig, loaded, names)
         refuse_impossible(loaded, names, how)
         person = SteeringPerson(Lines(answers), stopped, yes)
         try:
@@ -115,6 +111,17 @@ def _names(rig: Rig, asked: list[str] | None) -> tuple[str, ...]:
         if name not in rig.joints:
             raise SetupError(f"--joint {name}: no such joint; there is {', '.join(rig.names)}")
     return tuple(name for name in rig.names if not asked or name in asked)
+
+
+def _refuse_writes(how: CalibrationOptions) -> None:
+    """Refuse what would write into servos, where nothing is to be written.
+
+    Raises:
+        SetupError: names the option.
+    """
+    if how.clear_offset or how.set_middle:
+        option = "--clear-offset" if how.clear_offset else "--set-middle"
+        raise SetupError(f"--dry-run and {option} exclude each other: that is a write")
 
 
 def _refuse_long_lists(rig: str, loaded: Rig, names: tuple[str, ...]) -> None:

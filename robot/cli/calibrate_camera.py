@@ -34,6 +34,7 @@ from gazerig.robot.cli.neck_motion import go_on, moving_neck
 from gazerig.robot.cli.prompts import Lines, TerminalPerson
 from gazerig.robot.cli.rig_writer import refuse_unwritable, write_found
 from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say, signals, status
+from gazerig.robot.cli.write_options import AllYesOption, DryRunOption, OutOption
 from gazerig.robot.model.charuco_board import BoardParams, CharucoBoard
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.frames import CameraParams
@@ -90,13 +91,9 @@ def calibrate_camera(
     columns: ColumnsOption = _BOARD.columns,
     rows: RowsOption = _BOARD.rows,
     square: SquareOption = _BOARD.square_mm,
-    out: Annotated[
-        Path | None, typer.Option(help="Copy a shipped rig to this file and write there.")
-    ] = None,
-    dry_run: Annotated[
-        bool, typer.Option("--dry-run", help="Show what would change, write nothing.")
-    ] = False,
-    yes: Annotated[bool, typer.Option("--yes", help="Answer every yes or no with yes.")] = False,
+    out: OutOption = None,
+    dry_run: DryRunOption = False,
+    yes: AllYesOption = False,
     seed: Annotated[int, typer.Option(min=0, help="With --mock: seed of the noise.")] = 0,
     mock: Annotated[
         bool, typer.Option("--mock", help="Emulated servos, and a simulated board to look at.")

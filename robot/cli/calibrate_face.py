@@ -34,6 +34,7 @@ from gazerig.robot.cli.terminal import (
     signals,
     status,
 )
+from gazerig.robot.cli.write_options import AllYesOption, OutOption
 from gazerig.robot.control.event_text import drawn_together
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.loop import LoopCount, Tick
@@ -57,10 +58,8 @@ def calibrate_face(
     video: Annotated[Path | None, typer.Option(help="Look at a photo or film, looped.")] = None,
     camera: Annotated[int | None, typer.Option(min=0, help="Look through webcam N.")] = None,
     oak: Annotated[bool, typer.Option("--oak", help="Look through an OAK-D camera.")] = False,
-    out: Annotated[
-        Path | None, typer.Option(help="Copy a shipped rig to this file and write there.")
-    ] = None,
-    yes: Annotated[bool, typer.Option("--yes", help="Answer every yes or no with yes.")] = False,
+    out: OutOption = None,
+    yes: AllYesOption = False,
     answers: Annotated[
         Path | None, typer.Option(help="File with one key a line, e.g. left 3; empty is Enter.")
     ] = None,
