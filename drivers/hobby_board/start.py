@@ -46,9 +46,9 @@ def enable_channels(board: Board, channels: Sequence[Channel], log: EventLog) ->
     pulses = every_pulse(board, [channel.setup for channel in channels])
     for channel, pulse in zip(channels, pulses, strict=True):
         channel.found(pulse)
-    limp = [channel_label(channel.setup) for channel in channels if not channel.on]
-    if limp:
-        log.add(f"{', '.join(limp)} had no pulses: they go to their places at once")
+    without_pulses = [channel_label(channel.setup) for channel in channels if not channel.on]
+    if without_pulses:
+        log.add(f"{', '.join(without_pulses)} had no pulses: they go to their places at once")
     start_s = -inf
     for channel, pulse in zip(channels, pulses, strict=True):
         if not pulse:

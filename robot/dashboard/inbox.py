@@ -56,7 +56,7 @@ def overtaken(earlier: bytes, later: bytes) -> bool:
 
 
 def urgent(message: bytes) -> bool:
-    """Return whether a message cannot wait: an order, or the page's own words."""
+    """Return whether a message cannot wait: a command, or the page's own words."""
     return message[:1] != TELL or told(message)[1].startswith(_URGENT)
 
 
@@ -72,7 +72,7 @@ class Inbox:
     ) -> None:
         """Listen at once.
 
-        take: called with each message, orders in one thread and the rest in another
+        take: called with each message, commands in one thread and the rest in another
         refuse: called with each message that is dropped, as too many wait
         lost: called once when the other side is gone, unless this side was closed first
         """

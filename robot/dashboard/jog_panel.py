@@ -104,7 +104,7 @@ class JogPanel:
                 self._measured.content = self._table = table
 
     def _note_held(self, joint: str, desired_deg: float, stopped: bool) -> None:
-        """Forget a joint that was let go elsewhere, by a stop or another order."""
+        """Forget a joint that was let go elsewhere, by a stop or another command."""
         held = self._held.get(joint)
         if held is None:
             return

@@ -102,10 +102,10 @@ def _without_feedback(snapshot: Snapshot) -> str:
     if not estimated:
         return ""
     torque = dict(zip(snapshot.joints, snapshot.servos.torque, strict=False))
-    limp = sum(not torque.get(joint, True) for joint in estimated)
+    without_torque = sum(not torque.get(joint, True) for joint in estimated)
     where = "shown where they should be"
-    if limp:  # a finger moves them, and nobody sees it
-        where += f"; {'all' if limp == len(estimated) else limp} without torque: may be anywhere"
+    if without_torque:  # a finger moves them, and nobody sees it
+        where += f"; {'all' if without_torque == len(estimated) else without_torque} without torque: may be anywhere"
     return (
         f"<div style='color:{AMBER}'>{len(estimated)} of "
         f"{counted(len(snapshot.joints), 'joint')} without feedback: {where}</div>"

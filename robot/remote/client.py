@@ -212,7 +212,7 @@ class RobotClient:
         Raises:
             Refused: there is no such menu or choice.
         """
-        self._order(Ask(menu, choice))
+        self._command(Ask(menu, choice))
 
     def look_at(self, x_m: float, y_m: float, z_m: float, stay: bool = False) -> CommandReply:
         """Look at a point: metres, x ahead, y left, z up of the neck base.
@@ -231,7 +231,7 @@ class RobotClient:
     def look_freely(self) -> None:
         """Let the head choose again what to look at."""
         self._end_heartbeat()
-        self._order(LookAt(None, self._who))
+        self._command(LookAt(None, self._who))
 
     def jog(self, joint: str, deg: float, stay: bool = False) -> CommandReply:
         """Hold all joints and put one at an angle.
@@ -246,15 +246,15 @@ class RobotClient:
 
     def jog_free(self) -> None:
         """Let the models lead the joints again."""
-        self._order(Jog((), self._who))
+        self._command(Jog((), self._who))
 
     @property
     def leads(self) -> bool:
         """True while this connection renews a lead that the rig still obeys."""
         return self._heartbeat is not None and self._heartbeat.leads
 
-    def _lead(self, order: LookAt | Jog, stay: bool) -> CommandReply:
-        reply = self._order(order)
+    def _lead(self, command: LookAt | Jog, stay: bool) -> CommandReply:
+        reply = self._command(command)
         if stay or self._dial is None:
             self._end_heartbeat()
         elif not self.leads:
@@ -276,7 +276,7 @@ class RobotClient:
         Raises:
             ConnectionLost, Refused: nobody knows whether it stopped: press the emergency stop.
         """
-        self._order(Stop(why, self._who))
+        self._command(Stop(why, self._who))
 
     def resume(self, confirmed: bool = False) -> None:
         """Put the torque on again where the joints are, and go on slowly.
@@ -288,14 +288,14 @@ class RobotClient:
             Refused: a servo does not take it, or a rule of stops forbids it; the torque
                 stays off.
         """
-        self._order(Resume(self._who, confirmed))
+        self._command(Resume(self._who, confirmed))
 
-    def _order(self, order: Command) -> CommandReply:
+    def _command(self, command: Command) -> CommandReply:
         try:
-            check(order)
+            check(command)
         except ValueError as error:
             raise RequestRejected(str(error)) from None
-        words = as_json(order)
+        words = as_json(command)
         said = self._asked(str(words.pop("do")), **words)
         match said:
             case {"reply": dict(reply)}:

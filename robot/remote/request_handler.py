@@ -59,9 +59,9 @@ class Pulse:
             self._said.extend(tick.events)
 
     def taken_up(self, within_s: float = _TAKEN_UP_S, ticks: int = 2) -> bool:
-        """Wait until all orders given before are obeyed; tell whether that came to pass.
+        """Wait until all commands given before are obeyed; tell whether that came to pass.
 
-        ticks: to wait for; the one under way may have looked for orders already, the next
+        ticks: to wait for; the one under way may have looked for commands already, the next
             one has not
         """
         wanted = self._ticks + ticks

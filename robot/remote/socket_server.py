@@ -1,6 +1,6 @@
 """The running rig's side of its remote control: a thread for each program that steers it.
 
-None of them touches the control loop: they ask the tuning and leave orders, which the loop
+None of them touches the control loop: they ask the tuning and leave commands, which the loop
 takes up at its next tick. A program that sends rubbish, stops in the middle or reads no
 answers costs a thread and nothing else.
 """
