@@ -4,7 +4,7 @@ import json
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from servo_rows import Row, rows
 
@@ -115,12 +115,12 @@ class Twin:
     def _one(self, name: str, setups: Sequence[ServoSetup], give_up_s: float) -> ServoBus:
         port = self.wires.ports[name]
         # A shared machine may stall a process for longer than real servos ever wait.
-        patience = {"reply_timeout_ms": 200.0} if self._patient else {}
+        patience: dict[str, Any] = {"reply_timeout_ms": 200.0} if self._patient else {}
         if name == "maestro":
-            quick = {"stagger_ms": 0.0, "give_up_s": give_up_s}
+            quick: dict[str, Any] = {"stagger_ms": 0.0, "give_up_s": give_up_s}
             return MaestroBus(port, setups, MaestroParams(**patience, **quick))
         if name == "pca9685":
-            quick = {"stagger_ms": 0.0, "give_up_s": give_up_s}
+            quick: dict[str, Any] = {"stagger_ms": 0.0, "give_up_s": give_up_s}
             return Pca9685Bus(port, setups, Pca9685Params(**patience, **quick))
         if self._patient:
             patience["prompt_timeout_ms"] = 200.0

@@ -143,8 +143,8 @@ class Noisy:
             for i in IDS
         ]
         if self._make == "maestro":
-            params = MaestroParams(stagger_ms=0.0, crc=kind.endswith("crc"))
-            return MaestroBus(self.port, setups, params)
+            with_crc = MaestroParams(stagger_ms=0.0, crc=kind.endswith("crc"))
+            return MaestroBus(self.port, setups, with_crc)
         if self._make == "pca9685":
             return Pca9685Bus(self.port, setups, Pca9685Params(stagger_ms=0.0))
         if self._make == "feetech":

@@ -46,7 +46,7 @@ def drive(kind: str, guarded: bool, watchdog: bool, path: str) -> None:
     )
     bus.open()
     bus.enable_torque()
-    goals = [setup.max_steps for setup in rig_setups(rig)]
+    goals: list[float] = [setup.max_steps for setup in rig_setups(rig)]
     said = False
     ticks = 0
     while True:

@@ -3,7 +3,11 @@
 A bus's own test makes the chain and the driver; here is what is done with them.
 """
 
+from typing import Any
+
 from servo_rows import rows
+
+from gazerig.drivers.types import ServoBus
 
 IDS = (1, 2, 3, 4)
 NAMES = ("eye", "jaw", "neck", "lid")
@@ -20,11 +24,14 @@ class MovingBus:
     """
 
     alone = True
+    bus: ServoBus
+    chain: Any
 
     def __init__(self):
         self.now_s = 50.0
-        self.sent = []
-        self.k = self.longest_s = 0
+        self.sent: list[Any] = []
+        self.k = 0
+        self.longest_s = 0.0
 
     def sleep_until(self, t_s):
         self.now_s = max(self.now_s, t_s)

@@ -1,6 +1,8 @@
 """Emulated smart servos on a clock that is set by hand, and packets made apart from them."""
 
 import struct
+from collections.abc import Callable
+from typing import Any
 
 from fastcrc.crc16 import umts
 
@@ -32,6 +34,9 @@ class Bench:
     pong: int
     highest_id: int
     registers: dict
+    build: Callable[..., Any]
+    instruction: Callable[..., bytes]
+    packets: Callable[[bytes], list]
     living: tuple[int, int]
     """Address and length of all registers that change by themselves."""
 

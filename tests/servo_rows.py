@@ -1,6 +1,6 @@
 """Feedback of a bus servo by servo, as tests like to look at it; the product has columns."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from gazerig.drivers.types import Feedback
 
@@ -29,6 +29,7 @@ def rows(feedback: Feedback) -> tuple[Row | None, ...]:
 def feedback_of(given: list[Row | None]) -> Feedback:
     """Return the feedback of which these are the rows."""
     none = Feedback.of_none(1)
-    blank = Row(*(column[0] for column in none[:-1]))
-    columns = zip(*[blank if row is None else row for row in given], strict=True)
-    return Feedback(*columns, tuple(i for i, row in enumerate(given) if row is None))
+    columns: Any = (column[0] for column in none[:-1])
+    blank = Row(*columns)
+    every: Any = zip(*[blank if row is None else row for row in given], strict=True)
+    return Feedback(*every, tuple(i for i, row in enumerate(given) if row is None))

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from itertools import groupby
 from math import cos, exp, hypot, pi, radians, sin
+from typing import Any
 
 import numpy as np
 import pytest
@@ -48,7 +49,7 @@ def percept(t: float, *rows: tuple[int, str, tuple[float, ...], tuple[float, ...
     )
 
 
-def attention(**params: float) -> Attention:
+def attention(**params: Any) -> Attention:
     return Attention(
         AttentionParams(**params),
         FieldOfView(FieldOfViewParams()),

@@ -11,6 +11,7 @@ import pytest
 from bus_kinds import BOARDS, GRAIN_STEPS, KINDS, PLACES, SHARES, Twin, in_process, twin_of
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from present import present
 from servo_rows import rows
 
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
@@ -83,7 +84,9 @@ def test_open_finds_all_and_nothing_moves(twin):
     readings = rows(bus.read(twin.now_s()))
     assert twin.near(twin.seen(readings), starts(twin))
     # A Maestro that gives pulses goes on to give them; nobody else holds anything.
-    assert [r.torque for r in readings] == [twin.on[p] in BOARDS for p in range(twin.count)]
+    assert [present(r).torque for r in readings] == [
+        twin.on[p] in BOARDS for p in range(twin.count)
+    ]
     bus.write(twin.steps(away(twin)))
     twin.run(bus, 0.1, away(twin))
     assert twin.near(twin.truth(), before)
@@ -95,9 +98,11 @@ def test_readings_are_fresh_in_order_and_say_whether_they_are_measured(here, hel
     before_s = here.now_s()
     readings = rows(held_here.read(before_s))
     assert here.near(here.seen(readings), starts(here))
-    assert all(before_s <= r.at_s <= here.now_s() for r in readings)
-    assert [r.measured for r in readings] == [here.on[p] not in BOARDS for p in range(here.count)]
-    assert not any(r.fault or r.rearmed for r in readings)
+    assert all(before_s <= present(r).at_s <= here.now_s() for r in readings)
+    assert [present(r).measured for r in readings] == [
+        here.on[p] not in BOARDS for p in range(here.count)
+    ]
+    assert not any(present(r).fault or present(r).rearmed for r in readings)
 
 
 def test_engage_holds_every_servo_where_it_is(here):

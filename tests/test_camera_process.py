@@ -9,6 +9,7 @@ from functools import partial
 import cv2
 import numpy as np
 import pytest
+from present import present
 
 from gazerig.drivers.camera.params import CameraCareParams
 from gazerig.drivers.camera.pinhole import Intrinsics
@@ -65,15 +66,22 @@ def test_what_was_found_comes_over_with_picture_depth_and_lens(recording):
     wait_for(lambda: camera.pictures >= 5)
     for _ in range(20):
         found = camera.latest(0.0)
-        k = (found.number - 1) % 20
-        assert (found.width_px, found.height_px, found.faces) == (64, 48, ())
-        assert found.picture is not None and found.depth_m is not None
-        assert np.unique(found.picture).tolist() == [10 * k]
-        assert np.unique(found.depth_m).tolist() == [0.5 + k]
-        assert not found.picture.flags.writeable and not found.depth_m.flags.writeable
-        assert found.lens == Intrinsics(60.0, 60.0, 32.0, 24.0)
-        assert before_s < found.captured_s <= time.monotonic()
-        numbers.add(found.number)
+        k = (present(found).number - 1) % 20
+        assert (present(found).width_px, present(found).height_px, present(found).faces) == (
+            64,
+            48,
+            (),
+        )
+        assert present(found).picture is not None and present(found).depth_m is not None
+        assert np.unique(present(present(found).picture)).tolist() == [10 * k]
+        assert np.unique(present(present(found).depth_m)).tolist() == [0.5 + k]
+        assert (
+            not present(present(found).picture).flags.writeable
+            and not present(present(found).depth_m).flags.writeable
+        )
+        assert present(found).lens == Intrinsics(60.0, 60.0, 32.0, 24.0)
+        assert before_s < present(found).captured_s <= time.monotonic()
+        numbers.add(present(found).number)
         time.sleep(0.01)
     assert len(numbers) > 1
     camera.close()
@@ -106,18 +114,18 @@ def test_a_killed_process_is_started_again_and_the_rest_goes_on(recording):
     camera.open()
     wait_for(lambda: camera.latest(0.0) is not None)
     assert camera.retune(DETECTOR, None)
-    first, before = camera._process.pid, camera.latest(0.0)
-    os.kill(first, signal.SIGKILL)
+    first, before = present(camera._process).pid, camera.latest(0.0)
+    os.kill(present(first), signal.SIGKILL)
     assert camera.latest(0.0) is not None, "the last picture stays, and its age tells"
-    wait_for(lambda: camera.latest(0.0).captured_s > before.captured_s + 0.2)
+    wait_for(lambda: present(camera.latest(0.0)).captured_s > present(before).captured_s + 0.2)
     after = camera.latest(0.0)
-    assert after.number > before.number and after.picture is not None
-    assert camera._process.pid != first
+    assert present(after).number > present(before).number and present(after).picture is not None
+    assert present(camera._process).pid != first
     lost, back = camera.events()
     assert lost.startswith("camera lost (the process that looks at pictures has ended)")
     assert back.startswith("camera back after")
-    os.kill(camera._process.pid, signal.SIGKILL)  # so soon again
-    wait_for(lambda: camera.latest(0.0).number > after.number + 50)
+    os.kill(present(present(camera._process).pid), signal.SIGKILL)  # so soon again
+    wait_for(lambda: present(camera.latest(0.0)).number > present(after).number + 50)
     (again,) = camera.events()
     assert "without a word" in again
     camera.close()
@@ -128,14 +136,14 @@ def test_a_process_that_hangs_is_told_of_and_started_again(recording):
     camera = process(partial(CameraReplay, recording), care)
     camera.open()
     wait_for(lambda: camera.pictures > 20)
-    first = camera._process.pid
-    os.kill(first, signal.SIGSTOP)
+    first = present(camera._process).pid
+    os.kill(present(first), signal.SIGSTOP)
     before = camera.latest(0.0)
-    wait_for(lambda: camera.latest(0.0).number > before.number + 20)
+    wait_for(lambda: present(camera.latest(0.0)).number > present(before).number + 20)
     told = camera.events()
     assert "camera lost (no new picture): waiting for it" in told
     assert any("starting the camera's process again" in line for line in told)
-    assert camera._process.pid != first
+    assert present(camera._process).pid != first
     camera.close()
 
 
@@ -143,7 +151,7 @@ def test_where_no_loss_is_borne_a_killed_process_ends_the_run(recording):
     camera = process(partial(CameraReplay, recording), CameraCareParams(give_up_s=0.0))
     camera.open()
     wait_for(lambda: camera.latest(0.0) is not None)
-    os.kill(camera._process.pid, signal.SIGKILL)
+    os.kill(present(present(camera._process).pid), signal.SIGKILL)
     wait_for(lambda: camera._failure)
     with pytest.raises(CameraError, match="has ended"):
         camera.latest(0.0)
@@ -173,7 +181,7 @@ def test_an_exception_in_the_process_is_named_and_it_is_started_again(recording)
 def test_closing_does_not_wait_for_a_process_that_starts_again(recording):
     camera = process(partial(CameraReplay, recording), QUICK)
     camera.open()
-    os.kill(camera._process.pid, signal.SIGKILL)
+    os.kill(present(present(camera._process).pid), signal.SIGKILL)
     wait_for(lambda: camera._starts > 1)
     camera.close()
     assert not [t for t in threading.enumerate() if t.name == "camera"]
@@ -195,7 +203,7 @@ def test_silence_is_judged_by_what_is_usual():
 
 def test_camera_lost_for_good_ends_with_its_reason(tmp_path):
     path = tmp_path / "film.avi"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 50.0, (64, 48))
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 50.0, (64, 48))
     for k in range(3):
         writer.write(np.full((48, 64, 3), 20 * k, np.uint8))
     writer.release()
@@ -226,14 +234,14 @@ def test_slots_carry_arrays_of_any_shape_and_give_up_overwritten_ones():
         for shape in ((3, 4, 3), (480, 640, 3), (2, 2), (600, 800, 3)):
             array = np.random.default_rng(1).integers(0, 255, shape, np.uint8)
             where = writer.put(array)
-            assert np.array_equal(reader.take(where), array)
+            assert np.array_equal(present(reader.take(where)), array)
         depth = np.array([[1.5, np.nan]], np.float32)
-        assert np.array_equal(reader.take(writer.put(depth)), depth, equal_nan=True)
+        assert np.array_equal(present(reader.take(writer.put(depth))), depth, equal_nan=True)
         old = writer.put(np.zeros((4, 4), np.uint8))
         for _ in range(6):
             newest = writer.put(np.ones((4, 4), np.uint8))
         assert reader.take(old) is None
-        assert reader.take(newest).all()
+        assert present(reader.take(newest)).all()
     finally:
         reader.close()
         writer.close()

@@ -6,6 +6,7 @@ import time
 import cv2
 import numpy as np
 import pytest
+from present import present
 
 from gazerig.drivers.camera.params import CameraCareParams
 from gazerig.drivers.camera.pinhole import Intrinsics
@@ -94,7 +95,7 @@ def feed(source: Source, camera: CameraThread, count: int) -> None:
     goal = camera.pictures + count
     for _ in range(count):
         source.fed.release()
-    wait_for(lambda: camera.pictures == goal and camera.latest(0.0).number == goal)
+    wait_for(lambda: camera.pictures == goal and present(camera.latest(0.0)).number == goal)
 
 
 def test_nothing_before_the_first_picture(camera):
@@ -191,11 +192,14 @@ def test_camera_that_comes_back_is_told_and_counts_on(source):
     lose(source)
     wait_for(lambda: source.closed)
     old = camera.latest(0.0)
-    assert (old.number, old.captured_s) == (3, 3.0)  # the old one stays; its age tells
+    assert (present(old).number, present(old).captured_s) == (
+        3,
+        3.0,
+    )  # the old one stays; its age tells
     assert camera.events() == ("camera lost (camera gone: check its cable): trying it again",)
     source.fault = None
     feed(source, camera, 1)
-    assert camera.latest(0.0).number == 4
+    assert present(camera.latest(0.0)).number == 4
     assert source.opened >= 2
     (back,) = camera.events()
     assert back.startswith("camera back after ")
@@ -276,14 +280,14 @@ def test_depth_lens_motion_and_the_cameras_own_faces_come_through(source):
     camera.open()
     feed(source, camera, 1)
     found = camera.latest(0.0)
-    assert found.depth_m is depth and found.lens == lens
-    assert found.faces == (FACE,) and detector.looked == 0
-    assert found.blobs == (blob,) and seen[0].depth_m is depth
+    assert present(found).depth_m is depth and present(found).lens == lens
+    assert present(found).faces == (FACE,) and detector.looked == 0
+    assert present(found).blobs == (blob,) and seen[0].depth_m is depth
     camera.close()
 
 
 def write_film(path, rate_hz: float):
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), rate_hz, (64, 48))
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), rate_hz, (64, 48))
     for k in range(10):
         writer.write(np.full((48, 64, 3), 20 * k, np.uint8))
     writer.release()
@@ -297,13 +301,15 @@ def test_film_runs_at_its_own_pace(tmp_path):
     camera.open()
     wait_for(lambda: camera.latest(0.0) is not None)
     start = camera.latest(0.0)
-    wait_for(lambda: camera.latest(0.0).number >= start.number + 25)  # past its end, twice
+    wait_for(
+        lambda: present(camera.latest(0.0)).number >= present(start).number + 25
+    )  # past its end, twice
     later = camera.latest(0.0)
     camera.close()
-    assert later.captured_s - start.captured_s == pytest.approx(
-        (later.number - start.number) / 100.0
+    assert present(later).captured_s - present(start).captured_s == pytest.approx(
+        (present(later).number - present(start).number) / 100.0
     )
-    assert later.captured_s <= time.monotonic()
+    assert present(later).captured_s <= time.monotonic()
 
 
 def test_slow_detector_skips_pictures_and_queues_none(tmp_path):
@@ -326,7 +332,7 @@ def test_slow_detector_skips_pictures_and_queues_none(tmp_path):
     wait_for(lambda: camera.pictures == 2)
     clock[0] = 0.95
     free.release(2)
-    wait_for(lambda: camera.latest(0.0).number >= 10)
+    wait_for(lambda: present(camera.latest(0.0)).number >= 10)
     assert camera.pictures <= 4
     free.release(100)
     camera.close()

@@ -38,7 +38,7 @@ def test_the_page_has_the_size_of_the_paper_in_print(paper: str, tmp_path: Path)
 @pytest.mark.parametrize("paper", sorted(PAPERS_MM))
 def test_squares_and_ruler_on_the_page_are_as_long_as_they_say(paper: str) -> None:
     sheet = page(BOARD, paper)
-    seen = BOARD.find(cv2.GaussianBlur(sheet, (0, 0), 2.0))
+    seen = BOARD.find(cv2.GaussianBlur(sheet, (0, 0), 2.0).astype(np.uint8))
     assert seen is not None and len(seen.ids) == 24
     sides = np.diff(seen.corners_px.reshape(4, 6, 2)[:, :, 0], axis=1) / PX_PER_MM
     assert sides == pytest.approx(np.full((4, 5), 36.0), abs=0.02)

@@ -127,8 +127,7 @@ def test_a_lower_lid_s_ends_are_written_for_that_lid_alone(
     rigs: dict[str, str], tmp_path: Path
 ) -> None:
     before = load_rig(rigs["maker"]).lid_joints
-    words = ("", "1480", "", "3", "1560", "", "-5", "", "y")
-    answers = answers_in(tmp_path, *words)
+    answers = answers_in(tmp_path, "", "1480", "", "3", "1560", "", "-5", "", "y")
     words = ("--mock", "--joint", "right_lower_lid", "--more", "0", "--pulses", "1400:1600")
     done = invoked("calibrate", rigs["maker"], *words, "--answers", answers)
     assert done.code == 0, done.err

@@ -12,7 +12,7 @@ from gazerig.robot.cli.record import app
 @pytest.fixture
 def film(tmp_path):
     path = tmp_path / "film.avi"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 50.0, (64, 48))
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 50.0, (64, 48))
     for k in range(10):
         writer.write(np.full((48, 64, 3), 20 * k, np.uint8))
     writer.release()

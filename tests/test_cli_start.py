@@ -8,6 +8,7 @@ import sys
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
 
 import pytest
 import typer
@@ -60,7 +61,7 @@ def test_gazerig_alone_shows_it_and_is_no_error() -> None:
     assert done.returncode == 0 and "What next?" in done.stdout and not done.stderr
 
 
-def commands() -> dict[str, typer.core.TyperCommand | TyperGroup]:
+def commands() -> dict[str, Any]:
     group = typer.main.get_command(app)
     assert isinstance(group, TyperGroup)
     return dict(group.commands)
@@ -72,8 +73,8 @@ def test_every_command_has_examples_and_no_example_is_without_command() -> None:
     assert {*commands(), *ctl.commands} == set(EXAMPLES)
     for name, command in commands().items():
         assert f"gazerig {name}" in str(command.epilog), name
-    for name, command in ctl.commands.items():
-        assert f"gazerig {'stop' if name == 'stop' else f'ctl {name}'}" in str(command.epilog), name
+    for name, order in ctl.commands.items():
+        assert f"gazerig {'stop' if name == 'stop' else f'ctl {name}'}" in str(order.epilog), name
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from typing import Annotated
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from present import present
 
 from gazerig.config.load import ConfigError, load, read_yaml, shipped
 from gazerig.config.save import ValueChange, copy_shipped, propose, rig_file, save, save_rig
@@ -82,7 +83,7 @@ def test_a_value_changes_and_every_other_byte_stays(small):
     assert saved.changes == (ValueChange("joints.tilt.zero_step", "2048", "2051"),)
     assert str(saved.changes[0]) == "joints.tilt.zero_step: 2048 -> 2051"
     assert saved.backup == small.with_name("head.yaml.bak-20260131-235958")
-    assert saved.backup.read_text() == SMALL
+    assert present(saved.backup).read_text() == SMALL
 
 
 def test_flow_mappings_and_block_lists_keep_their_style(small):
@@ -212,8 +213,11 @@ def test_somebody_elses_change_meanwhile_is_not_lost(small):
 def test_backups_of_one_second_do_not_overwrite_each_other(small):
     first = save(small, {"name": "b"}, NOW, check, Head)
     second = save(small, {"name": "c"}, NOW, check, Head)
-    assert second.backup.name == "head.yaml.bak-20260131-235958-2"
-    assert first.backup.read_text() == SMALL and "name: b" in second.backup.read_text()
+    assert present(second.backup).name == "head.yaml.bak-20260131-235958-2"
+    assert (
+        present(first.backup).read_text() == SMALL
+        and "name: b" in present(second.backup).read_text()
+    )
 
 
 def test_rights_and_links_stay(small, tmp_path):
@@ -281,7 +285,7 @@ def test_a_whole_rig(tmp_path):
     assert isinstance(rig, Rig)
     assert (rig.joints["neck_yaw"].zero_step, rig.joints["neck_yaw"].sign) == (2051, -1)
     assert rig.joints["left_eye_pan"].torque_limit == 0.5
-    old, new = saved.backup.read_text().splitlines(), mine.read_text().splitlines()
+    old, new = present(saved.backup).read_text().splitlines(), mine.read_text().splitlines()
     assert len(set(new) - set(old)) <= 5 + 1 and len(new) - len(old) <= 2
     # A rule between two sections is checked before anything is replaced.
     before = mine.read_bytes()

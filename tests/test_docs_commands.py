@@ -86,7 +86,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Go to a folder with the files that the papers speak of."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "myrig.yaml").write_bytes((ROOT / "config/rigs/desk.yaml").read_bytes())
-    film = cv2.VideoWriter("film.avi", cv2.VideoWriter_fourcc(*"MJPG"), 25.0, (64, 48))
+    film = cv2.VideoWriter("film.avi", cv2.VideoWriter.fourcc(*"MJPG"), 25.0, (64, 48))
     for _ in range(5):
         film.write(np.zeros((48, 64, 3), np.uint8))
     film.release()
@@ -172,8 +172,8 @@ def test_python_of_a_paper_imports_what_there_is(block: Block) -> None:
     for node in ast.walk(tree):
         if isinstance(node, ast.ImportFrom) and node.module:
             module = importlib.import_module(node.module)
-            for name in node.names:
-                here[name.name] = _part(module, node.module, name.name)
+            for part in node.names:
+                here[part.name] = _part(module, node.module, part.name)
     for node in ast.walk(tree):
         match node:
             case ast.Attribute(ast.Name(name), attribute) if name in here:

@@ -4,6 +4,7 @@ from dataclasses import replace
 from functools import cache
 
 import pytest
+from present import present
 
 from gazerig.drivers.errors import PortError
 from gazerig.drivers.feetech.memory_table import REGISTERS, TABLE_END
@@ -122,7 +123,7 @@ def healthy(name):
         rig.set(1, shutdown=52)  # as from the factory it is worth a note
     found = ping(rig.port, kind.family, 1, BAUD)
     registers = Registers(rig.port, kind.family)
-    state = take(registers, CHECKS[kind.name], rig.setups[0], found, 0)
+    state = take(registers, CHECKS[kind.name], rig.setups[0], present(found), 0)
     assert None not in state.values.values() and worst(examine(state)) == "ok"
     return state
 
@@ -318,7 +319,9 @@ def test_a_servo_that_does_not_tell(kind):
     found = ping(rig.port, kind.family, 1, BAUD, 1)
     rig.command("lose 1")
     checks = CHECKS[kind.name]
-    (only,) = examine(take(Registers(rig.port, kind.family), checks, rig.setups[0], found, 0))
+    (only,) = examine(
+        take(Registers(rig.port, kind.family), checks, rig.setups[0], present(found), 0)
+    )
     says = "no good answer about its registers" if kind is FEETECH else "answers pings and nothing"
     assert only.level == "error" and says in only.what
 

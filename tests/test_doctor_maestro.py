@@ -3,6 +3,7 @@
 from xml.etree.ElementTree import fromstring
 
 import pytest
+from present import present
 
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.maestro.line import MaestroLink
@@ -213,7 +214,9 @@ def test_the_same_as_a_settings_file_of_pololu_s_programs():
     assert {one.get("homemode") for one in channels} == {"Off"}
     lid = channels[LID.id]
     assert (lid.get("name"), lid.get("min"), lid.get("max")) == (LID.name, "3584", "7232")
-    assert (int(lid.get("speed")), int(lid.get("acceleration"))) == start_limits(LID)
+    assert (int(present(lid.get("speed"))), int(present(lid.get("acceleration")))) == start_limits(
+        LID
+    )
     assert len(fromstring(settings_file(MaestroParams(channels=6), SETUPS, False))[7]) == 6
 
 

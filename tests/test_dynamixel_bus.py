@@ -2,17 +2,18 @@
 
 import time
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
 from dynamixel_sdk import PacketHandler
+from present import present
 from servo_rows import rows
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.dynamixel.protocol import instruction
 from gazerig.drivers.errors import ServoMissing
-from gazerig.drivers.serial.port import BlockingPort
+from gazerig.drivers.serial.port import BlockingPort, BusPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoSetup
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
@@ -37,12 +38,12 @@ SETUPS = tuple(ServoSetup(s.id, s.model, 1000, 3000, SPEED) for s in SPECS)
 class Twin(NamedTuple):
     """A bus with its port and its way to let time pass."""
 
-    port: object
+    port: BusPort
     wait: Callable[[float], None]
 
     def bus(self, setups=SETUPS, **params) -> SmartServoBus:
         # A shared machine may stall a process for longer than real servos ever wait.
-        patience = {"reply_timeout_ms": 100.0, "prompt_timeout_ms": 100.0}
+        patience: dict[str, Any] = {"reply_timeout_ms": 100.0, "prompt_timeout_ms": 100.0}
         chosen = {**patience, "watchdog_ms": 0, **params}
         return SmartServoBus(DYNAMIXEL, self.port, setups, DynamixelParams(**chosen))
 
@@ -165,8 +166,8 @@ def test_a_joint_outside_its_limits_comes_in_slowly(kind):
         slowest = 30 / 360 * 4096
         for _ in range(60):
             readings = rows(bus.read(twin.port.now_s()))
-            outside = [r for r in readings if not 1000 <= r.position_steps <= 3000]
-            assert all(abs(r.velocity_steps_s) <= slowest + 64 for r in outside)
+            outside = [r for r in readings if not 1000 <= present(r).position_steps <= 3000]
+            assert all(abs(present(r).velocity_steps_s) <= slowest + 64 for r in outside)
             twin.wait(0.02)
         assert near(readings, [1000, 3000])
         twin.run(bus, 1.0, [1100, 2900])

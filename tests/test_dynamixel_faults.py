@@ -1,6 +1,7 @@
 """What the servo driver does when bytes, servos or the whole line misbehave."""
 
 import struct
+from typing import Any
 
 import pytest
 from servo_rows import rows
@@ -43,7 +44,7 @@ class Rig:
 
     def __init__(self, fast=True, **params):
         self.now_s = 100.0
-        self.sent = []
+        self.sent: list[Any] = []
         specs = [ServoSpec(i, "xl330-m077", 2000 + i) for i in IDS]
         self.chain = build_dynamixel(specs, lambda: self.now_s)
         self.port = UnkindPort(self.chain, self.sent.append)
@@ -361,7 +362,8 @@ def test_release_survives_a_dead_bus(rig):
 def test_release_repeats_until_the_torque_is_off(rig):
     rig.bus.enable_torque()
     stubborn = rig.chain[2]
-    real, ignored = stubborn.write, []
+    ignored: list[Any] = []
+    real = stubborn.write
 
     def hard_of_hearing(address, data):
         if address == 64 and len(ignored) < 3:

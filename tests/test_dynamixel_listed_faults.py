@@ -54,6 +54,7 @@ from moving_bus import (
     IDS,
     LONGEST_S,
 )
+from present import present
 from servo_rows import rows
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
@@ -97,10 +98,10 @@ def test_17_no_goal_is_followed_before_positions_are_read_again(rig):
     rig.now_s += 0.6
     rig.sent.clear()
     readings = rows(rig.bus.read(rig.now_s))
-    present = [r.position_steps for r in readings]
+    places = [present(r).position_steps for r in readings]
     goals = [p for p in rig.sent if p[7] == 0x83 and int.from_bytes(p[8:10], "little") == 116]
     named = [int.from_bytes(goals[0][13 + 5 * k : 17 + 5 * k], "little") for k in range(4)]
-    assert all(abs(goal - at) <= 2 for goal, at in zip(named, present, strict=True))
+    assert all(abs(goal - at) <= 2 for goal, at in zip(named, places, strict=True))
 
 
 def test_17_servo_power_cut_and_back(rig):

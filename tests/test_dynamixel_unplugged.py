@@ -8,6 +8,7 @@ import sys
 import time
 from pathlib import Path
 
+from present import present
 from servo_rows import rows
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
@@ -101,14 +102,14 @@ def test_a_killed_driver_leaves_servos_that_stop_by_themselves():
         )
         try:
             for _ in range(40):
-                assert driver.stdout.readline() == b"moving\n"
+                assert present(driver.stdout).readline() == b"moving\n"
             moving = places(server)
             os.kill(driver.pid, signal.SIGKILL)
             driver.wait()
         finally:
             driver.kill()
             driver.wait()
-            driver.stdout.close()
+            present(driver.stdout).close()
         # Watchdog 200 ms, its step of 20, and time for a slow machine.
         time.sleep(0.5)
         stopped = places(server)

@@ -11,6 +11,7 @@ from pathlib import Path
 import child_processes
 import pytest
 from dynamixel_sdk import COMM_SUCCESS, PacketHandler
+from present import present
 from typer.testing import CliRunner
 
 from gazerig.drivers.errors import SetupError
@@ -46,11 +47,11 @@ class Emulator:
         self.path = self.ready["path"]
 
     def hear(self):
-        return json.loads(self.process.stdout.readline())
+        return json.loads(present(self.process.stdout).readline())
 
     def type(self, line):
-        self.process.stdin.write(line + "\n")
-        self.process.stdin.flush()
+        present(self.process.stdin).write(line + "\n")
+        present(self.process.stdin).flush()
         return self.hear()
 
     def end(self, number=signal.SIGINT):
@@ -180,9 +181,9 @@ def test_it_stays_without_standard_input_and_ends_on_sigterm(tmp_path):
 
 def test_it_ends_with_standard_input_when_told_to():
     emulator = Emulator("--servos", "1:xl330-m077", "--until-eof")
-    emulator.process.stdin.close()
+    present(emulator.process.stdin).close()
     assert emulator.process.wait(60) == 0
-    emulator.process.stdout.close()
+    present(emulator.process.stdout).close()
 
 
 def test_without_a_link_a_new_path_is_told_after_the_plug_is_back():
@@ -240,7 +241,7 @@ def test_a_person_is_told_once_of_a_client_at_a_wrong_rate():
         port.closePort()
     assert asked(emulator.path, STS_PING, 6, 500_000) == STS_PONG
     assert emulator.end() == 0
-    with emulator.process.stderr as told:
+    with present(emulator.process.stderr) as told:
         assert told.read() == "a client speaks at 1000000 bit/s; the servos listen at 500000\n"
 
 

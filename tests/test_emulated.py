@@ -9,6 +9,7 @@ from gazerig.sim_mock.devices import (
     BAUDS,
     CASES,
     DynamixelLine,
+    Emulated,
     FeetechLine,
     MaestroLine,
     build,
@@ -20,7 +21,7 @@ from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
 
 BUILT = ServoSpec(7, "xl330-m288", 1000, 45, Physics(stop_low_steps=900.0), Quirks(True), 3)
-LINES = [
+LINES: list[Emulated] = [
     DynamixelLine((BUILT, ServoSpec(1, "xc330-m288")), 57_600),
     FeetechLine((ServoSpec(253, "sts3215", 5, physics=Physics(load_nm=0.1)),)),
     MaestroLine(24, 5, True, (HobbySpec(3, 4000.0),), 9600),

@@ -3,6 +3,7 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from present import present
 
 from gazerig.sim_mock.dynamixel.servo import DynamixelServo
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
@@ -23,7 +24,7 @@ class Bench:
         return self.servo.write(address, value.to_bytes(size, "little", signed=value < 0))
 
     def get(self, address, size=4):
-        return int.from_bytes(self.servo.read(address, size), "little", signed=True)
+        return int.from_bytes(present(self.servo.read(address, size)), "little", signed=True)
 
     def run(self, ms):
         self.ms += ms

@@ -1,6 +1,7 @@
 """What the emulated servo does about heat, load and voltage."""
 
 import pytest
+from present import present
 
 from gazerig.sim_mock.dynamixel.servo import DynamixelServo
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
@@ -14,7 +15,7 @@ class Bench:
         return self.servo.write(address, value.to_bytes(size, "little"))
 
     def get(self, address, size=1):
-        return int.from_bytes(self.servo.read(address, size), "little")
+        return int.from_bytes(present(self.servo.read(address, size)), "little")
 
     def at(self, ms):
         return self.servo.advance(ms, ms)

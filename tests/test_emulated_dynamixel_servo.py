@@ -3,6 +3,7 @@
 import struct
 
 import pytest
+from present import present
 
 from gazerig.sim_mock.dynamixel.servo import DynamixelServo
 from gazerig.sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
@@ -25,7 +26,7 @@ class Bench:
 
     def read(self, address: int, size: int, signed: bool = False) -> int:
         self.advance()
-        return int.from_bytes(self.servo.read(address, size), "little", signed=signed)
+        return int.from_bytes(present(self.servo.read(address, size)), "little", signed=signed)
 
     def enable_torque(self, goal: int | None = None) -> None:
         assert self.write(64, 1, 1) == 0
@@ -163,7 +164,7 @@ def test_a_servo_that_holds_still_flickers_by_its_seed_however_often_one_looks()
             bench.now_s = 1.0 + k / looks / 1000.0
             bench.advance()
             if k % looks == 0:
-                out.append(struct.unpack("<hii", bench.servo.read(126, 10)))
+                out.append(struct.unpack("<hii", present(bench.servo.read(126, 10))))
         return out
 
     once = heard(1, 1)

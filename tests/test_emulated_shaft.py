@@ -1,6 +1,7 @@
 """The emulated shaft: what gains, limits, load, friction, stops and play make of it."""
 
 import math
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -12,7 +13,12 @@ from gazerig.sim_mock.smart_servo.physics import Physics, checked
 
 DEG = 4096.0 / 360.0
 P, D = 800 / 128 / 885, 800 / 16 / 885
-SMOOTH = {"coulomb_share": 0.0, "viscous_share": 0.0, "play_deg": 0.0, "supply_ohm": 0.0}
+SMOOTH: dict[str, Any] = {
+    "coulomb_share": 0.0,
+    "viscous_share": 0.0,
+    "play_deg": 0.0,
+    "supply_ohm": 0.0,
+}
 
 
 def shaft(model: str = "xl330-m077", loop: Loop = Loop(p=P, d=D), **physics) -> Shaft:  # noqa: B008

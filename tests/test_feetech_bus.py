@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from moving_bus import IDS
+from present import present
 from servo_rows import rows
 from sts_rig import Rig
 
@@ -74,8 +75,10 @@ def test_from_open_to_close(twin):
     before_s = twin.port.now_s()
     readings = rows(bus.read(before_s))
     assert places(readings) == STARTS
-    assert all(before_s <= r.at_s <= twin.port.now_s() and r.measured for r in readings)
-    assert not any(r.torque or r.fault for r in readings)
+    assert all(
+        before_s <= present(r).at_s <= twin.port.now_s() and present(r).measured for r in readings
+    )
+    assert not any(present(r).torque or present(r).fault for r in readings)
     bus.write([2000] * 3)
     assert places(twin.run(bus, 0.1)) == STARTS
     assert bus.enable_torque() == tuple(STARTS)

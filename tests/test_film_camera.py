@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from present import present
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay
@@ -127,7 +128,7 @@ def test_film_may_start_later(film, detector):
     camera = FilmCamera(film, detector, delay_s=0.0, start_s=100.0)
     camera.open()
     assert camera.latest(99.99) is None
-    assert camera.latest(100.05).captured_s == pytest.approx(100.04)
+    assert present(camera.latest(100.05)).captured_s == pytest.approx(100.04)
 
 
 def test_open_starts_anew(camera, film):
@@ -156,9 +157,9 @@ def test_two_runs_over_a_real_film_give_the_same_numbers():
         assert camera.pictures == 11
         return [
             (
-                found.captured_s,
-                found.number,
-                b"".join(f.landmarks_px.tobytes() for f in found.faces),
+                present(found).captured_s,
+                present(found).number,
+                b"".join(f.landmarks_px.tobytes() for f in present(found).faces),
             )
             for found in seen
         ]
@@ -182,7 +183,9 @@ def test_recording_in_simulated_time_gives_depth_and_lens_and_what_moves(tmp_pat
     camera.open()
     assert camera.latest(100.04) is None
     seen = [camera.latest(100.06 + k / 10.0) for k in range(4)]
-    assert [found.captured_s for found in seen] == pytest.approx([100.0, 100.1, 100.2, 100.3])
-    assert [float(found.depth_m[0, 0]) for found in seen] == [1.0, 2.0, 3.0, 4.0]
-    assert all(found.lens == lens and found.blobs == (blob,) for found in seen)
+    assert [present(found).captured_s for found in seen] == pytest.approx(
+        [100.0, 100.1, 100.2, 100.3]
+    )
+    assert [float(present(present(found).depth_m)[0, 0]) for found in seen] == [1.0, 2.0, 3.0, 4.0]
+    assert all(present(found).lens == lens and present(found).blobs == (blob,) for found in seen)
     camera.close()

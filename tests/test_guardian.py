@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from loop_deaths import PATIENCE_S, driven
 from mixed_rig import mixed_text
+from present import present
 from servo_rows import rows
 from sts_rig import Rig as StsRig
 
@@ -260,7 +261,7 @@ def test_a_port_that_is_gone_is_told_once_and_not_waited_for(capfd):
     guardian.arm(0)
     pid = guardian.pid
     guardian.leave(0)  # still armed: it could not be switched off
-    os.waitpid(pid, 0)
+    os.waitpid(present(pid), 0)
     told = capfd.readouterr().err
     assert told.count("not released yet") == 1 and "no serial port /tmp/no such port" in told
 
@@ -279,7 +280,7 @@ def test_one_that_dies_is_started_again_and_said(monkeypatch):
     guardian.join(0)
     guardian.arm(0)
     first = guardian.pid
-    os.kill(first, signal.SIGKILL)
+    os.kill(present(first), signal.SIGKILL)
     now_s, end_s = 0.0, time.monotonic() + PATIENCE_S
     while guardian.pid == first and time.monotonic() < end_s:
         time.sleep(0.01)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from math import degrees, radians
+from typing import Any
 
 import numpy as np
 import pytest
@@ -83,7 +84,7 @@ def test_an_eye_held_aside_is_relieved_slowly() -> None:
     model.reset(0.0, (0.0, 0.0, 0.0))
     target = Target((1.0, 0.4, 0.0), (0, 0, 0), 0.0, "face", 1, 0.5, True, None, 1, "")
     yaw = radians(21.0)
-    trace = []
+    trace: list[Any] = []
     for k in range(800):
         t = k * 0.005
         aside = abs(yaw - (trace[-1] if trace else 0.0))

@@ -1,6 +1,7 @@
 """A busy computer is told as that, and not as a bad plug."""
 
 import os
+from typing import Any
 
 import pytest
 from line_noise import Noisy
@@ -75,7 +76,8 @@ def test_a_host_that_slept_is_told_as_that_and_servos_go_on():
 
 def standing_still(noisy: Noisy, seconds: float):
     """Keep what is sent from now on from the servos for so long; then all of it arrives."""
-    until_s, held, write = noisy.now + seconds, [], noisy.port.write
+    held: list[Any] = []
+    until_s, write = noisy.now + seconds, noisy.port.write
     available, read_until = noisy.port.getBytesAvailable, noisy.port.read_until
 
     def arrive():

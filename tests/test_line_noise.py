@@ -2,6 +2,7 @@
 
 import pytest
 from line_noise import Noisy
+from present import present
 from servo_rows import rows
 
 SMART = ("dynamixel", "dynamixel direct", "feetech")
@@ -44,7 +45,7 @@ def test_a_joint_that_was_turned_by_hand_is_believed_soon(kind):
         seen.append(rows(noisy.bus.read(noisy.now))[2])
         noisy.now += 0.005
     assert seen[0] is None
-    assert abs(seen[-1].position_steps - noisy.truth()[2]) <= 2
+    assert abs(present(seen[-1]).position_steps - noisy.truth()[2]) <= 2
     assert noisy.bus.health().errors["implausible"] == 2
 
 

@@ -2,6 +2,8 @@
 
 import os
 
+from present import present
+
 from gazerig.drivers.serial.list_ports import (
     Host,
     access,
@@ -48,8 +50,8 @@ def test_latency_timer(tmp_path):
     (tmp_path / "ttyUSB0").mkdir()
     (tmp_path / "ttyUSB0" / "latency_timer").write_text("16\n")
     file = latency_file("/dev/ttyUSB0", host)
-    assert latency_ms(file) == 16
-    assert set_latency(file) and latency_ms(file) == 1
+    assert latency_ms(present(file)) == 16
+    assert set_latency(present(file)) and latency_ms(present(file)) == 1
     assert latency_ms(tmp_path / "none") is None
     assert not set_latency(tmp_path / "none" / "latency_timer")
 

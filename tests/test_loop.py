@@ -123,7 +123,8 @@ class SlowRobot:
     """Costs time as it is told, on a simulated clock."""
 
     def __init__(self, clock: SimulatedClock, cost_s: Callable[[int], float]) -> None:
-        self.clock, self.cost_s, self.times = clock, cost_s, []
+        self.times: list[float] = []
+        self.clock, self.cost_s = clock, cost_s
 
     def tick(self, t_s: float, dt_s: float) -> Any:
         self.times.append((t_s, dt_s))

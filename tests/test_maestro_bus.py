@@ -1,10 +1,12 @@
 """The Maestro driver against an emulated board: holding, following, errors, restarts, silence."""
 
 import time
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from present import present
 from servo_rows import rows
 
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
@@ -33,7 +35,7 @@ class Bench:
 
     def __init__(self, setups=SETUPS, channels=12, chosen=(), **params):
         self.now_s = 0.0
-        self.sent = []
+        self.sent: list[Any] = []
         self.board = build_board(channels, lambda: self.now_s, crc=params.get("crc", False))
         for case, value in chosen:
             self.board.choose(case, value)
@@ -622,7 +624,7 @@ def test_over_a_pseudo_terminal():
         assert places(readings) == goals
         assert bus.health().errors == {}
         bus.disable_torque()
-        assert not any(reading.torque for reading in rows(bus.read(port.now_s())))
+        assert not any(present(reading).torque for reading in rows(bus.read(port.now_s())))
         bus.close()
 
 

@@ -1,6 +1,7 @@
 """Finding a Maestro: what answers, in which form, what it held, and that nothing moves."""
 
 import pytest
+from present import present
 
 from gazerig.drivers.errors import PortError
 from gazerig.drivers.maestro.params import MaestroParams
@@ -57,7 +58,7 @@ def test_what_the_register_held_is_told():
     send(board, "55")
     found = probe(port, MaestroParams())
     assert found is not None and found.errors == ("serial protocol error",)
-    assert probe(port, MaestroParams()).errors == ()
+    assert present(probe(port, MaestroParams())).errors == ()
 
 
 def test_a_running_script_is_seen_and_goes_on():
@@ -78,10 +79,10 @@ def test_the_check_byte_is_found_out(wanted, real):
 
 def test_another_device_number_answers_the_compact_form_only():
     _, port = make(device=3)
-    assert probe(port, MaestroParams()).forms == ("compact",)
-    assert probe(port, MaestroParams(device=3)).forms == ("compact", "pololu")
-    assert probe(port, MaestroParams(protocol="pololu")).forms == ("compact",)
-    assert probe(port, MaestroParams(protocol="pololu", device=3)).forms == ("pololu",)
+    assert present(probe(port, MaestroParams())).forms == ("compact",)
+    assert present(probe(port, MaestroParams(device=3))).forms == ("compact", "pololu")
+    assert present(probe(port, MaestroParams(protocol="pololu"))).forms == ("compact",)
+    assert present(probe(port, MaestroParams(protocol="pololu", device=3))).forms == ("pololu",)
 
 
 def test_a_board_that_detects_its_baud_rate():

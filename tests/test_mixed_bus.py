@@ -2,6 +2,7 @@
 
 from collections import Counter
 from math import nan
+from typing import Any
 
 import pytest
 from servo_rows import Row, feedback_of, rows
@@ -78,7 +79,7 @@ class Mixture:
     """Servos 1, 3 and 4 on bus a, servos 2 and 0 (in this order) on bus b."""
 
     def __init__(self):
-        self.log = []
+        self.log: list[Any] = []
         self.a = Scripted("a", (11, 13, 14), self.log)
         self.b = Scripted("b", (12, 10), self.log)
         self.bus = MixedBus([Share("a", self.a, (1, 3, 4)), Share("b", self.b, (2, 0))])

@@ -1,5 +1,7 @@
 """Slide, growth and spin of a moving patch, against known truth."""
 
+from typing import Any
+
 import cv2
 import numpy as np
 import pytest
@@ -39,7 +41,7 @@ def seen(
     rng = np.random.default_rng(4)
     detector = MotionDetector(MotionParams())
     cover = cv2.circle(np.zeros((400, 400)), (200, 200), round(radius), 1.0, -1)
-    out = []
+    out: list[Any] = []
     for k in range(count):
         t_s = (k - count / 2) * DT_S
         growth, angle = np.exp(loom * t_s), spin * t_s

@@ -28,6 +28,7 @@ import cv2
 import numpy as np
 import pytest
 from desk import JOINTS
+from present import present
 from six_joints import of_six
 from websockets.sync.client import connect
 
@@ -314,7 +315,9 @@ def test_snapshot_survives_the_way() -> None:
 def irises(browser: Browser) -> np.ndarray:
     """Pixels (n, 2) of the rig's blue irises, the only strong blue left of the panel."""
     png = np.frombuffer(browser.photograph(), np.uint8)
-    scene = cv2.imdecode(png, cv2.IMREAD_COLOR)[:, : browser.width_px - PANEL_PX].astype(int)
+    scene = present(cv2.imdecode(png, cv2.IMREAD_COLOR))[:, : browser.width_px - PANEL_PX].astype(
+        int
+    )
     blue, green, red = scene[..., 0], scene[..., 1], scene[..., 2]
     return np.argwhere((blue > red + 70) & (blue > green + 20))
 

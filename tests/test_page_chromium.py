@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 from desk import JOINTS
+from present import present
 
 from gazerig.config.allowed_folder import AllowedFolder
 from gazerig.config.load import shipped
@@ -247,7 +248,7 @@ def test_stop_takes_the_torque_off_until_it_is_asked_back(
     rig, person = at_the_rig
     person.click(STOP)
     wait_for(lambda: "somebody pressed STOP on the page (browser " in rig.robot.stopped, "the stop")
-    wait_for(lambda: rig.newest.guard_result.level == "limp", "torque off")
+    wait_for(lambda: present(rig.newest).guard_result.level == "limp", "torque off")
     wait_for(lambda: person.reads("Torque is off", "Resume"), "the words")
     resumed(rig, person)
 
@@ -308,9 +309,9 @@ def test_buttons_ask_and_the_picture_leads(at_the_rig: tuple[Rig, Person]) -> No
     picture += "i.parentElement.previousElementSibling?.textContent === 'camera')"
     person.click(picture, 0.2)
     wait_for(lambda: isinstance(rig.orders[-1], LookAt), "the click in the picture")
-    wait_for(lambda: rig.newest.target.kind == "puppet", "the head being led")
+    wait_for(lambda: present(rig.newest).target.kind == "puppet", "the head being led")
     person.click(saying("look freely again"))
-    wait_for(lambda: rig.newest.target.kind != "puppet", "the head being free")
+    wait_for(lambda: present(rig.newest).target.kind != "puppet", "the head being free")
 
 
 def test_a_target_is_dragged_through_the_scene(at_the_rig: tuple[Rig, Person]) -> None:
@@ -319,7 +320,7 @@ def test_a_target_is_dragged_through_the_scene(at_the_rig: tuple[Rig, Person]) -
     person.run("window.drawScene = true")
     there = (0.7, 0.1, 0.3)
     rig.robot.command(LookAt(there, stay=True))
-    wait_for(lambda: rig.newest.target.p_world_m == there, "the head being led")
+    wait_for(lambda: present(rig.newest).target.p_world_m == there, "the head being led")
     wait_for(lambda: person.reads("somebody chose this point"), "the page knowing of it")
     person.click(beside("drag a target", "input"))
     rect = "(() => { const r = document.querySelector('canvas').getBoundingClientRect();"
@@ -333,11 +334,11 @@ def test_a_target_is_dragged_through_the_scene(at_the_rig: tuple[Rig, Person]) -
         return any(isinstance(order, LookAt) for order in rig.orders[before:])
 
     wait_for(dragged, "the target being dragged")
-    wait_for(lambda: rig.newest.target.p_world_m[2] > 0.38, "the head following")
+    wait_for(lambda: present(rig.newest).target.p_world_m[2] > 0.38, "the head following")
     # Along the arrow and nowhere else.
-    assert rig.newest.target.p_world_m[:2] == pytest.approx(there[:2], abs=1e-3)
+    assert present(rig.newest).target.p_world_m[:2] == pytest.approx(there[:2], abs=1e-3)
     person.click(saying("look freely again"))
-    wait_for(lambda: rig.newest.target.kind != "puppet", "the head being free")
+    wait_for(lambda: present(rig.newest).target.kind != "puppet", "the head being free")
     person.run("window.drawScene = false")
 
 
@@ -394,7 +395,7 @@ def test_what_is_in_force_is_saved_in_a_new_file_with_its_comments(
     person.click(saying("tuning"))
     wait_for(lambda: person.reads("not saved"), "the mark")
     file = tmp_path / "tuned at midnight.yaml"
-    rig.audience._page._hear._handler._paths = AllowedFolder(
+    present(present(rig.audience._page)._hear)._handler._paths = AllowedFolder(
         tmp_path
     )  # as if the rig's file lay there
     person.click(beside("save as", "input"))
@@ -453,7 +454,8 @@ def test_names_are_words_and_never_run(at_the_rig: tuple[Rig, Person]) -> None:
 
 def test_a_stop_that_gets_lost_is_sent_again(at_the_rig: tuple[Rig, Person]) -> None:
     rig, person = at_the_rig
-    hear, lost = rig.audience._page._hear, []
+    lost: list[Any] = []
+    hear = present(present(rig.audience._page)._hear)
 
     def deaf_at_first(asked: dict[str, object]) -> str | None:
         if asked.get("do") == "stop" and len(lost) < 3:
@@ -461,14 +463,14 @@ def test_a_stop_that_gets_lost_is_sent_again(at_the_rig: tuple[Rig, Person]) -> 
             return "refused: not now"
         return hear(asked)
 
-    rig.audience._page._hear = deaf_at_first
+    present(rig.audience._page)._hear = deaf_at_first
     try:
         person.click(STOP)
         wait_for(lambda: rig.robot.stopped, "the stop")
         wait_for(lambda: person.reads("Torque is off") and person.reads("STOP"), "the words")
         assert len(lost) == 3
     finally:
-        rig.audience._page._hear = hear
+        present(rig.audience._page)._hear = hear
     resumed(rig, person)
 
 

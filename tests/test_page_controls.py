@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from math import radians
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
 import viser
@@ -104,7 +104,7 @@ def linked(
         page.close()
 
 
-def sent(theirs: socket.socket) -> tuple[bytes, object]:
+def sent(theirs: socket.socket) -> tuple[bytes, Any]:
     """The next message to the page: its kind, and what its JSON holds."""
     message = theirs.recv(MESSAGE_BYTES)
     return message[:1], json.loads(message[1:])

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 from desk import JOINTS
+from present import present
 from six_joints import ESTIMATED_RAD, SIX, WISH_RAD, of_six
 
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
@@ -269,7 +270,9 @@ def test_encoded_picture_is_a_jpeg_that_fits_a_message() -> None:
     noise = np.random.default_rng(1).integers(0, 256, (240, 320, 3), dtype=np.uint8)
     jpeg = encode(noise)
     assert len(jpeg) < MESSAGE_BYTES
-    assert cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR).shape == noise.shape
+    assert (
+        present(cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)).shape == noise.shape
+    )
 
 
 def test_depth_is_shown_in_colours_near_red_far_blue_unknown_dark() -> None:

@@ -2,6 +2,7 @@
 
 import errno
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from board_rig import on_pca9685
@@ -45,7 +46,7 @@ class World:
         self.now = [10.0]
         specs = [HobbySpec(i) for i in ids]
         self.device = build_bridge(addresses, lambda: self.now[0], oscillator_hz, 0, specs)
-        self.sent = []
+        self.sent: list[Any] = []
         self.port = InProcessPort(self.device, self.sent.append, "emulated", self._sleep_until)
         self.setups = [setup(i, **more) for i in ids]
         self.bus = Pca9685Bus(self.port, self.setups, params)

@@ -248,7 +248,7 @@ def test_perception_tells_its_residual() -> None:
     """A head that turns before a still face, with times that are right."""
     mount = CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0)))
     perception, poses = Perception(mount, 69.0, Tracker(TrackParams())), PoseHistory(Neck())
-    taken = []
+    taken: list[Any] = []
     for tick in range(800):
         t = tick / 200
         yaw = 0.25 * np.sin(3.0 * t) ** 3

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from math import radians
+from typing import Any
 
 import numpy as np
 import pytest
@@ -60,7 +61,7 @@ class Still:
 
     name = "still"
     round_s = 10.0
-    behaviours = ()
+    behaviours: tuple[str, ...] = ()
 
     def __init__(
         self, *people: Vec3, things: tuple[Thing, ...] = (), v: Vec3 = (0.0, 0.0, 0.0)
@@ -98,7 +99,7 @@ def camera(
     detector: MtcnnDetector | Nobody,
     head: Callable[[float], tuple[Mat3, Vec3]] = level,
     seed: int = 0,
-    **params: float,
+    **params: Any,
 ) -> PixelCamera:
     rng = np.random.default_rng(seed)
     return PixelCamera(PixelCameraParams(**params), scene, MOUNT, head, detector, rng)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from dynamixel_sdk import COMM_SUCCESS, GroupSyncRead, GroupSyncWrite, PacketHandler
+from present import present
 
 from gazerig.drivers.errors import BusLost, PortError
 from gazerig.drivers.serial import port as serial_port
@@ -56,16 +57,16 @@ def start_server(**options) -> subprocess.Popen:
 
 def test_the_server_says_its_path_and_ends_with_its_parents_pipe():
     server = start_server()
-    terminal = json.loads(server.stdout.readline())["path"]
+    terminal = json.loads(present(server.stdout).readline())["path"]
     assert Path(terminal).is_char_device()
-    server.stdin.close()
+    present(server.stdin).close()
     assert server.wait(60) == 0
-    server.stdout.close()
+    present(server.stdout).close()
 
 
 def test_the_server_ignores_ctrl_c_and_heeds_sigterm():
     server = start_server()
-    terminal = json.loads(server.stdout.readline())["path"]
+    terminal = json.loads(present(server.stdout).readline())["path"]
     server.send_signal(signal.SIGINT)
     port = BlockingPort(terminal)
     port.setBaudRate(1_000_000)
@@ -74,8 +75,8 @@ def test_the_server_ignores_ctrl_c_and_heeds_sigterm():
     server.terminate()
     assert server.wait(60) == 0
     assert not Path(terminal).exists()
-    server.stdin.close()
-    server.stdout.close()
+    present(server.stdin).close()
+    present(server.stdout).close()
 
 
 def test_the_server_loads_nothing_heavy():

@@ -2,6 +2,7 @@
 
 from functools import cache
 from math import degrees, radians
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -96,7 +97,8 @@ def test_a_rig_without_a_neck_says_so() -> None:
 
 def test_the_running_robot_replies_so_and_keeps_saying_it() -> None:
     made = assemble(loaded("desk"), RunOptions(mock=True, fast=True, seed=3, scene="face-to-face"))
-    robot, ticks = made.robot, []
+    ticks: list[Any] = []
+    robot = made.robot
 
     def go(seconds: float) -> None:
         run(robot, made.clock, made.loop, lambda s: "s" if s >= seconds else None, ticks.append)

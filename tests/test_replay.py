@@ -3,7 +3,7 @@
 import json
 import re
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import radians
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import viser
+from present import present
 from typer.testing import CliRunner
 
 from gazerig.config.schema import load_rig
@@ -132,13 +133,16 @@ def test_a_snapshot_is_what_the_live_page_would_have_shown(
     snapshot = unpack(frames.message(frames.at(4.0)))
     tick = next(t for t in ticks if t.t_s == snapshot.t_s)
     assert snapshot.measured_rad == tick.joints.position_rad
-    assert snapshot.why == tick.target.why and snapshot.faces[0].id == tick.percept.faces[0].id
+    assert (
+        snapshot.why == tick.target.why
+        and snapshot.faces[0].id == present(tick.percept).faces[0].id
+    )
     assert snapshot.behaviour == "wait" and snapshot.rate_hz == pytest.approx(200.0, rel=0.01)
 
 
 def test_pictures_come_with_their_time(frames: SnapshotIndex) -> None:
     assert frames.picture_at(0.9) is None
-    found = [frames.picture(frames.picture_at(s)) for s in (1.0, 2.9, 3.1, 99.0)]
+    found = [frames.picture(present(frames.picture_at(s))) for s in (1.0, 2.9, 3.1, 99.0)]
     assert found == [b"jpeg at 1", b"jpeg at 1", b"jpeg at 3", b"jpeg at 5"]
 
 
@@ -345,7 +349,7 @@ class Shelf:
     """A view of a recording with what it asked for, on a server without a browser."""
 
     def __init__(self, server: viser.ViserServer) -> None:
-        self.asked: list[tuple[int, dict[str, object]]] = []
+        self.asked: list[tuple[int, Mapping[str, object]]] = []
         self.view = ReplayView(server.gui, lambda who, what: self.asked.append((who, what)), 10.0)
         self.handles = list(server.gui._gui_input_handle_from_uuid.values())
 

@@ -71,7 +71,7 @@ def test_odd_films_are_looked_at(tmp_path: Path, sizes: list[tuple[int, int]]) -
 
 def test_a_film_of_one_picture_is_not_cut_short(tmp_path: Path) -> None:
     path = tmp_path / "one.avi"
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), 25.0, (64, 48))
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 25.0, (64, 48))
     writer.write(np.full((48, 64, 3), 90, np.uint8))
     writer.release()
     assert figures("--video", str(path), "--seconds", "0.5")["pictures"] >= 2

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from itertools import pairwise
 from math import cos, inf, nan, radians
+from typing import Any
 
 import numpy as np
 import pytest
@@ -76,7 +77,7 @@ def test_whoever_commands_is_told_what_became_of_every_joint() -> None:
 )
 def test_a_joint_can_always_stop_inside_its_range(wishes: list[float], ticks: list[float]) -> None:
     guard, t = ready(), 0.0
-    command = (0.0,) * 9
+    command: tuple[float, ...] = (0.0,) * 9
     for desired, dt in zip(wishes, ticks, strict=False):
         t += dt
         command = guard.check((desired,) * 9, measured(t, command), 0.0, t).command_rad
@@ -225,7 +226,8 @@ def test_it_starts_slowly_from_where_the_joints_are_until_each_has_met_its_wish(
 
 
 def test_going_gently_in_flight_brakes_within_the_joints_own_strength() -> None:
-    guard, t, path = ready(), 0.0, []
+    path: list[Any] = []
+    guard, t = ready(), 0.0
     for k in range(60):
         t += DT
         if k == 15:

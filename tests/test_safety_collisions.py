@@ -81,6 +81,7 @@ def touches(begin: np.ndarray, end: np.ndarray, low: np.ndarray, high: np.ndarra
 
 def test_the_judge_of_these_tests_sees_what_a_tick_leaps_over() -> None:
     low, high = np.array([0.0, 0.0]), np.array([1.0, 1.0])
+    cases: list[tuple[tuple[float, float], tuple[float, float], bool]]
     cases = [((-1, 0.5), (2, 0.5), True), ((-1, -1), (2, 2), True), ((-1, 1.2), (2, 1.2), False)]
     cases += [((0.5, 0.5), (0.5, 0.5), True), ((2, 2), (2, 2), False), ((-1, 1), (1.2, 3.2), False)]
     for begin, end, expected in cases:

@@ -1,6 +1,7 @@
 """Heat, load, voltage, torque and latched faults: slower first, then still, then limp."""
 
 from math import nan, radians
+from typing import Any
 
 import numpy as np
 import pytest
@@ -37,7 +38,7 @@ class World:
         if stray is not None:
             at[JOINT] = stray
         joints = JointState(tuple(at), (0.0,) * 9, (self.t_s,) * 9, ())
-        columns = {
+        columns: dict[str, Any] = {
             name: tuple(one if k == JOINT else self._usual(name) for k in range(9))
             for name, one in said.items()
         }

@@ -83,14 +83,14 @@ class Bench:
         ages = tuple(self.t_s - (old_s if k == JOINT else 0.0) for k in range(9))
         usual = {"torque": True, "fault": "", "rearmed": False, "load": 0.0, "measured": True}
         usual |= {"temperature_c": 40.0, "voltage_v": 5.0}
-        columns = {
+        columns: dict[str, Any] = {
             name: tuple(one if k == JOINT else usual[name] for k in range(9))
             for name, one in said.items()
         }
         state = JointState(position, (0.0,) * 9, ages, ())._replace(**columns)
         wishes = (desired,) * 9 if isinstance(desired, float) else desired
         verdict = self.guard.check(wishes, state, age_s, self.t_s)
-        before = self.path[-1]
+        before: tuple[float, ...] = self.path[-1]
         if said.get("rearmed"):
             assert at is not None
             before = tuple(at if k == JOINT else p for k, p in enumerate(before))

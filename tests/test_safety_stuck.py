@@ -182,7 +182,8 @@ def test_a_silent_joint_is_stale_and_not_stuck() -> None:
 def test_a_stuck_joint_lets_the_others_move() -> None:
     guard = Guard(GuardParams(), LIMITS, JOINTS)
     guard.reset(0.0, (0.0,) * 9)
-    command, verdict = (0.0,) * 9, None
+    command: tuple[float, ...] = (0.0,) * 9
+    verdict = None
     for k in range(1, 500):
         joints = JointState((0.0, *command[1:]), (0.0,) * 9, (k * DT,) * 9, ())
         verdict = guard.check((0.3,) * 9, joints, 0.0, k * DT)

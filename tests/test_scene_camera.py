@@ -1,5 +1,7 @@
 """The camera on a scene: things come late, noisy, with their identity, inside the field."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -17,7 +19,7 @@ class Still:
 
     name = "still"
     round_s = 10.0
-    behaviours = ()
+    behaviours: tuple[str, ...] = ()
 
     def __init__(self, things: tuple[Thing, ...], later: tuple[Thing, ...] = ()) -> None:
         self._things, self._later = things, later
@@ -35,7 +37,7 @@ class Still:
         return ()
 
 
-def camera(scene: Still, **params: float) -> SceneCamera:
+def camera(scene: Still, **params: Any) -> SceneCamera:
     still = CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0)))
     made = SceneCamera(SceneCameraParams(**params), scene, still, where, np.random.default_rng(0))
     made.open()

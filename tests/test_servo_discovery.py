@@ -1,6 +1,9 @@
 """Who is on the bus: every baud rate, pieces, shared ids, echoes, the old protocol; homing."""
 
+from typing import Any
+
 import pytest
+from present import present
 from sts_rig import Rig
 
 from gazerig.drivers.dynamixel.control_table import BAUD_RATES
@@ -178,7 +181,7 @@ def test_latched_errors_and_stuffed_answers_are_heard():
     port = mixed()
     port.setBaudRate(57_600)
     port.faults.command("overload 9")
-    assert ping(port, DYNAMIXEL, 9, 57_600).model == XC
+    assert present(ping(port, DYNAMIXEL, 9, 57_600)).model == XC
     assert corrupt(port, DYNAMIXEL, 9) == 0
     port.faults.command("refuse 9 7")
     assert ping(port, DYNAMIXEL, 9, 57_600) is None
@@ -186,7 +189,7 @@ def test_latched_errors_and_stuffed_answers_are_heard():
 
 def test_ids_are_asked_one_by_one_where_a_ping_to_all_tells_nothing():
     bench, asked = Bench(FEETECH, 500_000, 1, 7), []
-    told = {"progress": lambda baud, servo_id: asked.append((baud, servo_id))}
+    told: dict[str, Any] = {"progress": lambda baud, servo_id: asked.append((baud, servo_id))}
     list(scan(bench.port, FEETECH, thorough=True, **told))
     assert len(asked) == 8 * 254
     asked.clear()
@@ -250,7 +253,7 @@ def test_a_thorough_scan_waits_as_long_as_the_sdk():
 def test_an_answer_in_time_is_not_waited_beyond():
     port = ScriptedPort(bytes.fromhex("FFFFFD000107005500060426655D"))
     raw, status = transact(port, DYNAMIXEL, b"ping", 3, 0.04)
-    assert len(raw) == 14 and status.id == 1
+    assert len(raw) == 14 and present(status).id == 1
     assert port.time_s < 0.01
 
 

@@ -5,7 +5,9 @@ true in its cycle (the rigs assert it in every tick); one bad servo does not bli
 What faults only one make has is in test_dynamixel_listed_faults and test_feetech_faults.
 """
 
+from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import pytest
 import sts_rig
@@ -23,7 +25,7 @@ from moving_bus import (
 
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
 
-RIGS = {
+RIGS: dict[str, Callable[[], Any]] = {
     **{f"dynamixel {way}": partial(DynamixelRig, *chosen) for way, chosen in WAYS.items()},
     "feetech": sts_rig.Rig,
 }

@@ -11,7 +11,7 @@ from dynamixel_sdk import (
 )
 
 from gazerig.drivers.errors import BusLost, PortError
-from gazerig.sim_mock.devices import DynamixelLine, FeetechLine, MaestroLine, build
+from gazerig.sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, build
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
@@ -109,7 +109,7 @@ def test_reading_part_of_an_answer_leaves_the_rest(world):
 # --- any device
 
 
-KINDS = {
+KINDS: dict[str, tuple[Emulated, bytes, int]] = {
     "dynamixel": (
         DynamixelLine((ServoSpec(1, "xl330-m288"),), 57_600),
         bytes.fromhex("FFFFFD0001030001194E"),

@@ -23,6 +23,7 @@ a check of one byte, an echo                test_faults_of_answers_with_a_check_
 
 import struct
 from itertools import pairwise
+from typing import Any
 
 import pytest
 from sts_rig import Rig as StsRig
@@ -49,7 +50,7 @@ class Rig:
         self.now_s = 0.0
         specs = [ServoSpec(i, "xl330-m077", 2000 + i) for i in (1, 2, 3)]
         self.chain = build_dynamixel(specs, lambda: self.now_s)
-        self.sent = []
+        self.sent: list[Any] = []
         self.port = SpoiltPort(self.chain, self.sent.append, sleep_until=self.sleep_until)
         self.port.setBaudRate(1_000_000)
         self.registers = Registers(self.port, DYNAMIXEL)

@@ -4,7 +4,9 @@ What their values become, and which of them are believed, is here, too.
 """
 
 import struct
+from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import pytest
 
@@ -32,7 +34,7 @@ SENSED, ARMED = window(56), window(40)
 dynamixel_read = partial(SyncRead, DYNAMIXEL)
 feetech_read = partial(SyncRead, FEETECH)
 
-READS = {
+READS: dict[str, tuple[Callable[..., Any], tuple[Any, ...]]] = {
     "dynamixel": (dynamixel_read, (DIRECT, *direct_windows()._spare)),
     "dynamixel fast": (FastSyncRead, (DIRECT, *direct_windows()._spare)),
     "feetech": (feetech_read, (SENSED, ARMED, window(55), window(30))),
@@ -46,7 +48,7 @@ class Kind:
         self.name, (self.make, self.windows) = name, READS[name]
         if name == "feetech":
             specs = [ServoSpec(i, "sts3215", PLACES[i]) for i in IDS]
-            self.chain = build_feetech(specs, lambda: 0.0)
+            self.chain: Any = build_feetech(specs, lambda: 0.0)
         else:
             self.chain = build_dynamixel([(i, "xl330-m288", PLACES[i]) for i in IDS], lambda: 0.0)
 
@@ -149,7 +151,12 @@ def test_signs_units_and_both_error_bytes():
     assert sample.torque is None
     armed = ARMED.sample(0, bytes((1, 50)) + bytes(6) + struct.pack("<H", 400) + bytes(6) + BLOCK)
     assert (armed.torque, armed.acceleration, armed.torque_limit) == (1, 50, 400)
-    told = {"torque": None, "acceleration": None, "torque_limit": None, "error": 0x01}
+    told: dict[str, Any] = {
+        "torque": None,
+        "acceleration": None,
+        "torque_limit": None,
+        "error": 0x01,
+    }
     assert armed._replace(**told) == sample
 
 

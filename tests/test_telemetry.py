@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from emulated_rig import EmulatedRig, mixed_rig
+from present import present
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.maestro.commands import Speech
@@ -145,8 +146,8 @@ def test_a_silent_servo_is_none_and_counted(kind: str) -> None:
 
 
 def test_load_is_a_share_of_the_stall() -> None:
-    assert DYNAMIXEL.driving.load("xl330-m077", -147) == pytest.approx(-0.1)
-    assert DYNAMIXEL.driving.load("xl430-w250", 250) == pytest.approx(0.25)
+    assert present(DYNAMIXEL.driving).load("xl330-m077", -147) == pytest.approx(-0.1)
+    assert present(DYNAMIXEL.driving).load("xl430-w250", 250) == pytest.approx(0.25)
     assert -100 * FEETECH.family.models["sts3215"].load_unit == pytest.approx(-0.1)
 
 

@@ -20,7 +20,8 @@ class Bench:
 
     def __init__(self, device=STS, **settings):
         self.now_s = 5.0
-        self.said, self.warned = [], []
+        self.said: list[str] = []
+        self.warned: list[str] = []
         self.line = TerminalLine(
             BusSettings(device, **settings),
             self.clock,

@@ -6,6 +6,7 @@ tests/attack/true_motion.py prints the whole table and runs for hours.
 
 from collections.abc import Iterator
 from math import radians
+from typing import Any
 
 import numpy as np
 import pytest
@@ -122,7 +123,7 @@ def test_joints_come_from_anywhere_slowly_at_start_and_at_resume(
             bench.turn(joint, angle)
         bench.resume()
     bench.shafts.angles_rad.clear()
-    gentle = []
+    gentle: list[Any] = []
     for _ in range(300):
         bench.tick(desired)
         gentle += [list(bench.guard._gentle)] * (len(bench.shafts.angles_rad) - len(gentle))

@@ -23,7 +23,7 @@ LENGTH, RATE_HZ = 20, 10.0
 
 def write_film(path: Path, length: int = LENGTH, rate_hz: float = RATE_HZ) -> Path:
     """Write a film whose picture k (from 0) is grey of 10 k."""
-    writer = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"MJPG"), rate_hz, (64, 48))
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), rate_hz, (64, 48))
     for k in range(length):
         writer.write(np.full((48, 64, 3), 10 * k, np.uint8))
     writer.release()

@@ -2,10 +2,12 @@
 
 import os
 import threading
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
+from present import present
 
 from gazerig.drivers.camera.params import WebcamParams
 from gazerig.drivers.camera.webcam import Webcam
@@ -116,28 +118,28 @@ def test_wishes_reach_the_camera(device):
 
 def test_picture_has_the_kernels_time_where_it_is_on_our_clock(device):
     camera = opened(device, Capture(stamp_ms=49_970.0))
-    assert camera.take(lambda: 50.0, GO_ON).captured_s == pytest.approx(49.97)
+    assert present(camera.take(lambda: 50.0, GO_ON)).captured_s == pytest.approx(49.97)
 
 
 @pytest.mark.parametrize("stamp_ms", [0.0, 51_000.0, 48_000.0, 1.7e12])
 def test_picture_has_the_time_of_its_arrival_otherwise(device, stamp_ms):
     camera = opened(device, Capture(stamp_ms=stamp_ms))
-    assert camera.take(lambda: 50.0, GO_ON).captured_s == 50.0
+    assert present(camera.take(lambda: 50.0, GO_ON)).captured_s == 50.0
 
 
 def test_pictures_are_counted_and_fresh(device):
     camera = opened(device, Capture())
     shots = [camera.take(lambda: 1.0, GO_ON) for _ in range(3)]
-    assert [shot.number for shot in shots] == [1, 2, 3]
-    assert [int(shot.picture[0, 0, 0]) for shot in shots] == [2, 3, 4]
-    assert not shots[0].picture.flags.writeable
+    assert [present(shot).number for shot in shots] == [1, 2, 3]
+    assert [int(present(shot).picture[0, 0, 0]) for shot in shots] == [2, 3, 4]
+    assert not present(shots[0]).picture.flags.writeable
 
 
 def test_a_few_failures_are_skipped(device):
     capture = Capture()
     camera = opened(device, capture)
     capture.failures, capture.empty = 2, 2
-    assert camera.take(lambda: 1.0, GO_ON).number == 1
+    assert present(camera.take(lambda: 1.0, GO_ON)).number == 1
 
 
 def test_lasting_failure_means_the_camera_is_gone(device):
@@ -169,7 +171,7 @@ def test_latency_of_the_camera_is_taken_off(device):
     camera = Webcam.of(device, params)
     camera._open_capture = lambda name: Capture(stamp_ms=49_970.0)
     camera.open()
-    assert camera.take(lambda: 50.0, GO_ON).captured_s == pytest.approx(49.935)
+    assert present(camera.take(lambda: 50.0, GO_ON)).captured_s == pytest.approx(49.935)
 
 
 def run(device, stated_hz: float, gives_hz: float, away_s: float, count: int = 60) -> list[str]:
@@ -177,7 +179,8 @@ def run(device, stated_hz: float, gives_hz: float, away_s: float, count: int = 6
     capture = Capture()
     capture.stated_hz = stated_hz
     camera = opened(device, capture)
-    clock, told, picture = [100.0], [], [0]
+    told: list[Any] = []
+    clock, picture = [100.0], [0]
 
     def grab() -> bool:
         # The next picture that is not over yet; missed ones are lost.
@@ -226,8 +229,8 @@ def test_grey_alpha_and_deep_pictures_become_colour(device, picture):
     capture = Capture()
     capture.picture = picture
     shot = opened(device, capture).take(lambda: 1.0, GO_ON)
-    assert shot.picture.shape == (4, 6, 3)
-    assert shot.picture.dtype == np.uint8 and (shot.picture == 7).all()
+    assert present(shot).picture.shape == (4, 6, 3)
+    assert present(shot).picture.dtype == np.uint8 and (present(shot).picture == 7).all()
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ current loop, and the millisecond at which a goal arrives, are below that and no
 Hobby servos hear a pulse every 20 ms and are emulated in steps of 10: there it is 20 and 20 ms.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import NamedTuple
 
@@ -27,7 +27,7 @@ from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.types import JointAngles
 from gazerig.robot.safety.guard import Guard
 from gazerig.sim_mock.device import Device
-from gazerig.sim_mock.devices import build
+from gazerig.sim_mock.devices import Emulated, build
 from gazerig.sim_mock.in_process_port import InProcessPort
 
 MS_S = 0.001
@@ -64,7 +64,7 @@ class Shafts(SimulatedClock):
             for name in rig.names
         ]
 
-    def build(self, lines: dict[str, object]) -> dict[str, InProcessPort]:
+    def build(self, lines: Mapping[str, Emulated]) -> dict[str, InProcessPort]:
         """Build the emulated lines on this clock."""
         self.devices = {name: build(line, self.now_s) for name, line in lines.items()}
         return {name: InProcessPort(device) for name, device in self.devices.items()}
@@ -104,7 +104,12 @@ class Worst(NamedTuple):
 
     def joined(self, other: "Worst") -> "Worst":
         """Return the worst of both."""
-        return Worst(*map(max, self[:3], other[:3]), self.stops + other.stops)
+        return Worst(
+            max(self.beyond_deg, other.beyond_deg),
+            max(self.speed_deg_s, other.speed_deg_s),
+            max(self.accel_deg_s2, other.accel_deg_s2),
+            self.stops + other.stops,
+        )
 
 
 class Judge:

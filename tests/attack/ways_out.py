@@ -29,6 +29,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
+from present import present
+
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from board_rig import on_pca9685
@@ -98,7 +100,7 @@ class Bench(NamedTuple):
         at = {servo["id"]: servo.get("place", servo.get("position")) for servo in self.servos()}
         park = park_rad(self.rig)
         return max(
-            abs(degrees(j.made().angle_rad(at[j.id]) - park.get(name, 0.0)))
+            abs(degrees(j.made().angle_rad(present(at[j.id])) - park.get(name, 0.0)))
             for name, j in self.rig.joints.items()
         )
 
