@@ -18,6 +18,7 @@ from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
 from gazerig.drivers.serial.port import BlockingPort, BusPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
+from gazerig.drivers.servo_bus.params import BusParams
 from gazerig.drivers.servo_families import FAMILY_OF
 from gazerig.drivers.types import ServoBus, ServoSetup
 from gazerig.sim_mock.device import Device
@@ -116,15 +117,14 @@ class Twin:
         port = self.wires.ports[name]
         # A shared machine may stall a process for longer than real servos ever wait.
         patience: dict[str, Any] = {"reply_timeout_ms": 200.0} if self._patient else {}
+        quick: dict[str, Any] = {"stagger_ms": 0.0, "give_up_s": give_up_s}
         if name == "maestro":
-            quick: dict[str, Any] = {"stagger_ms": 0.0, "give_up_s": give_up_s}
             return MaestroBus(port, setups, MaestroParams(**patience, **quick))
         if name == "pca9685":
-            quick: dict[str, Any] = {"stagger_ms": 0.0, "give_up_s": give_up_s}
             return Pca9685Bus(port, setups, Pca9685Params(**patience, **quick))
         if self._patient:
             patience["prompt_timeout_ms"] = 200.0
-        params = DynamixelParams(**patience, watchdog_ms=0, give_up_s=give_up_s)
+        params: BusParams = DynamixelParams(**patience, watchdog_ms=0, give_up_s=give_up_s)
         if name != "dynamixel":
             params = FeetechParams(**patience, give_up_s=give_up_s)
         return SmartServoBus(FAMILY_OF[MODELS[name]], port, setups, params)
@@ -160,7 +160,7 @@ class Twin:
         board = name in BOARDS and verb == "brown-out"
         self.command(verb if board else f"{verb} {self.setups[place].id}", name)
 
-    def reports(self) -> list[dict[str, object]]:
+    def reports(self) -> list[dict[str, Any]]:
         """Return what servos truly are, in the order of the whole."""
         by_bus = {}
         for name in self.buses:

@@ -21,7 +21,7 @@ def running() -> dict[int, str]:
 
     Those that multiprocessing keeps for itself are not among them, nor those that have ended.
     """
-    own = (resource_tracker._resource_tracker, forkserver._forkserver)  # type: ignore[attr-defined]
+    own = (resource_tracker._resource_tracker, forkserver._forkserver)
     kept = {getattr(one, name, None) for one in own for name in ("_pid", "_forkserver_pid")}
     found = {}
     for pid in _children(os.getpid()):

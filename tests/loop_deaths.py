@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from servo_rows import rows
 from struck_rigs import rig_of
@@ -46,7 +46,7 @@ def drive(kind: str, guarded: bool, watchdog: bool, path: str) -> None:
     )
     bus.open()
     bus.enable_torque()
-    goals: list[float] = [setup.max_steps for setup in rig_setups(rig)]
+    goals: list[Any] = [setup.max_steps for setup in rig_setups(rig)]
     said = False
     ticks = 0
     while True:

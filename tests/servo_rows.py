@@ -32,4 +32,5 @@ def feedback_of(given: list[Row | None]) -> Feedback:
     columns: Any = (column[0] for column in none[:-1])
     blank = Row(*columns)
     every: Any = zip(*[blank if row is None else row for row in given], strict=True)
-    return Feedback(*every, tuple(i for i, row in enumerate(given) if row is None))
+    missing = tuple(i for i, row in enumerate(given) if row is None)
+    return Feedback(*(*every, missing))

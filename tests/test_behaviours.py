@@ -225,7 +225,7 @@ class Distracted:
 
     name = "distracted"
     round_s = 20.0
-    behaviours = ("wait",)
+    behaviours: tuple[str, ...] = ("wait",)
     starts_s = (3.0, 6.0, 9.0, 12.0, 15.0)
 
     def __init__(self, way_m: Vec3) -> None:

@@ -5,7 +5,7 @@ Degrees and seconds; an angle commanded at tick k holds from the end of that per
 
 from collections.abc import Callable
 from math import cos, degrees, pi, radians, sin
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -142,7 +142,7 @@ def test_too_fast_a_target_is_left_behind() -> None:
 
 
 @pytest.mark.parametrize(("covered", "share"), [("copy", 1.0), ("cross", 2.0 / 6.0)])
-def test_e28_covered_eye(covered: str, share: float) -> None:
+def test_e28_covered_eye(covered: Any, share: float) -> None:
     controller = BinocularController(BinocularParams(covered=covered))
     controller.reset(0.0, 0.0, radians(4.0))
     for _ in range(400):

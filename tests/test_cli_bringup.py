@@ -3,6 +3,7 @@
 import json
 import re
 from datetime import datetime
+from typing import Any
 
 import pytest
 from command_line import invoked
@@ -265,7 +266,8 @@ def test_a_rig_of_ones_own_names_its_port(tmp_path):
     mine = copy_shipped("desk", tmp_path / "mine.yaml")
     with PtyBus() as bus:
         path = bus.start(SMALL[1:], baud=57_600)
-        wishes = {"bus.port": path, "bus.dynamixel.baud": 57_600, "joints.neck_yaw.id": 20}
+        wishes: dict[str, Any] = {"bus.port": path, "bus.dynamixel.baud": 57_600}
+        wishes["joints.neck_yaw.id"] = 20
         save_rig(mine, wishes, datetime(2026, 1, 1))
         code, _, err = invoked("setup", str(mine), "--joint", "neck_yaw", "--yes")
         assert code == 0 and "id 7 -> 20; answers as id 20 at 57600 bit/s" in err

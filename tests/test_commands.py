@@ -263,7 +263,7 @@ def test_who_is_in_a_conversation_blinks_as_people_do_there(mode: str) -> None:
     for name in ("rest", "conversation"):
         lids = Lids(LidParams(), np.random.default_rng(1))
         lids.mode("rest" if name == "conversation" else "conversation")
-        lids.mode(name)  # type: ignore[arg-type]
+        lids.mode(name)
         expected[name] = blinks_in_two_minutes(lids)
     assert expected["conversation"] > expected["rest"] + 5
     lids = Lids(LidParams(), np.random.default_rng(1))

@@ -5,7 +5,7 @@ import string
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -272,7 +272,7 @@ def test_shipped_rigs_are_copied_not_changed(tmp_path):
 
 def test_a_whole_rig(tmp_path):
     mine = copy_shipped("desk", tmp_path / "mine.yaml")
-    wishes = {
+    wishes: dict[str, Any] = {
         "joints.neck_yaw.zero_step": 2051,
         "joints.neck_yaw.sign": -1,
         "joints.left_eye_pan.min_deg": -31.5,

@@ -2,6 +2,7 @@
 
 import json
 from math import inf
+from typing import cast
 
 import pytest
 
@@ -37,7 +38,7 @@ def test_a_device_travels_as_json(line):
 
 def test_an_endless_stop_travels_too():
     line = unpacked(json.loads(json.dumps(packed(LINES[1]))))
-    assert line.servos[0].physics.stop_high_steps == inf
+    assert cast(ServoSpec, line.servos[0]).physics.stop_high_steps == inf
 
 
 def test_short_words_are_enough():

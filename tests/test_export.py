@@ -164,7 +164,9 @@ def test_amplitudes_are_measured(face: Run) -> None:
         a, b = (np.array((cos(y) * cos(x), cos(y) * sin(x), sin(y))) for x, y in
                 ((xa, ya), (xb, yb)))  # fmt: skip
         assert s.amplitude_deg == pytest.approx(degrees(np.arccos(a @ b)), abs=1e-6)
-        assert s.peak_deg_s is not None and s.peak_deg_s > s.amplitude_deg / present(s.duration_s)
+        assert s.peak_deg_s is not None and s.peak_deg_s > present(s.amplitude_deg) / present(
+            s.duration_s
+        )
     none_deg = [s.amplitude_deg for s in face.stretches if s.event == "blink"]
     assert set(none_deg) == {None}
 

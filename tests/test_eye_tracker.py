@@ -6,7 +6,7 @@ tracker's noise), and segmented by the velocity algorithm of Engbert & Kliegl.
 """
 
 from math import degrees, radians
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -117,7 +117,7 @@ def judged(trace: Trace) -> np.ndarray:
 
 
 @pytest.mark.parametrize("profile", ["min_jerk", "main_sequence"])
-def test_the_judge_finds_our_saccades_and_hardly_any_other(profile: str) -> None:
+def test_the_judge_finds_our_saccades_and_hardly_any_other(profile: Any) -> None:
     trace = look_about(1, SaccadeParams(profile=profile))
     seen = judged(trace)
     assert len(trace.onsets_ms) > 60

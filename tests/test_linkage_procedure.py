@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any, cast
 
 import pytest
 
@@ -44,11 +45,11 @@ class Bench:
 
     def place_us(self) -> float:
         """Return where the shaft truly is."""
-        return self.board.here(self.channel).place_steps / 4
+        return cast(Any, self.board).here(self.channel).place_steps / 4
 
     def pulse(self) -> int:
         """Return the pulse that the board gives now."""
-        report = self.board.faults.reports()[self.channel]
+        report = cast(Any, self.board).faults.reports()[self.channel]
         position = report["position"]
         assert isinstance(position, int)
         return position

@@ -123,7 +123,7 @@ class SlowRobot:
     """Costs time as it is told, on a simulated clock."""
 
     def __init__(self, clock: SimulatedClock, cost_s: Callable[[int], float]) -> None:
-        self.times: list[float] = []
+        self.times: list[tuple[float, float]] = []
         self.clock, self.cost_s = clock, cost_s
 
     def tick(self, t_s: float, dt_s: float) -> Any:

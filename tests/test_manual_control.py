@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from math import degrees, nan, radians
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 from desk import JOINTS
@@ -62,7 +63,7 @@ class Bench(EmulatedRig):
             self.command(self.at.pop(due_s))
 
     def torque(self) -> list[bool]:
-        return [servo.torque for servo in self.devices[""].servos]
+        return [servo.torque for servo in cast(Any, self.devices[""]).servos]
 
     def look(self, point: Vec3, seconds: float) -> LookedAt:
         kinematics, oculomotor = gaze_parts(self.rig, 0)

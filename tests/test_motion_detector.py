@@ -1,6 +1,7 @@
 """Any picture, any order of times, any depth: an honest answer, and the same one each time."""
 
 from dataclasses import astuple
+from typing import Any
 
 import cv2
 import numpy as np
@@ -51,7 +52,7 @@ def last(pictures: list[Pictures], depth_m: NDArray[np.float64] | None = None) -
     return blobs[0]
 
 
-FIVE = [scene(k) for k in range(5)]
+FIVE: list[Any] = [scene(k) for k in range(5)]
 
 
 def test_a_square_is_where_it_is_and_as_large_as_it_is() -> None:
@@ -135,7 +136,7 @@ def test_pictures_too_small_or_narrow_are_silent(shape: tuple[int, int]) -> None
 @pytest.mark.parametrize("finest_level", [0, 1, 2])
 @pytest.mark.parametrize("shape", [(48, 48), (48, 192), (192, 48), (64, 65)])
 def test_the_smallest_allowed_are_borne(
-    shape: tuple[int, int], preset: str, finest_level: int
+    shape: tuple[int, int], preset: Any, finest_level: int
 ) -> None:
     detector = MotionDetector(MotionParams(preset=preset, finest_level=finest_level))
     for k in range(3):

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -32,7 +33,7 @@ def test_what_moves_lies_on_people_who_walk() -> None:
         if k < BEGIN:
             continue
         height, width = picture.shape[:2]
-        lens = SimpleNamespace(
+        lens: Any = SimpleNamespace(
             fx_px=0.73 * width, fy_px=0.73 * width, cx_px=(width - 1) / 2, cy_px=(height - 1) / 2
         )
         blobs = detector.find(picture, k / RATE_HZ, lens, np.eye(3))

@@ -6,7 +6,7 @@ between the eyes, as in the sources of those numbers, unless a test says otherwi
 
 from collections.abc import Callable
 from math import degrees, radians
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -92,7 +92,9 @@ class Rig:
             t = k * DT
             commands.append(self.tick(where(t), t, DT))
             rows.append(self.row(t, where(t)))
-        return Trace(*np.array(rows).T, commands)
+        columns: Any = (*np.array(rows).T, commands)
+
+    return Trace(*columns)
 
     def tick(self, target: Target, t: float, dt: float) -> GazeCommand:
         state = self.kinematics.forward(self.joints)

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from math import degrees
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -70,7 +70,7 @@ class Rig:
         self.audience = RunObservers(made, options, say, say, self.tuning)
         self.newest: Tick | None = None
         self.pace_s = PACE_S
-        self.orders: list[object] = []
+        self.orders: list[Any] = []
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._tick_on)
 
@@ -297,7 +297,9 @@ def test_a_slider_moves_the_wish_of_its_joint(at_the_rig: tuple[Rig, Person]) ->
     person.click(beside("neck yaw", ".mantine-Slider-track"), 0.8)
     wait_for(lambda: abs(rig.desired_deg() - 42.0) < 6.0, "the wish")  # 0.8 of -70..70
     person.click(saying("let go: look freely"))
-    wait_for(lambda: rig.orders[-1]._replace(who="") == LookAt(None), "the rig being let go")
+    wait_for(
+        lambda: cast(Any, rig.orders[-1])._replace(who="") == LookAt(None), "the rig being let go"
+    )
 
 
 def test_buttons_ask_and_the_picture_leads(at_the_rig: tuple[Rig, Person]) -> None:

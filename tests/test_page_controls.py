@@ -440,7 +440,7 @@ class Mouth:
 
 def touch(server: viser.ViserServer, handle: object, value: object) -> None:
     """What viser does when the browser with number 5 sends another value."""
-    event = viser.GuiEvent(None, 5, handle)  # type: ignore[arg-type]
+    event = viser.GuiEvent(None, 5, handle)  # type: ignore[type-var]
     handle._impl.value = value  # type: ignore[attr-defined]
     (callback,) = handle._impl.update_cb  # type: ignore[attr-defined]
     asyncio.run_coroutine_threadsafe(callback(event), server._event_loop).result(PATIENCE_S)

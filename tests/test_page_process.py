@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeVar, cast
 from urllib.parse import urlsplit
 
 import pytest
@@ -223,7 +223,7 @@ def test_a_page_that_died_is_started_again_at_its_address_and_told_all() -> None
         assert wait_for(page.notice, "the second notice") == f"the page is there again, at {url}"
         with Visitor(url).open() as talk:
             talk.send(LOOKING)
-            while "'blink'" not in said(bytes(talk.recv(timeout=PATIENCE_S))):
+            while "'blink'" not in said(cast(bytes, talk.recv(timeout=PATIENCE_S))):
                 pass
         # Once more: no more words about it.
         second = page_process(os.getpid())

@@ -3,6 +3,7 @@
 import errno
 import sys
 from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from smbus2 import i2c_msg
@@ -32,7 +33,7 @@ class Bench:
     def get(self, register, length=1):
         read = i2c_msg.read(ADDRESS, length)
         self.bus.i2c_rdwr(i2c_msg.write(ADDRESS, (register,)), read)
-        return list(read)
+        return list(iter(cast(Any, read)))
 
     def wait(self, seconds):
         self.now[0] += seconds

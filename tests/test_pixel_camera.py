@@ -70,10 +70,7 @@ class Still:
 
     def people(self, t_s: float) -> tuple[ScenePerson, ...]:
         places = [tuple(a + t_s * b for a, b in zip(p, self._v, strict=True)) for p in self._people]
-        return tuple(
-            ScenePerson(p, (float(np.arctan2(-p[1], -p[0])), 0.0), None)  # type: ignore[arg-type]
-            for p in places
-        )
+        return tuple(ScenePerson(p, (float(np.arctan2(-p[1], -p[0])), 0.0), None) for p in places)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
         return self._things
@@ -114,7 +111,7 @@ def test_a_point_of_the_world_is_drawn_where_a_camera_sees_it(yaw_deg: float) ->
     red[:] = (0, 0, 255)
     right, down = np.array((s, -c, 0.0)) * 0.2, np.array((0.0, 0.0, -0.2))
     corner = middle - 0.5 * (right + down)
-    canvas.sheet(Sheet(tuple(corner), tuple(right), tuple(down), red))  # type: ignore[arg-type]
+    canvas.sheet(Sheet(tuple(corner), tuple(right), tuple(down), red))
     y, x = np.nonzero(canvas.picture[:, :, 2] > 127)
     expected = project(canvas.seen(middle), LENS)[0]
     assert (x.mean(), y.mean()) == pytest.approx(tuple(expected), abs=0.6)
@@ -193,7 +190,7 @@ def test_a_real_detector_finds_drawn_faces_where_they_are(
         pose = face_pose(found[0].landmarks_px, LENS)
         assert pose is not None
         nose = canvas.seen((away_m, 0.05 * away_m, 0.03))[0]
-        directions.append(angle_between(pose.p_camera_m, tuple(nose)))  # type: ignore[arg-type]
+        directions.append(angle_between(pose.p_camera_m, tuple(nose)))
         assert np.linalg.norm(pose.p_camera_m) == pytest.approx(np.linalg.norm(nose), rel=0.12)
     assert np.mean(errors) < 0.07 and max(errors) < 0.12
     assert np.degrees(np.mean(directions)) < 0.4
@@ -303,7 +300,7 @@ def watched(mtcnn: MtcnnDetector, scene: Still, seconds: float, placed_s: float 
 
     placed_s: pictures are said to be taken so much later than they were
     """
-    poses = PoseHistory(Neck())  # type: ignore[arg-type]
+    poses = PoseHistory(Neck())
     perception = Perception(MOUNT, 69.0, Tracker(TrackParams()))
 
     def head(t_s: float) -> tuple[Mat3, Vec3]:

@@ -3,6 +3,7 @@
 import re
 from itertools import pairwise
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 from desk import JOINTS
@@ -83,7 +84,9 @@ def test_the_desk_rig_spells_out_every_default(tmp_path: Path) -> None:
     cut = re.split(r"^gaze:", text, flags=re.M)[0]
     short.write_text(cut, encoding="utf-8")
     whole, cut_rig = load_rig("desk"), load_rig(str(short))
-    assert whole.gaze == cut_rig.gaze == Rig.__dataclass_fields__["gaze"].default_factory()
+    assert (
+        whole.gaze == cut_rig.gaze == cast(Any, Rig.__dataclass_fields__["gaze"]).default_factory()
+    )
 
 
 def test_shipped_profiles_characters_and_walks_load() -> None:

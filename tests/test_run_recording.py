@@ -391,7 +391,7 @@ def written(path: Path, profile: str) -> Path:
     with path.open("wb") as file:
         writer = Writer(file)
         writer.start(profile, "test")
-        writer.finish()  # type: ignore[no-untyped-call]
+        writer.finish()
     return path
 
 

@@ -69,7 +69,7 @@ class Bench:
             self.guard._gentle = [False] * 9
         self.t_s = 0.0
         self.path = [(radians(start_deg),) * 9]
-        self.speed = (0.0,) * 9
+        self.speed: tuple[float, ...] = (0.0,) * 9
         self.why = ""
         self.level = ""
 

@@ -8,6 +8,7 @@ the guard's own arithmetic.
 import os
 from collections.abc import Callable
 from math import inf, nan, radians
+from typing import Any
 
 import numpy as np
 import pytest
@@ -153,7 +154,8 @@ def sequence(trial: Trial, rng: np.random.Generator) -> None:
         t_s = trial.t_s + tick
         at = tuple([b if o else a for a, b, o in zip(trial.p, place, other, strict=True)])
         since = tuple([t_s - one for one in age])
-        joints = JointState(at, (0.0,) * 9, since, (), *told, rearmed)
+        columns: Any = (at, (0.0,) * 9, since, (), *told, rearmed)
+        joints = JointState(*columns)
         trial.tick(desired, joints, inf if unseen[k] else 0.0, tick)
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from math import degrees
+from typing import Any
 
 import numpy as np
 import pytest
@@ -137,7 +138,7 @@ def test_e43_face_tracking_stays_at_the_centre_of_a_moving_face() -> None:
 
 
 @pytest.mark.parametrize("model", ["markov", "simple", "face_tracking", "random"])
-def test_every_model_passes_other_targets_on_and_gives_the_head_the_centre(model: str) -> None:
+def test_every_model_passes_other_targets_on_and_gives_the_head_the_centre(model: Any) -> None:
     path = Scanpath(ScanpathParams(model=model), WALK, np.random.default_rng(1))
     hand = TARGET._replace(kind="hand", id=9, why="hand 9")
     assert path.wander(hand, PERCEPT, 0.0, True, HEAD) == hand
@@ -149,7 +150,7 @@ def test_every_model_passes_other_targets_on_and_gives_the_head_the_centre(model
 
 
 @pytest.mark.parametrize("model", ["markov", "simple", "face_tracking", "random"])
-def test_every_model_repeats_itself_with_the_same_dice(model: str) -> None:
+def test_every_model_repeats_itself_with_the_same_dice(model: Any) -> None:
     params = ScanpathParams(model=model)
     assert looks_of(params, 10.0, 0.02, seed=5) == looks_of(params, 10.0, 0.02, seed=5)
 

@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 from math import degrees, radians
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 from emulated_rig import EmulatedRig, mixed_rig
@@ -96,7 +97,7 @@ def test_a_sample_says_what_the_servos_say(kind: str) -> None:
 @each
 def test_nothing_is_ever_written(kind: str) -> None:
     bench = Bench(kind)
-    servo = bench.devices[""].here(1)
+    servo = cast(Any, bench.devices[""]).here(1)
     before = bytes(servo.memory.bytes[:56])
     bench.sent[""].clear()
     for _ in range(5):

@@ -6,7 +6,7 @@ tests/attack/true_motion.py prints the whole table and runs for hours.
 
 from collections.abc import Iterator
 from math import radians
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -144,7 +144,7 @@ def test_a_maestros_pulse_outside_its_range_comes_inside_slowly(rigs: dict[str, 
     bench = Bench(rig)
     name = "eyes_pan"
     joint = rig.joints[name]
-    board = bench.shafts.devices[""].body
+    board = cast(Any, bench.shafts.devices[""]).body
     outside = round(joint.steps(radians(joint.max_deg + 3.0)))
     board.channels[joint.id].aim(outside)
     bench.shafts.sleep_until(2.0)

@@ -134,7 +134,12 @@ def ask(clock: Seconds, number: signal.Signals = signal.SIGINT, after_s: float =
 def test_a_second_request_skips_parking_and_none_reaches_the_torque_off() -> None:
     head, clock = Head(), Seconds()
     head.while_parking = lambda: ask(clock)
-    head.while_off = lambda: [ask(clock) for _ in range(5)] and None
+
+    def impatient() -> None:
+        for _ in range(5):
+            ask(clock)
+
+    head.while_off = impatient
     with Interrupts(clock) as interrupts, head.way_out(interrupts) as leaving:
         leaving.switch_on(lambda: None)
         ask(clock)

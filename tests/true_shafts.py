@@ -152,7 +152,7 @@ class Judge:
         for i, name in enumerate(self.rig.names):
             one, before = self.worst[name], found.get(group_of(name), (-180.0, 0.0, 0.0, 0))
             now = (one.beyond_deg, one.speed_deg_s / self.top[i], one.accel_deg_s2 / self.most[i])
-            found[group_of(name)] = (*map(max, before[:3], now), before[3] + one.stops)  # type: ignore[assignment]
+            found[group_of(name)] = (*map(max, before[:3], now), before[3] + one.stops)
         return found
 
 
