@@ -7,7 +7,7 @@ happens, every tick is judged by where the servos truly are.
 from collections.abc import Sequence
 from dataclasses import replace
 from math import pi, radians, sin
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig, load_rig
@@ -378,7 +378,7 @@ RIGS = {"dynamixel": "desk", "feetech": "feetech", "maestro": "maker", "pca9685"
 """The shipped rig of each kind."""
 
 
-def rig_of(kind: str) -> Rig:
+def rig_of(kind: Any) -> Rig:
     """Return the shipped rig of a kind, with the other board where its own has none."""
     rig = load_rig(RIGS[kind])
     return replace(rig, bus=BusConfig("/dev/i2c-1", kind)) if kind == "pca9685" else rig

@@ -498,7 +498,7 @@ def test_a_goal_between_two_steps_is_rounded(kind):
     bus.enable_torque()
     bus.read(twin.now_s())
     middle = [(setup.min_steps + setup.max_steps) // 2 for setup in twin.setups]
-    bus.write([steps + 0.4 for steps in middle])
+    bus.write([steps + 0.4 for steps in middle])  # type: ignore[misc]
     twin.wait(0.02)
     assert list(twin.goals()) == middle
 

@@ -8,6 +8,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -221,7 +222,7 @@ def test_replay_counts_on_and_repeats(file):
         replay.shot(1)
 
 
-class Clock:
+class Clock(Any):
     """A clock that goes on as somebody waits; ``late_s`` is added to every wait."""
 
     def __init__(self) -> None:

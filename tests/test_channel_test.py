@@ -90,7 +90,7 @@ def test_an_error_of_the_board_on_the_way_is_no_place():
 
 def test_an_input_is_refused():
     bench = Bench()
-    bench.driver.line.pulses = lambda channels: (700,)
+    bench.driver.line.pulses = lambda channels: (700,)  # type: ignore[method-assign]
     with pytest.raises(ServoMissing, match="channel 2 is an input, left_upper_lid"):
         bench.walk()
 
@@ -138,12 +138,12 @@ class I2cBench(Bench):
 
     def __init__(self):
         self.now_s = 5.0
-        self.board = build_bridge(
+        self.board = build_bridge(  # type: ignore[assignment]
             (0x40,), lambda: self.now_s, 25.4e6, servos=[HobbySpec(2, 6500.0)]
         )
         self.port = InProcessPort(self.board)
         self.port.setBaudRate(115_200)
-        self.driver = Pca9685Board(self.port, Pca9685Params(oscillator_hz=25.4e6))
+        self.driver = Pca9685Board(self.port, Pca9685Params(oscillator_hz=25.4e6))  # type: ignore[assignment]
         self.seen = []
 
     def sleep_until(self, t_s):

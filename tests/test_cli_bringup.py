@@ -286,7 +286,7 @@ def test_a_rig_of_ones_own_names_its_port(tmp_path):
 def test_reboot_clears_an_error(rig, before, after):
     with PtyBus() as bus:
         model = {"desk": "xc330-m288", "feetech": "sts3215"}[rig]
-        path = bus.start_device(LINE[rig]((ServoSpec(7, model),), 1_000_000))
+        path = bus.start_device(LINE[rig]((ServoSpec(7, model),), 1_000_000))  # type: ignore[arg-type]
         bus.command("overload 7")
         code, _, err = invoked("reboot", rig, "neck_yaw", "--port", path)
     assert code == 0 and f"neck_yaw (servo 7): {before}" in err

@@ -565,7 +565,7 @@ def test_what_goes_wrong_on_the_way_is_a_finding(tmp_path):
     rig.port.faults.command("clear")
     assert len(rig.check_all(host)) > 3
     assert not rig.port.is_open
-    rig.port.setBaudRate = lambda baud: False
+    rig.port.setBaudRate = lambda baud: False  # type: ignore[assignment, method-assign]
     with pytest.raises(PortError, match="cannot run at 1000000"):
         look(rig.port, DYNAMIXEL, rig.setups, BAUD, lambda _: None)
 
@@ -600,10 +600,10 @@ def test_remarks_of_a_scan():
         SearchRound("dynamixel", 57_600, protocol_1=(5,)),
         SearchRound("dynamixel", 1, possible=False),
     ]
-    said = list(remarks(rounds, "/dev/x"))
-    assert any("only pieces came" in line for line in said)
-    assert any("Protocol 1 as id 5" in line for line in said)
-    assert "asked dynamixel at 9600, 57600 bit/s" in said[0] and "supply" in said[-1]
+    lines = list(remarks(rounds, "/dev/x"))
+    assert any("only pieces came" in line for line in lines)
+    assert any("Protocol 1 as id 5" in line for line in lines)
+    assert "asked dynamixel at 9600, 57600 bit/s" in lines[0] and "supply" in lines[-1]
     # Feetech servos answer the old protocol's ping: that is no riddle where they were found.
     sts = SearchRound("feetech", 57_600, True, two[:1])
     assert not any("Protocol 1" in line for line in remarks([*rounds, sts], "/dev/x"))

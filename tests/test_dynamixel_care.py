@@ -147,7 +147,7 @@ def test_healing_keeps_to_the_limits():
 def test_an_alert_whose_name_is_not_told_is_asked_about_seldom(fast):
     rig = Rig(fast, indirect_block=False)
     rig.bus.enable_torque()
-    rig.chain[2].alert = 0x20
+    rig.chain[2].alert = 0x20  # type: ignore[attr-defined]
     for _ in range(50):
         rig.tick()
     before = rig.bus.health().tx_bytes

@@ -183,7 +183,7 @@ def test_the_block_can_be_left_out_by_choice():
 def test_open_with_an_impossible_baud_rate_names_it():
     rig = Rig()
     setups = [ServoSetup(1, "xl330-m077", 1000, 3000, 6000.0)]
-    rig.bus = SmartServoBus(DYNAMIXEL, rig.port, setups, DynamixelParams(baud=1234))
+    rig.bus = SmartServoBus(DYNAMIXEL, rig.port, setups, DynamixelParams(baud=1234))  # type: ignore[arg-type]
     with pytest.raises(PortError, match="cannot run at 1234 bit/s"):
         rig.open()
 

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import child_processes
 import pytest
@@ -67,7 +68,7 @@ class Branch:
     """What a test wants of subprocess.Popen, for the command in a fork of this process."""
 
     def __init__(self, options, cwd, stdin, stdout, stderr, text):
-        ours = [None, None, None]
+        ours: list[Any] = [None, None, None]
         theirs = [None if file is subprocess.PIPE else file for file in (stdin, stdout, stderr)]
         for number, file in enumerate((stdin, stdout, stderr)):
             if file is subprocess.PIPE:

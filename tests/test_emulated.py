@@ -38,7 +38,7 @@ def test_a_device_travels_as_json(line):
 
 def test_an_endless_stop_travels_too():
     line = unpacked(json.loads(json.dumps(packed(LINES[1]))))
-    assert cast(ServoSpec, line.servos[0]).physics.stop_high_steps == inf
+    assert cast(ServoSpec, line.servos[0]).physics.stop_high_steps == inf  # type: ignore[union-attr]
 
 
 def test_short_words_are_enough():

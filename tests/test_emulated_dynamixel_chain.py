@@ -1,6 +1,7 @@
 """The emulated chain against byte-exact packets and the written rules of the protocol."""
 
 import struct
+from typing import Any
 
 import pytest
 from fastcrc.crc16 import umts
@@ -38,7 +39,7 @@ ONE = [(1, "xm430-w210", 166, 38)]
 TWO = [(2, "xm430-w210", 2079, 38), *ONE]
 THREE = [(3, "xm430-w210", 166), (7, "xm430-w210", 2079), (4, "xm430-w210", 1023)]
 DONE = "FF FF FD 00 01 04 00 55 00 A1 0C"
-MANUALS = {
+MANUALS: dict[str, tuple[Any, ...]] = {
     "ping": (ONE, PING.hex(), "FF FF FD 00 01 07 00 55 00 06 04 26 65 5D"),
     "ping to all": (
         TWO,

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from gazerig.drivers.dynamixel.control_table import MODELS
 from gazerig.sim_mock.smart_servo.motor import DISABLED, Loop, Shaft
 from gazerig.sim_mock.smart_servo.physics import Physics, checked
+from gazerig.sim_mock.smart_servo.profile import PositionProfile
 
 DEG = 4096.0 / 360.0
 P, D = 800 / 128 / 885, 800 / 16 / 885
@@ -29,6 +30,7 @@ def shaft(model: str = "xl330-m077", loop: Loop = Loop(p=P, d=D), **physics) -> 
 
 def go(made: Shaft, goal: float, ms: int, cruise: float = 0.0, ramp: float = 0.0) -> list[float]:
     """Lead to a goal; give the position after every millisecond."""
+    assert isinstance(made.profile, PositionProfile)
     made.profile.by_velocity(goal, cruise, ramp)
     made.resume()
     return run(made, ms)
@@ -120,6 +122,7 @@ def test_the_second_feed_forward_gain_shortens_the_lag_of_acceleration():
 
 def test_pwm_limit_and_slope_bound_the_output():
     made = shaft(loop=Loop(p=P, d=D, u_max=0.3, slew=0.01))
+    assert isinstance(made.profile, PositionProfile)
     made.profile.step(3000)
     made.resume()
     before = 0.0
@@ -134,6 +137,7 @@ def test_pwm_limit_and_slope_bound_the_output():
 @settings(max_examples=40, deadline=None)
 def test_the_current_limit_holds_always(limit, goal, load):
     made = shaft(loop=Loop(p=4 * P, d=D, torque_max=limit), load_nm=load)
+    assert isinstance(made.profile, PositionProfile)
     made.profile.step(goal)
     made.resume()
     for _ in range(60):
@@ -265,6 +269,7 @@ def test_in_one_go_or_in_steps_is_the_same(pieces, gain, goal):
     loop = Loop(p=gain / 128 / 885, i=0.0001, d=D, f1=0.01, f2=0.1, slew=0.05)
     once, often = (shaft(loop=loop, load_nm=0.02, gravity_nm=0.01) for _ in range(2))
     for made in (once, often):
+        assert isinstance(made.profile, PositionProfile)
         made.profile.by_velocity(goal, 3.0, 0.02)
         made.resume()
     once.run(sum(pieces))

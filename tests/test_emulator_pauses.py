@@ -160,7 +160,7 @@ def test_a_maestro_whose_script_runs_all_night_answers(timeout_s, monkeypatch):
     passed = []
     body = type(world.board.body)
     through = body._pass
-    monkeypatch.setattr(body, "_pass", lambda self: (passed.append(1), through(self)))
+    monkeypatch.setattr(body, "_pass", lambda self: (passed.append(1), through(self)))  # type: ignore[func-returns-value]
     world.after(HOUR_S)
     here = world.positions()
     assert len(passed) < 12_000

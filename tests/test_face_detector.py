@@ -250,7 +250,7 @@ def test_altered_or_missing_model_file_names_the_cure(tmp_path):
 
 def test_unknown_detector_is_refused():
     with pytest.raises(ModelFileError, match="'mtcnn' or 'yunet'"):
-        face_detector(FaceDetectorParams(kind="other"))
+        face_detector(FaceDetectorParams(kind="other"))  # type: ignore[arg-type]
 
 
 # ---- YuNet ------------------------------------------------------------------------------

@@ -71,10 +71,10 @@ def samples(boxes: PartBoxes, looks: Iterator[tuple[str, float]], seed: int) -> 
         flight = np.linspace(0.0, 1.0, 9)[1:-1, None]
         places += [at + flight * (goal - at), np.repeat(goal[None], round(dwell_s / step_s), 0)]
         at, before = goal, part
-    p = np.concatenate(places)
+    p = np.concatenate(places).astype(np.float64)
     p += rng.normal(0.0, 1.5, p.shape)
     p[rng.random(len(p)) < 0.01] = NAN
-    return Samples(np.arange(len(p)) * step_s, p[:, 0], p[:, 1], "")
+    return Samples(np.arange(len(p)) * step_s, p[:, 0], p[:, 1], "")  # type: ignore[arg-type]
 
 
 def written(path: Path, header: str, rows: Iterator[str]) -> Path:
@@ -149,7 +149,7 @@ def test_a_short_loss_is_bridged_and_a_long_one_ends_a_fixation(boxes: PartBoxes
     x, y = np.full(500, 400.0), np.full(500, 400.0)
     x[100:110] = NAN  # 40 ms
     x[300:400] = NAN  # 400 ms: a blink
-    found = fixations_of(Samples(np.arange(500) * 0.004, x, y, ""), boxes, FixationParams())
+    found = fixations_of(Samples(np.arange(500) * 0.004, x, y, ""), boxes, FixationParams())  # type: ignore[arg-type]
     assert [f.part for f in found] == ["N", "N"]
     assert found[0].duration_s == pytest.approx(1.2, abs=0.01)
     assert found[1].start_s == pytest.approx(1.6)

@@ -165,9 +165,9 @@ class Unattended(Guardian):
 @pytest.fixture
 def sts():
     rig, guardian = StsRig(), Unattended()
-    rig.inner = rig.bus
-    rig.bus = GuardedBus(rig.inner, 4, guardian, 0)
-    rig.guardian = guardian
+    rig.inner = rig.bus  # type: ignore[attr-defined]
+    rig.bus = GuardedBus(rig.inner, 4, guardian, 0)  # type: ignore[attr-defined]
+    rig.guardian = guardian  # type: ignore[attr-defined]
     rig.bus.open()
     return rig
 

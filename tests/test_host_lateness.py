@@ -100,7 +100,7 @@ def standing_still(noisy: Noisy, seconds: float):
         arrive()
         return read_until(length, deadline_s)
 
-    noisy.port.write, noisy.port.getBytesAvailable, noisy.port.read_until = queued, seen, read
+    noisy.port.write, noisy.port.getBytesAvailable, noisy.port.read_until = queued, seen, read  # type: ignore[method-assign]
 
 
 @pytest.mark.parametrize("kind", (*KINDS, "maestro"))
@@ -127,7 +127,7 @@ def test_an_answer_that_may_be_to_an_older_question_is_confirmed_by_another():
         asked.append(data[4])
         write(data)
 
-    noisy.port.write = counted
+    noisy.port.write = counted  # type: ignore[method-assign]
     noisy.run("clear", 0.0, 20)
     in_peace = asked.count(SYNC_READ)
     asked.clear()

@@ -177,7 +177,7 @@ STS_PARTS = [6 + 15] * len(IDS)
 @pytest.mark.parametrize("turnaround_us", [0, 30])
 def test_a_sync_read_of_feetech_servos_takes_what_the_formula_says(baud, turnaround_us):
     wire = Device(sts, turnaround_us * 1e-6)
-    answers = wire.answers(STS_READ, baud)
+    answers = wire.answers(STS_READ, baud)  # type: ignore[misc]
     assert sum(len(data) for _, data in answers) == sum(STS_PARTS)
     expected = (len(STS_READ) + sum(STS_PARTS)) * 10 / baud + len(IDS) * turnaround_us * 1e-6
     assert answers[-1][0] == pytest.approx(expected, abs=1e-9)
@@ -187,7 +187,7 @@ def test_a_sync_read_of_feetech_servos_takes_what_the_formula_says(baud, turnaro
 def test_a_boards_bare_answers_wait_for_its_turnaround_too(baud):
     wire = Device(lambda now_s: build_board(6, now_s), 100e-6)
     errors, place = bytes((0xA1,)), bytes((0x90, 3))
-    first, second = wire.answers(errors + place, baud)
+    first, second = wire.answers(errors + place, baud)  # type: ignore[misc]
     byte_s = 10 / baud
     assert first[0] == pytest.approx(byte_s + 100e-6 + 2 * byte_s)
     begun = max(first[0], 3 * byte_s)

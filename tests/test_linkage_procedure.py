@@ -159,9 +159,10 @@ def test_the_board_s_own_range_is_where_it_ends_and_is_named() -> None:
     bench = Bench("eyes_pan")
     narrow = emulated_lines(RIG)[""]
     servos = tuple(
-        one._replace(max_steps=1700 * 4) if one.channel == 0 else one for one in narrow.servos
+        one._replace(max_steps=1700 * 4) if one.channel == 0 else one
+        for one in cast(tuple[Any, ...], narrow.servos)
     )
-    bench.board = build(replace(narrow, servos=servos), bench.clock.now_s)
+    bench.board = build(replace(narrow, servos=servos), bench.clock.now_s)  # type: ignore[arg-type]
     bench.port = InProcessPort(bench.board, sleep_until=bench.clock.sleep_until)
     bench.hobby = OneHobby(
         "eyes_pan", RIG.joints["eyes_pan"], bench.port, BOARD, bench.clock,

@@ -1,5 +1,7 @@
 """The line's patience and the memory of one channel, each by itself."""
 
+from typing import Any
+
 import pytest
 
 from gazerig.drivers.hobby_board.channel import Channel
@@ -11,7 +13,7 @@ from gazerig.drivers.types import ServoSetup
 SETUP = ServoSetup(3, "hobby", 4400, 7600, 12_000.0)
 
 
-class SlowPort:
+class SlowPort(Any):
     """A port whose answers are a list of byte strings; one that is late arrives while draining."""
 
     port_name = "scripted"

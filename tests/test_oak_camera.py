@@ -55,7 +55,7 @@ def host_nodes(film, loop=True, depth=True, faces=False, lens=None, device_clock
 
             def run(self) -> None:
                 while self.isRunning():
-                    self.out.send(self.make(self.input.get()))
+                    self.out.send(self.make(self.input.get()))  # type: ignore[misc]
 
         def answer(make, source):
             node = pipeline.create(Answer)

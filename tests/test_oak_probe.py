@@ -170,7 +170,7 @@ class Rig:
             def setSyncThreshold(self, threshold):  # noqa: N802
                 assert threshold > timedelta(0)
 
-        rig.waited = False
+        rig.waited = False  # type: ignore[attr-defined]
 
         class Pipeline:
             def __init__(self, device) -> None:
@@ -187,7 +187,7 @@ class Rig:
                 return False
 
             def wait(self):
-                rig.waited = True
+                rig.waited = True  # type: ignore[attr-defined]
 
         self.dai = SimpleNamespace(
             **vars(sdk([info()])),
@@ -202,7 +202,7 @@ class Rig:
         def device(found):
             return self.device
 
-        device.getAllAvailableDevices = lambda: [info()]
+        device.getAllAvailableDevices = lambda: [info()]  # type: ignore[attr-defined]
         self.dai.Device = device
 
     def source(self, **wanted) -> OakSource:
@@ -246,7 +246,7 @@ def test_camera_that_does_not_start_is_freed_and_named():
     with pytest.raises(CameraError, match="X_LINK_DEVICE_ALREADY_IN_USE somewhere.*unplug") as it:
         rig.source().open()
     assert "\n" not in str(it.value)
-    assert rig.waited and rig.device.closed == 1
+    assert rig.waited and rig.device.closed == 1  # type: ignore[attr-defined]
 
 
 def take(rig, source, clock, *messages):

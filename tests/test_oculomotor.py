@@ -93,8 +93,7 @@ class Rig:
             commands.append(self.tick(where(t), t, DT))
             rows.append(self.row(t, where(t)))
         columns: Any = (*np.array(rows).T, commands)
-
-    return Trace(*columns)
+        return Trace(*columns)
 
     def tick(self, target: Target, t: float, dt: float) -> GazeCommand:
         state = self.kinematics.forward(self.joints)

@@ -326,7 +326,8 @@ def test_a_target_is_dragged_through_the_scene(at_the_rig: tuple[Rig, Person]) -
     wait_for(lambda: person.reads("somebody chose this point"), "the page knowing of it")
     person.click(beside("drag a target", "input"))
     rect = "(() => { const r = document.querySelector('canvas').getBoundingClientRect();"
-    x, y, width, height = person.run(rect + "return [r.x, r.y, r.width, r.height]; })()")
+    bounds: Any = person.run(rect + "return [r.x, r.y, r.width, r.height]; })()")
+    x, y, width, height = bounds
     canvas = (x, y, width, height)
     arrow, farther = ((0.7, 0.1, 0.3 + up) for up in (0.08, 0.2))
     before = len(rig.orders)
@@ -397,7 +398,7 @@ def test_what_is_in_force_is_saved_in_a_new_file_with_its_comments(
     person.click(saying("tuning"))
     wait_for(lambda: person.reads("not saved"), "the mark")
     file = tmp_path / "tuned at midnight.yaml"
-    present(present(rig.audience._page)._hear)._handler._paths = AllowedFolder(
+    cast(Any, present(rig.audience._page)._hear)._handler._paths = AllowedFolder(
         tmp_path
     )  # as if the rig's file lay there
     person.click(beside("save as", "input"))
@@ -435,7 +436,8 @@ def test_on_a_phone_stop_is_at_the_top_and_nothing_covers_it(
     try:
         wait_for(lambda: person.run("innerWidth") == 360, "the phone")
         test_stop_stays_in_sight_when_the_panels_are_shut(at_the_rig)
-        assert person.run("document.querySelector('#rig-stop').getBoundingClientRect().top") < 40
+        top: Any = person.run("document.querySelector('#rig-stop').getBoundingClientRect().top")
+        assert top < 40
         person.click(STOP)
         wait_for(lambda: rig.robot.stopped, "the stop")
         resumed(rig, person)

@@ -259,7 +259,7 @@ class Saved(NamedTuple):
     changes: tuple[object, ...] = ()
 
 
-class OneKnob:
+class OneKnob(Any):
     """The parameters of a rig that has one."""
 
     path = Path("/rigs/mine.yaml")

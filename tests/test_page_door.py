@@ -102,12 +102,12 @@ class Rig:
 
     def knock(self, path: str = "/", **headers: str | None) -> ClientConnection:
         """Open a websocket as a browser does, with other headers as given."""
-        given = {"Cookie": self.cookie, **headers}
+        given: dict[str, Any] = {"Cookie": self.cookie, **headers}
         origin = given.pop("origin", self.url)
         return connect(
             f"ws://{self.address}{path}",
             origin=origin,
-            subprotocols=VISER if path == "/" else None,
+            subprotocols=VISER if path == "/" else None,  # type: ignore[arg-type]
             max_size=None,
             compression=None,
             open_timeout=PATIENCE_S,
@@ -304,7 +304,7 @@ def test_a_stop_has_a_way_of_its_own_and_is_answered_by_the_rig(near: Rig) -> No
         assert near.post(b'{ "do": "stop",\n "why": "a test" }')[0] == 204
         assert near.stops == [{"do": "stop", "why": "a test (the page)", "who": "the page"}]
         with near.knock("/rig/line") as line:
-            assert stop_by_line(line, "by line") == 204
+            assert stop_by_line(line, "by line") == 204  # type: ignore[arg-type]
         assert near.stops[-1]["why"] == "by line (the page)"
         near.stop_answer = "refused: it has ended"
         status, _, text = near.post(b'{"do": "stop", "why": "late"}')
@@ -427,7 +427,7 @@ def test_whoever_opens_too_much_loses_his_own(near: Rig) -> None:
         host, port = near.address.split(":")
         silent = [socket.create_connection((host, int(port))) for _ in range(200)]
         near.stops.clear()
-        assert stop_by_line(ana, "by line") == 204
+        assert stop_by_line(ana, "by line") == 204  # type: ignore[arg-type]
         assert near.post(b'{"do": "stop", "why": "by a request"}')[0] == 204
         assert len(near.stops) == 2
         for gone in greedy[:3]:

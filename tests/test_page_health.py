@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import atan2, degrees
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import pytest
 import viser
@@ -268,14 +268,14 @@ def test_the_menu_of_traces_is_that_of_the_rig(server: viser.ViserServer) -> Non
     traces.add(snapshot(1.0))
     view.show(traces)
     assert view._what.options == ("yaw", "pitch", "left eye", "right eye", "neck")
-    view._what.value = "neck"
+    view._what.value = "neck"  # type: ignore[misc]
     view.show(traces)
     assert "neck, roll" in view._plots[-1].title.content
     traces.add(of_six(snapshot(2.0)))
     view.show(traces)
     assert view._what.options == ("yaw", "pitch", "left eye", "right eye")
     assert view._what.value == "yaw" and "lower lids" in view._plots[-1].title.content
-    view._what.value = "left eye"
+    view._what.value = "left eye"  # type: ignore[misc]
     view.show(traces)
     titles = " ".join(plot.title.content for plot in view._plots)
     assert len(view._plots) == 4 and titles.count("both eyes") == 2
@@ -321,10 +321,13 @@ def test_a_head_without_a_neck_stands_on_a_post(server: viser.ViserServer) -> No
     view.show(replace(of_six(snapshot()), p_world_head_m=(0.1, 0.05, 0.12)))
     (x, y, _), (fx, fy, _) = view._post.position, view._foot.position
     assert (x, y) == (fx, fy) and y == pytest.approx(0.05)
-    top_m = view._post.position[2] + view._post.scale[2]
+    _, _, high = cast(tuple[float, float, float], view._post.scale)
+    top_m = view._post.position[2] + high
     assert 0.0 < top_m < 0.12  # up to the shell and not out of its top
     view.show(replace(of_six(snapshot(2.0)), p_world_head_m=(0.0, 0.0, -0.3)))
-    assert 0.0 < view._post.scale[2] < 0.02  # a head that lies on the table
+    assert (
+        0.0 < cast(tuple[float, float, float], view._post.scale)[2] < 0.02
+    )  # a head that lies on the table
     view.show(snapshot(3.0))
     assert view._foot.position[0] == 0.0 and not view._post.visible
 

@@ -258,7 +258,7 @@ def test_a_stop_passes_a_page_that_cannot_be_told_anything_else() -> None:
 
 def test_snapshot_that_cannot_be_drawn_ends_the_page_in_words() -> None:
     with running_page() as (page, _):
-        page.show(replace(SNAPSHOT, level="mad"))
+        page.show(replace(SNAPSHOT, level="mad"))  # type: ignore[arg-type]
         assert "KeyError: 'mad'" in wait_for(page.notice, "the notice")
 
 

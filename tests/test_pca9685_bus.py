@@ -412,11 +412,11 @@ def kernel(world, monkeypatch):
     port = I2cPort("/dev/i2c-7", open_bus=made.open)
     clock = type("Clock", (), {"monotonic": lambda: world.now[0], "sleep": world._wait})
     monkeypatch.setattr(i2c_port, "time", clock)
-    made.servos = Pca9685Bus(port, world.setups, replace(QUICK, give_up_s=2.0))
+    made.servos = Pca9685Bus(port, world.setups, replace(QUICK, give_up_s=2.0))  # type: ignore[attr-defined]
     return made
 
 
-World._wait = staticmethod(lambda seconds: None)
+World._wait = staticmethod(lambda seconds: None)  # type: ignore[attr-defined]
 
 
 def ticks(world, bus, seconds, goals=None):

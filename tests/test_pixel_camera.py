@@ -70,7 +70,7 @@ class Still:
 
     def people(self, t_s: float) -> tuple[ScenePerson, ...]:
         places = [tuple(a + t_s * b for a, b in zip(p, self._v, strict=True)) for p in self._people]
-        return tuple(ScenePerson(p, (float(np.arctan2(-p[1], -p[0])), 0.0), None) for p in places)
+        return tuple(ScenePerson(p, (float(np.arctan2(-p[1], -p[0])), 0.0), None) for p in places)  # type: ignore[arg-type]
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
         return self._things
@@ -282,7 +282,7 @@ def test_what_finds_motion_gets_the_picture_with_its_pose_and_depth() -> None:
     assert shots[0].depth_m is not None and shots[0].picture.shape == (40, 64, 3)
 
 
-class Neck:
+class Neck(Any):
     """A head that turns about the origin."""
 
     def head_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:

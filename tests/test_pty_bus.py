@@ -166,7 +166,7 @@ def test_named_specs_travel_to_the_server():
 def strict():
     """Serve three servos that heed the baud rate."""
     with PtyBus() as bus:
-        bus.path = bus.start(SPECS, baud=1_000_000)
+        bus.path = bus.start(SPECS, baud=1_000_000)  # type: ignore[attr-defined]
         yield bus
 
 

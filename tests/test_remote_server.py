@@ -201,7 +201,7 @@ def errors() -> list[str]:
 
 @pytest.fixture
 def rig(folder: Path, beat: Beat, errors: list[str]) -> Iterator[RobotClient]:
-    tuning = SecondTuning(beat.robot.command)
+    tuning = SecondTuning(beat.robot.command)  # type: ignore[arg-type]
     about = {"rig": "desk", "pid": os.getpid()}
     requests = RequestHandler(beat.robot, tuning, beat.pulse, about, (Broken,))
     server = RemoteServer(requests, errors.append)

@@ -229,7 +229,7 @@ def test_the_bytes_sent_are_the_protocols(rig):
 def sts():
     rig = StsRig([ServoSpec(4, "sts3215", 1928)], setups=[], baud=1_000_000)
     rig.port.setBaudRate(1_000_000)
-    rig.registers = Registers(rig.port, FEETECH)
+    rig.registers = Registers(rig.port, FEETECH)  # type: ignore[attr-defined]
     return rig
 
 

@@ -322,7 +322,7 @@ def test_a_refusal_says_where_the_servo_answers_now(address, says):
 def test_an_adaptor_that_cannot_run_at_the_rate():
     bench = Bench()
     found = bench.find()
-    bench.port.setBaudRate = lambda baud: (
+    bench.port.setBaudRate = lambda baud: (  # type: ignore[assignment, method-assign]
         baud == 57_600 and InProcessPort.setBaudRate(bench.port, baud)
     )
     with pytest.raises(PortError, match="cannot run at 1000000"):
@@ -332,7 +332,7 @@ def test_an_adaptor_that_cannot_run_at_the_rate():
 def test_a_servo_that_is_gone_after_is_missed():
     bench = Bench()
     bench.port = StubbornPort(bench.chain)
-    bench.port.silent = 7
+    bench.port.silent = 7  # type: ignore[assignment]
     with pytest.raises(ServoMissing, match=f"does not answer as id 7 at {BAUD}"):
         bench.assign()
     bench = Bench(ServoSpec(7, "xc330-m288"))
@@ -367,6 +367,6 @@ def test_a_lost_status_of_the_restart_does_not_matter():
         if data[7] == 0x08:
             bench.port.drain()
 
-    bench.port.write = lossy
+    bench.port.write = lossy  # type: ignore[method-assign]
     assert bench.restart().after.torque is False
     assert bytes.fromhex("FFFFFD00010300082F4E") in tapped

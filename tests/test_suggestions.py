@@ -4,6 +4,7 @@ import re
 import shlex
 from pathlib import Path
 from threading import Thread
+from typing import Any, cast
 
 import pytest
 import typer
@@ -92,7 +93,8 @@ def test_what_a_driver_says_at_the_start_can_be_typed(asked: list[str], tmp_path
     words = [str(rig) if word == "RIG" else word for word in asked]
     with PtyBus() as bus:
         path = bus.start(
-            next(iter(emulated_lines(load_rig("desk")).values())).servos, baud=1_000_000
+            cast(Any, next(iter(emulated_lines(load_rig("desk")).values())).servos),
+            baud=1_000_000,
         )
         bus.command("overload 7")
         made = CliRunner().invoke(app, [*words, "--port", path])

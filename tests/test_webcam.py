@@ -16,7 +16,7 @@ from gazerig.drivers.errors import CameraError
 GO_ON = threading.Event()
 
 
-class Capture:
+class Capture(Any):
     """The part of cv2.VideoCapture the driver uses; ``failures`` grabs fail after the first."""
 
     def __init__(self, stamp_ms: float = 0.0, works: bool = True) -> None:
@@ -188,7 +188,7 @@ def run(device, stated_hz: float, gives_hz: float, away_s: float, count: int = 6
         clock[0] = 100.0 + picture[0] / gives_hz
         return True
 
-    capture.grab = grab
+    capture.grab = grab  # type: ignore[method-assign]
     for _ in range(count):
         camera.take(lambda: clock[0], GO_ON)
         told += camera.events()
