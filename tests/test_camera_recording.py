@@ -8,12 +8,12 @@ import sys
 import threading
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from mcap.reader import make_reader
 from present import present
+from stand_in import StandIn
 
 from gazerig.drivers.camera import recording_format as fmt
 from gazerig.drivers.camera import recording_writer as recording_write
@@ -222,7 +222,7 @@ def test_replay_counts_on_and_repeats(file):
         replay.shot(1)
 
 
-class Clock(Any):
+class Clock(StandIn):
     """A clock that goes on as somebody waits; ``late_s`` is added to every wait."""
 
     def __init__(self) -> None:

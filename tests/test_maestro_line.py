@@ -1,8 +1,7 @@
 """The line's patience and the memory of one channel, each by itself."""
 
-from typing import Any
-
 import pytest
+from stand_in import StandIn
 
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.maestro.limits import SPEED_STEPS_S, speed_units
@@ -13,7 +12,7 @@ from gazerig.drivers.types import ServoSetup
 SETUP = ServoSetup(3, "hobby", 4400, 7600, 12_000.0)
 
 
-class SlowPort(Any):
+class SlowPort(StandIn):
     """A port whose answers are a list of byte strings; one that is late arrives while draining."""
 
     port_name = "scripted"

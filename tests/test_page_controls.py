@@ -16,6 +16,7 @@ import pytest
 import viser
 from desk import JOINTS
 from six_joints import SIX, of_six
+from stand_in import StandIn
 
 from gazerig.config.parameters import parameters, values
 from gazerig.config.schema import load_rig
@@ -259,7 +260,7 @@ class Saved(NamedTuple):
     changes: tuple[object, ...] = ()
 
 
-class OneKnob(Any):
+class OneKnob(StandIn):
     """The parameters of a rig that has one."""
 
     path = Path("/rigs/mine.yaml")

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from stand_in import StandIn
 
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, Picture
@@ -282,7 +283,7 @@ def test_what_finds_motion_gets_the_picture_with_its_pose_and_depth() -> None:
     assert shots[0].depth_m is not None and shots[0].picture.shape == (40, 64, 3)
 
 
-class Neck(Any):
+class Neck(StandIn):
     """A head that turns about the origin."""
 
     def head_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:

@@ -4,6 +4,7 @@ from typing import Any
 
 import pytest
 from present import present
+from stand_in import StandIn
 from sts_rig import Rig
 
 from gazerig.drivers.dynamixel.control_table import BAUD_RATES
@@ -199,7 +200,7 @@ def test_ids_are_asked_one_by_one_where_a_ping_to_all_tells_nothing():
     assert FEETECH.version(353) == "3.53"
 
 
-class ScriptedPort(Any):
+class ScriptedPort(StandIn):
     """A port that answers every write with the same bytes, at a byte a read."""
 
     port_name, baudrate = "script", 57_600

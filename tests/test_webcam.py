@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 import pytest
 from present import present
+from stand_in import StandIn
 
 from gazerig.drivers.camera.params import WebcamParams
 from gazerig.drivers.camera.webcam import Webcam
@@ -16,7 +17,7 @@ from gazerig.drivers.errors import CameraError
 GO_ON = threading.Event()
 
 
-class Capture(Any):
+class Capture(StandIn):
     """The part of cv2.VideoCapture the driver uses; ``failures`` grabs fail after the first."""
 
     def __init__(self, stamp_ms: float = 0.0, works: bool = True) -> None:
