@@ -223,7 +223,9 @@ def _built(config_yaml: str) -> "ShownRig | None":
             rig = load(file, Rig)
         except ConfigError as error:
             first = str(error).splitlines()[0].replace(f"{folder}/", "")
-            say(f"no ghost of the wish: the recorded configuration is no longer valid ({first})")
+            say(
+                f"no ghost of the desired pose: the recorded configuration is no longer valid ({first})"
+            )
             return None
     return ShownRig(
         gaze_parts(rig, 0)[0],

@@ -1,4 +1,4 @@
-"""The terminal: lines for people, one status line, clear errors, and Ctrl-C as a wish to stop."""
+"""The terminal: lines for people, one status line, clear errors, Ctrl-C as a request to stop."""
 
 import atexit
 import contextlib

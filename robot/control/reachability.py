@@ -30,8 +30,8 @@ def look_reply(
     limits: of the joints, in the order of ``kinematics.names``
     """
     reach = oculomotor.reach(target)
-    wished = kinematics.inverse(_command(reach.head_rad, *reach.eyes_rad))
-    done = _within(wished, limits)
+    desired = kinematics.inverse(_command(reach.head_rad, *reach.eyes_rad))
+    done = _within(desired, limits)
     at_rest = (0.0,) * len(done)
     pose = kinematics.forward(JointState(done, at_rest, at_rest, ()))
     error = gaze_error(target.p_world_m, pose, not kinematics.one_pan)

@@ -59,7 +59,7 @@ def lead_words(tick: Tick) -> str:
 
 
 def guard_text(guard_result: GuardResult) -> str:
-    """Say what the guard made of the wish, e.g. "limited (neck_yaw: too fast, +2)"."""
+    """Say what the guard made of what is desired, e.g. "limited (neck_yaw: too fast, +2)"."""
     if not guard_result.reasons:
         return guard_result.level
     more = f", +{len(guard_result.reasons) - 1}" if len(guard_result.reasons) > 1 else ""

@@ -15,7 +15,7 @@ _STEP_DEG = 0.1
 _FOLLOWS_DEG = 0.15
 """A slider nobody holds follows its joint in steps of this."""
 _FREE_AFTER_S = 0.5
-"""A jogged joint whose wish is another for this long is no longer jogged."""
+"""A jogged joint whose desired angle is another for this long is no longer jogged."""
 _SAME_DEG = 0.3
 MEASURED, ESTIMATED = "measured", "estimated (not measured)"
 _RIGHT = "text-align:right"
@@ -118,7 +118,7 @@ class JogPanel:
 
 
 def measured_table(snapshot: Snapshot) -> str:
-    """List every joint's wish and measured angle in degrees, as HTML.
+    """List every joint's desired and measured angle in degrees, as HTML.
 
     What nobody measures stands in a column of its own: an estimated angle looks like any other.
     """

@@ -20,7 +20,7 @@ MOST_POINTS = 600
 """More points than this in a trace are thinned out: the panel is not wider."""
 
 _LEAST_SPAN_DEG = 10.0
-_WISHES = (("wish", GREY, 1.5), ("permitted", AMBER, 1.5))
+_COMMANDS = (("desired", GREY, 1.5), ("commanded", AMBER, 1.5))
 _MEASURED = ("measured", BLUE, 2.0)
 _ESTIMATED = ("estimated, not measured", PALE_BLUE, 2.0)
 _DASH_PX = (6.0, 4.0)
@@ -190,7 +190,7 @@ class JointCharts:
     def _add(self, title: str, estimated: bool, order: int) -> _Plot:
         lines = [
             uplot.Series(label=name, stroke=colour, width=width, points={"show": False})
-            for name, colour, width in _WISHES
+            for name, colour, width in _COMMANDS
         ]
         lines.append(_result(estimated))
         # Nothing is seen of the last line: it keeps the scale from following the noise.
@@ -237,7 +237,7 @@ def _title(words: str, estimated: bool) -> str:
 
 def _key(estimated: Sequence[bool]) -> str:
     """Name the lines that there are."""
-    shown = [(*line, "&#8212;") for line in _WISHES]
+    shown = [(*line, "&#8212;") for line in _COMMANDS]
     if not all(estimated):
         shown.append((*_MEASURED, "&#8212;"))
     if any(estimated):

@@ -1,4 +1,4 @@
-"""What can be drawn into the page's scene besides the rig as it is: wish, camera, eyes' field."""
+"""What can be drawn into the page's scene beside the rig: desired pose, camera, eyes' field."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -19,7 +19,7 @@ class OverlayChoices:
     eyes: bool = False
 
     NAMES: ClassVar[dict[str, str]] = {
-        "ghost": "ghost of the wish",
+        "ghost": "ghost of the desired pose",
         "camera": "what the camera covers",
         "eyes": "what the eyes can attend to",
     }

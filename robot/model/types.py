@@ -142,7 +142,7 @@ class SeenBody:
 
 
 class CommandedPose(NamedTuple):
-    """Where the wish would have head and eyes: the names and frames are those of Snapshot."""
+    """Where desired angles would have head and eyes: names and frames are those of Snapshot."""
 
     R_world_head: Mat3
     p_world_head_m: Vec3

@@ -1,1 +1,1 @@
-"""The guard between wish and bus."""
+"""The guard between what is desired and the bus."""

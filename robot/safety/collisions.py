@@ -62,7 +62,7 @@ class Collisions:
     ) -> None:
         """Put up this tick's walls, and say who has to leave a box first.
 
-        wish: where the joints want to go, any numbers at all
+        desired: where the joints want to go, any numbers at all
         position: as measured
         held: joints that cannot be sent anywhere
         """
@@ -149,7 +149,7 @@ def _wall_off(span: ForbiddenRange, motion: MotionLimiter) -> None:
 
 
 def _crosses(span: ForbiddenRange, motion: MotionLimiter, desired: JointAngles) -> bool:
-    """Return whether a joint's way to its wish leads into its half of the box."""
+    """Return whether a joint's path to its desired angle leads into its half of the box."""
     i = span.joint
     if not isfinite(desired[i]):
         return False

@@ -1,6 +1,6 @@
-"""The guard between wish and bus: knows limits, measurements and ages, nothing of gaze.
+"""The guard between desired angles and the bus: knows limits, measurements and ages, not gaze.
 
-Whatever is wished, what leaves is finite, inside every joint's range, within its speed
+Whatever is desired, what leaves is finite, inside every joint's range, within its speed
 and its acceleration, always able to stop before the end of the range, and in no pose in
 which joints collide. What is hot, overloaded, short of voltage or stuck slows down or
 stops, each joint by itself. Radians.
@@ -25,7 +25,7 @@ _ROUNDING_RAD = 1e-9
 
 
 class _Hold(NamedTuple):
-    """Why a joint does not follow its wish, and what it does instead.
+    """Why a joint does not follow its desired angle, and what it does instead.
 
     goal: where it goes; None: it comes to a stop
     slowly: it goes there slowly
@@ -177,7 +177,7 @@ class Guard:
         self.go_gently()
 
     def go_gently(self) -> None:
-        """Move slowly for a while, and each joint until it has once met its wish."""
+        """Move slowly for a while, and each joint until it has once met its desired angle."""
         self._gentle = [True] * len(self._limits)
         self._gentle_until_s = [self._t_s + self._params.soft_start_ms / 1e3] * len(self._limits)
 
@@ -225,7 +225,7 @@ class Guard:
             near = -far <= command[i] - position <= far and not watched[i]
             well = near and at_s >= stale_s and not unseen and (usual or self._well(i, joints))
             if well and self._motion.follow(i, desired, dt_s):
-                continue  # nearly every wish is a good one and is passed on as it is
+                continue  # nearly every desired angle is a good one and is passed on as it is
             outcome = self._pass(i, desired, joints, at_s >= stale_s, unseen, dt_s)
             if outcome[1]:
                 short[i] = outcome
@@ -318,7 +318,7 @@ class Guard:
         return _Hold(strain, again="slowly") if strain else None
 
     def _outer_hold(self, i: int, desired: float, unseen: bool) -> _Hold | None:
-        """Say what else keeps a joint from its wish."""
+        """Say what else keeps a joint from its desired angle."""
         if i in self._waiting:
             return _Hold("new limits")
         if i in self._collisions.exits:
@@ -369,7 +369,7 @@ class Guard:
             self._motion.seek(i, hold.goal, dt_s, limit.speed_rad_s, limit.accel_rad_s2)
 
     def _go(self, i: int, desired: float, position: float, dt_s: float) -> str:
-        """Move a joint towards its wish as far as it may; give why it fell short."""
+        """Move a joint towards its desired angle as far as it may; give why it fell short."""
         motion, limit, share = self._motion, self._limits[i], self._health.share[i]
         began = motion.command[i]
         target = min(max(desired, motion.low[i]), motion.high[i])

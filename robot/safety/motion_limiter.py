@@ -26,11 +26,11 @@ class MotionLimiter:
         self.speed = [0.0] * len(limits)
         self.low = [limit.low_rad for limit in limits]
         self.high = [limit.high_rad for limit in limits]
-        self._wished = list(self.command)
+        self._desired = list(self.command)
 
     def restart(self, i: int, angle_rad: float) -> None:
         """Begin anew from an angle, at rest."""
-        self.command[i] = self._wished[i] = angle_rad
+        self.command[i] = self._desired[i] = angle_rad
         self.speed[i] = 0.0
 
     def left_alone(self, for_s: float) -> None:
@@ -38,7 +38,7 @@ class MotionLimiter:
         for i, limit in enumerate(self.limits):
             left = abs(self.speed[i]) - limit.accel_rad_s2 * for_s
             self.speed[i] = copysign(left, self.speed[i]) if left > 0.0 else 0.0
-            self._wished[i] = self.command[i]
+            self._desired[i] = self.command[i]
 
     def recount(self, i: int, factor: float, offset_rad: float) -> None:
         """Count a joint's angles otherwise: what was x is factor x + offset from now on."""
@@ -51,14 +51,14 @@ class MotionLimiter:
             speed_rad_s=size * speed,
             accel_rad_s2=size * accel,
         )
-        self.command[i] = self._wished[i] = factor * self.command[i] + offset_rad
+        self.command[i] = self._desired[i] = factor * self.command[i] + offset_rad
         self.speed[i] *= factor
         self.let_be(i)
 
     def take(self, i: int, limit: JointLimit) -> None:
         """Put another limit in force."""
         self.limits[i] = limit
-        self._wished[i] = self.command[i]
+        self._desired[i] = self.command[i]
         self.let_be(i)
 
     def keeps(self, i: int, limit: JointLimit) -> bool:
@@ -85,7 +85,7 @@ class MotionLimiter:
         return stop >= wall_rad - _ROUNDING_RAD
 
     def follow(self, i: int, desired: float, dt_s: float) -> bool:
-        """Go where the wish is, if that keeps every limit; else do nothing and say no.
+        """Go to the desired angle, if that keeps every limit; else do nothing and say no.
 
         Who is still catching up would run past the wish: that is for ``chase``.
         """
@@ -96,19 +96,19 @@ class MotionLimiter:
         step, top = accel * dt_s, limit.speed_rad_s
         if not (-top <= wanted <= top and v - step <= wanted <= v + step):
             return False
-        if not -step * dt_s <= self._wished[i] - p <= step * dt_s:
+        if not -step * dt_s <= self._desired[i] - p <= step * dt_s:
             return False
         brake = 0.5 * wanted * wanted / accel
         if desired + brake > self.high[i] if wanted > 0.0 else desired - brake < self.low[i]:
             return False
-        self.command[i] = self._wished[i] = desired
+        self.command[i] = self._desired[i] = desired
         self.speed[i] = wanted
         return True
 
     def chase(self, i: int, desired: float, dt_s: float, top: float, soft: float) -> None:
-        """Catch up with a wish that moves and fall into its pace."""
+        """Catch up with a desired angle that moves and fall into its pace."""
         target = min(max(desired, self.low[i]), self.high[i])
-        along = (target - self._wished[i]) / dt_s
+        along = (target - self._desired[i]) / dt_s
         if not -top <= along <= top:  # it jumped, or is too fast: there is no pace to fall into
             along = 0.0
         self.seek(i, desired, dt_s, top, soft, along)
@@ -116,7 +116,7 @@ class MotionLimiter:
     def seek(
         self, i: int, desired: float, dt_s: float, top: float, soft: float, along: float = 0.0
     ) -> None:
-        """Go to a wish below a speed ``top``, gathering it with ``soft``, to end there.
+        """Go to a desired angle below a speed ``top``, gathering it with ``soft``, to end there.
 
         Braking may take all of the joint's own acceleration, as a slow passage may begin
         in full flight.
@@ -129,14 +129,14 @@ class MotionLimiter:
         target = min(max(desired, self.low[i]), self.high[i])
         gap = target - along * dt_s - self.command[i]
         closing = reachable_speed(abs(gap), soft, dt_s)
-        self._wished[i] = target
+        self._desired[i] = target
         self._step(i, along + (closing if gap >= 0.0 else -closing), dt_s, top, soft)
 
     def brake(self, i: int, dt_s: float) -> None:
         """Come to a stop as fast as the joint may."""
         limit = self.limits[i]
         self._step(i, 0.0, dt_s, limit.speed_rad_s, limit.accel_rad_s2)
-        self._wished[i] = self.command[i]
+        self._desired[i] = self.command[i]
 
     def _step(self, i: int, wanted: float, dt_s: float, top: float, soft: float) -> None:
         """Take the speed nearest to the wanted one that keeps every limit."""
