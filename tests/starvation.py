@@ -11,6 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 ATTEMPTS = 8
+LONGEST_S = 100.0
+"""After so long no attempt is begun any more."""
 SHORTEST_TIMEOUT_S = 0.01
 """No client gives up sooner: who waited for less was not starved."""
 
@@ -57,6 +59,7 @@ class Attempts:
 
     def __init__(self) -> None:
         self._left = ATTEMPTS
+        self._end_s = time.monotonic() + LONGEST_S
         self._before_s = 0.0
 
     def begin(self) -> None:
@@ -66,4 +69,5 @@ class Attempts:
 
     def again(self) -> bool:
         """Return whether an attempt that failed says nothing, and there is another."""
-        return self._left > 0 and waited_s() - self._before_s >= SHORTEST_TIMEOUT_S
+        in_time = self._left > 0 and time.monotonic() < self._end_s
+        return in_time and waited_s() - self._before_s >= SHORTEST_TIMEOUT_S

@@ -153,11 +153,20 @@ class Person:
         (x, y), (to_x, to_y) = start, end
         self._mouse("mouseMoved", x - 3.0, y, "none")
         self._mouse("mouseMoved", x, y, "none")
+        self.wait_for_frames(3)
         self._mouse("mousePressed", x, y, "left")
         for step in range(1, 6):
             share = step / 5.0
             self._mouse("mouseMoved", x + share * (to_x - x), y + share * (to_y - y), "left")
         self._mouse("mouseReleased", to_x, to_y, "left")
+
+    def wait_for_frames(self, count: int) -> None:
+        """Wait until the browser has drawn so often: what was sent to it is then to be seen."""
+        self.run(
+            "window.framesDrawn = 0; (function more() { window.framesDrawn += 1;"
+            f"if (window.framesDrawn < {count}) requestAnimationFrame(more); }})()"
+        )
+        wait_for(lambda: self.run("window.framesDrawn") == count, f"{count} frames")
 
     def press(self, key: str, code: str, number: int) -> None:
         for kind in ("keyDown", "keyUp"):
@@ -331,6 +340,9 @@ def test_a_target_is_dragged_through_the_scene(at_the_rig: tuple[Rig, Person]) -
     canvas = (x, y, width, height)
     arrow, farther = ((0.7, 0.1, 0.3 + up) for up in (0.08, 0.2))
     before = len(rig.orders)
+
+    # A drag that begins beside a gizmo not yet drawn would turn the view for good.
+    person.wait_for_frames(20)
 
     def dragged() -> bool:
         person.drag(seen_at(arrow, canvas), seen_at(farther, canvas))
