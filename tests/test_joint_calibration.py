@@ -2,11 +2,11 @@
 
 from dataclasses import replace
 from math import radians
+from typing import cast
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from present import present
 
 from gazerig.config.rig import LidJoints
 from gazerig.robot.calibration.endstop_search import (
@@ -176,7 +176,7 @@ def test_a_lower_lid_writes_its_own_ends() -> None:
 
 
 def test_only_what_differs_is_changed() -> None:
-    found = Calibration(present(JOINT.zero_step), 1, -35.0, 30.0)
+    found = Calibration(cast(int, JOINT.zero_step), 1, -35.0, 30.0)
     assert changes("left_eye_pan", JOINT, found, {}) == {"joints.left_eye_pan.max_deg": 30.0}
 
 

@@ -1,13 +1,12 @@
 """People who walk in a square, against a mask that knows nothing of flow."""
 
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.vision.motion.detector import MotionDetector
 from gazerig.drivers.vision.motion.params import MotionParams
 
@@ -33,7 +32,7 @@ def test_what_moves_lies_on_people_who_walk() -> None:
         if k < BEGIN:
             continue
         height, width = picture.shape[:2]
-        lens: Any = SimpleNamespace(
+        lens = Intrinsics(
             fx_px=0.73 * width, fy_px=0.73 * width, cx_px=(width - 1) / 2, cy_px=(height - 1) / 2
         )
         blobs = detector.find(picture, k / RATE_HZ, lens, np.eye(3))

@@ -519,7 +519,7 @@ MUTATIONS: tuple[Mutation, ...] = (
     (MOTION, "chosen = max(up, v - accel * dt_s)", "chosen = up", slower_in_flight),
     (MOTION, "chosen = min(down, v + accel * dt_s)", "chosen = down", slower_in_flight),
     # catching up
-    (MOTION, "-step * dt_s <= self._wished[i] - p <= step * dt_s", "True", no_overshoot),
+    (MOTION, "-step * dt_s <= self._desired[i] - p <= step * dt_s", "True", no_overshoot),
     (
         MOTION,
         "closing = reachable_speed(abs(gap), soft, dt_s)",
