@@ -7,14 +7,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated
 
-from gazerig.drivers.camera.oak_params import OakParams
+from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.params import CameraCareParams, WebcamParams
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.servo_models import BusKind
-from gazerig.drivers.vision.face_params import FaceDetectorParams
+from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.gaze.attention import AttentionParams
 from gazerig.gaze.aversion import AversionParams

@@ -22,8 +22,8 @@ from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.camera.worker import CameraParts
 from gazerig.drivers.errors import CameraError, ModelFileError
-from gazerig.drivers.vision.face_detector import face_detector
-from gazerig.drivers.vision.face_params import FaceDetectorParams
+from gazerig.drivers.vision.face.detector import face_detector
+from gazerig.drivers.vision.face.params import FaceDetectorParams
 
 PATIENCE_S = 40.0
 DETECTOR = partial(face_detector, FaceDetectorParams(work_width_px=64))

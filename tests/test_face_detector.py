@@ -12,10 +12,10 @@ from skimage import data
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import DetectedFace, FaceDetector, Picture, Pixels
-from gazerig.drivers.vision.face_detector import face_detector
-from gazerig.drivers.vision.face_mtcnn import package_folder, read_model
-from gazerig.drivers.vision.face_params import FaceDetectorParams
-from gazerig.drivers.vision.face_preprocess import prepare
+from gazerig.drivers.vision.face.detector import face_detector
+from gazerig.drivers.vision.face.mtcnn import package_folder, read_model
+from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.drivers.vision.face.preprocess import prepare
 
 SHARED = Path(__file__).parents[2] / "shared"
 YUNET_FILE = SHARED / "models" / "face_detection_yunet_2026may.onnx"

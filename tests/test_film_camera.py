@@ -13,8 +13,8 @@ from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.types import DetectedFace, MovingBlob
-from gazerig.drivers.vision.face_detector import face_detector
-from gazerig.drivers.vision.face_params import FaceDetectorParams
+from gazerig.drivers.vision.face.detector import face_detector
+from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.sim_mock.cameras.video import FilmCamera
 
 FILM_FILE = Path(__file__).parents[2] / "shared" / "media" / "Megamind.avi"

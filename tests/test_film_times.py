@@ -11,8 +11,8 @@ from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.camera.video_timestamps import FilmTimes, at_a_rate, by_table, rising
 from gazerig.drivers.errors import CameraError
-from gazerig.drivers.vision.face_detector import face_detector
-from gazerig.drivers.vision.face_params import FaceDetectorParams
+from gazerig.drivers.vision.face.detector import face_detector
+from gazerig.drivers.vision.face.params import FaceDetectorParams
 
 UNEVEN = (0, 1, 2, 6, 7, 8, 12, 13, 14, 20, 21, 22, 23, 30, 31, 32, 40, 41, 42, 43)
 

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from present import present
 
-from gazerig.drivers.camera.oak import OakSource
-from gazerig.drivers.camera.oak_params import OakParams
-from gazerig.drivers.camera.oak_pipeline import Outputs, device_nodes, read_archive
-from gazerig.drivers.camera.oak_sdk import load_depthai
+from gazerig.drivers.camera.oak.params import OakParams
+from gazerig.drivers.camera.oak.pipeline import Outputs, device_nodes, read_archive
+from gazerig.drivers.camera.oak.sdk import load_depthai
+from gazerig.drivers.camera.oak.source import OakSource
 from gazerig.drivers.errors import CameraError
 
 GO_ON = threading.Event()
@@ -239,9 +239,9 @@ def test_face_model_must_be_an_archive(dai, tmp_path):
 
 def test_depthai_is_loaded_without_telemetry_and_without_a_word():
     code = (
-        "import sys, gazerig.drivers.camera.oak\n"
+        "import sys, gazerig.drivers.camera.oak.source\n"
         "assert 'depthai' not in sys.modules\n"
-        "from gazerig.drivers.camera.oak_sdk import load_depthai; load_depthai()\n"
+        "from gazerig.drivers.camera.oak.sdk import load_depthai; load_depthai()\n"
         "import os; assert os.environ['DEPTHAI_TELEMETRY'] == '0'"
     )
     environment = {k: v for k, v in os.environ.items() if not k.startswith("DEPTHAI")}

@@ -7,11 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from gazerig.drivers.camera.oak import OakSource
-from gazerig.drivers.camera.oak_discovery import UDEV_RULE, find_oak
-from gazerig.drivers.camera.oak_params import OakParams
-from gazerig.drivers.camera.oak_pipeline import Outputs
-from gazerig.drivers.camera.oak_sdk import load_depthai
+from gazerig.drivers.camera.oak.discovery import UDEV_RULE, find_oak
+from gazerig.drivers.camera.oak.params import OakParams
+from gazerig.drivers.camera.oak.pipeline import Outputs
+from gazerig.drivers.camera.oak.sdk import load_depthai
+from gazerig.drivers.camera.oak.source import OakSource
 from gazerig.drivers.errors import CameraError
 
 real = load_depthai()

@@ -10,8 +10,8 @@ from stand_in import StandIn
 
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, Picture
-from gazerig.drivers.vision.face_mtcnn import MtcnnDetector
-from gazerig.drivers.vision.face_params import FaceDetectorParams
+from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
+from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.gaze.angles import angle_between, rotation, sub
 from gazerig.gaze.types import Angles3, Mat3, Vec3
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike, NDArray
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_input import read_limited
 from gazerig.drivers.file_output import write_file
-from gazerig.drivers.vision.face_detector import face_detector
-from gazerig.drivers.vision.face_params import FaceDetectorParams
+from gazerig.drivers.vision.face.detector import face_detector
+from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.gaze.types import PARTS, Floats
 from gazerig.robot.analysis.heatmap_face import HEIGHT_PX, PX_PER_M, WIDTH_PX, draw_face, on_canvas
 from gazerig.robot.analysis.heatmap_legend import with_legend

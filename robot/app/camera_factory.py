@@ -7,7 +7,7 @@ from math import radians
 import numpy as np
 
 from gazerig.config.schema import Rig
-from gazerig.drivers.camera.oak import OakSource
+from gazerig.drivers.camera.oak.source import OakSource
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay
 from gazerig.drivers.camera.pose_buffer import PoseRing
@@ -18,7 +18,7 @@ from gazerig.drivers.camera.webcam import Webcam
 from gazerig.drivers.camera.worker import CameraParts
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import Camera, MovingBlob
-from gazerig.drivers.vision.face_detector import face_detector
+from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.motion.detector import MotionDetector, turned_between
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.gaze.types import Mat3, Vec3

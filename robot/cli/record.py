@@ -60,8 +60,8 @@ def _source(
     width, height, rate_hz = wishes
     # OpenCV and depthai are heavy: loaded when it is clear that there is something to do.
     if oak:
-        from gazerig.drivers.camera.oak import OakSource
-        from gazerig.drivers.camera.oak_params import OakParams
+        from gazerig.drivers.camera.oak.params import OakParams
+        from gazerig.drivers.camera.oak.source import OakSource
 
         params = OakParams(width_px=width, height_px=height or 400, rate_hz=rate_hz)
         return OakSource(params), "OAK-D"

@@ -28,8 +28,8 @@ from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.camera.worker import CameraParts
 from gazerig.drivers.types import FaceDetector
-from gazerig.drivers.vision.face_detector import face_detector
-from gazerig.drivers.vision.face_params import FaceDetectorParams
+from gazerig.drivers.vision.face.detector import face_detector
+from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.robot.perception.motion_source import motion_finder
 

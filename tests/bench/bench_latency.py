@@ -18,7 +18,7 @@ import numpy as np
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Detections
-from gazerig.drivers.vision.face_detector import face_detector
+from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import DetectedFace, Picture
-from gazerig.drivers.vision.face_params import FaceDetectorParams
-from gazerig.drivers.vision.face_preprocess import largest_first, prepare
+from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.drivers.vision.face.preprocess import largest_first, prepare
 
 Floats32 = NDArray[np.float32]
 Floats = NDArray[np.float64]

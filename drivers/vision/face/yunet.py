@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from gazerig.drivers.camera.quiet_opencv import quiet_opencv
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import DetectedFace, Picture
-from gazerig.drivers.vision.face_params import FaceDetectorParams
-from gazerig.drivers.vision.face_preprocess import largest_first, prepare
+from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.drivers.vision.face.preprocess import largest_first, prepare
 
 _CURE = (
     "get face_detection_yunet_2023mar.onnx or a later one from the OpenCV zoo"

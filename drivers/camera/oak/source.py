@@ -6,11 +6,11 @@ from datetime import timedelta
 from typing import Any
 
 from gazerig.drivers.camera.clock_sync import ClockBridge
-from gazerig.drivers.camera.oak_discovery import find_oak
-from gazerig.drivers.camera.oak_messages import depth_of, faces_of, lens_of, picture_of
-from gazerig.drivers.camera.oak_params import OakParams
-from gazerig.drivers.camera.oak_pipeline import COLOUR, MakeNodes, device_nodes, joined
-from gazerig.drivers.camera.oak_sdk import load_depthai
+from gazerig.drivers.camera.oak.discovery import find_oak
+from gazerig.drivers.camera.oak.messages import depth_of, faces_of, lens_of, picture_of
+from gazerig.drivers.camera.oak.params import OakParams
+from gazerig.drivers.camera.oak.pipeline import COLOUR, MakeNodes, device_nodes, joined
+from gazerig.drivers.camera.oak.sdk import load_depthai
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
 

@@ -7,9 +7,9 @@ so a picture of width w reaches from -0.5 to w - 0.5.
 
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import FaceDetector
-from gazerig.drivers.vision.face_mtcnn import MtcnnDetector
-from gazerig.drivers.vision.face_params import FaceDetectorParams
-from gazerig.drivers.vision.face_yunet import YunetDetector
+from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
+from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.drivers.vision.face.yunet import YunetDetector
 
 
 def face_detector(params: FaceDetectorParams) -> FaceDetector:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from gazerig.drivers.camera.depth_roi import metres, resized
-from gazerig.drivers.camera.oak_pipeline import COLOUR, DEPTH, FACES
+from gazerig.drivers.camera.oak.pipeline import COLOUR, DEPTH, FACES
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import bgr
 from gazerig.drivers.types import Depth, DetectedFace, Picture

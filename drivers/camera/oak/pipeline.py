@@ -9,7 +9,7 @@ from datetime import timedelta
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from gazerig.drivers.camera.oak_params import OakParams
+from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.errors import CameraError
 
 COLOUR, DEPTH, FACES = "colour", "depth", "faces"

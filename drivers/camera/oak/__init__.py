@@ -1,0 +1,1 @@
+"""OAK-D cameras through depthai."""
