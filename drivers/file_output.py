@@ -140,7 +140,7 @@ def _is_stream(path: Path) -> bool:
 
 @contextlib.contextmanager
 def _clear(path: Path) -> Iterator[None]:
-    """Say in one line what the disk refuses."""
+    """Turn what the disk refuses into an error of one line."""
     try:
         yield
     except OSError as error:

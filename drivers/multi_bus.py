@@ -29,7 +29,7 @@ class Share(NamedTuple):
 
 
 class _Patience:
-    """Says when a bus is read: always, but seldom while nobody on it answers."""
+    """Decides when a bus is read: every tick, but rarely while no servo on it answers."""
 
     def __init__(self) -> None:
         self._in_vain, self._due_s = 0, -inf
@@ -166,7 +166,7 @@ class MixedBus:
         return tuple(fault for share in self._shares for fault in share.bus.faults())
 
     def events(self) -> tuple[str, ...]:
-        """Say what has happened since the last call."""
+        """Return what happened since the last call, one line each."""
         return tuple([event for share in self._shares for event in share.bus.events()])
 
     def retune(self, setups: Sequence[ServoSetup]) -> None:

@@ -70,7 +70,7 @@ class PortBus(ABC):
 
     @abstractmethod
     def _switch_off(self) -> Released:
-        """Take the torque off all servos and see that it is gone.
+        """Switch the torque of all servos off and verify that it is off.
 
         Raises:
             BusLost: the port is gone.
@@ -82,7 +82,7 @@ class PortBus(ABC):
 
     @abstractmethod
     def _cannot_release(self) -> str:
-        """Say what servos do that cannot be told to let go."""
+        """Return what the servos do when their torque cannot be switched off."""
 
     def retune(self, setups: Sequence[ServoSetup]) -> None:
         """Set the servos up so when the torque comes on the next time; the same ids and models.
@@ -99,7 +99,7 @@ class PortBus(ABC):
         self._wanted = tuple(setups)
 
     def events(self) -> tuple[str, ...]:
-        """Say what has happened since the last call."""
+        """Return what happened since the last call, one line each."""
         return self._log.drain()
 
     def health(self) -> BusHealth:
@@ -145,7 +145,7 @@ class PortBus(ABC):
         return True
 
     def _switch_all_off(self) -> None:
-        """Take the torque off, see that it is gone, and say where it is not.
+        """Switch all torque off, verify it, and report the servos that keep it.
 
         Raises:
             BusLost: the port is gone.

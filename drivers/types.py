@@ -163,7 +163,7 @@ class ServoBus(Protocol):
         ...
 
     def events(self) -> tuple[str, ...]:
-        """Say what has happened since the last call, e.g. "servo 3 restarted: set up anew"."""
+        """Return what happened since the last call, e.g. "servo 3 restarted: set up anew"."""
         ...
 
     def retune(self, setups: Sequence[ServoSetup]) -> None:
@@ -276,7 +276,7 @@ class Camera(Protocol):
         ...
 
     def events(self) -> tuple[str, ...]:
-        """Say what has happened since the last call, e.g. "camera lost: trying it again"."""
+        """Return what happened since the last call, e.g. "camera lost: trying it again"."""
         ...
 
     def close(self) -> None:

@@ -96,10 +96,10 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return dropped
 
     def _see(self) -> None:
-        """Take in what has arrived by now.
+        """Fetch what has arrived by now.
 
         Raises:
-            BusLost: unplugged since it was opened.
+            BusLost: it was unplugged after it was opened.
         """
         if self.faults.wire.any and self.faults.on("unplug"):
             self._lost = True
@@ -177,9 +177,9 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         self._give_up_s = self.now_s() + msec / 1000.0
 
     def isPacketTimeout(self) -> bool:
-        """Tell that waiting longer is of no use: every answer that will come is here.
+        """Whether waiting longer is useless: every answer that will come is here.
 
-        Where the clock can be moved on, it is, to the next bytes or the end of patience.
+        A simulated clock is advanced to the next bytes or to the end of the time-out.
         """
         if self._sleep_until is None or self._waiting:
             return not self.line.busy

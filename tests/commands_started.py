@@ -77,7 +77,7 @@ class OnTerminal:
         return first
 
     def _read(self) -> bool:
-        """Take what it has written; False where it has ended."""
+        """Read its output; return False at its end."""
         if not select.select([self.fd], [], [], 0.2)[0]:
             return True
         try:

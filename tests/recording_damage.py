@@ -93,7 +93,7 @@ def overwritten(data: bytes, rng: random.Random) -> bytes:
 
 
 def shuffled(data: bytes, rng: random.Random) -> bytes:
-    """Take out, double or move a stretch."""
+    """Return the data with a stretch of it removed, doubled or moved."""
     a, b = sorted(rng.randrange(len(data)) for _ in range(2))
     b = min(b, a + 5000)
     return rng.choice((data[:a] + data[b:], data[:b] + data[a:b] + data[b:], data[b:] + data[:b]))
@@ -145,7 +145,7 @@ def _replaced(data: bytes, at: int, length: int, body: bytes) -> bytes:
 
 
 def _unsummed(data: bytes) -> bytes:
-    """Take the check sum of the whole out, as a hostile hand would."""
+    """Return the data without the checksum of the whole, as an attacker would send it."""
     out = bytearray(data)
     for kind, at, _ in records(data):
         if kind == Opcode.DATA_END:

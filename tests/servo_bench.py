@@ -150,7 +150,7 @@ class DynamixelBench(Bench):
 
     @staticmethod
     def packets(data):
-        """Take statuses apart: (id, error, parameters) each; every byte must belong to one."""
+        """Return the statuses as (id, error, parameters); every byte must belong to one."""
         out = []
         while data:
             assert data[:4] + data[7:8] == b"\xff\xff\xfd\x00\x55"
@@ -177,7 +177,7 @@ class FeetechBench(Bench):
 
     @staticmethod
     def packets(data):
-        """Take statuses apart: (id, error, parameters) each; every byte must belong to one."""
+        """Return the statuses as (id, error, parameters); every byte must belong to one."""
         out = []
         while data:
             assert data[:2] == b"\xff\xff"

@@ -261,7 +261,7 @@ def test_recording_of_one_picture_can_be_played(tmp_path):
 
 
 class Source:
-    """Gives the test pictures one after another, then is lost."""
+    """A source that delivers the test frames one after another and is then lost."""
 
     def __init__(self, count: int = len(TIMES_S)) -> None:
         self.left = list(range(count))

@@ -25,7 +25,7 @@ FACE = DetectedFace((1.0, 2.0, 3.0, 4.0), np.zeros((5, 2)), 0.9)
 
 
 class Source:
-    """Gives a picture each time it is fed one; picture k is captured at k seconds."""
+    """A source that delivers one frame each time it is fed; frame k is captured at k seconds."""
 
     def __init__(self, fails_to_open: bool = False) -> None:
         self.fed = threading.Semaphore(0)

@@ -16,7 +16,7 @@ from gazerig.robot.remote.live_server import LiveServer
 
 
 class Robot:
-    """Takes commands and does nothing."""
+    """A robot that accepts commands and ignores them."""
 
     def command(self, command: Command) -> None:
         raise ValueError("nothing moves here")

@@ -338,7 +338,7 @@ def test_what_is_not_a_number_is_refused(held, bad):
 
 
 def targets(packet):
-    """Take the pulse widths out of compact commands: those of 84 and 9F."""
+    """Return the pulse widths of compact commands 84 and 9F."""
     found, at = [], 0
     while at < len(packet):
         size = {0x84: 4, 0x9F: 3 + 2 * packet[at + 1]}[packet[at]]

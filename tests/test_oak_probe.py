@@ -136,7 +136,7 @@ class Group(dict):
 
 
 class Queue:
-    """Gives the messages fed to it; an exception among them is raised."""
+    """A queue of given messages; an exception among them is raised."""
 
     def __init__(self) -> None:
         self.fed: list = []

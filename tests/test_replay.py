@@ -76,7 +76,7 @@ def frames(ticks: list[Tick]) -> Iterator[SnapshotIndex]:
 
 
 class Screen:
-    """Takes messages, as the page does; one that is full takes none."""
+    """A page that accepts messages, and none while it is full."""
 
     def __init__(self) -> None:
         self.messages: list[bytes] = []

@@ -68,7 +68,7 @@ class World:
 
 
 def touches(begin: np.ndarray, end: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Tell of every step (n, 2) whether its straight line meets the box, by slabs."""
+    """Whether the straight line of each step (n, 2) meets the box, by slabs."""
     way = end - begin
     with np.errstate(divide="ignore", invalid="ignore"):
         a, b = (low - begin) / way, (high - begin) / way

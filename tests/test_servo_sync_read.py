@@ -222,7 +222,7 @@ def columns_of(family, model, *ids, **limits):
 
 
 def both_ways(group, raw, *columns):
-    """Take an answer at once with the first columns, servo by servo with the second."""
+    """Apply an answer as a whole to the first columns, servo by servo to the second."""
     one, other = columns
     for each in columns:
         for slot in range(len(group.ids)):

@@ -216,7 +216,7 @@ class _Still:
 
 
 def quiet(words: str, share: float) -> None:
-    """Tell nobody."""
+    """Ignore progress."""
 
 
 @pytest.mark.slow

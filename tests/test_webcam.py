@@ -176,7 +176,7 @@ def test_latency_of_the_camera_is_taken_off(device):
 
 
 def run(device, stated_hz: float, gives_hz: float, away_s: float, count: int = 60) -> list[str]:
-    """Take pictures of a camera that states one rate and gives another."""
+    """Read frames of a camera that states one rate and delivers another."""
     capture = Capture()
     capture.stated_hz = stated_hz
     camera = opened(device, capture)

@@ -1,4 +1,4 @@
-"""Looking at one picture after another, and opening a lost camera again and again."""
+"""Detection frame by frame, and reopening a lost camera."""
 
 import threading
 from collections.abc import Callable
@@ -10,14 +10,22 @@ from gazerig.drivers.errors import CameraError
 from gazerig.drivers.types import Detections, FaceDetector
 
 LOST, BACK = "camera lost", "camera back"
-"""How lines begin that tell of a source that is tried again, and of its return."""
+"""The beginnings of the events about a source that is lost, and of its return."""
 
 
 class CameraWatch:
-    """A source of pictures with what finds things in them.
+    """A source of frames with the detectors that look for faces and motion in them.
 
-    A source that is lost in service is opened again until it is back or patience ends.
-    Numbers count on through that.
+    A source that is lost in service is reopened until it is back or ``care.give_up_s`` is
+    over. Frame numbers go on counting meanwhile.
+
+    Args:
+        source: the frames.
+        detector: finds faces.
+        now_s: the host's monotonic clock, seconds.
+        care: how a lost source is reopened.
+        motion: finds motion, None for none.
+        tell: gets each event as one line, at once.
     """
 
     def __init__(
@@ -29,10 +37,6 @@ class CameraWatch:
         motion: Motion | None,
         tell: Callable[[str], None],
     ) -> None:
-        """Take what gives pictures, what finds faces and motion, and the host's clock.
-
-        tell: takes a line about what has happened, at once
-        """
         self._source = source
         self._frames = FrameAnalyzer(detector, motion)
         self._now_s = now_s
@@ -51,7 +55,7 @@ class CameraWatch:
         self._counted = self._number = 0
 
     def next(self, stop: threading.Event) -> Detections | None:
-        """Wait for the next picture and look at it; None where ``stop`` was set meanwhile.
+        """Return the detections in the next frame, None if ``stop`` was set meanwhile.
 
         Raises:
             CameraError: the source is gone for good.
@@ -70,7 +74,7 @@ class CameraWatch:
         detector: Callable[[], FaceDetector] | None,
         motion: Callable[[Motion | None], Motion | None] | None,
     ) -> None:
-        """Look otherwise from the next picture on, as in FrameAnalyzer."""
+        """Change the detectors from the next frame on, as in FrameAnalyzer."""
         self._frames.retune(detector, motion)
 
     def close(self) -> None:
@@ -78,7 +82,7 @@ class CameraWatch:
         self._source.close()
 
     def _take(self, stop: threading.Event) -> Shot | None:
-        """Take the next picture, opening a lost source again."""
+        """Return the next frame, reopening a lost source; None where ``stop`` was set."""
         lost_s: float | None = None
         wait_s = self._care.retry_ms / 1e3
         while True:
@@ -101,7 +105,7 @@ class CameraWatch:
             return shot
 
     def _lose(self, error: CameraError) -> float:
-        """Tell of the loss, count on from the last picture, and give when it was."""
+        """Report the loss, keep the frame numbers going, and return the time of the loss."""
         self._counted = self._number
         if self._care.give_up_s > 0.0:
             self._tell(f"{LOST} ({error}): trying it again")
@@ -109,7 +113,7 @@ class CameraWatch:
 
 
 def failed(failure: Exception) -> CameraError:
-    """Return what to tell the loop of a fault that ended the looking."""
+    """Return the error that ended the detection, as the control loop reports it."""
     if isinstance(failure, CameraError):
         return CameraError(str(failure))
     return CameraError(

@@ -33,7 +33,12 @@ class RateWatch:
         return 1.0 / median(self._intervals_s)
 
     def update(self, captured_s: float, away_s: float) -> str:
-        """Take a picture's time and how long nobody waited before it; give a line or ""."""
+        """Add a frame; return a line when the rate is newly wrong or right again, else "".
+
+        Args:
+            captured_s: when it was captured.
+            away_s: how long the reader was busy elsewhere before it.
+        """
         before_s, self._before_s = self._before_s, captured_s
         if before_s is None or captured_s <= before_s:
             return ""

@@ -71,7 +71,7 @@ class CameraReplay:
         return None if due is None else self.shot(due.number)._replace(captured_s=due.host_s)
 
     def events(self) -> tuple[str, ...]:
-        """Say once what is not as it should be with the file."""
+        """Return what is wrong with the file, one line each, once."""
         told, self._untold = self._untold, ""
         return (told,) if told else ()
 

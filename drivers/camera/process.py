@@ -199,7 +199,7 @@ class CameraProcess:
     # --- one after the other, in a thread
 
     def _supervise(self) -> None:
-        """Take what processes find; start the next one until it may not be tried any more."""
+        """Receive results of a process and restart it when it ends, until retrying is over."""
         wait_s = self._care.retry_ms / 1e3
         while not self._closing.is_set():
             began_s = self._now_s()
@@ -225,7 +225,7 @@ class CameraProcess:
                     self._pipe.send(Retune(None, self._motion))
 
     def _may_go_on(self, end: _End) -> bool:
-        """Tell of an end, and return whether another process may be started."""
+        """Report the end of a process; return whether another may be started."""
         if self._lost_s is None:
             self._lose(end.reason, "starting its process again")
         gone_s = self._now_s() - (self._lost_s or 0.0)
@@ -242,7 +242,7 @@ class CameraProcess:
             self._events.append(f"{LOST} again ({reason}): from now on it is tried without a word")
 
     def _receive(self) -> _End:
-        """Take what a process finds until it ends, or nothing more is to be expected of it."""
+        """Receive results of a process until it ends or hangs; return how it ended."""
         pipe = self._pipe
         assert pipe is not None
         slots = SlotReader(), SlotReader()
@@ -278,7 +278,7 @@ class CameraProcess:
         return self._process is not None and self._process.is_alive()
 
     def _is_hung(self, silence: PictureSilence) -> bool:
-        """Tell of a camera that gives no more pictures; return whether to end its process."""
+        """Report a camera without new frames; return whether to end its process."""
         verdict = silence.verdict(self._now_s())
         if verdict and self._lost_s is None:
             self._lose("no new picture", "waiting for it")

@@ -1,4 +1,4 @@
-"""Recording what a camera gives while it is used: encoded and written by threads of its own."""
+"""Recording a camera's frames while it is used; they are encoded and written by threads."""
 
 import queue
 import threading
@@ -25,10 +25,17 @@ class _Waiting(NamedTuple):
 
 
 class CameraRecorder:
-    """A source of pictures that also go into a file; they come through unchanged.
+    """A source of frames that are also written to a file; they come through unchanged.
 
-    A fault of the disk ends the recording, is told, and leaves the camera running. The file
-    stays open while the source is closed and opened again; ``finish`` closes it.
+    A fault of the disk ends the recording, is reported, and leaves the camera running. The
+    file stays open while the source is closed and opened again; ``finish`` closes it.
+
+    Args:
+        source: the frames.
+        path: the file.
+        about: metadata of the recording.
+        jpeg_quality: 1..100, None keeps the frames exactly.
+        over: whether an existing file is overwritten.
 
     failure: why the recording ended early, or ""; left_out: pictures the disk was too slow for
     """
@@ -41,11 +48,6 @@ class CameraRecorder:
         jpeg_quality: int | None = None,
         over: bool = False,
     ) -> None:
-        """Take what gives pictures and where they go.
-
-        about: what should be known of the recording; jpeg_quality: 1..100, None keeps the
-        pictures exactly; over: an existing file is written over
-        """
         self._source = source
         self._path = path
         self._about = about or {}
@@ -95,7 +97,7 @@ class CameraRecorder:
         return shot
 
     def events(self) -> tuple[str, ...]:
-        """Say what happened to the source and to the recording."""
+        """Return new events of the source and of the recording, one line each."""
         told, self._events = tuple(self._events), []
         return (*self._source.events(), *told)
 
@@ -127,7 +129,7 @@ class CameraRecorder:
             self._waiting.put(_Waiting(shot.captured_s, shot.number, messages))
 
     def _write(self) -> None:
-        """Write pictures until told to finish; after a fault only throw them away."""
+        """Write frames until the end of the recording; after a fault only discard them."""
         writer = self._writer
         assert writer is not None
         while (one := self._waiting.get()) is not None:

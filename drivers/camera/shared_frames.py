@@ -67,7 +67,7 @@ class SlotWriter:
 
 
 class SlotReader:
-    """Takes arrays out of slots."""
+    """Reads arrays out of slots of shared memory."""
 
     def __init__(self) -> None:
         self._memory: SharedMemory | None = None

@@ -33,7 +33,7 @@ class Shot(NamedTuple):
 
 
 class PictureSource(Protocol):
-    """Gives pictures one after another, always the newest."""
+    """A source of frames; each ``take`` returns the newest one."""
 
     def open(self) -> None:
         """Open the device or file.
@@ -52,7 +52,7 @@ class PictureSource(Protocol):
         ...
 
     def events(self) -> tuple[str, ...]:
-        """Say what a person should know and was not told yet, one line each."""
+        """Return what happened since the last call and the user should know, one line each."""
         ...
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Pictures in real time: a thread looks, and leaves what it found in one slot.
+"""Detection in real time: a thread analyses frames and leaves the newest result in one slot.
 
 No queue and no lock: the slot holds one frozen value, and a Python name is rebound in
 one piece. Pictures that come while the detector works are skipped.
@@ -23,7 +23,14 @@ _MOST_EVENTS = 100
 class CameraThread:
     """A camera, or a film paced by the real clock, watched for faces and motion.
 
-    While a lost source is tried again the last detections stay, and their age tells.
+    While a lost source is reopened the last detections stay; their age shows the loss.
+
+    Args:
+        source: the frames.
+        detector: finds faces.
+        now_s: the host's monotonic clock, seconds.
+        care: how a lost source is reopened.
+        motion: called in the camera's thread with every frame, None for none.
 
     pictures, pictures_with_face: counts of pictures looked at since open
     """
@@ -36,10 +43,6 @@ class CameraThread:
         care: CameraCareParams | None = None,
         motion: Motion | None = None,
     ) -> None:
-        """Take what gives pictures, what finds faces, and the host's monotonic clock.
-
-        motion: called in the camera's thread with every picture
-        """
         self._events: deque[str] = deque(maxlen=_MOST_EVENTS)
         self._camera = CameraWatch(
             source, detector, now_s, care or CameraCareParams(), motion, self._events.append
@@ -78,7 +81,7 @@ class CameraThread:
         return self._newest
 
     def events(self) -> tuple[str, ...]:
-        """Say what has happened since the last call, one line each."""
+        """Return what happened since the last call, one line each."""
         told = []
         while self._events:
             told.append(self._events.popleft())
@@ -93,7 +96,7 @@ class CameraThread:
                 self._thread = None
 
     def _watch(self) -> None:
-        """Look at one picture after another until told to stop."""
+        """Analyse one frame after another until stopped."""
         try:
             while (found := self._camera.next(self._stop)) is not None:
                 self.pictures += 1

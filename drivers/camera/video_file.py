@@ -101,7 +101,7 @@ class VideoFile:
         return None if due is None else Shot(due.host_s, due.number, self.picture(due.number))
 
     def events(self) -> tuple[str, ...]:
-        """Say once what had to be assumed about the file."""
+        """Return what had to be assumed about the file, one line each, once."""
         told, self._untold = self._untold, ""
         return (f"{self._path.name}: {told}",) if told else ()
 

@@ -193,7 +193,11 @@ def _check_forward(number: int, least: int) -> None:
 
 
 def _frozen(picture: Any, path: Path) -> Picture:
-    """Take a picture as bytes that nobody writes to any more."""
+    """Return a frame as a read-only BGR array.
+
+    Raises:
+        CameraError: the file holds another pixel format.
+    """
     pixels = bgr(picture)
     if pixels is None:
         raise CameraError(f"{path} holds pictures of an unknown kind: convert it to mp4 or png")

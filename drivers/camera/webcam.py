@@ -118,7 +118,7 @@ class Webcam:
         )
 
     def events(self) -> tuple[str, ...]:
-        """Say when the camera's rate is not what it states."""
+        """Return a line when the measured frame rate differs from the stated one."""
         told, self._events = tuple(self._events), []
         return told
 

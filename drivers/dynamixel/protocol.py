@@ -118,7 +118,7 @@ class SyncWrite:
 
 
 def statuses(raw: bytes) -> list[Status]:
-    """Take every complete status out of received bytes; noise, echo and pieces are passed over."""
+    """Return every complete status packet in received bytes; noise, echo and parts are skipped."""
     found = []
     at = raw.find(HEADER)
     while at >= 0:

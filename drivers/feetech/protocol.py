@@ -145,7 +145,7 @@ class GoalWrite:
 
 
 def statuses(raw: bytes) -> list[Status]:
-    """Take every complete status out of received bytes; noise, echo and pieces are passed over.
+    """Return every complete status packet in received bytes; noise, echo and parts are skipped.
 
     Of two that overlap and are both right by their checksum neither can be believed: they
     are given as not intact.

@@ -248,10 +248,10 @@ class HobbyBoardBus(PortBus):
         return self._byte_s
 
     def _check_silence(self, now_s: float) -> None:
-        """Give up where the board has not answered for too long.
+        """Raise if the board has not answered for too long.
 
         Raises:
-            BusLost: so it is.
+            BusLost: no answer within the limit.
         """
         # Where anything arrives the board is there: it is noise that keeps it from being read.
         silent_s = min(self._silence.seconds(now_s), now_s - self._byte_s)
@@ -278,7 +278,7 @@ class HobbyBoardBus(PortBus):
         return channel_label(next(c.setup for c in self._channels if c.id == servo_id))
 
     def _cannot_release(self) -> str:
-        """Say what servos do that cannot be told to let go."""
+        """Return what the servos do when their pulses cannot be switched off."""
         return (
             f"{self._port.port_name} is gone: pulses could not be stopped; "
             f"{self._board.texts.left_alone}: {CUT} to free them"

@@ -50,7 +50,7 @@ class Channel:
         self.sent_steps = 0
 
     def want(self, setup: ServoSetup) -> None:
-        """Take another setup of the same servo."""
+        """Apply a changed setup of the same servo."""
         self.setup = setup
         self.ramp.shaft_speed_steps_s = _own_speed(setup)
         if not self._placed:
@@ -161,7 +161,7 @@ class Channel:
         return FINE_STEPS + self.ramp.speed_steps_s * BEHIND_S
 
     def found(self, pulse_steps: int) -> None:
-        """Take the board's word for the pulse that it gives now."""
+        """Adopt the pulse width that the board reports."""
         if pulse_steps and not self.held:
             self.goal_steps = pulse_steps
         if pulse_steps and self.held and not self.entering:
@@ -201,7 +201,7 @@ class Channel:
         return True
 
     def settle(self, pulse_steps: int) -> None:
-        """Take a pulse for the servo's place: it has been there for long."""
+        """Adopt a pulse as the servo's position: it has been there for long."""
         self.found(pulse_steps)
         if pulse_steps:
             self.ramp.shaft_steps = pulse_steps

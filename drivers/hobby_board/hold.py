@@ -48,7 +48,7 @@ def take(board: Board, channel: Channel, pulse_steps: int) -> Outcome:
 
 
 def refusal(board: Board, channel: Channel) -> str:
-    """Say why a channel gives another pulse than asked for, and the cure."""
+    """Return why a channel gives another pulse than commanded, with the remedy."""
     goal, pulse = channel.goal_steps, round(channel.ramp.pulse_steps) if channel.on else 0
     if not pulse:
         return f"{channel_label(channel.setup)} gives no pulses: {board.texts.no_pulses}"

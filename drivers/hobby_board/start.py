@@ -35,7 +35,7 @@ def every_pulse(board: Board, setups: Sequence[ServoSetup]) -> tuple[int, ...]:
 
 
 def enable_channels(board: Board, channels: Sequence[Channel], log: EventLog) -> None:
-    """Take hold of every channel, those without pulses one after another.
+    """Enable every channel, those without pulses one after another.
 
     Raises:
         BusLost: the port is gone.
@@ -58,7 +58,7 @@ def enable_channels(board: Board, channels: Sequence[Channel], log: EventLog) ->
 
 
 def _insist(board: Board, channel: Channel, pulse: int) -> None:
-    """Take hold of one channel.
+    """Enable one channel.
 
     Raises:
         ServoMissing: it does not take its goal.

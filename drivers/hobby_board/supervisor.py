@@ -262,7 +262,7 @@ class BoardSupervisor:
         self._pending.clear()
 
     def _recover_next(self, now_s: float) -> None:
-        """Take hold of one channel anew; the next at the next read, to spare the supply."""
+        """Enable one channel again; the next one at the next read, to spare the supply."""
         channel = self._pending[0]
         found = self._board.pulses((channel.id,))
         if found is None:
@@ -287,5 +287,5 @@ class BoardSupervisor:
 
     @property
     def sure(self) -> bool:
-        """Tell that goals may be sent: the board is as it was left."""
+        """Whether goals may be sent: the board has kept its settings."""
         return not self._unsure

@@ -43,10 +43,10 @@ class Part(NamedTuple):
 
 
 def commands(text: bytes) -> Iterator[tuple[Part, ...]]:
-    """Take whole commands apart; a question for the status is one without parts.
+    """Yield the parts of each command; a status request has none.
 
     Raises:
-        ValueError: these are no commands.
+        ValueError: the bytes are not whole commands.
     """
     at = 0
     while at < len(text):

@@ -192,7 +192,7 @@ class I2cPort:
 
 
 def explain(path: str, code: int | None) -> str:
-    """Say in one line why an I2C bus cannot be opened and what helps."""
+    """Return in one line why an I2C bus cannot be opened, with the remedy."""
     here = ", ".join(sorted(map(str, Path("/dev").glob("i2c-*")))) or "none"
     if code in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
         return (

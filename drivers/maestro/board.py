@@ -74,7 +74,7 @@ class MaestroBoard:
         return pulses
 
     def _mute_causes(self) -> str:
-        """Say what keeps a board from answering."""
+        """Return the possible causes of a board that does not answer."""
         params = self.params
         number = f", its device number {params.device}" if params.protocol == "pololu" else ""
         check_byte = "on" if params.crc else "off"

@@ -75,7 +75,7 @@ def name_errors(register: int) -> tuple[str, ...]:
 
 
 def words(answer: bytes) -> tuple[int, ...]:
-    """Take an answer of whole words apart."""
+    """Return the 16-bit words of an answer."""
     return tuple(
         int.from_bytes(answer[i : i + WORD], "little") for i in range(0, len(answer), WORD)
     )

@@ -277,7 +277,7 @@ class Pca9685Board:
     # --- sending
 
     def send_limits(self, channels: Sequence[Channel], confirmed: bool) -> bool:
-        """Take over what limits the speed of channels, and see that their boards are set up."""
+        """Set the ramp limits of channels; return whether their boards are configured."""
         for channel in channels:
             channel.ramp.speed_steps_s = channel.top_speed_steps_s
             channel.ramp.accel_steps_s2 = channel.setup.max_accel_steps_s2 or 0.0

@@ -67,7 +67,7 @@ def see_board(line: I2cLine, address: int) -> None:
 
 
 def _mute(line: I2cLine, address: int) -> str:
-    """Say why nothing was read, and the cure."""
+    """Return why nothing was read, with the remedy."""
     if line.why == "bus stuck":
         return (
             "the I2C bus is stuck, its data or clock line is held down: switch what "

@@ -334,7 +334,7 @@ def ask_low_latency(port: Any) -> None:
 
 
 def explain(port_name: str, code: int | None) -> str:
-    """Say in one line why a port cannot be opened and what helps."""
+    """Return in one line why a port cannot be opened, with the remedy."""
     if code == errno.ENOENT or code == errno.ENODEV or code == errno.ENXIO:
         return f"no serial port {port_name}: plug the adapter in; ports here: {name_ports()}"
     if code in (errno.EACCES, errno.EPERM):

@@ -53,7 +53,7 @@ class AdaptiveTimeout:
         return min(self._most_s, self.seconds + min(RESERVE_S, reserve_s))
 
     def waited_in_vain(self, beyond_s: float, now_s: float) -> None:
-        """Take from the reserve what was waited beyond the prompt time-out."""
+        """Subtract from the reserve what was waited in vain beyond the prompt time-out."""
         if beyond_s > 0.0:
             left_s = min(RESERVE_S, REFILL * (now_s - self._empty_s)) - beyond_s
             self._empty_s = now_s - max(0.0, left_s) / REFILL

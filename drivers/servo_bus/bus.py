@@ -129,7 +129,7 @@ class SmartServoBus(PortBus):
         self._supervisor.service(self._poll_list.group, now_s)
 
     def _take_whole(self, answer: GroupReply, now_s: float) -> bool:
-        """Take an answer in which nothing is amiss; False where anything must be looked at."""
+        """Apply an answer without any error; return False if it must be checked servo by servo."""
         if self._family.weak_check and (
             self._disturbed(now_s) or self._reader.any_answer_owed(now_s)
         ):
@@ -137,7 +137,7 @@ class SmartServoBus(PortBus):
         return self._supervisor.at_ease and self._feedback.take_whole(answer)
 
     def _take(self, heard: dict[int, ServoReply], now_s: float) -> None:
-        """Take an answer servo by servo, each with its errors."""
+        """Apply an answer servo by servo, each with its errors."""
         supervisor, feedback = self._supervisor, self._feedback
         feedback.begin()
         if heard and self._health.silent_for_s(now_s) >= RESTART_S:
@@ -353,10 +353,10 @@ class SmartServoBus(PortBus):
         )
 
     def _check_silence(self, now_s: float) -> None:
-        """Give up where no servo has answered for too long.
+        """Raise if no servo has answered for too long.
 
         Raises:
-            BusLost: so it is.
+            BusLost: no answer within the limit.
         """
         silent_s = self._health.silent_for_s(now_s)
         if silent_s >= self._params.give_up_s:

@@ -195,7 +195,7 @@ def corrupt(port: BusPort, family: Family, servo_id: int, tries: int = ANSWERS) 
 
 
 def reboot(port: BusPort, family: Family, servo_id: int) -> None:
-    """Tell a servo to restart; whether it has is seen by asking it afterwards."""
+    """Send a reboot instruction; only a later ping shows whether it was obeyed."""
     port.drain()
     port.write(family.codec.reboot(servo_id))
     port.drain()  # some firmware confirms it

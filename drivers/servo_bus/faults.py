@@ -123,7 +123,7 @@ class Health:
         return self._nobody_since is not None
 
     def heard_again(self, now_s: float, lateness: HostLateness) -> None:
-        """Say what a silence of all was, a moment after its end: what was owed comes first."""
+        """Report what a silence of all servos was, a moment later: late answers first."""
         if self._nobody_since is None:
             return
         if self._back_s is None:

@@ -68,7 +68,7 @@ class FeedbackColumns:
     def _take_one(
         self, slot: int, position: float, velocity: float, load: float, at_s: float
     ) -> None:
-        """Take one servo's answer."""
+        """Apply one servo's feedback."""
         now = self.now
         self.now = now._replace(
             position_steps=with_value(now.position_steps, slot, position),
@@ -79,7 +79,7 @@ class FeedbackColumns:
         )
 
     def set_limits(self, setups: Sequence[ServoSetup]) -> None:
-        """Take other ranges and armed limits for the same servos."""
+        """Set changed ranges and limits of the same servos."""
         self._ranges = [(setup.min_steps, setup.max_steps) for setup in setups]
         # Less than half a turn away from every range, no other turn is nearer.
         self._near_low = max((high for _, high in self._ranges), default=0) - self._turn // 2 + 1
@@ -90,7 +90,7 @@ class FeedbackColumns:
     # --- an answer of all servos
 
     def take_whole(self, answer: GroupReply) -> bool:
-        """Take an answer in which nothing is amiss; False where anything must be looked at."""
+        """Apply an answer without any error; return False if it must be checked servo by servo."""
         group, _, values, at_s = answer
         at, now, none = group.columns, self.now, self._none
         if any(values[at.error]) or (at.status is not None and any(values[at.status])):
@@ -206,7 +206,7 @@ class FeedbackColumns:
         )
 
     def take(self, slot: int, heard: ServoReply) -> None:
-        """Take one servo's answer, which was not refused."""
+        """Apply one servo's answer, which was accepted."""
         sample = heard.sample
         if sample.torque is not None:
             self.set_torque(slot, sample.torque == 1)
@@ -263,7 +263,7 @@ class FeedbackColumns:
         self.now = self.now._replace(temperature_c=warm)
 
     def hold(self, slot: int, position: int, at_s: float, torque: bool) -> None:
-        """Take the place of a servo that was just set up again and stands still."""
+        """Set the position of a servo that was just recovered and stands still."""
         near = self._near(slot, position)
         self.set_torque(slot, torque)
         self.places.place(slot, near, at_s)

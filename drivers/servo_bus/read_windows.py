@@ -87,13 +87,13 @@ class ReadWindow(NamedTuple):
 
 
 class WindowSchedule:
-    """Says which window is read next: the usual ones in turn, after trouble others for a while.
+    """Chooses the next window: the usual ones in turn, after a missing answer others for a while.
 
     Args:
         usual: neighbours, and the first and last, have different lengths.
         spare: no two alike; two of them take turns after each trouble, then the next two.
 
-    troubled: the spare ones are read
+    troubled: whether the spare ones are read
     """
 
     def __init__(self, usual: Iterable[ReadWindow], spare: Iterable[ReadWindow]) -> None:

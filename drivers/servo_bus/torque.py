@@ -147,7 +147,7 @@ def switch_on(
 
 
 def switch_off(line: Transactions, ids: Sequence[int]) -> Released:
-    """Take the torque away, watchdog first, and see that it is gone."""
+    """Switch the watchdog, then the torque off, and verify that it is off."""
     left = tuple(ids)
     found: dict[int, int] = {}
     watchdog = () if line.family.watchdog_unit_s is None else ("bus_watchdog",)

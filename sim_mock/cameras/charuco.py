@@ -71,7 +71,7 @@ class BoardCamera:
         self._light = 1.0 - share[None, :]
 
     def picture(self, R_camera_board: Mat3, p_camera_board_m: Vec3) -> Picture:
-        """Take a picture: (h, w, 3) BGR."""
+        """Return a frame of the board: (h, w, 3) BGR."""
         par = self.params
         pose = np.array(R_camera_board)
         # Board plane to the plane z = 1, and back.

@@ -63,7 +63,7 @@ class BoardScene:
         self._hanging = True
 
     def look(self, now_s: float) -> Shot:
-        """Take the next picture."""
+        """Return the next frame."""
         self._number += 1
         if self._hanging:
             pose = self.seen_pose(self.head_rad)
@@ -118,7 +118,7 @@ def held_pose(
 
 
 def _lens(camera: CameraParams, params: BoardCameraParams) -> Intrinsics:
-    """Take the lens that was measured, or one that is a little off its field of view."""
+    """Return the calibrated lens, or one that differs a little from the stated field of view."""
     size = (params.width_px, params.height_px)
     if camera.lens is None:
         return true_lens(*size, camera.horizontal_field_deg)

@@ -94,7 +94,7 @@ class SceneCamera:
         """Stop; there is nothing to free."""
 
     def _expose(self, t_s: float) -> Detections:
-        """Take one picture from where the camera is."""
+        """Return what one frame from the camera's present pose shows."""
         assert self._start_s is not None
         R, p = self._mount.pose(*self._head_pose(t_s))
         faces: list[DetectedFace] = []

@@ -72,7 +72,17 @@ class PixelCameraParams:
 
 
 class PixelCamera:
-    """A gazerig.drivers.types.Camera in a drawn scene; frames are computed on demand."""
+    """A gazerig.drivers.types.Camera in a drawn scene; frames are computed on demand.
+
+    Args:
+        params: resolution, rate and noise of the camera.
+        scene: what is in front of it.
+        mount: where the camera sits on the head.
+        head_pose: true rotation (3, 3) and position [m] of the head in the world at a time [s].
+        detector: finds the faces.
+        rng: for the noise.
+        find_motion: finds what moves, besides the faces.
+    """
 
     def __init__(
         self,
@@ -84,10 +94,6 @@ class PixelCamera:
         rng: np.random.Generator,
         find_motion: FindMotion | None = None,
     ) -> None:
-        """Take the scene, where the camera sits, where the head really is, and what looks.
-
-        find_motion: finds what moves, besides the faces
-        """
         self._params = params
         self._scene = scene
         self._mount = mount
@@ -166,7 +172,7 @@ class PixelCamera:
         )
 
     def _expose(self, t_s: float, R: Mat3, p: Vec3) -> Exposure:
-        """Take one picture from where the camera is; its time is the middle of the exposure."""
+        """Render one frame from the camera's pose; its time is the middle of the exposure."""
         assert self._start_s is not None
         par = self._params
         canvas = Picture3d(par.width_px, par.height_px, self.lens, R, p)

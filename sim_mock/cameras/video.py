@@ -27,7 +27,7 @@ class Film(Protocol):
         ...
 
     def events(self) -> tuple[str, ...]:
-        """Say once what a person should know of the film."""
+        """Return what the user should know of the film, one line each, once."""
         ...
 
     def close(self) -> None:
@@ -38,8 +38,15 @@ class Film(Protocol):
 class FilmCamera:
     """A film that starts at a simulated time and is watched for faces.
 
-    Every picture is looked at exactly once and in order, however far time jumps, so that
+    Every frame is analysed exactly once and in order, however far time jumps, so that
     the counts are those of any other run to the same time.
+
+    Args:
+        video: the film.
+        detector: finds faces.
+        delay_s: time from exposure to detections, at least 0.
+        start_s: simulated time of the first exposure.
+        motion: finds motion, None for none.
 
     pictures, pictures_with_face: counts of pictures looked at since open
     """
@@ -52,13 +59,6 @@ class FilmCamera:
         start_s: float = 0.0,
         motion: Motion | None = None,
     ) -> None:
-        """Take the film, what finds faces, and the time from exposure to detections.
-
-        start_s: simulated time of the first exposure; motion: finds what moves
-
-        Raises:
-            ValueError: the delay is negative.
-        """
         if not delay_s >= 0.0:
             raise ValueError(f"detections cannot come before their picture: delay {delay_s} s")
         self._video = video
@@ -99,7 +99,7 @@ class FilmCamera:
         return True
 
     def events(self) -> tuple[str, ...]:
-        """Say what the film had to be assumed to be."""
+        """Return what had to be assumed about the film, one line each, once."""
         return self._video.events()
 
     def close(self) -> None:

@@ -79,7 +79,7 @@ class Commands(NamedTuple):
 
 
 def _lasting(verb: Verb, words: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
-    """Take ``count N`` and ``for S`` off the end."""
+    """Split ``count N`` and ``for S`` off the end; return the other words and these values."""
     left, found = list(words), dict[str, Any]()
     while len(left) >= 2 and left[-2] in BOTH:
         value, word = left.pop(), left.pop()
@@ -171,7 +171,7 @@ def hex_bytes(text: str) -> bytes | None:
 
 
 def anything(text: str) -> str:
-    """Take a word as it is."""
+    """Return a word unchanged."""
     return text
 
 

@@ -156,12 +156,12 @@ class EmulatedMaestro:
     # --- bytes
 
     def receive(self, data: bytes, client_baud: int | None = None) -> bytes:
-        """Take bytes off the wire and give the bytes that the board answers with."""
+        """Process received bytes; return the bytes of the board's answers."""
         replies = self.exchange(data, client_baud)
         return b"".join(piece.data for reply in replies for piece in reply.pieces)
 
     def exchange(self, data: bytes, client_baud: int | None = None) -> list[DeviceReply]:
-        """Take bytes off the wire and give what is answered to each command in them."""
+        """Process received bytes; return the reply to each command in them."""
         self.body.advance()
         came = self._what_comes(data, client_baud)
         missing, replies = len(data) - len(came), []
@@ -226,7 +226,7 @@ class EmulatedMaestro:
     # --- commands
 
     def _at(self, data: bytes, do: Callable[[EmulatedChannel, int], None]) -> None:
-        """Tell one channel a number; one that does not exist is a protocol error [A]."""
+        """Apply a number to a channel; one that does not exist is a protocol error [A]."""
         if data[0] < len(self.body.channels):
             do(self.body.channels[data[0]], word(data[1], data[2]))
         else:

@@ -88,7 +88,7 @@ class CommandParser:
         self._deaf = False
 
     def feed(self, data: bytes) -> Iterator[ParsedCommand]:
-        """Take bytes one by one; gives what each of them completes."""
+        """Yield the commands that bytes complete, fed one by one."""
         for end, byte in enumerate(data, 1):
             for heard in self._take(byte):
                 yield heard._replace(end=end)

@@ -110,7 +110,7 @@ class Bridge:
     # --- bytes
 
     def exchange(self, data: bytes, client_baud: int | None = None) -> list[DeviceReply]:
-        """Take bytes off the wire and return what is answered to each command in them."""
+        """Process received bytes; return the reply to each command in them."""
         self.body.advance()
         came = data
         if self._wire.any and self._wire.on("lose_bytes", self.now_s()):
@@ -192,7 +192,7 @@ class Bridge:
 
 
 def _transfer(text: bytes, at: int) -> tuple[int, list[_Part]] | None:
-    """Take a transfer apart; gives where it ends. None where bytes are missing."""
+    """Return where a transfer ends and its parts, None while bytes are missing."""
     parts: list[_Part] = []
     while True:
         if at >= len(text):

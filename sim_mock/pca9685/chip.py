@@ -65,7 +65,7 @@ class Chip:
         return tuple(byte >> 1 for bit, byte in zip(bits, named, strict=True) if mode & bit)
 
     def write(self, data: bytes, now_s: float) -> None:
-        """Take the bytes behind the address of one write, up to the stop condition."""
+        """Process the bytes of one write after its address, up to the stop condition."""
         if data:
             self._pointer = data[0]
         for byte in data[1:]:

@@ -84,7 +84,7 @@ class TerminalLine:
         return json.dumps(told if name is None else {"bus": name, **told})
 
     def close(self) -> None:
-        """Take link and terminal away; safe to call twice."""
+        """Remove the link and the terminal; safe to call twice."""
         self.terminal.unplug()
 
     # --- bytes

@@ -59,7 +59,7 @@ class Server:
             raise
 
     def close(self) -> None:
-        """Take all terminals away."""
+        """Remove all terminals."""
         for line in self.lines:
             line.close()
 

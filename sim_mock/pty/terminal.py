@@ -108,7 +108,7 @@ class Terminal:
             self.path = str(self._link)
 
     def unplug(self) -> None:
-        """Take link and terminal away: a client gets an I/O error or a hang-up."""
+        """Remove the link and the terminal: a client gets an I/O error or a hang-up."""
         if not self.plugged:
             return
         if self._link is not None and _leads_to(self._link, os.ttyname(self._slave)):

@@ -20,7 +20,14 @@ _OLDEST_STAMP_S = 1.0
 
 
 class OakSource:
-    """An OAK-D as a source of pictures."""
+    """An OAK-D as a source of frames; nothing is imported or opened before ``open``.
+
+    Args:
+        params: what is asked of the camera.
+        nodes: makes the nodes of the pipeline.
+        on_device: False for nodes that all run on the host and need no camera.
+        load: returns the module depthai.
+    """
 
     def __init__(
         self,
@@ -29,11 +36,6 @@ class OakSource:
         on_device: bool = True,
         load: Callable[[], Any] = load_depthai,
     ) -> None:
-        """Take what is asked of the camera; nothing is imported or opened yet.
-
-        nodes: makes the nodes; on_device: False for nodes that all run on the host and need
-        no camera; load: gives depthai
-        """
         self._params = params
         self._nodes = nodes
         self._on_device = on_device
@@ -98,7 +100,7 @@ class OakSource:
         return None
 
     def events(self) -> tuple[str, ...]:
-        """Say what is not as it should be: USB 2, a clock set anew."""
+        """Return new events, one line each: USB 2 instead of 3, a clock that jumped."""
         told, self._events = tuple(self._events), []
         return told
 

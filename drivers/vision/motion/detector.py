@@ -160,7 +160,7 @@ class MotionDetector:
         return MotionReport(blobs, "", turn, ego.share, ego.noise_px, things.threshold_px)
 
     def _cannot_tell(self, pair: Compared, ego: Ego, turn_deg_s: float) -> str:
-        """Say why the camera's motion cannot be told from that of things, "" where it can."""
+        """Return why ego-motion cannot be separated from the motion of objects, "" if it can."""
         if not turn_deg_s <= self._params.max_turn_deg_s:
             return "the camera turns too fast"
         if pair.known.mean() < _LEAST_KNOWN:

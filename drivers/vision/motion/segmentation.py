@@ -44,7 +44,7 @@ class Things(NamedTuple):
 
 
 def what_moves(pair: Compared, ego: Ego, params: MotionParams) -> Things:
-    """Take the camera's own motion out of the flow and keep what the pictures bear out."""
+    """Return the flow without ego-motion, where both frames confirm it."""
     there = _background(ego, pair.now.shape)
     if pair.shift is not None:
         there += pair.shift

@@ -48,7 +48,7 @@ class MotionTracks:
         self._next_id = 1
 
     def retune(self, params: MotionParams) -> None:
-        """Take other times; what is followed stays."""
+        """Apply changed parameters; the tracks stay."""
         self._params = params
 
     def step(
@@ -87,7 +87,7 @@ class MotionTracks:
         return [found[j] for j in range(len(centres))]
 
     def pass_over(self, total: Floats, t_s: float, dt_s: float) -> None:
-        """Take everything where it should be by now, and forget what is long unseen."""
+        """Predict every track to ``t_s`` and delete those unseen for too long."""
         forget_s = self._params.forget_ms / 1e3
         self._follows = [f for f in self._follows if t_s - f.seen_s <= forget_s]
         for follow in self._follows:
