@@ -43,9 +43,13 @@ from gazerig.robot.model.types import in_order
 class Ranges:
     """Ranges a style of gaze keeps to, inside those of the rig's joints."""
 
-    eye_yaw_deg: Annotated[float, Bounds(1, 90), "eye range to each side"]
-    eye_pitch_deg: Annotated[float, Bounds(1, 90), "eye range up and down"]
-    neck_yaw_deg: Annotated[float, Bounds(0, 180), "head range to each side"]
+    eye_yaw_deg: Annotated[
+        float, Bounds(1, 90), "largest eye rotation to the left and to the right"
+    ]
+    eye_pitch_deg: Annotated[float, Bounds(1, 90), "largest eye rotation up and down"]
+    neck_yaw_deg: Annotated[
+        float, Bounds(0, 180), "largest head rotation to the left and to the right"
+    ]
 
 
 @dataclass(frozen=True)
@@ -54,7 +58,7 @@ class BusConfig:
 
     # fmt: off
     port: Annotated[str, "serial port or I2C bus, e.g. /dev/ttyUSB0"]
-    kind: Annotated[BusKind, "what the servos on it speak"] = "dynamixel"
+    kind: Annotated[BusKind, "type of the servos or board on this bus"] = "dynamixel"
     dynamixel: Annotated[DynamixelParams, "Protocol 2.0 settings, for kind dynamixel"] = field(default_factory=DynamixelParams)
     feetech: Annotated[FeetechParams, "Feetech STS settings, for kind feetech"] = field(default_factory=FeetechParams)
     maestro: Annotated[MaestroParams, "Pololu Maestro settings, for kind maestro"] = field(default_factory=MaestroParams)
@@ -72,16 +76,16 @@ class LidJoints:
     """Lid joint angles at which the lids are shut and fully open."""
 
     # fmt: off
-    left_shut_deg: Annotated[float, Bounds(-180, 180), "left upper lid shut"]
-    left_open_deg: Annotated[float, Bounds(-180, 180), "left upper lid open"]
-    right_shut_deg: Annotated[float, Bounds(-180, 180), "right upper lid shut"]
-    right_open_deg: Annotated[float, Bounds(-180, 180), "right upper lid open"]
+    left_shut_deg: Annotated[float, Bounds(-180, 180), "angle at which the left upper lid is shut"]
+    left_open_deg: Annotated[float, Bounds(-180, 180), "angle at which the left upper lid is fully open"]
+    right_shut_deg: Annotated[float, Bounds(-180, 180), "angle at which the right upper lid is shut"]
+    right_open_deg: Annotated[float, Bounds(-180, 180), "angle at which the right upper lid is fully open"]
     left_lower_shut_deg: Annotated[float | None, Bounds(-180, 180),
-        "left lower lid where it meets the upper one; null: there is none"] = None
-    left_lower_open_deg: Annotated[float | None, Bounds(-180, 180), "left lower lid open"] = None
+        "angle at which the left lower lid meets the upper one; null: there is no lower lid"] = None
+    left_lower_open_deg: Annotated[float | None, Bounds(-180, 180), "angle at which the left lower lid is fully open"] = None
     right_lower_shut_deg: Annotated[float | None, Bounds(-180, 180),
-        "right lower lid where it meets the upper one; null: there is none"] = None
-    right_lower_open_deg: Annotated[float | None, Bounds(-180, 180), "right lower lid open"] = None
+        "angle at which the right lower lid meets the upper one; null: there is no lower lid"] = None
+    right_lower_open_deg: Annotated[float | None, Bounds(-180, 180), "angle at which the right lower lid is fully open"] = None
     # fmt: on
 
     def __post_init__(self) -> None:
@@ -145,7 +149,8 @@ class Rig:
     geometry: Annotated[GeometryParams, "measures of the head"]
     joints: Annotated[Mapping[str, JointParams], "one entry a joint"]
     lid_joints: Annotated[LidJoints, "lid angles"]
-    park_deg: Annotated[Mapping[str, float], Bounds(-180, 180), "pose before torque goes off; joints left out go to 0"]
+    park_deg: Annotated[Mapping[str, float], Bounds(-180, 180),
+        "pose to which the joints move before torque is switched off; joints left out go to 0"]
     camera: Annotated[CameraParams, "where the camera sits"] = field(default_factory=CameraParams)
     webcam: Annotated[WebcamParams, "what is asked of a webcam"] = field(default_factory=WebcamParams)
     oak: Annotated[OakParams, "what is asked of an OAK-D"] = field(default_factory=OakParams)
@@ -153,8 +158,8 @@ class Rig:
     motion: Annotated[MotionParams, "how moving things are found"] = field(default_factory=MotionParams)
     detector: Annotated[FaceDetectorParams, "how faces are found"] = field(default_factory=FaceDetectorParams)
     face_parts_mm: Annotated[Mapping[str, tuple[float, float, float]], Bounds(-300, 300),
-        "a person's own places of face parts (DN FL LE M N FR RE UP) from the nose tip: out of the face, to "
-        "the owner's left, up; those left out are an adult's"] = field(default_factory=dict)
+        "measured positions of one person's face parts (DN FL LE M N FR RE UP) relative to the nose tip: "
+        "out of the face, to that person's left, up; parts left out use an average adult's"] = field(default_factory=dict)
     tracks: Annotated[TrackParams, "how identities are kept"] = field(default_factory=TrackParams)
     loop: Annotated[LoopParams, "control loop"] = field(default_factory=LoopParams)
     guard: Annotated[GuardParams, "safety"] = field(default_factory=GuardParams)

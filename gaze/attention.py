@@ -35,8 +35,9 @@ class AttentionParams:
     """Hysteresis of the choice, and the greatest age of a frame."""
 
     # fmt: off
-    hysteresis_ratio: Annotated[float, Bounds(1, 10), "salience of another body over that of the present one at which it takes over"] = 1.2
-    min_dwell_ms: Annotated[float, Bounds(0, 10000), "shortest time with one body"] = 300.0
+    hysteresis_ratio: Annotated[float, Bounds(1, 10),
+        "another body becomes the target if its salience exceeds the present target's by this factor"] = 1.2
+    min_dwell_ms: Annotated[float, Bounds(0, 10000), "shortest time on one target"] = 300.0
     stale_ms: Annotated[float, Bounds(20, 10000), "a frame older than this is not used"] = 400.0
     habituation: Annotated[HabituationParams, "habituation and inhibition of return"] = field(default_factory=HabituationParams)
     # fmt: on

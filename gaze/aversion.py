@@ -33,24 +33,25 @@ class AversionParams:
 
     # fmt: off
     talk_mutual_s: Annotated[float, Bounds(0.1, 60), "talking: mean time on the face"] = 3.13
-    talk_mutual_sd_s: Annotated[float, Bounds(0.1, 60), "its standard deviation"] = 3.16
+    talk_mutual_sd_s: Annotated[float, Bounds(0.1, 60), "talking: standard deviation of the time on the face"] = 3.16
     talk_away_s: Annotated[float, Bounds(0.1, 60), "talking: mean time away"] = 0.93
-    talk_away_sd_s: Annotated[float, Bounds(0.1, 60), "its standard deviation"] = 0.80
+    talk_away_sd_s: Annotated[float, Bounds(0.1, 60), "talking: standard deviation of the time away"] = 0.80
     listen_mutual_s: Annotated[float, Bounds(0.1, 60), "listening: mean time on the face"] = 7.92
-    listen_mutual_sd_s: Annotated[float, Bounds(0.1, 60), "its standard deviation"] = 1.57
+    listen_mutual_sd_s: Annotated[float, Bounds(0.1, 60), "listening: standard deviation of the time on the face"] = 1.57
     listen_away_s: Annotated[float, Bounds(0.1, 60), "listening: mean time away"] = 0.43
-    listen_away_sd_s: Annotated[float, Bounds(0.1, 60), "its standard deviation"] = 0.24
+    listen_away_sd_s: Annotated[float, Bounds(0.1, 60), "listening: standard deviation of the time away"] = 0.24
     think_mutual_s: Annotated[float, Bounds(0.1, 60), "thinking: mean time on the face"] = 1.50
-    think_mutual_sd_s: Annotated[float, Bounds(0.1, 60), "its standard deviation"] = 0.80
+    think_mutual_sd_s: Annotated[float, Bounds(0.1, 60), "thinking: standard deviation of the time on the face"] = 0.80
     think_away_s: Annotated[float, Bounds(0.1, 60), "thinking: mean time away"] = 3.54
-    think_away_sd_s: Annotated[float, Bounds(0.1, 60), "its standard deviation"] = 1.26
-    longest_mutual_s: Annotated[float, Bounds(0.5, 14.9), "no look at a face is longer; beyond 15 s it is a stare"] = 14.5
-    min_dwell_s: Annotated[float, Bounds(0.05, 2), "no time on or away is shorter: eyes and servos must get there first"] = 0.2
+    think_away_sd_s: Annotated[float, Bounds(0.1, 60), "thinking: standard deviation of the time away"] = 1.26
+    longest_mutual_s: Annotated[float, Bounds(0.5, 14.9), "longest time on the face; beyond 15 s it is a stare"] = 14.5
+    min_dwell_s: Annotated[float, Bounds(0.05, 2), "shortest time on the face or away, as eyes and servos need time to get there"] = 0.2
     least_deg: Annotated[float, Bounds(0, 20),
-        "no nearer beside the face: half the gazes of the published law would still be on it; 0 is that law"] = 5.0
-    talk_most_deg: Annotated[float, Bounds(1, 60), "farthest away while talking or thinking"] = 27.5
-    listen_most_deg: Annotated[float, Bounds(1, 60), "farthest while listening"] = 22.7
-    think_up_share: Annotated[float, Bounds(0, 1), "share of the looks away while thinking that go up; the others go anywhere"] = 0.8
+        "smallest angle of looking away; with 0, as in the published distribution, half of the looks away would still be on the "
+        "face"] = 5.0
+    talk_most_deg: Annotated[float, Bounds(1, 60), "largest angle of looking away while talking or thinking"] = 27.5
+    listen_most_deg: Annotated[float, Bounds(1, 60), "largest angle of looking away while listening"] = 22.7
+    think_up_share: Annotated[float, Bounds(0, 1), "share of looks away that go up while thinking; the others go in any direction"] = 0.8
     # fmt: on
 
     def __post_init__(self) -> None:

@@ -44,7 +44,7 @@ class BinocularParams:
     storage_s: Annotated[float, Bounds(0, 600), "velocity storage T_vs; 0 with a perfect gyroscope"] = 16.0
     servo_lead_ms: Annotated[float, Bounds(0, 30), "lead for the servos' own lag"] = 0.0
     interocular_mm: Annotated[float, Bounds(10, 500), "between the eye centres"] = 61.9
-    eye_limit_deg: Annotated[float, Bounds(1, 90), "eye range to each side"] = 55.0
+    eye_limit_deg: Annotated[float, Bounds(1, 90), "largest eye rotation to the left and to the right"] = 55.0
     covered: Annotated[Literal["copy", "cross"], "a covered eye goes all the way with the other, or by the crossed path only"] = "copy"
     efference: Annotated[bool, "know where the eyes were; without it only delayed errors steer"] = True
     # fmt: on

@@ -43,13 +43,15 @@ class BottomUpParams:
     """Form and reference motions of eq 1, and the salience of a new body."""
 
     # fmt: off
-    form: Annotated[Literal["retinal", "literal"], "retinal: as the eye sees it; literal: eq 1 as printed, without the weights"] = "retinal"
-    translation_reference_rad_s: Annotated[float, Bounds(0.01, 20), "angular speed across the line of sight that has the salience 1"] = 0.5
-    looming_reference_1_s: Annotated[float, Bounds(0.01, 20), "speed along the line of sight over distance that has the salience 1"] = 0.5
-    rotation_reference_rad_s: Annotated[float, Bounds(0.01, 100), "rotation about the line of sight that has the salience 1"] = 3.0
-    smoothing_s: Annotated[float, Bounds(0, 2), "time constant of the low-pass"] = 0.1
-    onset_salience: Annotated[float, Bounds(0, 10), "salience of what has just come into view; 0 for none"] = 1.0
-    onset_s: Annotated[float, Bounds(0.02, 10), "time constant with which that salience decays"] = 0.5
+    form: Annotated[Literal["retinal", "literal"],
+        "retinal: motion as angles seen by the eye; literal: eq 1 as printed, without weights"] = "retinal"
+    translation_reference_rad_s: Annotated[float, Bounds(0.01, 20), "angular speed across the line of sight that gives salience 1"] = 0.5
+    looming_reference_1_s: Annotated[float, Bounds(0.01, 20),
+        "speed along the line of sight divided by distance that gives salience 1"] = 0.5
+    rotation_reference_rad_s: Annotated[float, Bounds(0.01, 100), "angular speed about the line of sight that gives salience 1"] = 3.0
+    smoothing_s: Annotated[float, Bounds(0, 2), "time constant of the low-pass filter of salience"] = 0.1
+    onset_salience: Annotated[float, Bounds(0, 10), "extra salience of a body that has just come into view; 0: none"] = 1.0
+    onset_s: Annotated[float, Bounds(0.02, 10), "time constant with which onset_salience decays"] = 0.5
     # fmt: on
 
 

@@ -22,9 +22,9 @@ class BreathingParams:
     """Amplitude and rate."""
 
     # fmt: off
-    pitch_deg: Annotated[float, Bounds(0, 5), "how far the head nods up and down with the breath; 0 is not at all"] = 0.6
-    roll_deg: Annotated[float, Bounds(0, 5), "how far it rolls to each side, a quarter of a breath later"] = 0.0
-    rate_hz: Annotated[float, Bounds(0.02, 1), "breaths in a second"] = 0.25
+    pitch_deg: Annotated[float, Bounds(0, 5), "amplitude of the head's pitch with breathing; 0: none"] = 0.6
+    roll_deg: Annotated[float, Bounds(0, 5), "amplitude of the head's roll, a quarter of a breath later; 0: none"] = 0.0
+    rate_hz: Annotated[float, Bounds(0.02, 1), "breaths per second"] = 0.25
     # fmt: on
 
 

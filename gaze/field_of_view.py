@@ -28,12 +28,13 @@ class FieldOfViewParams:
     """Limits of one eye's field, from its line of sight, and what is not seen inside it."""
 
     # fmt: off
-    temporal_deg: Annotated[float, Bounds(5, 120), "towards the temple"] = 100.0
-    nasal_deg: Annotated[float, Bounds(5, 120), "towards the nose"] = 60.0
-    up_deg: Annotated[float, Bounds(5, 90), "upwards"] = 60.0
-    down_deg: Annotated[float, Bounds(5, 90), "downwards"] = 75.0
-    occlusion: Annotated[bool, "whether a body behind another one is hidden; costs time with the square of the number of bodies"] = False
-    own_kinds: Annotated[tuple[str, ...], "kinds of bodies that are one's own and never looked at"] = ("own",)
+    temporal_deg: Annotated[float, Bounds(5, 120), "extent of the visual field towards the temple"] = 100.0
+    nasal_deg: Annotated[float, Bounds(5, 120), "extent of the visual field towards the nose"] = 60.0
+    up_deg: Annotated[float, Bounds(5, 90), "extent of the visual field upwards"] = 60.0
+    down_deg: Annotated[float, Bounds(5, 90), "extent of the visual field downwards"] = 75.0
+    occlusion: Annotated[bool,
+        "a body behind another one cannot be seen; computing time grows with the square of the number of bodies"] = False
+    own_kinds: Annotated[tuple[str, ...], "kinds of bodies that are parts of the robot itself, never looked at"] = ("own",)
     # fmt: on
 
 

@@ -24,13 +24,15 @@ class HabituationParams:
     """Rates of habituation and recovery, and extent of the inhibition of return."""
 
     # fmt: off
-    decay_rate_1_s: Annotated[float, Bounds(0, 10), "rate at which the factor of what is attended falls from 1; 0 for never"] = 0.2
-    recovery_rate_1_s: Annotated[float, Bounds(0.01, 10), "rate at which the factors of all else recover"] = 1.0
+    decay_rate_1_s: Annotated[float, Bounds(0, 10),
+        "rate at which the salience factor of the present target decreases from 1; 0: never"] = 0.2
+    recovery_rate_1_s: Annotated[float, Bounds(0.01, 10), "rate at which the salience factors of everything else recover to 1"] = 1.0
     rule_floor: Annotated[float, Bounds(0, 1),
-        "least factor of what a rule points at; lower: the gaze changes sooner between several people"] = 0.6
-    inhibition_of_return_strength: Annotated[float, Bounds(0, 1), "how strongly the point just left is avoided; 0 for not at all"] = 0.5
+        "lowest salience factor of the target of a rule; lower: the gaze changes sooner between several people"] = 0.6
+    inhibition_of_return_strength: Annotated[float, Bounds(0, 1),
+        "how strongly the point that the gaze has just left is avoided; 0: not at all"] = 0.5
     inhibition_of_return_sigma_deg: Annotated[float, Bounds(0.1, 45), "standard deviation of that inhibition around the point"] = 4.0
-    inhibition_of_return_s: Annotated[float, Bounds(0.05, 60), "time constant with which it decays"] = 1.5
+    inhibition_of_return_s: Annotated[float, Bounds(0.05, 60), "time constant with which that inhibition decays"] = 1.5
     # fmt: on
 
 

@@ -25,24 +25,26 @@ class HeadParams:
 
     # fmt: off
     max_offset_deg: Annotated[float, Bounds(0, 90),
-        "how far short of the target the least interested head stops; also the trigger; both are lowered to the eye's limit less "
-        "eye_margin_deg"] = 30.0
-    eye_margin_deg: Annotated[float, Bounds(0, 30), "kept free at the eye limit"] = 2.0
-    min_salience: Annotated[float, Bounds(0, 10), "attention A1 at which the head moves least"] = 0.2
-    max_salience: Annotated[float, Bounds(0, 10), "attention A2 at which the head moves most"] = 1.0
+        "how far short of the target the head stops at min_salience, and the eccentricity beyond which it starts to move; both at "
+        "most the eye's limit less eye_margin_deg"] = 30.0
+    eye_margin_deg: Annotated[float, Bounds(0, 30), "distance that the eyes keep from their limit"] = 2.0
+    min_salience: Annotated[float, Bounds(0, 10), "salience A1 at which the head turns least"] = 0.2
+    max_salience: Annotated[float, Bounds(0, 10), "salience A2 at which the head turns most"] = 1.0
     goal_model: Annotated[Literal["attention", "align", "stahl"],
-        "head's share by the amount of attention (eq 7), a fixed alignment, or 0.77 of what lies beyond 17.9 deg (Stahl "
+        "share of the head in a gaze shift: by salience (eq 7), fixed (align), or 0.77 of what exceeds 17.9 deg (Stahl "
         "1999)"] = "attention"
-    align: Annotated[float, Bounds(0, 1), "with goal_model align: 0 stops as short as may be, 1 faces the target"] = 0.5
-    literal_reach: Annotated[bool, "keep trigger and offset whatever the eyes can reach, as printed"] = False
-    lead_ms: Annotated[float, Bounds(0, 100), "head before eyes for top-down targets that it turns to"] = 0.0
-    start_delay_ms: Annotated[float, Bounds(0, 1000), "head after eyes for bottom-up targets"] = 20.0
-    base_speed_deg_s: Annotated[float, Bounds(5, 500), "V0; the peak speed is (4/3 A/50 + 0.4) V0 for A degrees"] = 70.0
-    min_move_ms: Annotated[float, Bounds(20, 5000), "shortest head movement; small ones would be twitches otherwise"] = 300.0
-    replan_deg: Annotated[float, Bounds(0.05, 20), "change of the goal that makes a moving head plan anew"] = 1.0
-    recentre_after_ms: Annotated[float, Bounds(0, 60000), "an eye held aside this long is relieved by the head"] = 800.0
-    comfort_deg: Annotated[float, Bounds(0, 90), "eccentricity at which the eye is at ease"] = 8.0
-    recentre_speed_deg_s: Annotated[float, Bounds(1, 200), "peak speed of that slow relief"] = 30.0
+    align: Annotated[float, Bounds(0, 1),
+        "with goal_model align: 0: the head stops max_offset_deg short of the target, 1: it faces the target"] = 0.5
+    literal_reach: Annotated[bool, "use max_offset_deg even if it exceeds the eyes' limit, as printed in the paper"] = False
+    lead_ms: Annotated[float, Bounds(0, 100), "how long the head starts before the eyes, for top-down targets to which it turns"] = 0.0
+    start_delay_ms: Annotated[float, Bounds(0, 1000), "how long the head starts after the eyes, for bottom-up targets"] = 20.0
+    base_speed_deg_s: Annotated[float, Bounds(5, 500), "V0: the peak speed of a head movement of A degrees is (4/3 A/50 + 0.4) V0"] = 70.0
+    min_move_ms: Annotated[float, Bounds(20, 5000), "shortest duration of a head movement; otherwise small ones would be twitches"] = 300.0
+    replan_deg: Annotated[float, Bounds(0.05, 20), "a moving head plans its movement again when the goal changes by this much"] = 1.0
+    recentre_after_ms: Annotated[float, Bounds(0, 60000),
+        "after an eye has been eccentric for this long, the head turns slowly to bring it back"] = 800.0
+    comfort_deg: Annotated[float, Bounds(0, 90), "eccentricity up to which an eye is not brought back"] = 8.0
+    recentre_speed_deg_s: Annotated[float, Bounds(1, 200), "peak speed of the head while it brings the eyes back"] = 30.0
     # fmt: on
 
     def __post_init__(self) -> None:

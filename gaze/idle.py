@@ -34,20 +34,20 @@ class IdleParams:
     rest_distance_m: Annotated[float, Bounds(0.3, 20), "distance of the resting point"] = 1.5
     rest_height_m: Annotated[float, Bounds(-1, 3), "height of the resting point above the neck base"] = 0.2
     rest_salience: Annotated[float, Bounds(0, 10), "salience of the resting point"] = 0.2
-    coast_ms: Annotated[float, Bounds(0, 2000), "for this long at most a lost target is taken to have moved on"] = 200.0
-    search_ms: Annotated[float, Bounds(0, 60000), "time of searching for a lost target after that; 0 is not at all"] = 3000.0
-    search_fixation_ms: Annotated[float, Bounds(100, 10000), "mean time with one place of the search"] = 600.0
-    search_aside_deg: Annotated[float, Bounds(0, 90), "how far towards the side it left to"] = 18.0
-    search_spread_deg: Annotated[float, Bounds(0, 45), "standard deviation of the places of the search, sideways"] = 8.0
-    leaving_deg_s: Annotated[float, Bounds(0.1, 100), "slower targets did not leave to any side"] = 4.0
-    reach_deg: Annotated[float, Bounds(5, 180), "no farther to the side does it search, unless the target was there"] = 70.0
+    coast_ms: Annotated[float, Bounds(0, 2000), "longest time for which a lost target is assumed to move on with its last velocity"] = 200.0
+    search_ms: Annotated[float, Bounds(0, 60000), "duration of the search for a lost target after that; 0: no search"] = 3000.0
+    search_fixation_ms: Annotated[float, Bounds(100, 10000), "mean duration of one fixation of the search"] = 600.0
+    search_aside_deg: Annotated[float, Bounds(0, 90), "how far the search looks towards the side to which the target left"] = 18.0
+    search_spread_deg: Annotated[float, Bounds(0, 45), "standard deviation of the search points, horizontally"] = 8.0
+    leaving_deg_s: Annotated[float, Bounds(0.1, 100), "a target slower than this is not considered to have left to a side"] = 4.0
+    reach_deg: Annotated[float, Bounds(5, 180), "farthest search direction to the side, unless the target was farther"] = 70.0
     rest_ms: Annotated[float, Bounds(200, 600_000), "mean time at rest between glances around"] = 3000.0
     glance_ms: Annotated[float, Bounds(200, 60000), "mean time of a glance"] = 1200.0
-    spread: Annotated[float, Bounds(0, 3), "of all these times: standard deviation over mean"] = 0.6
-    again_share: Annotated[float, Bounds(0, 0.95), "share of glances that another one follows, without rest between"] = 0.35
-    glance_least_deg: Annotated[float, Bounds(0, 90), "nearest glance to the side"] = 8.0
-    glance_yaw_deg: Annotated[float, Bounds(0, 90), "farthest glance to the side"] = 35.0
-    glance_pitch_deg: Annotated[float, Bounds(0, 60), "highest and lowest glance"] = 12.0
+    spread: Annotated[float, Bounds(0, 3), "standard deviation over mean of all these durations"] = 0.6
+    again_share: Annotated[float, Bounds(0, 0.95), "share of glances that are followed by another one without a rest"] = 0.35
+    glance_least_deg: Annotated[float, Bounds(0, 90), "smallest angle of a glance to the side"] = 8.0
+    glance_yaw_deg: Annotated[float, Bounds(0, 90), "largest angle of a glance to the side"] = 35.0
+    glance_pitch_deg: Annotated[float, Bounds(0, 60), "largest angle of a glance up or down"] = 12.0
     # fmt: on
 
     def __post_init__(self) -> None:

@@ -28,33 +28,39 @@ class LidParams:
     """Rates, shapes and what the lids do at rest; lids without a name are the upper ones."""
 
     # fmt: off
-    blinks_per_min: Annotated[float, Bounds(0, 60), "spontaneous blinks at rest; 0 is never"] = 17.0
-    conversation_per_min: Annotated[float, Bounds(0, 60), "spontaneous blinks in conversation; 0 is never"] = 26.0
+    blinks_per_min: Annotated[float, Bounds(0, 60), "spontaneous blinks at rest; 0: never"] = 17.0
+    conversation_per_min: Annotated[float, Bounds(0, 60), "spontaneous blinks in conversation; 0: never"] = 26.0
     interval_distribution: Annotated[Literal["lognormal", "exponential", "fixed"],
-        "law of the intervals; all three keep the mean, fixed has no spread"] = "lognormal"
-    interval_cv: Annotated[float, Bounds(0.05, 3), "spread of log-normal intervals: standard deviation over mean"] = 0.8
-    min_interval_ms: Annotated[float, Bounds(400, 10000), "pause after a blink before a spontaneous one"] = 1000.0
-    double_share: Annotated[float, Bounds(0, 1), "share of blinks with a second one right after them"] = 0.0
-    double_gap_ms: Annotated[float, Bounds(0, 500), "pause between those two"] = 100.0
-    incomplete_share: Annotated[float, Bounds(0, 1), "share of blinks that shut the lid by 0.70 to 0.85 only"] = 0.12
-    close_ms: Annotated[float, Bounds(30, 500), "time of closing"] = 75.0
-    hold_ms: Annotated[float, Bounds(0, 1000), "time shut"] = 35.0
-    open_ms: Annotated[float, Bounds(50, 1500), "time of opening"] = 175.0
-    wink_hold_ms: Annotated[float, Bounds(0, 3000), "time shut in a wink"] = 200.0
-    rest_opening: Annotated[float, Bounds(0.1, 1), "opening with level gaze"] = 0.75
+        "distribution of the intervals between blinks; all three have the same mean, fixed has no spread"] = "lognormal"
+    interval_cv: Annotated[float, Bounds(0.05, 3), "coefficient of variation (standard deviation over mean) of log-normal intervals"] = 0.8
+    min_interval_ms: Annotated[float, Bounds(400, 10000), "shortest pause between a blink and the next spontaneous one"] = 1000.0
+    double_share: Annotated[float, Bounds(0, 1), "share of blinks that are followed by a second one at once"] = 0.0
+    double_gap_ms: Annotated[float, Bounds(0, 500), "pause between the two blinks of a double blink"] = 100.0
+    incomplete_share: Annotated[float, Bounds(0, 1), "share of blinks that close the lid only by 0.70 to 0.85"] = 0.12
+    close_ms: Annotated[float, Bounds(30, 500), "duration of closing in a blink"] = 75.0
+    hold_ms: Annotated[float, Bounds(0, 1000), "time that the lid stays shut in a blink"] = 35.0
+    open_ms: Annotated[float, Bounds(50, 1500), "duration of opening in a blink"] = 175.0
+    wink_hold_ms: Annotated[float, Bounds(0, 3000), "time that the lid stays shut in a wink"] = 200.0
+    rest_opening: Annotated[float, Bounds(0.1, 1), "opening of the upper lids with level gaze, 0 shut to 1 open"] = 0.75
     follow_per_deg: Annotated[float, Bounds(0, 0.1),
-        "change of the opening as the gaze sinks; gain 1 is one over the lid's travel"] = 0.0222
-    follow_up_share: Annotated[float, Bounds(0, 1.5), "the same above level gaze, in parts of the change below it"] = 0.85
-    lower_rest_opening: Annotated[float, Bounds(0.1, 1), "opening of the lower lids with level gaze"] = 0.8
-    lower_follow_per_deg: Annotated[float, Bounds(0, 0.1), "shutting of the lower lids as the gaze rises, opening as it sinks"] = 0.008
-    lower_close_share: Annotated[float, Bounds(0, 1), "part of its way that a lower lid goes in a blink; 1 meets the upper lid"] = 1.0
-    gaze_evoked_blink_middle_deg: Annotated[float, Bounds(1, 180), "gaze shift that brings a blink every second time"] = 17.0
-    gaze_evoked_blink_steepness_1_deg: Annotated[float, Bounds(0, 5), "slope of that probability"] = 0.217
-    gaze_evoked_blink_pause_ms: Annotated[float, Bounds(0, 10000), "from the onset of a blink to the next one evoked"] = 600.0
-    gaze_evoked_blink_literal: Annotated[bool, "a blink with every shift beyond gaze_evoked_blink_literal_deg, not at random"] = False
-    gaze_evoked_blink_literal_deg: Annotated[float, Bounds(0, 180), "a large saccade of Nakamoto & Tsuruno 3.6"] = 20.0
-    sleepy_level: Annotated[float, Bounds(0, 1), "sleepiness at the start"] = 0.0
-    sleepy_droop: Annotated[float, Bounds(0, 1), "part of the opening that full sleepiness takes away"] = 0.65
-    lower_sleepy_rise: Annotated[float, Bounds(0, 1), "part of a lower lid's opening that full sleepiness takes away"] = 0.1
-    sleepy_slowness: Annotated[float, Bounds(0, 5), "full sleepiness makes a blink this many times its length longer"] = 2.0
+        "decrease of the opening per degree that the gaze goes down; one over the lid's travel in degrees follows the eye "
+        "exactly"] = 0.0222
+    follow_up_share: Annotated[float, Bounds(0, 1.5), "factor on follow_per_deg above level gaze"] = 0.85
+    lower_rest_opening: Annotated[float, Bounds(0.1, 1), "opening of the lower lids with level gaze, 0 shut to 1 open"] = 0.8
+    lower_follow_per_deg: Annotated[float, Bounds(0, 0.1),
+        "decrease of the lower lids' opening per degree that the gaze goes up; they open as it goes down"] = 0.008
+    lower_close_share: Annotated[float, Bounds(0, 1),
+        "share of its travel that a lower lid closes in a blink; 1: it meets the upper lid"] = 1.0
+    gaze_evoked_blink_middle_deg: Annotated[float, Bounds(1, 180),
+        "size of a gaze shift that comes with a blink in half of the cases"] = 17.0
+    gaze_evoked_blink_steepness_1_deg: Annotated[float, Bounds(0, 5),
+        "steepness of that probability; larger: closer to a fixed threshold"] = 0.217
+    gaze_evoked_blink_pause_ms: Annotated[float, Bounds(0, 10000),
+        "shortest time from the onset of a blink to one evoked by a gaze shift"] = 600.0
+    gaze_evoked_blink_literal: Annotated[bool, "blink with every shift beyond gaze_evoked_blink_literal_deg instead of at random"] = False
+    gaze_evoked_blink_literal_deg: Annotated[float, Bounds(0, 180), "size of a large saccade, as in Nakamoto & Tsuruno 3.6"] = 20.0
+    sleepy_level: Annotated[float, Bounds(0, 1), "sleepiness at the start, 0 awake to 1"] = 0.0
+    sleepy_droop: Annotated[float, Bounds(0, 1), "share by which full sleepiness reduces the upper lids' opening"] = 0.65
+    lower_sleepy_rise: Annotated[float, Bounds(0, 1), "share by which full sleepiness reduces the lower lids' opening"] = 0.1
+    sleepy_slowness: Annotated[float, Bounds(0, 5), "full sleepiness lengthens a blink by this many times its duration"] = 2.0
     # fmt: on

@@ -43,12 +43,15 @@ class OculomotorParams(SaccadeTriggerParams):
     """Saccade trigger, prediction horizon and endpoint scatter."""
 
     # fmt: off
-    prediction_horizon_ms: Annotated[float, Bounds(0, 2000), "longest time for which a target is moved on by its own velocity"] = 200.0
-    fade_ms: Annotated[float, Bounds(1, 5000), "decay of that velocity when there is no news for longer"] = 300.0
-    eye_lag_ms: Annotated[float, Bounds(0, 200), "time from command to motion of an eye; the head's motion in it is foreseen"] = 15.0
-    nearest_m: Annotated[float, Bounds(0.05, 2), "no nearer point is converged on (0.2 m is 17.6 deg of vergence)"] = 0.2
-    endpoint_scatter_along: Annotated[float, Bounds(0, 0.2), "scatter along the path, SD as a share of the amplitude; people .03-.05"] = 0.0
-    endpoint_scatter_across: Annotated[float, Bounds(0, 0.2), "scatter across the path, SD as a share of the amplitude; people .02"] = 0.0
+    prediction_horizon_ms: Annotated[float, Bounds(0, 2000),
+        "longest time over which a target's position is extrapolated with its velocity"] = 200.0
+    fade_ms: Annotated[float, Bounds(1, 5000), "time constant with which that velocity decays after that time"] = 300.0
+    eye_lag_ms: Annotated[float, Bounds(0, 200), "delay from command to motion of an eye; the head's motion during it is predicted"] = 15.0
+    nearest_m: Annotated[float, Bounds(0.05, 2), "nearest distance on which the eyes converge (0.2 m is 17.6 deg of vergence)"] = 0.2
+    endpoint_scatter_along: Annotated[float, Bounds(0, 0.2),
+        "scatter of saccade endpoints along the path, standard deviation as a share of the amplitude; people .03-.05"] = 0.0
+    endpoint_scatter_across: Annotated[float, Bounds(0, 0.2),
+        "scatter of saccade endpoints across the path, standard deviation as a share of the amplitude; people .02"] = 0.0
     # fmt: on
 
 

@@ -31,13 +31,14 @@ class PursuitParams:
     """Gains and limits of the following."""
 
     # fmt: off
-    gain_1_s: Annotated[float, Bounds(0, 50), "rate Kc closing the error"] = 8.0
-    velocity_gain: Annotated[float, Bounds(0, 1), "share Gp of the target's speed taken over at once; people .95"] = 0.95
-    vergence_gain_1_s: Annotated[float, Bounds(0, 50), "rate Kd closing the error in depth"] = 4.0
-    divergence_gain_1_s: Annotated[float, Bounds(0, 50), "rate Kdiv closing it where the target is farther than the gaze"] = 3.0
-    max_speed_deg_s: Annotated[float, Bounds(1, 200), "fastest smooth following; human pursuit saturates near 63 deg/s"] = 60.0
-    reject_deg_s: Annotated[float, Bounds(1, 1000), "a target said to be faster than this has jumped, and is not followed"] = 100.0
-    max_error_deg: Annotated[float, Bounds(0.1, 90), "largest error that smooth following closes at its rate"] = 5.0
+    gain_1_s: Annotated[float, Bounds(0, 50), "rate Kc at which the position error is closed"] = 8.0
+    velocity_gain: Annotated[float, Bounds(0, 1), "gain Gp: share of the target's velocity that the eye follows at once; people .95"] = 0.95
+    vergence_gain_1_s: Annotated[float, Bounds(0, 50), "rate Kd at which the error in depth is closed"] = 4.0
+    divergence_gain_1_s: Annotated[float, Bounds(0, 50), "rate Kdiv instead of Kd if the target is farther away than the gaze point"] = 3.0
+    max_speed_deg_s: Annotated[float, Bounds(1, 200), "fastest smooth pursuit; human pursuit saturates near 63 deg/s"] = 60.0
+    reject_deg_s: Annotated[float, Bounds(1, 1000), "a target reported as faster than this is taken as a jump and not pursued"] = 100.0
+    max_error_deg: Annotated[float, Bounds(0.1, 90),
+        "the rate of closing applies to at most this error; larger errors are closed no faster"] = 5.0
     # fmt: on
 
 

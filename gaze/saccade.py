@@ -27,13 +27,14 @@ class SaccadeParams:
 
     # fmt: off
     profile: Annotated[Literal["min_jerk", "main_sequence", "literal_frame"],
-        "how an eye jumps: eqs 2-6, as people do, or 0.8 of the way each frame"] = "min_jerk"
+        "velocity profile of a saccade: minimum jerk (eqs 2-6), the human main sequence, or a fixed share of the way each "
+        "frame"] = "min_jerk"
     max_speed_deg_s: Annotated[float, Bounds(10, 1000), "fastest eye speed L; the paper's 8.7266 rad/s is 500 deg/s"] = 500.0
     min_duration_ms: Annotated[float, Bounds(10, 1000), "shortest saccade T of the profile min_jerk"] = 50.0
-    human_base_ms: Annotated[float, Bounds(1, 200), "duration of a human saccade of no size"] = 21.0
-    human_per_deg_ms: Annotated[float, Bounds(0.1, 20), "how much longer a human saccade is for each degree"] = 2.2
-    human_peak_over_mean: Annotated[float, Bounds(1.2, 1.875), "peak over mean speed of a human saccade below the cap"] = 1.65
-    device_floor_ms: Annotated[float, Bounds(1, 500), "shortest saccade the device can make with the profile main_sequence"] = 20.0
+    human_base_ms: Annotated[float, Bounds(1, 200), "main sequence: duration at amplitude 0"] = 21.0
+    human_per_deg_ms: Annotated[float, Bounds(0.1, 20), "main sequence: increase of the duration with amplitude"] = 2.2
+    human_peak_over_mean: Annotated[float, Bounds(1.2, 1.875), "main sequence: peak over mean speed, below max_speed_deg_s"] = 1.65
+    device_floor_ms: Annotated[float, Bounds(1, 500), "shortest saccade that the servos can make, with the profile main_sequence"] = 20.0
     frame_share: Annotated[float, Bounds(0.05, 0.99), "share of the remaining way per frame of the profile literal_frame"] = 0.8
     frame_ms: Annotated[float, Bounds(1, 200), "length of such a frame; the authors' display showed 90 a second"] = 11.1
     # fmt: on

@@ -24,14 +24,16 @@ class SaccadeTriggerParams:
     """Thresholds and times of the saccade trigger."""
 
     # fmt: off
-    saccade_deg: Annotated[float, Bounds(0.1, 30), "error that is closed by a saccade instead of smooth following"] = 2.0
-    smallest_shift_deg: Annotated[float, Bounds(0, 10), "a new target nearer than this needs no saccade"] = 0.3
-    refractory_ms: Annotated[float, Bounds(0, 2000), "pause before an error alone may bring the next saccade"] = 150.0
-    latency_ms: Annotated[float, Bounds(0, 1000), "from a new target to the saccade; people 200"] = 0.0
-    crossing_least_ms: Annotated[float, Bounds(0, 1000), "an eye that crosses the target later than this ..."] = 40.0
-    crossing_most_ms: Annotated[float, Bounds(0, 1000), "... and sooner than this needs no saccade"] = 180.0
-    correct_deg: Annotated[float, Bounds(0.1, 30), "error after a scattered landing that is corrected by a small saccade"] = 1.0
-    correct_after_ms: Annotated[float, Bounds(0, 1000), "from landing to that correction; people 150 to 250"] = 200.0
+    saccade_deg: Annotated[float, Bounds(0.1, 30), "position error above which a saccade is made instead of smooth pursuit"] = 2.0
+    smallest_shift_deg: Annotated[float, Bounds(0, 10), "a new target closer to the gaze than this gets no saccade"] = 0.3
+    refractory_ms: Annotated[float, Bounds(0, 2000),
+        "shortest time after a saccade before a position error alone triggers the next"] = 150.0
+    latency_ms: Annotated[float, Bounds(0, 1000), "latency from a new target to the saccade; people 200"] = 0.0
+    crossing_least_ms: Annotated[float, Bounds(0, 1000),
+        "no catch-up saccade if pursuit will bring the eye onto the target between this time ..."] = 40.0
+    crossing_most_ms: Annotated[float, Bounds(0, 1000), "... and this time from now"] = 180.0
+    correct_deg: Annotated[float, Bounds(0.1, 30), "landing error above which a corrective saccade follows, if endpoints scatter"] = 1.0
+    correct_after_ms: Annotated[float, Bounds(0, 1000), "delay from landing to the corrective saccade; people 150 to 250"] = 200.0
     # fmt: on
 
 

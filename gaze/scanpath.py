@@ -78,18 +78,20 @@ class ScanpathParams:
 
     # fmt: off
     model: Annotated[Literal["markov", "simple", "face_tracking", "random"],
-        "measured walk, or one of the three it is compared with"] = "markov"
-    transition_matrix: Annotated[str, "name of a shipped walk or path of a YAML file"] = "nakamoto_tsuruno"
-    start: Annotated[str, Choices("as_walk", *PARTS), "part at which a face is entered, named as in the walk"] = "as_walk"
-    viewers_left: Annotated[bool, "left and right in walk and round are the viewer's, not the owner's"] = False
+        "model of the scan path: the measured Markov walk, or one of the three baselines it is compared with"] = "markov"
+    transition_matrix: Annotated[str, "name of a shipped transition matrix or path of a YAML file"] = "nakamoto_tsuruno"
+    start: Annotated[str, Choices("as_walk", *PARTS),
+        "face part that is looked at first, named as in the matrix; as_walk: as the matrix file says"] = "as_walk"
+    viewers_left: Annotated[bool,
+        "left and right in the matrix and in simple_order are as the viewer sees them, not as the face's owner does"] = False
     diagonal: Annotated[Literal["refixation", "whole_visit"],
-        "a part drawn again: another dwell, or part of the visit whose dwell it is"] = "refixation"
-    dwell_distribution: Annotated[str, Choices(*LAWS), "law of the dwell times"] = "lognormal"
-    min_dwell_ms: Annotated[float, Bounds(0, 2000), "floor of a dwell: a servo cannot show shorter ones"] = 120.0
-    rate_scale: Annotated[float, Bounds(0.1, 10), "dwell times are divided by it: 2 wanders twice as fast"] = 1.0
-    simple_order: Annotated[tuple[str, ...], Choices(*PARTS), "round of the simple model"] = ("N", "RE", "LE")
-    simple_dwell_ms: Annotated[tuple[float, ...], Bounds(1, 60000),
-        "time on each part of the simple model's round"] = (459.42, 408.21, 408.21)
+        "meaning of the matrix's diagonal, the same part again: another dwell (refixation), or included in the dwell of "
+        "the visit (whole_visit)"] = "refixation"
+    dwell_distribution: Annotated[str, Choices(*LAWS), "distribution of the dwell times"] = "lognormal"
+    min_dwell_ms: Annotated[float, Bounds(0, 2000), "shortest dwell; servos cannot show shorter ones"] = 120.0
+    rate_scale: Annotated[float, Bounds(0.1, 10), "dwell times are divided by this: with 2 the gaze wanders twice as fast"] = 1.0
+    simple_order: Annotated[tuple[str, ...], Choices(*PARTS), "order of the parts in the simple model"] = ("N", "RE", "LE")
+    simple_dwell_ms: Annotated[tuple[float, ...], Bounds(1, 60000), "dwell on each part of simple_order"] = (459.42, 408.21, 408.21)
     random_angle_deg: Annotated[float, Bounds(0, 60), "largest yaw and pitch of the random model about the direction to the face"] = 20.0
     random_longest_ms: Annotated[float, Bounds(10, 60000), "longest interval between jumps of the random model"] = 3000.0
     # fmt: on

@@ -27,10 +27,10 @@ class Rule:
 
     # fmt: off
     look_at: Annotated[str,
-        'kind of body to look at, e.g. "face" or "hand"; "id:7" for the body with that id; "point" for the place point_world_m']
-    salience: Annotated[float, Bounds(0, 10), "its constant amount of attention (A_attack, A_guard, A_face)"]
+        'kind of body to look at, e.g. "face" or "hand"; "id:7" for the body with that id; "point" for the position point_world_m']
+    salience: Annotated[float, Bounds(0, 10), "salience of the rule's target (A_attack, A_guard, A_face)"]
     point_world_m: Annotated[tuple[float, float, float] | None, Bounds(-100, 100),
-        "place to look at: ahead, left and above of the neck base"] = None
+        "position to look at: ahead, left and above of the neck base"] = None
     # fmt: on
 
     def __post_init__(self) -> None:
@@ -63,10 +63,12 @@ class TopDownParams:
     """The rule set and the behaviour in force at the start."""
 
     # fmt: off
-    behaviour: Annotated[str, "behaviour in force at the start"] = "wait"
+    behaviour: Annotated[str, "name of the behaviour that is active at the start"] = "wait"
     rules: Annotated[Mapping[str, Rule], "behaviour -> what to look at and with what salience"] = field(default_factory=_shipped_rules)
-    stay_with_person: Annotated[float, Bounds(1, 10), "the one looked at last counts as this many times nearer than the others"] = 1.25
-    nearness: Annotated[float, Bounds(0, 4), "exponent of the distance by which the farther of several are less salient"] = 0.5
+    stay_with_person: Annotated[float, Bounds(1, 10),
+        "the person looked at last is treated as this many times nearer than they are; larger: the gaze changes less often"] = 1.25
+    nearness: Annotated[float, Bounds(0, 4),
+        "exponent with which salience decreases with distance if several bodies match a rule; 0: distance has no effect"] = 0.5
     # fmt: on
 
     def __post_init__(self) -> None:

@@ -46,7 +46,7 @@ def test_a_knob_says_what_its_field_says() -> None:
     (knob,) = (k for k in KNOBS if k.key == "gaze.lids.blinks_per_min")
     assert knob.group == "gaze.lids" and knob.unit == "1/min" and knob.kind == "number"
     assert (knob.low, knob.high, knob.default) == (0.0, 60.0, 17.0)
-    assert knob.says == "spontaneous blinks at rest; 0 is never" and knob.live == NEXT_TICK
+    assert knob.says == "spontaneous blinks at rest; 0: never" and knob.live == NEXT_TICK
     (pan,) = (k for k in KNOBS if k.key == "park_deg.left_eye_pan")
     assert (pan.default, pan.low, pan.unit) == (0.0, -180.0, "deg")
     (part,) = (k for k in KNOBS if k.key == "face_parts_mm.N")

@@ -13,11 +13,13 @@ class FeetechParams:
 
     # fmt: off
     baud: Annotated[int, Choices(*BAUD_RATES[::-1]), "Speed of the bus; the servos must be set to the same."] = 1_000_000
-    reply_timeout_ms: Annotated[float, Bounds(1, 200), "Longest patience for an answer beyond the time its bytes take on the wire."] = 20.0
-    prompt_timeout_ms: Annotated[float, Bounds(0.2, 200), "Shortest patience; between the two it is twice the worst delay measured."] = 1.0
-    give_up_s: Annotated[float, Bounds(0.5, 3600), "Wait so long for an unplugged adapter or servos without power to come back."] = 60.0
+    reply_timeout_ms: Annotated[float, Bounds(1, 200), "Longest time-out of a reply, added to the transmission time of its bytes."] = 20.0
+    prompt_timeout_ms: Annotated[float, Bounds(0.2, 200),
+        "Shortest time-out of a reply; between the two it adapts to twice the worst delay measured."] = 1.0
+    give_up_s: Annotated[float, Bounds(0.5, 3600),
+        "The run ends when an unplugged adapter or unpowered servos have not come back within this time."] = 60.0
     torque_every: Annotated[int, Bounds(1, 100), Unit("reads"),
-        "Every so many reads also tell whether torque and settings are still there."] = 8
+        "Every n-th read also checks whether torque and settings are still as they were set."] = 8
     # fmt: on
     watchdog_ms: ClassVar[int] = 0
     """These servos have none."""

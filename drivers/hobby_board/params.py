@@ -15,13 +15,14 @@ class HobbyBoardParams:
     """How long a board is waited for, how often it is looked at, and how its servos start."""
 
     # fmt: off
-    reply_timeout_ms: Annotated[float, Bounds(1, 200), "Patience for an answer beyond the time its bytes take on a serial line."] = 20.0
+    reply_timeout_ms: Annotated[float, Bounds(1, 200),
+        "Time-out of a reply, added to the transmission time of its bytes on a serial line."] = 20.0
     watch_ms: Annotated[float, Bounds(0, 50),
-        "Look at the board and one channel's pulse so often; 0: in every read. More saves time on a slow line, but restarts are "
-        "noticed later."] = 0.0
+        "Interval at which the board's status and the pulse of one channel are read; 0: in every read. A longer interval saves time "
+        "on a slow line, but restarts are detected later."] = 0.0
     stagger_ms: Annotated[float, Bounds(0, 1000),
-        "Servos without pulses start so long after one another: all at once pull a weak supply down."] = 100.0
-    give_up_s: Annotated[float, Bounds(0.5, 3600), "Wait so long for a port or board that is gone to come back."] = 60.0
+        "Delay between switching on the pulses of one servo and of the next; all at once could overload a weak power supply."] = 100.0
+    give_up_s: Annotated[float, Bounds(0.5, 3600), "The run ends when a lost port or board has not come back within this time."] = 60.0
     # fmt: on
 
     @property

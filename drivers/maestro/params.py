@@ -17,11 +17,12 @@ class MaestroParams(HobbyBoardParams):
     """How to speak with one board."""
 
     # fmt: off
-    baud: Annotated[int, Choices(9600, 19200, 38400, 57600, 115_200), "Speed of its serial pins; its USB port takes any."] = 115_200
-    protocol: Annotated[Form, "Form of the commands; pololu where several boards share one line."] = "compact"
-    device: Annotated[int, Bounds(0, 127), "The board's device number, heeded in the pololu form."] = 12
-    crc: Annotated[bool, "The board wants a check byte after every command: damaged ones do nothing."] = False
-    channels: Annotated[int, Choices(6, 12, 18, 24), "Size of the board; the Micro Maestro has 6."] = 12
+    baud: Annotated[int, Choices(9600, 19200, 38400, 57600, 115_200),
+        "Baud rate of the board's serial pins; its USB port accepts any."] = 115_200
+    protocol: Annotated[Form, "Format of the commands; pololu if several boards share one line."] = "compact"
+    device: Annotated[int, Bounds(0, 127), "Device number of the board, used only with the protocol pololu."] = 12
+    crc: Annotated[bool, "Whether the board is set up for a CRC byte after every command; it ignores damaged commands then."] = False
+    channels: Annotated[int, Choices(6, 12, 18, 24), "Number of channels of the board; the Micro Maestro has 6."] = 12
     # fmt: on
 
     def ends_us(self) -> tuple[float, float, str]:

@@ -19,16 +19,17 @@ class Pca9685Params(HobbyBoardParams):
     """How to reach the boards of one I2C bus."""
 
     # fmt: off
-    address: Annotated[int, Bounds(0x40, 0x77), "Address of the board; 0x40 unless its jumpers are closed."] = 0x40
+    address: Annotated[int, Bounds(0x40, 0x77), "I2C address of the board; 0x40 (64) unless address jumpers are closed."] = 0x40
     further_addresses: Annotated[tuple[int, ...], Bounds(0x40, 0x77),
-        "More boards on the same bus; the first channel of the second is id 16."] = ()
-    frequency_hz: Annotated[float, Bounds(40, 330), "Pulses in a second; analogue servos take 50, many digital ones more."] = 50.0
+        "I2C addresses of more boards on the same bus; the first channel of the second board is id 16."] = ()
+    frequency_hz: Annotated[float, Bounds(40, 330), "Pulses per second; analogue servos need 50, many digital servos accept more."] = 50.0
     oscillator_hz: Annotated[float, Bounds(22_000_000, 28_000_000),
-        "The board's own clock. It differs from board to board by some percent, and pulses with it: measure one (gazerig setup)."] = 25e6
+        "Frequency of the board's oscillator. It differs from board to board by some percent, and the pulse widths with it; "
+        "gazerig setup finds it from one measured pulse."] = 25e6
     further_oscillators_hz: Annotated[tuple[float, ...], Bounds(22_000_000, 28_000_000),
-        "Clocks of the further boards, in their order; oscillator_hz where none is."] = ()
-    min_pulse_us: Annotated[float, Bounds(100, 3000), "No shorter pulse is ever sent."] = 500.0
-    max_pulse_us: Annotated[float, Bounds(100, 3000), "No longer pulse is ever sent."] = 2500.0
+        "Oscillator frequencies of the further boards, in their order; oscillator_hz for those left out."] = ()
+    min_pulse_us: Annotated[float, Bounds(100, 3000), "Shortest pulse that is ever sent."] = 500.0
+    max_pulse_us: Annotated[float, Bounds(100, 3000), "Longest pulse that is ever sent."] = 2500.0
     # fmt: on
 
     def __post_init__(self) -> None:

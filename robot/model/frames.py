@@ -27,14 +27,14 @@ class LensParams:
     """A lens as measured, on pictures of one size."""
 
     # fmt: off
-    width_px: Annotated[int, Bounds(16, 16384), "width of those pictures"]
-    height_px: Annotated[int, Bounds(16, 16384), "height of those pictures"]
-    fx_px: Annotated[float, Bounds(10, 100_000), "focal length in pixel widths"]
-    fy_px: Annotated[float, Bounds(10, 100_000), "focal length in pixel heights"]
-    cx_px: Annotated[float, Bounds(-10000, 20000), "where the optical axis meets the picture, from the left"]
-    cy_px: Annotated[float, Bounds(-10000, 20000), "where the optical axis meets the picture, from the top"]
+    width_px: Annotated[int, Bounds(16, 16384), "image width at which the lens was calibrated"]
+    height_px: Annotated[int, Bounds(16, 16384), "image height at which the lens was calibrated"]
+    fx_px: Annotated[float, Bounds(10, 100_000), "focal length, in units of the pixel width"]
+    fy_px: Annotated[float, Bounds(10, 100_000), "focal length, in units of the pixel height"]
+    cx_px: Annotated[float, Bounds(-10000, 20000), "principal point, from the left edge of the image"]
+    cy_px: Annotated[float, Bounds(-10000, 20000), "principal point, from the top edge of the image"]
     distortion: Annotated[tuple[float, float, float, float, float], Bounds(-100, 100),
-        "k1 k2 p1 p2 k3 as in the OpenCV manual; zeros for a lens without"] = (0.0, 0.0, 0.0, 0.0, 0.0)
+        "distortion coefficients k1 k2 p1 p2 k3 of the OpenCV model; zeros: no distortion"] = (0.0, 0.0, 0.0, 0.0, 0.0)
     # fmt: on
 
 
@@ -43,13 +43,14 @@ class CameraParams:
     """Where the camera sits and what it covers."""
 
     # fmt: off
-    mount: Annotated[MountedOn, "head: it turns with the head; base: it stands still"] = "head"
+    mount: Annotated[MountedOn, "head: the camera turns with the head; base: it stands still"] = "head"
     position_mm: Annotated[tuple[float, float, float], Bounds(-2000, 2000),
-        "lens, ahead, left and above of the point between the eyes (head) or of the neck base (base)"] = (20.0, 0.0, 45.0)
-    yaw_deg: Annotated[float, Bounds(-180, 180), "lens turned left"] = 0.0
-    pitch_deg: Annotated[float, Bounds(-90, 90), "lens turned up"] = 0.0
+        "position of the lens in front of, left of and above the point between the eyes (mount head) or the neck base "
+        "(mount base)"] = (20.0, 0.0, 45.0)
+    yaw_deg: Annotated[float, Bounds(-180, 180), "rotation of the camera to the left"] = 0.0
+    pitch_deg: Annotated[float, Bounds(-90, 90), "rotation of the camera upwards"] = 0.0
     horizontal_field_deg: Annotated[float, Bounds(10, 150), "horizontal field of view of the lens"] = 69.0
-    roll_deg: Annotated[float, Bounds(-180, 180), "lens rolled, its right side down"] = 0.0
+    roll_deg: Annotated[float, Bounds(-180, 180), "rotation of the camera about its optical axis, right side down"] = 0.0
     lens: Annotated[LensParams | None, "the lens as measured; left out, the field of view stands for it"] = None
     # fmt: on
 

@@ -12,14 +12,17 @@ class HealthParams:
     """From where servos are slowed down and stopped, before they switch themselves off."""
 
     # fmt: off
-    warm_c: Annotated[float, Bounds(1, 60), "slower from so far below the temperature at which the servo gives up"] = 15.0
-    hot_c: Annotated[float, Bounds(0, 40), "standing still from so far below it"] = 5.0
-    slowest: Annotated[float, Bounds(0.01, 1), "share of speed and acceleration that is left just before standing still"] = 0.2
+    warm_c: Annotated[float, Bounds(1, 60), "a joint is slowed down from this far below the servo's own temperature limit"] = 15.0
+    hot_c: Annotated[float, Bounds(0, 40), "a joint is stopped from this far below that limit"] = 5.0
+    slowest: Annotated[float, Bounds(0.01, 1), "share of speed and acceleration that remains just before a joint is stopped"] = 0.2
     lasting_load: Annotated[float, Bounds(0.05, 0.95),
-        "share of the stall torque that may last; more is counted by its square (I2t), as the motor's heat goes"] = 0.5
-    overload_ms: Annotated[float, Bounds(50, 60000), "full load for so long stops a joint; slower from half of that"] = 700.0
-    voltage_margin_v: Annotated[float, Bounds(0, 5), "slower when the voltage is so near the servo's own limits"] = 0.3
-    voltage_ms: Annotated[float, Bounds(0, 60000), "standing still when it is outside for longer"] = 500.0
+        "share of the stall torque that is allowed continuously; a higher load counts by its square (I2t), as it heats the motor"] = 0.5
+    overload_ms: Annotated[float, Bounds(50, 60000),
+        "full load for this long stops a joint; it is slowed down from half of this time"] = 700.0
+    voltage_margin_v: Annotated[float, Bounds(0, 5),
+        "a joint is slowed down when the voltage is this close to the servo's own limits"] = 0.3
+    voltage_ms: Annotated[float, Bounds(0, 60000),
+        "a joint is stopped when the voltage is outside those limits for longer than this"] = 500.0
     # fmt: on
 
     def __post_init__(self) -> None:
@@ -38,13 +41,14 @@ class StallParams:
 
     # fmt: off
     position_error_deg: Annotated[float, Bounds(0.5, 45),
-        "a joint this far from its command ought to be moving; more than friction and weight leave"] = 3.0
-    moved_deg: Annotated[float, Bounds(0.1, 10), "a way towards the command that counts as moving"] = 0.5
+        "a joint at least this far from its commanded angle should be moving; larger than the error that friction and weight leave"] = 3.0
+    moved_deg: Annotated[float, Bounds(0.1, 10), "motion towards the commanded angle that counts as moving"] = 0.5
     # Dead time of a healthy servo is some 30 ms; with an answer's age and one tick more the
     # joint is found within 200 ms.
-    detection_ms: Annotated[float, Bounds(50, 5000), "a joint that has not moved for so long is stuck: it stops pushing"] = 150.0
-    retry_ms: Annotated[float, Bounds(100, 60000), "a stuck joint tries again, slowly, after so long"] = 1000.0
-    retry_deg: Annotated[float, Bounds(0.5, 45), "then the command is never farther ahead of the joint, so it pushes weakly"] = 4.5
+    detection_ms: Annotated[float, Bounds(50, 5000), "a joint that has not moved for this long is stalled and stops pushing"] = 150.0
+    retry_ms: Annotated[float, Bounds(100, 60000), "a stalled joint tries again, slowly, after this time"] = 1000.0
+    retry_deg: Annotated[float, Bounds(0.5, 45),
+        "while it tries again, the commanded angle is at most this far ahead of the joint, so that it pushes weakly"] = 4.5
     # fmt: on
 
     def __post_init__(self) -> None:
@@ -68,15 +72,18 @@ class GuardParams:
     """Ages beyond which nothing moves, slow passages, and what the servos bear."""
 
     # fmt: off
-    joint_timeout_ms: Annotated[float, Bounds(5, 5000), "a joint whose last answer is older holds still"] = 150.0
-    frame_timeout_ms: Annotated[float, Bounds(50, 60000), "the neck holds still when the last picture is older"] = 1500.0
+    joint_timeout_ms: Annotated[float, Bounds(5, 5000), "a joint whose last measurement is older than this holds still"] = 150.0
+    frame_timeout_ms: Annotated[float, Bounds(50, 60000), "the neck holds still while the last frame is older than this"] = 1500.0
     soft_start_ms: Annotated[float, Bounds(0, 60000), "shortest time of slow motion after torque-on"] = 1000.0
     soft_start_speed_deg_s: Annotated[float, Bounds(1, 500), "speed after torque-on and while parking"] = 60.0
     soft_start_accel_deg_s2: Annotated[float, Bounds(1, 50000), "acceleration after torque-on and while parking"] = 300.0
-    late_ms: Annotated[float, Bounds(0, 5000), "joints gather speed softly for so long after a tick that missed its slot"] = 50.0
-    late_accel_deg_s2: Annotated[float, Bounds(10, 200_000), "most acceleration while they do; servos brake when no goals come"] = 15000.0
+    late_ms: Annotated[float, Bounds(0, 5000),
+        "acceleration is limited to late_accel_deg_s2 for this long after a tick that missed its slot"] = 50.0
+    late_accel_deg_s2: Annotated[float, Bounds(10, 200_000),
+        "acceleration limit after a late tick, as servos have braked when no goals came"] = 15000.0
     health: Annotated[HealthParams, "what the servos bear"] = field(default_factory=HealthParams)
     stall: Annotated[StallParams, "joints that are told to move and do not"] = field(default_factory=StallParams)
-    collision_margin_deg: Annotated[float, Bounds(0.1, 20), "distance kept from collisions; servos round and lag"] = 1.0
-    collisions: Annotated[tuple[CollisionParams, ...], "pairs of joint ranges that may not be taken together"] = ()
+    collision_margin_deg: Annotated[float, Bounds(0.1, 20),
+        "distance kept from forbidden ranges, as servos round positions and lag behind"] = 1.0
+    collisions: Annotated[tuple[CollisionParams, ...], "pairs of joint ranges that must not be occupied at the same time"] = ()
     # fmt: on

@@ -21,22 +21,23 @@ class JointParams:
     model: Annotated[str, 'servo model, e.g. "xl330-m077", "sts3215" or "hobby"']
     min_deg: Annotated[float, Bounds(-180, 180), "lowest joint angle"]
     max_deg: Annotated[float, Bounds(-180, 180), "highest joint angle"]
-    max_speed_deg_s: Annotated[float, Bounds(1, 2000), "top speed of the joint"]
-    max_accel_deg_s2: Annotated[float, Bounds(10, 200_000), "top acceleration of the joint"]
-    sign: Annotated[Literal[1, -1], "1 where more steps turn the joint left, up, open or right ear down; else -1"] = 1
-    ratio: Annotated[float, Bounds(0.05, 50), "turns of the servo for one turn of the joint"] = 1.0
+    max_speed_deg_s: Annotated[float, Bounds(1, 2000), "highest speed of the joint"]
+    max_accel_deg_s2: Annotated[float, Bounds(10, 200_000), "highest acceleration of the joint"]
+    sign: Annotated[Literal[1, -1],
+        "1 if a larger servo position turns the joint left, up, open or towards the right shoulder; otherwise -1"] = 1
+    ratio: Annotated[float, Bounds(0.05, 50), "gear ratio: turns of the servo for one turn of the joint"] = 1.0
     zero_step: Annotated[int | None, Bounds(0, 4095), Unit("steps or us"),
-        "servo position at 0 deg, the pulse width in us of a hobby servo; null: the middle, 2048 or 1500"] = None
+        "servo position at joint angle 0, for a hobby servo its pulse width in us; null: the middle, 2048 or 1500"] = None
     transmission_points: Annotated[tuple[tuple[float, float], ...], Bounds(-180, 4095), Unit("deg, steps or us"),
-        "measured places of a push rod, each [joint angle, servo position]; they take the place of sign, ratio and zero_step"] = ()
-    bus: Annotated[str, "name of its bus under buses; empty: the one under bus"] = ""
+        "measured points of a push-rod linkage, each [joint angle, servo position]; they replace sign, ratio and zero_step"] = ()
+    bus: Annotated[str, "name of the joint's bus under buses; empty: the one under bus"] = ""
     servo_speed_deg_s: Annotated[float | None, Bounds(10, 5000),
-        "how fast a hobby servo turns its own shaft (0.12 s for 60 deg is 500): its place is estimated from it, as it has no feedback; "
-        "null: as fast as max_speed_deg_s"] = None
-    gains: Annotated[tuple[int, int, int] | None, Bounds(0, 16383), "the servo's Position P, I and D Gain; null: left as they are"] = None
+        "speed of a hobby servo's own shaft (0.12 s for 60 deg is 500), from which its position is estimated, as it has no "
+        "feedback; null: as fast as max_speed_deg_s"] = None
+    gains: Annotated[tuple[int, int, int] | None, Bounds(0, 16383), "Position P, I and D Gain of the servo; null: not changed"] = None
     torque_limit: Annotated[float | None, Bounds(0.05, 1),
-        "share of its full drive that the servo may use (PWM Limit), which bounds force and top speed alike; null: left as it is"] = None
-    firmware_min: Annotated[int, Bounds(0, 255), "oldest servo firmware that will do"] = 0
+        "share of its full drive that the servo may use (PWM Limit), which limits both torque and speed; null: not changed"] = None
+    firmware_min: Annotated[int, Bounds(0, 255), "oldest servo firmware version that is accepted"] = 0
     # fmt: on
 
     def __post_init__(self) -> None:

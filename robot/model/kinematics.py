@@ -23,10 +23,10 @@ class GeometryParams:
     """Measures of the rig, in millimetres, with the neck level and straight."""
 
     # fmt: off
-    pitch_axis_height_mm: Annotated[float, Bounds(0, 2000), "neck pitch and roll axes above the neck base"]
-    eyes_ahead_mm: Annotated[float, Bounds(-500, 500), "eye centres ahead of the pitch axis"]
-    eyes_above_mm: Annotated[float, Bounds(-500, 1000), "eye centres above the pitch axis"]
-    interocular_mm: Annotated[float, Bounds(10, 500), "between the eye centres (Mitake et al., table 1: 61.9)"] = 61.9
+    pitch_axis_height_mm: Annotated[float, Bounds(0, 2000), "height of the neck's pitch and roll axes above the neck base"]
+    eyes_ahead_mm: Annotated[float, Bounds(-500, 500), "distance of the eye centres in front of the pitch axis"]
+    eyes_above_mm: Annotated[float, Bounds(-500, 1000), "height of the eye centres above the pitch axis"]
+    interocular_mm: Annotated[float, Bounds(10, 500), "distance between the eye centres (Mitake et al., table 1: 61.9)"] = 61.9
     # fmt: on
 
 
