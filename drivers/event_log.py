@@ -5,7 +5,7 @@ from math import inf
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:  # the guardian, which names servos too, starts without numpy
-    from gazerig.drivers.types import ServoSetup
+    from gazerig.drivers.types import ServoConfig
 
 MOST = 200
 """More than so many lines that nobody has asked for are not kept."""
@@ -34,7 +34,7 @@ SELDOM_S = 10.0
 """The same is not said again within such a time."""
 
 
-class Seldom:
+class RateLimitedLog:
     """Adds what happens again and again once in a while, and how often it has happened since."""
 
     def __init__(self, log: EventLog) -> None:
@@ -52,7 +52,7 @@ class Seldom:
         self._log.add(f"{text} ({often} more times since it was said last)" if often else text)
 
 
-def servo_label(setup: "ServoSetup", noun: str = "servo") -> str:
+def servo_label(setup: "ServoConfig", noun: str = "servo") -> str:
     """Return how people know a servo: its joint and its id, or its id where it has no name."""
     return f"{setup.name} ({noun} {setup.id})" if setup.name else f"{noun} {setup.id}"
 

@@ -7,7 +7,7 @@ from math import inf
 from typing import NamedTuple
 
 from gazerig.drivers.errors import BusLost
-from gazerig.drivers.types import BusHealth, Feedback, ServoBus, ServoSetup
+from gazerig.drivers.types import BusHealth, Feedback, ServoBus, ServoConfig
 
 IN_A_ROW = 3
 """So many reads may stay without any answer before a bus is asked less often."""
@@ -17,7 +17,7 @@ AGAIN_S = 0.2
 as a rule, and while it lasts the servos of the other buses wait for their goals."""
 
 
-class Share(NamedTuple):
+class BusShare(NamedTuple):
     """One of the buses: what it is called, and which servos of the whole are on it.
 
     places: for each of its own servos the place in the whole
@@ -28,7 +28,7 @@ class Share(NamedTuple):
     places: tuple[int, ...]
 
 
-class _Patience:
+class _PollTimer:
     """Decides when a bus is read: every tick, but rarely while no servo on it answers."""
 
     def __init__(self) -> None:
@@ -48,7 +48,7 @@ class _Patience:
             self._due_s = now_s + AGAIN_S
 
 
-class MixedBus:
+class MultiBus:
     """Buses that are opened, read, written and released together; implements ServoBus.
 
     What one bus says or suffers stays its own: while one port is gone, the servos of the
@@ -62,9 +62,9 @@ class MixedBus:
         ValueError: they do not.
     """
 
-    def __init__(self, shares: Sequence[Share]) -> None:
+    def __init__(self, shares: Sequence[BusShare]) -> None:
         self._shares = tuple(shares)
-        self._patience = [_Patience() for _ in self._shares]
+        self._patience = [_PollTimer() for _ in self._shares]
         places = sorted(place for share in shares for place in share.places)
         if places != list(range(len(places))):
             raise ValueError(f"buses share out places {places}: each from 0 on must be there once")
@@ -80,8 +80,8 @@ class MixedBus:
             PortError: a port cannot be opened.
             ServoMissing: servos are absent or of another model.
         """
-        self._patience = [_Patience() for _ in self._shares]
-        opened: list[Share] = []
+        self._patience = [_PollTimer() for _ in self._shares]
+        opened: list[BusShare] = []
         try:
             for share in self._shares:
                 share.bus.open()
@@ -169,7 +169,7 @@ class MixedBus:
         """Return what happened since the last call, one line each."""
         return tuple([event for share in self._shares for event in share.bus.events()])
 
-    def retune(self, setups: Sequence[ServoSetup]) -> None:
+    def retune(self, setups: Sequence[ServoConfig]) -> None:
         """Set the servos up so when the torque comes on the next time.
 
         Raises:

@@ -7,10 +7,10 @@ from typing import ClassVar, Protocol
 
 from gazerig.drivers.errors import BusLost
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.released import Released
+from gazerig.drivers.released import ReleaseResult
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.serial.reconnect import LastingPort
-from gazerig.drivers.types import BusHealth, ServoSetup
+from gazerig.drivers.serial.reconnect import ReconnectingPort
+from gazerig.drivers.types import BusHealth, ServoConfig
 
 CUT = "cut the servo power"
 
@@ -27,7 +27,7 @@ class Exchange(Protocol):
         ...
 
 
-class Supervising(Protocol):
+class BusSupervisor(Protocol):
     """Whoever looks after the servos.
 
     engaged: goals are followed
@@ -52,16 +52,16 @@ class PortBus(ABC):
 
     _port: BusPort
     _line: Exchange
-    _link: LastingPort
+    _link: ReconnectingPort
     _log: EventLog
-    _supervisor: Supervising
-    _setups: tuple[ServoSetup, ...]
-    _wanted: tuple[ServoSetup, ...]
+    _supervisor: BusSupervisor
+    _setups: tuple[ServoConfig, ...]
+    _wanted: tuple[ServoConfig, ...]
     _opened = False
     _now_s = 0.0
 
     @abstractmethod
-    def _check_setups(self, setups: Sequence[ServoSetup]) -> None:
+    def _check_setups(self, setups: Sequence[ServoConfig]) -> None:
         """See that servos can be set up so.
 
         Raises:
@@ -69,7 +69,7 @@ class PortBus(ABC):
         """
 
     @abstractmethod
-    def _switch_off(self) -> Released:
+    def _switch_off(self) -> ReleaseResult:
         """Switch the torque of all servos off and verify that it is off.
 
         Raises:
@@ -84,7 +84,7 @@ class PortBus(ABC):
     def _cannot_release(self) -> str:
         """Return what the servos do when their torque cannot be switched off."""
 
-    def retune(self, setups: Sequence[ServoSetup]) -> None:
+    def retune(self, setups: Sequence[ServoConfig]) -> None:
         """Set the servos up so when the torque comes on the next time; the same ids and models.
 
         Under torque everything stays as it is.

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 
-class Released(NamedTuple):
+class ReleaseResult(NamedTuple):
     """Ids that still report torque or pulses, and those of which nothing was heard."""
 
     holding: tuple[int, ...]

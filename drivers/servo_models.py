@@ -12,7 +12,7 @@ from gazerig.drivers.feetech.memory_table import SCS_MODELS, SCS_STEPS, FeetechM
 from gazerig.drivers.hobby_board.models import HOBBY, US_STEPS
 
 if TYPE_CHECKING:
-    from gazerig.drivers.types import ServoSetup
+    from gazerig.drivers.types import ServoConfig
 
 BusKind = Literal["dynamixel", "feetech", "maestro", "pca9685"]
 BUS_KINDS: tuple[BusKind, ...] = get_args(BusKind)
@@ -23,7 +23,7 @@ HOBBY_KINDS: tuple[BusKind, ...] = ("maestro", "pca9685")
 SmartModel = DynamixelModel | FeetechModel
 
 
-class ServoFacts(NamedTuple):
+class ServoModelInfo(NamedTuple):
     """What people and joints must know of a servo model.
 
     bus: kind of bus it is on; of a hobby servo one of the boards that move it
@@ -54,9 +54,9 @@ class ServoFacts(NamedTuple):
         return kind == self.bus or (self.bus in HOBBY_KINDS and kind in HOBBY_KINDS)
 
 
-def _smart(bus: BusKind, family: str, model: SmartModel, steps: int) -> ServoFacts:
+def _smart(bus: BusKind, family: str, model: SmartModel, steps: int) -> ServoModelInfo:
     """Return the facts of a smart servo that counts so many steps."""
-    return ServoFacts(
+    return ServoModelInfo(
         bus,
         model.steps_per_turn,
         0,
@@ -69,12 +69,12 @@ def _smart(bus: BusKind, family: str, model: SmartModel, steps: int) -> ServoFac
     )
 
 
-SERVOS: dict[str, ServoFacts] = {
+SERVOS: dict[str, ServoModelInfo] = {
     **{n: _smart("dynamixel", "dynamixel", m, STEPS_PER_TURN) for n, m in DYNAMIXEL.items()},
     **{n: _smart("feetech", "feetech", m, m.steps_per_turn) for n, m in FEETECH.items()},
     **{n: _smart("feetech", "feetech scs", m, SCS_STEPS) for n, m in SCS_MODELS.items()},
     **{
-        name: ServoFacts(
+        name: ServoModelInfo(
             "maestro",
             model.steps_per_turn,
             model.lowest,
@@ -90,6 +90,6 @@ SERVOS: dict[str, ServoFacts] = {
 """By the name that a rig's YAML gives a model."""
 
 
-def servo_label(setup: "ServoSetup") -> str:
+def servo_label(setup: "ServoConfig") -> str:
     """Return how people know a servo: its joint and its id, or its channel."""
     return label_with(setup, "channel" if setup.model in HOBBY else "servo")

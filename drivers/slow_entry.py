@@ -9,7 +9,7 @@ its answers is marked ``rearmed``, which makes plans begin where it is.
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 
 ENTRY_DEG_S = 30.0
 """Speed at a joint that is brought inside its limits."""
@@ -35,7 +35,7 @@ class SlowEntry:
         setups: the servos by id.
     """
 
-    def __init__(self, setups: Mapping[int, ServoSetup]) -> None:
+    def __init__(self, setups: Mapping[int, ServoConfig]) -> None:
         self._setups = setups
         self._places: dict[int, _Place | None] = {}
 
@@ -82,7 +82,7 @@ class SlowEntry:
         return not setup.min_steps - room_steps <= steps <= setup.max_steps + room_steps
 
 
-def entry_speed_steps_s(setup: ServoSetup, steps_per_turn: float) -> float:
+def entry_speed_steps_s(setup: ServoConfig, steps_per_turn: float) -> float:
     """Return the speed of a servo that is led inside: never above its own top speed."""
     wanted = setup.entry_speed_steps_s
     slow = ENTRY_DEG_S / 360.0 * steps_per_turn if wanted is None else wanted

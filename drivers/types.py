@@ -87,7 +87,7 @@ class BusHealth(NamedTuple):
     errors: Mapping[str, int]
 
 
-class ServoSetup(NamedTuple):
+class ServoConfig(NamedTuple):
     """What a bus must know of one servo.
 
     model: name as in the control table, e.g. "xl330-m077"
@@ -166,7 +166,7 @@ class ServoBus(Protocol):
         """Return what happened since the last call, e.g. "servo 3 restarted: set up anew"."""
         ...
 
-    def retune(self, setups: Sequence[ServoSetup]) -> None:
+    def retune(self, setups: Sequence[ServoConfig]) -> None:
         """Set the servos up so when the torque comes on the next time; the same ids and models."""
         ...
 

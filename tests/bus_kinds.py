@@ -12,15 +12,15 @@ from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
-from gazerig.drivers.maestro.commands import Speech
-from gazerig.drivers.multi_bus import MixedBus, Share
+from gazerig.drivers.maestro.commands import MaestroCodec
+from gazerig.drivers.multi_bus import BusShare, MultiBus
 from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
 from gazerig.drivers.serial.port import BlockingPort, BusPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.servo_bus.params import BusParams
 from gazerig.drivers.servo_families import FAMILY_OF
-from gazerig.drivers.types import ServoBus, ServoSetup
+from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import (
     DynamixelLine,
@@ -104,16 +104,16 @@ class Twin:
         self.on = {p: name for name, places in self.buses.items() for p in places}
         self.now_s, self.wait = wires.now_s, wires.wait
 
-    def bus(self, setups: Sequence[ServoSetup] | None = None, give_up_s: float = 60.0) -> ServoBus:
+    def bus(self, setups: Sequence[ServoConfig] | None = None, give_up_s: float = 60.0) -> ServoBus:
         """Make the bus."""
         setups = setups or self.setups
         shares = [
-            Share(name, self._one(name, [setups[p] for p in places], give_up_s), places)
+            BusShare(name, self._one(name, [setups[p] for p in places], give_up_s), places)
             for name, places in self.buses.items()
         ]
-        return MixedBus(shares) if len(shares) > 1 else shares[0].bus
+        return MultiBus(shares) if len(shares) > 1 else shares[0].bus
 
-    def _one(self, name: str, setups: Sequence[ServoSetup], give_up_s: float) -> ServoBus:
+    def _one(self, name: str, setups: Sequence[ServoConfig], give_up_s: float) -> ServoBus:
         port = self.wires.ports[name]
         # A shared machine may stall a process for longer than real servos ever wait.
         patience: dict[str, Any] = {"reply_timeout_ms": 200.0} if self._patient else {}
@@ -190,7 +190,7 @@ class Twin:
         port = self.wires.ports["maestro"]
         assert port.setBaudRate(115_200)
         targets = self.steps([SHARES[p % 4] for p in range(self.count)])
-        speech = Speech("compact", 12, False, 12)
+        speech = MaestroCodec("compact", 12, False, 12)
         for place in self.buses["maestro"]:
             port.write(speech.target(self.setups[place].id, targets[place]))
         self.wait(0.3)
@@ -246,13 +246,13 @@ class Twin:
         return all(abs(x - goal) <= NEAR_SHARE for x, goal in zip(shares, goals, strict=True))
 
 
-def _setups(kind: str, name: str) -> dict[int, ServoSetup]:
+def _setups(kind: str, name: str) -> dict[int, ServoConfig]:
     """Return the setups of one bus by their place in the whole."""
     model = MODELS[name]
     low, high = RANGES[name]
     rest = (low + high) // 2 if name in BOARDS else None
     return {
-        place: ServoSetup(
+        place: ServoConfig(
             servo_id, model, low, high, SPEED_STEPS_S[name], NAMES[place], rest_steps=rest
         )
         for place, servo_id in zip(PLACES[kind][name], IDS, strict=False)

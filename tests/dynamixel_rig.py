@@ -6,7 +6,7 @@ from gazerig.drivers.dynamixel.control_table import BAUD_RATES
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.servo_bus.bus import SmartServoBus
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
@@ -25,7 +25,7 @@ class Rig(MovingBus):
         self.chain.refresh()
         self.port = InProcessPort(self.chain, self.sent.append, sleep_until=self.sleep_until)
         setups = [
-            ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0, name)
+            ServoConfig(i, "xl330-m077", 1000, 3000, 6000.0, name)
             for i, name in zip(IDS, NAMES, strict=True)
         ]
         chosen = DynamixelParams(fast_sync_read=fast, indirect_block=indirect, **params)

@@ -13,7 +13,7 @@ import pytest
 
 from gazerig.config.schema import Rig
 from gazerig.drivers.servo_models import HOBBY_KINDS
-from gazerig.drivers.types import BusHealth, Feedback, ServoSetup
+from gazerig.drivers.types import BusHealth, Feedback, ServoConfig
 from gazerig.robot.app import run_bus
 from gazerig.robot.app.bus_wiring import rig_setups
 from gazerig.robot.app.emulation import place_of
@@ -80,7 +80,7 @@ class IdealBus:
     def disable_torque(self) -> None:
         self._torque = False
 
-    def retune(self, setups: Sequence[ServoSetup]) -> None:
+    def retune(self, setups: Sequence[ServoConfig]) -> None:
         self._setups = tuple(setups)
 
     def faults(self) -> tuple[str, ...]:

@@ -17,7 +17,7 @@ from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
 from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
 from gazerig.drivers.servo_bus.bus import SmartServoBus
-from gazerig.drivers.types import ServoBus, ServoSetup
+from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import (
     DynamixelLine,
@@ -130,7 +130,7 @@ class Noisy:
         speed = SPEED_STEPS_S[self._make]
         own = 22_000.0 if self._make in BOARDS else None
         setups = [
-            ServoSetup(
+            ServoConfig(
                 i,
                 model,
                 self.low,

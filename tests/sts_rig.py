@@ -5,7 +5,7 @@ from moving_bus import IDS, NAMES, MovingBus
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.servo_bus.bus import SmartServoBus
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.feetech.chain import build_feetech
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
@@ -26,7 +26,7 @@ class Rig(MovingBus):
             self.chain, self.sent.append, sleep_until=self.sleep_until, wire_time=wire_time
         )
         self.setups = setups or [
-            ServoSetup(i, "sts3215", 1000, 3000, SPEED, name)
+            ServoConfig(i, "sts3215", 1000, 3000, SPEED, name)
             for i, name in zip(IDS, NAMES, strict=True)
         ]
         self.bus = SmartServoBus(FEETECH, self.port, self.setups, FeetechParams(**params))

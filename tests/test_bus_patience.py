@@ -16,10 +16,10 @@ from gazerig.drivers.servo_bus.adaptive_timeout import (
     WINDOW,
     AdaptiveTimeout,
 )
-from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN, Health
+from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN, ServoHealth
 from gazerig.drivers.servo_bus.read_windows import CALM_S
 from gazerig.drivers.servo_models import servo_label
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 
 
 def test_patience_begins_long_and_becomes_twice_the_worst_delay():
@@ -142,7 +142,7 @@ def test_a_lost_port_is_tried_ever_more_seldom_but_once_a_second():
 
 
 def test_the_fourth_restart_within_ten_seconds_is_one_too_many():
-    health = Health({3: ServoSetup(3, "xl330-m077", 0, 4095, 1.0, "jaw")}, EventLog())
+    health = ServoHealth({3: ServoConfig(3, "xl330-m077", 0, 4095, 1.0, "jaw")}, EventLog())
     for t_s in (0.0, 4.0, 8.0):
         assert not health.exhausted(3, t_s)
         health.restarted(3, t_s)
@@ -162,7 +162,7 @@ def test_the_journal_forgets_what_nobody_takes():
 
 
 def test_names_are_those_of_people_and_manuals():
-    setup = ServoSetup(7, "xl330-m077", 0, 4095, 1.0)
+    setup = ServoConfig(7, "xl330-m077", 0, 4095, 1.0)
     assert servo_label(setup) == "servo 7"
     assert servo_label(setup._replace(name="neck_yaw")) == "neck_yaw (servo 7)"
     assert register_label("return_delay_time") == "Return Delay Time"

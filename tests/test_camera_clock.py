@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gazerig.drivers.camera.clock_sync import ClockBridge
+from gazerig.drivers.camera.clock_sync import ClockSync
 
 RATE_HZ = 30.0
 
@@ -26,25 +26,25 @@ def run(
 
 
 def test_offset_is_the_least_delay():
-    errors = run(ClockBridge(0.02), 20.0, offset_s=-7000.0, start_s=100.0)
+    errors = run(ClockSync(0.02), 20.0, offset_s=-7000.0, start_s=100.0)
     assert np.abs(errors[60:]).max() < 0.001
 
 
 def test_unknown_least_delay_stays():
-    errors = run(ClockBridge(), 20.0)
+    errors = run(ClockSync(), 20.0)
     assert errors[60:] == pytest.approx(0.02, abs=0.001)
 
 
 @pytest.mark.parametrize("drift", [50e-6, -50e-6])
 def test_drift_is_followed_for_ten_minutes(drift):
-    bridge = ClockBridge(0.02)
+    bridge = ClockSync(0.02)
     errors = run(bridge, 600.0, drift=drift)
     assert bridge.drift_ppm == pytest.approx(-drift * 1e6, abs=8.0)
     assert np.abs(errors[30 * 30 :]).max() < 0.0015  # untouched it would be 30 ms
 
 
 def test_device_that_starts_anew_is_noticed_at_once():
-    bridge = ClockBridge(0.02)
+    bridge = ClockSync(0.02)
     run(bridge, 30.0, offset_s=500.0)
     errors = run(bridge, 10.0, offset_s=0.0, start_s=31.0, seed=2)
     assert bridge.jumps == 1
@@ -52,7 +52,7 @@ def test_device_that_starts_anew_is_noticed_at_once():
 
 
 def test_clock_set_ahead_is_noticed_at_once():
-    bridge = ClockBridge(0.02)
+    bridge = ClockSync(0.02)
     run(bridge, 30.0)
     errors = run(bridge, 10.0, offset_s=1000.0, start_s=31.0, seed=2)
     assert bridge.jumps == 1
@@ -60,13 +60,13 @@ def test_clock_set_ahead_is_noticed_at_once():
 
 
 def test_single_late_pictures_are_no_jump():
-    bridge = ClockBridge()
+    bridge = ClockSync()
     run(bridge, 60.0)
     assert bridge.jumps == 0
 
 
 def test_clock_that_stood_still_a_while_is_noticed_after_a_second():
-    bridge = ClockBridge(0.02)
+    bridge = ClockSync(0.02)
     run(bridge, 30.0, offset_s=0.0, start_s=0.0)
     # Device time goes on from where it was; the host is 5 s further.
     errors = run(bridge, 20.0, offset_s=30.0, start_s=35.0, seed=3)
@@ -77,7 +77,7 @@ def test_clock_that_stood_still_a_while_is_noticed_after_a_second():
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.tuples(st.floats(0.0, 0.5), st.floats(0.0, 1.0)), min_size=1, max_size=80))
 def test_time_never_runs_back_nor_ahead_of_the_arrival(steps):
-    bridge = ClockBridge()
+    bridge = ClockSync()
     device_s, before_s, arrived_s, jumps = 0.0, -np.inf, -np.inf, 0
     for step_s, late_s in steps:
         device_s += step_s

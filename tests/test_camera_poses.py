@@ -6,7 +6,7 @@ from math import cos, radians, sin
 import numpy as np
 import pytest
 
-from gazerig.drivers.camera.pose_buffer import PoseRing
+from gazerig.drivers.camera.pose_buffer import PoseBuffer
 
 
 def turn(deg: float) -> np.ndarray:
@@ -15,16 +15,16 @@ def turn(deg: float) -> np.ndarray:
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
 
-def filled(count: int, rate_deg_s: float = 100.0) -> PoseRing:
-    ring = PoseRing()
+def filled(count: int, rate_deg_s: float = 100.0) -> PoseBuffer:
+    ring = PoseBuffer()
     for k in range(count):
         ring.remember(10.0 + k * 0.005, turn(rate_deg_s * k * 0.005))
     return ring
 
 
 def test_nothing_is_known_at_first():
-    assert PoseRing().at(1.0) is None
-    assert PoseRing().turned(1.0, 0.9) is None
+    assert PoseBuffer().at(1.0) is None
+    assert PoseBuffer().turned(1.0, 0.9) is None
 
 
 @pytest.mark.parametrize("t_s", [10.0, 10.005, 10.0125, 10.1, 10.195])

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from present import present
 
-from gazerig.drivers.camera.params import CameraCareParams
+from gazerig.drivers.camera.frame_watchdog import FIRST_PICTURE_S, FrameWatchdog
+from gazerig.drivers.camera.params import CameraRecoveryParams
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay
 from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.recording_writer import RecordingWriter
 from gazerig.drivers.camera.shared_frames import SlotReader, SlotWriter
-from gazerig.drivers.camera.silence import FIRST_PICTURE_S, PictureSilence
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.camera.worker import CameraParts
@@ -106,7 +106,7 @@ def test_detector_that_cannot_be_made_says_so_at_once(recording):
         CameraProcess(parts, time.monotonic).open()
 
 
-QUICK = CameraCareParams(retry_ms=1.0, longest_retry_ms=20.0, silent_s=60.0, restart_s=60.0)
+QUICK = CameraRecoveryParams(retry_ms=1.0, longest_retry_ms=20.0, silent_s=60.0, restart_s=60.0)
 
 
 def test_a_killed_process_is_started_again_and_the_rest_goes_on(recording):
@@ -132,7 +132,7 @@ def test_a_killed_process_is_started_again_and_the_rest_goes_on(recording):
 
 
 def test_a_process_that_hangs_is_told_of_and_started_again(recording):
-    care = CameraCareParams(silent_s=1.0, restart_s=2.0)
+    care = CameraRecoveryParams(silent_s=1.0, restart_s=2.0)
     camera = process(partial(CameraReplay, recording), care)
     camera.open()
     wait_for(lambda: camera.pictures > 20)
@@ -148,7 +148,7 @@ def test_a_process_that_hangs_is_told_of_and_started_again(recording):
 
 
 def test_where_no_loss_is_borne_a_killed_process_ends_the_run(recording):
-    camera = process(partial(CameraReplay, recording), CameraCareParams(give_up_s=0.0))
+    camera = process(partial(CameraReplay, recording), CameraRecoveryParams(give_up_s=0.0))
     camera.open()
     wait_for(lambda: camera.latest(0.0) is not None)
     os.kill(present(present(camera._process).pid), signal.SIGKILL)
@@ -188,9 +188,9 @@ def test_closing_does_not_wait_for_a_process_that_starts_again(recording):
 
 
 def test_silence_is_judged_by_what_is_usual():
-    care = CameraCareParams(silent_s=1.0, restart_s=3.0)
+    care = CameraRecoveryParams(silent_s=1.0, restart_s=3.0)
     for period_s, lost_s, hung_s in ((0.03, 1.0, 3.0), (0.5, 2.5, 7.5), (2.0, 10.0, 30.0)):
-        silence, now_s = PictureSilence(care, 0.0), 0.0
+        silence, now_s = FrameWatchdog(care, 0.0), 0.0
         assert not silence.verdict(FIRST_PICTURE_S - 0.01)
         assert silence.verdict(FIRST_PICTURE_S + 0.01) == "hung"
         for _ in range(10):
@@ -207,7 +207,7 @@ def test_camera_lost_for_good_ends_with_its_reason(tmp_path):
     for k in range(3):
         writer.write(np.full((48, 64, 3), 20 * k, np.uint8))
     writer.release()
-    care = CameraCareParams(retry_ms=1.0, longest_retry_ms=5.0, give_up_s=0.1)
+    care = CameraRecoveryParams(retry_ms=1.0, longest_retry_ms=5.0, give_up_s=0.1)
     camera = process(partial(VideoFile, path), care)
     camera.open()
     wait_for(lambda: camera.latest(0.0) is not None)

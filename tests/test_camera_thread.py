@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from present import present
 
-from gazerig.drivers.camera.params import CameraCareParams
+from gazerig.drivers.camera.params import CameraRecoveryParams
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.thread import CameraThread
@@ -18,8 +18,8 @@ from gazerig.drivers.types import DetectedFace, MovingBlob
 
 PATIENCE_S = 20.0  # how long a test waits before it calls the thread stuck
 
-AT_ONCE = CameraCareParams(give_up_s=0.0)
-QUICKLY = CameraCareParams(retry_ms=1.0, longest_retry_ms=4.0, give_up_s=PATIENCE_S)
+AT_ONCE = CameraRecoveryParams(give_up_s=0.0)
+QUICKLY = CameraRecoveryParams(retry_ms=1.0, longest_retry_ms=4.0, give_up_s=PATIENCE_S)
 
 FACE = DetectedFace((1.0, 2.0, 3.0, 4.0), np.zeros((5, 2)), 0.9)
 
@@ -221,7 +221,7 @@ def test_camera_that_cannot_be_opened_anew_is_tried_until_it_can(source):
 
 def test_waits_between_tries_double_up_to_the_longest(source):
     waits: list[float] = []
-    care = CameraCareParams(retry_ms=100.0, longest_retry_ms=350.0, give_up_s=1.0)
+    care = CameraRecoveryParams(retry_ms=100.0, longest_retry_ms=350.0, give_up_s=1.0)
     clock = [0.0]
     camera = CameraThread(source, EveryOther(), lambda: clock[0], care)
 
@@ -242,7 +242,7 @@ def test_waits_between_tries_double_up_to_the_longest(source):
 
 
 def test_close_does_not_wait_for_a_lost_camera(source):
-    care = CameraCareParams(retry_ms=60_000.0, longest_retry_ms=60_000.0, give_up_s=86_400.0)
+    care = CameraRecoveryParams(retry_ms=60_000.0, longest_retry_ms=60_000.0, give_up_s=86_400.0)
     camera = CameraThread(source, EveryOther(), time.monotonic, care)
     camera.open()
     lose(source)

@@ -7,14 +7,14 @@ from gazerig.drivers.maestro.board import MaestroBoard
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.params import Pca9685Params
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.channel_test import SLOW_STEPS_S, ChannelPosition, walk
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import build_board
 from gazerig.sim_mock.pca9685.bridge import build_bridge
 
-LID = ServoSetup(2, "hobby", 4400, 7600, 9000.0, "left_upper_lid", rest_steps=5000)
+LID = ServoConfig(2, "hobby", 4400, 7600, 9000.0, "left_upper_lid", rest_steps=5000)
 PLACES = (5000, 4780, 5220, 5000)
 
 

@@ -11,7 +11,7 @@ from gazerig.drivers.feetech.memory_table import REGISTERS, TABLE_END
 from gazerig.drivers.serial.list_ports import Access, Host, SerialPort
 from gazerig.drivers.servo_bus.discovery import FoundServo, ping
 from gazerig.drivers.servo_bus.registers import Registers
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.bus_search import SearchRound
 from gazerig.robot.bringup.doctor.checks import apply_fix, examine, take
 from gazerig.robot.bringup.doctor.diagnostics import Diagnostic, Fix, worst
@@ -39,7 +39,7 @@ each = pytest.mark.parametrize("kind", [DYNAMIXEL, FEETECH], ids=lambda kind: ki
 
 def setups_of(kind):
     return tuple(
-        ServoSetup(i, (NECK if i == 7 else EYE)[kind.name], low, high,
+        ServoConfig(i, (NECK if i == 7 else EYE)[kind.name], low, high,
                    2000.0 if i == 7 else SPEED[kind.name], name)
         for i, low, high, name in RANGES
     )  # fmt: skip

@@ -8,7 +8,7 @@ from present import present
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.maestro.params import MaestroParams
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.channel_test import sent_home
 from gazerig.robot.bringup.doctor.diagnostics import worst
 from gazerig.robot.bringup.doctor.maestro import apply_fix, visit
@@ -24,8 +24,8 @@ from gazerig.robot.bringup.maestro_settings import (
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import build_board
 
-PAN = ServoSetup(0, "hobby", 4400, 7600, 9000.0, "eyes_pan", rest_steps=6000)
-LID = ServoSetup(2, "hobby", 3600, 7200, 9000.0, "left_upper_lid", rest_steps=5000)
+PAN = ServoConfig(0, "hobby", 4400, 7600, 9000.0, "eyes_pan", rest_steps=6000)
+LID = ServoConfig(2, "hobby", 3600, 7200, 9000.0, "left_upper_lid", rest_steps=5000)
 SETUPS = (PAN, LID)
 MINI, MICRO = "1ffb:008a", "1ffb:0089"
 

@@ -13,15 +13,15 @@ from gazerig.drivers.pca9685.registers import (
     prescale_of,
     pulse,
 )
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.doctor.diagnostics import worst
 from gazerig.robot.bringup.doctor.pca9685 import visit
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.pca9685.bridge import build_bridge
 
 SETUPS = (
-    ServoSetup(0, "hobby", 4400, 7600, 12_000.0, "eyes_pan"),
-    ServoSetup(1, "hobby", 4400, 7600, 12_000.0, "eyes_tilt"),
+    ServoConfig(0, "hobby", 4400, 7600, 12_000.0, "eyes_pan"),
+    ServoConfig(1, "hobby", 4400, 7600, 12_000.0, "eyes_tilt"),
 )
 PARAMS = Pca9685Params()
 

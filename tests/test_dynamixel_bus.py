@@ -15,7 +15,7 @@ from gazerig.drivers.dynamixel.protocol import instruction
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.serial.port import BlockingPort, BusPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.pty.client import PtyBus
@@ -32,7 +32,7 @@ SPECS = (
     ServoSpec(12, "xc330-m288", 2300),
     ServoSpec(7, "xc330-m288", 2048),
 )
-SETUPS = tuple(ServoSetup(s.id, s.model, 1000, 3000, SPEED) for s in SPECS)
+SETUPS = tuple(ServoConfig(s.id, s.model, 1000, 3000, SPEED) for s in SPECS)
 
 
 class Twin(NamedTuple):
@@ -137,7 +137,7 @@ def test_open_names_every_problem_at_once(twin):
     setups = (
         *SETUPS[:3],
         SETUPS[3]._replace(model="xl430-w250"),
-        ServoSetup(99, "xl330-m288", 0, 4095, SPEED),
+        ServoConfig(99, "xl330-m288", 0, 4095, SPEED),
     )
     with pytest.raises(ServoMissing) as caught:
         twin.bus(setups).open()
@@ -150,7 +150,7 @@ def test_open_names_every_problem_at_once(twin):
 
 def test_open_names_servos_that_nobody_expects_beside_the_missing_ones(twin):
     with pytest.raises(ServoMissing, match="unexpected: servo 1 .xl330-m077., 3 .xl330-m077."):
-        twin.bus([ServoSetup(i, "xl330-m288", 0, 4095, SPEED) for i in (50, 51)]).open()
+        twin.bus([ServoConfig(i, "xl330-m288", 0, 4095, SPEED) for i in (50, 51)]).open()
     bus = twin.bus(SETUPS[:3])
     bus.open()
     assert "servo 7 (xc330-m288) belongs to no joint: left alone" in bus.events()
@@ -160,7 +160,7 @@ def test_open_names_servos_that_nobody_expects_beside_the_missing_ones(twin):
 def test_a_joint_outside_its_limits_comes_in_slowly(kind):
     specs = (ServoSpec(1, "xl330-m077", 900), ServoSpec(2, "xl330-m077", 3170))
     for twin in make_twin(kind, specs):
-        bus = twin.bus([ServoSetup(i, "xl330-m077", 1000, 3000, SPEED) for i in (1, 2)])
+        bus = twin.bus([ServoConfig(i, "xl330-m077", 1000, 3000, SPEED) for i in (1, 2)])
         bus.open()
         assert bus.enable_torque() == (1000, 3000)
         slowest = 30 / 360 * 4096

@@ -6,7 +6,7 @@ from servo_rows import rows
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.servo_bus.bus import SmartServoBus
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
@@ -22,7 +22,7 @@ class Rig:
         self.now_s = 100.0
         specs = [ServoSpec(i, "xl330-m077", at) for i, at in zip(IDS, starts, strict=True)]
         self.chain = build_dynamixel(specs, lambda: self.now_s)
-        setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0) for i in IDS]
+        setups = [ServoConfig(i, "xl330-m077", 1000, 3000, 6000.0) for i in IDS]
         self.bus = SmartServoBus(
             DYNAMIXEL,
             InProcessPort(self.chain),

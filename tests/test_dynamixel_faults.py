@@ -11,7 +11,7 @@ from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.dynamixel.protocol import instruction
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.drivers.servo_bus.bus import SmartServoBus
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.dynamixel.packets import status
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -48,7 +48,7 @@ class Rig:
         specs = [ServoSpec(i, "xl330-m077", 2000 + i) for i in IDS]
         self.chain = build_dynamixel(specs, lambda: self.now_s)
         self.port = UnkindPort(self.chain, self.sent.append)
-        setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0) for i in IDS]
+        setups = [ServoConfig(i, "xl330-m077", 1000, 3000, 6000.0) for i in IDS]
         self.bus = SmartServoBus(
             DYNAMIXEL, self.port, setups, DynamixelParams(fast_sync_read=fast, **params)
         )

@@ -63,7 +63,7 @@ from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.servo_bus.adaptive_timeout import RESERVE_S
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
@@ -288,7 +288,7 @@ def test_14_one_silent_servo_of_nine_costs_little_time(fast):
     ids = range(1, 10)
     chain = build_dynamixel([ServoSpec(i, "xl330-m077", 2000) for i in ids], lambda: now_s[0])
     port = InProcessPort(chain, sleep_until=sleep_until, wire_time=True)
-    setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0) for i in ids]
+    setups = [ServoConfig(i, "xl330-m077", 1000, 3000, 6000.0) for i in ids]
     bus = SmartServoBus(DYNAMIXEL, port, setups, DynamixelParams(fast_sync_read=fast))
     bus.open()
     bus.enable_torque()

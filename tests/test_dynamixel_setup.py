@@ -13,7 +13,7 @@ from gazerig.drivers.dynamixel.protocol import HEADER
 from gazerig.drivers.errors import PortError, ServoMissing
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.servo_bus.registers import Registers
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.dynamixel.packets import status
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -42,7 +42,7 @@ class Rig:
             [ServoSpec(i, model, 2000 + i) for i in IDS], lambda: self.now_s
         )
         self.port = SpoiltPort(self.chain, self.sent.append)
-        setups = [ServoSetup(i, model, 1000, 3000, 6000.0) for i in IDS]
+        setups = [ServoConfig(i, model, 1000, 3000, 6000.0) for i in IDS]
         self.bus = SmartServoBus(DYNAMIXEL, self.port, setups, DynamixelParams())
 
     def open(self):
@@ -102,9 +102,9 @@ def test_open_tells_a_dead_bus_from_a_missing_servo():
 def test_one_message_names_missing_unexpected_wrong_and_old_servos_by_joint():
     rig = Rig()
     setups = [
-        ServoSetup(1, "xl430-w250", 1000, 3000, 6000.0, "neck_yaw"),
-        ServoSetup(2, "xl330-m077", 1000, 3000, 6000.0, "eye_left", 99),
-        ServoSetup(9, "xl330-m077", 1000, 3000, 6000.0, "jaw"),
+        ServoConfig(1, "xl430-w250", 1000, 3000, 6000.0, "neck_yaw"),
+        ServoConfig(2, "xl330-m077", 1000, 3000, 6000.0, "eye_left", 99),
+        ServoConfig(9, "xl330-m077", 1000, 3000, 6000.0, "jaw"),
     ]
     with pytest.raises(ServoMissing) as caught:
         SmartServoBus(DYNAMIXEL, rig.port, setups, DynamixelParams()).open()
@@ -120,7 +120,7 @@ def test_gains_strength_and_velocity_limit_are_set_where_they_differ_and_told():
     rig = Rig()
     servo = rig.chain[2]
     servo.memory.set("velocity_limit", 100)
-    setup = ServoSetup(2, "xl330-m077", 1000, 3000, 6000.0, "jaw", 0, (700, 10, 30), 0.4)
+    setup = ServoConfig(2, "xl330-m077", 1000, 3000, 6000.0, "jaw", 0, (700, 10, 30), 0.4)
     bus = SmartServoBus(DYNAMIXEL, rig.port, [setup], DynamixelParams())
     bus.open()
     get = servo.memory.get
@@ -146,7 +146,7 @@ def test_the_block_and_the_kind_of_reading_are_those_that_all_servos_have(
     sent: list[bytes] = []
     now_s = [0.0]
     port = InProcessPort(build_dynamixel(specs, lambda: now_s[0]), sent.append)
-    setups = [ServoSetup(s.id, s.model, 0, 4095, 6000.0) for s in specs]
+    setups = [ServoConfig(s.id, s.model, 0, 4095, 6000.0) for s in specs]
     bus = SmartServoBus(DYNAMIXEL, port, setups, DynamixelParams())
     bus.open()
     bus.enable_torque()
@@ -172,7 +172,7 @@ def test_the_block_and_the_kind_of_reading_are_those_that_all_servos_have(
 
 def test_the_block_can_be_left_out_by_choice():
     rig = Rig()
-    setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0) for i in IDS]
+    setups = [ServoConfig(i, "xl330-m077", 1000, 3000, 6000.0) for i in IDS]
     bus = SmartServoBus(DYNAMIXEL, rig.port, setups, DynamixelParams(indirect_block=False))
     bus.open()
     rig.sent.clear()
@@ -182,7 +182,7 @@ def test_the_block_can_be_left_out_by_choice():
 
 def test_open_with_an_impossible_baud_rate_names_it():
     rig = Rig()
-    setups = [ServoSetup(1, "xl330-m077", 1000, 3000, 6000.0)]
+    setups = [ServoConfig(1, "xl330-m077", 1000, 3000, 6000.0)]
     rig.bus = SmartServoBus(DYNAMIXEL, rig.port, setups, DynamixelParams(baud=1234))  # type: ignore[arg-type]
     with pytest.raises(PortError, match="cannot run at 1234 bit/s"):
         rig.open()
@@ -192,7 +192,7 @@ def test_old_firmware_is_read_the_plain_way():
     specs = [ServoSpec(1, "xl330-m077", 2000, 45), ServoSpec(2, "xl330-m077", 2000, 53)]
     sent: list[bytes] = []
     port = InProcessPort(build_dynamixel(specs, lambda: 0.0), sent.append)
-    setups = [ServoSetup(s.id, s.model, 0, 4095, 6000.0) for s in specs]
+    setups = [ServoConfig(s.id, s.model, 0, 4095, 6000.0) for s in specs]
     bus = SmartServoBus(DYNAMIXEL, port, setups, DynamixelParams())
     bus.open()
     assert None not in rows(bus.read(0.0))

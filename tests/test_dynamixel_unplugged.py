@@ -15,13 +15,13 @@ from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 IDS = (1, 2, 3)
 SPECS = [ServoSpec(i, "xl330-m077", 1200) for i in IDS]
-SETUPS = [ServoSetup(i, "xl330-m077", 1000, 3000, 200.0, f"joint_{i}") for i in IDS]
+SETUPS = [ServoConfig(i, "xl330-m077", 1000, 3000, 200.0, f"joint_{i}") for i in IDS]
 ROOT = Path(__file__).parents[1]
 
 DRIVER = """
@@ -30,8 +30,8 @@ from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.serial.port import BlockingPort
-from gazerig.drivers.types import ServoSetup
-setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 200.0) for i in (1, 2, 3)]
+from gazerig.drivers.types import ServoConfig
+setups = [ServoConfig(i, "xl330-m077", 1000, 3000, 200.0) for i in (1, 2, 3)]
 params = DynamixelParams(reply_timeout_ms=100.0)
 bus = SmartServoBus(DYNAMIXEL, BlockingPort(sys.argv[1]), setups, params)
 bus.open()

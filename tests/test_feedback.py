@@ -7,7 +7,7 @@ from servo_rows import Row, feedback_of, rows
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
-from gazerig.drivers.types import Feedback, ServoSetup
+from gazerig.drivers.types import Feedback, ServoConfig
 
 
 def row(steps, at_s, torque=True, rearmed=False):
@@ -38,7 +38,7 @@ def test_a_missing_servo_keeps_its_last_values_of_their_own_age():
 
 @pytest.fixture
 def columns():
-    setups = [ServoSetup(i, "xl330-m077", 0, 4095, 1000.0) for i in (1, 2, 3)]
+    setups = [ServoConfig(i, "xl330-m077", 0, 4095, 1000.0) for i in (1, 2, 3)]
     return FeedbackColumns(DYNAMIXEL, setups)
 
 

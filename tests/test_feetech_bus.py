@@ -16,7 +16,7 @@ from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.devices import FeetechLine
 from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
@@ -26,7 +26,7 @@ SPECS = (
     ServoSpec(1, "sts3215", 2048),
     ServoSpec(12, "sts3215-12v", 2300),
 )
-SETUPS = tuple(ServoSetup(s.id, s.model, 1000, 3000, 3000.0) for s in SPECS)
+SETUPS = tuple(ServoConfig(s.id, s.model, 1000, 3000, 3000.0) for s in SPECS)
 STARTS = [1800, 2048, 2300]
 
 
@@ -102,7 +102,7 @@ def test_from_open_to_close(twin):
 
 
 def test_open_names_every_problem_at_once_and_those_that_nobody_expects(twin):
-    setups = (SETUPS[0]._replace(firmware_min=400), ServoSetup(50, "sts3215", 0, 4095, 3000.0))
+    setups = (SETUPS[0]._replace(firmware_min=400), ServoConfig(50, "sts3215", 0, 4095, 3000.0))
     with pytest.raises(ServoMissing) as caught:
         twin.bus(setups).open()
     message = str(caught.value)
@@ -137,7 +137,7 @@ def test_a_second_open_writes_nothing_to_the_servos():
 @pytest.mark.parametrize(("low", "high"), [(900, 3170), (999, 3001)])
 def test_a_joint_outside_its_limits_comes_in_slowly(low, high):
     specs = [ServoSpec(1, "sts3215", low), ServoSpec(2, "sts3215", high)]
-    setups = [ServoSetup(i, "sts3215", 1000, 3000, 3000.0) for i in (1, 2)]
+    setups = [ServoConfig(i, "sts3215", 1000, 3000, 3000.0) for i in (1, 2)]
     rig = Rig(specs, setups)
     rig.bus.open()
     assert rig.bus.enable_torque() == (1000, 3000)
@@ -151,7 +151,7 @@ def test_a_joint_outside_its_limits_comes_in_slowly(low, high):
 
 
 def test_speed_and_acceleration_are_armed_before_the_torque():
-    setups = [ServoSetup(1, "sts3215", 1000, 3000, 700.0, max_accel_steps_s2=5000.0)]
+    setups = [ServoConfig(1, "sts3215", 1000, 3000, 700.0, max_accel_steps_s2=5000.0)]
     rig = Rig([ServoSpec(1, "sts3215", 2000)], setups)
     rig.bus.open()
     rig.sent.clear()
@@ -167,7 +167,7 @@ def test_speed_and_acceleration_are_armed_before_the_torque():
 
 
 def test_strength_and_gains_reach_the_servo_and_outlive_a_restart():
-    setup = ServoSetup(1, "sts3215", 1000, 3000, 3000.0, gains=(20, 1, 16), strength=0.4)
+    setup = ServoConfig(1, "sts3215", 1000, 3000, 3000.0, gains=(20, 1, 16), strength=0.4)
     rig = Rig([ServoSpec(1, "sts3215", 2000)], [setup])
     rig.bus.open()
     rig.bus.enable_torque()
@@ -237,7 +237,7 @@ def test_ranges_and_numbers_that_cannot_be_are_refused():
             SmartServoBus(FEETECH, rig.port, wrong, FeetechParams())
         with pytest.raises(ValueError, match="is no range within"):
             rig.bus.retune(wrong)
-    crowd = [ServoSetup(i, "sts3215", 0, 4095, 3000.0) for i in range(36)]
+    crowd = [ServoConfig(i, "sts3215", 0, 4095, 3000.0) for i in range(36)]
     with pytest.raises(ValueError, match="36 servos are too many for one bus: 35 at most"):
         SmartServoBus(FEETECH, rig.port, crowd, FeetechParams())
 
@@ -280,7 +280,7 @@ def test_corrupted_answers_never_become_readings(flips):
 
 def test_with_the_bytes_time_on_the_wire_a_tick_fits_into_ten_milliseconds():
     specs = [ServoSpec(i, "sts3215", 2000) for i in range(1, 9)]
-    setups = [ServoSetup(i, "sts3215", 1000, 3000, 3000.0) for i in range(1, 9)]
+    setups = [ServoConfig(i, "sts3215", 1000, 3000, 3000.0) for i in range(1, 9)]
     rig = Rig(specs, setups, wire_time=True).start()
     for _ in range(30):
         assert None not in rig.tick([2000] * 8)

@@ -21,7 +21,7 @@ from sts_rig import Rig
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN
 from gazerig.drivers.servo_bus.recovery import FAR_SIDE
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 
@@ -275,7 +275,7 @@ def test_whatever_goal_and_torque_do_nothing_leaps(goal, torque_on):
 
 @pytest.mark.parametrize("place", [2000, 950])
 def test_servos_whose_goal_goes_with_their_place_while_they_are_limp(place):
-    rig = Rig([ServoSpec(1, "sts3215", place)], [ServoSetup(1, "sts3215", 1000, 3000, 3000.0)])
+    rig = Rig([ServoSpec(1, "sts3215", place)], [ServoConfig(1, "sts3215", 1000, 3000, 3000.0)])
     servo = rig.chain[1]
     real = servo.read
 
@@ -295,7 +295,7 @@ def test_servos_whose_goal_goes_with_their_place_while_they_are_limp(place):
 
 def far_rig():
     specs = [ServoSpec(1, "sts3215", 4090), ServoSpec(2, "sts3215", 700)]
-    setups = [ServoSetup(i, "sts3215", 100, 1500, 3000.0, NAMES[i - 1]) for i in (1, 2)]
+    setups = [ServoConfig(i, "sts3215", 100, 1500, 3000.0, NAMES[i - 1]) for i in (1, 2)]
     return Rig(specs, setups)
 
 

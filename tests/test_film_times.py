@@ -9,7 +9,7 @@ from present import present
 
 from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
 from gazerig.drivers.camera.video_file import VideoFile
-from gazerig.drivers.camera.video_timestamps import FilmTimes, at_a_rate, by_table, rising
+from gazerig.drivers.camera.video_timestamps import VideoTimestamps, at_a_rate, by_table, rising
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
@@ -90,7 +90,7 @@ def times_s(rate_hz, count=40):
 
 
 def test_stated_rate_is_judged_by_the_times():
-    assert at_a_rate(25.0, "", times_s(25.0)) == FilmTimes(25.0)
+    assert at_a_rate(25.0, "", times_s(25.0)) == VideoTimestamps(25.0)
     assert present(at_a_rate(25.0, "", times_s(25.1))).rate_hz == 25.0  # rounding
     lie = at_a_rate(25.0, "", times_s(12.5))
     assert present(lie).rate_hz == pytest.approx(12.5)

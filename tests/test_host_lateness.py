@@ -7,7 +7,7 @@ import pytest
 from line_noise import Noisy
 
 from gazerig.drivers.errors import PortError
-from gazerig.drivers.event_log import SELDOM_S, EventLog, Seldom
+from gazerig.drivers.event_log import SELDOM_S, EventLog, RateLimitedLog
 from gazerig.drivers.host_lateness import BUSY, WITHIN_S, HostLateness
 from gazerig.drivers.serial.port import BlockingPort
 
@@ -27,7 +27,7 @@ def test_few_late_answers_are_no_busy_computer():
 
 def test_the_same_is_said_seldom_and_counted():
     journal = EventLog()
-    seldom = Seldom(journal)
+    seldom = RateLimitedLog(journal)
     for k in range(30):
         seldom.add("late", 7.0 + 0.1 * k)
     seldom.add("late", 7.0 + SELDOM_S)

@@ -8,7 +8,7 @@ import pytest
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import BusLost, ServoMissing
-from gazerig.drivers.maestro.commands import Speech
+from gazerig.drivers.maestro.commands import MaestroCodec
 from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.calibration.hobby_access import SPEED_US_S, OneHobby
 from gazerig.robot.calibration.joint_access import CalibrationStopped
@@ -120,7 +120,7 @@ def test_a_lid_is_left_shut_so_that_the_other_can_meet_it() -> None:
 def test_a_channel_that_gives_pulses_does_not_jump() -> None:
     bench = Bench("eyes_pan", "", "1550", "", "", "1450", "", "")
     bench.port.setBaudRate(115_200)
-    bench.port.write(Speech(crc=BOARD.crc).target(0, 1534 * 4))
+    bench.port.write(MaestroCodec(crc=BOARD.crc).target(0, 1534 * 4))
     bench.clock.sleep_until(1.0)
     before = bench.place_us()
     bench.hobby.open()

@@ -12,7 +12,7 @@ from servo_rows import rows
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
 from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
 from gazerig.drivers.serial.port import BlockingPort
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.devices import MaestroLine
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import build_board
@@ -22,9 +22,9 @@ CENTRE = 6000
 SPEED = 12_000.0
 LOW, HIGH = 4400, 7600
 SETUPS = (
-    ServoSetup(0, "hobby", LOW, HIGH, SPEED, "eyes", rest_steps=6100),
-    ServoSetup(1, "hobby", LOW, HIGH, SPEED, "lid"),
-    ServoSetup(5, "hobby", LOW, HIGH, SPEED, "brow", rest_steps=9000),
+    ServoConfig(0, "hobby", LOW, HIGH, SPEED, "eyes", rest_steps=6100),
+    ServoConfig(1, "hobby", LOW, HIGH, SPEED, "lid"),
+    ServoConfig(5, "hobby", LOW, HIGH, SPEED, "brow", rest_steps=9000),
 )
 IDS = tuple(setup.id for setup in SETUPS)
 TICK_S = 0.01

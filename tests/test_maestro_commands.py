@@ -4,10 +4,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gazerig.drivers.maestro.commands import Speech, crc7, name_errors, runs, split, words
+from gazerig.drivers.maestro.commands import MaestroCodec, crc7, name_errors, runs, split, words
 
-COMPACT = Speech()
-POLOLU = Speech("pololu")
+COMPACT = MaestroCodec()
+POLOLU = MaestroCodec("pololu")
 
 CALLS = (
     (lambda s: s.target(0, 6000), "84 00 70 2E"),
@@ -33,20 +33,20 @@ def test_commands_in_both_forms(call, expected):
 
 
 def test_another_device_number():
-    assert Speech("pololu", device=3).errors() == bytes.fromhex("AA 03 21")
+    assert MaestroCodec("pololu", device=3).errors() == bytes.fromhex("AA 03 21")
 
 
 def test_the_check_byte():
     assert crc7(bytes.fromhex("83 01")) == 0x17
     assert crc7(bytes.fromhex("84 00 70 2E")) == 0x2B
-    assert Speech(crc=True).target(0, 6000) == bytes.fromhex("84 00 70 2E 2B")
-    both = Speech("pololu", crc=True).position(1)
+    assert MaestroCodec(crc=True).target(0, 6000) == bytes.fromhex("84 00 70 2E 2B")
+    both = MaestroCodec("pololu", crc=True).position(1)
     assert both == bytes.fromhex("AA 0C 10 01") + bytes((crc7(bytes.fromhex("AA 0C 10 01")),))
 
 
 def test_every_command_of_a_packet_has_its_own_check_byte():
-    packet = Speech(crc=True).targets({0: 6000, 2: 6000})
-    assert packet == bytes.fromhex("84 00 70 2E 2B") + Speech(crc=True).target(2, 6000)
+    packet = MaestroCodec(crc=True).targets({0: 6000, 2: 6000})
+    assert packet == bytes.fromhex("84 00 70 2E 2B") + MaestroCodec(crc=True).target(2, 6000)
 
 
 def test_neighbours_share_a_command_where_the_board_has_it():
@@ -54,7 +54,7 @@ def test_neighbours_share_a_command_where_the_board_has_it():
     assert COMPACT.targets(goals) == (
         bytes.fromhex("9F 02 00 21 1F 20 1F") + COMPACT.target(4, 6000) + COMPACT.target(6, 5000)
     )
-    micro = Speech(channels=6)
+    micro = MaestroCodec(channels=6)
     assert micro.targets({0: 4001, 1: 4000}) == micro.target(0, 4001) + micro.target(1, 4000)
 
 
@@ -89,7 +89,7 @@ def test_what_does_not_fit_is_refused(number):
 
 @given(
     st.builds(
-        Speech,
+        MaestroCodec,
         st.sampled_from(["compact", "pololu"]),
         st.integers(0, 127),
         st.booleans(),

@@ -7,9 +7,9 @@ from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.maestro.limits import SPEED_STEPS_S, speed_units
 from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.maestro.params import MaestroParams
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 
-SETUP = ServoSetup(3, "hobby", 4400, 7600, 12_000.0)
+SETUP = ServoConfig(3, "hobby", 4400, 7600, 12_000.0)
 
 
 class SlowPort(StandIn):

@@ -5,13 +5,13 @@ from numpy.random import default_rng
 from servo_rows import rows
 
 from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.maestro.board import build_board
 
 SPEED = 12_000.0
 LOW, HIGH = 4400, 7600
-SETUPS = tuple(ServoSetup(i, "hobby", LOW, HIGH, SPEED, rest_steps=6000) for i in (0, 1, 2, 7))
+SETUPS = tuple(ServoConfig(i, "hobby", LOW, HIGH, SPEED, rest_steps=6000) for i in (0, 1, 2, 7))
 TICK_S = 0.01
 TIMEOUT_S = 0.02
 

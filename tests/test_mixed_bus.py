@@ -8,10 +8,10 @@ import pytest
 from servo_rows import Row, feedback_of, rows
 
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
-from gazerig.drivers.multi_bus import AGAIN_S, IN_A_ROW, MixedBus, Share
-from gazerig.drivers.types import BusHealth, ServoSetup
+from gazerig.drivers.multi_bus import AGAIN_S, IN_A_ROW, BusShare, MultiBus
+from gazerig.drivers.types import BusHealth, ServoConfig
 
-WANTED = tuple(ServoSetup(i, "xl330-m077", 0, 4095, 100.0) for i in range(5))
+WANTED = tuple(ServoConfig(i, "xl330-m077", 0, 4095, 100.0) for i in range(5))
 
 
 def row_at(steps, now_s):
@@ -82,7 +82,7 @@ class Mixture:
         self.log: list[Any] = []
         self.a = Scripted("a", (11, 13, 14), self.log)
         self.b = Scripted("b", (12, 10), self.log)
-        self.bus = MixedBus([Share("a", self.a, (1, 3, 4)), Share("b", self.b, (2, 0))])
+        self.bus = MultiBus([BusShare("a", self.a, (1, 3, 4)), BusShare("b", self.b, (2, 0))])
 
     def told(self):
         log, self.log[:] = list(self.log), []
@@ -100,9 +100,9 @@ def steps(readings):
 
 @pytest.mark.parametrize("places", [((0, 1), (1, 2)), ((0,), (2,)), ((1,), (2,)), ((0, 1), (-1,))])
 def test_every_place_must_be_there_once(places):
-    shares = [Share(str(k), Scripted(str(k), own, []), own) for k, own in enumerate(places)]
+    shares = [BusShare(str(k), Scripted(str(k), own, []), own) for k, own in enumerate(places)]
     with pytest.raises(ValueError, match="each from 0 on must be there once"):
-        MixedBus(shares)
+        MultiBus(shares)
 
 
 def test_every_sequence_is_in_the_order_of_the_whole(mixture):

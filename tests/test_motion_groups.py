@@ -6,7 +6,7 @@ import pytest
 from gazerig.drivers.vision.motion.clustering import gathered
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.drivers.vision.motion.segmentation import Things
-from gazerig.drivers.vision.motion.tracking import Follow, MotionTracks
+from gazerig.drivers.vision.motion.tracking import MotionTracks, PatchTrack
 
 SHAPE = (240, 320)
 Box = tuple[int, int, int, int]
@@ -69,7 +69,7 @@ def test_nothing_is_nothing() -> None:
 
 def follow(
     tracks: MotionTracks, k: int, *places: tuple[float, float], v: tuple[float, float] = (0, 0)
-) -> list[Follow]:
+) -> list[PatchTrack]:
     return tracks.step(
         [np.array(place, dtype=float) for place in places],
         [np.array(v, dtype=float)] * len(places),

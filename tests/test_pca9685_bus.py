@@ -21,7 +21,7 @@ from gazerig.drivers.pca9685.probe import probe
 from gazerig.drivers.pca9685.registers import AWAKE, MODE1, PRESCALE, counts_of, prescale_of, pulse
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.serial.port_owner import refuse_owner
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.sim_mock.hobby_servo import HobbySpec
@@ -35,7 +35,7 @@ QUICK = Pca9685Params(stagger_ms=0.0)
 
 
 def setup(servo_id, **changes):
-    made = ServoSetup(servo_id, "hobby", 4400, 7600, SPEED_STEPS_S, f"joint {servo_id}")
+    made = ServoConfig(servo_id, "hobby", 4400, 7600, SPEED_STEPS_S, f"joint {servo_id}")
     return made._replace(rest_steps=6000, **changes)
 
 

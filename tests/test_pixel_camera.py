@@ -21,9 +21,9 @@ from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.face_pose import face_pose
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
-from gazerig.sim_mock.cameras.canvas import Picture3d, Sheet
+from gazerig.sim_mock.cameras.canvas import Canvas, TexturedQuad
 from gazerig.sim_mock.cameras.draw_person import (
-    LOOKS,
+    PERSON_COLOURS,
     draw_body,
     draw_head,
     draw_person,
@@ -83,9 +83,9 @@ class Still:
         return ()
 
 
-def canvas_at(head_rad: Angles3 = (0.0, 0.0, 0.0), p_m: Vec3 = (0.0, 0.0, 0.0)) -> Picture3d:
+def canvas_at(head_rad: Angles3 = (0.0, 0.0, 0.0), p_m: Vec3 = (0.0, 0.0, 0.0)) -> Canvas:
     R, p = MOUNT.pose(rotation(head_rad), p_m)
-    return Picture3d(WIDTH, HEIGHT, LENS, R, p)
+    return Canvas(WIDTH, HEIGHT, LENS, R, p)
 
 
 def level(_: float) -> tuple[Mat3, Vec3]:
@@ -112,7 +112,7 @@ def test_a_point_of_the_world_is_drawn_where_a_camera_sees_it(yaw_deg: float) ->
     red[:] = (0, 0, 255)
     right, down = np.array((s, -c, 0.0)) * 0.2, np.array((0.0, 0.0, -0.2))
     corner = middle - 0.5 * (right + down)
-    canvas.sheet(Sheet(tuple(corner), tuple(right), tuple(down), red))
+    canvas.sheet(TexturedQuad(tuple(corner), tuple(right), tuple(down), red))
     y, x = np.nonzero(canvas.picture[:, :, 2] > 127)
     expected = project(canvas.seen(middle), LENS)[0]
     assert (x.mean(), y.mean()) == pytest.approx(tuple(expected), abs=0.6)
@@ -163,14 +163,14 @@ def test_the_nearer_covers_the_farther() -> None:
     assert canvas.depth_m[200 - 55, 320] == pytest.approx(2.0, abs=0.02)
 
 
-def face_drawn(away_m: float, roll_deg: float, who: int) -> tuple[Picture, Picture3d, np.ndarray]:
+def face_drawn(away_m: float, roll_deg: float, who: int) -> tuple[Picture, Canvas, np.ndarray]:
     """Draw a face that looks at the camera, rolled, before the room; with its true landmarks."""
     canvas = canvas_at()
     draw_room(canvas)
     place = (away_m, 0.05 * away_m, 0.03)
     R = np.array(rotation((np.pi, 0.0, radians(roll_deg))))
-    draw_body(canvas, place, LOOKS[who], who)
-    draw_head(canvas, place, R, LOOKS[who])
+    draw_body(canvas, place, PERSON_COLOURS[who], who)
+    draw_head(canvas, place, R, PERSON_COLOURS[who])
     noise = np.random.default_rng(0).normal(0.0, 3.0, canvas.picture.shape)
     picture = np.clip(canvas.picture + noise, 0.0, 255.0).astype(np.uint8)
     return picture, canvas, project(canvas.seen(LANDMARKS_FACE_M @ R.T + place), LENS)
@@ -183,7 +183,7 @@ def test_a_real_detector_finds_drawn_faces_where_they_are(
     """At ten distances: landmarks within a part of the distance between the eyes."""
     errors, directions = [], []
     for number, away_m in enumerate(np.geomspace(0.45, 2.2, 10).tolist()):
-        picture, canvas, true = face_drawn(away_m, roll_deg, number % len(LOOKS))
+        picture, canvas, true = face_drawn(away_m, roll_deg, number % len(PERSON_COLOURS))
         found = mtcnn.find(picture)
         assert len(found) == 1, away_m
         eyes_px = np.linalg.norm(true[1] - true[0])

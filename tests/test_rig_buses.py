@@ -9,7 +9,7 @@ from mixed_rig import mixed_text
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.multi_bus import MixedBus
+from gazerig.drivers.multi_bus import MultiBus
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, ports_of, rig_setups
 from gazerig.robot.app.options import RunOptions
 
@@ -98,8 +98,8 @@ def test_one_bus_is_itself_and_several_are_one(mixed: Rig) -> None:
     from gazerig.robot.app.assemble import assemble
 
     made = assemble(mixed, RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
-    assert isinstance(made.robot.body.bus, MixedBus)
+    assert isinstance(made.robot.body.bus, MultiBus)
     alone = assemble(load_rig("maker"), RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
-    assert not isinstance(alone.robot.body.bus, MixedBus)
+    assert not isinstance(alone.robot.body.bus, MultiBus)
     made.close()
     alone.close()

@@ -7,7 +7,7 @@ import pytest
 from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
 from gazerig.drivers.servo_bus.discovery import FoundServo, any_reply, ping
 from gazerig.drivers.servo_bus.registers import Registers
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.servo_families import DYNAMIXEL, FEETECH
 from gazerig.robot.bringup.servo_reboot import Standing, restart
 from gazerig.robot.bringup.servo_setup import assign, find_alone, search_order
@@ -19,7 +19,7 @@ from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 BAUD = 1_000_000
 MODELS = {"dynamixel": "xc330-m288", "feetech": "sts3215"}
-YAW = ServoSetup(7, "xc330-m288", 1252, 2844, 2000.0, "neck_yaw")
+YAW = ServoConfig(7, "xc330-m288", 1252, 2844, 2000.0, "neck_yaw")
 
 RATES = DYNAMIXEL.family.usual_rates
 

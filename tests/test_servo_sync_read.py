@@ -20,7 +20,7 @@ from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.poll_list import AGAIN_FIRST_S, AGAIN_LAST_S, PollList, silent_ones
 from gazerig.drivers.servo_bus.sync_packets import SyncRead
 from gazerig.drivers.servo_bus.sync_read import GroupReply, ServoReply
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.dynamixel.packets import status
 from gazerig.sim_mock.feetech.chain import build_feetech
@@ -215,7 +215,7 @@ def test_an_answer_of_another_length_is_not_the_one_asked_for():
 
 def columns_of(family, model, *ids, **limits):
     """Return the columns of some servos that are under torque."""
-    setups = [ServoSetup(i, model, 0, 4095, 3000.0, **limits) for i in ids]
+    setups = [ServoConfig(i, model, 0, 4095, 3000.0, **limits) for i in ids]
     columns = FeedbackColumns(family, setups)
     columns.expect_torque(True)
     return columns
@@ -284,7 +284,7 @@ def test_an_answer_in_which_anything_is_amiss_is_looked_at(
 
 
 def test_a_place_that_no_joint_can_have_come_to_must_be_said_twice():
-    columns = FeedbackColumns(FEETECH, [ServoSetup(1, "sts3215", 0, 4095, 3000.0)])
+    columns = FeedbackColumns(FEETECH, [ServoConfig(1, "sts3215", 0, 4095, 3000.0)])
 
     def believes(position, at_s):
         sample = SENSED.sample(0, struct.pack("<H", position) + BLOCK[2:])

@@ -11,7 +11,7 @@ from emulated_rig import EmulatedRig, mixed_rig
 from present import present
 
 from gazerig.config.schema import Rig, load_rig
-from gazerig.drivers.maestro.commands import Speech
+from gazerig.drivers.maestro.commands import MaestroCodec
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.bringup.monitor import Monitor, as_json
@@ -177,7 +177,7 @@ def test_hobby_servos_show_their_pulse_and_what_it_would_be_in_degrees() -> None
     bench = Bench(MAKER)
     limp = bench.see("eyes_pan")
     assert limp.pulse_us == 0.0 and limp.position_deg is None and not limp.torque
-    bench.ports[""].write(Speech(crc=MAKER.bus.maestro.crc).target(0, 1634 * 4))
+    bench.ports[""].write(MaestroCodec(crc=MAKER.bus.maestro.crc).target(0, 1634 * 4))
     bench.clock.sleep_until(0.5)
     seen = bench.see("eyes_pan")
     assert seen.pulse_us == 1634.0 and seen.position_deg == pytest.approx(10.0)

@@ -4,8 +4,8 @@ import threading
 from collections.abc import Callable
 
 from gazerig.drivers.camera.frame_analysis import FrameAnalyzer, Motion
-from gazerig.drivers.camera.params import CameraCareParams
-from gazerig.drivers.camera.source import PictureSource, Shot
+from gazerig.drivers.camera.params import CameraRecoveryParams
+from gazerig.drivers.camera.source import FrameSource, Shot
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.types import Detections, FaceDetector
 
@@ -13,7 +13,7 @@ LOST, BACK = "camera lost", "camera back"
 """The beginnings of the events about a source that is lost, and of its return."""
 
 
-class CameraWatch:
+class CaptureLoop:
     """A source of frames with the detectors that look for faces and motion in them.
 
     A source that is lost in service is reopened until it is back or ``care.give_up_s`` is
@@ -30,10 +30,10 @@ class CameraWatch:
 
     def __init__(
         self,
-        source: PictureSource,
+        source: FrameSource,
         detector: FaceDetector,
         now_s: Callable[[], float],
-        care: CameraCareParams,
+        care: CameraRecoveryParams,
         motion: Motion | None,
         tell: Callable[[str], None],
     ) -> None:

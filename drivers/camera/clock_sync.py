@@ -25,7 +25,7 @@ class _Best(NamedTuple):
     difference_s: float
 
 
-class ClockBridge:
+class ClockSync:
     """Translates stamps of one device clock; each is translated once, in order.
 
     jumps: how often the device clock was found set anew

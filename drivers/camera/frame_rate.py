@@ -11,7 +11,7 @@ _TOLERANCE = 0.2
 _PROMPT = 0.5
 
 
-class RateWatch:
+class FrameRateMonitor:
     """Measures the rate from the times of pictures, and tells once when it is not as stated.
 
     Only intervals in which the reader was back in time count: a slow reader misses

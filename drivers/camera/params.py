@@ -7,7 +7,7 @@ from gazerig.params import Bounds
 
 
 @dataclass(frozen=True)
-class CameraCareParams:
+class CameraRecoveryParams:
     """How a camera that went away is tried again."""
 
     # fmt: off

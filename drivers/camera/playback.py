@@ -7,8 +7,8 @@ from statistics import median
 
 from gazerig.drivers.camera.recording_reader import Recording
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.camera.video_pacing import FilmPace
-from gazerig.drivers.camera.video_timestamps import FilmTimes
+from gazerig.drivers.camera.video_pacing import VideoPacing
+from gazerig.drivers.camera.video_timestamps import VideoTimestamps
 from gazerig.drivers.errors import CameraError
 
 _ALONE_S = 0.1  # how long a recording of one picture lasts
@@ -21,8 +21,8 @@ class CameraReplay:
         """Name the file; nothing is opened yet."""
         self._path = Path(path).expanduser()
         self._recording: Recording | None = None
-        self._times = FilmTimes(1.0)
-        self._pace = FilmPace()
+        self._times = VideoTimestamps(1.0)
+        self._pace = VideoPacing()
         self._untold = ""
 
     def open(self) -> None:
@@ -36,8 +36,8 @@ class CameraReplay:
         starts = self._recording.times_s
         steps = [b - a for a, b in zip(starts, starts[1:], strict=False)]
         length_s = starts[-1] + (median(steps) if steps else _ALONE_S)
-        self._times = FilmTimes(len(starts) / length_s, starts, length_s)
-        self._pace, self._untold = FilmPace(), self._recording.note
+        self._times = VideoTimestamps(len(starts) / length_s, starts, length_s)
+        self._pace, self._untold = VideoPacing(), self._recording.note
 
     @property
     def length_s(self) -> float:

@@ -19,7 +19,7 @@ _MARGIN = 8  # oldest entries that the loop may be writing over
 _NEWEST_SERVES_S = 0.05
 
 
-class PoseRing:
+class PoseBuffer:
     """The last few seconds of the camera's orientation.
 
     It can be handed to a process that is being started, as an argument.

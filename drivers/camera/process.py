@@ -21,9 +21,9 @@ from typing import NamedTuple
 
 from gazerig.drivers.camera.capture_loop import BACK, LOST
 from gazerig.drivers.camera.frame_analysis import Motion
-from gazerig.drivers.camera.params import CameraCareParams
+from gazerig.drivers.camera.frame_watchdog import FrameWatchdog
+from gazerig.drivers.camera.params import CameraRecoveryParams
 from gazerig.drivers.camera.shared_frames import SlotReader
-from gazerig.drivers.camera.silence import PictureSilence
 from gazerig.drivers.camera.worker import LONGEST_END_S, CameraParts, Ended, Found, Retune, run
 from gazerig.drivers.errors import CameraError, SetupError
 from gazerig.drivers.types import Detections, FaceDetector
@@ -62,11 +62,11 @@ class CameraProcess:
         self,
         parts: CameraParts,
         now_s: Callable[[], float],
-        care: CameraCareParams | None = None,
+        care: CameraRecoveryParams | None = None,
     ) -> None:
         self._parts = parts
         self._now_s = now_s
-        self._care = care or CameraCareParams()
+        self._care = care or CameraRecoveryParams()
         self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
         self._thread: threading.Thread | None = None
@@ -246,7 +246,7 @@ class CameraProcess:
         pipe = self._pipe
         assert pipe is not None
         slots = SlotReader(), SlotReader()
-        silence = PictureSilence(self._care, self._now_s())
+        silence = FrameWatchdog(self._care, self._now_s())
         retrying = False  # the process itself opens a lost source again and again
         self._counted = self._number
         try:
@@ -277,7 +277,7 @@ class CameraProcess:
     def _alive(self) -> bool:
         return self._process is not None and self._process.is_alive()
 
-    def _is_hung(self, silence: PictureSilence) -> bool:
+    def _is_hung(self, silence: FrameWatchdog) -> bool:
         """Report a camera without new frames; return whether to end its process."""
         verdict = silence.verdict(self._now_s())
         if verdict and self._lost_s is None:

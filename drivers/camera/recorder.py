@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from gazerig.drivers.camera.recording_format import encoded
 from gazerig.drivers.camera.recording_writer import RecordingWriter
-from gazerig.drivers.camera.source import PictureSource, Shot
+from gazerig.drivers.camera.source import FrameSource, Shot
 
 _ENCODERS = 2  # PNG of colour and depth takes most of a picture's time; OpenCV frees the others
 _MOST_WAITING = 30  # pictures; where the disk is slower than the camera, pictures are left out
@@ -42,7 +42,7 @@ class CameraRecorder:
 
     def __init__(
         self,
-        source: PictureSource,
+        source: FrameSource,
         path: Path,
         about: dict[str, str] | None = None,
         jpeg_quality: int | None = None,

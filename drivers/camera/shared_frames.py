@@ -15,7 +15,7 @@ _SLOTS = 6
 _STAMP_BYTES = 64  # one line of the processor's cache
 
 
-class Where(NamedTuple):
+class SlotAddress(NamedTuple):
     """Where an array lies.
 
     memory: its name; slot, slot_bytes: which, and how large slots are; stamp: of this writing;
@@ -38,7 +38,7 @@ class SlotWriter:
         self._slot_bytes = 0
         self._stamp = 0
 
-    def put(self, array: NDArray[Any]) -> Where:
+    def put(self, array: NDArray[Any]) -> SlotAddress:
         """Copy an array into the next slot."""
         memory = self._room(array.nbytes)
         self._stamp += 2  # odd while it is written
@@ -47,7 +47,9 @@ class SlotWriter:
         stamp[0] = self._stamp - 1
         np.copyto(data[: array.nbytes].view(array.dtype).reshape(array.shape), array)
         stamp[0] = self._stamp
-        return Where(memory.name, slot, self._slot_bytes, self._stamp, array.shape, array.dtype.str)
+        return SlotAddress(
+            memory.name, slot, self._slot_bytes, self._stamp, array.shape, array.dtype.str
+        )
 
     def close(self) -> None:
         """Free the memory; safe to call twice."""
@@ -72,7 +74,7 @@ class SlotReader:
     def __init__(self) -> None:
         self._memory: SharedMemory | None = None
 
-    def take(self, where: Where) -> NDArray[Any] | None:
+    def take(self, where: SlotAddress) -> NDArray[Any] | None:
         """Copy an array out, read-only; None where its slot was written anew meanwhile."""
         if self._memory is None or self._memory.name != where.memory:
             self.close()

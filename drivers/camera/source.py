@@ -32,7 +32,7 @@ class Shot(NamedTuple):
     faces: tuple[DetectedFace, ...] | None = None
 
 
-class PictureSource(Protocol):
+class FrameSource(Protocol):
     """A source of frames; each ``take`` returns the newest one."""
 
     def open(self) -> None:

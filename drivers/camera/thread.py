@@ -8,10 +8,10 @@ import threading
 from collections import deque
 from collections.abc import Callable
 
-from gazerig.drivers.camera.capture_loop import CameraWatch, failed
+from gazerig.drivers.camera.capture_loop import CaptureLoop, failed
 from gazerig.drivers.camera.frame_analysis import Motion
-from gazerig.drivers.camera.params import CameraCareParams
-from gazerig.drivers.camera.source import PictureSource
+from gazerig.drivers.camera.params import CameraRecoveryParams
+from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.types import Detections, FaceDetector
 
@@ -37,15 +37,15 @@ class CameraThread:
 
     def __init__(
         self,
-        source: PictureSource,
+        source: FrameSource,
         detector: FaceDetector,
         now_s: Callable[[], float],
-        care: CameraCareParams | None = None,
+        care: CameraRecoveryParams | None = None,
         motion: Motion | None = None,
     ) -> None:
         self._events: deque[str] = deque(maxlen=_MOST_EVENTS)
-        self._camera = CameraWatch(
-            source, detector, now_s, care or CameraCareParams(), motion, self._events.append
+        self._camera = CaptureLoop(
+            source, detector, now_s, care or CameraRecoveryParams(), motion, self._events.append
         )
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.camera.video_pacing import FilmPace
-from gazerig.drivers.camera.video_reader import Reel, open_reel
+from gazerig.drivers.camera.video_pacing import VideoPacing
+from gazerig.drivers.camera.video_reader import VideoReader, open_video
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.types import Picture
 
 
-class FilmPicture(NamedTuple):
+class VideoFrame(NamedTuple):
     """A picture of a film: its number from 1, the film time it is due, the picture (read-only)."""
 
     number: int
@@ -30,8 +30,8 @@ class VideoFile:
     def __init__(self, path: str | Path) -> None:
         """Name the file; nothing is opened yet."""
         self._path = Path(path).expanduser()
-        self._reel: Reel | None = None
-        self._pace = FilmPace()
+        self._reel: VideoReader | None = None
+        self._pace = VideoPacing()
         self._untold = ""
 
     def open(self) -> None:
@@ -41,8 +41,8 @@ class VideoFile:
             CameraError: it is absent, no film or picture, empty or cut short.
         """
         self.close()
-        self._reel = open_reel(self._path)
-        self._pace = FilmPace()
+        self._reel = open_video(self._path)
+        self._pace = VideoPacing()
         self._untold = self._reel.times.note
 
     @property
@@ -81,7 +81,7 @@ class VideoFile:
         """
         return Shot(self.due_s(number), number, self.picture(number))
 
-    def picture_at(self, film_s: float) -> FilmPicture:
+    def picture_at(self, film_s: float) -> VideoFrame:
         """Read the newest picture at a film time (0 or later, never running back).
 
         Raises:
@@ -89,7 +89,7 @@ class VideoFile:
             CameraError: the file cannot be read any more.
         """
         number = self.number_at(film_s)
-        return FilmPicture(number, self.due_s(number), self.picture(number))
+        return VideoFrame(number, self.due_s(number), self.picture(number))
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
         """Wait until the next picture is due, then read the newest; the film starts here.
@@ -111,7 +111,7 @@ class VideoFile:
             self._reel.close()
         self._reel = None
 
-    def _opened(self) -> Reel:
+    def _opened(self) -> VideoReader:
         """Return the open file."""
         if self._reel is None:
             raise CameraError(f"{self._path} is not open: call open() before reading")

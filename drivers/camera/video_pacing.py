@@ -4,7 +4,7 @@ import threading
 from collections.abc import Callable
 from typing import NamedTuple
 
-from gazerig.drivers.camera.video_timestamps import FilmTimes
+from gazerig.drivers.camera.video_timestamps import VideoTimestamps
 
 
 class Due(NamedTuple):
@@ -14,7 +14,7 @@ class Due(NamedTuple):
     host_s: float
 
 
-class FilmPace:
+class VideoPacing:
     """Film time begins at the first wait and runs with the host's clock."""
 
     def __init__(self) -> None:
@@ -22,7 +22,7 @@ class FilmPace:
         self._taken = 0
 
     def wait(
-        self, times: FilmTimes, now_s: Callable[[], float], stop: threading.Event
+        self, times: VideoTimestamps, now_s: Callable[[], float], stop: threading.Event
     ) -> Due | None:
         """Wait until the next picture is due and give the newest; None where told to stop."""
         if self._zero_s is None:

@@ -8,7 +8,13 @@ import cv2
 
 from gazerig.drivers.camera.quiet_opencv import quiet_opencv
 from gazerig.drivers.camera.source import bgr
-from gazerig.drivers.camera.video_timestamps import SAMPLE, FilmTimes, at_a_rate, by_table, rising
+from gazerig.drivers.camera.video_timestamps import (
+    SAMPLE,
+    VideoTimestamps,
+    at_a_rate,
+    by_table,
+    rising,
+)
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.types import Picture
 
@@ -19,13 +25,13 @@ _LEAST_COMPLETE = 0.95
 _MOST_TIMES = 20_000  # pictures of an uneven film whose times are read at the start
 
 
-class Reel(Protocol):
+class VideoReader(Protocol):
     """An open film or still.
 
     times: when its pictures are due, and what had to be assumed for it
     """
 
-    times: FilmTimes
+    times: VideoTimestamps
 
     def picture(self, number: int) -> Picture:
         """Return a picture, counted through all repeats, not before the last one given."""
@@ -36,7 +42,7 @@ class Reel(Protocol):
         ...
 
 
-def open_reel(path: Path) -> Reel:
+def open_video(path: Path) -> VideoReader:
     """Open a file as what it is.
 
     Raises:
@@ -68,7 +74,7 @@ def usable_rate_hz(stated_hz: float) -> tuple[float, str]:
 class _Still:
     """One picture that is always there."""
 
-    times = FilmTimes(_STILL_RATE_HZ)
+    times = VideoTimestamps(_STILL_RATE_HZ)
 
     def __init__(self, path: Path) -> None:
         """Decode the picture."""

@@ -18,7 +18,7 @@ _UNEVEN = 0.5
 _LIE = 0.02
 
 
-class FilmTimes(NamedTuple):
+class VideoTimestamps(NamedTuple):
     """Due times of a film that is repeated for ever; numbers are from 1.
 
     rate_hz: pictures a second, the mean where they come unevenly
@@ -85,32 +85,32 @@ def measured_rate_hz(times_s: Sequence[float]) -> float | None:
     return rate_hz if even(times_s, rate_hz) else None
 
 
-def at_a_rate(stated_hz: float, note: str, times_s: Sequence[float]) -> FilmTimes | None:
+def at_a_rate(stated_hz: float, note: str, times_s: Sequence[float]) -> VideoTimestamps | None:
     """Judge by the first pictures; None where they come unevenly.
 
     stated_hz, note: the rate to use by what the container says, and what was assumed for it
     """
     if even(times_s, stated_hz) and (not note or measured_rate_hz(times_s) is None):
-        return FilmTimes(stated_hz, note=note)
+        return VideoTimestamps(stated_hz, note=note)
     rate_hz = measured_rate_hz(times_s)
     if rate_hz is None:
         return None
     if abs(rate_hz / stated_hz - 1.0) < _LIE:
-        return FilmTimes(stated_hz)
-    return FilmTimes(
+        return VideoTimestamps(stated_hz)
+    return VideoTimestamps(
         rate_hz,
         note=f"the film states {stated_hz:g} pictures a second and shows {rate_hz:.4g}: "
         "the times of its pictures count",
     )
 
 
-def by_table(times_s: Sequence[float]) -> FilmTimes:
+def by_table(times_s: Sequence[float]) -> VideoTimestamps:
     """Return the times as they are; the last picture stays as long as most do."""
     starts = tuple(t - times_s[0] for t in times_s)
     last_s = median(b - a for a, b in zip(starts, starts[1:], strict=False))
     length_s = starts[-1] + last_s
     rate_hz = len(starts) / length_s
-    return FilmTimes(
+    return VideoTimestamps(
         rate_hz,
         starts,
         length_s,

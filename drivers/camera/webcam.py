@@ -7,7 +7,7 @@ from pathlib import Path
 
 import cv2
 
-from gazerig.drivers.camera.frame_rate import RateWatch
+from gazerig.drivers.camera.frame_rate import FrameRateMonitor
 from gazerig.drivers.camera.params import WebcamParams
 from gazerig.drivers.camera.quiet_opencv import quiet_opencv
 from gazerig.drivers.camera.source import Shot, bgr
@@ -57,7 +57,7 @@ class Webcam:
         self._latency_s = latency_s
         self._capture: cv2.VideoCapture | None = None
         self._number = 0
-        self._rate = RateWatch("", 0.0)
+        self._rate = FrameRateMonitor("", 0.0)
         self._left_s: float | None = None
         self._events: list[str] = []
 
@@ -87,7 +87,7 @@ class Webcam:
                 "close that program or name another camera"
             )
         self._capture, self._number = capture, 0
-        self._rate = RateWatch(f"camera {self._file}", capture.get(cv2.CAP_PROP_FPS))
+        self._rate = FrameRateMonitor(f"camera {self._file}", capture.get(cv2.CAP_PROP_FPS))
         self._left_s = None
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:

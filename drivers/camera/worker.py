@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import cv2
 
-from gazerig.drivers.camera.capture_loop import CameraWatch, failed
+from gazerig.drivers.camera.capture_loop import CaptureLoop, failed
 from gazerig.drivers.camera.frame_analysis import Motion
-from gazerig.drivers.camera.params import CameraCareParams
-from gazerig.drivers.camera.shared_frames import SlotWriter, Where
-from gazerig.drivers.camera.source import PictureSource
+from gazerig.drivers.camera.params import CameraRecoveryParams
+from gazerig.drivers.camera.shared_frames import SlotAddress, SlotWriter
+from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.errors import CameraError, SetupError
 from gazerig.drivers.types import Detections, FaceDetector
 
@@ -31,7 +31,7 @@ class CameraParts(NamedTuple):
     source, detector: functions without arguments; motion: the same, or None
     """
 
-    source: Callable[[], PictureSource]
+    source: Callable[[], FrameSource]
     detector: Callable[[], FaceDetector]
     motion: Callable[[], Motion] | None = None
 
@@ -40,8 +40,8 @@ class Found(NamedTuple):
     """What the process tells of a picture."""
 
     detections: Detections  # without picture and depth
-    picture: Where | None
-    depth: Where | None
+    picture: SlotAddress | None
+    depth: SlotAddress | None
 
 
 class Retune(NamedTuple):
@@ -62,7 +62,7 @@ class Ended(NamedTuple):
 
 
 def run(
-    pipe: Connection, parts: CameraParts, now_s: Callable[[], float], care: CameraCareParams
+    pipe: Connection, parts: CameraParts, now_s: Callable[[], float], care: CameraRecoveryParams
 ) -> None:
     """Be the process: open, look, tell, until told to stop or the other side is gone."""
     # Ctrl-C reaches all processes of a terminal; it is the loop's to end this one.
@@ -74,7 +74,7 @@ def run(
     cv2.setNumThreads(max(1, (os.cpu_count() or 1) - 1))
     try:
         motion = parts.motion() if parts.motion is not None else None
-        camera = CameraWatch(parts.source(), parts.detector(), now_s, care, motion, pipe.send)
+        camera = CaptureLoop(parts.source(), parts.detector(), now_s, care, motion, pipe.send)
         camera.open()
     except SetupError as error:
         pipe.send(error)
@@ -119,7 +119,7 @@ def _heed(pipe: Connection, stop: threading.Event, words: deque[Retune]) -> None
     os._exit(1)
 
 
-def _retune(camera: CameraWatch, words: deque[Retune], pipe: Connection) -> None:
+def _retune(camera: CaptureLoop, words: deque[Retune], pipe: Connection) -> None:
     """Look otherwise, as asked for; of several detectors only the last is made."""
     detector: Callable[[], FaceDetector] | None = None
     while words:

@@ -21,7 +21,7 @@ from gazerig.drivers.dynamixel.read_plan import read_plan
 from gazerig.drivers.servo_bus.family import Arming, Family
 
 if TYPE_CHECKING:  # the guardian starts without numpy
-    from gazerig.drivers.types import ServoSetup
+    from gazerig.drivers.types import ServoConfig
 
 POSITION_MODE = 3
 
@@ -42,7 +42,7 @@ def goal_packets(ids: Sequence[int]) -> protocol.SyncWrite:
     return protocol.SyncWrite(ids, goal.address, goal.size)
 
 
-def wanted_settings(setup: "ServoSetup") -> dict[str, int]:
+def wanted_settings(setup: "ServoConfig") -> dict[str, int]:
     """Return the registers a servo must have, by name, in register units."""
     model = MODELS[setup.model]
     speed = speed_units(setup.max_speed_steps_s)

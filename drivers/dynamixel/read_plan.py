@@ -26,7 +26,7 @@ from gazerig.drivers.servo_bus.read_plan import AddressMap, ReadPlan
 from gazerig.drivers.servo_bus.read_windows import ReadWindow, WindowSchedule
 
 if TYPE_CHECKING:  # the guardian starts without numpy
-    from gazerig.drivers.types import ServoSetup
+    from gazerig.drivers.types import ServoConfig
 
 SENSED = ("effort", "velocity", "position")
 ARMED = ("torque", "status")
@@ -64,7 +64,7 @@ _ALONE = (
 
 
 def read_plan(
-    setups: "Sequence[ServoSetup]", params: DynamixelParams, firmware: Mapping[int, int] | None
+    setups: "Sequence[ServoConfig]", params: DynamixelParams, firmware: Mapping[int, int] | None
 ) -> ReadPlan:
     """Return how servos with this firmware are read; None: before it is known."""
     alone = WindowSchedule(_ALONE, _ALONE)
@@ -78,7 +78,7 @@ def read_plan(
     return ReadPlan(indirect_windows(block), alone, alone, packets, block=layout)
 
 
-def _all_fast(setups: "Sequence[ServoSetup]", firmware: Mapping[int, int] | None) -> bool:
+def _all_fast(setups: "Sequence[ServoConfig]", firmware: Mapping[int, int] | None) -> bool:
     """Return whether all understand fast sync read."""
     if not firmware:
         return False
@@ -86,7 +86,7 @@ def _all_fast(setups: "Sequence[ServoSetup]", firmware: Mapping[int, int] | None
 
 
 def _common_block(
-    setups: "Sequence[ServoSetup]", firmware: Mapping[int, int] | None
+    setups: "Sequence[ServoConfig]", firmware: Mapping[int, int] | None
 ) -> IndirectBlock | None:
     """Return the indirect block that all have in the same place, None where there is none."""
     if not firmware:

@@ -24,12 +24,12 @@ from gazerig.drivers.servo_bus.read_plan import ReadPlan
 from gazerig.drivers.servo_bus.read_windows import ReadWindow, WindowSchedule
 
 if TYPE_CHECKING:  # the guardian starts without numpy
-    from gazerig.drivers.types import ServoSetup
+    from gazerig.drivers.types import ServoConfig
 
 POSITION_MODE = 0
 
 
-def wanted_settings(setup: "ServoSetup") -> dict[str, int]:
+def wanted_settings(setup: "ServoConfig") -> dict[str, int]:
     """Return the registers a servo must have, by name, in register units.
 
     Of "phase" only the bit for many turns is meant: it must be 0.
@@ -74,7 +74,7 @@ def window(address: int) -> ReadWindow:
 
 
 def read_plan(
-    setups: "Sequence[ServoSetup]", params: FeetechParams, firmware: Mapping[int, int] | None
+    setups: "Sequence[ServoConfig]", params: FeetechParams, firmware: Mapping[int, int] | None
 ) -> ReadPlan:
     """Return how servos are read: what a loop needs every tick lies side by side in 56..70.
 
@@ -107,7 +107,7 @@ def plan_of(window: Callable[[int], ReadWindow], every: int) -> ReadPlan:
     )
 
 
-def armed_limits(setup: "ServoSetup") -> dict[str, int | None]:
+def armed_limits(setup: "ServoConfig") -> dict[str, int | None]:
     """Return what is written before the torque comes on, as a reading tells it."""
     limit = None if setup.strength is None else round(setup.strength * TORQUE_FULL)
     acceleration = acceleration_units(setup.max_accel_steps_s2)

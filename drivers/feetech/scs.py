@@ -34,7 +34,7 @@ from gazerig.drivers.servo_bus.read_plan import ReadPlan
 from gazerig.drivers.servo_bus.read_windows import ReadWindow
 
 if TYPE_CHECKING:  # the guardian starts without numpy
-    from gazerig.drivers.types import ServoSetup
+    from gazerig.drivers.types import ServoConfig
 
 _ABSENT = {
     *("protection_current", "angular_resolution", "position_offset", "operating_mode"),
@@ -82,13 +82,13 @@ def window(address: int) -> ReadWindow:
 
 
 def read_plan(
-    setups: "Sequence[ServoSetup]", params: FeetechParams, firmware: Mapping[int, int] | None
+    setups: "Sequence[ServoConfig]", params: FeetechParams, firmware: Mapping[int, int] | None
 ) -> ReadPlan:
     """Return how servos are read: as STS servos, but one by one."""
     return plan_of(window, params.torque_every)
 
 
-def scs_settings(setup: "ServoSetup") -> dict[str, int]:
+def scs_settings(setup: "ServoConfig") -> dict[str, int]:
     """Return the registers a servo must have; its share of full drive is Max Torque (16), kept."""
     wanted = {name: v for name, v in wanted_settings(setup).items() if name in SCS_REGISTERS}
     if setup.strength is not None:

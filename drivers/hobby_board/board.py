@@ -14,7 +14,7 @@ from gazerig.drivers.hobby_board.params import HobbyBoardParams
 from gazerig.drivers.host_lateness import HostLateness
 from gazerig.drivers.port_bus import Exchange
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 
 
 class BoardLine(Exchange, Protocol):
@@ -110,7 +110,7 @@ class Board(Protocol):
         """Return what a rig file has chosen for it."""
         ...
 
-    def find(self, setups: Sequence[ServoSetup], log: EventLog) -> tuple[int, ...]:
+    def find(self, setups: Sequence[ServoConfig], log: EventLog) -> tuple[int, ...]:
         """Find the board; return the pulses of these servos. Nothing moves.
 
         Raises:

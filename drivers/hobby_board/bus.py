@@ -20,13 +20,13 @@ from gazerig.drivers.hobby_board.board import Board, BoardLine
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.models import channel_label
 from gazerig.drivers.hobby_board.release import TRIES, switch_off
-from gazerig.drivers.hobby_board.silence import Silence
+from gazerig.drivers.hobby_board.silence import SilenceMonitor
 from gazerig.drivers.hobby_board.start import enable_channels
 from gazerig.drivers.hobby_board.supervisor import BoardSupervisor
 from gazerig.drivers.port_bus import CUT, PortBus
-from gazerig.drivers.released import Released
-from gazerig.drivers.serial.reconnect import LastingPort
-from gazerig.drivers.types import Feedback, ServoSetup
+from gazerig.drivers.released import ReleaseResult
+from gazerig.drivers.serial.reconnect import ReconnectingPort
+from gazerig.drivers.types import Feedback, ServoConfig
 
 UNMEASURED = "hobby servos tell no positions: what is shown is where they were sent"
 
@@ -48,7 +48,7 @@ class HobbyBoardBus(PortBus):
     _line: BoardLine
     _supervisor: BoardSupervisor
 
-    def __init__(self, board: Board, setups: Sequence[ServoSetup]) -> None:
+    def __init__(self, board: Board, setups: Sequence[ServoConfig]) -> None:
         self._board, self._line, self._port = board, board.line, board.line.port
         self._check_setups(setups)
         self._setups = self._wanted = tuple(setups)
@@ -65,9 +65,9 @@ class HobbyBoardBus(PortBus):
         timing = self._board.timing
         self._channels = tuple(Channel(setup, timing.longest_lead_s) for setup in self._setups)
         self._supervisor = BoardSupervisor(self._board, self._channels, self._log)
-        self._silence = Silence(self._log, self._line.lateness)
+        self._silence = SilenceMonitor(self._log, self._line.lateness)
         self._rx_bytes, self._byte_s = 0, -inf
-        self._link = LastingPort(
+        self._link = ReconnectingPort(
             self._port, timing.baud, timing.give_up_s, self._log, self._reset_trust
         )
         self._heard_s = -inf
@@ -202,7 +202,7 @@ class HobbyBoardBus(PortBus):
 
     # --- holding
 
-    def _check_setups(self, setups: Sequence[ServoSetup]) -> None:
+    def _check_setups(self, setups: Sequence[ServoConfig]) -> None:
         for setup in setups:
             self._board.params.check(setup)
 
@@ -267,7 +267,7 @@ class HobbyBoardBus(PortBus):
         """Begin anew with a port that was away."""
         self._supervisor.mark_all_for_recovery()
 
-    def _switch_off(self) -> Released:
+    def _switch_off(self) -> ReleaseResult:
         released = switch_off(self._board, self._ids)
         for channel in self._channels:
             if channel.id not in (*released.holding, *released.mute):

@@ -6,7 +6,7 @@ from math import inf
 from gazerig.drivers.hobby_board.models import HOBBY
 from gazerig.drivers.hobby_board.ramp import Ramp
 from gazerig.drivers.slow_entry import entry_speed_steps_s
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 
 RECENT_S = 0.1
 """The board may be so far behind the last goals: its own period is 20 ms, and lines are slow."""
@@ -33,7 +33,7 @@ class Channel:
             for a while: the driver leads them.
     """
 
-    def __init__(self, setup: ServoSetup, longest_lead_s: float = inf) -> None:
+    def __init__(self, setup: ServoConfig, longest_lead_s: float = inf) -> None:
         self._longest_lead_s = longest_lead_s
         self.setup = setup
         self.id = setup.id
@@ -49,7 +49,7 @@ class Channel:
         self._end_steps = 0
         self.sent_steps = 0
 
-    def want(self, setup: ServoSetup) -> None:
+    def want(self, setup: ServoConfig) -> None:
         """Apply a changed setup of the same servo."""
         self.setup = setup
         self.ramp.shaft_speed_steps_s = _own_speed(setup)
@@ -222,10 +222,10 @@ class Channel:
         return anew or self.entering
 
 
-def _rest(setup: ServoSetup) -> float:
+def _rest(setup: ServoConfig) -> float:
     middle = (setup.min_steps + setup.max_steps) // 2
     return middle if setup.rest_steps is None else setup.rest_steps
 
 
-def _own_speed(setup: ServoSetup) -> float:
+def _own_speed(setup: ServoConfig) -> float:
     return setup.own_speed_steps_s or setup.max_speed_steps_s

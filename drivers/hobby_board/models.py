@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from gazerig.drivers.event_log import servo_label
 
 if TYPE_CHECKING:  # the guardian starts without numpy
-    from gazerig.drivers.types import ServoSetup
+    from gazerig.drivers.types import ServoConfig
 
 US_STEPS = 4
 """Pulse widths are counted in quarters of a microsecond."""
@@ -31,6 +31,6 @@ HOBBY = {
 }
 
 
-def channel_label(setup: "ServoSetup") -> str:
+def channel_label(setup: "ServoConfig") -> str:
     """Return how people know a hobby servo: its joint and its channel."""
     return servo_label(setup, "channel")

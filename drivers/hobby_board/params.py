@@ -7,7 +7,7 @@ from gazerig.drivers.hobby_board.models import US_STEPS
 from gazerig.params import Bounds
 
 if TYPE_CHECKING:  # the guardian starts without numpy
-    from gazerig.drivers.types import ServoSetup
+    from gazerig.drivers.types import ServoConfig
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,7 +34,7 @@ class HobbyBoardParams:
         """Return the shortest and longest pulse that may be sent, and what decides that."""
         raise NotImplementedError
 
-    def check(self, setup: "ServoSetup") -> None:
+    def check(self, setup: "ServoConfig") -> None:
         """Refuse a servo that no channel can have.
 
         Raises:

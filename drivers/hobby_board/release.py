@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 from gazerig.drivers.errors import PortError
-from gazerig.drivers.released import Released
+from gazerig.drivers.released import ReleaseResult
 from gazerig.drivers.serial.port import BusPort
 
 TRIES = 3
@@ -23,7 +23,7 @@ class Stoppable(Protocol):
         ...
 
 
-def switch_off(board: Stoppable, channels: Sequence[int]) -> Released:
+def switch_off(board: Stoppable, channels: Sequence[int]) -> ReleaseResult:
     """Stop the pulses, and see that they are gone.
 
     Raises:
@@ -40,7 +40,7 @@ def switch_off(board: Stoppable, channels: Sequence[int]) -> Released:
         if not left:
             break
     holding = tuple(channel for channel in left if channel in heard)
-    return Released(holding, tuple(channel for channel in left if channel not in heard))
+    return ReleaseResult(holding, tuple(channel for channel in left if channel not in heard))
 
 
 def stop_pulses(

@@ -15,7 +15,7 @@ OWED_S = 0.1
 """So long after the first answer, those that were owed have come."""
 
 
-class Silence:
+class SilenceMonitor:
     """Counts answers that stayed out.
 
     missed: how many in a row

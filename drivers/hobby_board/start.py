@@ -10,10 +10,10 @@ from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.hold import Outcome, refusal, take
 from gazerig.drivers.hobby_board.models import channel_label
 from gazerig.drivers.hobby_board.release import TRIES
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 
 
-def every_pulse(board: Board, setups: Sequence[ServoSetup]) -> tuple[int, ...]:
+def every_pulse(board: Board, setups: Sequence[ServoConfig]) -> tuple[int, ...]:
     """Ask for every pulse.
 
     Raises:

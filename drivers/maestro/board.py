@@ -21,7 +21,7 @@ from gazerig.drivers.maestro.limits import ACCEL_STEPS_S2, SPEED_STEPS_S, accel_
 from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 
 
 class MaestroBoard:
@@ -45,7 +45,7 @@ class MaestroBoard:
         )
         self._errors_first = False
 
-    def find(self, setups: Sequence[ServoSetup], log: EventLog) -> tuple[int, ...]:
+    def find(self, setups: Sequence[ServoConfig], log: EventLog) -> tuple[int, ...]:
         """Greet the board and return the pulses of these servos; nothing moves.
 
         Raises:

@@ -7,7 +7,7 @@ from gazerig.drivers.maestro.board import MaestroBoard
 from gazerig.drivers.maestro.commands import MICRO
 from gazerig.drivers.maestro.params import MaestroParams as MaestroParams
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 
 
 class MaestroBus(HobbyBoardBus):
@@ -23,7 +23,7 @@ class MaestroBus(HobbyBoardBus):
         ValueError: a servo is on a channel or at a pulse width that the board cannot have.
     """
 
-    def __init__(self, port: BusPort, setups: Sequence[ServoSetup], params: MaestroParams) -> None:
+    def __init__(self, port: BusPort, setups: Sequence[ServoConfig], params: MaestroParams) -> None:
         self._maestro = MaestroBoard(port, params)
         super().__init__(self._maestro, setups)
 

@@ -82,7 +82,7 @@ def words(answer: bytes) -> tuple[int, ...]:
 
 
 @dataclass(frozen=True, slots=True)
-class Speech:
+class MaestroCodec:
     """Puts commands into the form that one board wants.
 
     form: "compact" or "pololu"; device: its number, 0..127, for the Pololu form

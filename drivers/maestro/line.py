@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from gazerig.drivers.host_lateness import HostLateness
-from gazerig.drivers.maestro.commands import MOST, PROTOCOL_ERROR, WORD, Speech, words
+from gazerig.drivers.maestro.commands import MOST, PROTOCOL_ERROR, WORD, MaestroCodec, words
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.serial.port import BITS_PER_BYTE, QUIET_S, BusPort
 
@@ -34,10 +34,10 @@ class MaestroLink:
 
     def __init__(self, port: BusPort, params: MaestroParams) -> None:
         self.port = port
-        self.speech = Speech(params.protocol, params.device, params.crc, params.channels)
+        self.speech = MaestroCodec(params.protocol, params.device, params.crc, params.channels)
         # A whole command in the Pololu form begins with the byte that a board waits for
         # which detects its baud rate; any other board takes it for the question it is.
-        self._waking = Speech("pololu", params.device, params.crc).errors()
+        self._waking = MaestroCodec("pololu", params.device, params.crc).errors()
         self.tx_bytes = self.rx_bytes = 0
         self.errors: Counter[str] = Counter()
         self.lateness = HostLateness()

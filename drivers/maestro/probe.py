@@ -25,7 +25,7 @@ FORMS: tuple[Form, ...] = ("compact", "pololu")
 TRIES = 3
 
 
-class MaestroFound(NamedTuple):
+class DetectedMaestro(NamedTuple):
     """A board that answers.
 
     forms: those of the commands that it answers; "pololu" with the device number given
@@ -44,7 +44,7 @@ class MaestroFound(NamedTuple):
     channels: int | None
 
 
-def probe(port: BusPort, params: MaestroParams, count: bool = False) -> MaestroFound | None:
+def probe(port: BusPort, params: MaestroParams, count: bool = False) -> DetectedMaestro | None:
     """Ask whether a Maestro is there; None where nothing answers as one. The port is left open.
 
     count: find the number of channels by asking for some that may not exist, on which a
@@ -70,7 +70,7 @@ def probe(port: BusPort, params: MaestroParams, count: bool = False) -> MaestroF
 
 def _look(
     line: MaestroLink, params: MaestroParams, register: int, count: bool
-) -> MaestroFound | None:
+) -> DetectedMaestro | None:
     """Ask a board that answers for what else it tells."""
     crc = line.speech.crc
     forms: tuple[Form, ...] = ()
@@ -93,7 +93,7 @@ def _look(
     if channels is not None and channels > MICRO:
         pulses = line.pulses(range(channels)) or pulses
     script = None if status is None else status == b"\0"
-    return MaestroFound(forms, crc, name_errors(register), script, pulses, channels)
+    return DetectedMaestro(forms, crc, name_errors(register), script, pulses, channels)
 
 
 def _patiently(ask: Callable[[], tuple[int, ...] | None]) -> tuple[int, ...] | None:

@@ -38,7 +38,7 @@ from gazerig.drivers.pca9685.registers import (
     runs,
 )
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 
 LONGEST_LEAD_S = 0.05
 """A pulse on its way goes on for no longer than this after a pause."""
@@ -112,7 +112,7 @@ class Pca9685Board:
 
     # --- finding
 
-    def find(self, setups: Sequence[ServoSetup], log: EventLog) -> tuple[int, ...]:
+    def find(self, setups: Sequence[ServoConfig], log: EventLog) -> tuple[int, ...]:
         """See that the boards are there and return the pulses of these servos; nothing changes.
 
         Raises:

@@ -6,7 +6,7 @@ from gazerig.drivers.hobby_board.bus import HobbyBoardBus
 from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.params import Pca9685Params as Pca9685Params
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 
 
 class Pca9685Bus(HobbyBoardBus):
@@ -23,5 +23,5 @@ class Pca9685Bus(HobbyBoardBus):
         ValueError: a servo is on a channel or at a pulse width that the boards cannot have.
     """
 
-    def __init__(self, port: BusPort, setups: Sequence[ServoSetup], params: Pca9685Params) -> None:
+    def __init__(self, port: BusPort, setups: Sequence[ServoConfig], params: Pca9685Params) -> None:
         super().__init__(Pca9685Board(port, params), setups)

@@ -46,7 +46,7 @@ class Reconnect:
         return now_s - self._since_s if self.down else 0.0
 
 
-class LastingPort:
+class ReconnectingPort:
     """The way back to a port of one bus.
 
     Args:

@@ -7,12 +7,12 @@ from math import ceil
 from gazerig.drivers.errors import BusLost, PortError, ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog, servo_label
 from gazerig.drivers.port_bus import CUT, PortBus
-from gazerig.drivers.released import Released
+from gazerig.drivers.released import ReleaseResult
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.serial.reconnect import LastingPort
+from gazerig.drivers.serial.reconnect import ReconnectingPort
 from gazerig.drivers.servo_bus.discovery import find
 from gazerig.drivers.servo_bus.family import Family
-from gazerig.drivers.servo_bus.faults import Health
+from gazerig.drivers.servo_bus.faults import ServoHealth
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.goals import clipped
 from gazerig.drivers.servo_bus.latched_faults import LatchedFaultSupervisor
@@ -23,10 +23,10 @@ from gazerig.drivers.servo_bus.provisioning import Provisioning
 from gazerig.drivers.servo_bus.recovery import Recovery
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.servo_bus.supervisor import Supervisor
-from gazerig.drivers.servo_bus.sync_read import GroupReply, Reader, ServoReply
+from gazerig.drivers.servo_bus.sync_read import GroupReply, ServoReply, SyncReader
 from gazerig.drivers.servo_bus.torque import switch_off
 from gazerig.drivers.servo_bus.transaction import Transactions
-from gazerig.drivers.types import Feedback, ServoSetup
+from gazerig.drivers.types import Feedback, ServoConfig
 
 RESTART_S = 0.1
 """Servos that were silent for so long may have restarted: their power was cut."""
@@ -51,7 +51,7 @@ class SmartServoBus(PortBus):
     _supervisor: Supervisor
 
     def __init__(
-        self, family: Family, port: BusPort, setups: Sequence[ServoSetup], params: BusParams
+        self, family: Family, port: BusPort, setups: Sequence[ServoConfig], params: BusParams
     ) -> None:
         if len(setups) > family.most_goals:
             raise ValueError(
@@ -89,11 +89,11 @@ class SmartServoBus(PortBus):
         """
         line, log = self._line, self._log
         by_id = self._by_id = {setup.id: setup for setup in self._setups}
-        self._link = LastingPort(
+        self._link = ReconnectingPort(
             self._port, self._params.baud, self._params.give_up_s, log, self._reset_after_reconnect
         )
         self._poll_list = PollList(self._ids)
-        self._health = Health(by_id, log)
+        self._health = ServoHealth(by_id, log)
         plan = self._plan = self._family.read_plan(self._setups, self._params, firmware)
         single = Registers(self._port, self._family, 1)
         self._provisioning = Provisioning(line, single, self._setups, log, plan.block)
@@ -102,7 +102,7 @@ class SmartServoBus(PortBus):
         )
         self._speeds = self._recovery.speeds(self._ids, ())
         self._feedback = FeedbackColumns(self._family, self._setups)
-        self._reader = Reader(line, self._poll_list, plan)
+        self._reader = SyncReader(line, self._poll_list, plan)
         kind: Callable[..., Supervisor]
         kind = LatchedFaultSupervisor if self._family.faults_latch else PassingFaultSupervisor
         self._supervisor = kind(
@@ -333,7 +333,7 @@ class SmartServoBus(PortBus):
             f"{self._line.label(i)}: {fault}" for i, fault in sorted(self._health.faults.items())
         )
 
-    def _switch_off(self) -> Released:
+    def _switch_off(self) -> ReleaseResult:
         return switch_off(self._line, self._ids)
 
     def _servo_label(self, servo_id: int) -> str:
@@ -371,7 +371,7 @@ class SmartServoBus(PortBus):
         self._line.starved = False
         self._supervisor.mark_all_for_recovery()
 
-    def _check_setups(self, setups: Sequence[ServoSetup]) -> None:
+    def _check_setups(self, setups: Sequence[ServoConfig]) -> None:
         """See that ranges lie within one turn: beyond, positions mean nothing after a restart.
 
         Raises:

@@ -14,7 +14,7 @@ from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort
 from gazerig.drivers.servo_bus.family import Family, Identity, Status
 from gazerig.drivers.servo_bus.registers import REPLY_S, Registers, transact
 from gazerig.drivers.servo_bus.transaction import Transactions
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 
 FIND_QUIET_S = 0.04
 """All servos of a rig have answered a ping to all when nothing came for so long."""
@@ -229,7 +229,7 @@ def identities(line: Transactions) -> dict[int, Identity]:
 
 
 def find(
-    line: Transactions, registers: Registers, setups: Sequence[ServoSetup], log: EventLog
+    line: Transactions, registers: Registers, setups: Sequence[ServoConfig], log: EventLog
 ) -> dict[int, int]:
     """Find every servo and check its model and firmware; return the firmware of each.
 
@@ -263,7 +263,7 @@ def find(
     return {servo_id: identity.firmware for servo_id, identity in found.items() if identity}
 
 
-def _problem(family: Family, setup: ServoSetup, found: Identity | None) -> str:
+def _problem(family: Family, setup: ServoConfig, found: Identity | None) -> str:
     """Return what is wrong with one servo, "" where nothing is."""
     who = servo_label(setup)
     if found is None:

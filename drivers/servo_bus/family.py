@@ -13,7 +13,7 @@ from gazerig.drivers.serial.port import BusPort
 
 if TYPE_CHECKING:  # the guardian starts without numpy
     from gazerig.drivers.servo_bus.read_plan import ReadPlan
-    from gazerig.drivers.types import ServoSetup
+    from gazerig.drivers.types import ServoConfig
 
 
 class Status(NamedTuple):
@@ -249,12 +249,12 @@ class Family:
     factory_baud: int
     highest_id: int
     version: Callable[[int], str]
-    read_plan: "Callable[[Sequence[ServoSetup], Any, Mapping[int, int] | None], ReadPlan]"
+    read_plan: "Callable[[Sequence[ServoConfig], Any, Mapping[int, int] | None], ReadPlan]"
     effort_register: str
-    armed: Callable[["ServoSetup"], Mapping[str, int | None]]
+    armed: Callable[["ServoConfig"], Mapping[str, int | None]]
     weak_check: bool
     spans: tuple[tuple[str, str], ...]
-    wanted: Callable[["ServoSetup"], Mapping[str, int]]
+    wanted: Callable[["ServoConfig"], Mapping[str, int]]
     target: Callable[[str, int, int], int]
     passes: int
     answer_level: int

@@ -2,9 +2,9 @@
 
 from collections.abc import Collection, Mapping, Sequence
 
-from gazerig.drivers.event_log import EventLog, Seldom, servo_label
+from gazerig.drivers.event_log import EventLog, RateLimitedLog, servo_label
 from gazerig.drivers.host_lateness import BLAME_S, SILENCE_S, STOOD_STILL, HostLateness
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 
 MOST_RESTARTS, WITHIN_S = 3, 10.0
 """A servo that restarts more often within such a time stays without torque."""
@@ -23,14 +23,14 @@ SAY_SILENT_S = 0.25
 """Silence is spoken of from so long on: one lost answer is no news."""
 
 
-class Health:
+class ServoHealth:
     """The state of every servo, in words.
 
     faults: what a servo suffers from now, by id
     latches: those of them that the servo itself has latched
     """
 
-    def __init__(self, setups: Mapping[int, ServoSetup], log: EventLog) -> None:
+    def __init__(self, setups: Mapping[int, ServoConfig], log: EventLog) -> None:
         self._setups = setups
         self._log = log
         self.faults: dict[int, str] = {}
@@ -41,7 +41,7 @@ class Health:
         self._all_silent = False
         self._nobody_since: float | None = None
         self._back_s: float | None = None
-        self._seldom = Seldom(log)
+        self._seldom = RateLimitedLog(log)
 
     def latched(self, servo_id: int, errors: Sequence[str]) -> bool:
         """Record latched errors; return whether that is news."""

@@ -15,7 +15,7 @@ from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.read_windows import Columns
 from gazerig.drivers.servo_bus.sync_read import GroupReply, ServoReply
 from gazerig.drivers.servo_bus.turn import nearest_turn
-from gazerig.drivers.types import Feedback, ServoSetup
+from gazerig.drivers.types import Feedback, ServoConfig
 
 ALIKE_C, ALIKE_TENTH_V = 3, 10
 """So far apart temperatures and voltages of two answers right after one another may be."""
@@ -37,7 +37,7 @@ class FeedbackColumns:
     now: all columns as they are now
     """
 
-    def __init__(self, family: Family, setups: Sequence[ServoSetup]) -> None:
+    def __init__(self, family: Family, setups: Sequence[ServoConfig]) -> None:
         models = [family.models[setup.model] for setup in setups]
         self._family = family
         self._ids = tuple(setup.id for setup in setups)
@@ -78,7 +78,7 @@ class FeedbackColumns:
             missing=tuple([other for other in now.missing if other != slot]),
         )
 
-    def set_limits(self, setups: Sequence[ServoSetup]) -> None:
+    def set_limits(self, setups: Sequence[ServoConfig]) -> None:
         """Set changed ranges and limits of the same servos."""
         self._ranges = [(setup.min_steps, setup.max_steps) for setup in setups]
         # Less than half a turn away from every range, no other turn is nearer.

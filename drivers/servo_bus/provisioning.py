@@ -13,7 +13,7 @@ from gazerig.drivers.servo_bus.family import Register
 from gazerig.drivers.servo_bus.read_plan import AddressMap
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.servo_bus.transaction import Transactions
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 
 
 class Difference(NamedTuple):
@@ -40,7 +40,7 @@ class Provisioning:
         self,
         line: Transactions,
         registers: Registers,
-        setups: Sequence[ServoSetup],
+        setups: Sequence[ServoConfig],
         log: EventLog,
         block: AddressMap | None = None,
     ) -> None:
@@ -50,7 +50,7 @@ class Provisioning:
         self._block = block
         self.set_target(setups)
 
-    def set_target(self, setups: Sequence[ServoSetup]) -> None:
+    def set_target(self, setups: Sequence[ServoConfig]) -> None:
         """Set what servos should be like from now on."""
         self._setups = {setup.id: setup for setup in setups}
         self._wanted = {setup.id: self._family.wanted(setup) for setup in setups}

@@ -8,13 +8,13 @@ from collections.abc import Collection, Mapping, Sequence
 
 from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.servo_bus.faults import Health
+from gazerig.drivers.servo_bus.faults import ServoHealth
 from gazerig.drivers.servo_bus.provisioning import Provisioning
 from gazerig.drivers.servo_bus.torque import find_faults, insist, positions, switch_off, switch_on
 from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.servo_bus.turn import nearest_turn
 from gazerig.drivers.slow_entry import entry_speed_steps_s
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 
 FAR_SIDE = "stands beyond its encoder's zero: turn it into its range by hand"
 
@@ -35,9 +35,9 @@ class Recovery:
         self,
         line: Transactions,
         provisioning: Provisioning,
-        setups: Mapping[int, ServoSetup],
+        setups: Mapping[int, ServoConfig],
         watchdog: int,
-        health: Health,
+        health: ServoHealth,
         log: EventLog,
     ) -> None:
         self._line, self._family = line, line.family

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping
 from math import inf
 
-from gazerig.drivers.servo_bus.faults import Health
+from gazerig.drivers.servo_bus.faults import ServoHealth
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.read_plan import ReadPlan
 from gazerig.drivers.servo_bus.read_windows import Sample
@@ -12,7 +12,7 @@ from gazerig.drivers.servo_bus.recovery import Recovery
 from gazerig.drivers.servo_bus.torque import rearm_tripped
 from gazerig.drivers.servo_bus.transaction import TRIES, Transactions
 from gazerig.drivers.slow_entry import SlowEntry
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 
 AGAIN_S = 0.25
 """Time between attempts to set a servo up again, or to learn what an alert is about."""
@@ -37,9 +37,9 @@ class Supervisor(ABC):
     def __init__(
         self,
         line: Transactions,
-        setups: Mapping[int, ServoSetup],
+        setups: Mapping[int, ServoConfig],
         recovery: Recovery,
-        health: Health,
+        health: ServoHealth,
         feedback: FeedbackColumns,
         plan: ReadPlan,
         watchdog: int = 0,

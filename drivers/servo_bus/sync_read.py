@@ -42,7 +42,7 @@ class GroupReply(NamedTuple):
         return {servo_id: ServoReply(sample, self.at_s) for servo_id, sample in samples.items()}
 
 
-class Reader:
+class SyncReader:
     """Reads all servos of a poll list.
 
     Args:

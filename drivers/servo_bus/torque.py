@@ -11,7 +11,7 @@ from functools import partial
 from typing import TypeVar
 
 from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
-from gazerig.drivers.released import Released
+from gazerig.drivers.released import ReleaseResult
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.transaction import Transactions
@@ -146,7 +146,7 @@ def switch_on(
         _until(line, wanted, send, partial(_ask_goals, line, {}), "goal_position")
 
 
-def switch_off(line: Transactions, ids: Sequence[int]) -> Released:
+def switch_off(line: Transactions, ids: Sequence[int]) -> ReleaseResult:
     """Switch the watchdog, then the torque off, and verify that it is off."""
     left = tuple(ids)
     found: dict[int, int] = {}
@@ -160,7 +160,7 @@ def switch_off(line: Transactions, ids: Sequence[int]) -> Released:
         if not left:
             break
     holding = tuple(servo_id for servo_id in left if servo_id in found)
-    return Released(holding, tuple(servo_id for servo_id in left if servo_id not in found))
+    return ReleaseResult(holding, tuple(servo_id for servo_id in left if servo_id not in found))
 
 
 def disable_torque(port: BusPort, family: Family, baud: int, ids: Sequence[int]) -> tuple[int, ...]:

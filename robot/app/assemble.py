@@ -9,7 +9,7 @@ import numpy as np
 
 from gazerig.config.schema import Rig, load_rules, load_walk
 from gazerig.drivers.camera.depth_roi import depth_at
-from gazerig.drivers.camera.pose_buffer import PoseRing
+from gazerig.drivers.camera.pose_buffer import PoseBuffer
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import Camera
 from gazerig.gaze.attention import Attention
@@ -185,12 +185,12 @@ class _Sight(NamedTuple):
 
     mount: CameraMount
     poses: PoseHistory
-    turns: PoseRing | None
+    turns: PoseBuffer | None
 
 
 def _sight(kinematics: Kinematics, camera: CameraParams, options: RunOptions, real: bool) -> _Sight:
     mount = CameraMount(camera)
-    turns = PoseRing() if real and mount.on_head else None
+    turns = PoseBuffer() if real and mount.on_head else None
     history = PoseHistory if options.placed_by == "capture" else NewestPose
     return _Sight(mount, history(kinematics, tell=_teller(kinematics, mount, turns)), turns)
 
@@ -312,7 +312,7 @@ def _camera_params(
 
 
 def _teller(
-    kinematics: Kinematics, mount: CameraMount, turns: PoseRing | None
+    kinematics: Kinematics, mount: CameraMount, turns: PoseBuffer | None
 ) -> Callable[[float, Angles3], None] | None:
     """Return what tells the camera's process how its camera is turned, None where nobody asks."""
     if turns is None:

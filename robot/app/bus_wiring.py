@@ -7,14 +7,14 @@ from gazerig.config.schema import Rig
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.i2c.port import port_of
 from gazerig.drivers.maestro.bus import MaestroBus
-from gazerig.drivers.multi_bus import MixedBus, Share
+from gazerig.drivers.multi_bus import BusShare, MultiBus
 from gazerig.drivers.pca9685.bus import Pca9685Bus
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.servo_bus.params import BusParams
 from gazerig.drivers.servo_families import FAMILY_OF
 from gazerig.drivers.servo_models import BUS_KINDS, SERVOS, BusKind
-from gazerig.drivers.types import ServoBus, ServoSetup
+from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.robot.app.rig_limits import park_rad
 from gazerig.robot.control.body import setups
 from gazerig.robot.guardian.guarded_bus import GuardedBus
@@ -22,12 +22,12 @@ from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.guardian.release_plan import ReleasePlan
 
 
-def _smart(port: BusPort, own: Sequence[ServoSetup], params: BusParams) -> ServoBus:
+def _smart(port: BusPort, own: Sequence[ServoConfig], params: BusParams) -> ServoBus:
     """Make the bus of smart servos of one family."""
     return SmartServoBus(FAMILY_OF[own[0].model], port, own, params)
 
 
-BUSES: Mapping[BusKind, Callable[[BusPort, Sequence[ServoSetup], Any], ServoBus]] = {
+BUSES: Mapping[BusKind, Callable[[BusPort, Sequence[ServoConfig], Any], ServoBus]] = {
     "dynamixel": _smart,
     "feetech": _smart,
     "maestro": MaestroBus,
@@ -68,7 +68,7 @@ def ports_of(rig: Rig, given: str | None) -> dict[str, str]:
     return ports
 
 
-def rig_setups(rig: Rig) -> tuple[ServoSetup, ...]:
+def rig_setups(rig: Rig) -> tuple[ServoConfig, ...]:
     """Return what buses must know of a rig's servos, in the order of its joints."""
     return setups(rig.joints, park_rad(rig), rig.guard.soft_start_speed_deg_s)
 
@@ -150,15 +150,15 @@ def has_watchdog(rig: Rig, name: str) -> bool:
     return bool(getattr(getattr(config, config.kind), "watchdog_ms", 0))
 
 
-def _joined(shares: list[Share]) -> ServoBus:
+def _joined(shares: list[BusShare]) -> ServoBus:
     """Return several buses as one; one stays as it is."""
-    return shares[0].bus if len(shares) == 1 else MixedBus(shares)
+    return shares[0].bus if len(shares) == 1 else MultiBus(shares)
 
 
-def _share(rig: Rig, name: str, port: BusPort) -> Share:
+def _share(rig: Rig, name: str, port: BusPort) -> BusShare:
     every = dict(zip(rig.names, rig_setups(rig), strict=True))
     mine = joints_on(rig, name)
     own = [every[joint] for joint in mine]
     places = tuple(rig.names.index(joint) for joint in mine)
     config = rig.bus_named(name)
-    return Share(name, BUSES[config.kind](port, own, getattr(config, config.kind)), places)
+    return BusShare(name, BUSES[config.kind](port, own, getattr(config, config.kind)), places)

@@ -10,9 +10,9 @@ from gazerig.config.schema import Rig
 from gazerig.drivers.camera.oak.source import OakSource
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay
-from gazerig.drivers.camera.pose_buffer import PoseRing
+from gazerig.drivers.camera.pose_buffer import PoseBuffer
 from gazerig.drivers.camera.process import CameraProcess
-from gazerig.drivers.camera.source import PictureSource
+from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.camera.webcam import Webcam
 from gazerig.drivers.camera.worker import CameraParts
@@ -54,7 +54,7 @@ def scene_camera(
 
 
 def real_camera(
-    rig: Rig, options: RunOptions, clock: Clock, placed: CameraParams, turns: PoseRing | None
+    rig: Rig, options: RunOptions, clock: Clock, placed: CameraParams, turns: PoseBuffer | None
 ) -> Camera:
     """Make the camera of a film, a recording, a webcam or an OAK-D.
 
@@ -104,7 +104,7 @@ def _film(options: RunOptions) -> VideoFile | CameraReplay:
     return CameraReplay(options.replay) if options.replay is not None else VideoFile(_path(options))
 
 
-def _source(rig: Rig, options: RunOptions) -> Callable[[], PictureSource]:
+def _source(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
     """Return how to make the source, for the process that will use it."""
     if options.replay is not None:
         return partial(CameraReplay, options.replay)

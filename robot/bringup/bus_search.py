@@ -20,7 +20,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from gazerig.drivers.maestro.params import MaestroParams
-from gazerig.drivers.maestro.probe import USB_CHANNELS, MaestroFound, probe
+from gazerig.drivers.maestro.probe import USB_CHANNELS, DetectedMaestro, probe
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.port_owner import POLOLU
 from gazerig.drivers.servo_bus.discovery import FoundServo, scan
@@ -56,7 +56,7 @@ class SearchRound:
     junk: int = 0
     shared: tuple[int, ...] = ()
     protocol_1: tuple[int, ...] = ()
-    board: MaestroFound | None = None
+    board: DetectedMaestro | None = None
     channels: int | None = None
 
     @property

@@ -18,7 +18,7 @@ from gazerig.drivers.hobby_board.start import every_pulse
 from gazerig.drivers.maestro.commands import name_errors
 from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.servo_models import servo_label
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 
 SLOW_STEPS_S = 20.0 / 360.0 * 16_000.0
 """20 deg/s of the servo's shaft."""
@@ -42,7 +42,7 @@ class ChannelPosition(NamedTuple):
 
 def walk(
     board: Board,
-    setup: ServoSetup,
+    setup: ServoConfig,
     places: Sequence[int],
     sleep_until: Callable[[float], None],
     speed_steps_s: float = SLOW_STEPS_S,
@@ -79,7 +79,7 @@ def walk(
 
 
 @contextmanager
-def given(board: Board, setup: ServoSetup) -> Iterator[Channel]:
+def given(board: Board, setup: ServoConfig) -> Iterator[Channel]:
     """Let a channel give pulses: those that it gives, or its servo's rest; off at the end.
 
     Raises:
@@ -140,7 +140,7 @@ def _led(board: Board, channel: Channel, sleep_until: Callable[[float], None]) -
     return every_pulse(board, [channel.setup])[0]
 
 
-def _end(board: Board, setup: ServoSetup) -> None:
+def _end(board: Board, setup: ServoConfig) -> None:
     """Stop the pulses and see that they have.
 
     Raises:

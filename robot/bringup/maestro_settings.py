@@ -17,7 +17,7 @@ from gazerig.drivers.maestro.commands import MICRO
 from gazerig.drivers.maestro.limits import accel_units, speed_units
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.servo_models import servo_label
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 
 FACTORY_US = (992, 2000)
 """Range of every channel of a new board."""
@@ -30,7 +30,7 @@ TIMEOUT_S = 0.5
 """Long beside a tick, short beside what a hand between lids needs."""
 
 
-def range_us(setup: ServoSetup) -> tuple[int, int]:
+def range_us(setup: ServoConfig) -> tuple[int, int]:
     """Return Min and Max of a channel, us: the joint's range rounded outwards."""
     step = UNIT_US * US_STEPS
     return (
@@ -39,7 +39,7 @@ def range_us(setup: ServoSetup) -> tuple[int, int]:
     )
 
 
-def wide_range(setup: ServoSetup) -> tuple[int, int] | None:
+def wide_range(setup: ServoConfig) -> tuple[int, int] | None:
     """Return Min and Max of a channel where a new board's would cut the joint's range."""
     low, high = range_us(setup)
     if setup.min_steps >= FACTORY_US[0] * US_STEPS and setup.max_steps <= FACTORY_US[1] * US_STEPS:
@@ -47,7 +47,7 @@ def wide_range(setup: ServoSetup) -> tuple[int, int] | None:
     return low, high
 
 
-def start_limits(setup: ServoSetup) -> tuple[int, int]:
+def start_limits(setup: ServoConfig) -> tuple[int, int]:
     """Return Speed and Acceleration of a channel, which the board keeps to from its start on.
 
     In the board's units (0.25 us in 10 ms; that in 80 ms), 0 for unlimited. A board keeps five
@@ -61,7 +61,7 @@ def start_limits(setup: ServoSetup) -> tuple[int, int]:
     return (speed >> doubled) << doubled, accel_units(setup.max_accel_steps_s2)
 
 
-def instructions(params: MaestroParams, setups: Sequence[ServoSetup], usb: bool) -> Iterator[str]:
+def instructions(params: MaestroParams, setups: Sequence[ServoConfig], usb: bool) -> Iterator[str]:
     """Say line by line what to set in Pololu's Maestro Control Center.
 
     usb: the board's own USB port is used; else its serial pins
@@ -86,7 +86,7 @@ def instructions(params: MaestroParams, setups: Sequence[ServoSetup], usb: bool)
     yield "  tab Script: no script, 'Run script on startup' off. Then Apply Settings, and close it."
 
 
-def settings_file(params: MaestroParams, setups: Sequence[ServoSetup], usb: bool) -> str:
+def settings_file(params: MaestroParams, setups: Sequence[ServoConfig], usb: bool) -> str:
     """Return the same as a settings file of Pololu's programs.
 
     Channels of no joint are servos without pulses, as from the factory.
@@ -133,7 +133,7 @@ def settings_file(params: MaestroParams, setups: Sequence[ServoSetup], usb: bool
     return tostring(root, encoding="unicode") + "\n"
 
 
-def clipped(setup: ServoSetup, asked_steps: float, got_steps: float) -> str:
+def clipped(setup: ServoConfig, asked_steps: float, got_steps: float) -> str:
     """Say that a board does not go where it was sent, and the cure."""
     low, high = range_us(setup)
     if not got_steps:

@@ -9,7 +9,7 @@ import re
 from gazerig.drivers.hobby_board.models import US_STEPS
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.pca9685.registers import CHANNELS, COUNTS, PulseClock
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 
 PULSE_STEPS = 1500 * US_STEPS
 LOW_HZ, HIGH_HZ = 22e6, 28e6
@@ -25,9 +25,9 @@ def free_channel(params: Pca9685Params, address: int, used: frozenset[int]) -> i
     return free[-1] if free else None
 
 
-def free_pulse(channel: int) -> ServoSetup:
+def free_pulse(channel: int) -> ServoConfig:
     """Return the setup of a channel that gives 1500 us, with no servo on it."""
-    return ServoSetup(
+    return ServoConfig(
         channel, "hobby", PULSE_STEPS, PULSE_STEPS, 1.0, "no joint", rest_steps=PULSE_STEPS
     )
 

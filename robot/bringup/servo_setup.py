@@ -23,7 +23,7 @@ from gazerig.drivers.servo_bus.discovery import (
 )
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.servo_models import servo_label
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.servo_family import ServoKind, Tell
 
 
@@ -80,7 +80,7 @@ def _crowd(found: Iterable[FoundServo]) -> str:
     return f"{len(named)} servos answer: {', '.join(named)}"
 
 
-def refuse_model(found: FoundServo, kind: ServoKind, setup: ServoSetup, where: str) -> None:
+def refuse_model(found: FoundServo, kind: ServoKind, setup: ServoConfig, where: str) -> None:
     """See that the servo found is of the model the joint wants.
 
     Raises:
@@ -94,7 +94,7 @@ def refuse_model(found: FoundServo, kind: ServoKind, setup: ServoSetup, where: s
 
 
 def assign(
-    port: BusPort, kind: ServoKind, found: FoundServo, setup: ServoSetup, baud: int, tell: Tell
+    port: BusPort, kind: ServoKind, found: FoundServo, setup: ServoConfig, baud: int, tell: Tell
 ) -> SetUp:
     """Return the servo found the id of a joint and the bus's baud rate, and see that it has them.
 

@@ -13,7 +13,7 @@ from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.pca9685.bus import Pca9685Bus
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.types import ServoBus, ServoSetup
+from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.robot.calibration.joint_access import CalibrationStopped
 from gazerig.robot.guardian.guarded_bus import GuardedBus
 from gazerig.robot.guardian.guardian import Guardian
@@ -61,7 +61,7 @@ class OneHobby:
         self._clock, self._stopped = clock, stopped
         low, high = (round(end * US_STEPS) for end in pulses_us)
         speed = SPEED_US_S * US_STEPS
-        self._setup = ServoSetup(joint.id, joint.model, low, high, speed, name)
+        self._setup = ServoConfig(joint.id, joint.model, low, high, speed, name)
         bus = _bus(port, self._setup, params)
         self._maestro = isinstance(params, MaestroParams)
         self._bus: ServoBus = bus if guardian is None else GuardedBus(bus, 1, guardian, 0)
@@ -184,7 +184,7 @@ class OneHobby:
             self._clock.sleep_until(self._clock.now_s() + PERIOD_S)
 
 
-def _bus(port: BusPort, setup: ServoSetup, params: MaestroParams | Pca9685Params) -> ServoBus:
+def _bus(port: BusPort, setup: ServoConfig, params: MaestroParams | Pca9685Params) -> ServoBus:
     """Return the bus of one servo on its board."""
     if isinstance(params, Pca9685Params):
         return Pca9685Bus(port, [setup], params)

@@ -9,7 +9,7 @@ import typer
 from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.robot.app.bus_wiring import has_watchdog, release_plan
 from gazerig.robot.bringup.doctor import maestro as doctor_maestro
 from gazerig.robot.bringup.doctor import pca9685 as doctor_pca9685
@@ -90,12 +90,12 @@ def _examine(rig: Rig, bus: str, line: BusPort) -> list[Diagnostic]:
     return checkup.check_all(line, bench.host, behind)
 
 
-def _maestro(line: BusPort, config: BusConfig, setups: Sequence[ServoSetup]) -> list[Diagnostic]:
+def _maestro(line: BusPort, config: BusConfig, setups: Sequence[ServoConfig]) -> list[Diagnostic]:
     usb = bench.usb_id(line.port_name)
     return doctor_maestro.visit(line, config.maestro, setups, usb)
 
 
-BOARDS: Mapping[str, Callable[[BusPort, BusConfig, Sequence[ServoSetup]], list[Diagnostic]]] = {
+BOARDS: Mapping[str, Callable[[BusPort, BusConfig, Sequence[ServoConfig]], list[Diagnostic]]] = {
     "maestro": _maestro,
     "pca9685": lambda line, config, setups: doctor_pca9685.visit(line, config.pca9685, setups),
 }

@@ -12,7 +12,7 @@ from gazerig.drivers.i2c.port import port_of
 from gazerig.drivers.serial.list_ports import serial_ports
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.port_owner import refuse_owner
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, ports_of, rig_setups
 from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.cli.progress import to_open
@@ -83,7 +83,7 @@ def bus_label(rig: Rig, name: str) -> str:
     return f"bus {name}" if name else "the main bus"
 
 
-def setups_on(rig: Rig, name: str) -> tuple[ServoSetup, ...]:
+def setups_on(rig: Rig, name: str) -> tuple[ServoConfig, ...]:
     """Return what a bus must know of its servos, in the order of the joints."""
     every = dict(zip(rig.names, rig_setups(rig), strict=True))
     return tuple(every[joint] for joint in joints_on(rig, name))

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from gazerig.drivers.camera.params import WebcamParams
-from gazerig.drivers.camera.source import PictureSource
+from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.cli.terminal import clear_errors, say, signals, status
 from gazerig.robot.model.clock import RealClock
@@ -50,7 +50,7 @@ def record_camera(
 
 def _source(
     oak: bool, camera: int | None, video: Path | None, wishes: tuple[int, int | None, float]
-) -> tuple[PictureSource, str]:
+) -> tuple[FrameSource, str]:
     """Make the one source that was asked for, and name it."""
     asked = [n for n, v in (("oak", oak), ("camera", camera is not None), ("video", video)) if v]
     if len(asked) != 1:
@@ -76,7 +76,7 @@ def _source(
 
 
 def _record(
-    source: PictureSource,
+    source: FrameSource,
     name: str,
     file: Path,
     seconds: float | None,

@@ -11,7 +11,7 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_models import servo_label
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.emulation import CHAINS
 from gazerig.robot.bringup import servo_setup
@@ -70,7 +70,7 @@ class _Task(NamedTuple):
     rig: Rig
     named: str
     bus: str
-    setups: list[ServoSetup]
+    setups: list[ServoConfig]
     port: str | None
     mock: bool
     yes: bool
@@ -118,7 +118,7 @@ def _chain(task: _Task) -> list[str]:
     return left
 
 
-def _step(task: _Task, one: ServoSetup) -> bool:
+def _step(task: _Task, one: ServoConfig) -> bool:
     """Set one joint's servo up, again and again until it is done or skipped."""
     bus, kind, yes = task.bus, kind_of(one.model), task.yes
     # As it comes from the factory.
@@ -139,7 +139,7 @@ def _step(task: _Task, one: ServoSetup) -> bool:
             say(f"   {error}")
 
 
-def _set_up(line: BusPort, kind: ServoKind, wanted: ServoSetup, baud: int, yes: bool) -> bool:
+def _set_up(line: BusPort, kind: ServoKind, wanted: ServoConfig, baud: int, yes: bool) -> bool:
     found = servo_setup.find_alone(line, kind, servo_setup.search_order(kind, baud), progress)
     wipe()
     firmware = kind.family.version(found.firmware)

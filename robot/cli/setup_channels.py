@@ -9,7 +9,7 @@ from gazerig.drivers.errors import DriverError, ServoFault
 from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.models import US_STEPS
 from gazerig.drivers.servo_models import servo_label
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.channel_test import FINE_STEPS, ChannelPosition, walk
 from gazerig.robot.cli.terminal import say, signals
 from gazerig.robot.model.clock import RealClock
@@ -17,13 +17,13 @@ from gazerig.robot.model.joint import JointParams
 
 WIGGLE_DEG = 5.0
 
-Explain = Callable[[ServoSetup, ChannelPosition], str]
+Explain = Callable[[ServoConfig, ChannelPosition], str]
 """Says why a board's pulse is not where it was sent, and the cure."""
 
 
 def try_channels(
     board: Board,
-    setups: Sequence[ServoSetup],
+    setups: Sequence[ServoConfig],
     joints: Mapping[str, JointParams],
     yes: bool,
     explain: Explain,
@@ -48,7 +48,7 @@ def try_channels(
 
 
 def walked(
-    board: Board, setup: ServoSetup, places: Sequence[int], *speed_steps_s: float
+    board: Board, setup: ServoConfig, places: Sequence[int], *speed_steps_s: float
 ) -> tuple[ChannelPosition, ...]:
     """Lead a channel over places; a request to end is obeyed with pulses off.
 
@@ -66,7 +66,7 @@ def walked(
         return walk(board, setup, places, sleep_until, *speed_steps_s)
 
 
-def rest_steps(setup: ServoSetup) -> int:
+def rest_steps(setup: ServoConfig) -> int:
     """Return the pulse at which a joint rests, within its range."""
     middle = (setup.min_steps + setup.max_steps) // 2
     rest = middle if setup.rest_steps is None else setup.rest_steps
@@ -74,7 +74,7 @@ def rest_steps(setup: ServoSetup) -> int:
 
 
 def _channel(
-    board: Board, setup: ServoSetup, joint: JointParams, yes: bool, explain: Explain
+    board: Board, setup: ServoConfig, joint: JointParams, yes: bool, explain: Explain
 ) -> bool:
     """Move one channel's servo until the person knows it, or skips it."""
     rest, low, high = wiggle(setup, joint)
@@ -104,7 +104,7 @@ def _channel(
         )
 
 
-def wiggle(setup: ServoSetup, joint: JointParams) -> tuple[int, int, int]:
+def wiggle(setup: ServoConfig, joint: JointParams) -> tuple[int, int, int]:
     """Return the rest place and two places about it, in steps, all within the joint's range."""
     made, rest = joint.made(), rest_steps(setup)
     angle = made.angle_rad(rest)

@@ -19,7 +19,7 @@ from gazerig.drivers.maestro.probe import USB_CHANNELS
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.port_owner import POLOLU
 from gazerig.drivers.servo_models import servo_label
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.channel_test import FINE_STEPS, ChannelPosition
 from gazerig.robot.bringup.maestro_settings import clipped, instructions, settings_file
 from gazerig.robot.cli import progress as bench
@@ -34,7 +34,7 @@ QUICK_STEPS_S = 90.0 / 360.0 * 16_000.0
 def set_up_board(
     line: BusPort,
     params: MaestroParams,
-    setups: Sequence[ServoSetup],
+    setups: Sequence[ServoConfig],
     joints: Mapping[str, JointParams],
     yes: bool,
 ) -> list[str]:
@@ -63,12 +63,12 @@ def set_up_board(
     return try_channels(board, setups, joints, yes, _explain)
 
 
-def _explain(setup: ServoSetup, place: ChannelPosition) -> str:
+def _explain(setup: ServoConfig, place: ChannelPosition) -> str:
     return clipped(setup, place.asked, place.got)
 
 
 def write_settings(
-    file: Path, params: MaestroParams, setups: Sequence[ServoSetup], port: str
+    file: Path, params: MaestroParams, setups: Sequence[ServoConfig], port: str
 ) -> None:
     """Write what to set on a board as a file of Pololu's programs, and say how it is loaded.
 
@@ -83,7 +83,7 @@ def write_settings(
     say(f"   settings file, then Apply Settings; or without it: UscCmd --configure {file}")
 
 
-def _refuse_size(setups: Sequence[ServoSetup], usb: str, where: str) -> None:
+def _refuse_size(setups: Sequence[ServoConfig], usb: str, where: str) -> None:
     """See that a board whose size its USB product tells has all the channels."""
     size = USB_CHANNELS.get(usb)
     beyond = [servo_label(setup) for setup in setups if size is not None and setup.id >= size]
@@ -105,7 +105,7 @@ def on_usb(path: str) -> bool:
 # --- ranges
 
 
-def _ranges(board: MaestroBoard, setups: Sequence[ServoSetup], yes: bool) -> None:
+def _ranges(board: MaestroBoard, setups: Sequence[ServoConfig], yes: bool) -> None:
     """Try out every channel's range, where the person says that nothing can move."""
     if yes:
         say("   the channels' ranges are not tried out: --yes cannot know that the supply is off")
@@ -128,7 +128,7 @@ def _ranges(board: MaestroBoard, setups: Sequence[ServoSetup], yes: bool) -> Non
     )  # fmt: skip
 
 
-def _range(board: MaestroBoard, setup: ServoSetup) -> list[str]:
+def _range(board: MaestroBoard, setup: ServoConfig) -> list[str]:
     """Lead a channel from end to end of its joint's range; return what cuts it."""
     places = (rest_steps(setup), setup.min_steps, setup.max_steps, rest_steps(setup))
     gone = walked(board, setup, places, QUICK_STEPS_S)

@@ -17,7 +17,7 @@ from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.pca9685.registers import CHANNELS
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_models import servo_label
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.channel_test import ChannelPosition, given
 from gazerig.robot.bringup.oscillator import free_channel, free_pulse, oscillator_hz
 from gazerig.robot.cli.setup_channels import try_channels
@@ -28,9 +28,9 @@ from gazerig.robot.model.joint import JointParams
 def set_up_boards(
     line: BusPort,
     params: Pca9685Params,
-    setups: Sequence[ServoSetup],
+    setups: Sequence[ServoConfig],
     joints: Mapping[str, JointParams],
-    every: Sequence[ServoSetup],
+    every: Sequence[ServoConfig],
     rig: str,
     key: str,
     yes: bool,
@@ -67,7 +67,7 @@ def set_up_boards(
     return try_channels(Pca9685Board(line, params), setups, joints, yes, _explain)
 
 
-def _explain(setup: ServoSetup, place: ChannelPosition) -> str:
+def _explain(setup: ServoConfig, place: ChannelPosition) -> str:
     sent, got = f"{place.asked / US_STEPS:g} us", f"{place.got / US_STEPS:g} us"
     return (
         f"{servo_label(setup)} is sent to {sent} and gets {got}: is another program using the "

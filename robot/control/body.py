@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from gazerig.drivers.errors import BusLost, DriverError
 from gazerig.drivers.slow_entry import ENTRY_DEG_S
-from gazerig.drivers.types import Feedback, ServoBus, ServoSetup
+from gazerig.drivers.types import Feedback, ServoBus, ServoConfig
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.types import JointAngles, JointState, in_order
@@ -14,7 +14,7 @@ def setups(
     joints: Mapping[str, JointParams],
     park_rad: Mapping[str, float],
     gentle_deg_s: float = ENTRY_DEG_S,
-) -> tuple[ServoSetup, ...]:
+) -> tuple[ServoConfig, ...]:
     """Return what a bus must know of all servos.
 
     park_rad: parking pose of joints, 0 where not given: where servos that do not tell their

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from gazerig.drivers.errors import DriverError
-from gazerig.drivers.types import BusHealth, Feedback, ServoBus, ServoSetup
+from gazerig.drivers.types import BusHealth, Feedback, ServoBus, ServoConfig
 from gazerig.robot.guardian.guardian import Guardian
 
 RETRY_S = 1.0
@@ -113,7 +113,7 @@ class GuardedBus:
         self._events.clear()
         return events
 
-    def retune(self, setups: Sequence[ServoSetup]) -> None:
+    def retune(self, setups: Sequence[ServoConfig]) -> None:
         """Set the servos up so when the torque comes on the next time."""
         self._bus.retune(setups)
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from math import ceil, floor, pi, radians
 from typing import Annotated, Literal
 
-from gazerig.drivers.servo_models import SERVOS, ServoFacts
+from gazerig.drivers.servo_models import SERVOS, ServoModelInfo
 from gazerig.drivers.slow_entry import ENTRY_DEG_S
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.params import Bounds, Unit
 from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.transmission import Curve, Linkage, Straight
@@ -81,7 +81,7 @@ class JointParams:
                 raise ValueError(f"{key} {angle} {at}")
 
     @property
-    def facts(self) -> ServoFacts:
+    def facts(self) -> ServoModelInfo:
         """Return what is known of its servo's model.
 
         Raises:
@@ -130,7 +130,7 @@ class JointParams:
 
     def setup(
         self, name: str = "", rest_rad: float | None = None, gentle_deg_s: float = ENTRY_DEG_S
-    ) -> ServoSetup:
+    ) -> ServoConfig:
         """Return what the bus must know: the range rounded inwards, speed and acceleration there.
 
         rest_rad: where the joint is taken to be when the torque comes on, for a servo that
@@ -140,7 +140,7 @@ class JointParams:
         linkage, facts = self.made(), self.facts
         ends = sorted(linkage.steps(radians(end)) for end in (self.min_deg, self.max_deg))
         own = self.servo_speed_deg_s
-        return ServoSetup(
+        return ServoConfig(
             self.id,
             self.model,
             ceil(ends[0]),

@@ -3,7 +3,7 @@
 import numpy as np
 
 from gazerig.drivers.camera.frame_analysis import Motion
-from gazerig.drivers.camera.pose_buffer import PoseRing
+from gazerig.drivers.camera.pose_buffer import PoseBuffer
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import MovingBlob
 from gazerig.drivers.vision.motion.detector import MotionDetector
@@ -21,7 +21,7 @@ class MotionSource:
         params: MotionParams,
         lens: LensParams | None,
         field_rad: float,
-        turns: PoseRing | None,
+        turns: PoseBuffer | None,
     ) -> None:
         """Take how to look.
 
@@ -53,7 +53,7 @@ class MotionSource:
 
 
 def motion_finder(
-    params: MotionParams, lens: LensParams | None, field_rad: float, turns: PoseRing | None
+    params: MotionParams, lens: LensParams | None, field_rad: float, turns: PoseBuffer | None
 ) -> Motion:
     """Return what finds motion, for the process that will look at the pictures."""
     return MotionSource(params, lens, field_rad, turns)

@@ -24,7 +24,7 @@ _NEAREST_M = 0.03
 _SHIFT = 4
 
 
-class Sheet(NamedTuple):
+class TexturedQuad(NamedTuple):
     """A flat textured piece: from a corner along two edges; texture rows go along ``down_m``."""
 
     corner_m: Vec3
@@ -33,7 +33,7 @@ class Sheet(NamedTuple):
     texture: Bytes
 
 
-class Picture3d:
+class Canvas:
     """What one camera sees from one place: colours and distances along its axis.
 
     picture: (h, w, 3) BGR; depth_m: (h, w) float32, infinite where nothing was drawn
@@ -61,7 +61,7 @@ class Picture3d:
             fixed = np.rint((self._pixels(points)) * (1 << _SHIFT)).astype(np.int32)
             cv2.fillPoly(self.picture, [fixed], colour, cv2.LINE_AA, _SHIFT)
 
-    def sheet(self, sheet: Sheet) -> None:
+    def sheet(self, sheet: TexturedQuad) -> None:
         """Draw a textured sheet; texture with a fourth channel is opaque by that."""
         right, down, corner = (
             self.R_world_camera.T @ np.array(v) - offset

@@ -16,11 +16,11 @@ import numpy as np
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Vec3
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
-from gazerig.sim_mock.cameras.canvas import Bytes, Colour, Floats, Picture3d, Sheet
+from gazerig.sim_mock.cameras.canvas import Bytes, Canvas, Colour, Floats, TexturedQuad
 from gazerig.sim_mock.scenes.scene import ScenePerson, Thing
 
 
-class Looks(NamedTuple):
+class PersonColours(NamedTuple):
     """Colours of a person."""
 
     skin: Colour
@@ -28,10 +28,10 @@ class Looks(NamedTuple):
     shirt: Colour
 
 
-LOOKS = (
-    Looks((150, 180, 225), (35, 50, 70), (140, 90, 60)),
-    Looks((135, 165, 210), (25, 30, 35), (70, 80, 160)),
-    Looks((165, 195, 235), (70, 120, 165), (90, 130, 80)),
+PERSON_COLOURS = (
+    PersonColours((150, 180, 225), (35, 50, 70), (140, 90, 60)),
+    PersonColours((135, 165, 210), (25, 30, 35), (70, 80, 160)),
+    PersonColours((165, 195, 235), (70, 120, 165), (90, 130, 80)),
 )
 
 _RIGHT_EYE, _LEFT_EYE, _, _MOUTH_RIGHT, _MOUTH_LEFT = LANDMARKS_FACE_M
@@ -44,16 +44,18 @@ _AROUND = np.linspace(0.0, 2.0 * pi, 40, endpoint=False)
 _TORSO_TOP_M, _TORSO_HEIGHT_M, _TORSO_WIDTH_M, _TORSO_BEHIND_M = -0.075, 0.80, 0.46, 0.10
 
 
-def draw_person(canvas: Picture3d, person: ScenePerson, number: int) -> None:
+def draw_person(canvas: Canvas, person: ScenePerson, number: int) -> None:
     """Draw a person; people with the same number look the same."""
-    looks = LOOKS[number % len(LOOKS)]
+    looks = PERSON_COLOURS[number % len(PERSON_COLOURS)]
     yaw, pitch = person.face_yaw_pitch_rad
     R = np.array(rotation((yaw, pitch, 0.0)))
     draw_body(canvas, person.p_world_face_m, looks, number)
     draw_head(canvas, person.p_world_face_m, R, looks)
 
 
-def draw_head(canvas: Picture3d, p_world_face_m: Vec3, R_world_face: Floats, looks: Looks) -> None:
+def draw_head(
+    canvas: Canvas, p_world_face_m: Vec3, R_world_face: Floats, looks: PersonColours
+) -> None:
     """Draw head and face with the face's axes at the tip of the nose."""
 
     def world(points_face_m: Floats) -> Floats:
@@ -72,7 +74,7 @@ def draw_head(canvas: Picture3d, p_world_face_m: Vec3, R_world_face: Floats, loo
     canvas.ellipsoid_depth((middle[0], middle[1], middle[2]), R_world_face, HEAD_HALF_M)
 
 
-def draw_body(canvas: Picture3d, p_world_face_m: Vec3, looks: Looks, number: int) -> None:
+def draw_body(canvas: Canvas, p_world_face_m: Vec3, looks: PersonColours, number: int) -> None:
     """Draw shoulders and trunk, turned to the camera."""
     x, y, z = p_world_face_m
     away = np.array((x - canvas.p_m[0], y - canvas.p_m[1]))
@@ -81,11 +83,11 @@ def draw_body(canvas: Picture3d, p_world_face_m: Vec3, looks: Looks, number: int
     middle = np.array((x, y, z + _TORSO_TOP_M)) + (*(away * _TORSO_BEHIND_M), 0.0)
     corner = middle - 0.5 * aside
     canvas.sheet(
-        Sheet(_vec(corner), _vec(aside), (0.0, 0.0, -_TORSO_HEIGHT_M), _trunk(looks, number))
+        TexturedQuad(_vec(corner), _vec(aside), (0.0, 0.0, -_TORSO_HEIGHT_M), _trunk(looks, number))
     )
 
 
-def draw_thing(canvas: Picture3d, thing: Thing) -> None:
+def draw_thing(canvas: Canvas, thing: Thing) -> None:
     """Draw a thing as a patterned ball; of hands, the colour of skin."""
     way = np.array(thing.p_world_m) - canvas.p_m
     aside = np.cross(way, (0.0, 0.0, 1.0))
@@ -94,10 +96,10 @@ def draw_thing(canvas: Picture3d, thing: Thing) -> None:
     r = thing.radius_m
     corner = np.array(thing.p_world_m) - r * aside + r * up
     texture = _ball(thing.kind == "hand", thing.id)
-    canvas.sheet(Sheet(_vec(corner), _vec(2 * r * aside), _vec(-2 * r * up), texture))
+    canvas.sheet(TexturedQuad(_vec(corner), _vec(2 * r * aside), _vec(-2 * r * up), texture))
 
 
-def _hull(canvas: Picture3d, points_world_m: Floats, colour: Colour) -> None:
+def _hull(canvas: Canvas, points_world_m: Floats, colour: Colour) -> None:
     """Fill the outline of a round body given by points on it."""
     seen = canvas.seen(points_world_m)
     flat = (seen[:, :2] / seen[:, 2:]).astype(np.float32)
@@ -115,7 +117,7 @@ def _ellipsoid(middle_m: Vec3, half_m: Vec3) -> Floats:
 
 
 @lru_cache(maxsize=8)
-def _features(looks: Looks) -> tuple[tuple[Floats, Colour], ...]:
+def _features(looks: PersonColours) -> tuple[tuple[Floats, Colour], ...]:
     """Return the outlines of a face's features, in the order in which they are drawn."""
     skin = looks.skin
     shade, deep = _darker(skin, 0.86), _darker(skin, 0.68)
@@ -203,7 +205,7 @@ def _on_head(y: Floats, z: Floats) -> Floats:
 
 
 @lru_cache(maxsize=8)
-def _trunk(looks: Looks, number: int) -> Bytes:
+def _trunk(looks: PersonColours, number: int) -> Bytes:
     """Return a neck, sloping shoulders and a checked shirt: (h, w, 4), opaque where they are."""
     width, height = 138, 225
     shirt = np.zeros((height, width, 4), np.uint8)
@@ -230,7 +232,7 @@ def _ball(hand: bool, number: int) -> Bytes:
     """Return a round patterned patch: (64, 64, 4)."""
     rng = np.random.default_rng(2000 + number)
     spread = 25.0 if hand else 90.0
-    colour = np.array(LOOKS[0].skin if hand else rng.uniform(60.0, 200.0, 3))
+    colour = np.array(PERSON_COLOURS[0].skin if hand else rng.uniform(60.0, 200.0, 3))
     cells = rng.uniform(-spread, spread, (6, 6))
     pattern = cv2.resize(cells, (64, 64), interpolation=cv2.INTER_CUBIC)
     ball = np.zeros((64, 64, 4), np.uint8)

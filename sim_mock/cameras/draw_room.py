@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from gazerig.gaze.types import Vec3
-from gazerig.sim_mock.cameras.canvas import Bytes, Colour, Picture3d, Sheet
+from gazerig.sim_mock.cameras.canvas import Bytes, Canvas, Colour, TexturedQuad
 
 _LOW: Vec3 = (-2.5, -3.0, -0.9)
 _HIGH: Vec3 = (4.0, 3.0, 1.6)
@@ -21,14 +21,14 @@ _WALLS: tuple[Colour, ...] = ((190, 200, 196), (196, 190, 178), (182, 196, 204),
 _PATCHES_M, _CONTRAST = (0.07, 0.2, 0.6), (26.0, 30.0, 24.0)
 
 
-def draw_room(canvas: Picture3d, seed: int = 0) -> None:
+def draw_room(canvas: Canvas, seed: int = 0) -> None:
     """Draw the walls, the floor and the ceiling that the camera sees."""
     for sheet in _room(seed):
         canvas.sheet(sheet)
 
 
 @lru_cache(maxsize=4)
-def _room(seed: int) -> tuple[Sheet, ...]:
+def _room(seed: int) -> tuple[TexturedQuad, ...]:
     """Return the six sides; textures are the same for the same seed."""
     rng = np.random.default_rng(seed)
     (x0, y0, z0), (x1, y1, z1) = _LOW, _HIGH
@@ -42,7 +42,7 @@ def _room(seed: int) -> tuple[Sheet, ...]:
         ((x0, y1, z1), (0.0, -wide, 0.0), (long, 0.0, 0.0), _CEILING),
     )
     return tuple(
-        Sheet(corner, right, down, _texture(_length(right), _length(down), colour, rng))
+        TexturedQuad(corner, right, down, _texture(_length(right), _length(down), colour, rng))
         for corner, right, down, colour in sides
     )
 

@@ -23,7 +23,7 @@ from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.model.frames import CameraMount
-from gazerig.sim_mock.cameras.canvas import Picture3d
+from gazerig.sim_mock.cameras.canvas import Canvas
 from gazerig.sim_mock.cameras.draw_person import draw_person, draw_thing
 from gazerig.sim_mock.cameras.draw_room import draw_room
 from gazerig.sim_mock.scenes.scene import Scene, Thing
@@ -175,7 +175,7 @@ class PixelCamera:
         """Render one frame from the camera's pose; its time is the middle of the exposure."""
         assert self._start_s is not None
         par = self._params
-        canvas = Picture3d(par.width_px, par.height_px, self.lens, R, p)
+        canvas = Canvas(par.width_px, par.height_px, self.lens, R, p)
         draw_scene(canvas, self._scene, t_s - self._start_s, par.room_seed)
         picture = self._noisy(smeared(canvas.picture, self._smear_px(t_s, R)))
         depth = self._stereo(canvas.depth_m) if par.depth else None
@@ -219,7 +219,7 @@ class PixelCamera:
         return np.take(self._noise, np.arange(start, start + size), mode="wrap")
 
 
-def draw_scene(canvas: Picture3d, scene: Scene, scene_s: float, room_seed: int = 0) -> None:
+def draw_scene(canvas: Canvas, scene: Scene, scene_s: float, room_seed: int = 0) -> None:
     """Draw a room and who and what is in it, the farthest first."""
     draw_room(canvas, room_seed)
     eye = (float(canvas.p_m[0]), float(canvas.p_m[1]), float(canvas.p_m[2]))

@@ -35,7 +35,7 @@ Fields = tuple[tuple[DynamixelRegister, int], ...]
 """Registers with the values to be written to them."""
 
 
-class Gather(NamedTuple):
+class ResolvedRange(NamedTuple):
     """Real addresses behind a range, resolved through the indirect windows.
 
     runs: of real addresses
@@ -62,7 +62,7 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
         self._windows = [(b.data_base, b.data_base + b.entries, b.address_base) for b in blocks]
         self._window_low = min(low for low, _, _ in self._windows)
         self._pointers_low = min(pointers for _, _, pointers in self._windows)
-        self._gathers: dict[tuple[int, int], Gather] = {}
+        self._gathers: dict[tuple[int, int], ResolvedRange] = {}
         self._defined = bytearray(size)
         for register in registers:
             end = register.address + register.size
@@ -103,12 +103,12 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
         gather = self.gather(address, length)
         return None if gather is None else self.collect(gather)
 
-    def collect(self, gather: Gather) -> bytes:
+    def collect(self, gather: ResolvedRange) -> bytes:
         """Return the bytes at resolved addresses."""
         content = self.bytes
         return b"".join([content[run] for run in gather.runs])
 
-    def gather(self, address: int, length: int) -> Gather | None:
+    def gather(self, address: int, length: int) -> ResolvedRange | None:
         """Return the real addresses behind a range, None where an address is not defined.
 
         It is kept, as a control loop reads the same ranges again and again.
@@ -121,7 +121,7 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
             found = self._gathers[address, length] = self._gather(address, address + length)
         return found
 
-    def _gather(self, address: int, end: int) -> Gather:
+    def _gather(self, address: int, end: int) -> ResolvedRange:
         """Join neighbouring real addresses to runs."""
         runs: list[list[int]] = []
         for real in map(self.real, range(address, end)):
@@ -134,7 +134,9 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
             return any(low < end and high > at for low, high in runs for at, end in spans)
 
         slices = tuple(slice(low, high) for low, high in runs)
-        return Gather(slices, touches(SENSED_SPAN), touches(SURROUNDINGS_SPAN), touches(*PROFILED))
+        return ResolvedRange(
+            slices, touches(SENSED_SPAN), touches(SURROUNDINGS_SPAN), touches(*PROFILED)
+        )
 
     def real(self, address: int) -> int:
         """Return the address an indirect data byte stands for, others unchanged."""

@@ -39,7 +39,7 @@ from gazerig.sim_mock.dynamixel.memory import (
     in_eeprom,
 )
 from gazerig.sim_mock.dynamixel.modes import DRIVEN_BY, TORQUE_ON_BY_GOAL
-from gazerig.sim_mock.dynamixel.write_rules import GOALS, Rules
+from gazerig.sim_mock.dynamixel.write_rules import GOALS, WriteRules
 from gazerig.sim_mock.smart_servo.physics import Quirks, ServoSpec
 from gazerig.sim_mock.smart_servo.servo import EmulatedServo
 
@@ -80,7 +80,7 @@ class DynamixelServo(EmulatedServo):
         self.memory.set("id", spec.id)
         self.baud_rates = BAUD_RATES[: (self.memory.named("baud_rate").high or 0) + 1]
         self.drive = DynamixelDrive(self.memory, self.model, spec)
-        self._rules = Rules(self.memory, self.model, self.drive)
+        self._rules = WriteRules(self.memory, self.model, self.drive)
         self.fast_reads = spec.firmware >= FAST_READ_SINCE[self.model.family]
         self._new = spec.firmware >= BACKUP_SINCE[self.model.family]
         self._backup = Backup()

@@ -16,7 +16,7 @@ MULTI_TURN_STEPS = 1_048_575
 WATCHDOG_AT = 98
 
 
-class Rules:
+class WriteRules:
     """Decides which writes are permitted, by table and state; changes nothing.
 
     goal_range: positions that a goal may have now

@@ -12,7 +12,7 @@ BOTH = ("count", "for")
 TIME = ("for",)
 
 
-class Word(NamedTuple):
+class Argument(NamedTuple):
     """One word of a command: how it is shown, and how it is understood."""
 
     shown: str
@@ -24,12 +24,12 @@ class Verb(NamedTuple):
     """One command. lasting: it may end with ``count N`` and ``for S``."""
 
     do: Callable[..., str]
-    words: tuple[Word, ...]
+    words: tuple[Argument, ...]
     says: str
     lasting: tuple[str, ...] = ()
 
 
-class Commands(NamedTuple):
+class CommandTable(NamedTuple):
     """All that can be asked of one kind of device.
 
     cases: what ``set`` can choose, and the values as they are typed
@@ -177,5 +177,5 @@ def anything(text: str) -> str:
 
 count = whole(1, 1_000_000, "a number of answers")
 
-MS = Word("MS", number(0.0, 60_000.0, "milliseconds"))
-SWITCH = Word("on|off", on_off, True)
+MS = Argument("MS", number(0.0, 60_000.0, "milliseconds"))
+SWITCH = Argument("on|off", on_off, True)

@@ -3,8 +3,16 @@
 from collections.abc import Mapping, Sequence
 from typing import Protocol
 
-from gazerig.sim_mock.faults.grammar import SWITCH, Commands, Verb, Word, number, or_all, whole
-from gazerig.sim_mock.faults.line import LineFaults, Struck
+from gazerig.sim_mock.faults.grammar import (
+    SWITCH,
+    Argument,
+    CommandTable,
+    Verb,
+    number,
+    or_all,
+    whole,
+)
+from gazerig.sim_mock.faults.line import FaultTarget, LineFaults
 from gazerig.sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs, lost
 from gazerig.sim_mock.hobby_servo import HobbyServo
 
@@ -27,7 +35,7 @@ class HobbyBody(Protocol):
         ...
 
 
-class HobbyBoard(Struck, Protocol):
+class HobbyBoard(FaultTarget, Protocol):
     """A board with hobby servos behind it."""
 
     @property
@@ -53,7 +61,7 @@ class HobbyFaults(LineFaults):
 
     noun = "channel"
 
-    def __init__(self, board: HobbyBoard, commands: Commands, seed: int, header: bytes) -> None:
+    def __init__(self, board: HobbyBoard, commands: CommandTable, seed: int, header: bytes) -> None:
         super().__init__(board, commands, seed, header)
         self._hobby = board
 
@@ -111,13 +119,13 @@ class HobbyFaults(LineFaults):
         ]
 
 
-def channel_word(highest: int) -> Word:
+def channel_word(highest: int) -> Argument:
     """Return the word that names a channel."""
-    return Word("ID", whole(0, highest, "a channel"))
+    return Argument("ID", whole(0, highest, "a channel"))
 
 
 # fmt: off
-def hobby_verbs(one: Word, writes: str, own: Mapping[str, Verb]) -> dict[str, Verb]:
+def hobby_verbs(one: Argument, writes: str, own: Mapping[str, Verb]) -> dict[str, Verb]:
     """Return what can be asked of a board of hobby servos.
 
     Args:
@@ -125,7 +133,7 @@ def hobby_verbs(one: Word, writes: str, own: Mapping[str, Verb]) -> dict[str, Ve
         writes: what is sent to it without an answer, for "lose-writes".
         own: what can be asked of this make of board beside.
     """
-    who = Word(one.shown, or_all(one.read))
+    who = Argument(one.shown, or_all(one.read))
     return {
         **line_verbs(one),
         "lose-writes": lost("lose_writes", writes),
@@ -138,7 +146,7 @@ def hobby_verbs(one: Word, writes: str, own: Mapping[str, Verb]) -> dict[str, Ve
                       "supply of the servos; the board notices nothing"),
         "stick": Verb(HobbyFaults.stick, (who,), "jam the servo where it is"),
         "free": Verb(HobbyFaults.free, (who,), "let a jammed servo go"),
-        "turn": Verb(HobbyFaults.turn, (who, Word("STEPS", number(-1e5, 1e5, "quarter us"))),
+        "turn": Verb(HobbyFaults.turn, (who, Argument("STEPS", number(-1e5, 1e5, "quarter us"))),
                      "turn the servo by hand; with pulses it goes back"),
         **closing_verbs(one),
     }

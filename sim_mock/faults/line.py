@@ -12,11 +12,11 @@ from typing import Protocol
 
 from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.active import NOBODY, ActiveFaults, LineFault
-from gazerig.sim_mock.faults.grammar import Commands
+from gazerig.sim_mock.faults.grammar import CommandTable
 from gazerig.sim_mock.replies import Piece
 
 
-class Struck(Protocol):
+class FaultTarget(Protocol):
     """What faults need of the device they strike."""
 
     now_s: Callable[[], float]
@@ -47,7 +47,9 @@ class LineFaults(ABC):
     noun = "servo"
     """What an id belongs to, for messages."""
 
-    def __init__(self, chain: Struck, commands: Commands, seed: int, header: bytes) -> None:
+    def __init__(
+        self, chain: FaultTarget, commands: CommandTable, seed: int, header: bytes
+    ) -> None:
         self._chain = chain
         self.commands = commands
         self.wire = ActiveFaults(seed, header)

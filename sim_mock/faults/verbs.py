@@ -7,8 +7,8 @@ from gazerig.sim_mock.faults.grammar import (
     MS,
     SWITCH,
     TIME,
+    Argument,
     Verb,
-    Word,
     anything,
     count,
     hex_bytes,
@@ -20,9 +20,9 @@ from gazerig.sim_mock.faults.grammar import (
 from gazerig.sim_mock.faults.line import LineFaults
 
 _BYTE_COUNT = whole(0, 1024, "a number of bytes")
-_BYTES = Word("BYTES", _BYTE_COUNT)
-_N = Word("N", _BYTE_COUNT)
-_TIMES = Word("N", count, True)
+_BYTES = Argument("BYTES", _BYTE_COUNT)
+_N = Argument("N", _BYTE_COUNT)
+_TIMES = Argument("N", count, True)
 
 Do = Callable[..., str]
 
@@ -92,9 +92,9 @@ def _plug(faults: LineFaults) -> str:
 
 
 # fmt: off
-def line_verbs(one: Word) -> dict[str, Verb]:
+def line_verbs(one: Argument) -> dict[str, Verb]:
     """Return what can be asked of any line; ``one`` reads an id."""
-    who = Word(one.shown, or_all(one.read))
+    who = Argument(one.shown, or_all(one.read))
     return {
         "lose": Verb(answers("lose", "{who} does not answer"), (who,),
                      "stay silent though it obeys", BOTH),
@@ -105,27 +105,27 @@ def line_verbs(one: Word) -> dict[str, Verb]:
         "duplicate": Verb(answers("duplicate", "what {who} answers arrives twice"), (who,),
                           "answers arrive twice", BOTH),
         "corrupt": Verb(answers("corrupt", "a bit flips in what {who} answers"),
-                        (who, Word("BIT", whole(0, 8191, "a bit"), True)),
+                        (who, Argument("BIT", whole(0, 8191, "a bit"), True)),
                         "a bit flips, at random where none is named", BOTH),
         "drop": Verb(answers("drop", "byte {} is lost of what {who} answers"),
-                     (who, Word("BYTE", whole(-1024, 1023, "a byte"))),
+                     (who, Argument("BYTE", whole(-1024, 1023, "a byte"))),
                      "byte BYTE of an answer is lost; -1 the last", BOTH),
         "stall": Verb(answers("stall", "{who} stops for {:g} ms half-way through its answer"),
                       (who, MS), "stop half-way through an answer", BOTH),
-        "noise": Verb(_noise, (Word("before|after", one_of("before", "after")),
-                               Word("HEX|random", hex_bytes, True)),
+        "noise": Verb(_noise, (Argument("before|after", one_of("before", "after")),
+                               Argument("HEX|random", hex_bytes, True)),
                       "bytes around whatever is answered", BOTH),
         "static": Verb(everything("static", "noise hits {:g} % of all bytes, to and fro"),
-                       (Word("PERCENT", number(0.0, 100.0, "a percentage")),),
+                       (Argument("PERCENT", number(0.0, 100.0, "a percentage")),),
                        "so much of all bytes is hit by noise, to and fro", TIME),
         "repeat": Verb(everything("repeat", "the answers of before arrive again before the next"),
                        (), "the last answers come again first", BOTH),
     }
 
 
-def packet_verbs(one: Word) -> dict[str, Verb]:
+def packet_verbs(one: Argument) -> dict[str, Verb]:
     """Return what can be asked where many servos answer with packets; ``one`` reads an id."""
-    who = Word(one.shown, or_all(one.read))
+    who = Argument(one.shown, or_all(one.read))
     return {
         "fragment": Verb(answers("fragment", "a loose header before what {who} answers"),
                          (who._replace(optional=True),),
@@ -133,13 +133,13 @@ def packet_verbs(one: Word) -> dict[str, Verb]:
         "reorder": Verb(everything("reorder", "groups answer in reverse order"), (),
                         "groups answer in reverse order", BOTH),
         "wrong-id": Verb(answers("wrong_id", "{who} answers as {}"),
-                         (who, Word("AS", whole(0, 255, "an id"))), "answer under another id", BOTH),
+                         (who, Argument("AS", whole(0, 255, "an id"))), "answer under another id", BOTH),
         "short": Verb(answers("short", "{who} answers {} bytes too few"), (who, _N),
                       "N bytes of data too few, checksum right", BOTH),
         "long": Verb(answers("long", "{who} answers {} bytes too many"), (who, _N),
                      "N bytes of data too many, checksum right", BOTH),
         "refuse": Verb(answers("refuse", "{who} answers with error {} and no data"),
-                       (who, Word("NUMBER", whole(0, 255, "an error number"))),
+                       (who, Argument("NUMBER", whole(0, 255, "an error number"))),
                        "answer with an error number and no data", BOTH),
         "lose-writes": lost("lose_writes", "group writes"),
     }
@@ -166,10 +166,10 @@ def adapter_verbs() -> dict[str, Verb]:
     }
 
 
-def closing_verbs(one: Word) -> dict[str, Verb]:
+def closing_verbs(one: Argument) -> dict[str, Verb]:
     """Return what can be asked of every device; these stand last in its help."""
     return {
-        "set": Verb(LineFaults.choose, (Word("CASE", anything), Word("VALUE", anything)),
+        "set": Verb(LineFaults.choose, (Argument("CASE", anything), Argument("VALUE", anything)),
                     "choose where documents and devices differ: see below"),
         "status": Verb(LineFaults.status, (), "all servos and faults as JSON"),
         "clear": Verb(LineFaults.clear, (one._replace(optional=True),),

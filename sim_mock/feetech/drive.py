@@ -47,7 +47,7 @@ SPEED_P_SHARE, SPEED_I_SHARE = 1 / 50, 1 / 40_000
 """What a unit of each gain makes of steps, steps times ms, and steps/ms: shares of full duty."""
 
 
-class Sensed(NamedTuple):
+class SensedMotion(NamedTuple):
     """What the servo tells of its motion, in register units with their signs."""
 
     position: int
@@ -98,7 +98,7 @@ class FeetechDrive(Drive):
         goes_on = self.counts_turns or self.torque or self._last is not None
         return (at if goes_on else at % TURN) * self._scale
 
-    def sensed(self, now_ms: int) -> Sensed:
+    def sensed(self, now_ms: int) -> SensedMotion:
         """Return position, speed, load and current."""
         shaft = self.shaft
         at = round((shaft.x + self._shift) * self._scale)
@@ -111,7 +111,7 @@ class FeetechDrive(Drive):
         if self.torque and not shaft.v:
             more, speed = flicker(now_ms, *self._noise)
             current += more
-        return Sensed(at, speed, load, current)
+        return SensedMotion(at, speed, load, current)
 
     @property
     def moving(self) -> bool:

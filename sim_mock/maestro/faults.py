@@ -1,6 +1,6 @@
 """What can go wrong with an emulated Maestro and its servos, beside all that can on its line."""
 
-from gazerig.sim_mock.faults.grammar import Commands, Verb, Word, one_of
+from gazerig.sim_mock.faults.grammar import Argument, CommandTable, Verb, one_of
 from gazerig.sim_mock.faults.hobby import HobbyBoard, HobbyFaults, channel_word, hobby_verbs
 from gazerig.sim_mock.maestro.body import MaestroBody
 from gazerig.sim_mock.maestro.commands import ERRORS
@@ -11,7 +11,7 @@ class MaestroFaults(HobbyFaults):
     """The faults of one board; an id is a channel."""
 
     def __init__(
-        self, board: HobbyBoard, body: MaestroBody, commands: Commands, seed: int = 0
+        self, board: HobbyBoard, body: MaestroBody, commands: CommandTable, seed: int = 0
     ) -> None:
         # A Maestro's packets begin with AA: what a loose header and a broken node send.
         super().__init__(board, commands, seed, header=b"\xaa")
@@ -51,11 +51,13 @@ def _script(text: str) -> int | bool:
 
 # fmt: off
 OWN: dict[str, Verb] = {
-    "error": Verb(MaestroFaults.error, (Word("NAME", one_of(*ERRORS)),),
+    "error": Verb(MaestroFaults.error, (Argument("NAME", one_of(*ERRORS)),),
                   f"the board finds an error: {', '.join(ERRORS)}"),
-    "script": Verb(MaestroFaults.script, (Word("on|off|ID", _script),),
+    "script": Verb(MaestroFaults.script, (Argument("on|off|ID", _script),),
                    "a script runs; with a channel it swings that from end to end"),
 }
 # fmt: on
 
-COMMANDS = Commands(hobby_verbs(_CHANNEL, "commands without an answer", OWN), cases(), "a channel")
+COMMANDS = CommandTable(
+    hobby_verbs(_CHANNEL, "commands without an answer", OWN), cases(), "a channel"
+)

@@ -1,6 +1,6 @@
 """What can go wrong with emulated PCA9685 boards and their servos, beside all on the line."""
 
-from gazerig.sim_mock.faults.grammar import SWITCH, TIME, Commands, Verb, Word, count
+from gazerig.sim_mock.faults.grammar import SWITCH, TIME, Argument, CommandTable, Verb, count
 from gazerig.sim_mock.faults.hobby import channel_word, hobby_verbs
 from gazerig.sim_mock.faults.verbs import switched, times
 
@@ -8,7 +8,7 @@ CASES = {"oscillator-mhz": "MHZ"}
 
 # fmt: off
 OWN: dict[str, Verb] = {
-    "nack": Verb(times("nack", "transfers are not acknowledged"), (Word("N", count, True),),
+    "nack": Verb(times("nack", "transfers are not acknowledged"), (Argument("N", count, True),),
                  "the next N transfers are not acknowledged", TIME),
     "stuck": Verb(switched("stuck", "the bus is stuck"), (SWITCH,),
                   "the data line is held down: no transfer is possible", TIME),
@@ -19,6 +19,6 @@ OWN: dict[str, Verb] = {
 }
 # fmt: on
 
-COMMANDS = Commands(
+COMMANDS = CommandTable(
     hobby_verbs(channel_word(255), "transfers that only write", OWN), CASES, "a channel"
 )

@@ -26,7 +26,7 @@ _EVENT = struct.Struct("iIII")
 """Of inotify(7), of which Python has no module."""
 
 
-class Watch:
+class ClientCounter:
     """Counts how many clients have a file open, with the kernel's inotify(7).
 
     Where the kernel has none, ``fd`` is -1 and no client is ever counted.
@@ -81,7 +81,7 @@ class Terminal:
         self._baud = baud
         self.master = self._slave = -1
         self.path = ""
-        self.watch: Watch | None = None
+        self.watch: ClientCounter | None = None
         self.plug()
 
     @property
@@ -97,7 +97,7 @@ class Terminal:
         self.path = os.ttyname(self._slave)
         if self._baud is not None:
             self._set_baud(self._baud)
-        self.watch = Watch(self.path)
+        self.watch = ClientCounter(self.path)
         if self._link is not None:
             try:
                 _point(self._link, self.path)

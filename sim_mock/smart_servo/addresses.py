@@ -8,7 +8,7 @@ from gazerig.sim_mock.smart_servo.servo import EmulatedServo
 S = TypeVar("S", bound=EmulatedServo)
 
 
-class Addresses(Generic[S]):
+class AddressTable(Generic[S]):
     """The servos that hear one client.
 
     by_id: the first servo of each id; twins: further ones with the same id

@@ -9,9 +9,9 @@ from typing import Any, Generic, TypeVar
 
 from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.active import NOBODY
-from gazerig.sim_mock.faults.grammar import Commands
+from gazerig.sim_mock.faults.grammar import CommandTable
 from gazerig.sim_mock.replies import BROADCAST, Answer, Piece, merge
-from gazerig.sim_mock.smart_servo.addresses import Addresses, hears
+from gazerig.sim_mock.smart_servo.addresses import AddressTable, hears
 from gazerig.sim_mock.smart_servo.faults import ServoFaults
 from gazerig.sim_mock.smart_servo.framing import (
     PING,
@@ -53,7 +53,7 @@ class ServoChain(Generic[S, Q]):
     framing_type: type[Framing]
     header: bytes
     instructions: InstructionSet[S]
-    commands: Commands
+    commands: CommandTable
     eeprom_end = 0
     """Writes below are not for those who listen under a secondary id."""
 
@@ -86,7 +86,7 @@ class ServoChain(Generic[S, Q]):
     def refresh(self) -> None:
         """Read ids, baud rates and return delays again; needed after changes from outside."""
         self._stale = False
-        known = Addresses(self.servos, self._client_baud if self.heed_baud else None)
+        known = AddressTable(self.servos, self._client_baud if self.heed_baud else None)
         self._known = known
         self._by_id, self._twins, self._delay_s = known.by_id, known.twins, known.delay_s
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from gazerig.sim_mock.faults.grammar import Commands, Verb, Word, number, or_all, whole
+from gazerig.sim_mock.faults.grammar import Argument, CommandTable, Verb, number, or_all, whole
 from gazerig.sim_mock.faults.line import LineFaults
 from gazerig.sim_mock.faults.verbs import (
     Do,
@@ -41,7 +41,7 @@ class Chain(Protocol):
 class ServoFaults(LineFaults):
     """The faults of one chain."""
 
-    def __init__(self, chain: Chain, commands: Commands, seed: int, header: bytes) -> None:
+    def __init__(self, chain: Chain, commands: CommandTable, seed: int, header: bytes) -> None:
         super().__init__(chain, commands, seed, header)
         self.chain = chain
 
@@ -92,7 +92,7 @@ def _has(attribute: str, unit: str) -> Do:
 # fmt: off
 def commands_of(
     highest_id: int, quirks: type[ChainQuirks], without: Sequence[str] = (), reset: str = ""
-) -> Commands:
+) -> CommandTable:
     """Return what can be asked of one make of servos as text.
 
     Args:
@@ -101,8 +101,8 @@ def commands_of(
         without: what cannot happen to it.
         reset: what the command of that name makes of a servo.
     """
-    one = Word("ID", whole(0, highest_id, "a servo id"))
-    some = Word("ID", or_all(one.read))
+    one = Argument("ID", whole(0, highest_id, "a servo id"))
+    some = Argument("ID", or_all(one.read))
     verbs = {
         **line_verbs(one),
         **packet_verbs(one),
@@ -115,22 +115,22 @@ def commands_of(
         "brown-out": Verb(_suffers(EmulatedServo.restart, "{who} restarts"), (one,),
                           "restart as a dip of the supply makes it: no status tells"),
         "reset": Verb(_reset, (one,), f"as from the factory: {reset}"),
-        "voltage": Verb(_has("supply_v", "V"), (some, Word("V", number(0.0, 30.0, "volts"))),
+        "voltage": Verb(_has("supply_v", "V"), (some, Argument("V", number(0.0, 30.0, "volts"))),
                         "supply with another voltage"),
         "temperature": Verb(_has("temperature_c", "degC"),
-                            (some, Word("C", number(-40.0, 200.0, "degC"))),
+                            (some, Argument("C", number(-40.0, 200.0, "degC"))),
                             "give the motor a temperature; it drifts on by itself"),
         "stick": Verb(_suffers(lambda servo: servo.jam(True), "{who} is stuck"), (some,),
                       "jam the joint where it is"),
         "free": Verb(_suffers(lambda servo: servo.jam(False), "{who} is free"), (some,),
                      "let a jammed joint go"),
         "load": Verb(_suffers(EmulatedServo.set_load, "{who} carries {:g} Nm"),
-                     (some, Word("NM", number(-100.0, 100.0, "Nm"))),
+                     (some, Argument("NM", number(-100.0, 100.0, "Nm"))),
                      "hang a constant torque on the joint"),
         "turn": Verb(_suffers(EmulatedServo.turn, "{who} was turned by {:g} steps"),
-                     (some, Word("STEPS", number(-1e6, 1e6, "steps"))), "turn the joint by hand"),
+                     (some, Argument("STEPS", number(-1e6, 1e6, "steps"))), "turn the joint by hand"),
         **closing_verbs(one),
     }
     verbs = {name: verb for name, verb in verbs.items() if name not in without}
-    return Commands(verbs, cases_of(quirks), "a servo's id")
+    return CommandTable(verbs, cases_of(quirks), "a servo's id")
 # fmt: on

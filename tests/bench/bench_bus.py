@@ -24,7 +24,7 @@ from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
-from gazerig.drivers.types import Feedback, ServoSetup
+from gazerig.drivers.types import Feedback, ServoConfig
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.pty.client import PtyBus
@@ -33,7 +33,7 @@ from gazerig.sim_mock.smart_servo.physics import ServoSpec
 IDS = tuple(range(1, 10))
 MODEL = "xl330-m077"
 SPECS = [ServoSpec(i, MODEL, 2048) for i in IDS]
-SETUPS = [ServoSetup(i, MODEL, 1000, 3000, 6000.0, f"joint_{i}") for i in IDS]
+SETUPS = [ServoConfig(i, MODEL, 1000, 3000, 6000.0, f"joint_{i}") for i in IDS]
 WIRE_BYTES = 59 + 23 + 134
 """Sync write of nine goals, fast sync read of 10 bytes from nine servos, and its answer."""
 

@@ -29,10 +29,10 @@ from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
-from gazerig.drivers.multi_bus import MixedBus, Share
+from gazerig.drivers.multi_bus import BusShare, MultiBus
 from gazerig.drivers.serial.port import BlockingPort, BusPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
-from gazerig.drivers.types import ServoBus, ServoSetup
+from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, build
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -94,12 +94,12 @@ def emulated(kind: str, ids: tuple[int, ...]) -> Emulated:
 def driver(kind: str, port: BusPort, ids: tuple[int, ...]) -> ServoBus:
     """Make our driver of one bus, as it comes."""
     if kind == "maestro":
-        setups = [ServoSetup(i, "hobby", 4400, 7600, 12_000.0, rest_steps=6000) for i in ids]
+        setups = [ServoConfig(i, "hobby", 4400, 7600, 12_000.0, rest_steps=6000) for i in ids]
         return MaestroBus(port, setups, MaestroParams(stagger_ms=0.0))
     if kind == "feetech":
-        setups = [ServoSetup(i, "sts3215", 1000, 3000, 3000.0) for i in ids]
+        setups = [ServoConfig(i, "sts3215", 1000, 3000, 3000.0) for i in ids]
         return SmartServoBus(FEETECH, port, setups, FeetechParams())
-    setups = [ServoSetup(i, "xl330-m077", 1000, 3000, 6000.0) for i in ids]
+    setups = [ServoConfig(i, "xl330-m077", 1000, 3000, 6000.0) for i in ids]
     # While others have their turn it is silent for longer than servos bear.
     return SmartServoBus(DYNAMIXEL, port, setups, DynamixelParams(watchdog_ms=0))
 
@@ -110,13 +110,13 @@ def ours(
 ) -> Iterator[Tick]:
     """Tick with our drivers, torque on."""
     opened = {k: BlockingPort(p) if isinstance(p, str) else p for k, p in ports.items()}
-    shares: list[Share] = []
+    shares: list[BusShare] = []
     goals: list[int] = []
     for kind, ids in kinds.items():
         places = tuple(range(len(goals), len(goals) + len(ids)))
-        shares.append(Share(kind, driver(kind, opened[kind], ids), places))
+        shares.append(BusShare(kind, driver(kind, opened[kind], ids), places))
         goals += [6000 if kind == "maestro" else 2048] * len(ids)
-    bus = MixedBus(shares) if len(shares) > 1 else shares[0].bus
+    bus = MultiBus(shares) if len(shares) > 1 else shares[0].bus
     now_s = next(iter(opened.values())).now_s
     bus.open()
     bus.enable_torque()

@@ -15,7 +15,7 @@ from types import SimpleNamespace
 
 from gazerig.drivers.i2c.port import I2cPort
 from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
@@ -60,7 +60,7 @@ def measured(name, bus, bench, tick):
 def ours():
     bench = Bench()
     bus = Counted(bench.bus)
-    setups = [ServoSetup(i, "hobby", 4400, 7600, 1e5, rest_steps=6000) for i in range(CHANNELS)]
+    setups = [ServoConfig(i, "hobby", 4400, 7600, 1e5, rest_steps=6000) for i in range(CHANNELS)]
     made = Pca9685Bus(
         I2cPort("/dev/i2c-1", open_bus=lambda path: bus), setups, Pca9685Params(stagger_ms=0.0)
     )

@@ -25,7 +25,7 @@ from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.feetech.protocol import sync_read as feetech_read
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
-from gazerig.drivers.types import ServoBus, ServoSetup
+from gazerig.drivers.types import ServoBus, ServoConfig
 
 IDS = tuple(range(1, 10))
 MODELS = {"dynamixel": "xl330-m077", "feetech": "sts3215"}
@@ -47,7 +47,7 @@ class Client(NamedTuple):
 def driver(kind: str, path: str, baud: int, **chosen: object) -> SmartServoBus:
     """Make our driver of one bus."""
     port = BlockingPort(path)
-    setups = [ServoSetup(i, MODELS[kind], 1000, 3000, 3000.0, f"joint_{i}") for i in IDS]
+    setups = [ServoConfig(i, MODELS[kind], 1000, 3000, 3000.0, f"joint_{i}") for i in IDS]
     if kind == "dynamixel":
         # While others have their turn it is silent for longer than servos bear.
         params = DynamixelParams(baud=baud, watchdog_ms=0, **chosen)  # type: ignore[arg-type]

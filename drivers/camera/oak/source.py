@@ -5,7 +5,7 @@ from collections.abc import Callable
 from datetime import timedelta
 from typing import Any
 
-from gazerig.drivers.camera.clock_sync import ClockBridge
+from gazerig.drivers.camera.clock_sync import ClockSync
 from gazerig.drivers.camera.oak.discovery import find_oak
 from gazerig.drivers.camera.oak.messages import depth_of, faces_of, lens_of, picture_of
 from gazerig.drivers.camera.oak.params import OakParams
@@ -44,7 +44,7 @@ class OakSource:
         self._device: Any = None
         self._pipeline: Any = None
         self._queue: Any = None
-        self._bridge = ClockBridge()
+        self._bridge = ClockSync()
         self._in_step = True
         self._number = 0
         self._events: list[str] = []
@@ -76,7 +76,7 @@ class OakSource:
         except BaseException:
             self.close()
             raise
-        self._bridge, self._in_step, self._number = ClockBridge(), True, 0
+        self._bridge, self._in_step, self._number = ClockSync(), True, 0
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
         """Wait for the next picture; its time is the middle of its exposure.
@@ -177,7 +177,7 @@ class OakSource:
         jumps = self._bridge.jumps
         if self._in_step and not 0.0 <= arrived_s - stamped_s <= _OLDEST_STAMP_S:
             self._in_step = False
-            self._bridge = ClockBridge(self._params.latency_ms / 1e3)
+            self._bridge = ClockSync(self._params.latency_ms / 1e3)
             jumps = 0
             self._events.append(
                 "the OAK camera's clock is not in step with the host's: arrivals less "

@@ -44,7 +44,7 @@ from gazerig.drivers.vision.motion.optical_flow import (
 from gazerig.drivers.vision.motion.parallax import parallax
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.drivers.vision.motion.segmentation import what_moves
-from gazerig.drivers.vision.motion.tracking import Follow, MotionTracks
+from gazerig.drivers.vision.motion.tracking import MotionTracks, PatchTrack
 
 _KIND = "thing"
 # With less of the older picture in view, too little is left to tell motions apart.
@@ -199,7 +199,7 @@ class MotionDetector:
         self,
         group: Group,
         motion: PatchMotion,
-        follow: Follow,
+        follow: PatchTrack,
         now: SmallPicture,
         depth: Plane | None,
         dt_s: float,

@@ -21,7 +21,7 @@ _LARGEST_GROWTH = 3.0
 
 
 @dataclass(slots=True)
-class Follow:
+class PatchTrack:
     """One patch through time, in pixels of the small picture.
 
     centre: (2,); velocity_px_s: (2,)
@@ -44,7 +44,7 @@ class MotionTracks:
 
     def __init__(self, params: MotionParams) -> None:
         self._params = params
-        self._follows: list[Follow] = []
+        self._follows: list[PatchTrack] = []
         self._next_id = 1
 
     def retune(self, params: MotionParams) -> None:
@@ -59,13 +59,13 @@ class MotionTracks:
         total: Floats,
         t_s: float,
         dt_s: float,
-    ) -> list[Follow]:
+    ) -> list[PatchTrack]:
         """Join one picture's patches to those followed: one for each, in their order.
 
         total: (3, 3) homography of the camera's own motion, older picture to newer
         """
         self.pass_over(total, t_s, dt_s)
-        found: dict[int, Follow] = {}
+        found: dict[int, PatchTrack] = {}
         taken: set[int] = set()
         for _, i, j in sorted(self._pairs(centres, sizes_px)):
             follow = self._follows[i]
@@ -99,13 +99,13 @@ class MotionTracks:
         """Forget everything; numbers are not used again."""
         self._follows = []
 
-    def told(self, follow: Follow) -> bool:
+    def told(self, follow: PatchTrack) -> bool:
         """Return whether a patch has been seen often enough."""
         return follow.seen >= self._params.confirm_pictures
 
-    def _begun(self, centre: Floats, t_s: float) -> Follow:
+    def _begun(self, centre: Floats, t_s: float) -> PatchTrack:
         """Begin to follow something new."""
-        follow = Follow(self._next_id, centre, np.zeros(2), 1.0, t_s, 0, np.zeros(2))
+        follow = PatchTrack(self._next_id, centre, np.zeros(2), 1.0, t_s, 0, np.zeros(2))
         self._next_id += 1
         self._follows.append(follow)
         return follow

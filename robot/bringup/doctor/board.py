@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from gazerig.drivers.hobby_board.models import US_STEPS
 from gazerig.drivers.servo_models import servo_label
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.doctor.diagnostics import Diagnostic
 
 WHERE = "the board"
@@ -32,7 +32,7 @@ class BoardRules(NamedTuple):
 
 def examine(
     rules: BoardRules,
-    setups: Sequence[ServoSetup],
+    setups: Sequence[ServoConfig],
     pulses: Mapping[int, int | None],
     channels: int,
     own: Sequence[Diagnostic],
@@ -64,7 +64,7 @@ def examine(
 
 def _channels(
     rules: BoardRules,
-    setups: Sequence[ServoSetup],
+    setups: Sequence[ServoConfig],
     pulses: Mapping[int, int | None],
     channels: int,
 ) -> Iterator[Diagnostic]:
@@ -88,7 +88,7 @@ def _channels(
             yield _left_on(rules, setup, pulse)
 
 
-def _left_on(rules: BoardRules, setup: ServoSetup, pulse: int) -> Diagnostic:
+def _left_on(rules: BoardRules, setup: ServoConfig, pulse: int) -> Diagnostic:
     what = f"gets pulses of {pulse / US_STEPS:g} us though no program runs it"
     if setup.min_steps <= pulse <= setup.max_steps:
         return Diagnostic("warn", what, servo_label(setup), rules.left_on.format(name=setup.name))

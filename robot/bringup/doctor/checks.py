@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import SHARED, FoundServo
 from gazerig.drivers.servo_bus.registers import Registers
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.doctor.diagnostics import Diagnostic, Fix
 from gazerig.robot.bringup.doctor.families import CHECKS
 from gazerig.robot.bringup.doctor.settings import SETTINGS
@@ -20,7 +20,7 @@ MOST_NAMED = 6
 
 
 def visit(
-    port: BusPort, kind: ServoKind, setup: ServoSetup, found: FoundServo, corrupt: int
+    port: BusPort, kind: ServoKind, setup: ServoConfig, found: FoundServo, corrupt: int
 ) -> list[Diagnostic]:
     """Read one servo and judge it; torque is left as it is.
 
@@ -33,7 +33,7 @@ def visit(
 
 
 def take(
-    registers: Registers, checks: ServoChecks, setup: ServoSetup, found: FoundServo, corrupt: int
+    registers: Registers, checks: ServoChecks, setup: ServoConfig, found: FoundServo, corrupt: int
 ) -> ServoState:
     """Read all that the rules want to know of one servo.
 

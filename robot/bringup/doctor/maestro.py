@@ -13,10 +13,10 @@ from gazerig.drivers.hobby_board.models import US_STEPS
 from gazerig.drivers.maestro.commands import MICRO, MOST_INPUT
 from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.maestro.params import MaestroParams
-from gazerig.drivers.maestro.probe import USB_CHANNELS, MaestroFound, probe
+from gazerig.drivers.maestro.probe import USB_CHANNELS, DetectedMaestro, probe
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_models import servo_label
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.doctor.board import WHERE, BoardRules, examine
 from gazerig.robot.bringup.doctor.diagnostics import BOARD, Diagnostic, Fix, Level
 from gazerig.robot.bringup.maestro_settings import FACTORY_US, wide_range
@@ -60,7 +60,7 @@ RULES = BoardRules(
 
 
 def visit(
-    port: BusPort, params: MaestroParams, setups: Sequence[ServoSetup], usb: str
+    port: BusPort, params: MaestroParams, setups: Sequence[ServoConfig], usb: str
 ) -> list[Diagnostic]:
     """Ask a board for all it tells and judge it; nothing moves.
 
@@ -90,7 +90,11 @@ def visit(
 
 
 def _pulses(
-    line: MaestroLink, setups: Sequence[ServoSetup], channels: int, found: MaestroFound, sized: bool
+    line: MaestroLink,
+    setups: Sequence[ServoConfig],
+    channels: int,
+    found: DetectedMaestro,
+    sized: bool,
 ) -> dict[int, int | None]:
     """Ask for the pulses of a rig's channels.
 
@@ -112,7 +116,7 @@ def _pulses(
     return pulses
 
 
-def _spoken(params: MaestroParams, found: MaestroFound) -> MaestroParams:
+def _spoken(params: MaestroParams, found: DetectedMaestro) -> MaestroParams:
     """Return how to speak to a board that was found, whatever the rig says."""
     form = params.protocol if params.protocol in found.forms else found.forms[0]
     return replace(params, protocol=form, crc=found.crc)
@@ -129,7 +133,9 @@ def _mute(params: MaestroParams, on_usb: bool) -> Diagnostic:
     return Diagnostic("error", f"no Maestro answers at {params.baud} bit/s", WHERE, cure)
 
 
-def _speech(params: MaestroParams, found: MaestroFound, size: int | None) -> Iterator[Diagnostic]:
+def _speech(
+    params: MaestroParams, found: DetectedMaestro, size: int | None
+) -> Iterator[Diagnostic]:
     """Judge how it wants to be spoken to."""
     if params.protocol not in found.forms:
         number = (
@@ -159,7 +165,7 @@ def _speech(params: MaestroParams, found: MaestroFound, size: int | None) -> Ite
         )
 
 
-def _state(found: MaestroFound) -> Iterator[Diagnostic]:
+def _state(found: DetectedMaestro) -> Iterator[Diagnostic]:
     """Judge its errors and its script."""
     for name in found.errors:
         cure = CURES.get(name, "look it up in Pololu's guide")
@@ -176,7 +182,7 @@ def _state(found: MaestroFound) -> Iterator[Diagnostic]:
         )
 
 
-def _wide_ranges(setups: Sequence[ServoSetup]) -> Iterator[Diagnostic]:
+def _wide_ranges(setups: Sequence[ServoConfig]) -> Iterator[Diagnostic]:
     """Say which joints a new board's own ranges would cut."""
     for setup in setups:
         if wide_range(setup) is None:

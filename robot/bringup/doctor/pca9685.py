@@ -12,7 +12,7 @@ from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_models import servo_label
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.doctor.board import WHERE, BoardRules, examine
 from gazerig.robot.bringup.doctor.diagnostics import Diagnostic
 
@@ -31,7 +31,7 @@ RULES = BoardRules(
 )
 
 
-def visit(port: BusPort, params: Pca9685Params, setups: Sequence[ServoSetup]) -> list[Diagnostic]:
+def visit(port: BusPort, params: Pca9685Params, setups: Sequence[ServoConfig]) -> list[Diagnostic]:
     """Ask the boards of one bus for all they tell and judge it; nothing moves.
 
     Raises:

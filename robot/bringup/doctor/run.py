@@ -20,7 +20,7 @@ from gazerig.drivers.serial.list_ports import (
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import FoundServo, any_reply, corrupt, ping, scan_ids
 from gazerig.drivers.servo_models import servo_label
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.doctor.checks import visit
 from gazerig.robot.bringup.doctor.diagnostics import Diagnostic, Fix, worst
 from gazerig.robot.bringup.doctor.port import examine_latency, examine_port, port_facts
@@ -37,7 +37,7 @@ class Presence(NamedTuple):
     """
 
     there: dict[int, FoundServo]
-    missing: tuple[ServoSetup, ...]
+    missing: tuple[ServoConfig, ...]
     strangers: tuple[FoundServo, ...]
     elsewhere: tuple[FoundServo, ...]
     corrupt: dict[int, int]
@@ -81,7 +81,7 @@ def check_all(
 
 
 def check(
-    port: BusPort, kind: ServoKind, setups: Sequence[ServoSetup], baud: int, tell: Tell
+    port: BusPort, kind: ServoKind, setups: Sequence[ServoConfig], baud: int, tell: Tell
 ) -> list[Diagnostic]:
     """Examine every servo of a bus, and any other on it; torque is left as it is.
 
@@ -102,7 +102,7 @@ def check(
 
 
 def look(
-    port: BusPort, kind: ServoKind, setups: Sequence[ServoSetup], baud: int, tell: Tell
+    port: BusPort, kind: ServoKind, setups: Sequence[ServoConfig], baud: int, tell: Tell
 ) -> Presence:
     """Find out who is on the bus; the port is left open at the rig's baud rate.
 
@@ -178,7 +178,7 @@ def judge_presence(presence: Presence, kind: ServoKind, baud: int) -> Iterator[D
         )
 
 
-def _missing(setup: ServoSetup, at: FoundServo | None, spoilt: int, baud: int) -> Diagnostic:
+def _missing(setup: ServoConfig, at: FoundServo | None, spoilt: int, baud: int) -> Diagnostic:
     where = servo_label(setup)
     if at is not None:
         return Diagnostic(

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from gazerig.drivers.servo_bus.discovery import FoundServo
 from gazerig.drivers.servo_bus.family import Model
 from gazerig.drivers.servo_models import servo_label
-from gazerig.drivers.types import ServoSetup
+from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.doctor.diagnostics import Level
 from gazerig.robot.bringup.servo_family import ServoKind
 
@@ -109,7 +109,7 @@ class ServoState:
     """
 
     checks: ServoChecks
-    setup: ServoSetup
+    setup: ServoConfig
     found: FoundServo
     values: Mapping[str, int | None]
     corrupt: int = 0

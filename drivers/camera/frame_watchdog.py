@@ -2,7 +2,7 @@
 
 from typing import Literal
 
-from gazerig.drivers.camera.params import CameraCareParams
+from gazerig.drivers.camera.params import CameraRecoveryParams
 
 FIRST_PICTURE_S = 15.0
 """A camera may take so long for its first picture: exposure settles, networks are loaded."""
@@ -15,7 +15,7 @@ _SHARE = 0.2
 Silence = Literal["", "lost", "hung"]
 
 
-class PictureSilence:
+class FrameWatchdog:
     """Compares the time since the last picture with what is usual.
 
     Args:
@@ -23,7 +23,7 @@ class PictureSilence:
         now_s: when the waiting for the first picture begins, monotonic seconds.
     """
 
-    def __init__(self, care: CameraCareParams, now_s: float) -> None:
+    def __init__(self, care: CameraRecoveryParams, now_s: float) -> None:
         self._care = care
         self._last_s = now_s
         self._period_s: float | None = None
