@@ -1,8 +1,6 @@
 """The command calibrate joints: zero, sign and range of each joint, found and written down."""
 
 from collections.abc import Mapping
-from pathlib import Path
-from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -14,6 +12,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.robot.calibration.endstop_search import StopSearchParams
 from gazerig.robot.calibration.joint_access import CalibrationStopped
 from gazerig.robot.calibration.joint_calibration import Value, changes
+from gazerig.robot.cli import calibrate_options as options
 from gazerig.robot.cli.calibrate_joint import (
     By,
     CalibrationJob,
@@ -33,40 +32,19 @@ from gazerig.robot.cli.write_options import AllYesOption, DryRunOption, OutOptio
 
 def calibrate_joints(
     rig: RigArgument = "desk",
-    joint: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="This joint (again: more); else all.")
-    ] = None,
-    by: Annotated[By, typer.Option(help="Turned by hand, torque off, or gently by itself.")] = (
-        By.hand
-    ),
-    margin: Annotated[
-        float, typer.Option(metavar="DEG", min=0.0, max=20.0, help="Kept from each end.")
-    ] = 2.0,
-    zero: Annotated[
-        ZeroBy, typer.Option(help="With --by motion: zero half-way, or where a person puts it.")
-    ] = ZeroBy.middle,
-    strength: Annotated[
-        float, typer.Option(min=0.05, max=1.0, help="With --by motion: share of full strength.")
-    ] = 0.3,
-    clear_offset: Annotated[
-        bool, typer.Option("--clear-offset", help="Set the offset in a servo to 0 first.")
-    ] = False,
-    set_middle: Annotated[
-        bool,
-        typer.Option("--set-middle", help="Feetech: make the middle of its travel 2048 first."),
-    ] = False,
-    pulses: Annotated[
-        str, typer.Option(metavar="US:US", help="Hobby servos: never narrower or wider pulses.")
-    ] = "500:2500",
-    more: Annotated[
-        int, typer.Option(min=0, max=5, help="Push rods: places between each two you mark.")
-    ] = 1,
+    joint: options.Joint = None,
+    by: options.TurnedBy = By.hand,
+    margin: options.Margin = 2.0,
+    zero: options.Zero = ZeroBy.middle,
+    strength: options.Strength = 0.3,
+    clear_offset: options.ClearOffset = False,
+    set_middle: options.SetMiddle = False,
+    pulses: options.Pulses = "500:2500",
+    more: options.More = 1,
     out: OutOption = None,
     dry_run: DryRunOption = False,
     yes: AllYesOption = False,
-    answers: Annotated[
-        Path | None, typer.Option(help="File with one answer a line; empty is Enter.")
-    ] = None,
+    answers: options.Answers = None,
     mock: MockOption = False,
     port: PortOption = None,
 ) -> None:

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 import typer
 
@@ -13,9 +13,10 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.servo_models import BusKind
 from gazerig.robot.app.emulation import emulated_lines
+from gazerig.robot.cli import emulate_options as options
 from gazerig.robot.cli.rig_command import RigCommand
-from gazerig.robot.cli.terminal import clear_errors, complete_rig
-from gazerig.sim_mock.device_spec import DEFAULT_FIRMWARE, EXAMPLE, line_of
+from gazerig.robot.cli.terminal import clear_errors
+from gazerig.sim_mock.device_spec import EXAMPLE, line_of
 from gazerig.sim_mock.devices import BAUDS, CASES, CHANNELS, Emulated, MaestroLine, Pca9685Line
 from gazerig.sim_mock.pty.line import BusSettings
 from gazerig.sim_mock.pty.server import ServerSettings, run
@@ -23,101 +24,31 @@ from gazerig.sim_mock.pty.server import say as say_line
 
 app = typer.Typer()
 
-DEFAULT_BAUD = 1_000_000
-DEFAULT_DEVICE = MaestroLine().device
-_WHO: dict[BusKind, tuple[str, str]] = {
-    "dynamixel": ("Dynamixel servos", "servos know"),
-    "feetech": ("STS servos", "STS servos know"),
-    "maestro": ("a Maestro", "a Maestro's pins know"),
-    "pca9685": ("PCA9685 boards", "their bridge knows"),
+_KNOWN_BY: dict[BusKind, str] = {
+    "dynamixel": "servos know",
+    "feetech": "STS servos know",
+    "maestro": "a Maestro's pins know",
+    "pca9685": "their bridge knows",
 }
-"""Each kind as it is named, and as it stands before its baud rates."""
+"""How each kind is named before the baud rates it knows."""
 
 
 @app.command(cls=RigCommand)
 def emulate(
-    rig: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="RIG",
-            help="All buses of a rig, each with its own terminal.",
-            autocompletion=complete_rig,
-        ),
-    ] = None,
-    servos: Annotated[
-        str | None,
-        typer.Option(
-            metavar="IDS:MODEL,...",
-            help=f"The servos of one line, for example {EXAMPLE}, or 1-6:sts3215.",
-        ),
-    ] = None,
-    maestro: Annotated[
-        int | None,
-        typer.Option(
-            metavar="CHANNELS",
-            help="A Pololu Maestro with a hobby servo on each of its 6, 12, 18 or 24 channels.",
-        ),
-    ] = None,
-    pca9685: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS,...",
-            help="PCA9685 boards behind an I2C bridge, with a hobby servo on each channel: 0x40.",
-        ),
-    ] = None,
-    link: Annotated[
-        Path | None,
-        typer.Option(
-            help="Name under which to open it; kept over unplug and plug. "
-            "A rig's further buses add their own names: LINK-NAME."
-        ),
-    ] = None,
-    baud: Annotated[
-        int | None,
-        typer.Option(
-            help=f"Baud rate of the servos in bit/s (default {DEFAULT_BAUD}, or the rig's), "
-            "or of a Maestro's pins (default: its USB port, which takes any)."
-        ),
-    ] = None,
-    any_baud: Annotated[
-        bool, typer.Option("--any-baud", help="Hear clients at every baud rate.")
-    ] = False,
-    wire_time: Annotated[
-        bool, typer.Option("--wire-time", help="Bytes take their time on the line.")
-    ] = False,
-    turnaround_us: Annotated[
-        float, typer.Option(min=0.0, max=10_000.0, help="With wire time: before each answer.")
-    ] = 0.0,
-    firmware: Annotated[
-        int | None,
-        typer.Option(
-            min=1,
-            max=255,
-            help=f"Firmware version of all servos (default {DEFAULT_FIRMWARE}); of STS servos "
-            "the number behind 3.",
-        ),
-    ] = None,
-    device: Annotated[
-        int | None,
-        typer.Option(
-            min=0, max=127, help=f"With --maestro: its device number (default {DEFAULT_DEVICE})."
-        ),
-    ] = None,
-    crc: Annotated[
-        bool, typer.Option("--crc", help="With --maestro: it wants a CRC behind every command.")
-    ] = False,
-    case: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="CASE=VALUE",
-            help="Choices. "
-            + " ".join(f"Of {_WHO[kind][0]}: {', '.join(CASES[kind])}." for kind in CASES),
-        ),
-    ] = None,
-    until_eof: Annotated[
-        bool, typer.Option("--until-eof", help="End when standard input ends.")
-    ] = False,
+    rig: options.Rig = None,
+    servos: options.Servos = None,
+    maestro: options.Maestro = None,
+    pca9685: options.Pca9685 = None,
+    link: options.Link = None,
+    baud: options.Baud = None,
+    any_baud: options.AnyBaud = False,
+    wire_time: options.WireTime = False,
+    turnaround_us: options.TurnaroundUs = 0.0,
+    firmware: options.Firmware = None,
+    device: options.Device = None,
+    crc: options.Crc = False,
+    case: options.Case = None,
+    until_eof: options.UntilEof = False,
 ) -> None:
     """Emulate servos on a pseudo-terminal; prints its path as JSON, takes fault commands.
 
@@ -130,7 +61,7 @@ def emulate(
             )
         _see_what_fits(maestro is not None, firmware, device, crc)
         if servos is not None:
-            devices: Mapping[str, Emulated] = {"": line_of(servos, firmware, DEFAULT_BAUD)}
+            devices: Mapping[str, Emulated] = {"": line_of(servos, firmware, options.DEFAULT_BAUD)}
         elif maestro is not None:
             devices = {"": _board(maestro, device, crc)}
         elif pca9685 is not None:
@@ -200,7 +131,7 @@ def _board(channels: int, device: int | None, crc: bool) -> MaestroLine:
     if channels not in CHANNELS:
         sizes = ", ".join(map(str, CHANNELS))
         raise SetupError(f"--maestro {channels}: a board has {sizes} channels")
-    return MaestroLine(channels, DEFAULT_DEVICE if device is None else device, crc)
+    return MaestroLine(channels, options.DEFAULT_DEVICE if device is None else device, crc)
 
 
 def _boards(text: str) -> Pca9685Line:
@@ -234,7 +165,7 @@ def _at(device: Emulated, baud: int | None, any_baud: bool) -> Emulated:
     known = BAUDS[device.kind]
     if baud is not None and baud not in known:
         rates = ", ".join(map(str, known))
-        raise SetupError(f"--baud {baud}: {_WHO[device.kind][1]} {rates}")
+        raise SetupError(f"--baud {baud}: {_KNOWN_BY[device.kind]} {rates}")
     if baud is None and not any_baud:
         return device
     return replace(device, baud=None if any_baud else baud)

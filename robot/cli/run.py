@@ -4,13 +4,13 @@ import json
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
 from gazerig.drivers.file_output import refuse_existing, write_file
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.cli.examples import complete_scene, complete_shipped
+from gazerig.robot.cli import run_options as options
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
 from gazerig.robot.control.joint_faults import JointFault
@@ -21,103 +21,42 @@ app = typer.Typer()
 @app.command(cls=RigCommand)
 def run(
     rig: RigArgument = "desk",
-    mock: Annotated[bool, typer.Option(help="Emulated servo bus instead of the rig's.")] = False,
-    port: Annotated[str | None, typer.Option(help="Serial port instead of the rig's.")] = None,
-    scene: Annotated[
-        str | None,
-        typer.Option(
-            help="Look at a simulated scene (default with --mock: visitor).",
-            autocompletion=complete_scene,
-        ),
-    ] = None,
-    video: Annotated[Path | None, typer.Option(help="Look at a film or picture, looped.")] = None,
-    camera: Annotated[int | None, typer.Option(help="Look through webcam N.")] = None,
-    oak: Annotated[bool, typer.Option(help="Look through an OAK-D camera.")] = False,
-    replay: Annotated[
-        Path | None,
-        typer.Option(
-            "--camera-recording", help="Look at a recording of record-camera, again and again."
-        ),
-    ] = None,
-    pixels: Annotated[
-        bool, typer.Option(help="Draw the scene and find faces and motion in the pictures.")
-    ] = False,
-    seconds: Annotated[float | None, typer.Option(min=0.0, help="Stop after S seconds.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of all dice.")] = 0,
-    fast: Annotated[
-        bool, typer.Option(help="Simulated clock: as fast as it goes (needs --mock).")
-    ] = False,
-    profile: Annotated[
-        str | None,
-        typer.Option(
-            help="Style of gaze: robot, or literal mitake, nakamoto.",
-            autocompletion=complete_shipped("profiles"),
-        ),
-    ] = None,
-    character: Annotated[
-        str | None,
-        typer.Option(
-            help="A character laid over the rig: shy, bold, sleepy, strong_boxer ...",
-            autocompletion=complete_shipped("characters"),
-        ),
-    ] = None,
-    rules: Annotated[
-        str | None,
-        typer.Option(
-            help="Rule set instead of the rig's: boxing, conversation.",
-            autocompletion=complete_shipped("rules"),
-        ),
-    ] = None,
-    behaviour: Annotated[
-        str | None, typer.Option(help="Behaviour in force at the start, one of the rig's rules.")
-    ] = None,
-    conversation: Annotated[
-        str | None, typer.Option(help="Looking away as in: talk, listen, think; none (default).")
-    ] = None,
-    scanpath: Annotated[
-        str | None, typer.Option(help="Face scanpath: markov, simple, face_tracking, random.")
-    ] = None,
-    saccade: Annotated[
-        str | None, typer.Option(help="Saccades: min_jerk, main_sequence, literal_frame.")
-    ] = None,
-    page: Annotated[
-        str,
-        typer.Option(
-            metavar="HOST:PORT",
-            help="Where the live page is served. Other machines reach it at 0.0.0.0:8080. It "
-            "opens with the token in the address that is printed at start.",
-        ),
-    ] = "127.0.0.1:8080",
-    no_page: Annotated[bool, typer.Option(help="Without the live page.")] = False,
-    heatmap: Annotated[
-        Path | None, typer.Option(help="Write a heat map of the gaze on the face as PNG.")
-    ] = None,
-    heatmap_face: Annotated[
-        Path | None, typer.Option(help="Picture of a face to lay the heat map over.")
-    ] = None,
-    record: Annotated[
-        Path | None, typer.Option(help="Record every tick, to replay and judge: FILE.mcap.")
-    ] = None,
-    record_pictures: Annotated[
-        float, typer.Option(min=0.0, max=60.0, help="Camera pictures a second in the recording.")
-    ] = 2.0,
-    force: Annotated[
-        bool,
-        typer.Option("--force", help="Write over an older recording, heat map or summary."),
-    ] = False,
-    summary: Annotated[
-        str | None, typer.Option(help="Write figures as JSON to this file; - prints them.")
-    ] = None,
+    mock: options.Mock = False,
+    port: options.Port = None,
+    scene: options.Scene = None,
+    video: options.Video = None,
+    camera: options.Camera = None,
+    oak: options.Oak = False,
+    replay: options.Replay = None,
+    pixels: options.Pixels = False,
+    seconds: options.Seconds = None,
+    seed: options.Seed = 0,
+    fast: options.Fast = False,
+    profile: options.Profile = None,
+    character: options.Character = None,
+    rules: options.Rules = None,
+    behaviour: options.Behaviour = None,
+    conversation: options.Conversation = None,
+    scanpath: options.Scanpath = None,
+    saccade: options.Saccade = None,
+    page: options.Page = "127.0.0.1:8080",
+    no_page: options.NoPage = False,
+    heatmap: options.Heatmap = None,
+    heatmap_face: options.HeatmapFace = None,
+    record: options.Record = None,
+    record_pictures: options.RecordPictures = 2.0,
+    force: options.Force = False,
+    summary: options.Summary = None,
 ) -> None:
     """Run the head: gazerig run --mock, then open the page it names."""
-    options = RunOptions(**locals())  # what a person can ask for is a field of the same name
+    asked = RunOptions(**locals())  # what a person can ask for is a field of the same name
     with clear_errors(rig, port, mock):
-        options = options.checked()
-        refuse_existing(*options.written_at_the_end, force=force)
+        asked = asked.checked()
+        refuse_existing(*asked.written_at_the_end, force=force)
         # Vision and emulator are heavy; `check` and `--help` do without them.
         from gazerig.robot.app import session
 
-        composed = session.compose(options)
+        composed = session.compose(asked)
         shows = status if not fast and sys.stderr.isatty() else None
         with signals() as stopped:
             figures = session.run(composed, stopped, say, shows)

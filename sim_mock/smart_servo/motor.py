@@ -7,6 +7,7 @@ way. So no gain the registers allow can shake the numbers to infinity. What
 is read does not depend on how often it is read.
 """
 
+from collections.abc import Sequence
 from math import inf, pi, sin
 from typing import NamedTuple, Protocol
 
@@ -76,6 +77,28 @@ class Loop(NamedTuple):
     slew: float = inf
 
 
+class _Built(NamedTuple):
+    """What never changes of a shaft, in steps and milliseconds.
+
+    accel: speed that the stall torque adds in 1 ms
+    drag, free: what divides a speed after 1 ms, with the motor's own braking and without
+    dry: speed that dry friction takes in 1 ms
+    rate: share of the rated voltage that the motor induces per step/ms
+    gravity: speed that the weight adds in 1 ms at its full lever; upright: where it has none
+    play: half the dead travel; sag: share of the voltage that the supply loses at stall
+    """
+
+    accel: float
+    drag: float
+    free: float
+    dry: float
+    rate: float
+    gravity: float
+    upright: float
+    play: float
+    sag: float
+
+
 DISABLED = Loop(u_max=0.0, torque_max=0.0)
 
 PAUSE_MS = 10_000
@@ -110,6 +133,15 @@ def flicker(now_ms: int, seed: int, current: int, velocity: int) -> tuple[int, i
     return amps, (mixed >> 8) % (2 * velocity + 1) - velocity
 
 
+def _stalled(u: float, volts: float, torque_max: float) -> tuple[float, float]:
+    """Return PWM and torque of a shaft that cannot move, within its torque limit."""
+    t = u * volts
+    if -torque_max <= t <= torque_max:
+        return u, t
+    t = torque_max if t > torque_max else -torque_max
+    return (t / volts if volts > 0.0 and torque_max > 0.0 else 0.0), t
+
+
 class Shaft:
     """Position and speed of one output shaft, advanced in whole milliseconds.
 
@@ -122,8 +154,8 @@ class Shaft:
     """
 
     __slots__ = (
-        "_accel", "_drag", "_dry", "_free", "_gravity", "_held", "_high", "_integral", "_load",
-        "_loop", "_low", "_low_high", "_play", "_rate", "_rv", "_sag", "_upright",
+        "_accel", "_built", "_held", "_high", "_integral", "_load", "_loop", "_low", "_low_high",
+        "_play", "_rv",
         "effort", "joint", "profile", "quiet", "supply", "u", "v", "volts", "x",
     )  # fmt: skip
 
@@ -135,18 +167,23 @@ class Shaft:
         self._accel = accel = stall_nm / inertia * STEPS_PER_RAD * MS_S * MS_S
         top = model.no_load_rpm / 60.0 * STEPS_PER_TURN * MS_S
         # Friction is part of the data sheet's no-load speed: the motor alone would be faster.
-        self._rate = (1.0 - physics.coulomb_share - physics.viscous_share) / top
+        rate = (1.0 - physics.coulomb_share - physics.viscous_share) / top
         viscous = physics.viscous_share / top
-        self._drag = 1.0 + accel * (self._rate + viscous)
-        self._free = 1.0 + accel * viscous
-        self._dry = accel * physics.coulomb_share
+        self._play = physics.play_deg * STEPS_PER_TURN / 720.0
+        self._built = _Built(
+            accel,
+            drag=1.0 + accel * (rate + viscous),
+            free=1.0 + accel * viscous,
+            dry=accel * physics.coulomb_share,
+            rate=rate,
+            gravity=accel * physics.gravity_nm / stall_nm,
+            upright=physics.upright_steps,
+            play=self._play,
+            sag=min(SAG_MOST, physics.supply_ohm * model.stall_current_a / model.rated_v),
+        )
         self._load = accel * physics.load_nm / stall_nm
-        self._gravity = accel * physics.gravity_nm / stall_nm
-        self._upright = physics.upright_steps
         self._low_high = physics.stop_low_steps, physics.stop_high_steps
         self._low, self._high = self._low_high
-        self._play = physics.play_deg * STEPS_PER_TURN / 720.0
-        self._sag = min(SAG_MOST, physics.supply_ohm * model.stall_current_a / model.rated_v)
         self.supply = self.volts = (physics.supply_v or model.rated_v) / model.rated_v
         self._loop = DISABLED
         self._held = False
@@ -218,18 +255,21 @@ class Shaft:
         if self.quiet or ticks <= 0:
             return
         loop, profile = self._loop, self.profile
-        kp, ki, kd, vi, f1, kf2, bias, u_max, torque_max, slew = loop
-        x, v, u, t, i, joint = self.x, self.v, self.u, self.effort, self._integral, self.joint
-        was = x, u, i, joint, self.volts
-        accel, drag, free, dry, rate = self._accel, self._drag, self._free, self._dry, self._rate
-        load, gravity, play = self._load, self._gravity, self._play
-        low, high, supply, sag, volts = self._low, self._high, self.supply, self._sag, self.volts
-        before, rv = profile.r, self._rv
-        u_least = -u_max
-        integrating = ki != 0.0 or vi != 0.0
-        path = profile.ahead(ticks)
+        was = self.x, self.u, self._integral, self.joint, self.volts
+        before, path = profile.r, profile.ahead(ticks)
         # Where there is no speed to follow, D brakes only.
-        kr = 0.0 if profile.jumps else kd + f1
+        self._follow(path, before, 0.0 if profile.jumps else loop.d + loop.f1)
+        still = self.v == 0.0 and self._rv == 0.0 and not profile.running
+        self.quiet = still and was == (self.x, self.u, self._integral, self.joint, self.volts)
+
+    def _follow(self, path: Sequence[float], before: float, kr: float) -> None:
+        """Follow a path of one position a millisecond, with a gain on its speed."""
+        kp, ki, kd, vi, _, kf2, bias, u_max, torque_max, slew = self._loop
+        accel, drag, free, dry, rate, gravity, upright, play, sag = self._built
+        x, v, u, t, i, joint = self.x, self.v, self.u, self.effort, self._integral, self.joint
+        low, high, supply, volts, load = self._low, self._high, self.supply, self.volts, self._load
+        rv, u_least, t_least, slew_down, play_low = self._rv, -u_max, -torque_max, -slew, -play
+        integrating = ki != 0.0 or vi != 0.0
         k = kp + kd
         special = kf2 != 0.0 or gravity != 0.0
         for r in path:
@@ -241,44 +281,35 @@ class Shaft:
             c = kp * (r - x) + kr * rv + i + bias
             if special:
                 c += kf2 * (rv - last)
-                load = self._load + gravity * sin((x - self._upright) / STEPS_PER_RAD)
+                load = self._load + gravity * sin((x - upright) / STEPS_PER_RAD)
             pull = v + load
             push = accel * volts
             w = pull + push * c
             # Dry friction stops what the torque of 1 ms cannot move.
             if w > dry:
                 v = (w - dry) / (drag + push * k)
-            elif w < -dry:
-                v = (w + dry) / (drag + push * k)
             else:
-                v = 0.0
-            earlier = u
-            u = c - k * v
-            clipped = not (u_least <= u <= u_max and -slew <= u - earlier <= slew)
+                v = (w + dry) / (drag + push * k) if w < -dry else 0.0
+            earlier, u = u, c - k * v
+            clipped = not (u_least <= u <= u_max and slew_down <= u - earlier <= slew)
             if clipped:
-                if u > earlier:
-                    u = earlier + slew if u > earlier + slew else u
-                else:
-                    u = earlier - slew if u < earlier - slew else u
+                least, most = earlier - slew, earlier + slew
+                u = most if u > most else least if u < least else u
                 u = u_max if u > u_max else u_least if u < u_least else u
                 w = pull + push * u
                 v = (w - dry) / drag if w > dry else (w + dry) / drag if w < -dry else 0.0
             t = u * volts - v * rate
-            if not -torque_max <= t <= torque_max:
+            if not t_least <= t <= torque_max:
                 clipped = True
-                t = torque_max if t > torque_max else -torque_max
+                t = torque_max if t > torque_max else t_least
                 w = pull + accel * t
                 v = (w - dry) / free if w > dry else (w + dry) / free if w < -dry else 0.0
                 u = (t + v * rate) / volts if volts > 0.0 and torque_max > 0.0 else 0.0
             x += v
             if not low <= x <= high:
-                x = high if x > high else low
-                v = 0.0
+                x, v = high if x > high else low, 0.0
                 u = min(max(c, earlier - slew, u_least), earlier + slew, u_max)
-                t = u * volts
-                if t > torque_max or t < -torque_max:
-                    t = torque_max if t > torque_max else -torque_max
-                    u = t / volts if volts > 0.0 and torque_max > 0.0 else 0.0
+                u, t = _stalled(u, volts, torque_max)
             power = u * t
             volts = supply - sag * power if power > 0.0 else supply
             if integrating and not clipped:
@@ -286,18 +317,11 @@ class Shaft:
                     i += vi * (rv - v)
                 elif r - x > RESOLUTION or x - r > RESOLUTION:
                     i += ki * (r - x)
-                if i > u_max:
-                    i = u_max
-                elif i < -u_max:
-                    i = -u_max
-            if not -play <= x - joint <= play:
+                i = u_max if i > u_max else u_least if i < u_least else i
+            if not play_low <= x - joint <= play:
                 joint = x - play if x > joint else x + play
-        self._rv = rv
         self.x, self.v, self.u, self.effort, self._integral = x, v, u, t, i
-        self.joint, self.volts = joint, volts
-        self.quiet = (
-            v == 0.0 and rv == 0.0 and not profile.running and was == (x, u, i, joint, volts)
-        )
+        self.joint, self.volts, self._rv = joint, volts, rv
 
     def skip(self, ticks: int) -> None:
         """Skip a long time: the shaft moves as far as its profile, between its stops.

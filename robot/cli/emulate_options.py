@@ -1,0 +1,97 @@
+"""The options of the command emulate: what each takes, and what --help says of it."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gazerig.drivers.servo_models import BusKind
+from gazerig.robot.cli.terminal import complete_rig
+from gazerig.sim_mock.device_spec import DEFAULT_FIRMWARE, EXAMPLE
+from gazerig.sim_mock.devices import CASES, MaestroLine
+
+DEFAULT_BAUD = 1_000_000
+DEFAULT_DEVICE = MaestroLine().device
+_NAMES: dict[BusKind, str] = {
+    "dynamixel": "Dynamixel servos",
+    "feetech": "STS servos",
+    "maestro": "a Maestro",
+    "pca9685": "PCA9685 boards",
+}
+
+Rig = Annotated[
+    str | None,
+    typer.Argument(
+        metavar="RIG",
+        help="All buses of a rig, each with its own terminal.",
+        autocompletion=complete_rig,
+    ),
+]
+Servos = Annotated[
+    str | None,
+    typer.Option(
+        metavar="IDS:MODEL,...",
+        help=f"The servos of one line, for example {EXAMPLE}, or 1-6:sts3215.",
+    ),
+]
+Maestro = Annotated[
+    int | None,
+    typer.Option(
+        metavar="CHANNELS",
+        help="A Pololu Maestro with a hobby servo on each of its 6, 12, 18 or 24 channels.",
+    ),
+]
+Pca9685 = Annotated[
+    str | None,
+    typer.Option(
+        metavar="ADDRESS,...",
+        help="PCA9685 boards behind an I2C bridge, with a hobby servo on each channel: 0x40.",
+    ),
+]
+Link = Annotated[
+    Path | None,
+    typer.Option(
+        help="Name under which to open it; kept over unplug and plug. "
+        "A rig's further buses add their own names: LINK-NAME."
+    ),
+]
+Baud = Annotated[
+    int | None,
+    typer.Option(
+        help=f"Baud rate of the servos in bit/s (default {DEFAULT_BAUD}, or the rig's), "
+        "or of a Maestro's pins (default: its USB port, which takes any)."
+    ),
+]
+AnyBaud = Annotated[bool, typer.Option("--any-baud", help="Hear clients at every baud rate.")]
+WireTime = Annotated[bool, typer.Option("--wire-time", help="Bytes take their time on the line.")]
+TurnaroundUs = Annotated[
+    float, typer.Option(min=0.0, max=10_000.0, help="With wire time: before each answer.")
+]
+Firmware = Annotated[
+    int | None,
+    typer.Option(
+        min=1,
+        max=255,
+        help=f"Firmware version of all servos (default {DEFAULT_FIRMWARE}); of STS servos "
+        "the number behind 3.",
+    ),
+]
+Device = Annotated[
+    int | None,
+    typer.Option(
+        min=0, max=127, help=f"With --maestro: its device number (default {DEFAULT_DEVICE})."
+    ),
+]
+Crc = Annotated[
+    bool, typer.Option("--crc", help="With --maestro: it wants a CRC behind every command.")
+]
+Case = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="CASE=VALUE",
+        help="Choices. "
+        + " ".join(f"Of {_NAMES[kind]}: {', '.join(CASES[kind])}." for kind in CASES),
+    ),
+]
+UntilEof = Annotated[bool, typer.Option("--until-eof", help="End when standard input ends.")]

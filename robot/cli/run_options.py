@@ -1,0 +1,94 @@
+"""The options of the command run: what each takes, and what --help says of it."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gazerig.robot.cli.examples import complete_scene, complete_shipped
+
+Mock = Annotated[bool, typer.Option(help="Emulated servo bus instead of the rig's.")]
+Port = Annotated[str | None, typer.Option(help="Serial port instead of the rig's.")]
+Scene = Annotated[
+    str | None,
+    typer.Option(
+        help="Look at a simulated scene (default with --mock: visitor).",
+        autocompletion=complete_scene,
+    ),
+]
+Video = Annotated[Path | None, typer.Option(help="Look at a film or picture, looped.")]
+Camera = Annotated[int | None, typer.Option(help="Look through webcam N.")]
+Oak = Annotated[bool, typer.Option(help="Look through an OAK-D camera.")]
+Replay = Annotated[
+    Path | None,
+    typer.Option(
+        "--camera-recording", help="Look at a recording of record-camera, again and again."
+    ),
+]
+Pixels = Annotated[
+    bool, typer.Option(help="Draw the scene and find faces and motion in the pictures.")
+]
+Seconds = Annotated[float | None, typer.Option(min=0.0, help="Stop after S seconds.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of all dice.")]
+Fast = Annotated[bool, typer.Option(help="Simulated clock: as fast as it goes (needs --mock).")]
+Profile = Annotated[
+    str | None,
+    typer.Option(
+        help="Style of gaze: robot, or literal mitake, nakamoto.",
+        autocompletion=complete_shipped("profiles"),
+    ),
+]
+Character = Annotated[
+    str | None,
+    typer.Option(
+        help="A character laid over the rig: shy, bold, sleepy, strong_boxer ...",
+        autocompletion=complete_shipped("characters"),
+    ),
+]
+Rules = Annotated[
+    str | None,
+    typer.Option(
+        help="Rule set instead of the rig's: boxing, conversation.",
+        autocompletion=complete_shipped("rules"),
+    ),
+]
+Behaviour = Annotated[
+    str | None, typer.Option(help="Behaviour in force at the start, one of the rig's rules.")
+]
+Conversation = Annotated[
+    str | None, typer.Option(help="Looking away as in: talk, listen, think; none (default).")
+]
+Scanpath = Annotated[
+    str | None, typer.Option(help="Face scanpath: markov, simple, face_tracking, random.")
+]
+Saccade = Annotated[
+    str | None, typer.Option(help="Saccades: min_jerk, main_sequence, literal_frame.")
+]
+Page = Annotated[
+    str,
+    typer.Option(
+        metavar="HOST:PORT",
+        help="Where the live page is served. Other machines reach it at 0.0.0.0:8080. It "
+        "opens with the token in the address that is printed at start.",
+    ),
+]
+NoPage = Annotated[bool, typer.Option(help="Without the live page.")]
+Heatmap = Annotated[
+    Path | None, typer.Option(help="Write a heat map of the gaze on the face as PNG.")
+]
+HeatmapFace = Annotated[
+    Path | None, typer.Option(help="Picture of a face to lay the heat map over.")
+]
+Record = Annotated[
+    Path | None, typer.Option(help="Record every tick, to replay and judge: FILE.mcap.")
+]
+RecordPictures = Annotated[
+    float, typer.Option(min=0.0, max=60.0, help="Camera pictures a second in the recording.")
+]
+Force = Annotated[
+    bool,
+    typer.Option("--force", help="Write over an older recording, heat map or summary."),
+]
+Summary = Annotated[
+    str | None, typer.Option(help="Write figures as JSON to this file; - prints them.")
+]
