@@ -115,7 +115,7 @@ def followed(
     seconds: float,
     head: Callable[[float], HeadMotion] = lambda t: AT_REST,
 ) -> np.ndarray:
-    """Let the binocular controller follow (degrees); give rows of time, version, vergence."""
+    """Run the binocular controller on a target; return time, version, vergence (degrees)."""
     controller = BinocularController(BinocularParams())
     controller.reset(0.0)
     rows = []

@@ -134,7 +134,7 @@ class Scanpath:
         self.reset(0.0)
 
     def retune(self, params: ScanpathParams, walk: Walk) -> None:
-        """Take another model, walk or tempo; the part looked at and its dwell go on.
+        """Change the model, walk or rate; the part looked at and its dwell go on.
 
         A model that does not know that part begins with its own first look.
         """
@@ -207,7 +207,7 @@ def _looks(params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> Scan
 
 
 def markov_walk(params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> MarkovWalk:
-    """Make the walk in the reading of its diagonal, sides and start that is asked for."""
+    """Return the walk with the chosen reading of its diagonal, sides and start."""
     merged = params.diagonal == "whole_visit"
     matrix = without_refixations(walk.matrix) if merged else normalised(walk.matrix)
     statistics = zip(walk.dwell_mean_s, walk.dwell_sd_s, strict=True)

@@ -45,7 +45,7 @@ class BlinkEvent(NamedTuple):
 
 
 class BlinkFinder:
-    """Takes one opening after the other and gives each blink when it is over."""
+    """Finds blinks in a sequence of lid openings; each is returned when it has ended."""
 
     def __init__(self) -> None:
         self.clear()
@@ -58,7 +58,7 @@ class BlinkFinder:
         self._back_s: float | None = None
 
     def update(self, t_s: float, left: float, right: float) -> BlinkEvent | None:
-        """Take both openings, 0 shut .. 1 open; give the blink that is over now, if any."""
+        """Add both openings, 0 shut .. 1 open; return the blink that has just ended, if any."""
         opening = left if left > right else right  # a wink is no blink
         trace = self._trace
         if not trace:

@@ -109,7 +109,7 @@ class EventDetector:
         return self._saccades.under_way
 
     def update(self, tick: Tick) -> tuple[Event, ...]:
-        """Take a tick; give the events that are over now, in the order of their beginning."""
+        """Add a tick; return the events that have ended, in the order of their onset."""
         if tick.stopped or (
             tick.joints.missing and not _EYE_JOINTS.isdisjoint(tick.joints.missing)
         ):
@@ -182,7 +182,7 @@ class _Flight:
         self._peak_rad_s = 0.0
 
     def update(self, t_s: float, way: Vec3) -> None:
-        """Take where the command points at ``t_s``."""
+        """Add the commanded gaze direction at ``t_s``."""
         if t_s > self._last_s:
             speed = angle_between(self._last, way) / (t_s - self._last_s)
             self._peak_rad_s = max(self._peak_rad_s, speed)
@@ -210,7 +210,7 @@ class _Rest:
         self._kinds: Counter[tuple[str, str | None]] = Counter()
 
     def update(self, tick: Tick, way: Vec3) -> None:
-        """Look up now and then what the gaze is on."""
+        """Determine at intervals what the gaze is on."""
         t_s = tick.t_s
         if self._start_s is None:
             self._start_s = t_s

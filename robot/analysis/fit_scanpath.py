@@ -146,7 +146,7 @@ def _source(recording: Path, parts: PartBoxes | None) -> _Source:
 
 
 def _walk(fitted: WalkFit) -> Walk:
-    """Make the walk that the YAML will hold, so that what ``run`` would refuse is not written."""
+    """Build the walk as it will be in the YAML, to write nothing that ``run`` would refuse."""
     means = tuple(mean.value for mean in fitted.dwell_mean_s)
     sds = tuple(sd.value for sd in fitted.dwell_sd_s)
     if min(means) < 0.001 or max((*means, *sds)) > 60.0:
@@ -184,7 +184,7 @@ def _one_line(text: str) -> str:
 def _report(
     fitted: WalkFit, params: FitParams, recording: Path, notes: tuple[str, ...], out: Path
 ) -> str:
-    """Say what was found, part by part."""
+    """Print what was found, part by part."""
     shares = np.array(fitted.visits) / sum(fitted.visits)
     lines = [f"{recording}: {note}" for note in notes]
     lines.append(

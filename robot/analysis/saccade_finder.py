@@ -83,7 +83,7 @@ class _Speed(NamedTuple):
 
 
 class SaccadeFinder:
-    """Takes one direction after the other and gives each saccade when it is over."""
+    """Finds saccades in a sequence of gaze directions; each is returned when it has ended."""
 
     def __init__(self) -> None:
         self.under_way = False
@@ -102,7 +102,7 @@ class SaccadeFinder:
         self.under_way = False
 
     def update(self, t_s: float, way: Vec3) -> Jump | None:
-        """Take a unit direction in the world; give the saccade that is over now, if any."""
+        """Add a unit direction in the world; return the saccade that has just ended, if any."""
         samples = self._samples
         if samples:
             since_s = t_s - samples[-1].t_s
@@ -177,7 +177,7 @@ class SaccadeFinder:
         return None
 
     def _follow(self, speed: _Speed) -> None:
-        """Take what goes on for too long for a saccade as the slow motion."""
+        """Treat motion that lasts too long for a saccade as slow motion."""
         self.under_way, self._slow, self._barrier_s = False, speed.velocity_1_s, speed.t_s
 
     def _foot(self) -> float:

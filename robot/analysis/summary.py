@@ -51,7 +51,7 @@ class Summary:
             self._limited[reason.partition(": ")[2]] += 1
 
     def _fixates(self, tick: Tick, dt_s: float) -> bool:
-        """Tell a fixation as an eye tracker does: by the speed of the gaze."""
+        """Whether this is a fixation, judged by the speed of the gaze as an eye tracker does."""
         before, self._gaze = self._gaze, cyclopean(tick)
         if before is None or dt_s <= 0.0 or tick.gaze.phase == "saccade":
             return False

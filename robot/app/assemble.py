@@ -205,7 +205,7 @@ def _components(
     walk: Walk,
     random: _Generators,
 ) -> Components:
-    """Make all that has parameters."""
+    """Build all components that have parameters."""
     lids = Lids(rig.gaze.lids, random.lids)
     tracker = Tracker(rig.tracks)
     moves = movers(rig)
@@ -301,7 +301,7 @@ def _scene(rig: Rig, name: str) -> Scene:
 def _camera_params(
     rig: Rig, options: RunOptions, kinematics: Kinematics
 ) -> tuple[CameraParams, tuple[str, ...]]:
-    """Take the rig's camera, standing still where its pictures cannot turn with the head."""
+    """Return the rig's camera, with mount base if its frames cannot turn with the head."""
     what = options.looks_through
     turns = options.video is None and options.replay is None and not options.mock
     if what is None or turns or rig.camera.mount == "base":

@@ -23,7 +23,7 @@ from gazerig.robot.guardian.release_plan import ReleasePlan
 
 
 def _smart(port: BusPort, own: Sequence[ServoConfig], params: BusParams) -> ServoBus:
-    """Make the bus of smart servos of one family."""
+    """Return the bus of smart servos of one family."""
     return SmartServoBus(FAMILY_OF[own[0].model], port, own, params)
 
 
@@ -74,7 +74,7 @@ def rig_setups(rig: Rig) -> tuple[ServoConfig, ...]:
 
 
 def rig_bus(rig: Rig, ports: Mapping[str, BusPort]) -> ServoBus:
-    """Make the bus of a rig; nothing is opened.
+    """Return the bus of a rig; nothing is opened.
 
     ports: by the name of the bus
     """

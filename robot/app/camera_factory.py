@@ -43,7 +43,7 @@ def scene_camera(
     where: HeadPose,
     rng: np.random.Generator,
 ) -> Camera:
-    """Make a camera on a simulated scene: drawn and looked at, or what a detector would find."""
+    """Return a camera on a simulated scene, which renders frames or returns ideal detections."""
     field_deg = rig.camera.horizontal_field_deg
     if not options.pixels:
         params = SceneCameraParams(horizontal_field_deg=field_deg)
@@ -56,7 +56,7 @@ def scene_camera(
 def real_camera(
     rig: Rig, options: RunOptions, clock: Clock, placed: CameraParams, turns: PoseBuffer | None
 ) -> Camera:
-    """Make the camera of a film, a recording, a webcam or an OAK-D.
+    """Return the camera of a film, a recording, a webcam or an OAK-D.
 
     placed: where it sits, which may be standing still though the rig's does not
     turns: how the camera was turned when; None where it stands still
@@ -74,7 +74,7 @@ def real_camera(
 
 
 def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams) -> str:
-    """Let the camera of a running rig look otherwise; say what of it cannot be done.
+    """Change the parameters of a running camera; return what cannot be changed while it runs.
 
     placed: where it sits, with the lens that is to be believed
     """
@@ -128,7 +128,7 @@ class _MotionOfDrawn:
         self._before: Mat3 | None = None
 
     def retune(self, params: MotionParams) -> None:
-        """Look otherwise from the next picture on; what is followed stays."""
+        """Use new parameters from the next frame on; tracked faces are kept."""
         self._enabled = params.enabled
         self._detector.retune(params)
         if not params.enabled:

@@ -134,7 +134,7 @@ class LiveParams:
         return self.camera.horizontal_field_deg
 
     def prepare(self, base: Rig, rig: Rig) -> Tune:
-        """Make the command that turns one rig into another that was checked; from any thread.
+        """Return the command that changes one rig into another that was checked; for any thread.
 
         Its tick then need not check it. base: in force when the command comes
 
@@ -146,7 +146,7 @@ class LiveParams:
         return command
 
     def __call__(self, command: Tune, t_s: float) -> tuple[str, ...]:
-        """Put a change in force, from this tick on; say what was done.
+        """Apply a change from this tick on; return a description of what was done.
 
         A change that nobody has prepared is checked here; a wrong one changes nothing.
         """
@@ -201,7 +201,7 @@ class LiveParams:
         return (*said, camera) if camera else said
 
     def _put_joints(self, old: Rig, new: Rig) -> tuple[str, ...]:
-        """Tell body and guard of joints; the guard where each joint is in angles of now.
+        """Apply joint limits to body and guard; the guard gets the present angles of the joints.
 
         Gives what has to wait for the servos to be set up anew.
         """
@@ -240,7 +240,7 @@ def _with_servo(joint: JointParams, first: JointParams) -> JointParams:
 
 
 def _ready(command: Tune, base: Rig, rig: Rig) -> _Ready:
-    """Put a checked change together, with the face walk where it is another one.
+    """Build a checked change, with a new face walk if that has changed.
 
     Raises:
         gazerig.config.load.ConfigError: the walk that the rig names is at fault.
@@ -253,7 +253,7 @@ def _ready(command: Tune, base: Rig, rig: Rig) -> _Ready:
 def _beyond(
     joints: tuple[str, ...], wanted: tuple[JointLimit, ...], reach: tuple[JointLimit, ...]
 ) -> tuple[str, ...]:
-    """Say which joints may go farther or faster than their servos were set up to."""
+    """Return which joints may go farther or faster than their servos were set up for."""
     more = [
         name
         for name, desired, most in zip(joints, wanted, reach, strict=True)

@@ -64,10 +64,23 @@ class _ParamState(NamedTuple):
 
 
 class ParamStore:
-    """Gives and changes the parameters of one running rig.
+    """The parameters of one running rig: returns and changes them.
 
-    version: goes up at each change
-    confined: says which files a person at a browser may name
+    version: increases with each change
+    confined: which files a user of the page may name
+
+    Args:
+        live_params: the parameters of the rig as it was assembled.
+        command: queues commands for the next tick, as gazerig.robot.control.loop.Robot.command.
+        rig: name or path of the rig.
+        character: name or path of the character.
+        profile: name or path of the profile.
+        now: the time in the name of a backup.
+        elsewhere: calls a function that reads or writes rig files in another process, so that
+            the control loop is not delayed.
+
+    Raises:
+        gazerig.config.load.ConfigError: the files have changed since, and are at fault now.
     """
 
     def __init__(
@@ -80,16 +93,6 @@ class ParamStore:
         now: Callable[[], datetime] = datetime.now,
         elsewhere: Callable[..., Any] = in_subprocess,
     ) -> None:
-        """Take a rig as it was assembled, and the names of the files it was made of.
-
-        command: takes commands for the next tick, as gazerig.robot.control.loop.Robot.command
-        now: the time in the name of a backup
-        elsewhere: calls a function that reads or writes rig files, so that the control loop
-            does not feel it
-
-        Raises:
-            gazerig.config.load.ConfigError: the files have changed since, and are at fault now.
-        """
         self._live_params, self._command = live_params, command
         self._profile, self._now, self._elsewhere = profile, now, elsewhere
         self._changing = threading.Lock()
@@ -151,7 +154,7 @@ class ParamStore:
         return found or {prefix: value_of(state.rig, prefix)}
 
     def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
-        """Put values at dotted keys in force from the next tick on, all of them or none.
+        """Apply values at dotted keys from the next tick on, all of them or none.
 
         Gives a line for each value that is another one now.
 
@@ -171,7 +174,7 @@ class ParamStore:
         return _changes(self._defaults, self._state.rig, values(self._defaults))
 
     def revert(self) -> tuple[str, ...]:
-        """Put in force what the files say."""
+        """Apply the values in the files again."""
         with self._changing:
             return self._put(self._state, self._state.saved)
 
@@ -229,7 +232,7 @@ class ParamStore:
             return self._put(state, rig)
 
     def reload(self, path: Path | str | None = None) -> tuple[str, ...]:
-        """Put in force what the files say now; what is unsaved stays, unless they changed it.
+        """Apply the present values of the files; unsaved values stay unless the files changed them.
 
         path: the one of the files that was edited
 
@@ -259,7 +262,7 @@ class ParamStore:
         return state._replace(saved=saved, was=values(saved), files=files)
 
     def _put(self, state: _ParamState, rig: Rig) -> tuple[str, ...]:
-        """Put a rig in force that was checked, and say what is other than before."""
+        """Apply a checked rig, and return what has changed."""
         before = self._state
         found = differences(before.rig, rig)
         if found:

@@ -262,14 +262,14 @@ def _decided(tick: Tick) -> _Decided:
 
 
 def _difference(was: Tick, now: Tick) -> str:
-    """Say what differs first in a tick, "" where nothing does."""
+    """Return the first difference of two ticks, "" if there is none."""
     pairs = zip(_Decided._fields, _decided(was), _decided(now), strict=True)
     name = next((name for name, then, again in pairs if then != again), None)
     return f"{name}: {_short(was, now, name)}" if name is not None else ""
 
 
 def _short(was: Tick, now: Tick, name: str) -> str:
-    """Say in a few words what one part of a tick became of what it was."""
+    """Return a short text on how one part of a tick differs."""
     if name == "target":
         return f"{now.target.why}, was {was.target.why}"
     if name == "gaze":

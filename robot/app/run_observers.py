@@ -47,7 +47,19 @@ class SteeringButtons(NamedTuple):
 
 
 class RunObservers:
-    """All that watch a run or reach into it, opened and closed together."""
+    """All observers of a run and all its remote controls, opened and closed together.
+
+    To be made before the robot starts.
+
+    Args:
+        made: the robot and its surroundings.
+        options: where the page is, and whether time is simulated, without any user.
+        say: prints a line.
+        status: rewrites the status line; None: there is none.
+        tuning: the parameters; None if they cannot be changed from outside.
+        recorder: records the run.
+        steer: buttons that lead the head; otherwise the page can then only stop and resume.
+    """
 
     def __init__(
         self,
@@ -59,17 +71,6 @@ class RunObservers:
         recorder: Recorder | None = None,
         steer: SteeringButtons | None = None,
     ) -> None:
-        """Take the robot before it starts.
-
-        Args:
-            made: the robot and its surroundings.
-            options: where the page is, and whether time is simulated, in which nobody watches.
-            say: writes a line.
-            status: rewrites the status line; None: there is none.
-            tuning: the parameters; None where they cannot be changed from outside.
-            recorder: what records the run.
-            steer: who leads the head by buttons; then the page can otherwise only stop and resume.
-        """
         self._steer = steer
         self._made, self._fast, self._say = made, options.fast, say
         self._tuning, self._recorder = tuning, recorder
@@ -133,7 +134,7 @@ class RunObservers:
             observers.add("the recording", self._recorder.record)
 
     def update(self, tick: Tick) -> None:
-        """Tell all of a tick; called by the loop where they have not joined others."""
+        """Update all observers with a tick; called by a loop that does not update them itself."""
         self._observers.update(tick)
 
     def timed(self, stop: Callable[[float], str | None]) -> Callable[[float], str | None]:
@@ -179,7 +180,7 @@ class RunObservers:
             self._say(left_out(name, error))
 
     def tell(self, words: str) -> None:
-        """Say something to everybody who looks at the page."""
+        """Show a message to all users of the page."""
         if self._page is not None:
             self._page.say(words)
 
@@ -189,7 +190,7 @@ class RunObservers:
             self._recorder.close("it could not start")
 
     def events(self) -> tuple[str, ...]:
-        """Say what has happened to those who watch."""
+        """Report events to all observers."""
         return self._recorder.events() if self._recorder is not None else ()
 
     def unwritten(self) -> Path | None:

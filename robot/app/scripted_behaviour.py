@@ -19,7 +19,7 @@ class ScriptedBehaviour:
         self._asked: str | None = None
 
     def update(self, t_s: float) -> None:
-        """Look at the plan for this tick."""
+        """Apply what the script plans for this tick."""
         if self._first_s is None:
             self._first_s = t_s
         wanted = self._plan(t_s - self._first_s)

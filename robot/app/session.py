@@ -42,7 +42,7 @@ class ComposedRun(NamedTuple):
 
 
 def compose(options: RunOptions) -> ComposedRun:
-    """Put one run together; nothing moves.
+    """Assemble one run; nothing moves.
 
     Raises:
         gazerig.config.load.ConfigError: the rig, character, profile or walk is at fault.
@@ -140,7 +140,7 @@ class _Session:
         return observers
 
     def _log(self, tick: Tick) -> None:
-        """Say what has happened in a tick."""
+        """Print the events of a tick."""
         for event in (*drawn_together(tick.events), *self._audience.events()):
             self._say(f"{tick.t_s - self._start_s:.2f} s: {event}")
 
@@ -231,7 +231,7 @@ def _longest_s(made: Assembly, options: RunOptions) -> float | None:
 
 
 def _ask_all(robot: Robot, options: RunOptions) -> None:
-    """Ask for what is to be in force at the start."""
+    """Send the commands that apply from the start of the run."""
     try:
         for menu, choice in options.choices:
             robot.ask(menu, choice)

@@ -92,7 +92,7 @@ def search(
     thorough: bool = False,
     to_the_end: bool = False,
 ) -> Iterator[SearchRound]:
-    """Ask one kind after the other; ends behind the kind that has answered.
+    """Search with one kind of bus after the other; end after the first kind that replied.
 
     asked: as ``plan`` gives it
     thorough: wait long for Dynamixel servos, ask each STS id even where nobody answers a ping

@@ -80,7 +80,7 @@ def walk(
 
 @contextmanager
 def given(board: Board, setup: ServoConfig) -> Iterator[Channel]:
-    """Let a channel give pulses: those that it gives, or its servo's rest; off at the end.
+    """Send pulses on a channel: its present pulse, or its servo's rest pulse; off at the end.
 
     Raises:
         ServoMissing: the board does not answer, or the channel is no servo's.

@@ -110,7 +110,7 @@ def judged(p_world_m: Vec3, pose: GazeState, moved: MoveResult, converges: bool 
 
 
 def met(looked: LookedAt) -> tuple[str, ...]:
-    """Say in words how well the point is met, as far as the mechanism can meet it."""
+    """Return a text: how closely the gaze reaches the point, within the mechanism's range."""
     eyes = [part for part in looked.moved.joints if part.joint.endswith(("_pan", "_tilt"))]
     known = " (estimated, not measured)" if any(part.estimated for part in eyes) else ""
     away = f"of a point {looked.distance_m:.2f} m away{known}"

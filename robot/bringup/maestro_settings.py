@@ -62,7 +62,7 @@ def start_limits(setup: ServoConfig) -> tuple[int, int]:
 
 
 def instructions(params: MaestroParams, setups: Sequence[ServoConfig], usb: bool) -> Iterator[str]:
-    """Say line by line what to set in Pololu's Maestro Control Center.
+    """Return the settings to make in Pololu's Maestro Control Center, line by line.
 
     usb: the board's own USB port is used; else its serial pins
     """
@@ -134,7 +134,7 @@ def settings_file(params: MaestroParams, setups: Sequence[ServoConfig], usb: boo
 
 
 def clipped(setup: ServoConfig, asked_steps: float, got_steps: float) -> str:
-    """Say that a board does not go where it was sent, and the cure."""
+    """Return a message that a board clips its goals, with the remedy."""
     low, high = range_us(setup)
     if not got_steps:
         return (

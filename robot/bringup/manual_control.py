@@ -156,7 +156,7 @@ class ManualControl:
         return self.follow(on_the_way, there, longest_s, desired, gently=True)
 
     def hold(self, seconds: float) -> MoveResult:
-        """Hold the goals in force for so long.
+        """Hold the present goals for this long.
 
         Raises:
             DriverError: the bus is gone.

@@ -30,7 +30,7 @@ def board_plain(looked: SearchRound) -> dict[str, object]:
 
 
 def board_words(looked: SearchRound) -> Iterator[str]:
-    """Say what a board has told."""
+    """Return a description of what a board reported."""
     board = looked.board
     if board is None:
         return
@@ -51,7 +51,7 @@ def board_words(looked: SearchRound) -> Iterator[str]:
 def remarks(
     rounds: Sequence[SearchRound], where: str, wished: Sequence[BusKind] = ()
 ) -> Iterator[str]:
-    """Say what tables of servos and boards do not.
+    """Return remarks on a scan beyond its tables of servos and boards.
 
     wished: kinds that were to be asked, unless one before them answered
     """
@@ -77,7 +77,7 @@ def remarks(
 
 
 def _asked(rounds: Sequence[SearchRound]) -> str:
-    """Say which kinds were asked at which rates."""
+    """Return a text: which kinds were searched at which baud rates."""
     rates: dict[BusKind, list[str]] = {}
     for one in rounds:
         if one.possible:
@@ -86,7 +86,7 @@ def _asked(rounds: Sequence[SearchRound]) -> str:
 
 
 def _odd(one: SearchRound, heard: Container[int]) -> Iterator[str]:
-    """Say what was odd at one rate; heard: the rates at which something was understood."""
+    """Return what was unusual at one baud rate."""
     twice = {servo.id for servo in one.found if one.found.count(servo) > 1}
     for servo_id in sorted({*one.shared, *twice}):
         yield (

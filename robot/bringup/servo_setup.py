@@ -147,7 +147,7 @@ class _Assignment:
         return SetUp(self._found, seen, tuple(self._done))
 
     def _torque_off(self) -> None:
-        """Make the servo confirm all that it is told, and switch its torque off."""
+        """Make the servo reply to every instruction, and switch its torque off."""
         registers = self._registers
         registers.write_all((self._id,), "status_return_level", self._kind.family.answer_level)
         if registers.read(self._id, "torque_enable"):

@@ -59,7 +59,7 @@ class TelemetryReader(Protocol):
     """Reads the servos of one line, and writes nothing."""
 
     def read(self, joint: JointParams) -> Telemetry | None:
-        """Ask a joint's servo; None where it does not answer.
+        """Read a joint's servo; None if it does not reply.
 
         Raises:
             BusLost: the port is gone.
@@ -80,7 +80,7 @@ class SmartServoTelemetry:
         self._names = (*LIVE, kind.family.error_register, kind.family.effort_register)
 
     def read(self, joint: JointParams) -> Telemetry | None:
-        """Ask a joint's servo; see TelemetryReader."""
+        """Read a joint's servo; see TelemetryReader."""
         values = self._registers.read_many(joint.id, self._names)
         whole = {name: value for name, value in values.items() if value is not None}
         return telemetry_of(self._kind, joint, whole) if len(whole) == len(values) else None
@@ -119,7 +119,7 @@ class MaestroTelemetry:
         ]
 
     def read(self, joint: JointParams) -> Telemetry | None:
-        """Ask for a joint's pulse; see TelemetryReader."""
+        """Read a joint's pulse; see TelemetryReader."""
         found = self._lines[0].pulses((joint.id,))
         if found is None:
             self._lines.reverse()
@@ -134,7 +134,7 @@ class Pca9685Telemetry:
         self._board = Pca9685Board(port, params)
 
     def read(self, joint: JointParams) -> Telemetry | None:
-        """Ask for a joint's pulse; see TelemetryReader."""
+        """Read a joint's pulse; see TelemetryReader."""
         found = self._board.pulses((joint.id,))
         return None if found is None else pulse_telemetry(joint, found[0])
 

@@ -85,7 +85,7 @@ def held(seen: SeenBoard, guess: Intrinsics, width_px: int, height_px: int) -> H
 
 
 def coverage(views: Sequence[Held], params: ViewParams) -> Coverage:
-    """Say what is missing."""
+    """Return what is missing."""
     edge, tilt = params.edge_share, params.least_tilt_deg
     wishes = {
         "bring the board to the left edge of the picture": any(v.left <= edge for v in views),
@@ -120,11 +120,11 @@ class ViewCollector:
 
     @property
     def coverage(self) -> Coverage:
-        """Say what the kept views show and what is missing."""
+        """Return what the kept views cover and what is missing."""
         return coverage(self._held, self.params)
 
     def offer(self, seen: SeenBoard | None) -> str:
-        """Keep a view if it is new; return why it was not kept, "" where it was."""
+        """Keep a view if it is new; return the reason if it was not kept, else ""."""
         if seen is None:
             return "no board seen"
         how = held(seen, self._guess, *self._size)

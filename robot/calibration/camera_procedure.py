@@ -67,7 +67,7 @@ class LensStep(NamedTuple):
 
 
 class LensSteps:
-    """Takes pictures of a board that a person holds until they show all of the lens."""
+    """Collects frames of a board that the user holds until they cover all of the lens."""
 
     def __init__(
         self, board: CharucoBoard, view_rad: float, params: LensCalibrationParams | None = None
@@ -78,7 +78,7 @@ class LensSteps:
         self._size = (0, 0)
 
     def take(self, shot: Shot) -> LensStep:
-        """Look for the board in a picture and keep the view if it is new.
+        """Detect the board in a frame and keep the view if it is new.
 
         Raises:
             CameraError: the pictures have changed their size.
@@ -138,7 +138,7 @@ class Neck(Protocol):
         ...
 
     def rest(self, seconds: float) -> None:
-        """Hold still for so long, with the servos' watchdog kept content."""
+        """Hold still for this long, and keep the servos' watchdog from expiring."""
         ...
 
     def angles(self) -> Angles3:
@@ -194,7 +194,7 @@ def neck_steps(
     angles_rad: Sequence[Angles3],
     params: NeckStepParams | None = None,
 ) -> Iterator[NeckStep]:
-    """Look at the board from one neck angle after another, and straight ahead at the end.
+    """View the board from one neck angle after another, and straight ahead at the end.
 
     geometry: gives the head's pose for measured angles
 

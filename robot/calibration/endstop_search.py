@@ -69,7 +69,7 @@ class StopSearch:
         self.found: EndStop | None = None
 
     def step(self, position_steps: int, load: float, t_s: float) -> int:
-        """Take a measurement, return the goal; after the end the goal that backs off.
+        """Add a measurement, return the goal; after the end the goal that backs off.
 
         load: present current as a share of the stall current, 0 where it is not known
         """

@@ -32,10 +32,16 @@ _PULL = 1.0
 class FaceSteering:
     """A gazerig.robot.control.loop.Chooser whose choices come from keys.
 
-    state: how far the person has come
+    state: progress of the calibration
     face: the face that is looked at, None while none is seen
-    error_deg: how far the worse eye is from the part, as measured, or the mean line of sight
-        of eyes that one linkage turns to the sides; inf while unknown
+    error_deg: angle of the worse eye from the part, as measured, or of the mean line of sight
+        of eyes that share one linkage for yaw; inf while unknown
+
+    Args:
+        state: where to start.
+        top_down: the behaviours, of which none is active.
+        rest_world_m: where to look while no face is seen.
+        converges: each eye has a yaw joint of its own.
     """
 
     def __init__(
@@ -45,10 +51,6 @@ class FaceSteering:
         rest_world_m: Vec3,
         converges: bool = True,
     ) -> None:
-        """Take where to begin, the behaviours, which rest, and where to look with no face there.
-
-        converges: each eye turns to the sides by itself
-        """
         self._converges = converges
         self.top_down = top_down
         self._begin = state

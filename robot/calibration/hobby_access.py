@@ -90,7 +90,7 @@ class OneHobby:
         return self._pulse / US_STEPS if self._on else None
 
     def begin(self, place_us: float) -> float:
-        """Hold it at the pulse that it gets, or begin with this one; return the pulse in us.
+        """Hold the joint at its present pulse, or start with this one; return the pulse in us.
 
         Where it had no pulses it goes there at once, at its own speed.
 
@@ -102,7 +102,7 @@ class OneHobby:
         return self.place_us
 
     def aim(self, place_us: float) -> float:
-        """Let it go slowly to a pulse from now on; return that pulse, inside what is allowed."""
+        """Move slowly to a pulse; return that pulse, limited to what is allowed."""
         self._goal = self._within(place_us)
         return self.place_us
 
@@ -146,7 +146,7 @@ class OneHobby:
         )
 
     def events(self) -> tuple[str, ...]:
-        """Say what has happened since the last call."""
+        """Return the events since the last call."""
         said, self._said = self._said, []
         return (*self._bus.events(), *said)
 
@@ -166,7 +166,7 @@ class OneHobby:
         return min(max(round(place_us * US_STEPS), low), high)
 
     def _read(self) -> int:
-        """Ask the board until it answers; return the pulse that it gives now, in steps.
+        """Read the board until it replies; return its present pulse in steps.
 
         Raises:
             BusLost: it does not answer any more.

@@ -94,7 +94,7 @@ class Unwrapped:
         return self._at
 
     def see(self, position_steps: int, t_s: float) -> int:
-        """Take one sample; return the unwrapped position.
+        """Add one sample; return the unwrapped position.
 
         Raises:
             CalibrationRefused: it moved so far while it was not watched that its way is unknown.
@@ -143,12 +143,12 @@ def lid_keys(joint_name: str) -> tuple[str, str]:
 
 
 def middle(marks: Marks) -> Marks:
-    """Put the zero half-way between the ends."""
+    """Set the zero half-way between the ends."""
     return marks._replace(zero=(marks.positive_end + marks.negative_end) // 2)
 
 
 def calibration(name: str, marks: Marks, joint: JointParams, margin_deg: float) -> Calibration:
-    """Make zero, sign and range of a joint, ``margin_deg`` short of each end.
+    """Return zero, sign and range of a joint, ``margin_deg`` short of each end.
 
     joint: as it is configured now; its gear ratio is taken as right
 

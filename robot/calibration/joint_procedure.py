@@ -27,7 +27,7 @@ class Operator(Protocol):
     """Who is asked; ``live`` is called more than 20 times a second while they think."""
 
     def tell(self, line: str) -> None:
-        """Say what is going on."""
+        """Show what is going on."""
         ...
 
     def wait(self, question: str, live: Callable[[], str]) -> None:
@@ -52,7 +52,7 @@ class Watched:
         self._first: int | None = None
 
     def live(self) -> str:
-        """Take a sample; return it in words."""
+        """Add a sample; return it as text."""
         steps, first = self.steps(), self._first
         first = steps if first is None else first
         self._first = first
@@ -63,12 +63,12 @@ class Watched:
         )
 
     def steps(self) -> int:
-        """Take a sample; return the unwrapped position."""
+        """Add a sample; return the unwrapped position."""
         return self._track.see(*self._single.position())
 
 
 def by_hand(single: SingleJoint, person: Operator, margin_deg: float) -> Calibration:
-    """Let a person turn the limp joint to its ends and straight ahead.
+    """Let the user turn the joint, with torque off, to its ends and straight ahead.
 
     Raises:
         gazerig.robot.calibration.joint_calibration.CalibrationRefused: what was marked makes no

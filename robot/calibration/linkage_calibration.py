@@ -43,7 +43,7 @@ def likely_angle(joint: JointParams, position: float, one: Place, other: Place) 
 
 
 def places(name: str, marked: Sequence[Place], joint: JointParams, margin_deg: float) -> LinkageFit:
-    """Make linkage and range of a joint; a lid's range ends at its marked places.
+    """Return linkage and range of a joint; a lid's range ends at its marked positions.
 
     Args:
         name: the joint's.

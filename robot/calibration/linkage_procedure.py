@@ -34,19 +34,19 @@ class Steered(Protocol):
     """A servo as a person moves it; pulse widths in us."""
 
     def by(self, us: float) -> None:
-        """Let it go by so much."""
+        """Move the joint by this much."""
         ...
 
     def nudge(self, us: float) -> None:
-        """Let it go by so much, and never far ahead: for a key that is held down."""
+        """Move the joint by this much, never far ahead of it: for a key that is held down."""
         ...
 
     def to(self, us: float) -> None:
-        """Let it go to a pulse width."""
+        """Move the joint to a pulse width."""
         ...
 
     def live(self) -> str:
-        """Look after it; return where it is in words."""
+        """Update the joint; return its position as text."""
         ...
 
 
@@ -77,7 +77,7 @@ class Placer(Protocol):
         ...
 
     def mark(self, where: str) -> float:
-        """Let a person bring it somewhere; return the place."""
+        """Let the user move the joint to a position; return it."""
         ...
 
     def bring(self, place: float) -> float:
@@ -89,7 +89,7 @@ class Placer(Protocol):
         ...
 
     def live(self) -> str:
-        """Look after it; return where it is in words."""
+        """Update the joint; return its position as text."""
         ...
 
 
@@ -101,7 +101,7 @@ class HobbyPlacer:
         self._hobby, self._person = hobby, person
 
     def begin(self) -> None:
-        """Take hold where its pulse is, or where a person lets the pulses begin."""
+        """Hold the joint at its present pulse, or where the user lets the pulses start."""
         hobby, person = self._hobby, self._person
         at_us = hobby.open()
         if at_us is None:
@@ -121,21 +121,21 @@ class HobbyPlacer:
         )
 
     def mark(self, where: str) -> float:
-        """Let a person steer it somewhere; return the pulse width in us."""
+        """Let the user move the joint to a position; return the pulse width in us."""
         self._person.steer(f"move {self.name} {where}, then press Enter", self)
         return self._arrived()
 
     def by(self, us: float) -> None:
-        """Let it go by so much."""
+        """Move the joint by this much."""
         self._hobby.aim(self._hobby.place_us + us)
 
     def nudge(self, us: float) -> None:
-        """Let it go by so much, at most ``LEAD_US`` ahead of its pulse."""
+        """Move the joint by this much, at most ``LEAD_US`` ahead of its pulse."""
         at_us = self._hobby.pulse_us
         self._hobby.aim(min(max(self._hobby.place_us + us, at_us - LEAD_US), at_us + LEAD_US))
 
     def to(self, us: float) -> None:
-        """Let it go to a pulse width."""
+        """Move the joint to a pulse width."""
         self._hobby.aim(us)
 
     def bring(self, place: float) -> float:
@@ -173,17 +173,17 @@ class HandPlacer:
         self._watched = Watched(single)
 
     def begin(self) -> None:
-        """Take the torque away."""
+        """Switch the torque off."""
         self._single.servo.disable_torque()
         self._person.tell(f"{self._single.who}: torque off, it can be turned by hand")
 
     def mark(self, where: str) -> float:
-        """Let a person turn it somewhere; return the position in steps."""
+        """Let the user turn the joint to a position; return it in steps."""
         self._person.wait(f"turn {self.name} {where}, then press Enter", self.live)
         return float(self._watched.steps())
 
     def bring(self, place: float) -> float:
-        """Let a person turn it to about a position in steps; return where it is."""
+        """Let the user turn the joint to about a position in steps; return where it is."""
         return self.mark(f"until it reads about step {place:.0f}")
 
     def leave(self, place: float) -> None:
@@ -240,7 +240,7 @@ def _lid(placer: Placer, person: Steerer) -> list[Place]:
 
 
 def _angle(placer: Placer, person: Steerer, at: float, proposed: float) -> float:
-    """Ask for the angle of the place where the joint is."""
+    """Ask for the angle of the joint's present position."""
     towards = f" ({ends_of(placer.name)[0]} is +)"
     asked = f"{placer.name} at {at:g} {placer.joint.facts.unit}: how many degrees{towards}?"
     return person.number(asked, proposed, placer.live)

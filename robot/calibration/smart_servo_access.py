@@ -139,7 +139,7 @@ class SingleServo:
         return was
 
     def set_middle(self) -> int:
-        """Make its present position the middle, 2048; return the offset it has now.
+        """Set the servo's present position as its middle, 2048; return the offset that it has now.
 
         Raises:
             SetupError: this kind cannot.
@@ -219,7 +219,7 @@ class SingleServo:
             put("bus_watchdog", round(WATCHDOG_S / unit_s))
 
     def _borrow(self, strength: float, speed_steps_s: float) -> None:
-        """Let goals lead anywhere in the turn, weak and slow; the stops alone are to be found."""
+        """Allow goals anywhere in the turn, weak and slow, to find the end stops."""
         value, driving = self._value, self._driving
         wanted = {
             **dict(zip(LIMITS, (0, self._family.steps_per_turn - 1), strict=True)),

@@ -217,7 +217,7 @@ def _eye(job: _Job, number: int, mock: bool, seed: int) -> Iterator[_Eye]:
 
 
 def _lens(job: _Job, eye: _Eye) -> LensCalibration:
-    """Let a person show the board until the lens is known."""
+    """Have the user show the board until the lens is known."""
     steps, number = LensSteps(job.board, radians(job.rig.camera.horizontal_field_deg)), 0
     say("hold the board before the camera and do what the line below says; Ctrl-C gives up")
     while True:
@@ -253,7 +253,7 @@ def _lens(job: _Job, eye: _Eye) -> LensCalibration:
 
 
 def _mount(job: _Job, eye: _Eye, neck: Neck, camera: CameraParams, good: HandEyeParams) -> HandEye:
-    """Look at the hanging board from several neck angles."""
+    """View the hanging board from several neck angles."""
     if camera.lens is None:
         raise SetupError("the lens is not measured yet: calibrate it first (--what lens or all)")
     shot = _first(job, eye)

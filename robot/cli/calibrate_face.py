@@ -117,7 +117,7 @@ def _steered(
     scripted: bool,
     stopped: Callable[[], str | None],
 ) -> FaceCalibration:
-    """Let a person steer the gaze from part to part; the rig ends parked, torque off.
+    """Let the user steer the gaze from part to part; the rig ends parked, torque off.
 
     Raises:
         gazerig.robot.calibration.joint_access.CalibrationStopped: a signal or a fault ended it.
@@ -197,7 +197,7 @@ class _Sitting:
         self._ready_s = self._shown_s = self._seen_s = now_s()
 
     def over(self, _: float) -> str | None:
-        """Take a key; return why it ended, None while it goes on."""
+        """Handle a key; return why the procedure ended, None while it goes on."""
         steering, now_s = self._steering, self._now_s()
         if (why := self._stopped()) is not None:
             return why

@@ -14,14 +14,14 @@ _HELP = ("--help", "-h")
 
 
 class JointsUnlessNamed(TyperGroup):
-    """Takes what begins with none of its commands as arguments of the default one.
+    """Passes arguments that name none of its commands to the default command.
 
     So ``gazerig calibrate my_rig.yaml`` stays what it was before there was anything else to
     calibrate. A rig file that is called like a command is named ``./face``.
     """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Put the default command before words that name none."""
+        """Insert the default command if the arguments name none."""
         if not args or (args[0] not in self.commands and args[0] not in _HELP):
             args = [DEFAULT, *args]
         return list(super().parse_args(ctx, args))

@@ -220,7 +220,7 @@ def _hand(wire: RigPorts, bus: str, servo_id: int) -> Callable[[int], None] | No
 def _off_after(
     who: str, torque_off: Callable[[], None], stopped: Callable[[], str | None]
 ) -> Iterator[None]:
-    """Take the torque away however the block ends; nothing is said where that works."""
+    """Switch the torque off however the block ends; nothing is printed if that works."""
 
     def told(line: str) -> None:
         say(f"{who}: {line}")
@@ -233,7 +233,7 @@ def _off_after(
 
 
 def _warn_of_neck(name: str, person: SteeringPerson) -> None:
-    """Ask before something as heavy as a head moves by itself.
+    """Ask for confirmation before something as heavy as a head moves by itself.
 
     Raises:
         gazerig.robot.calibration.joint_calibration.CalibrationRefused: the answer was no.

@@ -145,7 +145,7 @@ def _apply(rig: Rig, bus: str, line: BusPort, findings: Sequence[Diagnostic]) ->
 
 
 def show_findings(findings: Sequence[Diagnostic], tell: Tell) -> None:
-    """Tell findings, the worst first, the same one at several servos once."""
+    """Print findings, the worst first, the same one at several servos once."""
     for level, where, what, cure in grouped(findings):
         tell(f"{level} {where}: {what}")
         if cure:

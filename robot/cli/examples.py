@@ -126,7 +126,7 @@ class PanelGroup(TyperGroup):
 
 
 def add_examples(app: typer.Typer, panels: bool = True) -> None:
-    """Put examples under the help of every command of an app.
+    """Add examples to the help of every command of an app.
 
     panels: each command is put into its panel, too
     """

@@ -195,7 +195,7 @@ class PageKeys:
         self._others.__exit__(kind, error, trace)
 
     def press(self, word: str) -> str | None:
-        """Take what a button says, from any thread; return what stands against it.
+        """Handle a button, for any thread; return the reason if it is refused.
 
         Raises:
             ValueError: there is no such button.

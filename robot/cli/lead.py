@@ -39,7 +39,7 @@ def look(
     ] = None,
     pid: PidOption = None,
 ) -> None:
-    """Let the running head look at a point while this command runs, or freely again."""
+    """Make the running head look at a point while this command runs, or freely again."""
     with clear_errors():
         point = read_point(where)
         with RobotClient.connect(pid, "gazerig ctl look") as rig:
@@ -105,7 +105,7 @@ def resume(
     ] = False,
     pid: PidOption = None,
 ) -> None:
-    """Put the torque on again after a stop, where the joints are, and go on slowly."""
+    """Switch the torque on again after a stop, where the joints are, and go on slowly."""
     with clear_errors(), RobotClient.connect(pid, "gazerig ctl resume") as rig:
         now = rig.status()
         if not now["stopped"]:

@@ -60,7 +60,7 @@ def holding_rig(
 
 
 def holding(rig: Rig) -> str:
-    """Say what the servos do when the torque has come on."""
+    """Return what the servos do once the torque is on."""
     told = [name for name in rig.names if rig.joints[name].facts.measured]
     blind = len(rig.names) - len(told)
     if not blind:
@@ -74,7 +74,7 @@ def holding(rig: Rig) -> str:
 
 
 def left_alone(rig: Rig) -> str:
-    """Say what the servos do that could not be told to let go."""
+    """Return what the servos do whose torque could not be switched off."""
     return "; ".join(dict.fromkeys(_left_alone(rig, bus) for bus in bus_names(rig)))
 
 

@@ -100,7 +100,7 @@ def _samples(
     seconds: float | None,
     stopped: Callable[[], str | None],
 ) -> Iterator[TelemetrySample]:
-    """Look at absolute slots until the time is over or a signal comes; at least once."""
+    """Yield samples at absolute slots until the time is over or a signal comes; at least one."""
     start_s = clock.now_s()
     end_s = inf if seconds is None else start_s + seconds
     slot = 0

@@ -154,7 +154,7 @@ def _commanded(
 
 
 def _ask_for_fingers(rig: Rig, yes: bool) -> None:
-    """Ask before servos jump whose positions are not known.
+    """Ask for confirmation before servos jump whose positions are not known.
 
     Raises:
         SetupError: no user is there to ask.
@@ -218,7 +218,7 @@ def _stay(control: ManualControl, seconds: float, hold: bool) -> None:
 
 
 def _report(moved: MoveResult, asked: tuple[str, ...]) -> None:
-    """Say what was really applied, for the joints asked for and those that something befell."""
+    """Print what was applied, for the joints commanded and those that were limited or failed."""
     _tell(moved.events)
     for applied in moved.joints:
         if applied.joint in asked or applied.reasons:
@@ -227,7 +227,7 @@ def _report(moved: MoveResult, asked: tuple[str, ...]) -> None:
 
 
 def _report_look(looked: LookedAt, rig: Rig) -> bool:
-    """Say how well the eyes meet the point; return whether they do within 2 deg."""
+    """Print how close the eyes come to the point; return whether within 2 deg."""
     good = looked.error <= 2.0
     ranges = rig.ranges
     narrower = {
@@ -251,7 +251,7 @@ def _report_look(looked: LookedAt, rig: Rig) -> bool:
 
 
 def _tell(events: Iterable[str]) -> None:
-    """Say what was done to which servo."""
+    """Print what was done to which servo."""
     for line in drawn_together(events):
         say(line)
 

@@ -45,7 +45,7 @@ class JoggedNeck:
         self.rest(_SETTLE_S)
 
     def rest(self, seconds: float) -> None:
-        """Hold, and note where the head is."""
+        """Hold still, and record where the head is."""
         moved = self._control.hold(seconds)
         go_on(self._stopped)
         at = dict(zip(self._control.body.names, moved.last.joints.position_rad, strict=True))
@@ -102,5 +102,5 @@ def go_on(stopped: StopReason) -> None:
 
 
 def agrees(stopped: StopReason, yes: bool, question: str) -> bool:
-    """Ask on the terminal; yes: the answer is known."""
+    """Ask on the terminal; yes: the reply is known."""
     return TerminalPerson(Lines(None), stopped, yes).agrees(question)

@@ -42,7 +42,7 @@ class RigPorts(NamedTuple):
         return {name: port_of(path) for name, path in self.paths.items()}
 
     def command(self, text: str, bus: str) -> None:
-        """Let something happen to what is emulated on a bus; does nothing on real ports.
+        """Send a command to the emulator of a bus; without effect on real ports.
 
         Raises:
             ValueError: names the word that is wrong and what would be right.

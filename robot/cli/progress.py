@@ -56,6 +56,6 @@ def progress(line: str) -> None:
 
 
 def wipe() -> None:
-    """Take the progress line away."""
+    """Remove the progress line."""
     if sys.stderr.isatty():
         status("")

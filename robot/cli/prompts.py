@@ -95,7 +95,7 @@ class TerminalPerson:
         """Turns the joint at hand by some steps, where it is emulated."""
 
     def tell(self, line: str) -> None:
-        """Say a line."""
+        """Print a line."""
         say(line)
 
     def wait(self, question: str, live: Callable[[], str]) -> None:

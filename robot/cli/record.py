@@ -51,7 +51,7 @@ def record_camera(
 def _source(
     oak: bool, camera: int | None, video: Path | None, wishes: tuple[int, int | None, float]
 ) -> tuple[FrameSource, str]:
-    """Make the one source that was asked for, and name it."""
+    """Return the one source that was chosen, and its name."""
     asked = [n for n, v in (("oak", oak), ("camera", camera is not None), ("video", video)) if v]
     if len(asked) != 1:
         raise SetupError(

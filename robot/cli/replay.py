@@ -269,7 +269,7 @@ def _rerun(file: Path, rig: str | None, character: str | None, joints: str | Non
 
 
 def agreement(result: "Resimulation") -> str:
-    """Say in words how far a run done again is the one that was recorded."""
+    """Return a text: how far a rerun agrees with the recorded run."""
     words = f"{result.agreeing} of {result.ticks} ticks are the same to the bit"
     if result.first_difference_s is not None:
         words += f"; the first other one at {result.first_difference_s:.3f} s: {result.differs}"

@@ -69,7 +69,7 @@ def report(
     ] = None,
     force: ForceOption = False,
 ) -> None:
-    """Say how human a run's gaze was: gazerig report run.mcap, then open report.html."""
+    """Report how human a run's gaze was: gazerig report run.mcap, then open report.html."""
     with clear_errors():
         rig = DEFAULT_RIG
         if scene is not None and file is not None and file.suffix != ".mcap":
@@ -108,7 +108,7 @@ def compare(
     ] = Path("compare.html"),
     force: ForceOption = False,
 ) -> None:
-    """Put two runs side by side and say what differs by more than chance."""
+    """Show two runs side by side, with the differences that exceed chance."""
     with clear_errors():
         from gazerig.robot.recording.read import RunRecording, used
         from gazerig.robot.report.compare import LEVEL
@@ -181,7 +181,7 @@ def _run(
     conversation: str | None,
     tell: _Tell,
 ) -> None:
-    """Let the head look for so long; Ctrl-C ends the run early."""
+    """Run the head for this long; Ctrl-C ends the run early."""
     from gazerig.robot.app.scripted_behaviour import ScriptedBehaviour
     from gazerig.robot.control.loop import Tick, run
 
@@ -284,7 +284,7 @@ def _described(
 
 
 def _tell_findings(findings: "Sequence[MeasureResult]") -> None:
-    """Say what is outside, and how many are not."""
+    """Print which measures are outside their bands, and how many are within."""
     for finding in findings:
         if finding.verdict == "outside":
             band = finding.band

@@ -23,7 +23,7 @@ class RigCommand(TyperCommand):
     """
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Put the default rig before words that name none."""
+        """Insert the default rig if the arguments name none."""
         args = self._renamed(args)
         args, rig = self._without_rig_option(args)
         words = [one for one in self.params if not isinstance(one, TyperOption)]

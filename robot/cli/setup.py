@@ -44,7 +44,7 @@ def setup(
         typer.Option(metavar="FILE", help="Write a Maestro's settings as a file of Pololu's."),
     ] = None,
 ) -> None:
-    """Give each servo its id and baud rate, one connected at a time; try a Maestro's channels."""
+    """Set id and baud rate of each servo, one connected at a time; test a Maestro's channels."""
     with clear_errors(rig, port, mock):
         model = load_rig(rig)
         wanted = _known_joints(joint or list(model.names), model.names)
@@ -171,7 +171,7 @@ def _go_on(question: str) -> bool:
 
 
 def _maestro(task: _Task) -> list[str]:
-    """Say what to set on a board and try its channels; return the joints that were skipped."""
+    """Print what to set on a board and test its channels; return the joints that were skipped."""
     params, setups = task.config.maestro, task.setups
     say(f"{task.title}: a Pololu Maestro; {len(setups)} of its channels to try.")
     with rig_ports(task.rig, task.mock, task.port) as wired, to_open(wired.paths[task.bus]) as line:
@@ -182,7 +182,7 @@ def _maestro(task: _Task) -> list[str]:
 
 
 def _pca9685(task: _Task) -> list[str]:
-    """Say how boards are wired and try their channels; return the joints that were skipped."""
+    """Print how boards are wired and test their channels; return the joints that were skipped."""
     params, setups, every = task.config.pca9685, task.setups, setups_on(task.rig, task.bus)
     key = f"buses.{task.bus}.pca9685" if task.bus else "bus.pca9685"
     say(f"{task.title}: PCA9685; {len(setups)} of its channels to try.")

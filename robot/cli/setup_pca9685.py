@@ -81,7 +81,7 @@ def _explain(setup: ServoConfig, place: ChannelPosition) -> str:
 def _measured(
     line: BusPort, params: Pca9685Params, used: frozenset[int], rig: str, key: str
 ) -> Pca9685Params:
-    """Let a person measure every board's clock; return the params with what was found."""
+    """Let the user measure every board's clock; return the params with the measured values."""
     say(
         "   A board's clock is up to 8 % off, and so are all its pulses: 4 deg of a servo at 3 %. "
         "With a meter that shows Hz, an oscilloscope or a logic analyser it is known for good."
@@ -102,7 +102,7 @@ def _measured(
 
 
 def _asked(params: Pca9685Params, address: int, channel: int, known_hz: float) -> float:
-    """Ask for what the meter shows until it makes sense; Enter keeps what is known."""
+    """Ask for the meter's reading until it is plausible; Enter keeps the known value."""
     question = (
         f"   board {address:#x}: channel {channel}, where no joint is, gives 1500 us at "
         f"{params.frequency_hz:g} Hz. What is measured at its signal pin, in Hz or us? "

@@ -19,7 +19,7 @@ _given: list[Mapping[str, object]] = [{}]
 
 @contextlib.contextmanager
 def speaking_of(rig: str | None, port: str | None, mock: bool) -> Iterator[None]:
-    """Let messages within the block suggest commands for this rig and port.
+    """Make messages within the block suggest commands for this rig and port.
 
     A block that names no rig speaks of the one around it.
     """

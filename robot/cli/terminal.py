@@ -149,13 +149,13 @@ def _flush_stdout() -> None:
 
 
 def _drop_stdout() -> None:
-    """Let what is still to be printed go nowhere: at exit it would fail once more."""
+    """Discard what is still to be printed: at exit it would fail once more."""
     with contextlib.suppress(OSError, ValueError, AttributeError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _thread_failed(args: threading.ExceptHookArgs) -> None:
-    """Say in one line that a thread has ended by an error; the others go on."""
+    """Report in one line that a thread has ended by an error; the others go on."""
     name = args.thread.name if args.thread is not None else "a thread"
     what = " ".join(str(args.exc_value).split())
     say(f"{name} failed ({args.exc_type.__name__}: {what}); the rest runs on without")

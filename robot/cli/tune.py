@@ -168,7 +168,7 @@ def save(
 
 @ctl.command()
 def revert(pid: PidOption = None) -> None:
-    """Put back in force what the rig's file says."""
+    """Apply the values of the rig's file again."""
     with clear_errors(), RobotClient.connect(pid) as rig:
         notes = rig.revert()
     _tell(notes)
@@ -200,7 +200,7 @@ def ask(
     ] = None,
     pid: PidOption = None,
 ) -> None:
-    """Ask the running head for a behaviour, or to talk, listen or think; or list all there is."""
+    """Choose a behaviour, or talk, listen or think, on the running head; or list all choices."""
     with clear_errors(), RobotClient.connect(pid) as rig:
         if menu is not None and choice is not None:
             rig.ask(menu, choice)
@@ -218,7 +218,7 @@ def status(
     as_json: Annotated[bool, typer.Option("--json", help="Print all of it as JSON.")] = False,
     pid: PidOption = None,
 ) -> None:
-    """Say what the running rig does: target and why, guard, joints, what it said last."""
+    """Print what the running rig does: target and reason, guard, joints, its last messages."""
     with clear_errors(), RobotClient.connect(pid) as rig:
         now = rig.status()
     if as_json:
@@ -263,7 +263,7 @@ def read_value(key: str, text: str) -> Any:
 
 
 def state_lines(now: Mapping[str, Any]) -> list[str]:
-    """Say in a few lines what ``RobotClient.status`` gives."""
+    """Return the result of ``RobotClient.status`` as a few lines."""
     lines = [f"rig: {now.get('rig', '')}, process {now.get('pid', '')}"]
     if not now["ticks"]:
         return [*lines, "it has just been started: nothing is known yet"]
@@ -315,7 +315,7 @@ def _table(
 
 
 def _rule(knob: ParamInfo) -> str:
-    """Say what one parameter is, what it may be, and when it changes."""
+    """Return what one parameter is, its range, and when a change takes effect."""
     bounds = "" if knob.low is None or knob.high is None else f"{knob.low:g} .. {knob.high:g}"
     choices = ", ".join(map(_written, knob.choices))
     allowed = " ".join(part for part in (bounds, knob.unit if bounds else "") if part) or choices

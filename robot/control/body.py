@@ -30,6 +30,12 @@ class Body:
     """All joints of one rig on its bus, or its buses as one.
 
     names: of the joints, in the order of every sequence of them
+
+    Args:
+        bus: made with ``setups`` of the same joints.
+        joints: the joints by name.
+        park_rad: as in ``setups``.
+        gentle_deg_s: as in ``setups``.
     """
 
     def __init__(
@@ -39,10 +45,6 @@ class Body:
         park_rad: Mapping[str, float] | None = None,
         gentle_deg_s: float = ENTRY_DEG_S,
     ) -> None:
-        """Take the bus, made with ``setups`` of the same joints, and the joints.
-
-        park_rad: as in ``setups``
-        """
         self.bus = bus
         self.names = in_order(joints)
         self._park_rad = dict(park_rad or {})

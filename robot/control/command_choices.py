@@ -37,7 +37,7 @@ class Menus:
         }
 
     def choose(self, command: Ask, top_down: TopDown, t_s: float) -> None:
-        """Put a choice in force that ``refuse_unknown`` let through."""
+        """Apply a choice that ``refuse_unknown`` accepted."""
         if command.menu == "behaviour":
             top_down.behave(command.choice)
         elif command.menu == "conversation":

@@ -99,7 +99,7 @@ class ParamAccess(Protocol):
         ...
 
     def set(self, changes: Mapping[str, Value]) -> Iterable[str]:
-        """Put values in force from the next tick on; return what a person should know."""
+        """Apply values from the next tick on; return what the user should know."""
         ...
 
     def unsaved(self) -> Iterable[ChangedParam]:
@@ -115,7 +115,7 @@ class ParamAccess(Protocol):
         ...
 
     def revert(self) -> object:
-        """Put in force what the file says."""
+        """Apply the values of the file again."""
         ...
 
     def characters(self) -> Sequence[str]:
@@ -143,7 +143,7 @@ class Commandable(Protocol):
     """A robot that takes commands, as ``gazerig.robot.control.loop.Robot`` does."""
 
     def command(self, command: Command) -> Ticket | None:
-        """Ask for something from the next tick on; raises ValueError with the rule."""
+        """Queue a command for the next tick; raise ValueError with the rule that it breaks."""
         ...
 
     def menus(self) -> dict[str, tuple[str, ...]]:
@@ -182,7 +182,15 @@ Outcome = Answered | ParamsChanged | ParamsSaved | CommandGiven
 class CommandHandler:
     """Carries out requests; everything may be called from any thread.
 
-    refusals: what ``do`` raises where a request breaks a rule
+    Args:
+        robot: executes commands.
+        params: the parameters; None if they cannot be seen or changed.
+        status: returns the state of the rig, as plain values.
+        refusals: what ``params`` raises if a value breaks a rule, besides ValueError; the
+            attribute holds all that ``do`` raises then.
+        saved: called with each file that was written.
+        paths: which files may be named; None: any.
+        fixed: why parameters cannot be changed, if they cannot.
     """
 
     def __init__(
@@ -195,17 +203,6 @@ class CommandHandler:
         paths: PathGuard | None = None,
         fixed: str = FIXED,
     ) -> None:
-        """Take the rig.
-
-        Args:
-            robot: takes commands.
-            params: the parameters; None where nobody may see or change them.
-            status: returns how the rig does, as plain values.
-            refusals: what ``params`` raises where a value breaks a rule, besides ValueError.
-            saved: is told each file that was written.
-            paths: which files may be named; None: any.
-            fixed: why parameters cannot be changed, where they cannot.
-        """
         self._robot, self._params, self._status = robot, params, status
         self._saved, self._paths, self._fixed = saved, paths, fixed
         self._described: tuple[Iterable[DescribedParam], list[tuple[str, object]]] = (), []
@@ -311,7 +308,7 @@ class CommandHandler:
 
 
 def plain(value: object) -> object:
-    """Make lists and dicts of tuples and mappings, as JSON has them."""
+    """Return lists and dicts made of tuples and mappings, as in JSON."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, tuple | list):
@@ -325,7 +322,7 @@ def as_changes(changes: Iterable[ChangedParam]) -> list[dict[str, object]]:
 
 
 def as_value(value: object) -> Value:
-    """Make tuples of JSON's lists, as the reader of files does."""
+    """Return JSON's lists as tuples, as the reader of files does."""
     if isinstance(value, list):
         return tuple(as_value(item) for item in value)
     if isinstance(value, dict):

@@ -50,7 +50,7 @@ class CommandQueue:
         return waiting.ticket
 
     def stops(self) -> list[QueuedCommand]:
-        """Take all stops, and with them refuse what would move the head after all."""
+        """Remove and return all stops, and refuse with them commands that would move the head."""
         taken: list[QueuedCommand] = []
         while self._stops:
             taken.append(self._stops.popleft())
@@ -59,7 +59,7 @@ class CommandQueue:
         return taken
 
     def take(self) -> list[QueuedCommand]:
-        """Take what is to be obeyed in this tick, stops first."""
+        """Return and remove the commands of this tick, stops first."""
         if not self._commands and not self._stops:
             return []
         taken = self.stops()

@@ -76,7 +76,7 @@ class Interrupts:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        """Put everything back as it was."""
+        """Restore the signal handlers of before."""
         self._depth -= 1
         if self._depth:
             return

@@ -55,7 +55,7 @@ class JointFaults:
         self._first_s: float | None = None
 
     def update(self, tick: Tick) -> None:
-        """Look at one tick."""
+        """Check one tick."""
         if self._first_s is None:
             self._first_s = tick.t_s
         guard_result = tick.guard_result

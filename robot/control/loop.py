@@ -106,7 +106,7 @@ class Robot:
         return self._stop.why
 
     def command(self, command: Command) -> Ticket:
-        """Ask for something, from the next tick on; may be called from any thread.
+        """Queue a command for the next tick; may be called from any thread.
 
         Returns:
             Where the reply comes, once the loop has taken the command up.
@@ -121,7 +121,7 @@ class Robot:
         return self.replay_command(command)
 
     def replay_command(self, command: Command) -> Ticket:
-        """Ask for what was accepted in a recorded run, whatever the ranges are now.
+        """Queue a command that was accepted in a recorded run, whatever the ranges are now.
 
         Raises:
             ValueError: as ``command``.
@@ -134,7 +134,7 @@ class Robot:
         return self._commands.add(command)
 
     def ask(self, menu: str, choice: str) -> None:
-        """Ask for a behaviour, a mode of conversation or a wink, from the next tick on.
+        """Choose a behaviour, a mode of conversation or a wink, from the next tick on.
 
         May be called from any thread.
 
@@ -176,7 +176,7 @@ class Robot:
             raise
 
     def _begin(self, t_s: float, goals: JointAngles) -> None:
-        """Let every part begin where the joints are."""
+        """Initialise every component with the present angles of the joints."""
         self._guard.reset(t_s, goals)
         joints = self.body.read(t_s)
         pose = self._kinematics.forward(joints)
@@ -266,7 +266,7 @@ class Robot:
             self.camera.close()
 
     def _obey(self, t_s: float) -> tuple[Command, ...]:
-        """Put in force what was asked for, and end a lead that nobody renews."""
+        """Execute the commands that wait, and end a lead that is not renewed."""
         taken = self._commands.take()
         for command, ticket in taken:
             ticket.answer(self._obey_one(command, t_s))
@@ -276,7 +276,7 @@ class Robot:
         return tuple([command for command, _ in taken])
 
     def _obey_one(self, command: Command, t_s: float) -> CommandReply:
-        """Put one command in force; return what became of it."""
+        """Execute one command; return its reply."""
         match command:
             case Ask():
                 self._menus.choose(command, self.attention.top_down, t_s)
@@ -299,7 +299,7 @@ class Robot:
         return CommandReply()
 
     def _look(self, command: LookAt, t_s: float) -> CommandReply:
-        """Look at a point that a person chose, or freely again."""
+        """Look at a point that a user chose, or freely again."""
         self._let_lead(lambda: self._lead.look(command, t_s))
         target = self._lead.puppet(t_s)
         if target is None:
@@ -307,7 +307,7 @@ class Robot:
         return look_reply(target, self._oculomotor, self._kinematics, self._guard.limits)
 
     def _jog(self, command: Jog, t_s: float) -> CommandReply:
-        """Hold all joints but those given; without any, let the models lead again."""
+        """Hold all joints but those given; without any, return the joints to the gaze models."""
         self._let_lead(lambda: self._lead.jog(command, self.body.names, self._last, t_s))
         if command.angles_rad:
             # A slider can be torn from end to end in no time.
@@ -325,7 +325,7 @@ class Robot:
             self._told.append(f"led by {self._lead.words}")
 
     def _resume(self, command: Resume, t_s: float) -> CommandReply:
-        """Put the torque on where the joints are; a servo that refuses leaves it off."""
+        """Switch the torque on where the joints are; a servo that refuses leaves it off."""
         if not self.stopped:
             return CommandReply()
         resumed = self._stop.resume(command, self.body, t_s)

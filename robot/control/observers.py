@@ -27,7 +27,7 @@ class Observers:
         self._observers = (*self._observers, _Observer(name, update))
 
     def update(self, tick: Tick) -> None:
-        """Tell all of a tick; called by the loop."""
+        """Update all observers with a tick; called by the loop."""
         for observer in self._observers:
             try:
                 observer.update(tick)
@@ -37,7 +37,7 @@ class Observers:
 
 
 def left_out(name: str, error: Exception) -> str:
-    """Say that something goes on without somebody who only watches."""
+    """Return a message that the run goes on without a failed observer."""
     what = " ".join(str(error).split())
     kind = type(error).__name__
     return (

@@ -12,7 +12,7 @@ _RELEASE_AGAIN_S = 0.5
 
 
 class StopControl:
-    """Takes the torque off and puts it on again.
+    """Switches the torque off and on again.
 
     Args:
         told: takes a line for people of whatever happens.
@@ -30,14 +30,14 @@ class StopControl:
         return self._latch.why
 
     def halt(self, command: Stop, body: Body, t_s: float) -> None:
-        """Take the torque off at once."""
+        """Switch the torque off at once."""
         if self._latch.stop(command, t_s):
             by = f" by {command.who}" if command.who else ""
             self._told.append(f"stopped{by}: {command.why}; torque off")
         self._release(body, t_s)
 
     def keep_released(self, body: Body, joints: JointState, t_s: float) -> None:
-        """Take the torque off again where a servo that answers still reports it after a stop."""
+        """Switch the torque off again if a servo still reports it after a stop."""
         if True not in joints.torque or t_s - self._released_s < _RELEASE_AGAIN_S:
             return
         names = zip(body.names, joints.torque, strict=True)
@@ -47,7 +47,7 @@ class StopControl:
             self._release(body, t_s)
 
     def resume(self, command: Resume, body: Body, t_s: float) -> JointAngles | CommandReply:
-        """Put the torque on where the joints are; return the goals in force, or why not."""
+        """Switch the torque on where the joints are; return the goals in force, or the refusal."""
         by = f" by {command.who}" if command.who else ""
         if refusal := self._latch.refusal(command, t_s):
             if refusal != self._refused:  # a flood of them is one line
@@ -65,7 +65,7 @@ class StopControl:
         return goals
 
     def _release(self, body: Body, t_s: float) -> None:
-        """Take the torque off; where the bus is gone it does so itself when it is back."""
+        """Switch the torque off; a bus that is lost does so itself when it is back."""
         self._released_s = t_s
         try:
             body.disable_torque()

@@ -35,7 +35,7 @@ class Tick(NamedTuple):
 def at_rest(
     joints: JointState, desired_rad: JointAngles, why: str, names: tuple[str, ...]
 ) -> GuardResult:
-    """Say that nothing is sent, as somebody stopped the robot."""
+    """Record that nothing is sent, as a user stopped the robot."""
     reason = f"all: stopped ({why})"
     each = ("stopped",) * len(names)
     return GuardResult(joints.position_rad, "limp", (reason,), desired_rad, each, (reason,), names)

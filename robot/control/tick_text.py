@@ -12,7 +12,7 @@ from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
 
 def seeing_words(tick: Tick, residual: ResidualFigures) -> str:
-    """Say how old the picture is, how far faces are and by what, and what the head's turn leaves.
+    """Return age of the frame, distance of faces and its source, and the ego-motion residual.
 
     e.g. "picture 63 ms old | face 1 at 0.98 m by camera, +- 1 cm | still things seem to move
     0.3 deg/s while the head turns"
@@ -41,7 +41,7 @@ def target_name(target: Target) -> str:
 
 
 def lead_words(tick: Tick) -> str:
-    """Say who leads and how far beside the point the eyes look, "" while nobody leads.
+    """Return who leads and how far the gaze is from the point, "" if no client leads.
 
     e.g. "gazerig ctl look (process 7): look at -1 0 0.3; 72 deg beside it: head yaw 70 of 180 deg"
     """
@@ -59,7 +59,7 @@ def lead_words(tick: Tick) -> str:
 
 
 def guard_text(guard_result: GuardResult) -> str:
-    """Say what the guard made of what is desired, e.g. "limited (neck_yaw: too fast, +2)"."""
+    """Return what the guard did to the desired angles, e.g. "limited (neck_yaw: too fast, +2)"."""
     if not guard_result.reasons:
         return guard_result.level
     more = f", +{len(guard_result.reasons) - 1}" if len(guard_result.reasons) > 1 else ""
@@ -67,7 +67,7 @@ def guard_text(guard_result: GuardResult) -> str:
 
 
 def health_words(health: BusHealth) -> str:
-    """Say how the bus does, e.g. "bus: 3 lost"."""
+    """Return the state of the bus, e.g. "bus: 3 lost"."""
     errors = sum(health.errors.values())
     if errors == 0:
         return "bus ok"

@@ -170,7 +170,7 @@ class AuthProxy:
     # --- who may come in ----------------------------------------------------------------
 
     def _doorkeeper(self) -> Middleware:
-        """Let in, send on without the token in the address, or refuse in one line."""
+        """Accept a request, redirect it to an address without token, or refuse it in one line."""
 
         @web.middleware
         async def admit(request: web.Request, handler: Handler) -> web.StreamResponse:
@@ -185,7 +185,7 @@ class AuthProxy:
         return admit
 
     def _refusal(self, request: web.Request) -> str | None:
-        """Say why somebody may not come in, None for those who may."""
+        """Return the reason why a request is refused, None if it is accepted."""
         sends = request.method not in ("GET", "HEAD") or "upgrade" in request.headers
         origin = request.headers.get("Origin")
         if origin is None and sends:
@@ -203,7 +203,7 @@ class AuthProxy:
         )
 
     def _with_cookie(self, request: web.Request) -> web.Response:
-        """Take the token out of the address, so that it is not seen, kept or sent on."""
+        """Move the token from the address into a cookie, where it is not seen, kept or sent on."""
         clean = request.rel_url.without_query_params("token").raw_path_qs
         # "//elsewhere" is the address of another machine, and so is "/\elsewhere".
         there = "/" + clean.lstrip("/\\")
@@ -259,7 +259,7 @@ class AuthProxy:
         return (204, "") if self._ask(compact(asked)) else (503, "the rig takes nothing now")
 
     async def _line(self, request: web.Request) -> web.StreamResponse:
-        """Tell the state whenever it changes, with a sign of life in between; hear stops.
+        """Send the state whenever it changes, with heartbeats in between; receive stops.
 
         A connection that stands already when STOP is pressed: a browser opens only six others.
         """
@@ -305,7 +305,7 @@ class AuthProxy:
             news.set()
 
     async def _renew(self) -> None:
-        """Let the rig know that the browser which leads is there; until cancelled."""
+        """Renew the lead for the browser that holds it; until cancelled."""
         while True:
             await asyncio.sleep(_RENEWED_EVERY_S)
             if who := self.browsers.leading():

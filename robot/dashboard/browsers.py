@@ -39,7 +39,7 @@ class Browsers:
                 self._open[name] -= 1
 
     def led_by(self, name: str) -> None:
-        """Note who led the head last."""
+        """Record who led the head last."""
         self._leads = name
 
     def leading(self) -> str:
@@ -60,7 +60,7 @@ class TabLimits:
 
     @contextmanager
     def take(self, name: str) -> Iterator[asyncio.Event]:
-        """Take a place; the event is set when it has to be left."""
+        """Take a slot; the event is set when it has to be freed."""
         leave = asyncio.Event()
         self._taken[leave] = name
         if len(self._taken) > self._most:

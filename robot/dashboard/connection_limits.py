@@ -67,7 +67,7 @@ class Connections:
 
     @contextmanager
     def busy(self, request: web.BaseRequest) -> Iterator[None]:
-        """Note that a request is being answered."""
+        """Record that a request is being answered."""
         state = self._states.get(request.protocol)
         if state is None:
             yield
@@ -80,7 +80,7 @@ class Connections:
             state.busy, state.since_s = False, loop.time()
 
     def lasting(self, request: web.BaseRequest) -> None:
-        """Note that a request is a websocket, which lasts as long as the browser likes."""
+        """Record that a request is a websocket, which lasts as long as the browser keeps it."""
         if (state := self._states.get(request.protocol)) is not None:
             state.lasting = True
 

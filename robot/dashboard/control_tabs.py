@@ -33,7 +33,7 @@ class ControlTabs:
         self._tuning = ParamState(server, tuning, teller)
 
     def leave(self) -> None:
-        """Take everything away: a recording cannot be led."""
+        """Remove all controls: a recording cannot be controlled."""
         self._lead.leave()
         self._window.remove()
 
@@ -47,7 +47,7 @@ class ControlTabs:
         self._tuning.knobs(knobs)
 
     def values(self, state: Mapping[str, object]) -> None:
-        """Take what is in force: changed values, what is not saved, the file, characters."""
+        """Update the values in force: changed values, what is not saved, the file, characters."""
         self._tuning.values(state)
         self._joints.values(self._tuning.in_force)
         characters = state.get("characters")
@@ -60,7 +60,7 @@ class ControlTabs:
         self._joints.show(snapshot)
 
     def answered(self, who: str, words: str | None) -> None:
-        """Take the rig's answer to a request, for whoever waits for it."""
+        """Pass the rig's reply to the panel that waits for it."""
         self._tuning.answered(who, words)
 
 
@@ -96,7 +96,7 @@ class LeadView:
         self._listen(free)
 
     def leave(self) -> None:
-        """Take the target away."""
+        """Remove the target."""
         self._gizmo.remove()
 
     def _listen(self, free: viser.GuiButtonHandle) -> None:
@@ -151,7 +151,7 @@ class LeadView:
         self._characters = group
 
     def show(self, snapshot: Snapshot) -> None:
-        """Say what is in force; the target to drag starts where the head looks."""
+        """Show the values in force; the target to drag starts where the head looks."""
         self._target_m = snapshot.p_world_target_m
         said = {
             "behaviour": snapshot.behaviour,
@@ -168,7 +168,7 @@ class LeadView:
 
 
 def _leader(led: str) -> str:
-    """Say who leads on one line, always there: the buttons below must not slip away."""
+    """Show who leads on one line, always present: the buttons below must not move."""
     words = f"led by <b>{escape(led)}</b>" if led else "led by nobody"
     cut = "height:1.5em;overflow:hidden;text-overflow:ellipsis;white-space:nowrap"
     return _note(f"<div title='{escape(led)}' style='{cut}'>{words}</div>")

@@ -44,7 +44,7 @@ class DwellChart:
         self._counts: Counter[str] = Counter()
 
     def update(self, fixation: SeenFixation) -> None:
-        """Take in a fixation; one that lay on no face part is left out."""
+        """Add a fixation; one that was on no face part is left out."""
         part = fixation.part
         if part is None:
             return

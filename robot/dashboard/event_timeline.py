@@ -58,7 +58,7 @@ class Timeline:
             stretches.clear()
 
     def update(self, snapshot: Snapshot) -> None:
-        """Take in a snapshot; one from before the last begins anew."""
+        """Add a snapshot; one from before the last resets the timeline."""
         t_s = snapshot.t_s
         if self._now_s is not None and t_s < self._now_s:
             self._clear()

@@ -201,7 +201,7 @@ class HeadModel:
         ]
 
     def _hold_up(self, R_world_head: Mat3, p_world_head_m: Vec3) -> None:
-        """Put a neck, or where there is none a post, between the table and the head."""
+        """Add a neck, or a post if there is none, between the table and the head."""
         if self._necked:
             self._stretch_neck(add(p_world_head_m, rotate(R_world_head, _NECK_TOP_M)))
             return

@@ -31,7 +31,7 @@ LINE_PX = 320
 
 
 def frame(inner: str) -> str:
-    """Put HTML into the panel's margins."""
+    """Return HTML with the panel's margins."""
     return f"<div style='padding:4px 12px;font-size:13px;line-height:1.5'>{inner}</div>"
 
 

@@ -118,7 +118,7 @@ class Inbox:
                 self._refuse(message)
 
     def _end_later(self) -> None:
-        """Let the slow thread end after what it has in hand; what waits is for nobody now."""
+        """End the slow thread after its present request; requests that wait are dropped."""
         while True:
             try:
                 self._later.put_nowait(_OVER)

@@ -50,7 +50,7 @@ class JogPanel:
             self._teller.command(LookAt(None), str(event.client_id))
 
     def values(self, in_force: Mapping[str, object]) -> None:
-        """Make the sliders, and keep their ends where the joints' limits are."""
+        """Create the sliders, and keep their ends at the joints' limits."""
         for joint in JOINTS:
             low, high = (in_force.get(f"joints.{joint}.{end}_deg") for end in ("min", "max"))
             if not (isinstance(low, int | float) and isinstance(high, int | float)):
@@ -145,7 +145,7 @@ def measured_table(snapshot: Snapshot) -> str:
 
 
 def _under(columns: Sequence[str], estimated: bool, angle_deg: float) -> list[float | None]:
-    """Put an angle under what it is."""
+    """Show an angle below the joint's present one."""
     kind = ESTIMATED if estimated else MEASURED
     return [angle_deg if column == kind else None for column in columns]
 

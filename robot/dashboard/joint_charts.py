@@ -174,7 +174,7 @@ class JointCharts:
             plot.data = _columns(ago_s, mean_deg(angles_deg, group, traces.joints))
 
     def _make(self, wanted: tuple[tuple[ChartGroup, bool], ...]) -> None:
-        """Make the plots anew where other groups are wanted, or they are estimated now."""
+        """Create the plots again if other groups are chosen, or values are estimated now."""
         if wanted == self._drawn:
             return
         for plot in self._plots:

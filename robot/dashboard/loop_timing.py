@@ -24,7 +24,7 @@ class LoopTiming:
         self._overruns = 0
 
     def update(self, t_s: float) -> None:
-        """Note the time at which a tick began; a time before the last begins anew."""
+        """Record the start time of a tick; a time before the last resets the record."""
         last_s, self._last_s = self._last_s, t_s
         if last_s is None or t_s <= last_s:
             self._rows.clear()

@@ -45,7 +45,7 @@ class MainSequenceChart:
         self.count = 0
 
     def update(self, saccade: SeenSaccade) -> None:
-        """Take in a saccade."""
+        """Add a saccade."""
         self._seen.append(saccade)
         self.count += 1
 

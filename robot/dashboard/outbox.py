@@ -41,7 +41,7 @@ class Outbox:
         return self.ask(as_json(command), who)
 
     def ask(self, data: Mapping[str, object], who: str) -> bool:
-        """Ask for anything; ``who`` comes back with the answer."""
+        """Send a request; ``who`` is returned with the reply."""
         return self.hand_on(json.dumps(data, separators=(",", ":")).encode(), who)
 
     def hand_on(self, data: bytes, who: str = DOOR) -> bool:

@@ -31,7 +31,7 @@ class News(NamedTuple):
 
 
 def drain(feed: socket.socket) -> News:
-    """Take everything that waits, without waiting for more."""
+    """Return everything that waits, without waiting for more."""
     snapshots: list[Snapshot] = []
     others: list[tuple[bytes, object]] = []
     jpeg, ended = None, False

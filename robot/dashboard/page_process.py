@@ -185,12 +185,12 @@ class PageProcess:
             self.pictures_dropped += 1
 
     def offer(self, choices: Mapping[str, tuple[str, ...]]) -> None:
-        """Put menus on the page: name of the menu -> what can be chosen, the present first."""
+        """Set the menus of the page: name of the menu -> choices, the present one first."""
         self._choices = choices
         self.send(CHOICES + json.dumps(choices).encode())
 
     def say(self, words: str) -> None:
-        """Tell everybody who looks at the page something."""
+        """Show a message to all users of the page."""
         self._answer(EVERYBODY, words)
 
     def send(self, message: bytes) -> bool:
@@ -224,7 +224,7 @@ class PageProcess:
             self._answer(who, self._heard(data))
 
     def _take_url(self, url: str) -> None:
-        """Note that the page is there; one that was started again is told what it must know."""
+        """Record that the page is ready; a restarted page is sent its initial state."""
         self._url = url
         self._port = int(urlsplit(url).port or self._port)
         self.started += 1
@@ -238,7 +238,7 @@ class PageProcess:
         self._answer(told(message)[0], "refused: too many requests at once; try again")
 
     def _stop(self, asked: Mapping[str, object]) -> str:
-        """Hear a stop; "" where it is obeyed."""
+        """Execute a stop; return "" if it succeeded."""
         return self._heard(json.dumps(asked).encode()) or ""
 
     def _heard(self, data: bytes) -> str | None:
@@ -250,7 +250,7 @@ class PageProcess:
             return f"the rig could not do that: {type(error).__name__}: {error}"
 
     def _answer(self, who: str, words: str | None) -> None:
-        """Say that something was heard and what there is to say about it."""
+        """Acknowledge a request, with the reply."""
         words = words[:_MOST_WORDS] if words is not None else None
         self._owed.append(WORDS + json.dumps((who, words)).encode())
         self._pay()
@@ -262,7 +262,7 @@ class PageProcess:
                 self._owed.popleft()
 
     def _lose(self) -> None:
-        """Say that the page has died, once, and start it again where that can help."""
+        """Report once that the page has died, and restart it if that can help."""
         process = self._process
         self._hang_up()
         words = self._last_words()

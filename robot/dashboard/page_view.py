@@ -98,7 +98,7 @@ class PageView:
         return {"stopped": stopped, "silent": False, "blind": blind}
 
     def _take(self, kind: bytes, data: object) -> None:
-        """Take what the rig says beside snapshots and pictures."""
+        """Apply messages of the rig other than snapshots and frames."""
         if kind == WORDS and isinstance(data, list):
             who, words = data
             self._controls.answered(who, words)
@@ -142,7 +142,7 @@ class PageView:
         self._newest = self._jpeg = None
 
     def silent(self) -> None:
-        """Say that nothing comes any more, beside the last that came."""
+        """Show that no data arrives any more, with the last that arrived."""
         self.show(News((), None, ended=False))
         if self._drawn:
             self._panel.silent()

@@ -36,7 +36,6 @@ class PanelView:
     """
 
     def __init__(self, gui: viser.GuiApi) -> None:
-        """Say that nothing has come yet; traces and pictures appear with their first data."""
         self._gui = gui
         self._status = gui.add_html(frame("<b>waiting for the rig</b>"), order=1)
         self._picture: viser.GuiImageHandle | None = None
@@ -110,7 +109,7 @@ class PanelView:
         self._shown += 1
 
     def silent(self) -> None:
-        """Say that the rig sends nothing any more."""
+        """Show that the rig sends nothing any more."""
         self._status.content = silence()
         self.draw_all()
 
@@ -160,7 +159,7 @@ class PanelView:
 
 
 def of_what(snapshot: Snapshot) -> str:
-    """Say that the eyes' movements are no measurements where they are none, "" elsewhere."""
+    """Return a remark that eye movements are estimated, "" if they are measured."""
     if not any("eye" in joint for joint in snapshot.estimated):
         return ""
     return frame(

@@ -41,7 +41,7 @@ def knob_from(data: Mapping[str, object]) -> PageParam:
 
 
 def hint(knob: PageParam) -> str:
-    """Say what a parameter is, may be and would be: the text beside the mouse."""
+    """Return the tooltip of a parameter: description, range and default."""
     parts = [f"{knob.key}: {knob.says}" if knob.says else knob.key]
     unit = f" {knob.unit}" if knob.unit else ""
     if knob.low is not None and knob.high is not None:
@@ -214,5 +214,5 @@ class ParamControl:
         return self._form is not None or value is not None
 
     def remove(self) -> None:
-        """Take the control away."""
+        """Remove the control."""
         (self._form or self._handle).remove()

@@ -49,14 +49,17 @@ class Fed(Protocol):
 
 
 class ParamFeed:
-    """What the page knows of the parameters, and what it must still be told."""
+    """Sends the parameters to the page, and after that all changes.
+
+    The first messages are written by the constructor: it takes a moment, so make it before the
+    torque is on.
+
+    Args:
+        send: sends a message to the page; False: not now.
+        tuning: the parameters.
+    """
 
     def __init__(self, send: Callable[[bytes], bool], tuning: Fed) -> None:
-        """Take where messages go (False: not now), and the parameters.
-
-        What there is to tell at first is written here: it takes a moment, so make this before
-        the torque is on.
-        """
         self._send = send
         self._tuning = tuning
         self._due: deque[bytes] = deque()
@@ -65,7 +68,7 @@ class ParamFeed:
         self._write()
 
     def begin_anew(self) -> None:
-        """Tell all again: the page that knew it has died, and another is there."""
+        """Send everything again to a restarted page."""
         self._due.clear()
         self._known, self._version = {}, None
 

@@ -25,10 +25,9 @@ _SAID_S = 8.0
 
 
 class ParamState:
-    """The parameters, and one panel of controls a browser."""
+    """The parameters, and one panel of controls for each browser."""
 
     def __init__(self, server: viser.ViserServer, tab: viser.GuiTabHandle, teller: Outbox) -> None:
-        """Give every browser that comes its own controls in the tab."""
         self._tab = tab
         self._teller = teller
         self._knobs: dict[str, PageParam] = {}
@@ -63,7 +62,7 @@ class ParamState:
                 panel.offer(self._knobs)
 
     def values(self, state: Mapping[str, object]) -> None:
-        """Take values that have changed, what is not saved, and the file it would go to."""
+        """Update changed values, what is not saved, and the file that save would write."""
         with self._lock:
             self.in_force.update(cast(Mapping[str, object], state.get("values", {})))
             self._unsaved = frozenset(cast(Iterable[str], state.get("unsaved", ())))
@@ -148,13 +147,13 @@ class ParamPanel:
             self._ask({"do": "save", "path": self._file.value.strip() or None})
 
     def offer(self, knobs: Mapping[str, PageParam]) -> None:
-        """Take the parameters there are."""
+        """Set the parameters that there are."""
         self._knobs = knobs
         groups = tuple(dict.fromkeys(group_of(knob) for knob in knobs.values()))
         self._group.options = (NOTHING, UNSAVED, DIFFERENT, *groups)
 
     def take(self, values: Mapping[str, object], unsaved: frozenset[str], path: str) -> None:
-        """Take what is in force; a control that is being moved keeps its place."""
+        """Update the values in force; a control that is being moved keeps its value."""
         self._values, self._unsaved = values, unsaved
         some = f"<b>● {len(unsaved)} not saved</b>" if unsaved else "all saved"
         words = _note(f"{len(self._knobs)} parameters, {some}<br>{escape(path)}")
@@ -164,7 +163,7 @@ class ParamPanel:
             self._refresh()
 
     def answered(self) -> None:
-        """Note that the rig has taken or refused a change."""
+        """Record that the rig has applied or refused a change."""
         self._unanswered = max(0, self._unanswered - 1)
         if not self._unanswered:
             self._refresh()

@@ -46,11 +46,25 @@ class InForce(NamedTuple):
 
 
 def _nobody(words: str) -> None:
-    """Tell nobody."""
+    """Drop a message: there is no page."""
 
 
 class Publisher:
-    """One thread that looks at the newest tick."""
+    """A thread that publishes the newest tick to the page and the status line.
+
+    Args:
+        page: the page; None: there is none.
+        say: rewrites the status line; None: there is none.
+        snapshots: builds what the page shows.
+        health: returns the present state of the bus.
+        in_force: returns the present choices.
+        residual: returns the present ego-motion residual.
+        mount: where the camera sits.
+        poses: the poses of the head.
+        horizontal_field_deg: returns the camera's present field of view.
+        feed: sends the parameters to the page.
+        tell: prints a line that stays, such as the page's address.
+    """
 
     def __init__(
         self,
@@ -66,13 +80,6 @@ class Publisher:
         feed: ParamFeed | None = None,
         tell: Callable[[str], None] = _nobody,
     ) -> None:
-        """Take the page, and where to write the status line (None: nowhere).
-
-        snapshots: makes what the page shows
-        health, in_force, residual, horizontal_field_deg: give what is so now
-        feed: tells the page what can be tuned
-        tell: writes a line that stays, such as the page's address
-        """
         self._page = page
         self._say = say
         self._snapshots = snapshots
@@ -151,7 +158,7 @@ class Publisher:
         return SnapshotTexts(words, now.behaviour, seeing, now.character, now.conversation)
 
     def _tell_of(self, page: PageProcess) -> None:
-        """Keep the page told of what can be tuned, and the person at the rig of the page."""
+        """Send the page its parameters, and print the page's address."""
         if self._feed is not None:
             if page.started != self._page_started and self._page_started:
                 self._feed.begin_anew()

@@ -133,7 +133,7 @@ def _bars(counts: Sequence[int], colour: str, top: int, height: int) -> str:
 
 
 def place(at_s: float, duration_s: float, playing: bool) -> str:
-    """Say where the recording stands."""
+    """Show the present position in the recording."""
     word = "playing" if playing else "standing still"
     return _frame(
         f"{word}"

@@ -1,4 +1,4 @@
-"""Put things of the page's scene where they belong, and tell browsers only what has moved.
+"""Place the objects of the page's 3-D scene, and send browsers only what has moved.
 
 Turns are quaternions (w, x, y, z).
 """

@@ -94,7 +94,7 @@ def _figures(servos: Servos, i: int) -> str:
 
 
 def _said(servos: Servos, i: int) -> str:
-    """Say what is wrong with a servo, in words."""
+    """Return what is wrong with a servo."""
     if servos.fault and servos.fault[i]:
         return servos.fault[i]
     if servos.age_s[i] > _OLD_S:
@@ -127,7 +127,7 @@ def strain_of_voltage(servos: Servos, i: int) -> Strain:
 
 
 def _timing(timing: LoopFigures | None) -> str:
-    """Say how the loop keeps its time."""
+    """Return the timing of the loop."""
     if timing is None:
         return note("the loop's times are not known yet")
     period_ms = 1e3 / timing.rate_hz if timing.rate_hz > 0.0 else 0.0

@@ -1,4 +1,4 @@
-"""Say in a few lines what the rig does, loudly where something is not as it should be."""
+"""The state of the rig in a few lines, with faults emphasised."""
 
 from html import escape
 
@@ -21,7 +21,7 @@ OLD_PICTURE_S = 0.5
 
 
 def status(snapshot: Snapshot) -> str:
-    """Say what the rig does and what is wrong with it."""
+    """Return what the rig does and what is wrong with it."""
     pills = (
         pill(snapshot.phase, PHASES.get(snapshot.phase, GREY))
         + (pill(snapshot.behaviour, GREY) if snapshot.behaviour else "")
@@ -39,7 +39,7 @@ def status(snapshot: Snapshot) -> str:
 
 
 def silence() -> str:
-    """Say that the rig sends nothing any more."""
+    """Return a message that the rig sends nothing any more."""
     return frame(
         f"{pill('silent', GREY)}<div style='margin-top:6px'>nothing has come from the rig "
         "for a second; what is shown is the last that was seen</div>"
@@ -47,7 +47,7 @@ def silence() -> str:
 
 
 def _guard(snapshot: Snapshot) -> str:
-    """Say what the guard does; what stands still shouts."""
+    """Return what the guard does; joints that are held are emphasised."""
     if snapshot.stopped:
         return _banner(f"STOPPED: {snapshot.stopped}; torque is off", (), RED)
     colour = LEVELS[snapshot.level]
@@ -61,9 +61,10 @@ def _guard(snapshot: Snapshot) -> str:
 
 
 def drawn_together(reasons: tuple[str, ...]) -> str:
-    """Say each reason once, with its first joint and how many more, e.g. "too fast (neck_yaw, +2)".
+    """Return each reason once, with its first joint and the number of others.
 
-    A guard that limits for a moment must not push the picture down under somebody's finger.
+    For example "too fast (neck_yaw, +2)": a limitation that lasts a moment must not move the
+    image down under the user's finger.
     """
     joints: dict[str, list[str]] = {}
     for reason in reasons:
@@ -97,7 +98,7 @@ def _old_picture(age_s: float | None) -> str:
 
 
 def _without_feedback(snapshot: Snapshot) -> str:
-    """Say of how many joints nobody knows where they are, "" where all are measured."""
+    """Return the number of joints without position feedback, "" if all are measured."""
     estimated = snapshot.estimated
     if not estimated:
         return ""

@@ -43,7 +43,7 @@ class StopSender:
             raise OSError("the rig does not answer") from None
 
     def attach(self, loop: asyncio.AbstractEventLoop) -> None:
-        """Hear the answers in this event loop."""
+        """Receive the replies in this event loop."""
         loop.add_reader(self._link.fileno(), self._hear)
 
     def _sent(self, why: str, who: str) -> asyncio.Future[str]:

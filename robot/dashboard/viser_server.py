@@ -45,7 +45,7 @@ def browser_of(server: viser.ViserServer, client_id: int) -> str:
 
 @contextlib.contextmanager
 def _on_unix_socket(path: Path) -> Iterator[None]:
-    """Let servers that are opened meanwhile listen at a path; viser knows only ports."""
+    """Within the block, make viser's server, which supports only ports, listen on a socket file."""
     serve = websocket_server.serve
 
     @functools.wraps(serve)

@@ -90,7 +90,7 @@ class Guardian:
             )
 
     def arm(self, plan: int) -> None:
-        """Let it watch from now on, before torque comes on.
+        """Start watching, before torque is switched on.
 
         Raises:
             SetupError: it does not run, and torque must not come on without it.
@@ -101,7 +101,7 @@ class Guardian:
         self._heartbeat.arm(plan, True)
 
     def disarm(self, plan: int) -> None:
-        """Tell it that the torque is off."""
+        """Report to the guardian that the torque is off."""
         self._heartbeat.arm(plan, False)
 
     def releasing(self, plan: int) -> bool:
@@ -145,7 +145,7 @@ class Guardian:
         return events
 
     def leave(self, plan: int) -> None:
-        """Say goodbye for one port; after the last the guardian ends.
+        """Unregister one port; after the last the guardian ends.
 
         Where servos of the port are still armed, as they could not be released, it goes on
         trying for some seconds by itself.
@@ -179,7 +179,7 @@ class Guardian:
         )
 
     def _end_unfinished(self) -> None:
-        """Take what a guardian that died was releasing as released."""
+        """Treat what a dead guardian was releasing as released."""
         for i in range(len(self.plans)):
             if self.releasing(i):
                 self._heartbeat.set_state(i, RELEASED)

@@ -23,7 +23,7 @@ class Ask(NamedTuple):
 
 
 class LookAt(NamedTuple):
-    """Look at a point of the world in place of all that pulls; None: choose freely again.
+    """Look at a point of the world instead of the models' target; None: choose freely again.
 
     p_world_m: metres, x ahead, y left, z up of the neck base
     who: who asks, in words; stay: until told otherwise; else for as long as ``Renew`` comes
@@ -36,7 +36,7 @@ class LookAt(NamedTuple):
 
 
 class Jog(NamedTuple):
-    """Hold all joints, and put these at angles; without any, the gaze is free again.
+    """Hold all joints, with these at the given angles; without any, the gaze is free again.
 
     angles_rad: (joint, angle) pairs
     who, stay: as in LookAt
@@ -54,14 +54,14 @@ class Renew(NamedTuple):
 
 
 class Stop(NamedTuple):
-    """Take the torque off at once, nothing parks; the program goes on and reads."""
+    """Switch the torque off at once, without parking; the program goes on reading."""
 
     why: str
     who: str = ""
 
 
 class Resume(NamedTuple):
-    """Put the torque on again after a stop, where the joints are, and go on slowly.
+    """Switch the torque on again after a stop, where the joints are, and go on slowly.
 
     Obeyed by the rules of ``gazerig.robot.model.stop_latch``: of the one who stopped, or confirmed.
 
@@ -74,7 +74,7 @@ class Resume(NamedTuple):
 
 
 class Tune(NamedTuple):
-    """Put parameters in force.
+    """Apply parameters.
 
     changes: (dotted key of the rig's YAML, value) pairs, checked beforehand
     """
@@ -216,7 +216,7 @@ def _within(value: object, most: float) -> bool:
 
 
 def _frozen(value: object) -> object:
-    """Make tuples of JSON's lists."""
+    """Return JSON's lists as tuples."""
     if isinstance(value, list | tuple):
         return tuple(_frozen(item) for item in value)
     if isinstance(value, dict):

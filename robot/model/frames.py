@@ -71,7 +71,7 @@ class PoseHistory:
         self._angles: deque[Angles3] = deque(maxlen=ticks)
 
     def remember(self, t_s: float, head_rad: Angles3) -> None:
-        """Note the head's measured angles; times must grow."""
+        """Record the head's measured angles; times must increase."""
         self._times.append(t_s)
         self._angles.append(head_rad)
         if self._tell is not None:
@@ -105,7 +105,7 @@ class PoseHistory:
 
 
 class NewestPose(PoseHistory):
-    """Gives the newest pose whatever the time: for comparison only, it makes heads overshoot.
+    """Returns the newest pose for any time: for comparison only, it makes heads overshoot.
 
     This is what placing a picture by where the head is now does, instead of by where it
     was when the picture was taken.
@@ -127,7 +127,7 @@ class CameraMount:
         self.retune(params)
 
     def retune(self, params: CameraParams) -> None:
-        """Take another place."""
+        """Change the camera's placement."""
         self.on_head = params.mount == "head"
         x, y, z = params.position_mm
         self._p: Vec3 = (x / 1e3, y / 1e3, z / 1e3)

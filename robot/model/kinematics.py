@@ -64,7 +64,7 @@ class Kinematics:
         self.retune(params, lids)
 
     def retune(self, params: GeometryParams, lids: Mapping[str, LidEnds]) -> None:
-        """Take other measures and lid angles."""
+        """Change the geometry and lid angles."""
         self._pivot: Vec3 = (0.0, 0.0, params.pitch_axis_height_mm / 1e3)
         self._arm: Vec3 = (params.eyes_ahead_mm / 1e3, 0.0, params.eyes_above_mm / 1e3)
         self._half = params.interocular_mm / 2e3

@@ -46,7 +46,7 @@ class Lead:
         self._take(command, t_s)
 
     def jog(self, command: Jog, names: tuple[str, ...], now_rad: JointAngles, t_s: float) -> None:
-        """Hold all joints but those given; without any, the models move them again.
+        """Hold all joints but those given; without any, return them to the gaze models.
 
         now_rad: where the joints are held that nobody has jogged yet
         """
@@ -64,7 +64,7 @@ class Lead:
         self._take(command, t_s)
 
     def renew(self, command: Renew, t_s: float) -> bool:
-        """Take a heartbeat; True if it is of the one who leads."""
+        """Record a heartbeat; return whether it came from the client that leads."""
         mine = self.active and command.who == self._who
         if mine:
             self._renewed_s = t_s
@@ -75,7 +75,7 @@ class Lead:
         return self.active and not self._stay and t_s - self._renewed_s > HEARTBEAT_S
 
     def end(self) -> None:
-        """Let the models lead again."""
+        """End the lead: the gaze models move the head again."""
         if self.point is not None:
             self._shifts += 1
         self.point, self.pose_rad = None, ()
@@ -103,7 +103,7 @@ class Lead:
         self._describe()
 
     def _describe(self) -> None:
-        """Say who leads and what."""
+        """Return who leads and what."""
         if self.pose_rad:
             angles = (f"{name} {degrees(angle):.1f}" for name, angle in self._jogged.items())
             what = f"jog {', '.join(angles)}"

@@ -74,7 +74,7 @@ class EgomotionResidual:
     def step(
         self, t_s: float, turn_rad_s: Vec3, p_world_eye_m: Vec3, seen: Iterable[TrackedPoint]
     ) -> None:
-        """Take in one picture; times must grow.
+        """Add one frame; times must increase.
 
         turn_rad_s: angular velocity of the camera at the capture, along the world's axes
         p_world_eye_m: where the camera was
@@ -112,7 +112,7 @@ class EgomotionResidual:
         self._turns = {s.id: _Turn(t_s, views[s.id]) for s in seen if s.speed_m_s < _STILL_M_S}
 
     def _believe(self, turn: _Turn) -> None:
-        """Take in what one still thing seemed to do."""
+        """Update the estimate with the apparent motion of one still thing."""
         for shift, change, dt_s, fast in turn.shifts:
             self._shift_by_turn = _FORGET * self._shift_by_turn + dot(shift, change)
             self._turn_by_turn = _FORGET * self._turn_by_turn + dot(change, change)

@@ -70,7 +70,7 @@ class TrackFilter:
         self._keep(state, cov)
 
     def correct(self, p_m: Vec3, cov_m2: Floats) -> None:
-        """Take in a measured place (3,) with its covariance (3, 3)."""
+        """Update with a measured position (3,) and its covariance (3, 3)."""
         off = np.subtract(p_m, self.state[:3])
         if off @ np.linalg.solve(self.cov[:3, :3] + cov_m2, off) > _SURPRISING:
             # Whatever happened may have happened at any time since the last look: a place
@@ -81,7 +81,7 @@ class TrackFilter:
         self._correct(_PLACE, p_m, cov_m2)
 
     def correct_velocity(self, v_m_s: Vec3, cov_m2_s2: Floats) -> None:
-        """Take in a measured velocity (3,) with its covariance (3, 3)."""
+        """Update with a measured velocity (3,) and its covariance (3, 3)."""
         self._correct(_VELOCITY, v_m_s, cov_m2_s2)
 
     @property
@@ -105,7 +105,7 @@ class TrackFilter:
         self._keep(state[:, 0], cov)
 
     def _keep(self, state: Floats, cov: Floats) -> None:
-        """Put a state in force, its covariance made symmetric again after rounding."""
+        """Set the state, with its covariance made symmetric again after rounding."""
         self._state, self._cov = state, 0.5 * (cov + cov.T)
         kalman = self._kalman
         kalman.statePre = kalman.statePost = state[:, None]

@@ -33,7 +33,7 @@ class MotionSource:
         self._detector = MotionDetector(params)
 
     def retune(self, params: MotionParams, lens: LensParams | None, field_rad: float) -> None:
-        """Look otherwise from the next picture on; what is followed stays."""
+        """Use new parameters from the next frame on; what is tracked stays."""
         self._enabled, self._lens, self._field_rad = params.enabled, lens, field_rad
         self._detector.retune(params)
         if not params.enabled:
@@ -62,7 +62,7 @@ def motion_finder(
 def retuned(
     params: MotionParams, lens: LensParams | None, field_rad: float, finder: Motion | None
 ) -> Motion | None:
-    """Let a finder look otherwise, in the process that has it."""
+    """Change the parameters of a detector in its own process."""
     if isinstance(finder, MotionSource):
         finder.retune(params, lens, field_rad)
     return finder

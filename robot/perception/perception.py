@@ -80,7 +80,7 @@ class Perception:
         parts_face_m: Mapping[str, Vec3] | None,
         lens: LensParams | None,
     ) -> None:
-        """Take another field of view, parts and lens, from the next picture on."""
+        """Change field of view, parts and lens, from the next frame on."""
         own = parts_face_m or {}
         # A measured part is where it was measured; a canonical one is stretched with the face.
         self._parts = tuple((own.get(code, PARTS_FACE_M[code]), code in own) for code in PARTS)

@@ -95,7 +95,7 @@ class Track:
 
     @property
     def depth_from(self) -> str:
-        """Say what its distance rests on: "camera", "face size" or "assumed"."""
+        """Return the source of its distance: "camera", "face size" or "assumed"."""
         if self.sighting.depth_measured:
             return "camera"
         return "face size" if self.R_world_face is not None else "assumed"
@@ -203,7 +203,7 @@ class Tracker:
         return track
 
     def _update(self, track: Track, sighting: LocalisedDetection, p_camera: Vec3) -> None:
-        """Take a sighting in."""
+        """Update a track with a detection."""
         place = sized(track, sighting, p_camera)
         track.filter.correct(
             place, sight_cov(place, p_camera, sighting.across_sd_m, sighting.along_sd_m)
@@ -219,7 +219,7 @@ class Tracker:
         track.sighting, track.seen_s = sighting, track.at_s
 
     def _velocity(self, track: Track, sighting: LocalisedDetection, p_camera: Vec3) -> None:
-        """Take in a velocity that was measured in the picture."""
+        """Update with a velocity that was measured in the image."""
         if sighting.v_world_m_s is None:
             return
         share = 1.0

@@ -113,7 +113,7 @@ def _refuse_foreign(root: Path, force: bool) -> None:
 
 
 def label_of(name: str) -> str:
-    """Make a BIDS label of a name: its letters and digits."""
+    """Return a BIDS label made of a name: its letters and digits."""
     return re.sub(r"[^A-Za-z0-9]", "", name) or "unnamed"
 
 

@@ -81,7 +81,7 @@ def columns(joints: Collection[str]) -> tuple[str, ...]:
 
 
 def _rests_on(trace: GazeAngles) -> dict[str, object]:
-    """Say of each group of columns whether it was measured."""
+    """Return for each group of columns whether it was measured."""
     gaze = {"x_deg y_deg": "cyclopean", "left_*_deg": "left", "right_*_deg": "right"}
     more = {"head_*_deg": ("head", _HEAD), "*_lid": ("lids", _LIDS)}
     there = {

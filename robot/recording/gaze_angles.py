@@ -182,7 +182,7 @@ class GazeAnglesBuilder:
         )  # fmt: skip
 
     def _note_orders(self, tick: Tick, time_s: float) -> None:
-        """Keep what was said and asked for, and whether the joints are moved by hand."""
+        """Record messages and commands, and whether the joints are moved by hand."""
         self._messages += [(time_s, event) for event in tick.events]
         for command in tick.commands:
             if isinstance(command, Renew):
@@ -221,7 +221,7 @@ def target_words(target: Target) -> str:
 
 
 def command_text(command: Command) -> str:
-    """Say in words what was asked for, e.g. "asked: stop why=space bar"."""
+    """Return a command as text, e.g. "asked: stop why=space bar"."""
     usual = command._field_defaults
     given = " ".join(
         f"{name}={value}"

@@ -106,7 +106,7 @@ def stretches_of(trace: GazeAngles, labels: Labels) -> tuple[LabelledInterval, .
 
 
 def _steadied(movement: Ints, time_s: Floats) -> Ints:
-    """Take short pursuits as fixations, and short fixations inside a pursuit as pursuit."""
+    """Relabel short pursuits as fixations, and short fixations inside a pursuit as pursuit."""
     out = movement.copy()
     for wanted, other in ((_PURSUIT, _FIXATION), (_FIXATION, _PURSUIT)):
         for first, last in _runs(out):

@@ -14,7 +14,7 @@ from gazerig.robot.dashboard.camera_overlay import encode
 
 
 class PictureEncoder:
-    """Takes pictures out of ticks at a rate and gives them as JPEG."""
+    """Encodes the frames of ticks as JPEG, at a given rate."""
 
     def __init__(self, rate_hz: float, at_once: bool = False) -> None:
         """Take the rate, 0 for none.
@@ -38,7 +38,7 @@ class PictureEncoder:
             self._thread.start()
 
     def look(self, tick: Tick) -> None:
-        """Take the tick's picture if it is a new one and due."""
+        """Encode the tick's frame if it is a new one and due."""
         found = tick.detections
         if found is None or found.picture is None or found.number == self._number:
             return

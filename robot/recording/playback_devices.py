@@ -37,7 +37,7 @@ class PlaybackBody(ForwardingBody):
         self._newest: JointState | None = None
 
     def play(self, moment: TickRecord) -> None:
-        """Take what is to be said until the end of a tick; once for each."""
+        """Set what is returned until the end of a tick; once for each tick."""
         if moment is not self._moment:
             self._moment = moment
             self._said = deque(
@@ -45,7 +45,7 @@ class PlaybackBody(ForwardingBody):
             )
 
     def leave_off(self) -> None:
-        """Say from now on what the body behind says."""
+        """Return from now on what the wrapped body returns."""
         self._said.clear()
         self._newest = None
 
@@ -113,7 +113,7 @@ class NoCamera:
         return None
 
     def events(self) -> tuple[str, ...]:
-        """Say nothing."""
+        """Return no events."""
         return ()
 
     def close(self) -> None:

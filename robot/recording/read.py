@@ -106,7 +106,7 @@ class RunRecording:
 
     @property
     def note(self) -> str:
-        """Say what is not as it should be with the recording, or nothing."""
+        """Return what is wrong with the recording, "" if nothing is."""
         name, lost = self.path.name, self.end.lost
         if not self.whole:
             return f"{name} was not closed: what its writer had put on the disk is there"
@@ -265,7 +265,7 @@ def _wanted(
 
 @contextmanager
 def used(path: Path) -> Iterator[None]:
-    """Say in one line that what a recording holds cannot be what a run gave.
+    """Turn errors caused by impossible contents of a recording into one line.
 
     To be put around what is made of it, as a file may be well-formed and still hold nonsense.
 

@@ -82,7 +82,7 @@ class Recorder:
         self._pictures.start()
 
     def begin(self) -> None:
-        """Take the place of an older recording, now that the run has begun.
+        """Replace an older recording, now that the run has begun.
 
         Raises:
             OSError: that is refused; the older one stays.
@@ -133,7 +133,7 @@ class Recorder:
             self._link.flush()
 
     def events(self) -> tuple[str, ...]:
-        """Say, once, that the recording cannot go on."""
+        """Return, once, the event that the recording cannot go on."""
         if self._said or not self._link.failed:
             return ()
         self._said = True

@@ -64,7 +64,7 @@ class RunWriter:
         return self._started_ns + round(at_s * _WHOLE_NS)
 
     def add(self, message: fmt.Message) -> None:
-        """Put a message into the chunk in progress; without effect after a failure."""
+        """Append a message to the present chunk; without effect after a failure."""
         if self.failed:
             return
         self._counts[message.topic] = self._counts.get(message.topic, 0) + 1
@@ -149,7 +149,7 @@ class _Straight:
         """Nothing waits here."""
 
     def keep(self) -> None:
-        """Note that the file is good as it is."""
+        """Mark the file as complete."""
         self._kept = self._at
 
     def cut(self) -> None:

@@ -119,7 +119,7 @@ class SnapshotIndex:
         return self._pictures.read(self._places[number + 1] - self._places[number])
 
     def close(self) -> None:
-        """Let the pictures go."""
+        """Free the frames."""
         self._pictures.close()
 
     def _read_ticks(

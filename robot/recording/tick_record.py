@@ -272,12 +272,12 @@ def _plain(one: BodyRecord) -> Flat:
 
 
 def _named(kind: Any, values: Flat) -> Json:
-    """Put a named tuple's values under their names."""
+    """Return a named tuple's values by name."""
     return dict(zip(kind._fields, values, strict=True))
 
 
 def _made(kind: Any, data: Json) -> Any:
-    """Make a named tuple of JSON; a field that this version does not know is left out."""
+    """Return a named tuple made of JSON; fields unknown to this version are left out."""
     known = kind._fields
     return kind(**{k: _tupled(v) if type(v) is list else v for k, v in data.items() if k in known})
 
@@ -288,7 +288,7 @@ def _limited(gaze: Json) -> list[Limited]:
 
 
 def _tupled(value: Any) -> Any:
-    """Make tuples of JSON's lists."""
+    """Return JSON's lists as tuples."""
     if type(value) is not list:
         return value
     if value and type(value[0]) is list:

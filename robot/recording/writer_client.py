@@ -94,7 +94,7 @@ class WriterClient:
             self._send(len(self._queue))
 
     def listen(self) -> None:
-        """Hear what the writer has to say."""
+        """Receive the messages of the writer."""
         while self._socket is not None:
             try:
                 message = self._socket.recv(writer.PIECE_BYTES)
@@ -108,7 +108,7 @@ class WriterClient:
             self._hear(*pickle.loads(message))
 
     def close(self) -> None:
-        """Tell the writer that nothing more comes, and wait until it has closed the file."""
+        """Send the end of the recording to the writer, and wait until it has closed the file."""
         self.drain()
         if self._socket is not None:
             self._socket.shutdown(socket.SHUT_WR)

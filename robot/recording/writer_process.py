@@ -120,7 +120,7 @@ def _told(rig: socket.socket, parent: int) -> Iterator[tuple[str, Any] | None]:
 
 
 def _answer(rig: socket.socket, kind: str, values: Any) -> None:
-    """Tell the other side, if it is still there."""
+    """Send a reply, if the other side still exists."""
     with contextlib.suppress(OSError):
         rig.send(pickle.dumps((kind, values)))
 

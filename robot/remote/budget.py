@@ -34,7 +34,7 @@ class Budget:
         self._lock = threading.Lock()
 
     def spend(self, used_s: float, now_s: float) -> None:
-        """Take processor time that was used, also where there is none left."""
+        """Deduct processor time that was used, even if none is left."""
         with self._lock:
             self._fill(now_s)
             self._left_s -= used_s

@@ -151,7 +151,7 @@ class RobotClient:
         raise RequestRejected(f"{key}: unknown key; gazerig ctl get lists all")
 
     def set(self, key: str, value: Value) -> tuple[str, ...]:
-        """Put a value in force; when this returns, the loop has it. Gives what to know of it.
+        """Apply a value; when this returns, the loop uses it. Return what the user should know.
 
         Raises:
             Refused: the value breaks a rule; all is as before.
@@ -159,7 +159,7 @@ class RobotClient:
         return self.set_many({key: value})
 
     def set_many(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
-        """Put several values in force in the same tick, or none of them.
+        """Apply several values in the same tick, or none of them.
 
         Raises:
             Refused: with every rule that is broken.
@@ -186,7 +186,7 @@ class RobotClient:
         return SavedFile(Path(said["path"]), backup, differences(said["changes"]))
 
     def revert(self) -> tuple[str, ...]:
-        """Put in force what the rig's file says."""
+        """Apply the values of the rig's file again."""
         return self._notes(self._asked("revert"))
 
     def characters(self) -> tuple[str, ...]:
@@ -229,12 +229,12 @@ class RobotClient:
         return self._lead(LookAt((x_m, y_m, z_m), self._who, stay), stay)
 
     def look_freely(self) -> None:
-        """Let the head choose again what to look at."""
+        """Let the head choose its targets again."""
         self._end_heartbeat()
         self._command(LookAt(None, self._who))
 
     def jog(self, joint: str, deg: float, stay: bool = False) -> CommandReply:
-        """Hold all joints and put one at an angle.
+        """Hold all joints and move one to an angle.
 
         stay: as in ``look_at``
 
@@ -245,7 +245,7 @@ class RobotClient:
         return self._lead(Jog(((joint, radians(deg)),), self._who, stay), stay)
 
     def jog_free(self) -> None:
-        """Let the models lead the joints again."""
+        """Return the joints to the gaze models."""
         self._command(Jog((), self._who))
 
     @property
@@ -271,7 +271,7 @@ class RobotClient:
             heartbeat.end()
 
     def stop(self, why: str = "asked for from another program") -> None:
-        """Take the torque off at once; when this returns, the loop has done it.
+        """Switch the torque off at once; when this returns, the loop has done it.
 
         Raises:
             ConnectionLost, Refused: nobody knows whether it stopped: press the emergency stop.
@@ -279,7 +279,7 @@ class RobotClient:
         self._command(Stop(why, self._who))
 
     def resume(self, confirmed: bool = False) -> None:
-        """Put the torque on again where the joints are, and go on slowly.
+        """Switch the torque on again where the joints are, and go on slowly.
 
         confirmed: a person has said that no hand is in the mechanism; it is needed where
             somebody else has stopped it

@@ -36,7 +36,7 @@ class FileState(NamedTuple):
 
 
 def look(path: Path) -> FileState | None:
-    """Look at a file; None where there is nothing to read: absent, empty or not permitted."""
+    """Return the state of a file; None if it cannot be read: absent, empty or not permitted."""
     try:
         stat, data = path.stat(), read_limited(path, _LARGEST)
     except OSError:
@@ -49,20 +49,20 @@ def look(path: Path) -> FileState | None:
 
 
 class Settling:
-    """Tells from one look after the other when a file holds something new that stays."""
+    """Detects when a file has new content that no longer changes."""
 
     def __init__(self, first: FileState | None) -> None:
         self.known(first)
 
     def known(self, now: FileState | None) -> None:
-        """Take what the file is now as read."""
+        """Treat the present content of the file as read."""
         self._known = now.digest if now is not None else b""
         self._last = now
         self._same = 0
         self._missing = 0
 
     def update(self, now: FileState | None) -> bool:
-        """Take a look; tell whether the file should be read, to find it new or missing."""
+        """Add a state of the file; return whether the file, new or missing, should be read."""
         self._same = self._same + 1 if now == self._last else 0
         self._last = now
         if now is None:
@@ -107,13 +107,13 @@ class FileWatch:
         self._thread.start()
 
     def stop(self) -> None:
-        """Look no more."""
+        """Stop watching."""
         self._over.set()
         if self._thread.is_alive():
             self._thread.join(timeout=2.0)
 
     def saved(self, path: Path) -> None:
-        """Take a file as known: it was written by this program; from any thread.
+        """Treat a file as known: it was written by this program; for any thread.
 
         A file that is not watched yet is from now on, so that an edit made before the next
         look is heard of.
@@ -127,7 +127,7 @@ class FileWatch:
                 self._watched[path] = Settling(look(path))
 
     def look(self) -> None:
-        """Look at all files once and tell of those that are new or stay away."""
+        """Check all files once and report those that are new or stay missing."""
         with self._lock:
             files = dict.fromkeys(self._files())
             self._watched = {

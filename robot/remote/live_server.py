@@ -22,7 +22,7 @@ class FileTuning(ParamAccess, Protocol):
         ...
 
     def reload(self, path: Path) -> object:
-        """Put in force what a file says now; raises with every fault, and all is as it was."""
+        """Apply the contents of a file; raise with every fault, and change nothing then."""
         ...
 
 
@@ -66,7 +66,7 @@ class LiveServer:
         self._pulse.update(tick)
 
     def saved(self, path: Path) -> None:
-        """Take note that this program itself has written a file."""
+        """Record that this program itself has written a file."""
         self._watch.saved(path)
 
     def close(self) -> None:
@@ -85,7 +85,7 @@ class LiveServer:
         return files
 
     def _read_again(self, path: Path) -> None:
-        """Put a file that was edited in force, or say all that is wrong with it."""
+        """Apply a file that was edited, or report everything that is wrong with it."""
         try:
             notes = self._tuning.reload(path)
         except self._refusals as error:

@@ -47,7 +47,7 @@ def folder(environ: Mapping[str, str], uid: int) -> Path:
 
 
 def make_private(path: Path, uid: int) -> None:
-    """Make a folder that only its owner can enter, or see that it is one.
+    """Create a folder that only its owner can enter, or check that it is one.
 
     Raises:
         SetupError: somebody else could put a socket there, or it cannot be made.
@@ -96,7 +96,7 @@ def dial(path: Path, within_s: float) -> socket.socket:
 
 
 def listen(path: Path) -> socket.socket:
-    """Put a listening socket at a path, for its owner alone; what was there is replaced.
+    """Listen on a socket file, for its owner alone; an existing one is replaced.
 
     Raises:
         SetupError: the path is too long, or the disk refuses.

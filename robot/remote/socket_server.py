@@ -79,7 +79,7 @@ class RemoteServer:
             thread.start()
 
     def _accept(self, listener: socket.socket) -> None:
-        """Give every program that connects a thread."""
+        """Start a thread for every program that connects."""
         while self._listener is not None:
             try:
                 end, _ = listener.accept()
@@ -145,7 +145,7 @@ class RemoteServer:
         return taken
 
     def _delayed(self, own: Budget) -> str:
-        """Let a program wait that takes too much time; return why it is refused all the same."""
+        """Delay a program that uses too much time; return the reason if it is refused even so."""
         now_s = self._clock.now_s()
         wait_s = max(own.wait_s(now_s), self._budget.wait_s(now_s))
         if wait_s > 0.0:

@@ -78,7 +78,7 @@ def compare(
 def differences_of(
     a: Sequence[MeasuredValue], b: Sequence[MeasuredValue]
 ) -> tuple[MeasureDifference, ...]:
-    """Hold the measures that both runs have against each other."""
+    """Compare the measures that both runs have."""
     theirs = {measure.key: measure for measure in b}
     pairs = [(m, theirs[m.key]) for m in a if m.key in theirs]
     enough = {m.key for m, n in pairs if min(m.events, n.events) >= BY_KEY[m.key].least}

@@ -134,7 +134,7 @@ class GazeTrace:
 
 
 class GazeTraceBuilder:
-    """Takes the ticks of a run, one after the other, and gives what was gathered."""
+    """Builds the gaze trace of a run from its ticks."""
 
     def __init__(self) -> None:
         self._events, self._asked_lids = EventDetector(), BlinkFinder()
@@ -150,7 +150,7 @@ class GazeTraceBuilder:
         self._estimated: dict[str, None] = {}
 
     def update(self, tick: Tick) -> None:
-        """Take a tick; what happens while somebody has stopped the robot does not count."""
+        """Add a tick; time during which a user has stopped the robot does not count."""
         for command in tick.commands:
             if (
                 isinstance(command, Ask)

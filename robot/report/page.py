@@ -128,7 +128,7 @@ def rendered(template: str, **values: object) -> str:
 
 
 def line_of(finding: MeasureResult, styles: frozenset[str]) -> TextLine:
-    """Put a finding into words."""
+    """Return a finding as text."""
     band, value = finding.band, finding.value
     known = isfinite(finding.low95)
     interval = f"{number(finding.low95)} to {number(finding.high95)}" if known else ""

@@ -61,7 +61,7 @@ def caption_of(drawing: Drawing, runs: Sequence[Shown]) -> str:
 
 
 def basis_words(runs: Sequence[Shown], group: str) -> str:
-    """Tell in a word or some what runs together rest on, e.g. "measured or estimated"."""
+    """Return what several runs rest on together, e.g. "measured or estimated"."""
     return " or ".join(dict.fromkeys(shown.run.joints.basis(group) for shown in runs))
 
 
@@ -78,7 +78,7 @@ def png(drawing: Drawing, runs: Sequence[Shown]) -> bytes:
 
 
 def nothing(axes: Axes, what: str) -> None:
-    """Say in the place of a figure that there is nothing to draw."""
+    """Write in place of a figure that there is nothing to draw."""
     axes.set_xticks([])
     axes.set_yticks([])
     axes.grid(False)

@@ -54,7 +54,7 @@ class MeasureResult(NamedTuple):
 
 
 def judged(measured: MeasuredValue, band: NormBand) -> MeasureResult:
-    """Hold a figure against its pass band; too few events are no pass."""
+    """Compare a figure with its pass band; too few events are no pass."""
     value = figure(measured.of, measured.rows)
     if measured.events < band.least or not isfinite(value):
         return MeasureResult(band, measured, value, nan, nan, "too few events")

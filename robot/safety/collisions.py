@@ -60,7 +60,7 @@ class Collisions:
         position: JointAngles,
         held: Sequence[bool],
     ) -> None:
-        """Put up this tick's walls, and say who has to leave a box first.
+        """Set this tick's limits, and return which joints have to leave a forbidden range first.
 
         desired: where the joints want to go, any numbers at all
         position: as measured
@@ -133,14 +133,14 @@ class Collisions:
 
 
 def _side(span: ForbiddenRange, motion: MotionLimiter) -> int:
-    """Tell on which side a joint is and can stay: -1 below, 1 above, 0 neither."""
+    """Return on which side a joint is and can stay: -1 below, 1 above, 0 neither."""
     if motion.keeps_below(span.joint, span.below):
         return -1
     return 1 if motion.keeps_above(span.joint, span.above) else 0
 
 
 def _wall_off(span: ForbiddenRange, motion: MotionLimiter) -> None:
-    """Keep a joint on the side where it is."""
+    """Limit a joint to the side on which it is."""
     i = span.joint
     if _side(span, motion) < 0:
         motion.high[i] = min(motion.high[i], span.below)

@@ -86,7 +86,7 @@ class Guard:
         self._late.period_s = period_s
 
     def retune(self, params: GuardParams, limits: tuple[JointLimit, ...]) -> None:
-        """Take other limits without a jump; what has been counted and found stays.
+        """Change the limits without a jump; counters and findings stay.
 
         A joint that moves so that it cannot keep its new limit comes to rest under the old
         one first. A joint that is outside its new range then is led inside slowly.
@@ -151,7 +151,7 @@ class Guard:
             self._note_outside(i)
 
     def _adopt(self) -> None:
-        """Put new limits in force for the joints that can keep them."""
+        """Apply new limits to the joints that can keep them."""
         limits = self._within_reach()
         for i in sorted(self._waiting):
             # Walls were put up for the old acceleration.
@@ -247,7 +247,7 @@ class Guard:
         )
 
     def _well(self, i: int, joints: JointState) -> bool:
-        """Tell the same of one joint."""
+        """Whether this holds for one joint."""
         return not (
             self._soft
             or self._gentle[i]
@@ -272,7 +272,7 @@ class Guard:
                 self._slow_down(i)
 
     def _slow_down(self, i: int) -> None:
-        """Let one joint go on slowly, as after torque-on."""
+        """Make one joint go on slowly, as after torque-on."""
         self._gentle[i] = True
         self._gentle_until_s[i] = self._t_s + self._params.soft_start_ms / 1e3
 
@@ -299,7 +299,7 @@ class Guard:
         return (3, fault) if fault else (rank, reason)
 
     def _servo_hold(self, i: int, joints: JointState, fault: str, fresh: bool) -> _Hold | None:
-        """Say why a joint's servo cannot or must not go where it is sent."""
+        """Return why a joint's servo cannot or must not follow the command."""
         position = joints.position_rad[i]
         powered = joints.torque[i] if joints.torque else not fault
         if not powered:
@@ -318,7 +318,7 @@ class Guard:
         return _Hold(strain, again="slowly") if strain else None
 
     def _outer_hold(self, i: int, desired: float, unseen: bool) -> _Hold | None:
-        """Say what else keeps a joint from its desired angle."""
+        """Return what else keeps a joint from its desired angle."""
         if i in self._waiting:
             return _Hold("new limits")
         if i in self._collisions.exits:
@@ -347,7 +347,7 @@ class Guard:
         return False
 
     def _give_way(self, i: int, reason: str, position: float, fresh: bool) -> _Hold:
-        """Take the command back to where the joint is, and again if it is pushed away.
+        """Move the command back to where the joint is, and again if it is pushed away.
 
         Not all the time: a neck would sink under its own weight.
         """

@@ -57,7 +57,7 @@ class JointHealth:
         self._counting = True
 
     def step(self, joints: JointState, dt_s: float) -> None:
-        """Take what the servos tell; what they do not tell strains nothing."""
+        """Update with the servos' reports; missing values do not strain a joint."""
         load, lasting = joints.load, self._params.lasting_load
         strained = bool(load) and not (max(load) <= lasting and min(load) >= -lasting)
         before = self._seen

@@ -16,7 +16,7 @@ slow for its rate. Each of them taken for a gap would leave a neck at 10 deg/s."
 
 
 class LateTicks:
-    """Tells ticks that came too late, and for how long joints gather speed softly after one.
+    """Detects late ticks, and for how long acceleration is limited after one.
 
     Args:
         period_s: nominal time between ticks.

@@ -34,7 +34,7 @@ class MotionLimiter:
         self.speed[i] = 0.0
 
     def left_alone(self, for_s: float) -> None:
-        """Note that servos got no goals for a time, in which they braked to their last ones."""
+        """Record that servos got no goals for a time, in which they braked to their last ones."""
         for i, limit in enumerate(self.limits):
             left = abs(self.speed[i]) - limit.accel_rad_s2 * for_s
             self.speed[i] = copysign(left, self.speed[i]) if left > 0.0 else 0.0
@@ -56,7 +56,7 @@ class MotionLimiter:
         self.let_be(i)
 
     def take(self, i: int, limit: JointLimit) -> None:
-        """Put another limit in force."""
+        """Change the limit."""
         self.limits[i] = limit
         self._desired[i] = self.command[i]
         self.let_be(i)
@@ -68,7 +68,7 @@ class MotionLimiter:
         return abs(v) <= limit.speed_rad_s and v * v <= 2.0 * limit.accel_rad_s2 * max(0.0, room)
 
     def let_be(self, i: int) -> None:
-        """Let a joint be where it is: its range holds it, and the way back into it."""
+        """Accept a joint's position: its range holds, and the way back into it."""
         limit, now = self.limits[i], self.command[i]
         self.low[i], self.high[i] = min(limit.low_rad, now), max(limit.high_rad, now)
 
@@ -139,7 +139,7 @@ class MotionLimiter:
         self._desired[i] = self.command[i]
 
     def _step(self, i: int, wanted: float, dt_s: float, top: float, soft: float) -> None:
-        """Take the speed nearest to the wanted one that keeps every limit."""
+        """Return the speed nearest to the wanted one that keeps every limit."""
         accel = self.limits[i].accel_rad_s2
         p, v, low, high = self.command[i], self.speed[i], self.low[i], self.high[i]
         most, least = _faster(v, accel, soft, dt_s), -_faster(-v, accel, soft, dt_s)

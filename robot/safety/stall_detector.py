@@ -45,7 +45,7 @@ class StallDetector:
         return t_s < self._until_s[i]
 
     def found(self, i: int, command: float, position: float, at_s: float, t_s: float) -> bool:
-        """Look at one fresh answer; tell whether the joint is stuck from now on.
+        """Update with one new measurement; return whether the joint is stalled from now on.
 
         Only motion towards the command counts: who drags a joint the other way is to be
         given way to.

@@ -62,7 +62,7 @@ RULES = BoardRules(
 def visit(
     port: BusPort, params: MaestroParams, setups: Sequence[ServoConfig], usb: str
 ) -> list[Diagnostic]:
-    """Ask a board for all it tells and judge it; nothing moves.
+    """Read and check everything that a board reports; nothing moves.
 
     Args:
         port: opened here.
@@ -96,7 +96,7 @@ def _pulses(
     found: DetectedMaestro,
     sized: bool,
 ) -> dict[int, int | None]:
-    """Ask for the pulses of a rig's channels.
+    """Read the pulses of a rig's channels.
 
     A channel that is not there is an error to a board, on which it sends all channels home:
     those that cannot be there are not asked for, nor, while any gives pulses, those beyond
@@ -183,7 +183,7 @@ def _state(found: DetectedMaestro) -> Iterator[Diagnostic]:
 
 
 def _wide_ranges(setups: Sequence[ServoConfig]) -> Iterator[Diagnostic]:
-    """Say which joints a new board's own ranges would cut."""
+    """Return the joints whose range a new board's own limits would cut."""
     for setup in setups:
         if wide_range(setup) is None:
             continue

@@ -32,7 +32,7 @@ RULES = BoardRules(
 
 
 def visit(port: BusPort, params: Pca9685Params, setups: Sequence[ServoConfig]) -> list[Diagnostic]:
-    """Ask the boards of one bus for all they tell and judge it; nothing moves.
+    """Read and check everything that the boards of one bus report; nothing moves.
 
     Raises:
         PortError: the port cannot be opened.

@@ -39,7 +39,7 @@ class PortFacts(NamedTuple):
 
 
 def port_facts(device: str, host: Host) -> PortFacts:
-    """Ask the system about a port."""
+    """Return what the operating system knows of a port."""
     return PortFacts(device, access(device), holders(device, host), serial_ports(host))
 
 

@@ -139,7 +139,7 @@ def _open(port: BusPort, baud: int) -> None:
 
 
 def _elsewhere(port: BusPort, kind: ServoKind, baud: int, tell: Tell) -> Iterator[FoundServo]:
-    """Look at all other baud rates."""
+    """Search at all other baud rates."""
     for other in kind.family.usual_rates:
         if other == baud:
             continue
