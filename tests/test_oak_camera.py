@@ -6,6 +6,8 @@ import sys
 import threading
 import time
 from datetime import timedelta
+from functools import partial
+from typing import Any
 
 import cv2
 import numpy as np
@@ -40,79 +42,84 @@ def film(tmp_path_factory):
     return path
 
 
+def stamped(message, frame):
+    """Give a message the times and the number of a frame."""
+    message.setTimestamp(frame.getTimestamp())
+    message.setTimestampDevice(frame.getTimestampDevice())
+    message.setSequenceNum(frame.getSequenceNum())
+    return message
+
+
+def depth_mm(dai, frame):
+    """Return a depth message for a frame: nothing on the left, its number on the right."""
+    mm = np.zeros((120, 160), np.uint16)  # half the size, as a camera may give it
+    mm[:, 80:] = 1000 + frame.getSequenceNum()
+    found = dai.ImgFrame()
+    found.setType(dai.ImgFrame.Type.RAW16)
+    found.setWidth(160)
+    found.setHeight(120)
+    found.setData(mm.view(np.uint8).ravel())
+    return stamped(found, frame)
+
+
+def found_faces(dai, frame):
+    """Return a message with two faces, one without landmarks and an unsure one."""
+    detections = []
+    for scale, confidence, points in ((0.1, 0.99, POINTS), (0.3, 0.8, POINTS)):
+        box = dai.RotatedRect(dai.Point2f(0.5, 0.5), dai.Size2f(scale, scale), 0.0)
+        face = dai.ImgDetection(box, confidence, 0)
+        face.setKeypoints([dai.Keypoint(x, y, 0.0) for x, y in points])
+        detections.append(face)
+    box = dai.RotatedRect(dai.Point2f(0.2, 0.2), dai.Size2f(0.1, 0.1), 0.0)
+    detections.append(dai.ImgDetection(box, 0.95, 0))  # without landmarks
+    detections.append(dai.ImgDetection(box, 0.1, 0))  # unsure
+    message = dai.ImgDetections()
+    message.detections = detections
+    message.setTransformation(frame.getTransformation())
+    return stamped(message, frame)
+
+
+def answering(dai, pipeline, make, source) -> Any:
+    """Return the output of a node that sends what ``make`` makes of every frame."""
+
+    class Answer(dai.node.ThreadedHostNode):
+        def __init__(self) -> None:
+            super().__init__()
+            self.input = self.createInput()
+            self.out = self.createOutput()
+
+        def run(self) -> None:
+            while self.isRunning():
+                self.out.send(make(self.input.get()))
+
+    node = pipeline.create(Answer)
+    source.link(node.input)
+    return node.out
+
+
 def host_nodes(film, loop=True, depth=True, faces=False, lens=None, device_clock=None):
     """Make what stands for device_nodes: a replayed film and nodes that answer each picture."""
 
+    def looked_through(frame):
+        if lens is not None:
+            transformation = frame.getTransformation()
+            transformation.setIntrinsicMatrix(lens)
+            frame.setTransformation(transformation)
+        if device_clock is not None:
+            frame.setTimestampDevice(device_clock(frame.getTimestampDevice()))
+        return frame
+
     def nodes(dai, pipeline, params) -> Outputs:
-        class Answer(dai.node.ThreadedHostNode):
-            """Sends what ``make`` makes of every picture."""
-
-            def __init__(self) -> None:
-                super().__init__()
-                self.input = self.createInput()
-                self.out = self.createOutput()
-                self.make = None
-
-            def run(self) -> None:
-                while self.isRunning():
-                    self.out.send(self.make(self.input.get()))  # type: ignore[misc]
-
-        def answer(make, source):
-            node = pipeline.create(Answer)
-            node.make = make
-            source.link(node.input)
-            return node.out
-
-        def stamped(message, frame):
-            message.setTimestamp(frame.getTimestamp())
-            message.setTimestampDevice(frame.getTimestampDevice())
-            message.setSequenceNum(frame.getSequenceNum())
-            return message
-
-        def looked_through(frame):
-            if lens is not None:
-                transformation = frame.getTransformation()
-                transformation.setIntrinsicMatrix(lens)
-                frame.setTransformation(transformation)
-            if device_clock is not None:
-                frame.setTimestampDevice(device_clock(frame.getTimestampDevice()))
-            return frame
-
-        def depth_mm(frame):
-            mm = np.zeros((120, 160), np.uint16)  # half the size, as a camera may give it
-            mm[:, 80:] = 1000 + frame.getSequenceNum()
-            found = dai.ImgFrame()
-            found.setType(dai.ImgFrame.Type.RAW16)
-            found.setWidth(160)
-            found.setHeight(120)
-            found.setData(mm.view(np.uint8).ravel())
-            return stamped(found, frame)
-
-        def found_faces(frame):
-            detections = []
-            for scale, confidence, points in ((0.1, 0.99, POINTS), (0.3, 0.8, POINTS)):
-                box = dai.RotatedRect(dai.Point2f(0.5, 0.5), dai.Size2f(scale, scale), 0.0)
-                face = dai.ImgDetection(box, confidence, 0)
-                face.setKeypoints([dai.Keypoint(x, y, 0.0) for x, y in points])
-                detections.append(face)
-            box = dai.RotatedRect(dai.Point2f(0.2, 0.2), dai.Size2f(0.1, 0.1), 0.0)
-            detections.append(dai.ImgDetection(box, 0.95, 0))  # without landmarks
-            detections.append(dai.ImgDetection(box, 0.1, 0))  # unsure
-            message = dai.ImgDetections()
-            message.detections = detections
-            message.setTransformation(frame.getTransformation())
-            return stamped(message, frame)
-
         replay = pipeline.create(dai.node.ReplayVideo)
         replay.setReplayVideoFile(film)
         replay.setOutFrameType(dai.ImgFrame.Type.NV12)
         replay.setFps(params.rate_hz)
         replay.setLoop(loop)
-        colour = answer(looked_through, replay.out)
+        colour = answering(dai, pipeline, looked_through, replay.out)
         return Outputs(
             colour,
-            answer(depth_mm, colour) if depth else None,
-            answer(found_faces, colour) if faces else None,
+            answering(dai, pipeline, partial(depth_mm, dai), colour) if depth else None,
+            answering(dai, pipeline, partial(found_faces, dai), colour) if faces else None,
         )
 
     return nodes

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from stand_in import StandIn
 
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
@@ -32,17 +33,11 @@ FRONTAL = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
 STILL = CameraMount(CameraParams(mount="base", position_mm=(0.0, 0.0, 0.0)))
 
 
-class Neck:
+class Neck(StandIn):
     """A head that turns about the origin."""
 
     def head_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
         return rotation(head_rad), (0.0, 0.0, 0.0)
-
-    def facing(self, p_world_m: Vec3) -> tuple[float, float]:
-        raise NotImplementedError
-
-    def eyes_on(self, p: Vec3, R: Mat3, p_head: Vec3) -> tuple[Any, Any]:
-        raise NotImplementedError
 
 
 def standing() -> PoseHistory:

@@ -289,12 +289,6 @@ class Neck(StandIn):
     def head_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
         return rotation(head_rad), (0.0, 0.0, 0.0)
 
-    def facing(self, p_world_m: Vec3) -> tuple[float, float]:
-        raise NotImplementedError
-
-    def eyes_on(self, p: Vec3, R: Mat3, p_head: Vec3) -> tuple[tuple[float, float], ...]:
-        raise NotImplementedError
-
 
 def watched(mtcnn: MtcnnDetector, scene: Still, seconds: float, placed_s: float = 0.0) -> list:
     """Let a head turn there and back before a scene; give percepts with the time of each.

@@ -1,5 +1,6 @@
 """What a rig file may choose for any board of hobby servos."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,7 +12,7 @@ if TYPE_CHECKING:  # the guardian starts without numpy
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class HobbyBoardParams:
+class HobbyBoardParams(ABC):
     """How long a board is waited for, how often it is looked at, and how its servos start."""
 
     # fmt: off
@@ -26,13 +27,13 @@ class HobbyBoardParams:
     # fmt: on
 
     @property
+    @abstractmethod
     def channels(self) -> int:
         """Return how many there are."""
-        raise NotImplementedError
 
+    @abstractmethod
     def ends_us(self) -> tuple[float, float, str]:
         """Return the shortest and longest pulse that may be sent, and what decides that."""
-        raise NotImplementedError
 
     def check(self, setup: "ServoConfig") -> None:
         """Refuse a servo that no channel can have.

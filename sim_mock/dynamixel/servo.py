@@ -120,8 +120,7 @@ class DynamixelServo(EmulatedServo):
 
     def _trip(self, after_ms: int) -> None:
         """Stop as the bus watchdog does; goals are refused until 98 is cleared."""
-        self._move(self._ms + after_ms)
-        self._watchdog_ms = 0
+        super()._trip(after_ms)
         self.memory.set("bus_watchdog", TRIPPED)
         self.drive.halt()
 

@@ -52,6 +52,8 @@ class ServoChain(Generic[S, Q]):
     quirks_type: type[Q]
     framing_type: type[Framing]
     header: bytes
+    status: Callable[[int, int, bytes], bytes]
+    """Builds a status packet of id, error and parameters."""
     instructions: InstructionSet[S]
     commands: CommandTable
     eeprom_end = 0
@@ -152,11 +154,6 @@ class ServoChain(Generic[S, Q]):
         return tuple(servo.position_steps for servo in self.servos)
 
     # --- what a make of servos adds
-
-    @staticmethod
-    def status(servo_id: int, error: int, params: bytes) -> bytes:
-        """Build a status packet."""
-        raise NotImplementedError
 
     def _apply_quirks(self, quirks: Q) -> None:
         """Apply quirks from now on."""

@@ -170,8 +170,9 @@ class EmulatedServo(ABC):
         self._boot()
 
     def _trip(self, after_ms: int) -> None:
-        """Stop as a bus watchdog does, so many milliseconds from where its clock stands."""
-        raise NotImplementedError
+        """Let the bus watchdog run out, once, so many ms from where the servo's clock stands."""
+        self._move(self._ms + after_ms)
+        self._watchdog_ms = 0
 
     @abstractmethod
     def _protect_from(self, bits: int) -> None:
