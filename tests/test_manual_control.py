@@ -173,7 +173,7 @@ def test_a_silent_servo_is_named(bench: Bench) -> None:
 def test_a_latched_fault_ends_it(bench: Bench) -> None:
     bench.at[bench.clock.now_s() + 0.5] = "overload 7"
     moved = bench.control.jog("neck_yaw", 40.0)
-    assert moved.ended == "limp" and moved.level == "limp"
+    assert moved.ended == "torque_off" and moved.level == "torque_off"
     assert any("overload" in reason for reason in moved.of("neck_yaw").reasons)
 
 

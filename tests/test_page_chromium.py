@@ -257,7 +257,7 @@ def test_stop_takes_the_torque_off_until_it_is_asked_back(
     rig, person = at_the_rig
     person.click(STOP)
     wait_for(lambda: "somebody pressed STOP on the page (browser " in rig.robot.stopped, "the stop")
-    wait_for(lambda: present(rig.newest).guard_result.level == "limp", "torque off")
+    wait_for(lambda: present(rig.newest).guard_result.level == "torque_off", "torque off")
     wait_for(lambda: person.reads("Torque is off", "Resume"), "the words")
     resumed(rig, person)
 

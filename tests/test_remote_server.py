@@ -319,7 +319,7 @@ def test_looking_jogging_and_asking(rig: RobotClient, beat: Beat) -> None:
 def test_stop_and_resume(rig: RobotClient, beat: Beat) -> None:
     rig.stop("finger")
     status = rig.status()
-    assert status["stopped"] == "finger" and status["level"] == "limp"
+    assert status["stopped"] == "finger" and status["level"] == "torque_off"
     assert not any(beat.ticks[-1].joints.torque)
     rig.resume()
     assert rig.status()["stopped"] == ""

@@ -241,7 +241,7 @@ def test_a_fault_that_ended_a_run_ends_nothing_here(tmp_path: Path) -> None:
             made.robot.body.bus._port.chain[7].fail("overload")  # type: ignore[attr-defined]
 
     ticks = recorded(path, 2.0, at=fail)
-    assert ticks[-1].guard_result.level == "limp"
+    assert ticks[-1].guard_result.level == "torque_off"
     recording = RunRecording(path)
     assert recording.end.stopped_by.startswith("fault")
     found = rerun(recording)

@@ -331,6 +331,12 @@ def test_any_float_comes_back(recorded: Recorded, odd: float) -> None:
     assert repr(back.dt_s) == repr(odd)
 
 
+def test_a_level_in_an_older_recording_has_its_present_name(recorded: Recorded) -> None:
+    values = moments.as_json(moments.flat(recorded.ticks[-1], None, 0.005, ()))
+    values["verdict"]["level"] = "limp"
+    assert moments.from_json(values, {}).tick.guard_result.level == "torque_off"
+
+
 @pytest.mark.parametrize("odd", [0.25, nan, -inf])
 def test_any_percept_comes_back(odd: float) -> None:
     face = Face(3, (odd, 0.0, 1.0), (0.0,) * 3, ((1.0, 0.0, 0.0),) * 3, ((odd,) * 3,) * 8, 0.5)

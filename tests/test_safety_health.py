@@ -223,7 +223,7 @@ def test_a_latched_fault_is_limp_with_its_words(torque: dict[str, bool]) -> None
     world = World()
     for _ in range(80):
         verdict = world.tick(0.5, stray=0.1, fault="overload and input voltage", **torque)
-        assert verdict.level == "limp"
+        assert verdict.level == "torque_off"
         assert verdict.reasons == (f"{NAME}: overload and input voltage",)
     assert verdict.command_rad[JOINT] == pytest.approx(0.1)
 
@@ -241,7 +241,7 @@ def test_what_still_moves_with_a_fault_moves_slowly_and_the_others_as_they_shoul
     world = World()
     for _ in range(100):
         verdict = world.tick(0.5, fault="input voltage", torque=True)
-        assert verdict.level == "limp" and reason(verdict) == "input voltage"
+        assert verdict.level == "torque_off" and reason(verdict) == "input voltage"
     assert 0.0 < world.speeds().max() <= radians(60.0) + 1e-9
     assert World().tick(0.5, fault="encoder", torque=True).command_rad[JOINT] == 0.0
 

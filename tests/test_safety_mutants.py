@@ -325,7 +325,7 @@ def limp(m: ModuleType) -> None:
         for desired in (0.0, 0.5, nan):
             bench = Bench(m)
             bench.tick(desired, fault="overload", torque=torque)
-            assert (bench.level, bench.why) == ("limp", "overload")
+            assert (bench.level, bench.why) == ("torque_off", "overload")
     bench = Bench(m)
     for _ in range(60):
         bench.tick(0.8, fault="input voltage", torque=True)

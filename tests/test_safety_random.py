@@ -76,7 +76,7 @@ class Trial:
         self.v = tuple([(b - a) / dt_s for a, b in zip(self.p, verdict.command_rad, strict=True)])
         self.p = verdict.command_rad
         self.after.append(self.p)
-        assert verdict.level == "limp" or not any(joints.fault)
+        assert verdict.level == "torque_off" or not any(joints.fault)
         assert (verdict.level == "ok") == (not verdict.reasons)
 
     def judge(self) -> int:

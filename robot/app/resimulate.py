@@ -183,7 +183,7 @@ class _Resimulator:
             self._compared.update(moment.tick, tick)
             if self._on_tick is not None:
                 self._on_tick(tick)
-            if tick.guard_result.level == "limp" and not tick.stopped and self._body is None:
+            if tick.guard_result.level == "torque_off" and not tick.stopped and self._body is None:
                 return f"fault: {'; '.join(tick.guard_result.critical_reasons)}"
         return None
 

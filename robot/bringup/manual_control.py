@@ -216,7 +216,7 @@ class ManualControl:
             notes.add(step.guard_result)
             events += self.body.bus.events()
             ended = done(step) or self._stopped()
-            ended = "limp" if step.guard_result.level == "limp" else ended
+            ended = "torque_off" if step.guard_result.level == "torque_off" else ended
             if ended is None and step.t_s - start_s >= longest_s:
                 ended = "not there in time"
             if ended is not None:

@@ -54,7 +54,7 @@ class Step(NamedTuple):
 class MoveResult(NamedTuple):
     """How a movement ended.
 
-    ended: "arrived", "held back" (by the guard), "not there in time", "limp", or the name
+    ended: "arrived", "held back" (by the guard), "not there in time", "torque_off", or the name
         of what stopped it
     level: the guard's last level; events: what the bus reported on the way
     last: the last exchange

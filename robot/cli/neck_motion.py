@@ -40,7 +40,7 @@ class JoggedNeck:
         axes = zip(NECK, head_rad, strict=True)
         goal = {name: degrees(a) for name, a in axes if name in there}
         moved = self._control.pose(goal)
-        if moved.ended == "limp":
+        if moved.ended == "torque_off":
             raise SetupError("the torque went off on the way: see gazerig doctor, then begin anew")
         self.rest(_SETTLE_S)
 

@@ -59,7 +59,7 @@ class JointFaults:
         if self._first_s is None:
             self._first_s = tick.t_s
         guard_result = tick.guard_result
-        held = guard_result.level in ("hold", "limp") and not tick.stopped
+        held = guard_result.level in ("hold", "torque_off") and not tick.stopped
         if not held and not self._running:
             return
         for joint, reason in _held(tick) if held else ():

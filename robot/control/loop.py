@@ -380,7 +380,7 @@ def run(
         except DriverError as error:
             return LoopCount(ticks, overruns, f"fault: {error}")
         watch(tick)
-        if tick.guard_result.level == "limp" and not tick.stopped:
+        if tick.guard_result.level == "torque_off" and not tick.stopped:
             return LoopCount(
                 ticks, overruns, f"fault: {'; '.join(tick.guard_result.critical_reasons)}"
             )

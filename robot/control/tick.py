@@ -38,4 +38,6 @@ def at_rest(
     """Record that nothing is sent, as a user stopped the robot."""
     reason = f"all: stopped ({why})"
     each = ("stopped",) * len(names)
-    return GuardResult(joints.position_rad, "limp", (reason,), desired_rad, each, (reason,), names)
+    return GuardResult(
+        joints.position_rad, "torque_off", (reason,), desired_rad, each, (reason,), names
+    )

@@ -61,9 +61,9 @@ def lead_words(tick: Tick) -> str:
 def guard_text(guard_result: GuardResult) -> str:
     """Return what the guard did to the desired angles, e.g. "limited (neck_yaw: too fast, +2)"."""
     if not guard_result.reasons:
-        return guard_result.level
+        return guard_result.level.replace("_", " ")
     more = f", +{len(guard_result.reasons) - 1}" if len(guard_result.reasons) > 1 else ""
-    return f"{guard_result.level} ({guard_result.reasons[0]}{more})"
+    return f"{guard_result.level.replace('_', ' ')} ({guard_result.reasons[0]}{more})"
 
 
 def health_words(health: BusHealth) -> str:

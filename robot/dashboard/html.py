@@ -11,7 +11,7 @@ PALE_BLUE = "#74b0e4"
 INK = "#343a40"
 
 PHASES = {"fixate": GREEN, "saccade": ORANGE, "pursue": BLUE, "blink": GREY}
-LEVELS = {"ok": GREEN, "limited": AMBER, "hold": ORANGE, "limp": RED, "stopped": RED}
+LEVELS = {"ok": GREEN, "limited": AMBER, "hold": ORANGE, "torque_off": RED, "stopped": RED}
 PARTS = {
     "DN": "#8d6e63",
     "FL": "#9c36b5",

@@ -41,7 +41,7 @@ _TRAIL_S = 0.0095
 """Joints are shown 100 times a second; a little less than 10 ms, for rounding's sake."""
 _TIMING_S = 0.5
 _LOWER_LIDS = frozenset(("left_lower_lid", "right_lower_lid"))
-_GRAVITY: dict[Level, int] = {"ok": 0, "limited": 1, "hold": 2, "limp": 3}
+_GRAVITY: dict[Level, int] = {"ok": 0, "limited": 1, "hold": 2, "torque_off": 3}
 
 
 class ShownRig(NamedTuple):

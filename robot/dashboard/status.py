@@ -51,8 +51,8 @@ def _guard(snapshot: Snapshot) -> str:
     if snapshot.stopped:
         return _banner(f"STOPPED: {snapshot.stopped}; torque is off", (), RED)
     colour = LEVELS[snapshot.level]
-    if snapshot.level in ("hold", "limp"):
-        return _banner(f"guard: {snapshot.level}", snapshot.reasons, colour)
+    if snapshot.level in ("hold", "torque_off"):
+        return _banner("guard: " + snapshot.level.replace("_", " "), snapshot.reasons, colour)
     return (
         f"<div style='display:flex;height:1.7em'>{pill(f'guard: {snapshot.level}', colour)}"
         f"<span style='color:{AMBER};min-width:0'>{_one_line(drawn_together(snapshot.reasons))}"

@@ -37,7 +37,7 @@ def in_order(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(name for name in JOINTS if name in there)
 
 
-Level = Literal["ok", "limited", "hold", "limp"]
+Level = Literal["ok", "limited", "hold", "torque_off"]
 
 
 class JointState(NamedTuple):
@@ -87,7 +87,8 @@ class GuardResult(NamedTuple):
     """What the guard let through.
 
     command_rad: permitted joint angles
-    level: ok, limited (changed), hold (neck or all stand still), limp (torque must go)
+    level: ok, limited (changed), hold (neck or all stand still), torque_off (torque must be
+        switched off)
     reasons: "joint: reason" for every joint that was changed, empty when ok
     desired_rad: what was asked for
     why: one reason a joint, "" where it was not changed; empty when ok

@@ -30,7 +30,7 @@ RECALL_S = 10.0
 
 _CLOSELY_S, _THINNED = 1.5, 2
 _MOST_EVENTS = 1000  # with the joints some 150 kB: they fit in one message
-_GRAVE = ("hold", "limp")
+_GRAVE = ("hold", "torque_off")
 _TELL_EVERY = 50
 
 

@@ -73,7 +73,10 @@ _FORMER = {
     "pull": "salience", "pulls": "saliences", "slide": "translation", "loom": "looming",
     "spin": "rotation", "interest": "habituation",
 }  # fmt: skip
-"""Fields of a target in recordings of before -> their names now."""
+"""Fields of a target in older recordings -> their present names."""
+
+_FORMER_LEVELS = {"limp": "torque_off"}
+"""Guard levels in older recordings -> their present names."""
 
 _HEARD: dict[str, type[BodyRecord]] = {
     "engaged": TorqueEnabled,
@@ -183,6 +186,7 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> TickRecord:
     number = data["percept"]
     desired = tuple(data["wish_rad"])
     guard_result = _from_file(data["verdict"])
+    guard_result["level"] = _FORMER_LEVELS.get(guard_result["level"], guard_result["level"])
     if guard_result["desired_rad"] is None:
         guard_result["desired_rad"] = desired
     guard_result.setdefault("joints", _ONCE_ALL)

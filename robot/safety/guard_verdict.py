@@ -2,7 +2,7 @@
 
 from gazerig.robot.model.types import GuardResult, JointAngles, Level
 
-_LEVELS: tuple[Level, ...] = ("ok", "limited", "hold", "limp")
+_LEVELS: tuple[Level, ...] = ("ok", "limited", "hold", "torque_off")
 
 
 def standstill(
@@ -25,7 +25,7 @@ def verdict(
     Args:
         command: what is sent, rad.
         desired_rad: what was asked for.
-        short: how bad it is, 1 (limited) to 3 (limp), and why, by the number of every joint
+        short: how bad it is, 1 (limited) to 3 (torque_off), and why, by the number of every joint
             that falls short.
         joints: their names.
     """
