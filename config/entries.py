@@ -32,7 +32,7 @@ class ConfigFault:
 
     line, column: from 1, None where the file could not be read at all
     key: dotted key path, list items counted from 0; value: what stands there, shortened
-    rule: what is wrong, and the cure
+    rule: what is wrong, and the remedy
     """
 
     file: str

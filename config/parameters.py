@@ -157,7 +157,7 @@ def _judged(rig: Rig, changes: Mapping[str, Value]) -> Rig | None:
 
 
 def _weighed(rig: Rig, changes: Mapping[str, Value]) -> Rig:
-    """Return the changed rig, or raise every fault; all is checked anew."""
+    """Return the changed rig, or raise every fault; all is checked again."""
     data, faults = plain(rig), []
     for key, value in changes.items():
         faults += _put(data, key, _frozen(value))

@@ -55,7 +55,7 @@ class SaveResult:
 def save_rig(path: Path | str, changes: Mapping[str, Value], now: datetime) -> SaveResult:
     """Write values into a rig file: ``save_rig("my.yaml", {"loop.rate_hz": 100.0}, now)``.
 
-    path: the file; the name of a shipped rig is understood too, to be refused with the cure
+    path: the file; the name of a shipped rig is understood too, to be refused with the remedy
 
     Raises:
         gazerig.config.load.ConfigError: see ``save``.

@@ -1,7 +1,7 @@
 """Changing values inside YAML text; every other byte stays as it is.
 
 The text is parsed only to learn where each value stands. Comments, order, indentation,
-quotes, anchors and line ends survive because nobody writes them anew.
+quotes, anchors and line ends survive because nobody writes them again.
 """
 
 import json
@@ -29,7 +29,7 @@ _NO_TEXT = {"null", "true", "false", "yes", "no", "on", "off", "y", "n"}
 
 
 class EditRefused(ValueError):
-    """A value cannot be changed in place; the message says which one, why, and the cure."""
+    """A value cannot be changed in place; the message says which one, why, and the remedy."""
 
 
 class _Edit(NamedTuple):

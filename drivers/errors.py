@@ -2,7 +2,7 @@
 
 
 class DriverError(Exception):
-    """Base; the message is one line that names the thing and the cure."""
+    """Base; the message is one line that names the thing and the remedy."""
 
 
 class SetupError(DriverError):

@@ -44,7 +44,7 @@ class HostLateness:
         return self._last_s >= begin_s
 
     def forget(self) -> None:
-        """Begin to count anew."""
+        """Begin to count again."""
         self._late.clear()
 
     def busy(self, now_s: float) -> int:

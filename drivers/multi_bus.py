@@ -39,7 +39,7 @@ class _PollTimer:
         return now_s >= self._due_s
 
     def update(self, feedback: Feedback, now_s: float) -> None:
-        """Note what it gave."""
+        """Record what it gave."""
         if len(feedback.missing) < len(feedback.at_s):
             self._in_vain = 0
             return

@@ -3,7 +3,7 @@
 A check over the bytes of an answer lets some damaged ones pass: a sum of one byte one in
 256, a CRC of two bytes one in 65,536. Between two answers a joint moves no farther than its
 motor can turn it, so a position farther away is not given as fresh. A joint that really is
-elsewhere - pushed by hand, restarted, counted anew by a turn - says so again and again, and
+elsewhere - pushed by hand, restarted, counted again by a turn - says so again and again, and
 is believed then.
 """
 
@@ -55,7 +55,7 @@ class Plausibility:
         self._whole_s = float("nan")
 
     def place(self, slot: int, position: int, at_s: float) -> None:
-        """Note where a servo was found by other means than its cyclic answer."""
+        """Record where a servo was found by other means than its cyclic answer."""
         last = self._last = list(self._last)
         if not isnan(self._whole_s):
             self._at_s = [self._whole_s] * len(last)
@@ -99,7 +99,7 @@ class Plausibility:
     # --- a line on which answers have been damaged of late
 
     def damaged(self, at_s: float) -> None:
-        """Note that an answer arrived damaged, or was not plausible."""
+        """Record that an answer arrived damaged, or was not plausible."""
         self._damaged_s = at_s
 
     def disturbed(self, now_s: float) -> bool:

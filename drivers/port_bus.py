@@ -42,7 +42,7 @@ class BusSupervisor(Protocol):
 class PortBus(ABC):
     """The servos behind one port; part of an implementation of gazerig.drivers.types.ServoBus.
 
-    A bus makes its parts before any of these methods is called; it may make them anew.
+    A bus makes its parts before any of these methods is called; it may make them again.
 
     holding, mute: what is said of a servo whose torque is not off, or that does not confirm it
     """
@@ -129,7 +129,7 @@ class PortBus(ABC):
         self._port.closePort()
 
     def _reachable(self, now_s: float) -> bool:
-        """Return whether the port is there, opened anew if need be, and no torque is due off.
+        """Return whether the port is there, opened again if need be, and no torque is due off.
 
         Raises:
             BusLost: it has been gone for longer than ``give_up_s``.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 
-Picture = NDArray[np.uint8]
+ImageArray = NDArray[np.uint8]
 """(height, width, 3) BGR."""
 Pixels = NDArray[np.float64]
 """(n, 2) x right, y down."""
@@ -42,7 +42,7 @@ class Feedback(NamedTuple):
 
     measured: False where the servo tells nothing and position and velocity are its goal
         moved by the speed it is known to have
-    rearmed: True in the first answer after the torque came on anew with the present
+    rearmed: True in the first answer after the torque came on again with the present
         position as goal (a restarted servo, a port that was unplugged), and in every answer
         of a servo on its slow way into its limits: whoever plans goals begins there
     missing: indices of the servos without a fresh answer, rising
@@ -163,7 +163,7 @@ class ServoBus(Protocol):
         ...
 
     def events(self) -> tuple[str, ...]:
-        """Return what happened since the last call, e.g. "servo 3 restarted: set up anew"."""
+        """Return what happened since the last call, e.g. "servo 3 restarted: set up again"."""
         ...
 
     def retune(self, setups: Sequence[ServoConfig]) -> None:
@@ -185,11 +185,11 @@ class ServoBus(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class DetectedFace:
-    """A face in a picture.
+    """A face in a image.
 
     box_px: x, y, width, height
     landmarks_px: (5, 2): right eye, left eye, nose tip, right and left mouth corner;
-        left and right are the owner's (the right eye lies left in the picture)
+        left and right are the owner's (the right eye lies left in the image)
     confidence: 0..1
     """
 
@@ -202,9 +202,9 @@ class DetectedFace:
 class MovingBlob:
     """Something that moves, with its place in the camera frame (x right, y down, z forward).
 
-    id: identity given by the detector, stable from picture to picture
+    id: identity given by the detector, stable from image to image
     kind: "hand", "thing", ...
-    spin_rad_s: rotation about the line of view, clockwise in the picture above 0
+    spin_rad_s: rotation about the line of view, clockwise in the image above 0
     loom_1_s: growth of its image in parts of its size; above 0 it comes nearer
 
     What follows is at its default where the detector does not measure it:
@@ -213,7 +213,7 @@ class MovingBlob:
         axes at the capture; None where only the places are known
     depth_known: the distance was measured; else it is assumed and depth_sd_m is large
     depth_sd_m, spin_sd_rad_s, loom_sd_1_s: standard deviations
-    box_px: x, y, width, height; centre_px: a point on it; area_px: how much of the picture
+    box_px: x, y, width, height; centre_px: a point on it; area_px: how much of the image
         it covers; flow_px_s: its mean motion, the camera's own taken out
     """
 
@@ -236,13 +236,13 @@ class MovingBlob:
 
 @dataclass(frozen=True, slots=True)
 class Detections:
-    """What was found in one picture.
+    """What was found in one image.
 
-    captured_s: host time of the exposure; number: counts pictures from 1
-    picture: the BGR picture itself where there is one (never written to after this)
-    depth_m: distances seen from where the picture was taken, where the camera measures
+    captured_s: host time of the exposure; number: counts images from 1
+    image: the BGR image itself where there is one (never written to after this)
+    depth_m: distances seen from where the image was taken, where the camera measures
         them: (height_px, width_px), NaN where unknown
-    lens: the lens where the camera tells it; such pictures are without distortion
+    lens: the lens where the camera tells it; such images are without distortion
     """
 
     captured_s: float
@@ -251,7 +251,7 @@ class Detections:
     height_px: int
     faces: tuple[DetectedFace, ...] = ()
     blobs: tuple[MovingBlob, ...] = ()
-    picture: Picture | None = None
+    image: ImageArray | None = None
     depth_m: Depth | None = None
     lens: Intrinsics | None = None
 
@@ -263,7 +263,7 @@ class Camera(Protocol):
         """Start looking.
 
         Raises:
-            CameraError: it cannot; the message names the thing and the cure.
+            CameraError: it cannot; the message names the thing and the remedy.
         """
         ...
 
@@ -285,8 +285,8 @@ class Camera(Protocol):
 
 
 class FaceDetector(Protocol):
-    """Finds faces in one picture; pure but for the network's own memory."""
+    """Finds faces in one image; pure but for the network's own memory."""
 
-    def find(self, picture: Picture) -> tuple[DetectedFace, ...]:
-        """Find faces, the largest first, in pixels of the picture given."""
+    def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
+        """Find faces, the largest first, in pixels of the image given."""
         ...

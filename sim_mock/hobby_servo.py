@@ -18,9 +18,9 @@ class HobbySpec(NamedTuple):
 
     channel: where it is plugged in
     start_steps: where its shaft is before the first pulse
-    speed_steps_s: its own top speed; 22000 is 60 deg in 0.12 s, as data sheets of SG90 tell
+    speed_steps_s: its own top speed; 22000 is 60 deg in 0.12 s, from data sheets of SG90
     lag_s: time constant of the last bit of the way [A]
-    dead_steps: it does not move for less, 5 us as data sheets of MG90S tell
+    dead_steps: it does not move for less, 5 us from data sheets of MG90S
     stop_low_steps, stop_high_steps: hard stops of the shaft or of what it moves
     min_steps, max_steps: the board clips targets of this channel so; from the factory
         992..2000 us

@@ -62,7 +62,7 @@ def test_lens_from_pictures_is_within_one_percent(seed: int) -> None:
     views = []
     for number in range(24):
         pose = held_pose(number + 5 * seed, camera.params, LENS, BOARD)
-        seen = BOARD.find(camera.picture(*pose))
+        seen = BOARD.find(camera.image(*pose))
         assert seen is not None
         # 0.3 px on top of what the drawn pictures' own noise and blur do.
         views.append(

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from present import present
 
-from gazerig.drivers.camera.frame_watchdog import FIRST_PICTURE_S, FrameWatchdog
+from gazerig.drivers.camera.frame_watchdog import FIRST_FRAME_S, FrameWatchdog
 from gazerig.drivers.camera.params import CameraRecoveryParams
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay
@@ -63,7 +63,7 @@ def test_what_was_found_comes_over_with_picture_depth_and_lens(recording):
     with pytest.raises(CameraError, match="runs already"):
         camera.open()
     numbers = set()
-    wait_for(lambda: camera.pictures >= 5)
+    wait_for(lambda: camera.frames >= 5)
     for _ in range(20):
         found = camera.latest(0.0)
         k = (present(found).number - 1) % 20
@@ -72,11 +72,11 @@ def test_what_was_found_comes_over_with_picture_depth_and_lens(recording):
             48,
             (),
         )
-        assert present(found).picture is not None and present(found).depth_m is not None
-        assert np.unique(present(present(found).picture)).tolist() == [10 * k]
+        assert present(found).image is not None and present(found).depth_m is not None
+        assert np.unique(present(present(found).image)).tolist() == [10 * k]
         assert np.unique(present(present(found).depth_m)).tolist() == [0.5 + k]
         assert (
-            not present(present(found).picture).flags.writeable
+            not present(present(found).image).flags.writeable
             and not present(present(found).depth_m).flags.writeable
         )
         assert present(found).lens == Intrinsics(60.0, 60.0, 32.0, 24.0)
@@ -119,7 +119,7 @@ def test_a_killed_process_is_started_again_and_the_rest_goes_on(recording):
     assert camera.latest(0.0) is not None, "the last picture stays, and its age tells"
     wait_for(lambda: present(camera.latest(0.0)).captured_s > present(before).captured_s + 0.2)
     after = camera.latest(0.0)
-    assert present(after).number > present(before).number and present(after).picture is not None
+    assert present(after).number > present(before).number and present(after).image is not None
     assert present(camera._process).pid != first
     lost, back = camera.events()
     assert lost.startswith("camera lost (the process that looks at pictures has ended)")
@@ -135,7 +135,7 @@ def test_a_process_that_hangs_is_told_of_and_started_again(recording):
     care = CameraRecoveryParams(silent_s=1.0, restart_s=2.0)
     camera = process(partial(CameraReplay, recording), care)
     camera.open()
-    wait_for(lambda: camera.pictures > 20)
+    wait_for(lambda: camera.frames > 20)
     first = present(camera._process).pid
     os.kill(present(first), signal.SIGSTOP)
     before = camera.latest(0.0)
@@ -171,7 +171,7 @@ def test_an_exception_in_the_process_is_named_and_it_is_started_again(recording)
     parts = CameraParts(partial(CameraReplay, recording), Fussy)
     camera = CameraProcess(parts, time.monotonic, QUICK)
     camera.open()
-    wait_for(lambda: camera._starts > 1 and camera.pictures > 11)
+    wait_for(lambda: camera._starts > 1 and camera.frames > 11)
     told = camera.events()
     assert "ZeroDivisionError" in told[0] and told[0].startswith("camera lost")
     assert camera.latest(0.0) is not None
@@ -191,11 +191,11 @@ def test_silence_is_judged_by_what_is_usual():
     care = CameraRecoveryParams(silent_s=1.0, restart_s=3.0)
     for period_s, lost_s, hung_s in ((0.03, 1.0, 3.0), (0.5, 2.5, 7.5), (2.0, 10.0, 30.0)):
         silence, now_s = FrameWatchdog(care, 0.0), 0.0
-        assert not silence.verdict(FIRST_PICTURE_S - 0.01)
-        assert silence.verdict(FIRST_PICTURE_S + 0.01) == "hung"
+        assert not silence.verdict(FIRST_FRAME_S - 0.01)
+        assert silence.verdict(FIRST_FRAME_S + 0.01) == "hung"
         for _ in range(10):
             now_s += period_s
-            silence.record_picture(now_s)
+            silence.record_frame(now_s)
         assert silence.verdict(now_s + lost_s - 0.01) == ""
         assert silence.verdict(now_s + lost_s + 0.01) == "lost"
         assert silence.verdict(now_s + hung_s + 0.01) == "hung"

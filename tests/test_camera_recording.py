@@ -60,7 +60,7 @@ def file(tmp_path):
 
 
 def assert_same(found: Shot, wanted: Shot) -> None:
-    assert np.array_equal(found.picture, wanted.picture)
+    assert np.array_equal(found.image, wanted.image)
     assert np.array_equal(present(found.depth_m), present(wanted.depth_m), equal_nan=True)
     assert present(found.depth_m).dtype == np.float32
     assert found.lens == wanted.lens
@@ -76,7 +76,7 @@ def test_pictures_depth_lens_faces_and_times_come_out_exactly(file):
     assert recording.times_s == pytest.approx([t - TIMES_S[0] for t in TIMES_S], abs=1e-9)
     for k in range(len(TIMES_S)):
         assert_same(recording.shot(k), shot(k))
-        assert not recording.shot(k).picture.flags.writeable
+        assert not recording.shot(k).image.flags.writeable
     recording.close()
 
 
@@ -105,7 +105,7 @@ def test_jpeg_is_smaller_and_nearly_the_same(tmp_path):
     exact = write(tmp_path / "a.mcap", shots)
     small = write(tmp_path / "b.mcap", shots, jpeg_quality=90)
     assert small.stat().st_size < 0.3 * exact.stat().st_size
-    difference = Recording(small).shot(0).picture.astype(int) - smooth
+    difference = Recording(small).shot(0).image.astype(int) - smooth
     assert np.abs(difference).mean() < 2.0
 
 
@@ -367,7 +367,7 @@ def test_killed_program_leaves_what_it_wrote(tmp_path):
     child.wait()
     recording = Recording(path)
     assert len(recording.times_s) >= last + 1  # every picture that was written is there
-    assert int(recording.shot(last).picture[0, 0, 0]) == last
+    assert int(recording.shot(last).image[0, 0, 0]) == last
     assert "was not closed" in recording.note
 
 

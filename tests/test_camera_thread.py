@@ -92,10 +92,10 @@ def camera(source):
 
 
 def feed(source: Source, camera: CameraThread, count: int) -> None:
-    goal = camera.pictures + count
+    goal = camera.frames + count
     for _ in range(count):
         source.fed.release()
-    wait_for(lambda: camera.pictures == goal and present(camera.latest(0.0)).number == goal)
+    wait_for(lambda: camera.frames == goal and present(camera.latest(0.0)).number == goal)
 
 
 def test_nothing_before_the_first_picture(camera):
@@ -107,7 +107,7 @@ def test_slot_holds_the_newest_find(source, camera):
     first = camera.latest(0.0)
     assert (first.number, first.captured_s, first.faces) == (1, 1.0, ())
     assert (first.width_px, first.height_px) == (32, 24)
-    assert first.picture.shape == (24, 32, 3)
+    assert first.image.shape == (24, 32, 3)
     feed(source, camera, 1)
     assert camera.latest(0.0).faces == (FACE,)
     assert camera.latest(0.0) is camera.latest(99.0)
@@ -116,7 +116,7 @@ def test_slot_holds_the_newest_find(source, camera):
 
 def test_pictures_and_pictures_with_a_face_are_counted(source, camera):
     feed(source, camera, 7)
-    assert (camera.pictures, camera.pictures_with_face) == (7, 3)
+    assert (camera.frames, camera.frames_with_face) == (7, 3)
 
 
 def test_camera_that_cannot_be_opened_says_so_at_once():
@@ -165,7 +165,7 @@ def test_open_again_starts_anew(source, camera):
         camera.open()
     camera.close()
     camera.open()
-    assert (camera.latest(0.0), camera.pictures, camera.pictures_with_face) == (None, 0, 0)
+    assert (camera.latest(0.0), camera.frames, camera.frames_with_face) == (None, 0, 0)
     feed(source, camera, 1)
     assert source.opened == 2
 
@@ -326,13 +326,13 @@ def test_slow_detector_skips_pictures_and_queues_none(tmp_path):
     )
     camera.open()
     free.release()
-    wait_for(lambda: camera.pictures == 1)
+    wait_for(lambda: camera.frames == 1)
     clock[0] = 0.15  # picture 2 is due and taken; the detector is busy with it
     free.release()
-    wait_for(lambda: camera.pictures == 2)
+    wait_for(lambda: camera.frames == 2)
     clock[0] = 0.95
     free.release(2)
     wait_for(lambda: present(camera.latest(0.0)).number >= 10)
-    assert camera.pictures <= 4
+    assert camera.frames <= 4
     free.release(100)
     camera.close()

@@ -30,7 +30,7 @@ def test_film_is_recorded_and_can_be_read(film, tmp_path):
     recording = Recording(out)
     assert recording.note == ""
     assert f"{len(recording.times_s)} pictures (" in done.output
-    assert recording.shot(0).picture.shape == (48, 64, 3)
+    assert recording.shot(0).image.shape == (48, 64, 3)
 
 
 def test_existing_file_is_kept(film, tmp_path):

@@ -11,7 +11,7 @@ from skimage import data
 
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.errors import ModelFileError
-from gazerig.drivers.types import DetectedFace, FaceDetector, Picture, Pixels
+from gazerig.drivers.types import DetectedFace, FaceDetector, ImageArray, Pixels
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.mtcnn import package_folder, read_model
 from gazerig.drivers.vision.face.params import FaceDetectorParams
@@ -45,11 +45,11 @@ def yunet() -> FaceDetector:
 
 
 @pytest.fixture(scope="module")
-def astronaut() -> Picture:
+def astronaut() -> ImageArray:
     return cv2.cvtColor(data.astronaut(), cv2.COLOR_RGB2BGR)
 
 
-def scene(photo: Picture, size: tuple[int, int], eyes_px: float, roll_deg: float = 0.0):
+def scene(photo: ImageArray, size: tuple[int, int], eyes_px: float, roll_deg: float = 0.0):
     """Put the photo's face into the middle of a picture: the picture and the true landmarks."""
     scale = eyes_px / ASTRONAUT_EYES_PX
     centre = ASTRONAUT_PX.mean(axis=0)
@@ -66,7 +66,7 @@ def error_of_eyes(face: DetectedFace, truth: Pixels) -> float:
     return float(np.linalg.norm(face.landmarks_px - truth, axis=1).mean() / eyes)
 
 
-def cartoon(centre: tuple[int, int], half_height: int, skin=(150, 180, 225)) -> Picture:
+def cartoon(centre: tuple[int, int], half_height: int, skin=(150, 180, 225)) -> ImageArray:
     """Draw a face of ellipses into a 320x240 picture."""
     picture = np.full((240, 320, 3), (160, 140, 120), np.uint8)
     x, y, h = *centre, half_height
@@ -186,7 +186,7 @@ def test_same_picture_same_numbers_whatever_came_before(astronaut):
         assert (face.box_px, face.confidence) == (first.box_px, first.confidence)
 
 
-def degenerate_pictures() -> dict[str, Picture]:
+def degenerate_pictures() -> dict[str, ImageArray]:
     return {
         "1x1": np.zeros((1, 1, 3), np.uint8),
         "no rows": np.zeros((0, 40, 3), np.uint8),
@@ -310,7 +310,7 @@ def test_yunet_is_deterministic_and_obeys_the_smallest_size(yunet, astronaut):
 def test_photo_from_a_file_is_found(mtcnn):
     video = VideoFile(PHOTO_FILE)
     video.open()
-    assert error_of_eyes(mtcnn.find(video.picture(1))[0], ASTRONAUT_PX) < 0.06
+    assert error_of_eyes(mtcnn.find(video.image(1))[0], ASTRONAUT_PX) < 0.06
 
 
 @needs_film
@@ -319,6 +319,6 @@ def test_film_shows_a_face_in_nearly_every_picture(request, kind):
     detector = request.getfixturevalue(kind)
     video = VideoFile(FILM_FILE)
     video.open()
-    found = [bool(detector.find(video.picture(number))) for number in range(1, 271, 6)]
+    found = [bool(detector.find(video.image(number))) for number in range(1, 271, 6)]
     video.close()
     assert np.mean(found) >= 0.95

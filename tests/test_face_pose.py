@@ -40,7 +40,7 @@ def angle_between(R: np.ndarray, S: np.ndarray) -> float:
     return atan2(sine, (np.trace(R.T @ S) - 1) / 2)
 
 
-def picture_of(R: np.ndarray, p: np.ndarray) -> np.ndarray:
+def image_of(R: np.ndarray, p: np.ndarray) -> np.ndarray:
     return project(LANDMARKS_FACE_M @ R.T + p, CAMERA)
 
 
@@ -61,7 +61,7 @@ def pose_of(landmarks_px: np.ndarray) -> tuple[FacePose, np.ndarray, np.ndarray]
 )
 def test_noiseless_pose_comes_back(yaw, pitch, roll, x, y, z_m):
     R, p = turned(radians(yaw), radians(pitch), radians(roll)), np.array([x, y, 1.0]) * z_m
-    pose, found_R, found_p = pose_of(picture_of(R, p))
+    pose, found_R, found_p = pose_of(image_of(R, p))
     # What is left is the belief that faces look here; it weighs more the smaller the face.
     far = z_m > 1.0
     assert degrees(angle_between(R, found_R)) < (9.0 if far else 4.0)
@@ -82,7 +82,7 @@ def errors_over_grid(eyes_px: float, noise_px: float) -> np.ndarray:
                 for aside in (0.0, 0.3):
                     R = turned(radians(yaw), radians(pitch), radians(roll))
                     p = np.array([aside * z_m, -0.2 * aside * z_m, z_m])
-                    seen = picture_of(R, p) + rng.normal(0.0, noise_px, (5, 2))
+                    seen = image_of(R, p) + rng.normal(0.0, noise_px, (5, 2))
                     _, found_R, found_p = pose_of(seen)
                     off = degrees(yaw_of(found_R) - yaw_of(R))
                     away = np.linalg.norm(found_p) / np.linalg.norm(p) - 1.0
@@ -120,18 +120,18 @@ def test_error_grows_with_the_noise_and_never_flips():
 
 def test_belief_draws_noisy_small_faces_towards_the_camera():
     R, p = turned(radians(35), 0.0, 0.0), np.array([0.0, 0.0, 6.0])  # eyes 5 px apart
-    _, found_R, _ = pose_of(picture_of(R, p))
+    _, found_R, _ = pose_of(image_of(R, p))
     assert radians(15) < yaw_of(found_R) < radians(34)
 
 
 @pytest.mark.parametrize("yaw_deg", [180, 150, 110, 89, -120, 80])
 def test_face_turned_away_is_no_face(yaw_deg):
     R = turned(radians(yaw_deg), 0.0, 0.0)
-    assert face_pose(picture_of(R, np.array([0.0, 0.0, 0.6])), CAMERA) is None
+    assert face_pose(image_of(R, np.array([0.0, 0.0, 0.6])), CAMERA) is None
 
 
 def test_mirrored_landmarks_are_no_face():
-    seen = picture_of(turned(0.2, 0.0, 0.0), np.array([0.0, 0.0, 0.6]))
+    seen = image_of(turned(0.2, 0.0, 0.0), np.array([0.0, 0.0, 0.6]))
     assert face_pose(seen, CAMERA) is not None
     assert face_pose(seen[[1, 0, 2, 4, 3]], CAMERA) is None
 
@@ -165,15 +165,15 @@ def test_any_points_give_none_or_finite_numbers(points, scale):
 
 def test_upside_down_face_is_found_upside_down():
     R, p = turned(0.1, 0.1, pi), np.array([0.0, 0.1, 0.5])
-    _, found_R, _ = pose_of(picture_of(R, p))
+    _, found_R, _ = pose_of(image_of(R, p))
     assert degrees(angle_between(R, found_R)) < 2.0
 
 
 def test_yaw_is_to_the_owners_left_which_is_the_pictures_right():
     p = np.array([0.0, 0.0, 0.6])
-    _, left_R, _ = pose_of(picture_of(turned(radians(20), 0, 0), p))
+    _, left_R, _ = pose_of(image_of(turned(radians(20), 0, 0), p))
     assert left_R[0, 0] > 0.25  # the outward axis leans to the camera's right
-    _, up_R, _ = pose_of(picture_of(turned(0, radians(20), 0), p))
+    _, up_R, _ = pose_of(image_of(turned(0, radians(20), 0), p))
     assert up_R[1, 0] < -0.25  # and upwards in the picture
 
 
@@ -204,11 +204,11 @@ def test_parts_lie_where_a_face_has_them():
 
 def test_parts_of_a_seen_face_appear_on_it():
     R, p = turned(radians(15), radians(-10), radians(8)), np.array([0.15, -0.1, 0.9])
-    pose, _, _ = pose_of(picture_of(R, p))
+    pose, _, _ = pose_of(image_of(R, p))
     truth = np.array([PARTS_FACE_M[part] for part in PARTS]) @ R.T + p
     assert np.linalg.norm(face_parts(pose) - truth, axis=1).max() < 0.01
     right_eye_px = project(face_parts(pose), CAMERA)[PARTS.index("RE")]
-    assert np.linalg.norm(right_eye_px - picture_of(R, p)[0]) < 0.5
+    assert np.linalg.norm(right_eye_px - image_of(R, p)[0]) < 0.5
 
 
 # ---- camera -----------------------------------------------------------------------------

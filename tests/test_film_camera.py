@@ -34,7 +34,7 @@ class Film:
     def due_s(self, number: int) -> float:
         return (number - 1) / RATE_HZ
 
-    def picture(self, number: int):
+    def image(self, number: int):
         if not self.is_open:
             raise CameraError("the film is not open")
         assert not self.read or number > self.read[-1]
@@ -42,7 +42,7 @@ class Film:
         return np.full((12, 16, 3), number % 256, np.uint8)
 
     def shot(self, number: int) -> Shot:
-        return Shot(self.due_s(number), number, self.picture(number))
+        return Shot(self.due_s(number), number, self.image(number))
 
     def events(self) -> tuple[str, ...]:
         return ("the film is a fake",)
@@ -91,19 +91,19 @@ def test_picture_comes_through_after_the_delay(camera):
     second = camera.latest(0.101)
     assert (second.number, second.captured_s) == (2, 0.04)
     assert (second.width_px, second.height_px) == (16, 12)
-    assert int(second.picture[0, 0, 0]) == 2
+    assert int(second.image[0, 0, 0]) == 2
 
 
 def test_jump_looks_at_every_picture_in_order(camera, film):
     assert camera.latest(1.07).number == 26
     assert film.read == list(range(1, 27))
-    assert (camera.pictures, camera.pictures_with_face) == (26, 8)
+    assert (camera.frames, camera.frames_with_face) == (26, 8)
 
 
 def test_no_picture_is_looked_at_twice(camera, detector):
     for k in range(400):
         camera.latest(k * 0.005)
-    assert detector.looks == camera.pictures == 49
+    assert detector.looks == camera.frames == 49
 
 
 def test_counts_do_not_depend_on_the_steps(film, detector):
@@ -114,7 +114,7 @@ def test_counts_do_not_depend_on_the_steps(film, detector):
         for t_s in np.arange(0.0, 4.2, step_s):
             camera.latest(float(t_s))
         camera.latest(4.2)
-        counts.add((camera.pictures, camera.pictures_with_face))
+        counts.add((camera.frames, camera.frames_with_face))
     assert counts == {(105, 35)}
 
 
@@ -134,7 +134,7 @@ def test_film_may_start_later(film, detector):
 def test_open_starts_anew(camera, film):
     camera.latest(1.0)
     camera.open()
-    assert (camera.pictures, camera.pictures_with_face) == (0, 0)
+    assert (camera.frames, camera.frames_with_face) == (0, 0)
     assert camera.latest(0.0) is None
     assert camera.latest(0.06).number == 1
 
@@ -154,7 +154,7 @@ def test_two_runs_over_a_real_film_give_the_same_numbers():
         camera.open()
         seen = [camera.latest(t_s) for t_s in (0.3, 0.31, 0.5)]
         camera.close()
-        assert camera.pictures == 11
+        assert camera.frames == 11
         return [
             (
                 present(found).captured_s,

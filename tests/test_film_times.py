@@ -63,13 +63,13 @@ def test_uneven_film_runs_by_the_times_of_its_pictures(folder):
     for k, tick in enumerate(UNEVEN):
         assert film.due_s(k + 1) == pytest.approx(tick / 30.0, abs=0.002)
         assert film.number_at(film.due_s(k + 1)) == k + 1
-        assert round(float(film.picture(k + 1).mean()) / 12.0) == k
+        assert round(float(film.image(k + 1).mean()) / 12.0) == k
     (told,) = film.events()
     assert told.startswith("uneven.mkv: the film's pictures come unevenly")
     assert film.events() == ()
     # The last picture stays for the usual time; then the film begins anew.
     assert film.due_s(21) == pytest.approx(44 / 30.0, abs=0.003)
-    assert round(float(film.picture(21).mean()) / 12.0) == 0
+    assert round(float(film.image(21).mean()) / 12.0) == 0
 
 
 def test_film_that_lies_about_its_rate_is_noticed(folder):
@@ -140,8 +140,8 @@ def test_odd_stills_become_plain_pictures(tmp_path, pixels):
         assert found.faces == ()
         assert (found.height_px, found.width_px) == pixels.shape[:2]
         assert (
-            present(found.picture).shape == (*pixels.shape[:2], 3)
-            and present(found.picture).dtype == np.uint8
+            present(found.image).shape == (*pixels.shape[:2], 3)
+            and present(found.image).dtype == np.uint8
         )
 
 
@@ -163,7 +163,7 @@ def test_small_film_of_grey_is_a_film(tmp_path):
     for k in range(12):
         writer.write(np.full((16, 16), 20 * k, np.uint8))
     writer.release()
-    assert opened(tmp_path / "g.avi").picture(1).shape == (16, 16, 3)
+    assert opened(tmp_path / "g.avi").image(1).shape == (16, 16, 3)
 
 
 def test_empty_file_and_file_of_text_are_named(tmp_path):

@@ -81,7 +81,7 @@ def test_mount_from_pictures_is_within_3_mm_and_0_3_deg(seed: int) -> None:
     views = []
     for angles in planned(scene):
         scene.head_rad = angles
-        seen = BOARD.find(scene.look(0.0).picture)
+        seen = BOARD.find(scene.look(0.0).image)
         assert seen is not None
         # 0.3 px on top of what the drawn pictures' own noise and blur do.
         noisy = seen.corners_px + rng.normal(0.0, 0.3, seen.corners_px.shape)

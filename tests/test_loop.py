@@ -196,7 +196,7 @@ def test_a_picture_is_placed_where_the_head_was_when_it_was_taken() -> None:
                 break
     assert np.degrees(max(errors)) < 0.4  # without the history it would be 6
     assert max(speeds) < 0.1
-    assert perception.pictures == perception.pictures_with_face == len(errors)
+    assert perception.frames == perception.frames_with_face == len(errors)
 
 
 @pytest.mark.parametrize("turn_deg", [-30.0, 0.0, 30.0])
@@ -227,7 +227,7 @@ def test_the_same_picture_is_seen_once() -> None:
     assert perception.see(None, poses) is None
     first = perception.see(seen_from(0.0, 0.0, 1), poses)
     assert perception.see(seen_from(0.0, 0.0, 1), poses) is first
-    assert perception.pictures == 1
+    assert perception.frames == 1
 
 
 def test_the_visitor_comes_moves_waves_leaves_and_comes_back() -> None:

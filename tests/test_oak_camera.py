@@ -141,13 +141,13 @@ def test_colour_depth_and_times_of_one_instant(film):
     shots = take(opened(host_nodes(film)), 12)
     assert [shot.number for shot in shots] == list(range(1, 13))
     for shot in shots:
-        assert shot.picture.shape == (240, 320, 3)
-        assert not shot.picture.flags.writeable
+        assert shot.image.shape == (240, 320, 3)
+        assert not shot.image.flags.writeable
         assert shot.depth_m.shape == (240, 320) and shot.depth_m.dtype == np.float32
         assert np.isnan(shot.depth_m[:, :160]).all()
         # Depth and picture are of the same instant: both carry the film's number.
         number = round(float(shot.depth_m[0, 319]) * 1000.0) - 1000
-        shade = round(float(shot.picture.mean()) / 8.0)
+        shade = round(float(shot.image.mean()) / 8.0)
         assert abs(shade - number % LENGTH) <= 1
         assert shot.lens is None and shot.faces is None
 

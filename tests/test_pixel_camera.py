@@ -9,7 +9,7 @@ import pytest
 from stand_in import StandIn
 
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
-from gazerig.drivers.types import DetectedFace, Picture
+from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.gaze.angles import angle_between, rotation, sub
@@ -53,7 +53,7 @@ def mtcnn() -> MtcnnDetector:
 class Nobody:
     """A detector that finds nothing."""
 
-    def find(self, picture: Picture) -> tuple[DetectedFace, ...]:
+    def find(self, picture: ImageArray) -> tuple[DetectedFace, ...]:
         return ()
 
 
@@ -113,7 +113,7 @@ def test_a_point_of_the_world_is_drawn_where_a_camera_sees_it(yaw_deg: float) ->
     right, down = np.array((s, -c, 0.0)) * 0.2, np.array((0.0, 0.0, -0.2))
     corner = middle - 0.5 * (right + down)
     canvas.sheet(TexturedQuad(tuple(corner), tuple(right), tuple(down), red))
-    y, x = np.nonzero(canvas.picture[:, :, 2] > 127)
+    y, x = np.nonzero(canvas.image[:, :, 2] > 127)
     expected = project(canvas.seen(middle), LENS)[0]
     assert (x.mean(), y.mean()) == pytest.approx(tuple(expected), abs=0.6)
     seen_m = canvas.depth_m[round(expected[1]), round(expected[0])]
@@ -127,7 +127,7 @@ def test_the_room_fills_every_picture_and_has_something_on_its_walls(yaw_deg: fl
     draw_room(canvas)
     assert np.isfinite(canvas.depth_m).all() and canvas.depth_m.min() > 0.5
     assert canvas.depth_m.max() < 8.0
-    assert canvas.picture.std() > 10.0 and (canvas.picture.max(axis=2) > 0).all()
+    assert canvas.image.std() > 10.0 and (canvas.image.max(axis=2) > 0).all()
 
 
 def test_the_room_stays_where_it_is_when_the_head_turns() -> None:
@@ -139,8 +139,8 @@ def test_the_room_stays_where_it_is_when_the_head_turns() -> None:
     rays = np.stack(((x - LENS.cx_px) / LENS.fx_px, (y - LENS.cy_px) / LENS.fy_px, 1 + 0 * x), -1)
     directions = rays.reshape(-1, 3) @ before.R_world_camera.T
     there = np.rint(project(directions @ after.R_world_camera, LENS)).astype(int)
-    was = before.picture[y.ravel(), x.ravel()].astype(float)
-    now = after.picture[there[:, 1], there[:, 0]].astype(float)
+    was = before.image[y.ravel(), x.ravel()].astype(float)
+    now = after.image[there[:, 1], there[:, 0]].astype(float)
     assert np.abs(was - now).mean() < 4.0 < 10.0 < np.abs(was - was[::-1]).mean()
 
 
@@ -152,7 +152,7 @@ def test_whoever_is_behind_or_in_the_lens_is_not_drawn() -> None:
     assert np.isfinite(canvas.depth_m).mean() < 0.5  # at most a shoulder
     empty = canvas_at()
     draw_person(empty, ScenePerson((-1.0, 0.0, 0.0), (0.0, 0.0), None), 0)
-    assert not empty.picture.any()
+    assert not empty.image.any()
 
 
 def test_the_nearer_covers_the_farther() -> None:
@@ -163,7 +163,7 @@ def test_the_nearer_covers_the_farther() -> None:
     assert canvas.depth_m[200 - 55, 320] == pytest.approx(2.0, abs=0.02)
 
 
-def face_drawn(away_m: float, roll_deg: float, who: int) -> tuple[Picture, Canvas, np.ndarray]:
+def face_drawn(away_m: float, roll_deg: float, who: int) -> tuple[ImageArray, Canvas, np.ndarray]:
     """Draw a face that looks at the camera, rolled, before the room; with its true landmarks."""
     canvas = canvas_at()
     draw_room(canvas)
@@ -171,8 +171,8 @@ def face_drawn(away_m: float, roll_deg: float, who: int) -> tuple[Picture, Canva
     R = np.array(rotation((np.pi, 0.0, radians(roll_deg))))
     draw_body(canvas, place, PERSON_COLOURS[who], who)
     draw_head(canvas, place, R, PERSON_COLOURS[who])
-    noise = np.random.default_rng(0).normal(0.0, 3.0, canvas.picture.shape)
-    picture = np.clip(canvas.picture + noise, 0.0, 255.0).astype(np.uint8)
+    noise = np.random.default_rng(0).normal(0.0, 3.0, canvas.image.shape)
+    picture = np.clip(canvas.image + noise, 0.0, 255.0).astype(np.uint8)
     return picture, canvas, project(canvas.seen(LANDMARKS_FACE_M @ R.T + place), LENS)
 
 
@@ -201,7 +201,7 @@ def test_nobody_is_found_in_the_empty_room(mtcnn: MtcnnDetector) -> None:
     for yaw_deg in (-50.0, 0.0, 50.0, 160.0):
         canvas = canvas_at((radians(yaw_deg), 0.0, 0.0))
         draw_room(canvas)
-        assert mtcnn.find(canvas.picture) == ()
+        assert mtcnn.find(canvas.image) == ()
 
 
 def test_pictures_come_late_at_their_rate_and_a_late_look_skips_some() -> None:
@@ -224,8 +224,8 @@ def test_the_same_dice_give_the_same_bytes() -> None:
 
     def shot(seed: int) -> bytes:
         found = camera(Still((1.0, 0.0, 0.0)), Nobody(), seed=seed, latency_ms=0.0).latest(0.0)
-        assert found is not None and found.picture is not None
-        return found.picture.tobytes()
+        assert found is not None and found.image is not None
+        return found.image.tobytes()
 
     assert shot(1) == shot(1) != shot(2)
 
@@ -260,8 +260,8 @@ def test_a_turn_during_the_exposure_smears_along_the_turn() -> None:
         made = camera(Still(), Nobody(), head, latency_ms=0.0, noise_grey=0.0, exposure_ms=10.0)
         for now_s in np.arange(0.0, 0.04, 0.005).tolist():
             found = made.latest(now_s)
-        assert found is not None and found.picture is not None and found.number == 2
-        return float(np.abs(np.diff(found.picture[60:300].astype(float), axis=1)).mean())
+        assert found is not None and found.image is not None and found.number == 2
+        return float(np.abs(np.diff(found.image[60:300].astype(float), axis=1)).mean())
 
     assert sharpness(200.0) < 0.6 * sharpness(0.0)
 
@@ -280,7 +280,7 @@ def test_what_finds_motion_gets_the_picture_with_its_pose_and_depth() -> None:
         made.latest(now_s)
     assert [shot.number for shot in shots] == list(range(1, 7))
     assert shots[0].R_world_camera == MOUNT.pose(AHEAD, (0.0, 0.0, 0.0))[0]
-    assert shots[0].depth_m is not None and shots[0].picture.shape == (40, 64, 3)
+    assert shots[0].depth_m is not None and shots[0].image.shape == (40, 64, 3)
 
 
 class Neck(StandIn):
@@ -307,9 +307,9 @@ def watched(mtcnn: MtcnnDetector, scene: Still, seconds: float, placed_s: float 
         t = tick / 200
         poses.remember(t - placed_s, (0.3 * np.sin(2.5 * t), 0.05, 0.0))
         found = made.latest(t)
-        number = perception.pictures
+        number = perception.frames
         percept = perception.see(found, poses)
-        if percept is not None and perception.pictures > number:
+        if percept is not None and perception.frames > number:
             percepts.append(percept)
     return percepts
 

@@ -141,8 +141,8 @@ def test_a_snapshot_is_what_the_live_page_would_have_shown(
 
 
 def test_pictures_come_with_their_time(frames: SnapshotIndex) -> None:
-    assert frames.picture_at(0.9) is None
-    found = [frames.picture(present(frames.picture_at(s))) for s in (1.0, 2.9, 3.1, 99.0)]
+    assert frames.frame_at(0.9) is None
+    found = [frames.picture(present(frames.frame_at(s))) for s in (1.0, 2.9, 3.1, 99.0)]
     assert found == [b"jpeg at 1", b"jpeg at 1", b"jpeg at 3", b"jpeg at 5"]
 
 

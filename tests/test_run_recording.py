@@ -108,9 +108,7 @@ def with_picture(tick: Tick, number: int) -> Tick:
     if number % 10:
         return tick
     picture = np.full((40, 60, 3), number % 250, np.uint8)
-    return tick._replace(
-        detections=Detections(tick.t_s - 0.03, number + 1, 60, 40, picture=picture)
-    )
+    return tick._replace(detections=Detections(tick.t_s - 0.03, number + 1, 60, 40, image=picture))
 
 
 def ordered(number: int, made: Assembly) -> None:
@@ -239,7 +237,7 @@ def test_a_picture_larger_than_a_message_arrives_whole(tmp_path: Path) -> None:
     recorder.open()
     made.robot.start(made.clock)
     noise = np.random.default_rng(0).integers(0, 255, (900, 1200, 3), np.uint8)
-    found = Detections(0.001, 1, 1200, 900, picture=noise)
+    found = Detections(0.001, 1, 1200, 900, image=noise)
     recorder.record(made.robot.tick(0.005, 0.005)._replace(detections=found))
     recorder.close("seconds")
     ((at_s, jpeg),) = RunRecording(path).pictures()

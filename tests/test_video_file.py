@@ -55,10 +55,10 @@ def test_film_states_its_rate(film):
 
 def test_picture_at_is_the_newest_due(film):
     for film_s, number in ((0.0, 1), (0.05, 1), (0.1, 2), (0.1999, 2), (0.2, 3), (1.95, 20)):
-        seen = film.picture_at(film_s)
+        seen = film.frame_at(film_s)
         assert seen.number == number
         assert seen.film_time_s == pytest.approx((number - 1) / RATE_HZ)
-        assert shade(seen.picture) == number - 1
+        assert shade(seen.image) == number - 1
 
 
 def test_every_due_time_belongs_to_its_own_picture(tmp_path):
@@ -70,37 +70,37 @@ def test_every_due_time_belongs_to_its_own_picture(tmp_path):
 
 def test_film_repeats_and_counts_on(film):
     numbers = [1, 20, 21, 25, 40, 41, 65]
-    assert [shade(film.picture(n)) for n in numbers] == [(n - 1) % LENGTH for n in numbers]
+    assert [shade(film.image(n)) for n in numbers] == [(n - 1) % LENGTH for n in numbers]
     assert film.due_s(41) == pytest.approx(4.0)
 
 
 def test_long_jump_lands_on_the_right_picture(film):
-    film.picture(3)
+    film.image(3)
     for number in (1_000_007, 1_000_008, 30_000_000_020):
-        assert shade(film.picture(number)) == (number - 1) % LENGTH
+        assert shade(film.image(number)) == (number - 1) % LENGTH
 
 
 def test_same_picture_may_be_asked_for_again_but_none_before(film):
-    first = film.picture_at(0.5)
-    assert film.picture_at(0.55).picture is first.picture
+    first = film.frame_at(0.5)
+    assert film.frame_at(0.55).image is first.image
     with pytest.raises(ValueError, match="forward"):
-        film.picture_at(0.3)
+        film.frame_at(0.3)
 
 
 @pytest.mark.parametrize("film_s", [-0.1, -5.0])
 def test_film_time_starts_at_zero(film, film_s):
     with pytest.raises(ValueError, match="picture -?[0-9]+ wanted"):
-        film.picture_at(film_s)
+        film.frame_at(film_s)
 
 
 def test_open_starts_anew(film):
-    film.picture(15)
+    film.image(15)
     film.open()
-    assert shade(film.picture(1)) == 0
+    assert shade(film.image(1)) == 0
 
 
 def test_pictures_are_colour_and_read_only(film):
-    picture = film.picture(1)
+    picture = film.image(1)
     assert picture.shape == (48, 64, 3)
     assert picture.dtype == np.uint8
     with pytest.raises(ValueError, match="read-only"):
@@ -111,7 +111,7 @@ def test_closed_film_says_so(film):
     film.close()
     film.close()
     with pytest.raises(CameraError, match="not open"):
-        film.picture(1)
+        film.image(1)
 
 
 @pytest.mark.parametrize("ending", ["png", "jpg"])
@@ -121,12 +121,12 @@ def test_still_repeats_ten_times_a_second(tmp_path, ending):
     video = VideoFile(str(file))
     video.open()
     assert video.rate_hz == 10.0
-    early, late = video.picture_at(0.05), video.picture_at(100.0)
+    early, late = video.frame_at(0.05), video.frame_at(100.0)
     assert (early.number, late.number) == (1, 1001)
-    assert late.picture is early.picture
-    assert np.abs(early.picture[5, 5].astype(int) - (10, 100, 200)).max() < 5
+    assert late.image is early.image
+    assert np.abs(early.image[5, 5].astype(int) - (10, 100, 200)).max() < 5
     with pytest.raises(ValueError, match="forward"):
-        video.picture_at(50.0)
+        video.frame_at(50.0)
 
 
 def test_name_with_a_pattern_in_it_is_one_file(tmp_path):
@@ -134,7 +134,7 @@ def test_name_with_a_pattern_in_it_is_one_file(tmp_path):
         cv2.imwrite(str(tmp_path / f"still_{k:02d}.png"), np.full((30, 40, 3), 50 * k, np.uint8))
     video = VideoFile(tmp_path / "still_01.png")
     video.open()
-    assert [int(video.picture(n)[0, 0, 0]) for n in (1, 2, 3)] == [50, 50, 50]
+    assert [int(video.image(n)[0, 0, 0]) for n in (1, 2, 3)] == [50, 50, 50]
 
 
 def test_rate_that_is_none_is_replaced_and_noted():
@@ -224,9 +224,9 @@ def test_film_that_vanishes_is_noticed_at_its_end(tmp_path):
     video = VideoFile(file)
     video.open()
     file.unlink()
-    assert shade(video.picture(4)) == 3
+    assert shade(video.image(4)) == 3
     with pytest.raises(CameraError, match=r"film\.avi"):
-        video.picture(5)
+        video.image(5)
 
 
 # ---- real time --------------------------------------------------------------------------
@@ -245,11 +245,11 @@ class Hand:
 def test_take_gives_each_picture_at_its_due_time(film):
     clock, go_on = Hand(100.0), threading.Event()
     first = film.take(clock, go_on)
-    assert (first.captured_s, first.number, shade(first.picture)) == (100.0, 1, 0)
+    assert (first.captured_s, first.number, shade(first.image)) == (100.0, 1, 0)
     clock.t_s = 100.1
     second = film.take(clock, go_on)
     assert second.captured_s == pytest.approx(100.1)
-    assert (second.number, shade(second.picture)) == (2, 1)
+    assert (second.number, shade(second.image)) == (2, 1)
 
 
 def test_take_skips_what_came_while_nobody_looked(film):
@@ -257,7 +257,7 @@ def test_take_skips_what_came_while_nobody_looked(film):
     film.take(clock, go_on)
     clock.t_s = 0.75
     late = film.take(clock, go_on)
-    assert (late.number, shade(late.picture)) == (8, 7)
+    assert (late.number, shade(late.image)) == (8, 7)
     assert late.captured_s == pytest.approx(0.7)
 
 
@@ -278,9 +278,9 @@ def test_real_film_is_read_to_its_end():
     video = VideoFile(FILM_FILE)
     video.open()
     assert video.rate_hz == pytest.approx(23.976)
-    first = video.picture(1)
+    first = video.image(1)
     assert first.shape == (528, 720, 3)
-    assert np.array_equal(video.picture(271), first)
+    assert np.array_equal(video.image(271), first)
     assert video.due_s(271) == pytest.approx(11.261, abs=0.001)
 
 

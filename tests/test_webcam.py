@@ -132,8 +132,8 @@ def test_pictures_are_counted_and_fresh(device):
     camera = opened(device, Capture())
     shots = [camera.take(lambda: 1.0, GO_ON) for _ in range(3)]
     assert [present(shot).number for shot in shots] == [1, 2, 3]
-    assert [int(present(shot).picture[0, 0, 0]) for shot in shots] == [2, 3, 4]
-    assert not present(shots[0]).picture.flags.writeable
+    assert [int(present(shot).image[0, 0, 0]) for shot in shots] == [2, 3, 4]
+    assert not present(shots[0]).image.flags.writeable
 
 
 def test_a_few_failures_are_skipped(device):
@@ -230,8 +230,8 @@ def test_grey_alpha_and_deep_pictures_become_colour(device, picture):
     capture = Capture()
     capture.picture = picture
     shot = opened(device, capture).take(lambda: 1.0, GO_ON)
-    assert present(shot).picture.shape == (4, 6, 3)
-    assert present(shot).picture.dtype == np.uint8 and (present(shot).picture == 7).all()
+    assert present(shot).image.shape == (4, 6, 3)
+    assert present(shot).image.dtype == np.uint8 and (present(shot).image == 7).all()
 
 
 @pytest.mark.parametrize(

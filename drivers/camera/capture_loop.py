@@ -41,12 +41,12 @@ class CaptureLoop:
         self._frames = FrameAnalyzer(detector, motion)
         self._now_s = now_s
         self._care = care
-        self._counted = 0  # pictures of the source before it was last opened
+        self._counted = 0  # frames of the source before it was last opened
         self._number = 0
         self._tell = tell
 
     def open(self) -> None:
-        """Open the source and begin at picture 1.
+        """Open the source and begin at frame 1.
 
         Raises:
             CameraError: the source cannot be opened.

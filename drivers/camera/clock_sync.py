@@ -1,25 +1,25 @@
-"""A camera's own clock in host time: the least delayed pictures tell the offset, a line the drift.
+"""A camera's own clock in host time: the least delayed frames tell the offset, a line the drift.
 
-Every picture arrives late by a varying time, never early; so of a handful of pictures the one
+Every frame arrives late by a varying time, never early; so of a handful of frames the one
 with the smallest difference between arrival and stamp tells most about the clocks (the minimum
 filter of NTP's clock filter, RFC 5905 section 10). Crystals differ by tens of millionths: the
-drift is the median of the slopes between such best pictures (Theil 1950, Sen 1968).
+drift is the median of the slopes between such best frames (Theil 1950, Sen 1968).
 """
 
 from collections import deque
 from statistics import median
 from typing import NamedTuple
 
-_BUCKET_S = 1.0  # one best picture is kept of each
+_BUCKET_S = 1.0  # one best frame is kept of each
 _BUCKETS = 60
 _LEAST_SPAN_S = 10.0  # no drift is told from less
 _MOST_DRIFT = 300e-6  # crystals are better; more is a mistake
-_JUMP_S = 0.1  # differences that leave the line by more are a clock set anew ...
-_LASTING_S = 1.0  # ... if they are late for as long as this: one picture may just be late
+_JUMP_S = 0.1  # differences that leave the line by more are a clock set again ...
+_LASTING_S = 1.0  # ... if they are late for as long as this: one frame may just be late
 
 
 class _Best(NamedTuple):
-    """The least delayed picture of its time: device time, and arrival less device time."""
+    """The least delayed frame of its time: device time, and arrival less device time."""
 
     device_s: float
     difference_s: float
@@ -28,7 +28,7 @@ class _Best(NamedTuple):
 class ClockSync:
     """Translates stamps of one device clock; each is translated once, in order.
 
-    jumps: how often the device clock was found set anew
+    jumps: how often the device clock was found set again
     """
 
     def __init__(self, least_delay_s: float = 0.0) -> None:
@@ -47,7 +47,7 @@ class ClockSync:
         return self._drift * 1e6
 
     def host_s(self, device_s: float, arrived_s: float) -> float:
-        """Return the host time of a device stamp whose picture arrived just now.
+        """Return the host time of a device stamp whose frame arrived just now.
 
         Later stamps never give earlier times, and no time lies after the arrival.
         """
@@ -79,7 +79,7 @@ class ClockSync:
         arrived_s = device_s + difference_s
         if self._late_since_s is None:
             self._late_since_s = arrived_s
-        # A device that started anew counts from 0.
+        # A device that started again counts from 0.
         return device_s < self._last[0] or arrived_s - self._late_since_s > _LASTING_S
 
     def _forget(self) -> None:
@@ -90,7 +90,7 @@ class ClockSync:
         self.jumps += 1
 
     def _keep(self, device_s: float, difference_s: float) -> None:
-        """Keep a picture if it is the least delayed of its bucket, and draw the line anew."""
+        """Keep a frame if it is the least delayed of its bucket, and draw the line again."""
         bucket = int(device_s // _BUCKET_S)
         new = _Best(device_s, difference_s)
         if bucket != self._bucket:
@@ -104,11 +104,11 @@ class ClockSync:
         self._offset_s = min(self._above_drift(best) for best in self._best)
 
     def _above_drift(self, best: _Best) -> float:
-        """Return a picture's difference with the drift since device time 0 taken out."""
+        """Return a frame's difference with the drift since device time 0 taken out."""
         return best.difference_s - self._drift * best.device_s
 
     def _slope(self) -> float:
-        """Return the median slope between pictures far enough apart."""
+        """Return the median slope between frames far enough apart."""
         best = list(self._best)
         if len(best) < 2:
             return self._drift

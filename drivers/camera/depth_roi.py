@@ -1,4 +1,4 @@
-"""The distance of a thing from a depth picture with holes, edges and nonsense in it."""
+"""The distance of a thing from a depth frame with holes, edges and nonsense in it."""
 
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ _MOST_PIXELS = 4096
 
 
 class DepthReading(NamedTuple):
-    """What a depth picture says of one thing.
+    """What a depth frame says of one thing.
 
     distance_m: None where nothing is known
     spread_m: standard deviation of its pixels, robust; valid_share: of its pixels, 0..1
@@ -39,7 +39,7 @@ def depth_at(
     mask: NDArray[np.bool_] | None = None,
     shrink: float = 0.6,
 ) -> DepthReading:
-    """Read the distance of what a box or a mask of the picture covers.
+    """Read the distance of what a box or a mask of the frame covers.
 
     The nearest layer of some size is the thing; what shows beside it lies behind.
 
@@ -85,7 +85,7 @@ def millimetres(depth_m: Depth) -> NDArray[np.uint16]:
 
 
 def resized(depth_m: Depth, width_px: int, height_px: int) -> Depth:
-    """Bring a depth picture to the size of its colour picture, without inventing distances."""
+    """Bring a depth frame to the size of its colour frame, without inventing distances."""
     if depth_m.shape == (height_px, width_px):
         return depth_m
     size = width_px, height_px

@@ -1,4 +1,4 @@
-"""What one picture shows: faces and what moves."""
+"""What one frame shows: faces and what moves."""
 
 from collections.abc import Callable
 
@@ -6,11 +6,11 @@ from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import Detections, FaceDetector, MovingBlob
 
 Motion = Callable[[Shot], tuple[MovingBlob, ...]]
-"""Finds what moves, from one picture to the next."""
+"""Finds what moves, from one frame to the next."""
 
 
 class FrameAnalyzer:
-    """Looks at one picture after another, with detectors that may be changed in between.
+    """Looks at one frame after another, with detectors that may be changed in between.
 
     Args:
         detector: finds faces.
@@ -21,10 +21,10 @@ class FrameAnalyzer:
         self._detector, self._motion = detector, motion
 
     def look(self, shot: Shot) -> Detections:
-        """Find the faces of a picture, unless the camera itself has, and what moves in it."""
-        faces = shot.faces if shot.faces is not None else self._detector.find(shot.picture)
+        """Find the faces of a frame, unless the camera itself has, and what moves in it."""
+        faces = shot.faces if shot.faces is not None else self._detector.find(shot.image)
         blobs = self._motion(shot) if self._motion is not None else ()
-        height, width = shot.picture.shape[:2]
+        height, width = shot.image.shape[:2]
         return Detections(
             shot.captured_s,
             shot.number,
@@ -32,7 +32,7 @@ class FrameAnalyzer:
             height,
             faces,
             blobs,
-            shot.picture,
+            shot.image,
             shot.depth_m,
             shot.lens,
         )
@@ -42,7 +42,7 @@ class FrameAnalyzer:
         detector: Callable[[], FaceDetector] | None,
         motion: Callable[[Motion | None], Motion | None] | None,
     ) -> None:
-        """Look otherwise from the next picture on.
+        """Look otherwise from the next frame on.
 
         Args:
             detector: makes another one; None: as it is.

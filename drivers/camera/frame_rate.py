@@ -1,4 +1,4 @@
-"""How many pictures a second a camera really gives, against what it says."""
+"""How many frames a second a camera really gives, against what it says."""
 
 from collections import deque
 from math import isfinite
@@ -7,15 +7,15 @@ from statistics import median
 _WINDOW = 45
 _LEAST = 15  # intervals before anything is said
 _TOLERANCE = 0.2
-# Absence of the reader for less than this part of a frame cannot have cost a picture.
+# Absence of the reader for less than this part of a frame cannot have cost a frame.
 _PROMPT = 0.5
 
 
 class FrameRateMonitor:
-    """Measures the rate from the times of pictures, and tells once when it is not as stated.
+    """Measures the rate from the times of frames, and tells once when it is not as stated.
 
     Only intervals in which the reader was back in time count: a slow reader misses
-    pictures, and that is no fault of the camera.
+    frames, and that is no fault of the camera.
     """
 
     def __init__(self, name: str, stated_hz: float) -> None:
@@ -59,5 +59,5 @@ class FrameRateMonitor:
         )
 
     def _prompt(self, away_s: float) -> bool:
-        """Return whether the reader was back before a picture could be missed."""
+        """Return whether the reader was back before a frame could be missed."""
         return self._stated_hz == 0.0 or away_s <= _PROMPT / self._stated_hz

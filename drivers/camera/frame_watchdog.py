@@ -4,8 +4,8 @@ from typing import Literal
 
 from gazerig.drivers.camera.params import CameraRecoveryParams
 
-FIRST_PICTURE_S = 15.0
-"""A camera may take so long for its first picture: exposure settles, networks are loaded."""
+FIRST_FRAME_S = 15.0
+"""A camera may take so long for its first frame: exposure settles, networks are loaded."""
 
 LOST_PERIODS, HUNG_PERIODS = 5.0, 15.0
 """So many of its usual periods may go by at least: films and weak computers are slow."""
@@ -16,11 +16,11 @@ Silence = Literal["", "lost", "hung"]
 
 
 class FrameWatchdog:
-    """Compares the time since the last picture with what is usual.
+    """Compares the time since the last frame with what is usual.
 
     Args:
         care: how long is too long.
-        now_s: when the waiting for the first picture begins, monotonic seconds.
+        now_s: when the waiting for the first frame begins, monotonic seconds.
     """
 
     def __init__(self, care: CameraRecoveryParams, now_s: float) -> None:
@@ -29,8 +29,8 @@ class FrameWatchdog:
         self._period_s: float | None = None
         self._first = True
 
-    def record_picture(self, now_s: float) -> None:
-        """Record that a picture came."""
+    def record_frame(self, now_s: float) -> None:
+        """Record that a frame came."""
         period_s = now_s - self._last_s
         if self._first:
             self._first = False
@@ -41,14 +41,14 @@ class FrameWatchdog:
         self._last_s = now_s
 
     def record_life(self, now_s: float) -> None:
-        """Record that the process is busy with something else than pictures."""
+        """Record that the process is busy with something else than frames."""
         self._last_s = now_s
 
     def verdict(self, now_s: float) -> Silence:
-        """Return "lost" where no picture came for too long, "hung" where none will come."""
+        """Return "lost" where no frame came for too long, "hung" where none will come."""
         silent_s = now_s - self._last_s
         if self._first:
-            return "hung" if silent_s >= FIRST_PICTURE_S else ""
+            return "hung" if silent_s >= FIRST_FRAME_S else ""
         lost_s = self._lost_after_s()
         hung_s = max(lost_s, self._care.restart_s, HUNG_PERIODS * (self._period_s or 0.0))
         return "hung" if silent_s >= hung_s else "lost" if silent_s >= lost_s else ""

@@ -1,4 +1,4 @@
-"""What every camera can be told about being lost, and a webcam about its pictures."""
+"""What every camera can be told about being lost, and a webcam about its frames."""
 
 from dataclasses import dataclass
 from typing import Annotated

@@ -22,7 +22,7 @@ _NONE: Distortion = (0.0, 0.0, 0.0, 0.0, 0.0)
 class Intrinsics:
     """A camera.
 
-    fx_px, fy_px: focal lengths; cx_px, cy_px: where the optical axis meets the picture
+    fx_px, fy_px: focal lengths; cx_px, cy_px: where the optical axis meets the frame
     distortion: k1 k2 p1 p2 k3 of the OpenCV manual; all 0 for a lens without
     """
 
@@ -45,7 +45,7 @@ class Intrinsics:
 
     @property
     def distorts(self) -> bool:
-        """Return whether straight lines become bent in its pictures."""
+        """Return whether straight lines become bent in its frames."""
         return any(self.distortion)
 
     @property
@@ -56,7 +56,7 @@ class Intrinsics:
         )
 
     def scaled(self, factor_x: float, factor_y: float) -> "Intrinsics":
-        """Return the intrinsics of the same pictures made wider and higher by these factors.
+        """Return the intrinsics of the same frames made wider and higher by these factors.
 
         Raises:
             ValueError: a factor is not above 0.
@@ -71,7 +71,7 @@ class Intrinsics:
 
 
 def intrinsics_of_view(view_rad: float, width_px: int, height_px: int) -> Intrinsics:
-    """Return the intrinsics of square pixels with the axis in the middle of the picture.
+    """Return the intrinsics of square pixels with the axis in the middle of the frame.
 
     view_rad: horizontal field of view, from edge to edge
 

@@ -1,4 +1,4 @@
-"""A camera recording played again: the same pictures at the same times from each other."""
+"""A camera recording played again: the same frames at the same times from each other."""
 
 import threading
 from collections.abc import Callable
@@ -11,11 +11,11 @@ from gazerig.drivers.camera.video_pacing import VideoPacing
 from gazerig.drivers.camera.video_timestamps import VideoTimestamps
 from gazerig.drivers.errors import CameraError
 
-_ALONE_S = 0.1  # how long a recording of one picture lasts
+_ALONE_S = 0.1  # how long a recording of one frame lasts
 
 
 class CameraReplay:
-    """A recording, repeated for ever like a film; film time starts at 0 with picture 1."""
+    """A recording, repeated for ever like a film; film time starts at 0 with frame 1."""
 
     def __init__(self, path: str | Path) -> None:
         """Name the file; nothing is opened yet."""
@@ -26,10 +26,10 @@ class CameraReplay:
         self._untold = ""
 
     def open(self) -> None:
-        """Open the file, or open it anew at film time 0.
+        """Open the file, or open it again at film time 0.
 
         Raises:
-            CameraError: it is absent, no recording, or holds no picture.
+            CameraError: it is absent, no recording, or holds no frame.
         """
         self.close()
         self._recording = Recording(self._path)
@@ -46,12 +46,12 @@ class CameraReplay:
         return self._times.length_s
 
     def due_s(self, number: int) -> float:
-        """Return the film time at which a picture is due."""
+        """Return the film time at which a frame is due."""
         self._opened()
         return self._times.due_s(number)
 
     def shot(self, number: int) -> Shot:
-        """Read a picture by number, with the film time at which it is due.
+        """Read a frame by number, with the film time at which it is due.
 
         Raises:
             CameraError: the file is damaged there.
@@ -61,7 +61,7 @@ class CameraReplay:
         return found._replace(captured_s=self._times.due_s(number), number=number)
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
-        """Wait until the next picture is due, then read the newest; time starts here.
+        """Wait until the next frame is due, then read the newest; time starts here.
 
         Raises:
             CameraError: the file is damaged there.

@@ -1,6 +1,6 @@
 """How the camera was turned when: written by the control loop, read by the camera's process.
 
-Whoever looks for motion must know how the camera itself turned between two pictures. The ring
+Whoever looks for motion must know how the camera itself turned between two frames. The ring
 is shared memory without a lock: the loop writes an entry and then counts it; the reader looks at
 the count before and after, and leaves out what may have been overwritten meanwhile.
 """
@@ -15,7 +15,7 @@ Floats = NDArray[np.float64]
 _ENTRIES = 512  # 2.5 s at 200 Hz
 _WIDTH = 10  # time, and the nine numbers of the rotation
 _MARGIN = 8  # oldest entries that the loop may be writing over
-# A picture can be younger than the newest pose by a tick or two.
+# A frame can be younger than the newest pose by a tick or two.
 _NEWEST_SERVES_S = 0.05
 
 
@@ -31,7 +31,7 @@ class PoseBuffer:
         self._entries = context.RawArray("d", _ENTRIES * _WIDTH)
 
     def remember(self, t_s: float, R_world_camera: Floats) -> None:
-        """Note an orientation; times rise. R_world_camera: (3, 3)."""
+        """Record an orientation; times rise. R_world_camera: (3, 3)."""
         count = self._count.value
         start = count % _ENTRIES * _WIDTH
         self._entries[start : start + _WIDTH] = [t_s, *np.ravel(R_world_camera).tolist()]

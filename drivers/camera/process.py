@@ -1,11 +1,11 @@
-"""Pictures looked at in a process of its own: nothing of it can hold up or end the control loop.
+"""Frames looked at in a process of its own: nothing of it can hold up or end the control loop.
 
 Python runs one thread of a process at a time, so what finds faces would cost a loop in the
 same process milliseconds now and then; and where processors are few, the loop's process is
-to go first. What was found comes back through a pipe, pictures through shared memory.
+to go first. What was found comes back through a pipe, frames through shared memory.
 
 A process that crashes, or is blocked in a camera's driver, is started again while the loop
-goes on without pictures: the last detections stay, and their age tells.
+goes on without frames: the last detections stay, and their age tells.
 """
 
 import multiprocessing
@@ -38,7 +38,7 @@ _BLOB_IDS = 1_000_000
 
 
 class _End(NamedTuple):
-    """Why a process gives no more pictures; final: no other one is started."""
+    """Why a process gives no more frames; final: no other one is started."""
 
     reason: str
     final: bool = False
@@ -51,11 +51,11 @@ class CameraProcess:
     stay, and their age tells.
 
     Args:
-        parts: how to make what gives pictures and what finds things; nothing starts yet.
+        parts: how to make what gives frames and what finds things; nothing starts yet.
         now_s: the host's monotonic clock, picklable; all processes share its zero.
         care: how a camera that is lost is tried again.
 
-    pictures, pictures_with_face: counts of pictures looked at since open
+    frames, frames_with_face: counts of frames looked at since open
     """
 
     def __init__(
@@ -78,8 +78,8 @@ class CameraProcess:
         self._forget()
 
     def _forget(self) -> None:
-        """Begin to count at picture 1."""
-        self.pictures = self.pictures_with_face = 0
+        """Begin to count at frame 1."""
+        self.frames = self.frames_with_face = 0
         self._starts = self._counted = self._number = 0
         self._lost_s: float | None = None
         self._back_s = 0.0
@@ -107,7 +107,7 @@ class CameraProcess:
         self._thread.start()
 
     def latest(self, now_s: float) -> Detections | None:
-        """Return what the newest picture showed, or None before the first.
+        """Return what the newest frame showed, or None before the first.
 
         Raises:
             CameraError: the source has been gone for longer than ``give_up_s``.
@@ -121,7 +121,7 @@ class CameraProcess:
         detector: Callable[[], FaceDetector] | None,
         motion: Callable[[Motion | None], Motion | None] | None,
     ) -> bool:
-        """Let the process look otherwise from one of the next pictures on.
+        """Let the process look otherwise from one of the next frames on.
 
         Never waits; return whether the process has room for the word. A detector that cannot
         be made there is told of as an event, and the old one goes on.
@@ -232,7 +232,7 @@ class CameraProcess:
         return not end.final and gone_s < self._care.give_up_s
 
     def _lose(self, reason: str, remedy: str) -> None:
-        """Record that no pictures come; a loss soon after another one is told once at most."""
+        """Record that no frames come; a loss soon after another one is told once at most."""
         self._lost_s = self._now_s()
         self._losses += 1
         if self._care.give_up_s > 0.0 and self._losses == 1:
@@ -266,7 +266,7 @@ class CameraProcess:
                     self._events.append(word)
                 else:
                     retrying = False
-                    silence.record_picture(self._now_s())
+                    silence.record_frame(self._now_s())
                     self._note(word, slots)
         except (EOFError, OSError):
             return _End("the process that looks at pictures has ended")
@@ -287,20 +287,18 @@ class CameraProcess:
         return verdict == "hung"
 
     def _note(self, word: Found, slots: tuple[SlotReader, SlotReader]) -> None:
-        """Leave what was found in the slot, with the picture if it is still there."""
+        """Leave what was found in the slot, with the frame if it is still there."""
         found = word.detections
-        self.pictures += 1
-        self.pictures_with_face += bool(found.faces)
+        self.frames += 1
+        self.frames_with_face += bool(found.faces)
         self._number = self._counted + found.number
-        picture = slots[0].take(word.picture) if word.picture is not None else None
+        image = slots[0].take(word.image) if word.image is not None else None
         depth = slots[1].take(word.depth) if word.depth is not None else None
         blobs = found.blobs
         if self._starts > 1:
             first = (self._starts - 1) * _BLOB_IDS
             blobs = tuple(replace(blob, id=first + blob.id) for blob in blobs)
-        self._newest = replace(
-            found, number=self._number, blobs=blobs, picture=picture, depth_m=depth
-        )
+        self._newest = replace(found, number=self._number, blobs=blobs, image=image, depth_m=depth)
         now_s = self._now_s()
         if self._lost_s is not None:
             if self._owes_back:

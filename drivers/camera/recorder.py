@@ -12,12 +12,12 @@ from gazerig.drivers.camera.recording_format import encoded
 from gazerig.drivers.camera.recording_writer import RecordingWriter
 from gazerig.drivers.camera.source import FrameSource, Shot
 
-_ENCODERS = 2  # PNG of colour and depth takes most of a picture's time; OpenCV frees the others
-_MOST_WAITING = 30  # pictures; where the disk is slower than the camera, pictures are left out
+_ENCODERS = 2  # PNG of colour and depth takes most of a frame's time; OpenCV frees the others
+_MOST_WAITING = 30  # frames; where the disk is slower than the camera, frames are left out
 
 
 class _Waiting(NamedTuple):
-    """A picture on its way into the file."""
+    """A frame on its way into the file."""
 
     captured_s: float
     number: int
@@ -37,7 +37,7 @@ class CameraRecorder:
         jpeg_quality: 1..100, None keeps the frames exactly.
         over: whether an existing file is overwritten.
 
-    failure: why the recording ended early, or ""; left_out: pictures the disk was too slow for
+    failure: why the recording ended early, or ""; left_out: frames the disk was too slow for
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class CameraRecorder:
 
     @property
     def written(self) -> int:
-        """Return how many pictures are in the file."""
+        """Return how many frames are in the file."""
         return 0 if self._writer is None else self._writer.written
 
     def open(self) -> None:
@@ -86,10 +86,10 @@ class CameraRecorder:
             self._thread.start()
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
-        """Wait for the next picture, and hand it to the recording.
+        """Wait for the next frame, and hand it to the recording.
 
         Raises:
-            CameraError: there will be no more pictures.
+            CameraError: there will be no more frames.
         """
         shot = self._source.take(now_s, stop)
         if shot is not None and not self.failure:
@@ -116,7 +116,7 @@ class CameraRecorder:
             self._encoders = None
 
     def _hand_on(self, shot: Shot) -> None:
-        """Begin to encode a picture, unless too many wait already."""
+        """Begin to encode a frame, unless too many wait already."""
         if self._waiting.full():
             if self.left_out == 0:
                 self._events.append(
@@ -149,5 +149,5 @@ class CameraRecorder:
 
 
 def _add(writer: RecordingWriter, one: _Waiting) -> None:
-    """Wait until a picture is encoded, and write it."""
+    """Wait until a frame is encoded, and write it."""
     writer.add(one.captured_s, one.number, one.messages.result())

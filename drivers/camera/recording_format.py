@@ -1,9 +1,9 @@
 """What a camera recording holds: MCAP messages in JSON that Foxglove's tools show as they are.
 
-Pictures are PNG (exact) or JPEG (small) files inside foxglove.CompressedImage, depth is a
+Frames are PNG (exact) or JPEG (small) files inside foxglove.CompressedImage, depth is a
 16-bit PNG of millimetres with 0 where unknown, the lens is foxglove.CameraCalibration (schemas:
-Foxglove documentation, message schemas). All messages of one picture carry the time of its
-exposure in the host's monotonic clock, and the picture itself comes last: where it is, the rest
+Foxglove documentation, message schemas). All messages of one frame carry the time of its
+exposure in the host's monotonic clock, and the frame itself comes last: where it is, the rest
 is. MCAP: mcap.dev/spec.
 """
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from gazerig.drivers.camera.depth_roi import metres, millimetres
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import Shot, bgr
-from gazerig.drivers.types import Depth, DetectedFace, Picture
+from gazerig.drivers.types import Depth, DetectedFace, ImageArray
 
 PICTURE, DEPTH, LENS, FACES = "/camera/picture", "/camera/depth", "/camera/lens", "/camera/faces"
 """Topics."""
@@ -92,33 +92,33 @@ def nanoseconds(time_s: float) -> int:
 
 
 def encoded(shot: Shot, jpeg_quality: int | None) -> list[tuple[str, bytes]]:
-    """Turn a picture and what belongs to it into messages, the picture last.
+    """Turn a frame and what belongs to it into messages, the frame last.
 
     jpeg_quality: 1..100, None for PNG
     """
     stamp = nanoseconds(shot.captured_s)
     found: list[tuple[str, bytes]] = []
     if shot.lens is not None:
-        found.append((LENS, _dump(_lens(shot.lens, shot.picture, stamp))))
+        found.append((LENS, _dump(_lens(shot.lens, shot.image, stamp))))
     if shot.depth_m is not None:
         file = _file(".png", millimetres(shot.depth_m), _DEPTH_PNG)
         found.append((DEPTH, _dump(_image("png", file, stamp))))
     if shot.faces is not None:
         found.append((FACES, _dump({"faces": [_face(face) for face in shot.faces]})))
     if jpeg_quality is None:
-        file = _file(".png", shot.picture, _COLOUR_PNG)
+        file = _file(".png", shot.image, _COLOUR_PNG)
         found.append((PICTURE, _dump(_image("png", file, stamp))))
     else:
-        file = _file(".jpg", shot.picture, [cv2.IMWRITE_JPEG_QUALITY, jpeg_quality])
+        file = _file(".jpg", shot.image, [cv2.IMWRITE_JPEG_QUALITY, jpeg_quality])
         found.append((PICTURE, _dump(_image("jpeg", file, stamp))))
     return found
 
 
-def picture(data: bytes) -> Picture:
-    """Read a picture message.
+def image(data: bytes) -> ImageArray:
+    """Read a frame message.
 
     Raises:
-        BadMessage: it holds no picture.
+        BadMessage: it holds no frame.
     """
     pixels = bgr(_pixels(data))
     if pixels is None:
@@ -130,7 +130,7 @@ def depth(data: bytes) -> Depth:
     """Read a depth message.
 
     Raises:
-        BadMessage: it holds no 16-bit picture.
+        BadMessage: it holds no 16-bit frame.
     """
     mm = _pixels(data)
     if mm.dtype != np.uint16 or mm.ndim != 2:
@@ -167,8 +167,8 @@ def faces(data: bytes) -> tuple[DetectedFace, ...]:
     return tuple(found)
 
 
-def _lens(of: Intrinsics, shown: Picture, stamp: int) -> dict[str, Any]:
-    """Return a lens as the camera matrix of its picture."""
+def _lens(of: Intrinsics, shown: ImageArray, stamp: int) -> dict[str, Any]:
+    """Return a lens as the camera matrix of its frame."""
     fx, fy, cx, cy = of.fx_px, of.fy_px, of.cx_px, of.cy_px
     return {
         "timestamp": _stamp(stamp),

@@ -1,4 +1,4 @@
-"""A camera recording as a list of pictures; what a killed program left counts up to its end."""
+"""A camera recording as a list of frames; what a killed program left counts up to its end."""
 
 import struct
 from collections.abc import Iterator
@@ -29,8 +29,8 @@ class _MessagePlace(NamedTuple):
     length: int
 
 
-class _Picture(NamedTuple):
-    """When a picture was taken, and where in the file it and what belongs to it lie."""
+class _FrameIndex(NamedTuple):
+    """When a frame was taken, and where in the file it and what belongs to it lie."""
 
     stamp_ns: int
     places: dict[str, _MessagePlace]
@@ -39,21 +39,21 @@ class _Picture(NamedTuple):
 class Recording:
     """An open recording.
 
-    times_s: when each picture was taken, rising, the first at 0; note: what is not as it
+    times_s: when each frame was taken, rising, the first at 0; note: what is not as it
         should be with the file, or ""
     """
 
     def __init__(self, path: Path) -> None:
-        """Open the file and find its pictures.
+        """Open the file and find its frames.
 
         Raises:
-            CameraError: it is absent, no recording, or holds no picture.
+            CameraError: it is absent, no recording, or holds no frame.
         """
         self._path = path
         self._file = open_mcap(path, CameraError, _CURE)
         try:
             self._channels: dict[int, str] = {}
-            self._pictures: list[_Picture] = []
+            self._pictures: list[_FrameIndex] = []
             ended = self._index()
         except BaseException:
             self._file.close()
@@ -70,7 +70,7 @@ class Recording:
         )
 
     def shot(self, index: int) -> Shot:
-        """Read a picture, counted from 0, with its time from the first picture's.
+        """Read a frame, counted from 0, with its time from the first frame's.
 
         Raises:
             CameraError: the file is damaged there.
@@ -80,7 +80,7 @@ class Recording:
             return Shot(
                 self.times_s[index],
                 index + 1,
-                fmt.picture(self._data(places[fmt.PICTURE])),
+                fmt.image(self._data(places[fmt.PICTURE])),
                 fmt.depth(self._data(places[fmt.DEPTH])) if fmt.DEPTH in places else None,
                 fmt.lens(self._data(places[fmt.LENS])) if fmt.LENS in places else None,
                 fmt.faces(self._data(places[fmt.FACES])) if fmt.FACES in places else None,
@@ -103,7 +103,7 @@ class Recording:
         return bytes(Message.read(ReadDataStream(BytesIO(content)), place.length).data)
 
     def _index(self) -> bool:
-        """Note where the pictures are; tell whether the file was closed as it should.
+        """Record where the frames are; return whether the file was closed as it should.
 
         Raises:
             CameraError: a record says what none can.
@@ -114,7 +114,7 @@ class Recording:
             raise CameraError(f"{self._path} is damaged: copy the file anew") from error
 
     def _indexed(self) -> bool:
-        """Note where the pictures are; tell whether the file was closed as it should."""
+        """Record where the frames are; return whether the file was closed as it should."""
         waiting: dict[str, _MessagePlace] = {}
         stamp_ns = -1
         for kind, place in self._records():
@@ -125,7 +125,7 @@ class Recording:
             elif kind == Opcode.MESSAGE:
                 head = Message.read(self._content(place, _FIXED), _FIXED)
                 topic = self._channels.get(head.channel_id, "")
-                if head.log_time != stamp_ns:  # what came before belongs to no picture
+                if head.log_time != stamp_ns:  # what came before belongs to no frame
                     stamp_ns, waiting = head.log_time, {}
                 waiting[topic] = place
                 if topic == fmt.PICTURE:
@@ -133,9 +133,9 @@ class Recording:
         return False
 
     def _add(self, stamp_ns: int, places: dict[str, _MessagePlace]) -> None:
-        """Note a picture if it is later than the last one."""
+        """Record a frame if it is later than the last one."""
         if not self._pictures or stamp_ns > self._pictures[-1].stamp_ns:
-            self._pictures.append(_Picture(stamp_ns, places))
+            self._pictures.append(_FrameIndex(stamp_ns, places))
 
     def _meet(self, kind: int, place: _MessagePlace) -> None:
         """Read the records that say what the file is."""

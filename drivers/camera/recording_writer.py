@@ -1,7 +1,7 @@
-"""A camera recording being written: every picture is in the file when ``write`` returns.
+"""A camera recording being written: every frame is in the file when ``write`` returns.
 
 The file has no chunks, so a killed program leaves all that was written, readable to the last
-whole picture.
+whole frame.
 """
 
 import json
@@ -20,9 +20,9 @@ _SYNC_NS = 1_000_000_000
 
 
 class RecordingWriter:
-    """An MCAP file of pictures.
+    """An MCAP file of frames.
 
-    written: pictures so far
+    written: frames so far
     """
 
     def __init__(
@@ -31,7 +31,7 @@ class RecordingWriter:
         """Create the file.
 
         about: what should be known of the recording, kept in it; jpeg_quality: 1..100, None
-            keeps pictures exactly; over: an existing file is written over
+            keeps frames exactly; over: an existing file is written over
 
         Raises:
             CameraError: the file is there already or cannot be made.
@@ -56,7 +56,7 @@ class RecordingWriter:
         self.written = 0
 
     def write(self, shot: Shot) -> None:
-        """Add a picture and what belongs to it.
+        """Add a frame and what belongs to it.
 
         Raises:
             OSError: the disk is full or gone.
@@ -64,7 +64,7 @@ class RecordingWriter:
         self.add(shot.captured_s, shot.number, encoded(shot, self._jpeg_quality))
 
     def add(self, captured_s: float, number: int, messages: list[tuple[str, bytes]]) -> None:
-        """Add a picture that is encoded already: topics and messages, the picture last.
+        """Add a frame that is encoded already: topics and messages, the frame last.
 
         Raises:
             OSError: the disk is full or gone.

@@ -1,4 +1,4 @@
-"""Pictures from one process to another through shared memory: a few slots, written in turn.
+"""Frames from one process to another through shared memory: a few slots, written in turn.
 
 The reader copies a slot out and looks at its stamp before and after; a slot that was written
 meanwhile is given up. Nobody waits for anybody.
@@ -75,7 +75,7 @@ class SlotReader:
         self._memory: SharedMemory | None = None
 
     def take(self, where: SlotAddress) -> NDArray[Any] | None:
-        """Copy an array out, read-only; None where its slot was written anew meanwhile."""
+        """Copy an array out, read-only; None where its slot was written again meanwhile."""
         if self._memory is None or self._memory.name != where.memory:
             self.close()
             try:

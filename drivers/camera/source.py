@@ -1,4 +1,4 @@
-"""What gives pictures in real time: a camera, a film paced by the clock, or a recording."""
+"""What gives frames in real time: a camera, a film paced by the clock, or a recording."""
 
 import threading
 from collections.abc import Callable
@@ -8,25 +8,25 @@ import cv2
 import numpy as np
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.types import Depth, DetectedFace, Picture
+from gazerig.drivers.types import Depth, DetectedFace, ImageArray
 
 
 class Shot(NamedTuple):
-    """One picture and when it was taken.
+    """One frame and when it was taken.
 
-    captured_s: host time of the exposure (of a film: when the picture was due)
-    number: counts the source's pictures from 1; skipped ones are counted too
+    captured_s: host time of the exposure (of a film: when the frame was due)
+    number: counts the source's frames from 1; skipped ones are counted too
 
     What follows is None where the source does not give it:
 
-    depth_m: distances, aligned with the picture and of its size, NaN where unknown
-    lens: the lens of this picture, which is then without distortion
+    depth_m: distances, aligned with the frame and of its size, NaN where unknown
+    lens: the lens of this frame, which is then without distortion
     faces: what the camera itself has found; nobody need look again
     """
 
     captured_s: float
     number: int
-    picture: Picture
+    image: ImageArray
     depth_m: Depth | None = None
     lens: Intrinsics | None = None
     faces: tuple[DetectedFace, ...] | None = None
@@ -39,15 +39,15 @@ class FrameSource(Protocol):
         """Open the device or file.
 
         Raises:
-            CameraError: it cannot; the message names the thing and the cure.
+            CameraError: it cannot; the message names the thing and the remedy.
         """
         ...
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
-        """Wait for a picture newer than the last one; None where ``stop`` was set meanwhile.
+        """Wait for a frame newer than the last one; None where ``stop`` was set meanwhile.
 
         Raises:
-            CameraError: there will be no more pictures.
+            CameraError: there will be no more frames.
         """
         ...
 
@@ -60,8 +60,8 @@ class FrameSource(Protocol):
         ...
 
 
-def bgr(pixels: Any) -> Picture | None:
-    """Return what a camera or file delivered as a read-only BGR picture; None where it is none.
+def bgr(pixels: Any) -> ImageArray | None:
+    """Return what a camera or file delivered as a read-only BGR frame; None where it is none.
 
     pixels: (h, w) or (h, w, 1) grey, (h, w, 3) BGR or (h, w, 4) BGR with alpha, 8 bits, or
         16 of which the upper 8 are kept

@@ -1,7 +1,7 @@
 """Detection in real time: a thread analyses frames and leaves the newest result in one slot.
 
 No queue and no lock: the slot holds one frozen value, and a Python name is rebound in
-one piece. Pictures that come while the detector works are skipped.
+one piece. Frames that come while the detector works are skipped.
 """
 
 import threading
@@ -32,7 +32,7 @@ class CameraThread:
         care: how a lost source is reopened.
         motion: called in the camera's thread with every frame, None for none.
 
-    pictures, pictures_with_face: counts of pictures looked at since open
+    frames, frames_with_face: counts of frames looked at since open
     """
 
     def __init__(
@@ -51,8 +51,8 @@ class CameraThread:
         self._thread: threading.Thread | None = None
         self._newest: Detections | None = None
         self._failure: Exception | None = None
-        self.pictures = 0
-        self.pictures_with_face = 0
+        self.frames = 0
+        self.frames_with_face = 0
 
     def open(self) -> None:
         """Open the source and start looking.
@@ -66,12 +66,12 @@ class CameraThread:
         self._camera.open()
         self._stop.clear()
         self._newest, self._failure = None, None
-        self.pictures = self.pictures_with_face = 0
+        self.frames = self.frames_with_face = 0
         self._thread = threading.Thread(target=self._watch, name="camera", daemon=True)
         self._thread.start()
 
     def latest(self, now_s: float) -> Detections | None:
-        """Return what the newest picture showed, or None before the first.
+        """Return what the newest frame showed, or None before the first.
 
         Raises:
             CameraError: the source is gone for good, or looking has failed.
@@ -99,11 +99,11 @@ class CameraThread:
         """Analyse one frame after another until stopped."""
         try:
             while (found := self._camera.next(self._stop)) is not None:
-                self.pictures += 1
-                self.pictures_with_face += bool(found.faces)
+                self.frames += 1
+                self.frames_with_face += bool(found.faces)
                 self._newest = found
         except Exception as failure:  # handed to the loop by latest()
             self._failure = failure
         finally:
-            # Freed by the thread that reads it: never under a picture being fetched.
+            # Freed by the thread that reads it: never under a frame being fetched.
             self._camera.close()

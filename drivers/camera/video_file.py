@@ -1,6 +1,6 @@
-"""A film or still picture as a source of pictures that never ends.
+"""A film or still frame as a source of frames that never ends.
 
-Film time starts at 0 with picture 1 and runs on through every repeat; so do numbers.
+Film time starts at 0 with frame 1 and runs on through every repeat; so do numbers.
 Reading goes forward only. A still repeats ten times a second.
 """
 
@@ -13,19 +13,19 @@ from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.video_pacing import VideoPacing
 from gazerig.drivers.camera.video_reader import VideoReader, open_video
 from gazerig.drivers.errors import CameraError
-from gazerig.drivers.types import Picture
+from gazerig.drivers.types import ImageArray
 
 
 class VideoFrame(NamedTuple):
-    """A picture of a film: its number from 1, the film time it is due, the picture (read-only)."""
+    """A frame of a film: its number from 1, the film time it is due, the frame (read-only)."""
 
     number: int
     film_time_s: float
-    picture: Picture
+    image: ImageArray
 
 
 class VideoFile:
-    """A film or still picture, repeated for ever."""
+    """A film or still frame, repeated for ever."""
 
     def __init__(self, path: str | Path) -> None:
         """Name the file; nothing is opened yet."""
@@ -35,10 +35,10 @@ class VideoFile:
         self._untold = ""
 
     def open(self) -> None:
-        """Open the file, or open it anew at film time 0.
+        """Open the file, or open it again at film time 0.
 
         Raises:
-            CameraError: it is absent, no film or picture, empty or cut short.
+            CameraError: it is absent, no film or frame, empty or cut short.
         """
         self.close()
         self._reel = open_video(self._path)
@@ -47,7 +47,7 @@ class VideoFile:
 
     @property
     def rate_hz(self) -> float:
-        """Pictures a second."""
+        """Frames a second."""
         return self._opened().times.rate_hz
 
     @property
@@ -56,49 +56,49 @@ class VideoFile:
         return self._opened().times.note
 
     def due_s(self, number: int) -> float:
-        """Return the film time at which a picture is due."""
+        """Return the film time at which a frame is due."""
         return self._opened().times.due_s(number)
 
     def number_at(self, film_s: float) -> int:
-        """Return the number of the newest picture at a film time; below 1 before the first."""
+        """Return the number of the newest frame at a film time; below 1 before the first."""
         return self._opened().times.number_at(film_s)
 
-    def picture(self, number: int) -> Picture:
-        """Read a picture by number: (height, width, 3) BGR, read-only.
+    def image(self, number: int) -> ImageArray:
+        """Read a frame by number: (height, width, 3) BGR, read-only.
 
         Raises:
             ValueError: the number is below 1 or below the last one read.
             CameraError: the file cannot be read any more.
         """
-        return self._opened().picture(number)
+        return self._opened().image(number)
 
     def shot(self, number: int) -> Shot:
-        """Read a picture by number with the film time at which it is due.
+        """Read a frame by number with the film time at which it is due.
 
         Raises:
             ValueError: the number is below 1 or below the last one read.
             CameraError: the file cannot be read any more.
         """
-        return Shot(self.due_s(number), number, self.picture(number))
+        return Shot(self.due_s(number), number, self.image(number))
 
-    def picture_at(self, film_s: float) -> VideoFrame:
-        """Read the newest picture at a film time (0 or later, never running back).
+    def frame_at(self, film_s: float) -> VideoFrame:
+        """Read the newest frame at a film time (0 or later, never running back).
 
         Raises:
             ValueError: film time is negative or ran back.
             CameraError: the file cannot be read any more.
         """
         number = self.number_at(film_s)
-        return VideoFrame(number, self.due_s(number), self.picture(number))
+        return VideoFrame(number, self.due_s(number), self.image(number))
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
-        """Wait until the next picture is due, then read the newest; the film starts here.
+        """Wait until the next frame is due, then read the newest; the film starts here.
 
         Raises:
             CameraError: the file cannot be read any more.
         """
         due = self._pace.wait(self._opened().times, now_s, stop)
-        return None if due is None else Shot(due.host_s, due.number, self.picture(due.number))
+        return None if due is None else Shot(due.host_s, due.number, self.image(due.number))
 
     def events(self) -> tuple[str, ...]:
         """Return what had to be assumed about the file, one line each, once."""

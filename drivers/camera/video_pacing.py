@@ -1,4 +1,4 @@
-"""Showing a film in real time: the newest picture that is due, none twice."""
+"""Showing a film in real time: the newest frame that is due, none twice."""
 
 import threading
 from collections.abc import Callable
@@ -8,7 +8,7 @@ from gazerig.drivers.camera.video_timestamps import VideoTimestamps
 
 
 class Due(NamedTuple):
-    """A picture that is due: its number, and the host time at which it was."""
+    """A frame that is due: its number, and the host time at which it was."""
 
     number: int
     host_s: float
@@ -24,12 +24,12 @@ class VideoPacing:
     def wait(
         self, times: VideoTimestamps, now_s: Callable[[], float], stop: threading.Event
     ) -> Due | None:
-        """Wait until the next picture is due and give the newest; None where told to stop."""
+        """Wait until the next frame is due and return the newest; None where told to stop."""
         if self._zero_s is None:
             self._zero_s = now_s()
         wait_s = self._zero_s + times.due_s(self._taken + 1) - now_s()
         if stop.wait(max(0.0, wait_s)):
             return None
-        # A wait may end a shade early; the picture waited for is the least that is given.
+        # A wait may end a shade early; the frame waited for is the least that is given.
         self._taken = max(self._taken + 1, times.number_at(now_s() - self._zero_s))
         return Due(self._taken, self._zero_s + times.due_s(self._taken))

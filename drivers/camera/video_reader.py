@@ -1,4 +1,4 @@
-"""An open film, or a still picture, read forward by number and repeated for ever."""
+"""An open film, or a still frame, read forward by number and repeated for ever."""
 
 from math import isfinite
 from pathlib import Path
@@ -16,25 +16,25 @@ from gazerig.drivers.camera.video_timestamps import (
     rising,
 )
 from gazerig.drivers.errors import CameraError
-from gazerig.drivers.types import Picture
+from gazerig.drivers.types import ImageArray
 
 _STILL_RATE_HZ, _ASSUMED_RATE_HZ = 10.0, 25.0
 _RATES_HZ = (0.5, 1000.0)
-# A container may promise a few pictures too many without being damaged.
+# A container may promise a few frames too many without being damaged.
 _LEAST_COMPLETE = 0.95
-_MOST_TIMES = 20_000  # pictures of an uneven film whose times are read at the start
+_MOST_TIMES = 20_000  # frames of an uneven film whose times are read at the start
 
 
 class VideoReader(Protocol):
     """An open film or still.
 
-    times: when its pictures are due, and what had to be assumed for it
+    times: when its frames are due, and what had to be assumed for it
     """
 
     times: VideoTimestamps
 
-    def picture(self, number: int) -> Picture:
-        """Return a picture, counted through all repeats, not before the last one given."""
+    def image(self, number: int) -> ImageArray:
+        """Return a frame, counted through all repeats, not before the last one given."""
         ...
 
     def close(self) -> None:
@@ -46,7 +46,7 @@ def open_video(path: Path) -> VideoReader:
     """Open a file as what it is.
 
     Raises:
-        CameraError: it is absent, no film or picture, empty or cut short.
+        CameraError: it is absent, no film or frame, empty or cut short.
     """
     if not path.exists():
         raise CameraError(f"no film or picture at {path}: check the path")
@@ -56,13 +56,13 @@ def open_video(path: Path) -> VideoReader:
         path.open("rb").close()
     except OSError as error:
         raise CameraError(f"cannot read {path} ({error.strerror}): check its rights") from error
-    # A GIF is a film; OpenCV's picture reader would give its first picture alone.
+    # A GIF is a film; OpenCV's frame reader would give its first frame alone.
     still = path.suffix.lower() != ".gif" and cv2.haveImageReader(str(path))
     return _Still(path) if still else _Film(path)
 
 
 def usable_rate_hz(stated_hz: float) -> tuple[float, str]:
-    """Return the picture rate to use, and a note where the stated one is no rate."""
+    """Return the frame rate to use, and a note where the stated one is no rate."""
     low, high = _RATES_HZ
     if isfinite(stated_hz) and low <= stated_hz <= high:
         return stated_hz, ""
@@ -72,27 +72,27 @@ def usable_rate_hz(stated_hz: float) -> tuple[float, str]:
 
 
 class _Still:
-    """One picture that is always there."""
+    """One frame that is always there."""
 
     times = VideoTimestamps(_STILL_RATE_HZ)
 
     def __init__(self, path: Path) -> None:
-        """Decode the picture."""
+        """Decode the frame."""
         try:
             with quiet_opencv():
-                picture = cv2.imread(str(path), cv2.IMREAD_COLOR)
+                image = cv2.imread(str(path), cv2.IMREAD_COLOR)
         except cv2.error as error:
             raise CameraError(f"{path} is too large a picture: scale it down") from error
-        if picture is None:
+        if image is None:
             raise CameraError(f"{path} is a damaged picture: copy or save it anew")
-        self._picture = _frozen(picture, path)
+        self._image = _frozen(image, path)
         self._last = 1
 
-    def picture(self, number: int) -> Picture:
-        """Return the picture."""
+    def image(self, number: int) -> ImageArray:
+        """Return the frame."""
         _check_forward(number, self._last)
         self._last = number
-        return self._picture
+        return self._image
 
     def close(self) -> None:
         """Have nothing to free."""
@@ -112,25 +112,25 @@ class _Film:
         if times is None:
             times = by_table(rising(first_s + _times_s(self._capture, _MOST_TIMES)))
         elif times.rate_hz == stated[0]:
-            # The number of pictures stated is often the length times the rate: where the
+            # The number of frames stated is often the length times the rate: where the
             # rate is wrong, so is that.
             _check_complete(path, self._capture, len(first_s))
         self.times = times
         self._rewind()
-        self._number, self._index = 0, 0  # last picture reached, and its place in this showing
+        self._number, self._index = 0, 0  # last frame reached, and its place in this showing
         self._length: int | None = None  # known after the first showing
-        self._seen: tuple[int, Picture] | None = None
+        self._seen: tuple[int, ImageArray] | None = None
 
-    def picture(self, number: int) -> Picture:
-        """Read on to a picture; those on the way are decoded but not converted."""
+    def image(self, number: int) -> ImageArray:
+        """Read on to a frame; those on the way are decoded but not converted."""
         _check_forward(number, max(1, self._number))
         if self._seen is None or self._seen[0] != number:
             while self._number < number:
                 self._advance(number)
-            found, picture = self._capture.retrieve()
+            found, image = self._capture.retrieve()
             if not found:
                 raise CameraError(f"picture {self._index} of {self._path} is damaged: copy it anew")
-            self._seen = number, _frozen(picture, self._path)
+            self._seen = number, _frozen(image, self._path)
         return self._seen[1]
 
     def close(self) -> None:
@@ -138,7 +138,7 @@ class _Film:
         self._capture.release()
 
     def _advance(self, goal: int) -> None:
-        """Go to the next picture, from the end to the start, past whole showings at once."""
+        """Go to the next frame, from the end to the start, past whole showings at once."""
         if not self._capture.grab():
             self._length, self._index = self._index, 0
             self._rewind()
@@ -149,7 +149,7 @@ class _Film:
             self._number += (goal - self._number) // self._length * self._length
 
     def _rewind(self) -> None:
-        """Start anew; opening again is exact where seeking back may not be."""
+        """Start again; opening again is exact where seeking back may not be."""
         self._capture.release()
         self._capture = _open_film(self._path)
 
@@ -167,7 +167,7 @@ def _open_film(path: Path) -> cv2.VideoCapture:
 
 
 def _times_s(capture: cv2.VideoCapture, most: int) -> list[float]:
-    """Read on, and give the times that the pictures carry."""
+    """Read on, and return the times that the frames carry."""
     found: list[float] = []
     for _ in range(most):
         if not capture.grab():
@@ -179,7 +179,7 @@ def _times_s(capture: cv2.VideoCapture, most: int) -> list[float]:
 def _check_complete(path: Path, capture: cv2.VideoCapture, seen: int) -> None:
     """Refuse a film that ends long before the end it states.
 
-    seen: so many pictures have been read already
+    seen: so many frames have been read already
     """
     stated = int(capture.get(cv2.CAP_PROP_FRAME_COUNT))
     if stated <= seen:  # all there, or a stream without a table of contents
@@ -198,13 +198,13 @@ def _check_forward(number: int, least: int) -> None:
         raise ValueError(f"films are read forward: picture {number} wanted, {least} is the least")
 
 
-def _frozen(picture: Any, path: Path) -> Picture:
+def _frozen(image: Any, path: Path) -> ImageArray:
     """Return a frame as a read-only BGR array.
 
     Raises:
         CameraError: the file holds another pixel format.
     """
-    pixels = bgr(picture)
+    pixels = bgr(image)
     if pixels is None:
         raise CameraError(f"{path} holds pictures of an unknown kind: convert it to mp4 or png")
     return pixels

@@ -1,6 +1,6 @@
-"""When each picture of a film is due: by its rate, or by a table where pictures come unevenly.
+"""When each frame of a film is due: by its rate, or by a table where frames come unevenly.
 
-What the container states is checked against the times that its pictures carry.
+What the container states is checked against the times that its frames carry.
 """
 
 from bisect import bisect_right
@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 SAMPLE = 100
-"""So many pictures are looked at; only where these come unevenly, all are."""
+"""So many frames are looked at; only where these come unevenly, all are."""
 _LEAST = 8
-# Containers round times; half a picture is no rounding any more.
+# Containers round times; half a frame is no rounding any more.
 _UNEVEN = 0.5
 _LIE = 0.02
 
@@ -21,8 +21,8 @@ _LIE = 0.02
 class VideoTimestamps(NamedTuple):
     """Due times of a film that is repeated for ever; numbers are from 1.
 
-    rate_hz: pictures a second, the mean where they come unevenly
-    starts_s: due time of each picture of one showing, or () where the rate says it all
+    rate_hz: frames a second, the mean where they come unevenly
+    starts_s: due time of each frame of one showing, or () where the rate says it all
     length_s: of one showing, where there is a table
     note: what a person should know, or ""
     """
@@ -33,14 +33,14 @@ class VideoTimestamps(NamedTuple):
     note: str = ""
 
     def due_s(self, number: int) -> float:
-        """Return the film time at which a picture is due."""
+        """Return the film time at which a frame is due."""
         if not self.starts_s:
             return (number - 1) / self.rate_hz
         showing, index = divmod(number - 1, len(self.starts_s))
         return showing * self.length_s + self.starts_s[index]
 
     def number_at(self, film_s: float) -> int:
-        """Return the number of the newest picture at a film time; below 1 before the first."""
+        """Return the number of the newest frame at a film time; below 1 before the first."""
         if not self.starts_s:
             number = int(film_s * self.rate_hz) + 1
         else:
@@ -56,7 +56,7 @@ class VideoTimestamps(NamedTuple):
 
 
 def even(times_s: Sequence[float], rate_hz: float) -> bool:
-    """Return whether pictures come at a rate, but for rounding; too few are taken as even."""
+    """Return whether frames come at a rate, but for rounding; too few are taken as even."""
     if len(times_s) < _LEAST:
         return True
     off = np.asarray(times_s) - times_s[0] - np.arange(len(times_s)) / rate_hz
@@ -66,7 +66,7 @@ def even(times_s: Sequence[float], rate_hz: float) -> bool:
 def rising(times_s: Sequence[float]) -> list[float]:
     """Return the times with those that do not rise put right; [] where few do.
 
-    The last picture of a film often carries none.
+    The last frame of a film often carries none.
     """
     steps = [b - a for a, b in zip(times_s, times_s[1:], strict=False) if b > a]
     if len(steps) < len(times_s) // 2:
@@ -78,7 +78,7 @@ def rising(times_s: Sequence[float]) -> list[float]:
 
 
 def measured_rate_hz(times_s: Sequence[float]) -> float | None:
-    """Return the rate at which pictures come if they come evenly, else None."""
+    """Return the rate at which frames come if they come evenly, else None."""
     if len(times_s) < _LEAST:
         return None
     rate_hz = (len(times_s) - 1) / (times_s[-1] - times_s[0])
@@ -86,7 +86,7 @@ def measured_rate_hz(times_s: Sequence[float]) -> float | None:
 
 
 def at_a_rate(stated_hz: float, note: str, times_s: Sequence[float]) -> VideoTimestamps | None:
-    """Judge by the first pictures; None where they come unevenly.
+    """Judge by the first frames; None where they come unevenly.
 
     stated_hz, note: the rate to use by what the container says, and what was assumed for it
     """
@@ -105,7 +105,7 @@ def at_a_rate(stated_hz: float, note: str, times_s: Sequence[float]) -> VideoTim
 
 
 def by_table(times_s: Sequence[float]) -> VideoTimestamps:
-    """Return the times as they are; the last picture stays as long as most do."""
+    """Return the times as they are; the last frame stays as long as most do."""
     starts = tuple(t - times_s[0] for t in times_s)
     last_s = median(b - a for a, b in zip(starts, starts[1:], strict=False))
     length_s = starts[-1] + last_s

@@ -13,12 +13,12 @@ from gazerig.drivers.camera.quiet_opencv import quiet_opencv
 from gazerig.drivers.camera.source import Shot, bgr
 from gazerig.drivers.errors import CameraError
 
-# Pictures in a row that may fail before the camera counts as gone; one fails now and
+# Frames in a row that may fail before the camera counts as gone; one fails now and
 # then where a cable is long.
 _MOST_FAILURES = 5
 # The kernel's stamp is believed if it is this young on the same clock.
 _OLDEST_STAMP_S = 1.0
-# OpenCV waits 10 s for a picture unless told otherwise; it reads this once.
+# OpenCV waits 10 s for a frame unless told otherwise; it reads this once.
 _PATIENCE = ("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "2")
 
 
@@ -43,14 +43,14 @@ class Webcam:
         """Name the camera and what is asked of it; it gives what comes nearest.
 
         capture: opens a device file; another one serves where there is no camera
-        latency_s: from the middle of the exposure to the stamp of the picture
+        latency_s: from the middle of the exposure to the stamp of the frame
         """
         self._file = Path(f"/dev/video{device}" if isinstance(device, int) else device)
         self._wishes = {
             cv2.CAP_PROP_FRAME_WIDTH: width_px,
             cv2.CAP_PROP_FRAME_HEIGHT: height_px,
             cv2.CAP_PROP_FPS: rate_hz,
-            # One buffer: a picture fetched late is a fresh one, not an old one kept.
+            # One buffer: a frame fetched late is a fresh one, not an old one kept.
             cv2.CAP_PROP_BUFFERSIZE: 1,
         }
         self._open_capture = capture
@@ -68,10 +68,10 @@ class Webcam:
         return cls(device, *size, params.rate_hz, latency_s=params.latency_ms / 1e3)
 
     def open(self) -> None:
-        """Open the camera and fetch one picture as a proof.
+        """Open the camera and fetch one frame as a proof.
 
         Raises:
-            CameraError: it is absent, forbidden, busy or gives no picture.
+            CameraError: it is absent, forbidden, busy or gives no frame.
         """
         self.close()
         self._check_file()
@@ -91,10 +91,10 @@ class Webcam:
         self._left_s = None
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
-        """Wait for the next picture; its time is the kernel's stamp, else that of its arrival.
+        """Wait for the next frame; its time is the kernel's stamp, else that of its arrival.
 
         Raises:
-            CameraError: the camera is not open or gives no more pictures.
+            CameraError: the camera is not open or gives no more frames.
         """
         if self._capture is None:
             raise CameraError(f"camera {self._file} is not open: call open() before taking")
@@ -105,8 +105,8 @@ class Webcam:
             if not self._capture.grab():
                 continue
             arrived_s = now_s()
-            found, picture = self._capture.retrieve()
-            pixels = bgr(picture) if found and picture is not None else None
+            found, image = self._capture.retrieve()
+            pixels = bgr(image) if found and image is not None else None
             if pixels is not None:
                 captured_s = self._stamp_s(self._capture, arrived_s)
                 self._watch_rate(captured_s, came_s)
@@ -143,7 +143,7 @@ class Webcam:
             )
 
     def _watch_rate(self, captured_s: float, came_s: float) -> None:
-        """Compare the times of pictures with the rate that the camera states."""
+        """Compare the times of frames with the rate that the camera states."""
         away_s = 0.0 if self._left_s is None else came_s - self._left_s
         line = self._rate.update(captured_s, away_s)
         if line:
@@ -151,6 +151,6 @@ class Webcam:
 
     @staticmethod
     def _stamp_s(capture: cv2.VideoCapture, arrived_s: float) -> float:
-        """Return the kernel's stamp of the last picture where it is on our clock."""
+        """Return the kernel's stamp of the last frame where it is on our clock."""
         stamp_s = capture.get(cv2.CAP_PROP_POS_MSEC) / 1000.0
         return stamp_s if 0.0 <= arrived_s - stamp_s <= _OLDEST_STAMP_S else arrived_s

@@ -1,4 +1,4 @@
-"""The process that looks at pictures, from its start to its end (see ``process``)."""
+"""The process that looks at frames, from its start to its end (see ``process``)."""
 
 import os
 import signal
@@ -37,10 +37,10 @@ class CameraParts(NamedTuple):
 
 
 class Found(NamedTuple):
-    """What the process tells of a picture."""
+    """What the process tells of a frame."""
 
-    detections: Detections  # without picture and depth
-    picture: SlotAddress | None
+    detections: Detections  # without frame and depth
+    image: SlotAddress | None
     depth: SlotAddress | None
 
 
@@ -64,13 +64,13 @@ class Ended(NamedTuple):
 def run(
     pipe: Connection, parts: CameraParts, now_s: Callable[[], float], care: CameraRecoveryParams
 ) -> None:
-    """Be the process: open, look, tell, until told to stop or the other side is gone."""
+    """Be the process: open, look, tell, until stopped or the other side is gone."""
     # Ctrl-C reaches all processes of a terminal; it is the loop's to end this one.
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     os.nice(NICE)
     # One processor stays the loop's: with all of them in OpenCV's hands the loop is later, and
-    # no more pictures are looked at.
+    # no more frames are looked at.
     cv2.setNumThreads(max(1, (os.cpu_count() or 1) - 1))
     try:
         motion = parts.motion() if parts.motion is not None else None
@@ -99,11 +99,11 @@ def run(
 
 
 def _told(found: Detections, slots: tuple[SlotWriter, SlotWriter]) -> Found:
-    """Put picture and depth into shared memory, and the rest into words."""
-    picture, depth = found.picture, found.depth_m
+    """Put frame and depth into shared memory, and the rest into words."""
+    image, depth = found.image, found.depth_m
     return Found(
-        replace(found, picture=None, depth_m=None),
-        slots[0].put(picture) if picture is not None else None,
+        replace(found, image=None, depth_m=None),
+        slots[0].put(image) if image is not None else None,
         slots[1].put(depth) if depth is not None else None,
     )
 

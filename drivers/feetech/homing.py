@@ -17,7 +17,7 @@ NEAR_STEPS = 8
 
 
 def set_middle(port: BusPort, family: Family, servo_id: int) -> int:
-    """Let a limp servo call its present place 2048; gives the offset it has now, in steps.
+    """Let a servo without torque call its present place 2048; return its offset in steps.
 
     Raises:
         ServoMissing: it does not answer.

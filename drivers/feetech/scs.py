@@ -3,7 +3,7 @@
 They speak the packets of the STS series with the high byte of two first. Their position comes from
 a potentiometer of 1024 steps over less than a turn, so no position is ambiguous. They have neither
 sync read (each is asked by itself), nor an offset, nor a torque limit that is not kept, nor a
-present current. What is marked [A] is assumed: no public document tells.
+present current. What is marked [A] is assumed: not documented.
 Sources: Feetech, SCSCL of its SDK (addresses); rustypot's table of the SCS0009.
 """
 

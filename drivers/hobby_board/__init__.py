@@ -1,1 +1,1 @@
-"""Boards that send pulses to hobby servos, which tell nothing: what they share."""
+"""Boards that send pulses to hobby servos, which give no feedback: what they share."""

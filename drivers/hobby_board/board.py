@@ -35,9 +35,9 @@ class BoardTexts(NamedTuple):
     """What people are told of a make of board.
 
     name: of the board, with its number or address
-    no_pulses, other_pulse: the cure where a channel gives no pulses, or others than it is sent
-    noise: the cure where its line is disturbed
-    no_answer: the cure where it does not answer
+    no_pulses, other_pulse: the remedy where a channel gives no pulses, or others than it is sent
+    noise: the remedy where its line is disturbed
+    no_answer: the remedy where it does not answer
     left_alone: what it does that cannot be reached any more
     """
 
@@ -135,7 +135,7 @@ class Board(Protocol):
         ...
 
     def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
-        """Return what channels give now, beyond doubt; None where that did not succeed."""
+        """Return what channels give now, confirmed; None where that did not succeed."""
         ...
 
     def send_limits(self, channels: Sequence[Channel], confirmed: bool) -> bool:

@@ -1,4 +1,4 @@
-"""Hobby servos behind a board that tells nothing of them: a short question and goals in every tick.
+"""Hobby servos behind a board without feedback: a short request and goals in every tick.
 
 What such a board cannot do, and so this bus cannot promise:
 
@@ -215,7 +215,7 @@ class HobbyBoardBus(PortBus):
     # --- reading
 
     def _watch(self, now_s: float) -> bool:
-        """Ask the board, where that is due; tells whether it is known to be alive."""
+        """Ask the board, where that is due; return whether it is known to be alive."""
         if self._supervisor.sure and now_s - self._heard_s < self._board.timing.watch_s:
             self._supervisor.advance(self._port.now_s())
             self._supervisor.lead()
@@ -233,7 +233,7 @@ class HobbyBoardBus(PortBus):
         return True
 
     def _wake(self, now_s: float) -> bool:
-        """Ask a board that has long been silent; it may have to detect its baud rate anew."""
+        """Ask a board that has long been silent; it may have to detect its baud rate again."""
         errors = self._board.wake()
         if errors is None:
             self._silence.miss(now_s, self._any_byte_s(now_s))
@@ -264,7 +264,7 @@ class HobbyBoardBus(PortBus):
     # --- a port that goes away
 
     def _reset_trust(self) -> None:
-        """Begin anew with a port that was away."""
+        """Begin again with a port that was away."""
         self._supervisor.mark_all_for_recovery()
 
     def _switch_off(self) -> ReleaseResult:

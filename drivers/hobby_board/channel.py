@@ -17,12 +17,12 @@ FINE_STEPS = 8
 
 
 class Channel:
-    """A servo that tells nothing; its place is what the ramp computes.
+    """A servo that gives no feedback; its place is what the ramp computes.
 
     on: it gives pulses, as far as known
     held: it follows the goals that are written
     entering: it is on its slow way into its limits
-    rearmed: it was taken hold of anew, which nobody has been told yet
+    rearmed: it was enabled again, not yet reported
     fault: why it stays without pulses; "" where nothing is wrong
     told: a person has been told that it does not give the pulses it should
     sent_steps: the pulse that it was sent last, where the driver leads it
@@ -80,7 +80,7 @@ class Channel:
         return self.setup.max_speed_steps_s
 
     def start(self, pulse_steps: int, now_s: float) -> int:
-        """Begin to hold: at its pulse, or where there is none at its last place; gives the goal."""
+        """Hold at the present pulse, or at the last position if there is none; return the goal."""
         self.goal_steps = self.clip(pulse_steps or round(self.ramp.shaft_steps))
         self.entering = pulse_steps not in (0, self.goal_steps)
         if not (self.on and pulse_steps):
@@ -94,21 +94,21 @@ class Channel:
         return self.goal_steps
 
     def hold(self) -> None:
-        """Note that it holds its goal and follows others."""
+        """Record that it holds its goal and follows others."""
         self.held = self._placed = True
 
     def release(self) -> None:
-        """Note that it follows no goals any more; its pulses may go on."""
+        """Record that it follows no goals any more; its pulses may go on."""
         self.held = self.entering = self.rearmed = False
 
     def stop(self) -> None:
-        """Note that it gives no pulses: its servo is limp."""
+        """Record that it gives no pulses: its servo has no torque."""
         self.release()
         self.on = False
         self.ramp.stop()
 
     def aim(self, goal_steps: int, now_s: float) -> None:
-        """Note a goal that was sent."""
+        """Record a goal that was sent."""
         self.advance(now_s)
         self._recent.append((now_s, self.goal_steps))
         self._forget(now_s)
@@ -170,7 +170,7 @@ class Channel:
         self.gives(pulse_steps)
 
     def confirmed(self, pulse_steps: int) -> None:
-        """Note that it gives a pulse as expected.
+        """Record that it gives a pulse as expected.
 
         One that the driver leads is farther by now than what it was sent last.
         """
@@ -178,7 +178,7 @@ class Channel:
             self.found(pulse_steps)
 
     def gives(self, pulse_steps: int) -> None:
-        """Note the pulse that it gives, whatever its goal is."""
+        """Record the pulse that it gives, whatever its goal is."""
         self.on = pulse_steps > 0
         if self.on:
             self.ramp.found(pulse_steps)
@@ -186,7 +186,7 @@ class Channel:
             self.ramp.stop()
 
     def off_goal(self, pulse_steps: int) -> bool:
-        """Note where a goal has ended; gives whether that is elsewhere, twice at the same pulse."""
+        """Record where a move has ended; return whether it ended off goal twice at one pulse."""
         before, self._end_steps = self._end_steps, pulse_steps
         short = self.goal_steps - pulse_steps
         self._bottom = -inf
@@ -212,12 +212,12 @@ class Channel:
         return self.setup.min_steps <= self.ramp.pulse_steps <= self.setup.max_steps
 
     def rearm(self) -> None:
-        """Note that it was taken hold of anew: plans begin at its pulse."""
+        """Record that it was enabled again: plans begin at its pulse."""
         self.rearmed = True
         self.ramp.shaft_steps = self.ramp.pulse_steps
 
     def take_rearmed(self) -> bool:
-        """Return whether plans must begin at its pulse; after being taken hold of, once."""
+        """Return whether plans must begin at its pulse; after it was enabled, once."""
         anew, self.rearmed = self.rearmed, False
         return anew or self.entering
 

@@ -12,7 +12,7 @@ from gazerig.drivers.hobby_board.models import US_STEPS, channel_label
 
 
 class Outcome(Enum):
-    """What came of taking hold: it is held, nobody answered, or it gives another pulse."""
+    """The result of enabling a channel: it is held, no answer, or it gives another pulse."""
 
     HELD = "held"
     MUTE = "mute"

@@ -12,7 +12,7 @@ US_STEPS = 4
 
 
 class HobbyModel(NamedTuple):
-    """A hobby servo: its shaft turns with the pulse width, and it tells nothing.
+    """A hobby servo: its shaft turns with the pulse width, and it gives no feedback.
 
     steps_per_turn: quarter microseconds that would be one turn
     lowest, highest: pulse widths that such servos take, quarter microseconds

@@ -29,17 +29,17 @@ class Ramp:
         self.begin(place_steps)
 
     def begin(self, pulse_steps: float) -> None:
-        """Note that pulses begin, or are found to be, at a width; the shaft stays."""
+        """Record that pulses begin, or are found to be, at a width; the shaft stays."""
         self.pulse_steps = pulse_steps
         self.shaft_steps_s = 0.0
         self._pulse_steps_s = 0.0
 
     def stop(self) -> None:
-        """Note that there are no pulses: the shaft is taken to stay where it is."""
+        """Record that there are no pulses: the shaft is taken to stay where it is."""
         self.begin(self.shaft_steps)
 
     def found(self, pulse_steps: float) -> None:
-        """Note the width that the board says it gives now."""
+        """Record the width that the board says it gives now."""
         self.pulse_steps = pulse_steps
 
     def longest_s(self, way_steps: float) -> float:

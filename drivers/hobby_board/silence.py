@@ -34,7 +34,7 @@ class SilenceMonitor:
         return now_s >= self._due_s
 
     def miss(self, now_s: float, heard_s: float = -inf) -> None:
-        """Note an answer that stayed out, or could not be read; anything came last at heard_s."""
+        """Record an answer that stayed out, or could not be read; anything came last at heard_s."""
         if not self.missed:
             self._wait_s = AGAIN_FIRST_S
             if self._back_s is None:
@@ -55,7 +55,7 @@ class SilenceMonitor:
             )
 
     def answer(self, now_s: float) -> None:
-        """Note an answer."""
+        """Record an answer."""
         if self.missed:
             self.missed, self._due_s, self._back_s = 0, -inf, now_s
         if self._back_s is None or now_s - self._back_s < OWED_S:

@@ -64,14 +64,14 @@ class BoardSupervisor:
             channel.release()
 
     def mark_all_for_recovery(self) -> None:
-        """Trust no channel to be as it was left: each is taken hold of anew."""
+        """Trust no channel to be as it was left: each is enabled again."""
         self._unsure = True
         if self.engaged:
             for channel in self._channels:
                 self._drop(channel)
 
     def record_errors(self, names: Sequence[str], now_s: float) -> None:
-        """Note what the board has reported."""
+        """Record what the board has reported."""
         for name in names:
             self._line.errors[name] += 1
             if now_s - self._errors_s.get(name, -inf) >= SAME_S:
@@ -142,7 +142,7 @@ class BoardSupervisor:
         return True
 
     def _check_all(self) -> bool:
-        """Compare every channel's pulse with what it should be; tells whether they came."""
+        """Compare every channel's pulse with what it should be; return whether they came."""
         pulses = self._board.pulses([channel.id for channel in self._channels])
         if pulses is None:
             self._unsure = True
@@ -174,7 +174,7 @@ class BoardSupervisor:
         return True
 
     def _restore(self) -> None:
-        """Arm the limits anew, which a restart forgets, then send the goals in force.
+        """Arm the limits again, which a restart forgets, then send the goals in force.
 
         A board that leads its channels home at their armed speed has not yet gone far. A goal
         to a channel that an error has just left without pulses would not be ramped: goals are
@@ -189,7 +189,7 @@ class BoardSupervisor:
         self._board.send_goals(held)
 
     def _off_goal(self, channel: Channel, pulse: int) -> None:
-        """Note that a channel stays elsewhere: it meets an end of the board's own range."""
+        """Record that a channel stays elsewhere: it meets an end of the board's own range."""
         if self._led:
             # Boards that are led have no range of their own: what was sent was lost.
             self._line.errors["other pulse"] += 1
@@ -201,7 +201,7 @@ class BoardSupervisor:
             self._log.add(refusal(self._board, channel))
 
     def _lost_hold(self, lost: Sequence[Channel], errors: Sequence[str], now_s: float) -> None:
-        """Note that channels are not where they were sent, and that they are to be held anew."""
+        """Record that channels are not where they were sent, and that they are to be held again."""
         named = " and ".join(errors)
         who = (
             "the board"
@@ -230,7 +230,7 @@ class BoardSupervisor:
         return now_s - self._damaged_s < WITHIN_S
 
     def _wait_for_quiet(self, who: str, named: str, now_s: float) -> None:
-        """Hold anew who was sent home by noise: at once, but ever later where it does not end.
+        """Hold again who was sent home by noise: at once, but ever later where it does not end.
 
         Without pulses nothing moves; a servo that is held and let go all the time jerks.
         """

@@ -48,7 +48,7 @@ class I2cPort:
     Args:
         port_name: its path, e.g. /dev/i2c-1.
         exclusive: no other program of this kind may use it meanwhile; sensors' may.
-        on_traffic: called whenever bytes are sent or waited for, None where nobody asks.
+        on_traffic: called whenever bytes are sent or waited for; None if not needed.
         open_bus: opens it.
     """
 
@@ -140,7 +140,7 @@ class I2cPort:
         """See that no driver of the kernel has taken an address for itself.
 
         Raises:
-            BusLost: so it is; the message says how to free it.
+            BusLost: it is; the message says how to free it.
         """
         if self._bus.fd is None or address in self._checked:
             return

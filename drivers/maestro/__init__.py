@@ -1,1 +1,1 @@
-"""A Pololu Maestro and the hobby servos behind it, which tell nothing."""
+"""A Pololu Maestro and the hobby servos behind it, which give no feedback."""

@@ -109,12 +109,12 @@ class MaestroBoard:
         return ChannelStatus(pulse, name_errors(register | self.line.unheard()))
 
     def wake(self) -> tuple[str, ...] | None:
-        """Ask a board that may have to detect its baud rate anew; None: no answer."""
+        """Ask a board that may have to detect its baud rate again; None: no answer."""
         register = self.line.wake()
         return None if register is None else name_errors(register)
 
     def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
-        """Return what channels give now, beyond doubt; None where that did not succeed."""
+        """Return what channels give now, confirmed; None where that did not succeed."""
         return self.line.pulses(channels)
 
     def send_limits(self, channels: Sequence[Channel], confirmed: bool) -> bool:

@@ -53,7 +53,7 @@ class MaestroLink:
         self.tx_bytes += len(packet)
 
     def ask(self, packet: bytes, length: int) -> bytes | None:
-        """Send questions and give their answers; None where they do not come in time."""
+        """Send questions and return their answers; None where they do not come in time."""
         port = self.port
         if self._late or self._owed:
             # After a silence the answer to an older question may come first, and more behind it.
@@ -89,7 +89,7 @@ class MaestroLink:
         return found
 
     def send_checked(self, packet: bytes) -> bool:
-        """Send commands, and tell whether the board has found no error up to their end.
+        """Send commands and return whether the board has found no error up to their end.
 
         On an error it may have stopped all pulses: what moves a servo must not come behind.
         """

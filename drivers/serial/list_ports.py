@@ -157,7 +157,7 @@ def latency_ms(file: Path) -> int | None:
 
 
 def set_latency(file: Path, ms: int = WISHED_LATENCY_MS) -> bool:
-    """Write a latency timer; tells whether the adaptor has it now. Needs the right to write."""
+    """Write a latency timer; return whether the adaptor has it now. Needs the right to write."""
     try:
         file.write_text(f"{ms}\n", encoding="ascii")
     except OSError:

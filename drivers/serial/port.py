@@ -86,7 +86,7 @@ class BusPort(Protocol):
         ...
 
     def drain(self) -> int:
-        """Throw away what arrives until the line is quiet; gives the number of bytes.
+        """Throw away what arrives until the line is quiet; return the number of bytes.
 
         Raises:
             BusLost: the port is gone.
@@ -100,7 +100,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
     Args:
         port_name: its path.
         exclusive: opened for this program alone; False: beside the program that has it open.
-        on_traffic: called whenever bytes are sent or waited for, None where nobody asks.
+        on_traffic: called whenever bytes are sent or waited for; None if not needed.
         by_id: folder of names that adaptors keep, None for the system's.
 
     opened_as: the path that was opened last: an adaptor may come back under another name
@@ -176,7 +176,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return got
 
     def drain(self) -> int:
-        """Throw away what arrives until nothing came for 3 ms; gives the number of bytes.
+        """Throw away what arrives until nothing came for 3 ms; return the number of bytes.
 
         Raises:
             BusLost: the port is gone.
@@ -302,7 +302,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return self.read_until(length, self._deadline_s)
 
     def writePort(self, packet: bytes | list[int]) -> int:
-        """Send bytes; gives their number."""
+        """Send bytes; return their number."""
         self.write(bytes(packet))
         return len(packet)
 

@@ -1,4 +1,4 @@
-"""A port that may be unplugged while in use: noted, tried again now and then, opened anew."""
+"""A port that may be unplugged while in use: noted, tried again now and then, opened again."""
 
 from collections.abc import Callable
 
@@ -22,7 +22,7 @@ class Reconnect:
         self._wait_s = FIRST_S
 
     def lost(self, now_s: float) -> None:
-        """Note that the port went away."""
+        """Record that the port went away."""
         self.down = True
         self._since_s, self._wait_s = now_s, FIRST_S
         self._next_s = now_s + FIRST_S
@@ -32,12 +32,12 @@ class Reconnect:
         return now_s >= self._next_s
 
     def failed(self, now_s: float, longest_s: float = LAST_S) -> None:
-        """Note an attempt in vain; the next one comes within ``longest_s``."""
+        """Record an attempt in vain; the next one comes within ``longest_s``."""
         self._wait_s = min(longest_s, 2.0 * self._wait_s)
         self._next_s = now_s + self._wait_s
 
     def back(self, now_s: float) -> float:
-        """Note that the port is open again; gives for how long it had been gone."""
+        """Record that the port is open again; return for how long it had been gone."""
         self.down = False
         return now_s - self._since_s
 
@@ -54,7 +54,7 @@ class ReconnectingPort:
         baud: bit/s to open it with.
         give_up_s: it may stay away for so long.
         log: where its going and coming is told.
-        anew: called when it is open again: nobody on it may be trusted.
+        again: called when it is open again: nobody on it may be trusted.
 
     down: the port is gone
     release_due: torque has to be taken off as soon as the port is there, before all else; set
@@ -75,14 +75,14 @@ class ReconnectingPort:
         self.down = self.release_due = False
 
     def lose(self, lost: BusLost, now_s: float) -> None:
-        """Note that the port is gone."""
+        """Record that the port is gone."""
         self._link.lost(now_s)
         self.down = True
         self._port.closePort()
         self._log.add(f"port lost: {lost}")
 
     def returned(self, now_s: float) -> bool:
-        """Try to open the port again where that is due; tell whether it is open.
+        """Try to open the port again where that is due; return whether it is open.
 
         Raises:
             BusLost: it has been gone for longer than ``give_up_s``.
@@ -103,17 +103,17 @@ class ReconnectingPort:
         return False
 
     def refused_release(self) -> None:
-        """Note that torque could not be taken off: it is as soon as the port is back."""
+        """Record that torque could not be taken off: it is as soon as the port is back."""
         self.release_due = True
 
     def released(self) -> None:
-        """Note that torque was taken off on everything that answers."""
+        """Record that torque was taken off on everything that answers."""
         if self.release_due:
             self._log.add("torque switched off, as was asked for while the port was gone")
         self.release_due = False
 
     def open_once_more(self, now_s: float) -> bool:
-        """Try to open the port now, whether it is due or not; tell whether it is open."""
+        """Try to open the port now, whether it is due or not; return whether it is open."""
         if not self._open():
             return False
         self._link.back(now_s)

@@ -366,7 +366,7 @@ class SmartServoBus(PortBus):
             )
 
     def _reset_after_reconnect(self) -> None:
-        """Begin anew with a port that was away."""
+        """Begin again with a port that was away."""
         self._poll_list = self._reader.poll_list = PollList(self._ids)
         self._line.starved = False
         self._supervisor.mark_all_for_recovery()

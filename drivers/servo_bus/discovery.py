@@ -285,7 +285,7 @@ def _message(
     strangers: Mapping[int, Identity],
     found: Mapping[int, Identity | None],
 ) -> str:
-    """Return everything in one line, with the cure."""
+    """Return everything in one line, with the remedy."""
     there = "; ".join(problems)
     if strangers:
         named = ", ".join(

@@ -170,7 +170,7 @@ class PassingFaultSupervisor(Supervisor):
         """On a disturbed line compare one servo's settings, the next at the next time.
 
         An order that noise has changed may pass the sum of one byte and be written anywhere:
-        limits, gains, mode. A servo that differs is set up anew, softly.
+        limits, gains, mode. A servo that differs is set up again, softly.
 
         Raises:
             BusLost: the port is gone.

@@ -1,6 +1,6 @@
 """Bringing servos back that have restarted, or whose bus had been gone.
 
-Nothing of what they were told before is trusted: settings are compared anew, the goal
+Nothing of what they were told before is trusted: settings are compared again, the goal
 becomes the present position, and only then comes the torque.
 """
 

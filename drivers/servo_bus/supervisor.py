@@ -170,7 +170,7 @@ class Supervisor(ABC):
     # --- marks on answers
 
     def _mark_rearmed(self) -> None:
-        """Mark the first answer of servos whose torque came on anew."""
+        """Mark the first answer of servos whose torque came on again."""
         for servo_id in tuple(self._rearmed):
             slot = self._slot[servo_id]
             if self._feedback.position(slot) is not None:

@@ -67,9 +67,9 @@ def _send_goals(line: Transactions, wanted: Mapping[int, tuple[int, int]]) -> No
 def _ask_goals(
     line: Transactions, present: Mapping[int, tuple[int, int]], ids: Sequence[int]
 ) -> dict[int, tuple[int, int]]:
-    """Read goals and their speeds; one that went with a limp servo's place counts as its own.
+    """Read goals and goal speeds; a goal that has only followed the shaft counts as the wanted one.
 
-    present: place and goal of limp servos
+    present: position and wanted goal of servos without torque
     """
     goal, speed = (line.family.registers[name] for name in ("goal_position", "goal_speed"))
     span = speed.address + speed.size - goal.address
@@ -77,7 +77,7 @@ def _ask_goals(
     for i, data in line.ask_bytes(ids, goal.address, span).items():
         steps = goal.decode(data[: goal.size])
         place, wanted = present.get(i, (steps, steps))
-        # Where a limp servo's goal goes with its place, nothing can leap either.
+        # The goal of a servo without torque may follow its shaft: then nothing can jump either.
         near = abs(steps - place) <= STILL_STEPS
         found[i] = wanted if near else steps, speed.decode(data[-speed.size :])
     return found
@@ -191,7 +191,7 @@ def find_faults(line: Transactions, ids: Sequence[int]) -> dict[int, int]:
 def rearm_tripped(
     line: Transactions, ids: Sequence[int], watchdog: int, clip: Callable[[int, int], int]
 ) -> tuple[int, ...]:
-    """Return servos whose bus watchdog has tripped their present position as goal and arm it anew.
+    """Return servos whose bus watchdog has tripped their present position as goal and arm it again.
 
     A tripped servo stands still and refuses goals. ``clip(id, steps)`` keeps a goal inside
     the limits. Returns the servos that were healed.

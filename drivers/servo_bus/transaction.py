@@ -86,7 +86,7 @@ class Transactions:
         self.tx_bytes += len(packet)
 
     def exchange(self, request: bytes, length: int, reserve: bool = True) -> tuple[bytes, float]:
-        """Send a request, wait for ``length`` bytes; gives what came, and when.
+        """Send a request, wait for ``length`` bytes; return what came, and when.
 
         The wait ends as the time-out does, beyond the time the bytes take on the wire.
 
@@ -136,7 +136,7 @@ class Transactions:
         return raw
 
     def drain(self, quiet_s: float = QUIET_S) -> int:
-        """Throw away what arrives until the line is quiet; gives the number of bytes.
+        """Throw away what arrives until the line is quiet; return the number of bytes.
 
         Gives up on a line that never falls silent.
         """
@@ -194,7 +194,7 @@ class Transactions:
         self.send(self.family.codec.sync_write(ids, register.address, register.size, rows))
 
     def _ask(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
-        """Read the same bytes of several servos once; gives those of who answered well."""
+        """Read the same bytes of several servos once; return those of who answered well."""
         found: dict[int, bytes] = {}
         alone = not self.family.sync_read
         # Where a question's echo looks like an answer the answer must be of another length.

@@ -2,7 +2,7 @@
 
 The encoder knows its place within one turn; a joint whose range lies near the encoder's
 zero can stand on the other side of it, at 4090 where -6 is meant, and a servo that counts
-turns may have counted some while the joint was limp. What the joint is told is the place
+turns may have counted some while the torque was off. What the joint is told is the place
 nearest to its range. The servo itself would go the other way round: it must not.
 """
 

@@ -144,7 +144,7 @@ class _MotionOfDrawn:
             if before is not None and self._detector.before_s is not None
             else None
         )
-        return self._detector.find(shot.picture, shot.captured_s, lens, turned, shot.depth_m)
+        return self._detector.find(shot.image, shot.captured_s, lens, turned, shot.depth_m)
 
 
 FindMotion = Callable[[Exposure, Intrinsics], tuple[MovingBlob, ...]]

@@ -83,7 +83,7 @@ class LensSteps:
         Raises:
             CameraError: the pictures have changed their size.
         """
-        height, width = shot.picture.shape[:2]
+        height, width = shot.image.shape[:2]
         if self._collector is None:
             self._size = (width, height)
             guess = intrinsics_of_view(self._view_rad, width, height)
@@ -93,7 +93,7 @@ class LensSteps:
                 f"the camera changed from {self._size[0]} x {self._size[1]} to {width} x {height} "
                 "pixels: a lens is measured on pictures of one size; begin anew"
             )
-        seen = self._board.find(shot.picture)
+        seen = self._board.find(shot.image)
         why = self._collector.offer(seen)
         corners = 0 if seen is None else len(seen.ids)
         return LensStep(shot.number, corners, not why, why, self._collector.coverage)
@@ -236,7 +236,7 @@ def _seen_at_rest(
         if max(abs(a - b) for a, b in zip(before, after, strict=True)) > radians(params.still_deg):
             why = "the head does not hold still"
             continue
-        seen = board.find(shot.picture)
+        seen = board.find(shot.image)
         if seen is None:
             why = "no board seen"
             continue

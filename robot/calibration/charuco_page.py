@@ -8,7 +8,7 @@ from PIL import Image
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_output import output_file
-from gazerig.drivers.types import Picture
+from gazerig.drivers.types import ImageArray
 from gazerig.robot.model.charuco_board import CharucoBoard
 
 PAPERS_MM: dict[str, tuple[float, float]] = {"a4": (297.0, 210.0), "letter": (279.4, 215.9)}
@@ -25,7 +25,7 @@ _EDGE_MM, _STRIP_MM = 5.0, 13.0
 _BLACK = 0
 
 
-def page(board: CharucoBoard, paper: str) -> Picture:
+def page(board: CharucoBoard, paper: str) -> ImageArray:
     """Draw the page: (h, w) grey, 12 px a millimetre.
 
     Raises:
@@ -72,7 +72,7 @@ def write_page(board: CharucoBoard, paper: str, out: Path, force: bool = False) 
             image.save(file, format="PNG", dpi=(_DPI, _DPI))
 
 
-def _ruler(sheet: Picture, left: int, top: int) -> None:
+def _ruler(sheet: ImageArray, left: int, top: int) -> None:
     """Draw a line of 100 mm with a mark every 10 mm; its length is that between outer edges."""
     mm = _PX_PER_MM
     sheet[top : top + 3, left : left + RULER_MM * mm] = _BLACK
@@ -82,7 +82,7 @@ def _ruler(sheet: Picture, left: int, top: int) -> None:
         sheet[top : top + high, start : start + 3] = _BLACK
 
 
-def _text(sheet: Picture, left: int, top: int, board: CharucoBoard) -> None:
+def _text(sheet: ImageArray, left: int, top: int, board: CharucoBoard) -> None:
     """Write what to check to the right of the ruler."""
     par = board.params
     lines = (

@@ -18,7 +18,7 @@ from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.camera.webcam import Webcam
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.types import DetectedFace, Picture
+from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.robot.app.rig_limits import lid_ends, neck_span
 from gazerig.robot.calibration.camera_calibration import LensCalibration
 from gazerig.robot.calibration.camera_procedure import (
@@ -187,7 +187,7 @@ class _Eye(NamedTuple):
 class _NoFaces:
     """Stands where faces are looked for: a board has none."""
 
-    def find(self, _: Picture) -> tuple[DetectedFace, ...]:
+    def find(self, _: ImageArray) -> tuple[DetectedFace, ...]:
         """Find nothing."""
         return ()
 
@@ -205,9 +205,9 @@ def _eye(job: _Job, number: int, mock: bool, seed: int) -> Iterator[_Eye]:
 
     def look() -> Shot | None:
         found = thread.latest(clock.now_s())
-        if found is None or found.picture is None:
+        if found is None or found.image is None:
             return None
-        return Shot(found.captured_s, found.number, found.picture)
+        return Shot(found.captured_s, found.number, found.image)
 
     thread.open()
     try:
@@ -257,7 +257,7 @@ def _mount(job: _Job, eye: _Eye, neck: Neck, camera: CameraParams, good: HandEye
     if camera.lens is None:
         raise SetupError("the lens is not measured yet: calibrate it first (--what lens or all)")
     shot = _first(job, eye)
-    height, width = shot.picture.shape[:2]
+    height, width = shot.image.shape[:2]
     if (camera.lens.width_px, camera.lens.height_px) != (width, height):
         raise SetupError(
             f"pictures are {width} x {height}, the lens was measured on {camera.lens.width_px} x "

@@ -5,7 +5,7 @@ from typing import cast
 import cv2
 import numpy as np
 
-from gazerig.drivers.types import Depth, DetectedFace, Detections, MovingBlob, Picture
+from gazerig.drivers.types import Depth, DetectedFace, Detections, ImageArray, MovingBlob
 
 PICTURE_WIDTH_PX = 320
 NEAREST_M, FARTHEST_M = 0.3, 6.0
@@ -23,11 +23,11 @@ Point = tuple[int, int]
 
 
 def draw_detections(
-    picture: Picture | None,
+    picture: ImageArray | None,
     detections: Detections,
     gaze_px: tuple[float, float] | None,
     focal_px: float,
-) -> Picture:
+) -> ImageArray:
     """Draw faces, landmarks, moving blobs and the gaze point into a small copy.
 
     picture: the camera's picture, or None where the source has none: a dark ground
@@ -46,22 +46,22 @@ def draw_detections(
     return drawn
 
 
-def ground(detections: Detections, depth: bool) -> Picture | None:
+def ground(detections: Detections, depth: bool) -> ImageArray | None:
     """Return what ``draw_detections`` is to draw on: the picture, or the depth as asked for.
 
     A camera that measures no depth gives its picture with words that say so.
     """
     if not depth:
-        return detections.picture
+        return detections.image
     if detections.depth_m is not None:
         return depth_picture(detections.depth_m)
     scale = min(1.0, PICTURE_WIDTH_PX / detections.width_px)
-    drawn = _small(detections.picture, detections, scale)
+    drawn = _small(detections.image, detections, scale)
     _write(drawn, "this camera measures no depth", (6, drawn.shape[0] - 8), _LANDMARK)
     return drawn
 
 
-def depth_picture(depth_m: Depth) -> Picture:
+def depth_picture(depth_m: Depth) -> ImageArray:
     """Return distances as colours, at most PICTURE_WIDTH_PX wide, with their scale at the foot.
 
     depth_m: (height, width), NaN where unknown, which is shown dark. Red is NEAREST_M or less,
@@ -80,7 +80,7 @@ def depth_picture(depth_m: Depth) -> Picture:
     return np.asarray(drawn, np.uint8)
 
 
-def _draw_scale(drawn: Picture) -> None:
+def _draw_scale(drawn: ImageArray) -> None:
     height, width = drawn.shape[:2]
     ramp = np.linspace(255, 0, width).astype(np.uint8)[None].repeat(_SCALE_PX, axis=0)
     foot = drawn[max(0, height - _SCALE_PX) :]
@@ -92,7 +92,7 @@ def _draw_scale(drawn: Picture) -> None:
         )  # fmt: skip
 
 
-def encode(picture: Picture) -> bytes:
+def encode(picture: ImageArray) -> bytes:
     """Encode a BGR picture as JPEG."""
     done, jpeg = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
     if not done:
@@ -100,17 +100,17 @@ def encode(picture: Picture) -> bytes:
     return jpeg.tobytes()
 
 
-def _small(picture: Picture | None, detections: Detections, scale: float) -> Picture:
+def _small(picture: ImageArray | None, detections: Detections, scale: float) -> ImageArray:
     width = max(1, round(detections.width_px * scale))
     height = max(1, round(detections.height_px * scale))
     if picture is None:
         return np.full((height, width, 3), _DARK_GROUND, np.uint8)
     if picture.shape[:2] == (height, width):
         return picture.copy()
-    return cast(Picture, cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA))
+    return cast(ImageArray, cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA))
 
 
-def _draw_face(drawn: Picture, face: DetectedFace, scale: float) -> None:
+def _draw_face(drawn: ImageArray, face: DetectedFace, scale: float) -> None:
     x, y, width, height = face.box_px
     corner = _pixel(x, y, scale)
     cv2.rectangle(drawn, corner, _pixel(x + width, y + height, scale), _FACE, 1, cv2.LINE_AA)
@@ -120,7 +120,7 @@ def _draw_face(drawn: Picture, face: DetectedFace, scale: float) -> None:
 
 
 def _draw_blob(
-    drawn: Picture, blob: MovingBlob, detections: Detections, focal_px: float, scale: float
+    drawn: ImageArray, blob: MovingBlob, detections: Detections, focal_px: float, scale: float
 ) -> None:
     x, y, z = blob.p_camera_m
     if z <= 0.0:  # behind the camera there is no pixel
@@ -133,12 +133,12 @@ def _draw_blob(
     _write(drawn, blob.kind, (centre[0] - radius, centre[1] - radius), _BLOB)
 
 
-def _draw_gaze(drawn: Picture, at: Point) -> None:
+def _draw_gaze(drawn: ImageArray, at: Point) -> None:
     cv2.circle(drawn, at, 7, _GAZE, 2, cv2.LINE_AA)
     cv2.circle(drawn, at, 2, _GAZE, -1, cv2.LINE_AA)
 
 
-def _write(drawn: Picture, text: str, at: Point, colour: tuple[int, int, int]) -> None:
+def _write(drawn: ImageArray, text: str, at: Point, colour: tuple[int, int, int]) -> None:
     above = (at[0], max(9, at[1] - 3))
     cv2.putText(drawn, text, above, cv2.FONT_HERSHEY_SIMPLEX, 0.35, colour, 1, cv2.LINE_AA)
 

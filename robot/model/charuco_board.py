@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.types import Picture
+from gazerig.drivers.types import ImageArray
 from gazerig.params import Bounds
 
 Floats = NDArray[np.float64]
@@ -89,7 +89,7 @@ class CharucoBoard:
         self.corners_m: Floats = np.array(self._board.getChessboardCorners(), dtype=np.float64)
         self.size_m = (par.columns * par.square_mm / 1e3, par.rows * par.square_mm / 1e3)
 
-    def find(self, picture: Picture) -> SeenBoard | None:
+    def find(self, picture: ImageArray) -> SeenBoard | None:
         """Find the board's inner corners, None where too few are seen.
 
         picture: (h, w), (h, w, 1), BGR or BGRA
@@ -105,7 +105,7 @@ class CharucoBoard:
         seen = SeenBoard(numbers, places, self.corners_m[numbers])
         return seen if _spread(seen.corners_board_m) and np.isfinite(places).all() else None
 
-    def picture(self, px_per_mm: float) -> Picture:
+    def picture(self, px_per_mm: float) -> ImageArray:
         """Draw the board itself, edge to edge, black on white.
 
         px_per_mm: squares and marker modules are exact where their sides are whole pixels
@@ -116,7 +116,7 @@ class CharucoBoard:
         return np.asarray(self._board.generateImage((width, height)), dtype=np.uint8)
 
 
-def _grey(picture: Picture) -> Picture | None:
+def _grey(picture: ImageArray) -> ImageArray | None:
     """Return a grey picture, None where there is none to speak of."""
     if picture.ndim not in (2, 3) or min(picture.shape[:2]) < 16:
         return None

@@ -43,13 +43,13 @@ class MotionSource:
         """Find what has moved since the picture before; nothing while not enabled."""
         if not self._enabled:
             return ()
-        height, width = shot.picture.shape[:2]
+        height, width = shot.image.shape[:2]
         lens = intrinsics_of_lens(self._lens, self._field_rad, width, height, shot.lens)
         before_s = self._detector.before_s
         turned: Floats | None = np.eye(3)
         if self._turns is not None:
             turned = None if before_s is None else self._turns.turned(shot.captured_s, before_s)
-        return self._detector.find(shot.picture, shot.captured_s, lens, turned, shot.depth_m)
+        return self._detector.find(shot.image, shot.captured_s, lens, turned, shot.depth_m)
 
 
 def motion_finder(

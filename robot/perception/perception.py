@@ -71,8 +71,8 @@ class Perception:
         self._residual = EgomotionResidual()
         self._percept: Percept | None = None
         self._number = 0
-        self.pictures = 0
-        self.pictures_with_face = 0
+        self.frames = 0
+        self.frames_with_face = 0
 
     def retune(
         self,
@@ -94,8 +94,8 @@ class Perception:
         if detections is None or detections.number == self._number:
             return self._percept
         self._number = detections.number
-        self.pictures += 1
-        self.pictures_with_face += bool(detections.faces)
+        self.frames += 1
+        self.frames_with_face += bool(detections.faces)
         t_s = detections.captured_s
         R, p = self._mount.pose(*poses.head_pose(t_s))
         faces, things = self._sightings(detections, R, p)

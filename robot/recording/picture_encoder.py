@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Iterator
 from math import inf
 
-from gazerig.drivers.types import Picture
+from gazerig.drivers.types import ImageArray
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.dashboard.camera_overlay import encode
 
@@ -25,7 +25,7 @@ class PictureEncoder:
         self._at_once = at_once
         self._due_s = -inf
         self._number = 0
-        self._slot: tuple[float, Picture] | None = None
+        self._slot: tuple[float, ImageArray] | None = None
         self._made: deque[tuple[float, bytes]] = deque()
         self._come = threading.Event()
         self._over = False
@@ -40,7 +40,7 @@ class PictureEncoder:
     def look(self, tick: Tick) -> None:
         """Encode the tick's frame if it is a new one and due."""
         found = tick.detections
-        if found is None or found.picture is None or found.number == self._number:
+        if found is None or found.image is None or found.number == self._number:
             return
         self._number = found.number
         if found.captured_s < self._due_s or self._every_s == inf:
@@ -50,9 +50,9 @@ class PictureEncoder:
         began_s = self._due_s if late_s < self._every_s else found.captured_s
         self._due_s = began_s + self._every_s - 1e-3
         if self._at_once:
-            self._made.append((found.captured_s, encode(found.picture)))
+            self._made.append((found.captured_s, encode(found.image)))
         else:
-            self._slot = (found.captured_s, found.picture)
+            self._slot = (found.captured_s, found.image)
             self._come.set()
 
     def taken(self) -> Iterator[tuple[float, bytes]]:

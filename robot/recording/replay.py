@@ -115,7 +115,7 @@ class Replay:
             self._missing = None
 
     def _show_picture(self, screen: Screen, at_s: float) -> None:
-        number = self._frames.picture_at(at_s)
+        number = self._frames.frame_at(at_s)
         if number is None or number == self._picture:
             return
         if screen.send(PICTURE + self._frames.picture(number)):

@@ -108,7 +108,7 @@ class SnapshotIndex:
         shown = replace(unpack(self.message(number)), trail=tuple(trail), events=tuple(events))
         return pack(shown)
 
-    def picture_at(self, at_s: float) -> int | None:
+    def frame_at(self, at_s: float) -> int | None:
         """Return the number of the picture in force at a time, None before the first."""
         number = bisect_right(self._picture_times, at_s + 1e-9) - 1
         return number if number >= 0 else None

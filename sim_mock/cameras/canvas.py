@@ -36,13 +36,13 @@ class TexturedQuad(NamedTuple):
 class Canvas:
     """What one camera sees from one place: colours and distances along its axis.
 
-    picture: (h, w, 3) BGR; depth_m: (h, w) float32, infinite where nothing was drawn
+    image: (h, w, 3) BGR; depth_m: (h, w) float32, infinite where nothing was drawn
     """
 
     def __init__(
         self, width_px: int, height_px: int, lens: Intrinsics, R_world_camera: Mat3, p_m: Vec3
     ) -> None:
-        self.picture: Bytes = np.zeros((height_px, width_px, 3), np.uint8)
+        self.image: Bytes = np.zeros((height_px, width_px, 3), np.uint8)
         self.depth_m = np.full((height_px, width_px), np.inf, np.float32)
         self.lens = lens
         self.R_world_camera = np.array(R_world_camera)
@@ -59,7 +59,7 @@ class Canvas:
         points = self.seen(points_world_m)
         if points[:, 2].min() > _NEAREST_M:
             fixed = np.rint((self._pixels(points)) * (1 << _SHIFT)).astype(np.int32)
-            cv2.fillPoly(self.picture, [fixed], colour, cv2.LINE_AA, _SHIFT)
+            cv2.fillPoly(self.image, [fixed], colour, cv2.LINE_AA, _SHIFT)
 
     def sheet(self, sheet: TexturedQuad) -> None:
         """Draw a textured sheet; texture with a fourth channel is opaque by that."""
@@ -129,7 +129,7 @@ class Canvas:
         return pixels
 
     def _window(self, pixels: Floats) -> tuple[int, int, int, int] | None:
-        """Return x, y, width, height of the part of the picture that points span."""
+        """Return x, y, width, height of the part of the image that points span."""
         height, width = self.depth_m.shape
         low = np.floor(np.clip(pixels.min(axis=0), -2.0, 1e6)).astype(int)
         high = np.ceil(np.clip(pixels.max(axis=0), -2.0, 1e6)).astype(int) + 1
@@ -150,9 +150,9 @@ class Canvas:
         return ray
 
     def _blend(self, window: tuple[int, int, int, int], drawn: Bytes, mask: Bytes) -> None:
-        """Lay what was drawn over the picture as far as the mask is opaque."""
+        """Lay what was drawn over the image as far as the mask is opaque."""
         left, top, width, height = window
-        part = self.picture[top : top + height, left : left + width]
+        part = self.image[top : top + height, left : left + width]
         cv2.copyTo(drawn, np.where(mask == 255, mask, np.uint8(0)), part)
         y, x = np.nonzero((mask > 0) & (mask < 255))
         share = mask[y, x, None].astype(np.float32) / 255.0

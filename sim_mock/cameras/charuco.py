@@ -1,6 +1,6 @@
 """A camera that looks at a ChArUco board whose place is known to the millimetre.
 
-It gives pictures as a camera would: the lens distorts, edges are soft, the light falls
+It gives frames as a camera would: the lens distorts, edges are soft, the light falls
 off to one side, pixels have noise. Not modelled: motion blur, rolling shutter, glare,
 paper that is not flat.
 """
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.types import Picture
+from gazerig.drivers.types import ImageArray
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.model.charuco_board import CharucoBoard
@@ -32,7 +32,7 @@ _WALL = 90.0
 
 @dataclass(frozen=True)
 class BoardCameraParams:
-    """How good the pictures are."""
+    """How good the frames are."""
 
     width_px: Annotated[int, Bounds(64, 4096)] = 640
     height_px: Annotated[int, Bounds(64, 4096)] = 400
@@ -70,7 +70,7 @@ class BoardCamera:
         share = np.linspace(0.0, params.falloff, params.width_px, dtype=np.float32)
         self._light = 1.0 - share[None, :]
 
-    def picture(self, R_camera_board: Mat3, p_camera_board_m: Vec3) -> Picture:
+    def image(self, R_camera_board: Mat3, p_camera_board_m: Vec3) -> ImageArray:
         """Return a frame of the board: (h, w, 3) BGR."""
         par = self.params
         pose = np.array(R_camera_board)

@@ -30,7 +30,7 @@ _OFF_DEG: Angles3 = (2.0, -3.0, 1.5)
 
 
 class BoardScene:
-    """Pictures of the board, taken when they are asked for.
+    """Frames of the board, taken when they are asked for.
 
     head_rad: where the emulated head is; whoever moves it keeps this true
     mount, lens: the camera as it truly is
@@ -69,7 +69,7 @@ class BoardScene:
             pose = self.seen_pose(self.head_rad)
         else:
             pose = held_pose(self._number - 1, self._camera.params, self.lens, self._camera.board)
-        return Shot(now_s, self._number, self._camera.picture(*pose))
+        return Shot(now_s, self._number, self._camera.image(*pose))
 
     def seen_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
         """Return R_camera_board and p_camera_board_m of the hanging board for neck angles."""
@@ -96,7 +96,7 @@ def held_pose(
 ) -> tuple[Mat3, Vec3]:
     """Return R_camera_board and p_camera_board_m of the number-th way to hold the board, from 0.
 
-    Everywhere in the picture, near and far, tilted to all sides; no two alike.
+    Everywhere in the frame, near and far, tilted to all sides; no two alike.
     """
     # Golden ratios spread any count of samples evenly.
     a, b, c = ((number + 0.5) * g % 1.0 for g in (0.7548776662, 0.5698402910, 0.6180339887))
@@ -107,7 +107,7 @@ def held_pose(
     R = turn @ spin
     wide, high = board.size_m
     away = lens.fx_px * wide / (fills * params.width_px)
-    # Now and then a part of it is out of the picture.
+    # Now and then a part of it is out of the frame.
     fills_height = fills * (params.width_px / params.height_px) * high / wide
     u = params.width_px * (0.5 + (0.5 - 0.4 * fills) * (2.0 * a - 1.0))
     v = params.height_px * (0.5 + (0.5 - 0.4 * fills_height) * (2.0 * b - 1.0))

@@ -64,7 +64,7 @@ class SceneCamera:
         )
 
     def open(self) -> None:
-        """Start: the first picture is taken at the first look."""
+        """Start: the first frame is taken at the first look."""
         self._on_the_way: deque[Detections] = deque()
         self._arrived: Detections | None = None
         self._start_s: float | None = None
@@ -75,7 +75,7 @@ class SceneCamera:
         if self._start_s is None:
             self._start_s = now_s
         if now_s >= self._start_s + self._number / self._params.rate_hz - 1e-9:
-            # A late look skips the pictures it missed, as a real camera's slot does.
+            # A late look skips the frames it missed, as a real camera's slot does.
             due = int((now_s - self._start_s) * self._params.rate_hz + 1e-6)
             self._number = max(self._number, due) + 1
             self._on_the_way.append(self._expose(now_s))
@@ -142,7 +142,7 @@ class SceneCamera:
         return DetectedFace(box, px + noise, 0.98)
 
     def _blob(self, thing: Thing, R: Mat3, p: Vec3) -> tuple[MovingBlob, ...]:
-        """Place a hand or thing by depth; nothing where it is behind or outside the picture."""
+        """Place a hand or thing by depth; nothing where it is behind or outside the frame."""
         noise = self._rng.normal(0.0, self._params.depth_noise_mm / 1e3)
         point = rotate_back(R, sub(thing.p_world_m, p))
         if point[2] < 0.1:

@@ -2,8 +2,8 @@
 
 Where scene_camera gives what a detector would find, this one gives pixels, and the real
 detectors find what they find: a room with texture, people with faces, things, distances.
-Pictures come late, at their own rate, noisy, and smeared by the camera's turn during the
-exposure; a depth picture has the noise of stereo and holes at edges. Not modelled: lens
+Frames come late, at their own rate, noisy, and smeared by the camera's turn during the
+exposure; a depth frame has the noise of stereo and holes at edges. Not modelled: lens
 distortion, rolling shutter, light, the smear of things that move themselves.
 """
 
@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
-from gazerig.drivers.types import Detections, FaceDetector, MovingBlob, Picture
+from gazerig.drivers.types import Detections, FaceDetector, ImageArray, MovingBlob
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.params import Bounds
@@ -37,15 +37,15 @@ _BLIND_PX, _JUMP = 5, 0.08
 
 
 class Exposure(NamedTuple):
-    """One picture as taken.
+    """One frame as taken.
 
-    picture: (h, w, 3) BGR; depth_m: (h, w) metres along the axis, NaN in holes, None without
+    frame: (h, w, 3) BGR; depth_m: (h, w) metres along the axis, NaN in holes, None without
     R_world_camera, p_world_camera_m: where the camera truly was
     """
 
     captured_s: float
     number: int
-    picture: Picture
+    image: ImageArray
     depth_m: NDArray[np.float32] | None
     R_world_camera: Mat3
     p_world_camera_m: Vec3
@@ -108,7 +108,7 @@ class PixelCamera:
         self.open()
 
     def open(self) -> None:
-        """Start: the first picture is taken at the first look."""
+        """Start: the first frame is taken at the first look."""
         self._on_the_way: deque[Detections] = deque()
         self._arrived: Detections | None = None
         self._start_s: float | None = None
@@ -121,7 +121,7 @@ class PixelCamera:
             self._start_s = now_s
         R, p = self._mount.pose(*self._head_pose(now_s))
         if now_s >= self._start_s + self._number / self._params.rate_hz - 1e-9:
-            # A late look skips the pictures it missed, as a real camera's slot does.
+            # A late look skips the frames it missed, as a real camera's slot does.
             due = int((now_s - self._start_s) * self._params.rate_hz + 1e-6)
             self._number = max(self._number, due) + 1
             self._on_the_way.append(self._looked_at(self._expose(now_s, R, p)))
@@ -136,7 +136,7 @@ class PixelCamera:
         detector: Callable[[], FaceDetector] | None,
         motion: Callable[[FindMotion | None], FindMotion | None] | None,
     ) -> bool:
-        """Look otherwise from the next picture on; always possible.
+        """Look otherwise from the next frame on; always possible.
 
         detector: makes another one; motion: gives what finds motion from what did; None: as is
 
@@ -157,17 +157,17 @@ class PixelCamera:
         """Stop; there is nothing to free."""
 
     def _looked_at(self, shot: Exposure) -> Detections:
-        """Let the detectors look at a picture."""
+        """Let the detectors look at a frame."""
         blobs = self._find_motion(shot, self.lens) if self._find_motion is not None else ()
-        height, width = shot.picture.shape[:2]
+        height, width = shot.image.shape[:2]
         return Detections(
             shot.captured_s,
             shot.number,
             width,
             height,
-            self._detector.find(shot.picture),
+            self._detector.find(shot.image),
             blobs,
-            picture=shot.picture,
+            image=shot.image,
             depth_m=shot.depth_m,
         )
 
@@ -177,12 +177,12 @@ class PixelCamera:
         par = self._params
         canvas = Canvas(par.width_px, par.height_px, self.lens, R, p)
         draw_scene(canvas, self._scene, t_s - self._start_s, par.room_seed)
-        picture = self._noisy(smeared(canvas.picture, self._smear_px(t_s, R)))
+        image = self._noisy(smeared(canvas.image, self._smear_px(t_s, R)))
         depth = self._stereo(canvas.depth_m) if par.depth else None
-        return Exposure(t_s, self._number, picture, depth, R, p)
+        return Exposure(t_s, self._number, image, depth, R, p)
 
     def _smear_px(self, t_s: float, R: Mat3) -> tuple[float, float]:
-        """Return how far the picture's middle moves during the exposure."""
+        """Return how far the frame's middle moves during the exposure."""
         if self._before is None or t_s <= self._before[0]:
             return 0.0, 0.0
         before_s, R_before = self._before
@@ -194,12 +194,12 @@ class PixelCamera:
             float(-ahead[1] / ahead[2]) * lens.fy_px * share,
         )
 
-    def _noisy(self, picture: NDArray[np.uint8]) -> Picture:
+    def _noisy(self, image: NDArray[np.uint8]) -> ImageArray:
         """Add the sensor's noise."""
         if self._params.noise_grey <= 0.0:
-            return picture
-        noise = self._piece(picture.size).reshape(picture.shape)
-        out: Picture = cv2.add(picture, noise, dtype=cv2.CV_8U).astype(np.uint8, copy=False)
+            return image
+        noise = self._piece(image.size).reshape(image.shape)
+        out: ImageArray = cv2.add(image, noise, dtype=cv2.CV_8U).astype(np.uint8, copy=False)
         return out
 
     def _stereo(self, depth_m: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -237,11 +237,11 @@ def draw_scene(canvas: Canvas, scene: Scene, scene_s: float, room_seed: int = 0)
         draw()
 
 
-def smeared(picture: NDArray[np.uint8], way_px: tuple[float, float]) -> NDArray[np.uint8]:
+def smeared(image: NDArray[np.uint8], way_px: tuple[float, float]) -> NDArray[np.uint8]:
     """Blur a frame evenly along a displacement (x, y) in pixels."""
     length = hypot(*way_px)
     if length < 1.0:
-        return picture
+        return image
     half = int(np.ceil(0.5 * length))
     kernel = np.zeros((2 * half + 1, 2 * half + 1), np.float32)
     # Looks spread evenly over the way, each shared among the four pixels around it.
@@ -251,7 +251,7 @@ def smeared(picture: NDArray[np.uint8], way_px: tuple[float, float]) -> NDArray[
         u, v = x - i, y - j
         kernel[j : j + 2, i : i + 2] += np.outer((1.0 - v, v), (1.0 - u, u))
     out: NDArray[np.uint8] = cv2.filter2D(
-        picture, -1, kernel / kernel.sum(), borderType=cv2.BORDER_REPLICATE
+        image, -1, kernel / kernel.sum(), borderType=cv2.BORDER_REPLICATE
     ).astype(np.uint8, copy=False)
     return out
 

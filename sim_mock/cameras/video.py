@@ -1,6 +1,6 @@
 """A film seen as a camera in simulated time: the same calls give the same detections.
 
-It does not blur, distort, drop or reorder pictures, and its delay is constant.
+It does not blur, distort, drop or reorder frames, and its delay is constant.
 """
 
 from collections.abc import Callable
@@ -12,18 +12,18 @@ from gazerig.drivers.types import Detections, FaceDetector
 
 
 class Film(Protocol):
-    """Pictures by number from 1, each due at a film time; without end."""
+    """Frames by number from 1, each due at a film time; without end."""
 
     def open(self) -> None:
         """Open at film time 0."""
         ...
 
     def due_s(self, number: int) -> float:
-        """Return the film time at which a picture is due."""
+        """Return the film time at which a frame is due."""
         ...
 
     def shot(self, number: int) -> Shot:
-        """Read a picture with what belongs to it; numbers never run back."""
+        """Read a frame with what belongs to it; numbers never run back."""
         ...
 
     def events(self) -> tuple[str, ...]:
@@ -48,7 +48,7 @@ class FilmCamera:
         start_s: simulated time of the first exposure.
         motion: finds motion, None for none.
 
-    pictures, pictures_with_face: counts of pictures looked at since open
+    frames, frames_with_face: counts of frames looked at since open
     """
 
     def __init__(
@@ -66,18 +66,18 @@ class FilmCamera:
         self._delay_s = delay_s
         self._start_s = start_s
         self._newest: Detections | None = None
-        self.pictures = 0
-        self.pictures_with_face = 0
+        self.frames = 0
+        self.frames_with_face = 0
 
     def open(self) -> None:
-        """Open the film at its first picture.
+        """Open the film at its first frame.
 
         Raises:
             CameraError: the film cannot be opened.
         """
         self._video.open()
         self._newest = None
-        self.pictures = self.pictures_with_face = 0
+        self.frames = self.frames_with_face = 0
 
     def latest(self, now_s: float) -> Detections | None:
         """Return the newest detections that have come through by ``now_s``.
@@ -85,8 +85,8 @@ class FilmCamera:
         Raises:
             CameraError: the film cannot be read any more.
         """
-        while self._captured_s(self.pictures + 1) + self._delay_s <= now_s:
-            self._look(self.pictures + 1)
+        while self._captured_s(self.frames + 1) + self._delay_s <= now_s:
+            self._look(self.frames + 1)
         return self._newest
 
     def retune(
@@ -94,7 +94,7 @@ class FilmCamera:
         detector: Callable[[], FaceDetector] | None,
         motion: Callable[[Motion | None], Motion | None] | None,
     ) -> bool:
-        """Look otherwise from the next picture on, as in FrameAnalyzer; always possible."""
+        """Look otherwise from the next frame on, as in FrameAnalyzer; always possible."""
         self._frames.retune(detector, motion)
         return True
 
@@ -107,13 +107,13 @@ class FilmCamera:
         self._video.close()
 
     def _captured_s(self, number: int) -> float:
-        """Return the simulated time of a picture's exposure."""
+        """Return the simulated time of a frame's exposure."""
         return self._start_s + self._video.due_s(number)
 
     def _look(self, number: int) -> None:
-        """Find the faces of one picture, and what moves in it."""
+        """Find the faces of one frame, and what moves in it."""
         shot = self._video.shot(number)._replace(captured_s=self._captured_s(number))
         found = self._frames.look(shot)
-        self.pictures += 1
-        self.pictures_with_face += bool(found.faces)
+        self.frames += 1
+        self.frames_with_face += bool(found.faces)
         self._newest = found

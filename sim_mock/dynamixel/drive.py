@@ -41,7 +41,7 @@ ARRIVED, RUNNING, ASTRAY = 1, 2, 8
 
 IN_POSITION_STEPS = 12
 FOLLOWING_STEPS = 100
-"""Distances that decide over in position and following error; no document tells them."""
+"""Distances that decide over in position and following error; not documented them."""
 
 _WATCHDOG_AT = 98
 _SPEED_UNIT = VELOCITY_UNIT_STEPS_S / 1000.0
@@ -198,7 +198,7 @@ class DynamixelDrive(Drive):
     def reset_goals(self) -> None:
         """Set the goals to the limits, the goal position to where it is.
 
-        The goal that turns the shaft by itself starts at 0: no document tells, and a servo
+        The goal that turns the shaft by itself starts at 0: not documented, and a servo
         that ran away as its torque comes on would be known for it.
         """
         for name in ("goal_pwm", "goal_current", "goal_velocity"):

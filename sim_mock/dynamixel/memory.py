@@ -29,7 +29,7 @@ ACCESS = 7
 NOT_STORED = (
     "torque_enable", "bus_watchdog", "goal_pwm", "goal_current", "goal_velocity", "goal_position",
 )  # fmt: skip
-"""A backup (instruction 0x20) leaves out what moves the servo [assumed: no document tells]."""
+"""A backup (instruction 0x20) leaves out what moves the servo [assumed: not documented]."""
 
 Fields = tuple[tuple[DynamixelRegister, int], ...]
 """Registers with the values to be written to them."""
@@ -147,7 +147,7 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
         return address
 
     def fields(self, address: int, data: bytes) -> Fields | int:
-        """Split bytes to be written into registers, or give the error number."""
+        """Split bytes to be written into registers, or the error number."""
         if address + len(data) > self._window_low and any(
             self.real(a) != a for a in range(address, address + len(data))
         ):
@@ -167,7 +167,7 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
         return tuple(out)
 
     def _layout(self, address: int, length: int) -> tuple[DynamixelRegister, ...] | int:
-        """Return the registers that a write covers exactly, or give the error number."""
+        """Return the registers that a write covers exactly, or the error number."""
         key = (address, length)
         if key not in self._layouts:
             self._layouts[key] = self._lay_out(address, length)

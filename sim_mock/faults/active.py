@@ -22,7 +22,7 @@ BABBLE_MOST = 2000
 class LineFault:
     """One fault in force.
 
-    servo_id: whose answers, None for everybody's
+    servo_id: whose answers; None for those of all servos
     numbers, data: what the kind needs (milliseconds, byte counts, ids; noise bytes)
     left: for so many answers, until_s: until then; None for no such end
     """

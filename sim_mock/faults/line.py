@@ -88,7 +88,7 @@ class LineFaults(ABC):
 
         Args:
             kind: its name among the faults in force.
-            servo_id: whose answers, None for everybody's.
+            servo_id: whose answers; None for those of all servos.
             says: what happens now.
             count: for so many answers.
             seconds: for so long.

@@ -2,7 +2,7 @@
 
 The registers' position is ``shaft.x + shift``;
 where turns are not counted it is told within one turn. Shaft and motor are those of
-gazerig.sim_mock.smart_servo.motor. What no document tells of the controller is assumed, so that a
+gazerig.sim_mock.smart_servo.motor. What not documented of the controller is assumed, so that a
 servo with factory gains needs all its duty at 50 steps of error and does not overshoot:
 owners measure 20-30 steps at half the stall torque. Left out: the starting force (24) and the
 dead zones (26, 27), so that friction keeps it up to 2 steps from its goal, as it does in fact.

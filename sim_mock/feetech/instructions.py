@@ -1,6 +1,6 @@
 """Instructions that Feetech servos alone have.
 
-What is not understood is met with silence [assumed: no document tells].
+What is not understood is met with silence [assumed: not documented].
 Source: Feetech, communication protocol of the STS/SMS series.
 """
 

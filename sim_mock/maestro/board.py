@@ -48,7 +48,7 @@ class EmulatedMaestro:
         servos: one for each channel, in their order.
         device: its number in the Pololu protocol.
         settings: what it was set to over USB.
-        seed: of the dice that faults throw.
+        seed: of the random generator of faults.
     """
 
     def __init__(
@@ -197,7 +197,7 @@ class EmulatedMaestro:
         return b""
 
     def _execute(self, heard: ParsedCommand) -> list[Piece]:
-        """Carry out one command; gives what is answered."""
+        """Carry out one command; return what is answered."""
         if heard.trouble:
             self.body.fail(heard.trouble)
             return []

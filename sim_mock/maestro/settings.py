@@ -107,7 +107,7 @@ def _timeout_ms(value: str) -> float:
 
 
 def width_steps(case: str, value: str) -> int:
-    """Read a pulse width in microseconds; gives quarters.
+    """Read a pulse width in microseconds; return quarters.
 
     Raises:
         ValueError: it is none that the board can send.

@@ -18,7 +18,7 @@ STRANGE = 0xA5
 
 
 class NotAcknowledged(Exception):
-    """Nobody has acknowledged an address, or a byte."""
+    """No device has acknowledged an address or a byte."""
 
 
 class BusStuck(Exception):
@@ -60,7 +60,7 @@ class Pca9685Body:
         """Write up to a stop condition.
 
         Raises:
-            NotAcknowledged: nobody has this address.
+            NotAcknowledged: no device has this address.
             BusStuck: the lines do not go high.
         """
         self.advance()
@@ -92,7 +92,7 @@ class Pca9685Body:
         """Read up to a stop condition.
 
         Raises:
-            NotAcknowledged: nobody has this address.
+            NotAcknowledged: no device has this address.
             BusStuck: the lines do not go high.
         """
         self.advance()

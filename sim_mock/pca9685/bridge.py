@@ -37,7 +37,7 @@ class Bridge:
     Args:
         servos: sixteen for each board.
         addresses: of the boards, in their order.
-        seed: of the dice that faults throw.
+        seed: of the random generator of faults.
     """
 
     def __init__(

@@ -38,7 +38,7 @@ class ServerStopped(Exception):
 
 
 class Server:
-    """Serves every bus on a terminal of its own until told to stop."""
+    """Serves every bus on a terminal of its own until stopped."""
 
     def __init__(self, settings: ServerSettings, say: Callable[[str], None]) -> None:
         self._settings = settings

@@ -56,7 +56,7 @@ class Event(NamedTuple):
 
 
 class Scene(Protocol):
-    """Who and what is there at an instant; it begins anew after every round.
+    """Who and what is there at an instant; it begins again after every round.
 
     behaviours: every behaviour that its planner may put in force, so that a rig without a
         rule for one can be refused before it moves

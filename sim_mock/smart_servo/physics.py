@@ -1,7 +1,7 @@
 """Physical parameters of an emulated servo, and the specification it is built from.
 
 Stall torque, stall current and no-load speed are the model's own and stand in
-gazerig.drivers.dynamixel.control_table. What no data sheet tells is an assumption, marked [A];
+gazerig.drivers.dynamixel.control_table. What no data sheet states is an assumption, marked [A];
 what follows from a report of users, [R].
 """
 
@@ -34,7 +34,7 @@ class Physics(NamedTuple):
     stall_rise_c: K; final rise above ambient at stall current [A].
     thermal_s: s; time constant of warming and cooling [A].
     overload_share: share of the stall torque at the present voltage that counts as
-        overload; overload_s: s; how long until it latches [A: no data sheet tells].
+        overload; overload_s: s; how long until it latches [A: no data sheet states].
     brown_out_share: share of the rated voltage below which the servo restarts [A].
     noise_current: units; largest flicker of Present Current while it holds still [R: 1-3].
     noise_velocity: units; the same of Present Velocity.

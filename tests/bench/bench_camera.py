@@ -111,9 +111,9 @@ def jitter(film: Path) -> None:
             camera.open()
             while camera.latest(0.0) is None:
                 time.sleep(0.01)
-            before = camera.pictures
+            before = camera.frames
             late[name].append(lateness_ms(SECONDS))
-            seen[name] += camera.pictures - before
+            seen[name] += camera.frames - before
             camera.close()
     print(f"lateness of a {RATE_HZ:g} Hz loop, ms; {ROUNDS} turns of {SECONDS:g} s each")
     alone = float(np.percentile(np.concatenate(late["alone"]), 99))
@@ -168,7 +168,7 @@ def recording(pictures: list[np.ndarray], folder: Path) -> None:
         read_ms = (time.perf_counter() - began) / len(shots) * 1e3
         bare = time.perf_counter()
         for shot in shots:
-            cv2.imencode(".png" if quality is None else ".jpg", shot.picture)
+            cv2.imencode(".png" if quality is None else ".jpg", shot.image)
         bare_ms = (time.perf_counter() - bare) / len(shots) * 1e3
         size = sum(len(data) for _, data in encoded(shots[-1], quality)) / 1e3
         print(

@@ -1,4 +1,4 @@
-"""Messages of an OAK pipeline as pictures with distances, lens and faces."""
+"""Messages of an OAK pipeline as frames with distances, lens and faces."""
 
 from math import isfinite
 from typing import Any
@@ -9,7 +9,7 @@ from gazerig.drivers.camera.depth_roi import metres, resized
 from gazerig.drivers.camera.oak.pipeline import COLOUR, DEPTH, FACES
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import bgr
-from gazerig.drivers.types import Depth, DetectedFace, Picture
+from gazerig.drivers.types import Depth, DetectedFace, ImageArray
 
 _LANDMARKS = 5
 # A frame that never saw a lens carries the unit matrix.
@@ -21,13 +21,13 @@ def names(group: Any) -> set[str]:
     return set(group.getMessageNames())
 
 
-def picture_of(group: Any) -> Picture | None:
-    """Return the colour picture of a group, None where it is none."""
+def image_of(group: Any) -> ImageArray | None:
+    """Return the colour frame of a group, None where it is none."""
     return bgr(group[COLOUR].getCvFrame())
 
 
 def depth_of(group: Any, width_px: int, height_px: int) -> Depth | None:
-    """Return the depth of a group in metres and in the size of its picture."""
+    """Return the depth of a group in metres and in the size of its frame."""
     if DEPTH not in names(group):
         return None
     mm = np.asarray(group[DEPTH].getFrame())
@@ -37,7 +37,7 @@ def depth_of(group: Any, width_px: int, height_px: int) -> Depth | None:
 
 
 def lens_of(group: Any) -> Intrinsics | None:
-    """Return the lens that the picture carries, None where it carries none."""
+    """Return the lens that the frame carries, None where it carries none."""
     matrix = np.asarray(group[COLOUR].getTransformation().getIntrinsicMatrix(), dtype=float)
     if matrix.shape != (3, 3) or not np.isfinite(matrix).all() or matrix[0, 0] < _LEAST_FOCAL_PX:
         return None
@@ -65,12 +65,12 @@ def faces_of(
 
 
 def _face(detection: Any, width_px: int, height_px: int) -> DetectedFace | None:
-    """Turn a detection in shares of the picture into one in pixels."""
+    """Turn a detection in shares of the frame into one in pixels."""
     points = np.array([[p.x, p.y] for p in detection.getKeypoints2f()], dtype=np.float64)
     edges = (detection.xmin, detection.ymin, detection.xmax, detection.ymax)
     if points.shape != (_LANDMARKS, 2) or not all(map(isfinite, (*edges, *points.ravel()))):
         return None
-    # Pixels have their centres at whole numbers; the picture begins half a pixel before 0.
+    # Pixels have their centres at whole numbers; the frame begins half a pixel before 0.
     landmarks = points * (width_px, height_px) - 0.5
     left, top, right, bottom = edges
     box = (

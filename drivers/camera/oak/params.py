@@ -8,7 +8,7 @@ from gazerig.params import Bounds
 
 @dataclass(frozen=True)
 class OakParams:
-    """Size and rate of the pictures, how stereo depth is found, and where faces are found."""
+    """Size and rate of the frames, how stereo depth is found, and where faces are found."""
 
     # fmt: off
     device: Annotated[str, "device id or IP address, if there are several cameras; empty: the first one found"] = ""

@@ -19,7 +19,7 @@ _QUEUE = 2
 
 
 class Outputs(NamedTuple):
-    """Outputs of nodes: pictures, depth in millimetres (RAW16) and found faces.
+    """Outputs of nodes: frames, depth in millimetres (RAW16) and found faces.
 
     depth and faces are None where they are not wanted
     """
@@ -30,7 +30,7 @@ class Outputs(NamedTuple):
 
 
 MakeNodes = Callable[[Any, Any, OakParams], Outputs]
-"""Takes depthai, a pipeline and the parameters; gives the outputs of the nodes it made."""
+"""Takes depthai, a pipeline and the parameters; return the outputs of the nodes it made."""
 
 
 def device_nodes(dai: Any, pipeline: Any, params: OakParams) -> Outputs:
@@ -86,7 +86,7 @@ def joined(dai: Any, pipeline: Any, outputs: Outputs, rate_hz: float) -> Any:
 
 
 def _stereo(dai: Any, pipeline: Any, params: OakParams, colour: Any) -> Any:
-    """Make depth that lies on the colour picture pixel by pixel."""
+    """Make depth that lies on the colour frame pixel by pixel."""
     socket = dai.CameraBoardSocket
     stereo = pipeline.create(dai.node.StereoDepth)
     preset = getattr(dai.node.StereoDepth.PresetMode, params.stereo_preset.upper())

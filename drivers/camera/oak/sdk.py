@@ -12,7 +12,7 @@ from gazerig.drivers.errors import CameraError
 
 
 def load_depthai() -> Any:
-    """Import depthai and give the module.
+    """Import depthai and return the module.
 
     Raises:
         CameraError: it is not installed or does not start here.

@@ -7,7 +7,7 @@ from typing import Any
 
 from gazerig.drivers.camera.clock_sync import ClockSync
 from gazerig.drivers.camera.oak.discovery import find_oak
-from gazerig.drivers.camera.oak.messages import depth_of, faces_of, lens_of, picture_of
+from gazerig.drivers.camera.oak.messages import depth_of, faces_of, image_of, lens_of
 from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.oak.pipeline import COLOUR, MakeNodes, device_nodes, joined
 from gazerig.drivers.camera.oak.sdk import load_depthai
@@ -79,7 +79,7 @@ class OakSource:
         self._bridge, self._in_step, self._number = ClockSync(), True, 0
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
-        """Wait for the next picture; its time is the middle of its exposure.
+        """Wait for the next frame; its time is the middle of its exposure.
 
         Raises:
             CameraError: the camera is not open, was unplugged or is silent.
@@ -120,7 +120,7 @@ class OakSource:
         """Open the device, and see how fast its USB is."""
         info = find_oak(self._dai, self._params.device)
         device = self._dai.Device(info)
-        # It is this program that opens a lost camera anew, and tells.
+        # It is this program that opens a lost camera again, and tells.
         device.setMaxReconnectionAttempts(0)
         speed = device.getUsbSpeed()
         slow = (self._dai.UsbSpeed.LOW, self._dai.UsbSpeed.FULL, self._dai.UsbSpeed.HIGH)
@@ -150,16 +150,16 @@ class OakSource:
         return group
 
     def _shot(self, group: Any, arrived_s: float) -> Shot | None:
-        """Make a picture of a group of messages."""
-        picture = picture_of(group)
-        if picture is None:
+        """Make a frame of a group of messages."""
+        image = image_of(group)
+        if image is None:
             return None
         self._number += 1
-        height, width = picture.shape[:2]
+        height, width = image.shape[:2]
         return Shot(
             self._captured_s(group[COLOUR], arrived_s),
             self._number,
-            picture,
+            image,
             depth_of(group, width, height),
             lens_of(group),
             faces_of(group, width, height, self._params.min_confidence),

@@ -1,8 +1,8 @@
 """Which face detector.
 
-Landmarks are in pixels of the picture given, also where a smaller one is searched.
+Landmarks are in pixels of the image given, also where a smaller one is searched.
 Pixels have their centres at whole numbers: (0, 0) is the middle of the top left pixel,
-so a picture of width w reaches from -0.5 to w - 0.5.
+so a image of width w reaches from -0.5 to w - 0.5.
 """
 
 from gazerig.drivers.errors import ModelFileError

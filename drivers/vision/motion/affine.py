@@ -1,6 +1,6 @@
 """Slide, growth and spin of a patch of flow: an affine motion, fitted robustly.
 
-A thing that turns fast moves its points along arcs between two pictures, not along the
+A thing that turns fast moves its points along arcs between two images, not along the
 tangents; growth and spin are therefore taken from the whole map from now to before, as
 the logarithm of its scale and its angle, not from the divergence and curl of the flow.
 """
@@ -23,11 +23,11 @@ _NOISE_PX = 0.03
 
 
 class PatchMotion(NamedTuple):
-    """How a patch moves between two pictures.
+    """How a patch moves between two images.
 
     slide_px: motion of its centre
     growth: logarithm of its size now by its size before
-    spin_rad: clockwise in the picture above 0
+    spin_rad: clockwise in the image above 0
     growth_sd, spin_sd: standard deviations
     rest_px: what the affine motion leaves unexplained, along one axis
     """
@@ -43,7 +43,7 @@ class PatchMotion(NamedTuple):
 def flow_map(places: Floats, flow: Floats, centre: Floats, area_px: float) -> tuple[Back, float]:
     """Fit the map from now to before of points that flow, and what it leaves unexplained.
 
-    places, flow: (n, 2) where they are now, and their motion from the older picture
+    places, flow: (n, 2) where they are now, and their motion from the older image
     centre: (2,) whose motion is the map's shift
     area_px: what the points stand for
     """

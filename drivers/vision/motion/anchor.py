@@ -16,16 +16,16 @@ _MARGIN_PX = 8
 _UNLIKE, _LEAST_LEVELS = 2.0, 12.0
 # A thing of which less stands out is not told from the ground by its looks at all.
 _LEAST_SHARE = 0.25
-# How much of the last picture's choice is kept, so that the point does not jump to and fro.
+# How much of the last image's choice is kept, so that the point does not jump to and fro.
 _KEPT = 0.5
 
 
 def anchor(group: Group, grey: Grey, middle: Floats, offset: Floats) -> Floats:
     """Return a pixel of the thing, (2,), near its middle.
 
-    grey: (h, w) picture
+    grey: (h, w) image
     middle: (2,) middle of the patch
-    offset: (2,) how far from its middle the point was in the picture before
+    offset: (2,) how far from its middle the point was in the image before
     """
     apart = _standing_out(group, grey)
     if apart.mean() < _LEAST_SHARE:

@@ -1,4 +1,4 @@
-"""A moving patch of the picture -> a thing in the camera frame, with place and velocity.
+"""A moving patch of the image -> a thing in the camera frame, with place and velocity.
 
 Camera frame: optical, x right, y down, z forward. With p = z (x', y', 1), x' and y' being
 the pixel by focal length, the velocity is z (dx'/dt, dy'/dt, 0) + (dz/dt) (x', y', 1), and
@@ -17,7 +17,7 @@ from gazerig.drivers.vision.motion.params import MotionParams
 
 Vec3 = tuple[float, float, float]
 
-# A depth picture has holes and, at edges, the background; a tenth of a thing must be known.
+# A depth image has holes and, at edges, the background; a tenth of a thing must be known.
 _LEAST_SHARE, _LEAST_PIXELS = 0.1, 5
 _LEAST_SD_M = 0.005
 # Median absolute deviation to standard deviation.
@@ -33,7 +33,7 @@ class Distance(NamedTuple):
 
 
 def small_depth(depth_m: NDArray[Any] | None, shape: tuple[int, ...]) -> Plane | None:
-    """Bring a depth picture to the small picture's size; what is no distance becomes NaN."""
+    """Bring a depth image to the small image's size; what is no distance becomes NaN."""
     if depth_m is None or depth_m.ndim != 2 or depth_m.size == 0:
         return None
     depth = np.asarray(depth_m, dtype=np.float32)
@@ -45,7 +45,7 @@ def small_depth(depth_m: NDArray[Any] | None, shape: tuple[int, ...]) -> Plane |
 
 
 def distance(group: Group, depth: Plane | None, params: MotionParams) -> Distance:
-    """Return a thing's distance from the depth picture, else the assumed one."""
+    """Return a thing's distance from the depth image, else the assumed one."""
     if depth is not None:
         values = depth[group.y, group.x]
         values = values[np.isfinite(values)]
@@ -74,5 +74,5 @@ def velocity(p_m: Vec3, flow_px_s: tuple[float, float], loom_1_s: float, K: Floa
 
 
 def radius_m(area_px: float, z_m: float, K: Floats) -> float:
-    """Return the radius of the disc that covers as much of the picture."""
+    """Return the radius of the disc that covers as much of the image."""
     return z_m * float(np.sqrt(area_px / (np.pi * K[0, 0] * K[1, 1])))

@@ -31,7 +31,7 @@ class Group(NamedTuple):
     """Pixels that move together.
 
     x, y: (n,) columns and rows
-    flow: (n, 2) their motion from the older picture to the newer, pixels
+    flow: (n, 2) their motion from the older image to the newer, pixels
     """
 
     x: Indices

@@ -1,11 +1,11 @@
-"""Things that move, found in a picture and the one before it, whatever the camera did itself.
+"""Things that move, found in a image and the one before it, whatever the camera did itself.
 
-Small grey picture -> flow to the older one, turned as the joints say (motion_flow) -> the
+Small grey image -> flow to the older one, turned as the joints say (motion_flow) -> the
 camera's own motion (motion_ego) -> what moves besides (motion_things) -> patches
 (motion_groups) -> slide, growth and spin (motion_affine) -> place and velocity
-(motion_place) -> numbers that last (motion_tracks). No clock: times come with pictures.
+(motion_place) -> numbers that last (motion_tracks). No clock: times come with images.
 
-While the camera turns fast, and where the picture does not tell its own motion from that
+While the camera turns fast, and where the image does not tell its own motion from that
 of things, nothing is said, as our own eyes say nothing during a saccade.
 """
 
@@ -30,7 +30,7 @@ from gazerig.drivers.vision.motion.ego_motion import Ego, own_motion, turn_rad
 from gazerig.drivers.vision.motion.image import (
     Floats,
     Plane,
-    SmallPicture,
+    SmallImage,
     made_small,
     to_given,
 )
@@ -47,21 +47,21 @@ from gazerig.drivers.vision.motion.segmentation import what_moves
 from gazerig.drivers.vision.motion.tracking import MotionTracks, PatchTrack
 
 _KIND = "thing"
-# With less of the older picture in view, too little is left to tell motions apart.
+# With less of the older image in view, too little is left to tell motions apart.
 _LEAST_KNOWN = 0.4
 # Points enough for an affine fit.
 _SAMPLE = 400
 
 
 class MotionReport(NamedTuple):
-    """What became of a picture, for the page and the summary.
+    """What became of a image, for the page and the summary.
 
     blobs: what moves
     silent: why nothing could be said, "" where it could
     turn_deg_s: the camera's own turn as seen
-    background_share: share of the picture's texture that moved as one
+    background_share: share of the image's texture that moved as one
     noise_px, threshold_px: flow noise of the still room, and the least motion believed, in
-        pixels of the small picture
+        pixels of the small image
     """
 
     blobs: tuple[MovingBlob, ...] = ()
@@ -73,17 +73,17 @@ class MotionReport(NamedTuple):
 
 
 class MotionDetector:
-    """Finds what moves from picture to picture; pure but for the memory of the last."""
+    """Finds what moves from image to image; pure but for the memory of the last."""
 
     def __init__(self, params: MotionParams) -> None:
         self._params = params
         self._search = FlowSearch(params.preset, params.finest_level)
         self._tracks = MotionTracks(params)
-        self._before: SmallPicture | None = None
+        self._before: SmallImage | None = None
         self.report = MotionReport()
 
     def retune(self, params: MotionParams) -> None:
-        """Look more or less finely from the next picture on; what is followed stays."""
+        """Look more or less finely from the next image on; what is followed stays."""
         if (params.preset, params.finest_level) != (self._params.preset, self._params.finest_level):
             self._search = FlowSearch(params.preset, params.finest_level)
         self._params = params
@@ -91,51 +91,51 @@ class MotionDetector:
 
     @property
     def before_s(self) -> float | None:
-        """Return the capture time of the picture that the next one will be compared with."""
+        """Return the capture time of the image that the next one will be compared with."""
         return None if self._before is None else self._before.captured_s
 
     def find(
         self,
-        picture: NDArray[Any],
+        image: NDArray[Any],
         captured_s: float,
         lens: Intrinsics,
         R_now_before: NDArray[np.float64] | None,
         depth_m: NDArray[Any] | None = None,
         t_now_before_m: NDArray[np.float64] | None = None,
     ) -> tuple[MovingBlob, ...]:
-        """Find what moves between the last picture and this one.
+        """Find what moves between the last image and this one.
 
-        picture: (h, w), or with 1, 3 or 4 channels, uint8
-        lens: focal lengths and centre in pixels of this picture
+        image: (h, w), or with 1, 3 or 4 channels, uint8
+        lens: focal lengths and centre in pixels of this image
         R_now_before: (3, 3) turns directions from the camera's axes at ``before_s`` into
             those at ``captured_s``; identity for a camera that stands, None where unknown
-        depth_m: (any, any) distance along the optical axis, aligned with the picture; 0, NaN
+        depth_m: (any, any) distance along the optical axis, aligned with the image; 0, NaN
             and infinite where unknown
         t_now_before_m: (3,) where the lens was at ``before_s`` seen from where it is now, in
             its axes of now; with it and depth, near things do not seem to move past far ones
 
         Raises:
-            ValueError: the picture is none of those.
+            ValueError: the image is none of those.
         """
-        now = made_small(picture, self._params.work_px, lens, captured_s)
+        now = made_small(image, self._params.work_px, lens, captured_s)
         before, self._before = self._before, now
         self.report = self._look(now, before, R_now_before, depth_m, t_now_before_m)
         return self.report.blobs
 
     def forget(self) -> None:
-        """Forget the last picture: the next one is the first of another scene."""
+        """Forget the last image: the next one is the first of another scene."""
         self._before = None
         self._tracks.forget()
 
     def _look(
         self,
-        now: SmallPicture,
-        before: SmallPicture | None,
+        now: SmallImage,
+        before: SmallImage | None,
         R_now_before: Floats | None,
         depth_m: NDArray[Any] | None,
         t_now_before_m: Floats | None,
     ) -> MotionReport:
-        """Compare two pictures, or say why they cannot be."""
+        """Compare two images, or say why they cannot be."""
         if not searchable(now.grey):
             return MotionReport(silent="picture too small")
         if before is None or before.grey.shape != now.grey.shape:
@@ -172,15 +172,15 @@ class MotionDetector:
     def _blobs(
         self,
         groups: list[Group],
-        now: SmallPicture,
+        now: SmallImage,
         pair: Compared,
         ego: Ego,
         depth: Plane | None,
         dt_s: float,
     ) -> tuple[MovingBlob, ...]:
         """Measure each patch and give it its number."""
-        pictures = blurred(pair.now, pair.before) if groups else Blurred(())
-        motions = [_measured(group, pictures, _room(group, pair, ego)) for group in groups]
+        frames = blurred(pair.now, pair.before) if groups else Blurred(())
+        motions = [_measured(group, frames, _room(group, pair, ego)) for group in groups]
         follows = self._tracks.step(
             [centre for centre, _ in motions],
             [np.array(motion.slide_px) / dt_s for _, motion in motions],
@@ -200,7 +200,7 @@ class MotionDetector:
         group: Group,
         motion: PatchMotion,
         follow: PatchTrack,
-        now: SmallPicture,
+        now: SmallImage,
         depth: Plane | None,
         dt_s: float,
     ) -> MovingBlob:
@@ -240,20 +240,20 @@ def turned_between(R_world_now: NDArray[Any], R_world_before: NDArray[Any]) -> F
 
 
 def _room(group: Group, pair: Compared, ego: Ego) -> Room:
-    """Return where a patch would be in the older picture if it stood still."""
+    """Return where a patch would be in the older image if it stood still."""
     if pair.shift is None:
         return Room(ego.B, np.zeros(2))
     return Room(ego.B, np.median(pair.shift[group.y, group.x], axis=0).astype(np.float64))
 
 
-def _measured(group: Group, pictures: Blurred, room: Room) -> tuple[Floats, PatchMotion]:
+def _measured(group: Group, frames: Blurred, room: Room) -> tuple[Floats, PatchMotion]:
     """Return a patch's middle, and the motion there."""
     places = np.column_stack((group.x, group.y)).astype(np.float64)
     middle = places.mean(axis=0)
     step = max(1, len(places) // _SAMPLE)
     places, flow = places[::step], group.flow[::step]
     start, rest = flow_map(places, flow, middle, float(len(group.x)))
-    return middle, patch_motion(refined(start, places, middle, pictures, room), rest)
+    return middle, patch_motion(refined(start, places, middle, frames, room), rest)
 
 
 def _believed(value: float, sd: float) -> float:

@@ -4,7 +4,7 @@ The joints give a first guess that lags, and knows nothing of the lens moving si
 the neck turns. What is left in the flow is fitted by a homography (exact for a turn and
 for one plane, eight numbers for the rest), by iteratively reweighted least squares with
 Tukey's weights. The fit starts from the guess and from the scale of its usual error, so
-that a body which fills the picture cannot pass for the room while the joints say that
+that a body which fills the image cannot pass for the room while the joints say that
 the camera stands.
 """
 
@@ -17,17 +17,17 @@ from gazerig.drivers.vision.motion.image import Floats, Grey, middle
 from gazerig.drivers.vision.motion.optical_flow import Compared, moved
 
 _GRID_PX = 8
-# At the edge the flow is worst, and leads out of the picture.
+# At the edge the flow is worst, and leads out of the image.
 _EDGE_PX = 6
 # Corner strength (smaller eigenvalue of the gradients' matrix, at half size) for which
 # noise of a few grey levels does not pass.
 _CORNER_BLOCK = 5
 _LEAST_CORNER = 2e-4
 _LEAST_POINTS = 30
-# A room is around us: what fills fewer of the picture's 48 cells is a thing.
+# A room is around us: what fills fewer of the image's 48 cells is a thing.
 _CELLS, _LEAST_CELLS = (8, 6), 12
 _STEPS = 8
-# A step that moves the picture by less is the last.
+# A step that moves the image by less is the last.
 _SMALL_PX = 0.01
 _TUKEY = 4.685
 _LEAST_NOISE_PX, _MOST_NOISE_PX = 0.02, 1.5
@@ -40,15 +40,15 @@ _POINT_NOISE = 1e-3
 
 
 class Ego(NamedTuple):
-    """The camera's own motion between two pictures.
+    """The camera's own motion between two images.
 
-    B: (3, 3) pixels of the newer picture to those of the older one, turned as predicted
-    total: (3, 3) pixels of the older picture to those of the newer
+    B: (3, 3) pixels of the newer image to those of the older one, turned as predicted
+    total: (3, 3) pixels of the older image to those of the newer
     share: of the points with texture, those that moved with the room; 0 where they agree on
         nothing better than noise
     noise_px: how far the flow there is from it, standard deviation along one axis
-    way_px: how far the camera's motion moved the picture, median
-    fitted: the picture had enough texture to be asked
+    way_px: how far the camera's motion moved the image, median
+    fitted: the image had enough texture to be asked
     """
 
     B: Floats
@@ -167,7 +167,7 @@ def _noise(errors: Floats, mask: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> 
 
 
 def _spread(points: Floats, shape: tuple[int, ...]) -> bool:
-    """Return whether points lie all over a picture of (height, width)."""
+    """Return whether points lie all over a image of (height, width)."""
     cells = np.floor(points / (shape[1], shape[0]) * _CELLS)
     return len(np.unique(cells[:, 0] * _CELLS[1] + cells[:, 1])) >= _LEAST_CELLS
 
@@ -182,7 +182,7 @@ def _way(H: Floats, points: Floats) -> float:
 
 
 def turn_rad(ego: Ego, grey: Grey, K: Floats) -> float:
-    """Return by how much the middle of the picture turned away, as an angle."""
+    """Return by how much the middle of the image turned away, as an angle."""
     height, width = grey.shape
     middle = np.array([[0.5 * (width - 1), 0.5 * (height - 1)]])
     rays = (np.concatenate((middle, moved(ego.total, middle))) - K[:2, 2]) / K[[0, 1], [0, 1]]

@@ -1,6 +1,6 @@
-"""The small grey picture in which motion is looked for, and the lens that goes with it.
+"""The small grey image in which motion is looked for, and the lens that goes with it.
 
-Pixels have their centres at whole numbers: a picture of width w reaches from -0.5 to
+Pixels have their centres at whole numbers: a image of width w reaches from -0.5 to
 w - 0.5, so scaling by s takes u to s (u + 0.5) - 0.5.
 """
 
@@ -19,11 +19,11 @@ Plane = NDArray[np.float32]
 """(height, width)."""
 
 
-class SmallPicture(NamedTuple):
-    """A picture made small and grey.
+class SmallImage(NamedTuple):
+    """A image made small and grey.
 
-    scale: (x, y) small pixels per pixel of the picture given
-    K: (3, 3) camera matrix of the small picture
+    scale: (x, y) small pixels per pixel of the image given
+    K: (3, 3) camera matrix of the small image
     """
 
     grey: Grey
@@ -33,47 +33,47 @@ class SmallPicture(NamedTuple):
 
 
 def made_small(
-    picture: NDArray[Any], work_px: int, lens: Intrinsics, captured_s: float
-) -> SmallPicture:
-    """Scale a picture so that its longer side is at most ``work_px``, and take its brightness.
+    image: NDArray[Any], work_px: int, lens: Intrinsics, captured_s: float
+) -> SmallImage:
+    """Scale a image so that its longer side is at most ``work_px``, and take its brightness.
 
-    It is made small before it is made grey: less work on a large picture.
+    It is made small before it is made grey: less work on a large image.
 
     Raises:
-        ValueError: it is no 8-bit picture: grey, BGR or BGR with alpha.
+        ValueError: it is no 8-bit image: grey, BGR or BGR with alpha.
     """
-    _check(picture)
-    height, width = picture.shape[:2]
+    _check(image)
+    height, width = image.shape[:2]
     shrink = min(1.0, work_px / max(width, height))
     size = max(1, round(width * shrink)), max(1, round(height * shrink))
     if size != (width, height):
-        picture = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+        image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
     scale = size[0] / width, size[1] / height
-    return SmallPicture(grey_of(picture), scale, lens.scaled(*scale).matrix, captured_s)
+    return SmallImage(grey_of(image), scale, lens.scaled(*scale).matrix, captured_s)
 
 
-def grey_of(picture: NDArray[Any]) -> Grey:
-    """Return a picture's brightness, (h, w), whether it is BGR, BGR with alpha, or grey."""
-    channels = picture.shape[2] if picture.ndim == 3 else 1
+def grey_of(image: NDArray[Any]) -> Grey:
+    """Return a image's brightness, (h, w), whether it is BGR, BGR with alpha, or grey."""
+    channels = image.shape[2] if image.ndim == 3 else 1
     if channels == 3:
-        return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
+        return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), dtype=np.uint8)
     if channels == 4:
-        return np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGRA2GRAY), dtype=np.uint8)
-    return np.ascontiguousarray(picture.reshape(picture.shape[:2]))
+        return np.asarray(cv2.cvtColor(image, cv2.COLOR_BGRA2GRAY), dtype=np.uint8)
+    return np.ascontiguousarray(image.reshape(image.shape[:2]))
 
 
-def _check(picture: NDArray[Any]) -> None:
-    channels = picture.shape[2] if picture.ndim == 3 else 1
-    right = picture.ndim in (2, 3) and channels in (1, 3, 4) and picture.size > 0
-    if not right or picture.dtype != np.uint8:
+def _check(image: NDArray[Any]) -> None:
+    channels = image.shape[2] if image.ndim == 3 else 1
+    right = image.ndim in (2, 3) and channels in (1, 3, 4) and image.size > 0
+    if not right or image.dtype != np.uint8:
         raise ValueError(
             "a picture is (height, width), or that with 1, 3 or 4 channels, of uint8, not "
-            f"{picture.shape} of {picture.dtype}"
+            f"{image.shape} of {image.dtype}"
         )
 
 
 def to_given(point_px: tuple[float, float], scale: tuple[float, float]) -> tuple[float, float]:
-    """Return where a point of the small picture lies in the picture given."""
+    """Return where a point of the small image lies in the image given."""
     return (point_px[0] + 0.5) / scale[0] - 0.5, (point_px[1] + 0.5) / scale[1] - 0.5
 
 

@@ -3,7 +3,7 @@
 Flow is found from patches that reach over a thing's edge, where they mix its motion with
 the ground's; of a small thing that is most of it. Here one affine map is fitted to all its
 pixels at once (inverse compositional alignment, Baker and Matthews 2004), with Tukey's
-weights, so that pixels of the ground drop out, first on blurred and then on sharp pictures.
+weights, so that pixels of the ground drop out, first on blurred and then on sharp images.
 """
 
 from typing import NamedTuple
@@ -25,7 +25,7 @@ _LEAST_NOISE = 1.0
 _SMALL_PX = 0.02
 # Spread of what flow is off by: its slide (pixels) and, a patch's radius away, its slopes.
 _SLIDE_SD_PX, _SLOPE_SD_PX = 2.0, 3.0
-# Neighbouring pixels of blurred pictures say the same: so many are one measurement.
+# Neighbouring pixels of blurred images say the same: so many are one measurement.
 _ALIKE = 12.0
 # Weak beliefs in the start; brightness may differ as it likes.
 _BELIEF = np.diag([_SLOPE_SD_PX**-2.0] * 4 + [_SLIDE_SD_PX**-2.0] * 2 + [1e-9])
@@ -34,7 +34,7 @@ _EDGE = cv2.BORDER_REPLICATE
 
 
 class Back(NamedTuple):
-    """An affine map of places now to places in the older picture, the camera's motion taken out.
+    """An affine map of places now to places in the older image, the camera's motion taken out.
 
     matrix: (2, 2); shift: (2,): x -> centre + matrix (x - centre) + shift
     slope_sd: standard deviation of the matrix's numbers, root mean square
@@ -46,18 +46,18 @@ class Back(NamedTuple):
 
 
 class Blurred(NamedTuple):
-    """Two pictures, blurred once for all patches: pairs (now, before), coarse first."""
+    """Two images, blurred once for all patches: pairs (now, before), coarse first."""
 
     pairs: tuple[tuple[Plane, Plane], ...]
 
 
 def blurred(now: Grey, before: Grey) -> Blurred:
-    """Blur both pictures at every level."""
+    """Blur both images at every level."""
     return Blurred(tuple((_blur(now, sigma), _blur(before, sigma)) for sigma, _ in _LEVELS))
 
 
 class Room(NamedTuple):
-    """Where still things are in the older picture.
+    """Where still things are in the older image.
 
     B: (3, 3) pixels now to pixels there; shift: (2,) besides, at the distance of the patch
     """
@@ -66,14 +66,14 @@ class Room(NamedTuple):
     shift: Floats
 
 
-def refined(start: Back, places: Floats, centre: Floats, pictures: Blurred, room: Room) -> Back:
+def refined(start: Back, places: Floats, centre: Floats, frames: Blurred, room: Room) -> Back:
     """Refine a map on the pixels at ``places``, (n, 2); the start itself where that fails."""
     arms = places - centre
     size = max(1.0, float(np.sqrt((arms**2).sum(axis=1).mean())))
     if len(places) < _LEAST_POINTS:
         return start
     best = start
-    for (now, before), (_, steps) in zip(pictures.pairs, _LEVELS, strict=True):
+    for (now, before), (_, steps) in zip(frames.pairs, _LEVELS, strict=True):
         fit = _aligned(best, arms, centre, size, now, before, room, steps)
         if fit is None:
             return best
@@ -130,7 +130,7 @@ def _template(now: Plane, at: NDArray[np.intp], arms: Floats) -> tuple[Floats, F
 
 
 def _seen(before: Plane, room: Room, places: Floats) -> Floats:
-    """Return the older picture's brightness at places of the newer, (n,)."""
+    """Return the older image's brightness at places of the newer, (n,)."""
     there = (moved(room.B, places) + room.shift).astype(np.float32)
     seen = cv2.remap(before, there[:, None], _ONE_MAP, cv2.INTER_LINEAR, None, _EDGE)
     return np.asarray(seen, dtype=np.float64).ravel()

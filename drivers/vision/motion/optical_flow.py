@@ -1,9 +1,9 @@
-"""Optical flow between two pictures, of which the older is first turned as the camera was.
+"""Optical flow between two images, of which the older is first turned as the camera was.
 
 Dense inverse search (Kroeger et al. 2016) finds motions of some 20 px; a head turns by
-more between two pictures. What is known of the turn is taken out before the search, so
+more between two images. What is known of the turn is taken out before the search, so
 that only what the joints do not know is left to it. The flow stands at the pixels of the
-newer picture: where a thing is counts now, not where it was.
+newer image: where a thing is counts now, not where it was.
 """
 
 from typing import NamedTuple
@@ -12,13 +12,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.vision.motion.image import Floats, Grey, Plane, SmallPicture
+from gazerig.drivers.vision.motion.image import Floats, Grey, Plane, SmallImage
 
 Mask = NDArray[np.bool_]
 Flow = NDArray[np.float32]
 """(height, width, 2): x right, y down, pixels."""
 
-# Below 8 px at the finest level of its pyramid, a quarter of the picture, DIS reads
+# Below 8 px at the finest level of its pyramid, a quarter of the image, DIS reads
 # outside its memory; how it counts its levels has changed with the versions of OpenCV.
 _LEAST_SIDE_PX, _LARGEST_ASPECT = 48, 4.0
 _PRESETS = {
@@ -31,13 +31,13 @@ _STILL_PX = 0.02
 
 
 class Compared(NamedTuple):
-    """Two pictures, laid over each other as far as the joints know how.
+    """Two images, laid over each other as far as the joints know how.
 
-    now: the newer picture
+    now: the newer image
     before: the older one, turned as predicted
     known: where it shows anything, and the flow does not lead out of it
     flow: what is at x in ``now`` is at x + flow in ``before``
-    H: (3, 3) pixels of the older picture to those of ``before``
+    H: (3, 3) pixels of the older image to those of ``before``
     shift: (h, w, 2) part of the flow that still things have by their distance; None for none
     """
 
@@ -50,14 +50,14 @@ class Compared(NamedTuple):
 
 
 class FlowSearch:
-    """DIS with its memory, for pictures of any size that it can bear."""
+    """DIS with its memory, for images of any size that it can bear."""
 
     def __init__(self, preset: str, finest_level: int) -> None:
         self._dis = cv2.DISOpticalFlow.create(_PRESETS[preset])
         self._dis.setFinestScale(finest_level)
 
-    def compare(self, now: SmallPicture, before: SmallPicture, H: Floats) -> Compared:
-        """Find what moved, the older picture being turned by ``H`` first."""
+    def compare(self, now: SmallImage, before: SmallImage, H: Floats) -> Compared:
+        """Find what moved, the older image being turned by ``H`` first."""
         grey, known = _turned(before.grey, H)
         flow: Flow = np.zeros((*grey.shape, 2), dtype=np.float32)  # the guess, then the answer
         self._dis.calc(now.grey, grey, flow)
@@ -66,12 +66,12 @@ class FlowSearch:
 
 
 def searchable(grey: Grey) -> bool:
-    """Return whether a picture is large enough, and shaped so, that flow can be found in it."""
+    """Return whether a image is large enough, and shaped so, that flow can be found in it."""
     short, long = sorted(grey.shape)
     return bool(short >= _LEAST_SIDE_PX and long <= _LARGEST_ASPECT * short)
 
 
-def turn_homography(R_now_before: Floats | None, now: SmallPicture, before: SmallPicture) -> Floats:
+def turn_homography(R_now_before: Floats | None, now: SmallImage, before: SmallImage) -> Floats:
     """Return how pixels move when the camera turns about its lens: K R K^-1.
 
     R_now_before: (3, 3) turns directions from the older camera's axes into the newer's;
@@ -93,13 +93,13 @@ def moved(H: Floats, points_px: Floats) -> Floats:
 
 
 def corners(shape: tuple[int, ...]) -> Floats:
-    """Return the middles of a picture's four corner pixels, (4, 2)."""
+    """Return the middles of a image's four corner pixels, (4, 2)."""
     height, width = shape[:2]
     return np.array([(0, 0), (width - 1, 0), (0, height - 1), (width - 1, height - 1)], float)
 
 
 def _turned(grey: Grey, H: Floats) -> tuple[Grey, Mask]:
-    """Turn a picture, and tell which of its pixels are known afterwards."""
+    """Turn a image, and tell which of its pixels are known afterwards."""
     at = corners(grey.shape)
     height, width = grey.shape
     if np.abs(moved(H, at) - at).max() < _STILL_PX:
@@ -112,7 +112,7 @@ def _turned(grey: Grey, H: Floats) -> tuple[Grey, Mask]:
 
 
 def _inside(flow: Flow) -> Mask:
-    """Return which pixels the flow leads to a pixel of the other picture."""
+    """Return which pixels the flow leads to a pixel of the other image."""
     height, width = flow.shape[:2]
     x, y = np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)[:, None]
     at_x: Plane = flow[..., 0] + x

@@ -1,7 +1,7 @@
-"""How still things move in the picture when the lens itself moves, by their distance.
+"""How still things move in the image when the lens itself moves, by their distance.
 
 A neck turns about an axis some centimetres behind the lens: what is near then passes what
-is far. With the older picture turned as predicted, a point that is at X now, in the axes
+is far. With the older image turned as predicted, a point that is at X now, in the axes
 of now, was seen at X - t, whatever it is part of; its depth says by how much that differs.
 """
 
@@ -12,14 +12,14 @@ from gazerig.drivers.vision.motion.optical_flow import Flow
 
 # Nearer than this no lens is sharp, and depth cameras invent.
 _NEAREST_M = 0.1
-# A lens that moves less than this between two pictures stands.
+# A lens that moves less than this between two images stands.
 _STILL_M = 1e-4
 
 
 def parallax(depth_m: Plane | None, K: Floats, t_now_before_m: Floats | None) -> Flow | None:
-    """Return how far still things are from their place now in the older picture, (h, w, 2).
+    """Return how far still things are from their place now in the older image, (h, w, 2).
 
-    depth_m: (h, w), NaN where unknown: there the picture's middle distance is taken
+    depth_m: (h, w), NaN where unknown: there the image's middle distance is taken
     t_now_before_m: (3,) where the lens was, seen from where it is, in its axes of now
 
     None where the lens stands, or nothing is known of depth or motion.

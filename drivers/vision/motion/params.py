@@ -1,6 +1,6 @@
 """What the motion detector can be told.
 
-Lengths in pixels are of the small picture in which the search is done.
+Lengths in pixels are of the small image in which the search is done.
 """
 
 from dataclasses import dataclass

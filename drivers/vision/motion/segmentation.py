@@ -1,9 +1,9 @@
-"""Which pixels move on their own: what is left of the flow, where the pictures bear it out.
+"""Which pixels move on their own: what is left of the flow, where the images bear it out.
 
 Flow is found everywhere, in plain walls too, where it means nothing. A pixel counts when
 its flow differs from the camera's, when the camera's own motion does not explain the newer
-picture there, and when the flow does. Light that flickers, shadows' edges apart, changes the
-picture and is no better explained by any flow.
+image there, and when the flow does. Light that flickers, shadows' edges apart, changes the
+image and is no better explained by any flow.
 """
 
 from typing import NamedTuple
@@ -33,7 +33,7 @@ _EDGE = cv2.BORDER_REPLICATE
 class Things(NamedTuple):
     """What moves on its own.
 
-    flow: (h, w, 2) motion from the older picture to the newer, the camera's taken out, pixels
+    flow: (h, w, 2) motion from the older image to the newer, the camera's taken out, pixels
     mask: (h, w) where that is believed
     threshold_px: least motion that was believed
     """
@@ -67,7 +67,7 @@ def _jumps(shift: Flow | None) -> Plane | float:
 
 
 def _background(ego: Ego, shape: tuple[int, ...]) -> Flow:
-    """Return where the still room's pixels lie in the older picture, (h, w, 2)."""
+    """Return where the still room's pixels lie in the older image, (h, w, 2)."""
     height, width = shape
     x, y = np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)[:, None]
     (a, b, c), (d, e, f), (g, h, i) = ego.B.astype(np.float32)
@@ -76,7 +76,7 @@ def _background(ego: Ego, shape: tuple[int, ...]) -> Flow:
 
 
 def _borne_out(pair: Compared, there: Flow, rest: Flow) -> Mask:
-    """Return where the flow explains the newer picture and the camera's motion does not.
+    """Return where the flow explains the newer image and the camera's motion does not.
 
     Ground that a thing has left changed too, and plain ground is explained by any flow; but
     it "came" from where nothing has changed, while a thing has left where it came from.
@@ -100,7 +100,7 @@ def _added(flow: Flow, sign: float) -> Flow:
 
 
 def _unlike(now: Plane, pair: Compared, there: Flow) -> Plane:
-    """Return how unlike the older picture is, seen through a map: a local mean of squares."""
+    """Return how unlike the older image is, seen through a map: a local mean of squares."""
     seen = cv2.remap(pair.before, there, _ONE_MAP, cv2.INTER_LINEAR, None, _EDGE)
     off = now - seen
     # Clipped, or a dark coat would darken all around it.

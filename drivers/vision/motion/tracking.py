@@ -1,7 +1,7 @@
-"""Which moving patch is which from picture to picture, in the picture alone.
+"""Which moving patch is which from image to image, in the image alone.
 
 Each is looked for where its last motion, and the camera's, should have taken it. Nearest
-pairs are joined first; a thing must be seen in a few pictures in a row before it is told.
+pairs are joined first; a thing must be seen in a few images in a row before it is told.
 """
 
 from dataclasses import dataclass
@@ -22,12 +22,12 @@ _LARGEST_GROWTH = 3.0
 
 @dataclass(slots=True)
 class PatchTrack:
-    """One patch through time, in pixels of the small picture.
+    """One patch through time, in pixels of the small image.
 
     centre: (2,); velocity_px_s: (2,)
     offset: (2,) from there to the point of it that was told last
     size_px: root of the box's area
-    seen: pictures in a row
+    seen: images in a row
     """
 
     id: int
@@ -40,7 +40,7 @@ class PatchTrack:
 
 
 class MotionTracks:
-    """Numbers for moving patches that last from picture to picture."""
+    """Numbers for moving patches that last from image to image."""
 
     def __init__(self, params: MotionParams) -> None:
         self._params = params
@@ -60,9 +60,9 @@ class MotionTracks:
         t_s: float,
         dt_s: float,
     ) -> list[PatchTrack]:
-        """Join one picture's patches to those followed: one for each, in their order.
+        """Join one image's patches to those followed: one for each, in their order.
 
-        total: (3, 3) homography of the camera's own motion, older picture to newer
+        total: (3, 3) homography of the camera's own motion, older image to newer
         """
         self.pass_over(total, t_s, dt_s)
         found: dict[int, PatchTrack] = {}
