@@ -33,11 +33,16 @@ LOOKING = msgspec.msgpack.encode(
 )
 
 
-def said(data: bytes) -> str:
-    """What viser sent, as text: sizes, then packed messages."""
+def unpacked(data: bytes) -> Any:
+    """What viser sent: sizes, then packed messages."""
     size, packed = (int.from_bytes(data[i : i + 8], "little") for i in (0, 8))
     plain = zstandard.ZstdDecompressor().decompress(data[16 : 16 + packed], max_output_size=size)
-    return str(msgspec.msgpack.decode(plain))
+    return msgspec.msgpack.decode(plain)
+
+
+def said(data: bytes) -> str:
+    """What viser sent, as text."""
+    return str(unpacked(data))
 
 
 class _Stay(urllib.request.HTTPRedirectHandler):

@@ -11,7 +11,6 @@ import math
 import os
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import tempfile
@@ -28,7 +27,9 @@ import cv2
 import numpy as np
 import pytest
 from desk import JOINTS
+from page_visitor import PATIENCE_S
 from present import present
+from shown_page import running_page, wait_for
 from six_joints import of_six
 from websockets.sync.client import connect
 
@@ -38,7 +39,6 @@ from gazerig.robot.dashboard.page_process import PageProcess, pack, unpack
 from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
 
 T = TypeVar("T")
-PATIENCE_S = 60.0  # how long a slow machine is waited for, not how long it takes
 REPOSITORY = Path(__file__).parents[1]
 WINDOW_PX = (1280, 800)
 WINDOW_SMALL_PX = (900, 500)  # a processor that does a graphics card's work has less to do
@@ -144,33 +144,6 @@ def life(t_s: float) -> Snapshot:
     part = (2, 6, 4, 3)[int(t_s / 0.7) % 4]
     hand = SeenBody(7, "hand", (0.6, 0.35, 0.1), 0.04)
     return looking(t_s, face, part, (opening, opening), (hand,))
-
-
-def wait_for(ready: Callable[[], T | None], what: str) -> T:
-    """Ask again and again until there is something that is neither None nor False."""
-    last_s = time.monotonic() + PATIENCE_S
-    while time.monotonic() < last_s:
-        found = ready()
-        if found is not None and found is not False:
-            return found
-        time.sleep(0.02)
-    raise AssertionError(f"{what} did not come within {PATIENCE_S:.0f} s")
-
-
-def free_port() -> int:
-    with socket.socket() as trial:
-        trial.bind(("127.0.0.1", 0))
-        return trial.getsockname()[1]
-
-
-@contextmanager
-def running_page(port: int | None = None) -> Iterator[tuple[PageProcess, str]]:
-    page = PageProcess("127.0.0.1", free_port() if port is None else port)
-    page.open()
-    try:
-        yield page, wait_for(page.url, "the page's address")
-    finally:
-        page.close()
 
 
 # --- a browser --------------------------------------------------------------------------

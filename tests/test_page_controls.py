@@ -15,6 +15,8 @@ from typing import Any, NamedTuple
 import pytest
 import viser
 from desk import JOINTS
+from page_visitor import PATIENCE_S
+from shown_page import SNAPSHOT, wait_for
 from six_joints import SIX, of_six
 from stand_in import StandIn
 
@@ -44,10 +46,8 @@ from gazerig.robot.dashboard.page_process import (
     PageProcess,
 )
 from gazerig.robot.dashboard.param_control import (
-    PageParam,
     ParamControl,
     hint,
-    knob_from,
     label,
     read,
     slides,
@@ -58,38 +58,7 @@ from gazerig.robot.dashboard.param_feed import ParamFeed
 from gazerig.robot.dashboard.param_panel import found, group_of
 from gazerig.robot.dashboard.request_handler import PAGE, PageRequestHandler
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Stop, Value, as_json, from_json
-from gazerig.robot.model.types import Snapshot
-
-PATIENCE_S = 20.0
-AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-SNAPSHOT = Snapshot(
-    t_s=1.0,
-    measured_rad=(0.1,) * 9,
-    desired_rad=(0.1,) * 9,
-    R_world_head=AHEAD,
-    p_world_head_m=(0.03, 0.0, 0.14),
-    p_world_eyes_m=((0.03, 0.031, 0.14), (0.03, -0.031, 0.14)),
-    gaze_world=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
-    lids=(0.8, 0.8),
-    p_world_target_m=(0.9, 0.1, 0.25),
-    target_name="face 3: nose",
-    why="it is there",
-    phase="fixate",
-    level="ok",
-    reasons=(),
-    faces=(),
-    bodies=(),
-    rate_hz=200.0,
-    health="0 lost",
-    joints=JOINTS,
-)
-
-
-def wait_for(ready: Callable[[], object], what: str) -> None:
-    last_s = time.monotonic() + PATIENCE_S
-    while not ready():
-        assert time.monotonic() < last_s, f"{what} did not come within {PATIENCE_S:.0f} s"
-        time.sleep(0.01)
+from gazerig.robot.remote.param_info import JsonValue, ParamInfo
 
 
 @contextmanager
@@ -163,7 +132,7 @@ def test_a_stop_does_not_wait_behind_what_takes_long() -> None:
         teller = Outbox(theirs)
         teller.ask({"do": "revert"}, "7")
         teller.command(Stop("a test"), "7")
-        wait_for(lambda: heard, "the stop")
+        wait_for(lambda: bool(heard), "the stop")
         assert heard == ["stop"]
         done.set()
         wait_for(lambda: heard == ["stop", "revert"], "the rest")
@@ -242,7 +211,7 @@ def test_the_ear_tells_once_that_the_page_is_gone() -> None:
     with ours:
         ear = Inbox(ours, lambda message: None, lambda: lost.append(True))
         theirs.close()
-        wait_for(lambda: lost, "the end")
+        wait_for(lambda: bool(lost), "the end")
         ear.close()
         assert lost == [True]
 
@@ -286,7 +255,7 @@ class OneKnob(StandIn):
         self.value = 1.0
         return ()
 
-    def parameters(self) -> tuple[PageParam, ...]:
+    def parameters(self) -> tuple[ParamInfo, ...]:
         return tuple(KNOB._replace(key=f"a.{n}") for n in range(100))
 
     def values(self) -> dict[str, Value]:
@@ -308,7 +277,7 @@ class OneKnob(StandIn):
         return self.values()
 
 
-KNOB = PageParam("a.b", "a", "deg", "how far", 0.0, 10.0, (), "number", 1.0, "next tick")
+KNOB = ParamInfo("a.b", "a", "deg", "how far", 0.0, 10.0, (), "number", 1.0, "next tick")
 
 
 class Heard(NamedTuple):
@@ -546,7 +515,7 @@ def test_sliders_are_those_of_the_rig(server: viser.ViserServer) -> None:
 
 def test_a_knob_is_read_as_the_rig_writes_it() -> None:
     data = {**KNOB._asdict(), "choices": [1, -1], "length": None, "items": None}
-    assert knob_from(json.loads(json.dumps(data))) == KNOB._replace(choices=(1, -1))
+    assert ParamInfo.from_json(json.loads(json.dumps(data))) == KNOB._replace(choices=(1, -1))
 
 
 def test_a_hint_says_all_there_is_to_know() -> None:
@@ -577,7 +546,7 @@ def test_what_a_slider_cannot_set_finely_is_typed() -> None:
     ("kind", "value"),
     [("number", 1e-7), ("number", 3.0), ("whole", 7), ("text", "a b"), ("list", [1.0, 2.5])],
 )
-def test_what_is_written_is_read_again(kind: str, value: object) -> None:
+def test_what_is_written_is_read_again(kind: str, value: JsonValue) -> None:
     knob = KNOB._replace(kind=kind, default=value)
     assert read(knob, written(knob, value)) == value
 
@@ -609,7 +578,7 @@ def test_every_parameter_of_every_rig_becomes_a_control(
     sent = json.loads(
         json.dumps([plain(knob._asdict()) for knob in parameters(rig, load_rig("desk"))])
     )
-    places = [knob_from(data) for data in sent]
+    places = [ParamInfo.from_json(data) for data in sent]
     assert {knob.key for knob in places} == set(now)
     tab = server.gui.add_tab_group().add_tab(name)
     refused: list[str] = []

@@ -6,57 +6,25 @@ other browsers and the stop button do not notice.
 
 import socket
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from desk import JOINTS
 from page_visitor import LOOKING, Visitor
+from shown_page import SNAPSHOT, wait_for
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
 from gazerig.robot.dashboard.camera_overlay import encode
 from gazerig.robot.dashboard.page_process import PageProcess
 from gazerig.robot.model.commands import Stop, as_json
-from gazerig.robot.model.types import Snapshot
 
-PATIENCE_S = 60.0  # how long a slow machine is waited for, not how long it takes
-AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-SNAPSHOT = Snapshot(
-    t_s=1.0,
-    measured_rad=(0.1,) * 9,
-    desired_rad=(0.1,) * 9,
-    R_world_head=AHEAD,
-    p_world_head_m=(0.03, 0.0, 0.14),
-    p_world_eyes_m=((0.03, 0.031, 0.14), (0.03, -0.031, 0.14)),
-    gaze_world=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
-    lids=(0.8, 0.8),
-    p_world_target_m=(0.9, 0.1, 0.25),
-    target_name="the first target",
-    why="it is there",
-    phase="fixate",
-    level="ok",
-    reasons=(),
-    faces=(),
-    bodies=(),
-    rate_hz=200.0,
-    health="0 lost",
-    joints=JOINTS,
-)
 # Noise does not compress: what the deaf browser is owed soon fills all buffers.
 NOISE = np.random.default_rng(0).integers(0, 255, (8, 360, 480, 3)).astype(np.uint8)
 OWED_BYTES = 16_000_000
 """More than Linux keeps for one connection on its way through the door."""
-
-
-def wait_for(ready: Callable[[], object], what: str) -> None:
-    last_s = time.monotonic() + PATIENCE_S
-    while not ready():
-        assert time.monotonic() < last_s, f"{what} did not come within {PATIENCE_S:.0f} s"
-        time.sleep(0.02)
 
 
 def browser(visitor: Visitor, deaf: bool = False) -> ClientConnection:

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from math import radians
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pytest
 
@@ -37,6 +37,7 @@ from gazerig.robot.remote.client import (
     RobotClient,
     running,
 )
+from gazerig.robot.remote.param_info import ParamInfo
 from gazerig.robot.remote.request_handler import Pulse, RequestHandler
 from gazerig.robot.remote.socket_io import REQUEST_BYTES
 from gazerig.robot.remote.socket_server import RemoteServer
@@ -45,19 +46,6 @@ pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 RATE = "loop.rate_hz"
 BLINKS = "gaze.lids.blinks_per_min"
-
-
-class Knob(NamedTuple):
-    key: str
-    group: str
-    unit: str
-    says: str
-    low: float | None
-    high: float | None
-    choices: tuple[Value, ...]
-    kind: str
-    default: Value
-    live: str
 
 
 @dataclass
@@ -87,9 +75,9 @@ class SecondTuning:
         self._now = dict(self._file)
         self.version = 0
 
-    def parameters(self) -> tuple[Knob, ...]:
+    def parameters(self) -> tuple[ParamInfo, ...]:
         return tuple(
-            Knob(
+            ParamInfo(
                 key, key.rpartition(".")[0], "Hz", "a rate", 1.0, 1000.0, (), "number", 17.0, "now"
             )
             for key in self._now
@@ -625,6 +613,7 @@ def test_without_a_runtime_folder_it_is_one_of_the_user_in_tmp(tmp_path: Path) -
 LISTENS = """
 import os, sys
 from gazerig.robot.model.clock import RealClock
+from gazerig.robot.remote.param_info import ParamInfo
 from gazerig.robot.remote.request_handler import Pulse, RequestHandler
 from gazerig.robot.remote.socket_server import RemoteServer
 server = RemoteServer(RequestHandler(None, None, Pulse(RealClock()), {"rig": "other"}), print)

@@ -8,7 +8,6 @@ import sys
 import termios
 import tty
 from queue import Empty, Full, Queue
-from types import TracebackType
 from typing import Protocol, Self, get_args
 
 from gazerig.drivers.errors import SetupError
@@ -81,12 +80,7 @@ class Keys(Protocol):
         """Begin."""
         ...
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         """End."""
         ...
 
@@ -106,12 +100,7 @@ class TerminalKeys:
         self._rest = ""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         """Switch them on again; keys that were not read are forgotten."""
         # Not TCSAFLUSH: a terminal that was stopped with Ctrl-S would be waited for.
         with contextlib.suppress(termios.error, OSError):  # it may be gone
@@ -142,12 +131,7 @@ class LineKeys:
         """Need nothing."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         """Leave nothing behind."""
 
     def next(self, ready: bool) -> Key | None:
@@ -185,14 +169,9 @@ class PageKeys:
         self._others.__enter__()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         """End with the other source."""
-        self._others.__exit__(kind, error, trace)
+        self._others.__exit__(*raised)
 
     def press(self, word: str) -> str | None:
         """Handle a button, for any thread; return the reason if it is refused.

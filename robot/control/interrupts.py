@@ -3,7 +3,7 @@
 import signal
 import threading
 from collections.abc import Callable
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Any, Self
 
 from gazerig.robot.model.clock import RealClock
@@ -70,12 +70,7 @@ class Interrupts:
                 self._before[number] = signal.signal(number, signal.SIG_IGN)
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         """Restore the signal handlers of before."""
         self._depth -= 1
         if self._depth:

@@ -11,7 +11,7 @@ that, and what is written cannot keep it from happening.
 
 import contextlib
 from collections.abc import Callable
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Self, TypeVar
 
 from gazerig.drivers.errors import DriverError
@@ -76,12 +76,7 @@ class PowerDown:
         self._interrupts.spared = _at_work_here
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         """Leave with the torque off."""
         if isinstance(error, KeyboardInterrupt):
             self.cause = self.cause or self._interrupts() or "an interrupt"

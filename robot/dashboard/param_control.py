@@ -1,13 +1,14 @@
 """One parameter as a control: a slider, a tick box, a choice or a line of text."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from math import floor, isclose, log10
-from typing import NamedTuple, cast
+from typing import cast
 
 import viser
 
 from gazerig.robot.dashboard.widget import put
+from gazerig.robot.remote.param_info import ParamInfo
 
 Put = Callable[[str, object], None]
 """Asks for another value: key, value."""
@@ -17,30 +18,7 @@ _FAR = 20.0
 """A range this many times wider than the value needs a number typed, not a slider."""
 
 
-class PageParam(NamedTuple):
-    """A parameter as gazerig.config.parameters describes it, read from JSON."""
-
-    key: str
-    group: str
-    unit: str
-    says: str
-    low: float | None
-    high: float | None
-    choices: tuple[object, ...]
-    kind: str
-    default: object
-    live: str
-    optional: bool = False
-
-
-def knob_from(data: Mapping[str, object]) -> PageParam:
-    """Read what the rig's side wrote; what this page does not need is left."""
-    plain = {name: data[name] for name in PageParam._fields if name in data}
-    plain["choices"] = tuple(cast(list[object], data.get("choices") or ()))
-    return PageParam(**plain)  # type: ignore[arg-type]
-
-
-def hint(knob: PageParam) -> str:
+def hint(knob: ParamInfo) -> str:
     """Return the tooltip of a parameter: description, range and default."""
     parts = [f"{knob.key}: {knob.says}" if knob.says else knob.key]
     unit = f" {knob.unit}" if knob.unit else ""
@@ -54,7 +32,7 @@ def hint(knob: PageParam) -> str:
     return "; ".join(parts)
 
 
-def label(knob: PageParam, unsaved: bool) -> str:
+def label(knob: ParamInfo, unsaved: bool) -> str:
     """Name a control: the last parts of the key, its unit, a mark where it is not saved."""
     unit = f" ({knob.unit})" if knob.unit else ""
     name = ".".join(knob.key.split(".")[-2:])
@@ -68,7 +46,7 @@ def step_of(low: float, high: float) -> float:
     return next(n * ten for n in (1.0, 2.0, 5.0, 10.0) if n * ten >= fine * (1.0 - 1e-9))
 
 
-def slides(knob: PageParam, value: object) -> bool:
+def slides(knob: ParamInfo, value: object) -> bool:
     """Return whether a slider can set a parameter finely enough."""
     if knob.kind not in ("number", "whole") or isinstance(value, bool):
         return False
@@ -81,7 +59,7 @@ def slides(knob: PageParam, value: object) -> bool:
     return low <= value <= high and (usual == 0.0 or high - low <= _FAR * usual)
 
 
-def written(knob: PageParam, value: object) -> str:
+def written(knob: ParamInfo, value: object) -> str:
     """Write a value as a person types it: text as it is, everything else as in the file."""
     if isinstance(value, str) and knob.kind in ("text", "choice"):
         return value
@@ -90,7 +68,7 @@ def written(knob: PageParam, value: object) -> str:
     return json.dumps(value)
 
 
-def read(knob: PageParam, text: str) -> object:
+def read(knob: ParamInfo, text: str) -> object:
     """Read what a person typed.
 
     Raises:
@@ -114,7 +92,7 @@ class ParamControl:
     def __init__(
         self,
         gui: viser.GuiApi,
-        knob: PageParam,
+        knob: ParamInfo,
         value: object,
         unsaved: bool,
         put: Put,

@@ -12,8 +12,9 @@ from typing import cast
 import viser
 
 from gazerig.robot.dashboard.outbox import Outbox
-from gazerig.robot.dashboard.param_control import PageParam, ParamControl, knob_from
+from gazerig.robot.dashboard.param_control import ParamControl
 from gazerig.robot.dashboard.widget import put
+from gazerig.robot.remote.param_info import ParamInfo
 
 MOST_SHOWN = 30
 SAVE, REVERT = "save", "revert to the file"
@@ -30,7 +31,7 @@ class ParamState:
     def __init__(self, server: viser.ViserServer, tab: viser.GuiTabHandle, teller: Outbox) -> None:
         self._tab = tab
         self._teller = teller
-        self._knobs: dict[str, PageParam] = {}
+        self._knobs: dict[str, ParamInfo] = {}
         self._panels: dict[str, ParamPanel] = {}
         # A tab takes one builder at a time, and browsers come and go in a thread of their own.
         self._lock = threading.RLock()
@@ -56,7 +57,7 @@ class ParamState:
         """Add parameters that can be tuned."""
         with self._lock:
             for data in knobs:
-                knob = knob_from(data)
+                knob = ParamInfo.from_json(data)
                 self._knobs[knob.key] = knob
             for panel in self._panels.values():
                 panel.offer(self._knobs)
@@ -102,7 +103,7 @@ class ParamPanel:
         self._teller = teller
         self._lock = lock
         self._who = f"{client.client_id}{_OF_TUNING}"
-        self._knobs: Mapping[str, PageParam] = {}
+        self._knobs: Mapping[str, ParamInfo] = {}
         self._values: Mapping[str, object] = {}
         self._unsaved: frozenset[str] = frozenset()
         self._controls: dict[str, ParamControl] = {}
@@ -146,7 +147,7 @@ class ParamPanel:
         async def _(event: viser.GuiEvent[viser.GuiFormHandle]) -> None:
             self._ask({"do": "save", "path": self._file.value.strip() or None})
 
-    def offer(self, knobs: Mapping[str, PageParam]) -> None:
+    def offer(self, knobs: Mapping[str, ParamInfo]) -> None:
         """Set the parameters that there are."""
         self._knobs = knobs
         groups = tuple(dict.fromkeys(group_of(knob) for knob in knobs.values()))
@@ -232,12 +233,12 @@ class ParamPanel:
                 return [knob.key for knob in known if group_of(knob) == group]
 
 
-def group_of(knob: PageParam) -> str:
+def group_of(knob: ParamInfo) -> str:
     """Return the group a parameter is listed in: as in the file, two names deep."""
     return ".".join(knob.group.split(".")[:2]) if knob.group else "rig"
 
 
-def found(text: str, knobs: Iterable[PageParam]) -> list[str]:
+def found(text: str, knobs: Iterable[ParamInfo]) -> list[str]:
     """Return the keys in which, with what they mean, every word of a text occurs."""
     words = text.lower().split()
     return [

@@ -15,7 +15,6 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from math import radians
 from pathlib import Path
-from types import TracebackType
 from typing import Any, cast
 
 from gazerig.drivers.errors import DriverError, SetupError
@@ -112,12 +111,7 @@ class RobotClient:
         """Return the connection itself."""
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *raised: object) -> None:
         """Hang up."""
         self.close()
 

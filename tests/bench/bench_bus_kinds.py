@@ -14,24 +14,19 @@ import argparse
 import json
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, ExitStack, contextmanager
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, ExitStack
 from statistics import median
 from typing import NamedTuple
 
-from dynamixel_sdk import GroupSyncRead, GroupSyncWrite, PacketHandler, PortHandler
+import bus_clients
+from bus_clients import Cycle, driven, robotis, rustypot
 from rich.console import Console
 from rich.table import Table
-from rustypot import Sts3215PyController, Xl330PyController
 
-from gazerig.drivers.dynamixel.family import DYNAMIXEL
-from gazerig.drivers.dynamixel.params import DynamixelParams
-from gazerig.drivers.feetech.family import FEETECH
-from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
 from gazerig.drivers.multi_bus import BusShare, MultiBus
 from gazerig.drivers.serial.port import BlockingPort, BusPort
-from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, build
 from gazerig.sim_mock.hobby_servo import HobbySpec
@@ -46,9 +41,6 @@ MIXED = {"dynamixel": (1, 2), "feetech": (3, 4), "maestro": (5, 6)}
 Ports = Mapping[str, BusPort | str]
 """By the kind of their bus: opened ones, or paths."""
 
-Tick = Callable[[int], int]
-"""Reads all servos and writes goals; takes a number, gives how many values came."""
-
 out = Console(width=118)
 
 
@@ -62,7 +54,7 @@ class Client(NamedTuple):
     name: str
     kinds: Mapping[str, tuple[int, ...]]
     reads: str
-    make: Callable[[Ports], AbstractContextManager[Tick]]
+    make: Callable[[Ports], AbstractContextManager[Cycle]]
     peer: str = ""
     in_process: bool = True
 
@@ -96,18 +88,10 @@ def driver(kind: str, port: BusPort, ids: tuple[int, ...]) -> ServoBus:
     if kind == "maestro":
         setups = [ServoConfig(i, "hobby", 4400, 7600, 12_000.0, rest_steps=6000) for i in ids]
         return MaestroBus(port, setups, MaestroParams(stagger_ms=0.0))
-    if kind == "feetech":
-        setups = [ServoConfig(i, "sts3215", 1000, 3000, 3000.0) for i in ids]
-        return SmartServoBus(FEETECH, port, setups, FeetechParams())
-    setups = [ServoConfig(i, "xl330-m077", 1000, 3000, 6000.0) for i in ids]
-    # While others have their turn it is silent for longer than servos bear.
-    return SmartServoBus(DYNAMIXEL, port, setups, DynamixelParams(watchdog_ms=0))
+    return bus_clients.driver(kind, port, BAUD[kind], ids)
 
 
-@contextmanager
-def ours(
-    kinds: Mapping[str, tuple[int, ...]], ports: Mapping[str, BusPort | str]
-) -> Iterator[Tick]:
+def ours(kinds: Mapping[str, tuple[int, ...]], ports: Ports) -> AbstractContextManager[Cycle]:
     """Tick with our drivers, torque on."""
     opened = {k: BlockingPort(p) if isinstance(p, str) else p for k, p in ports.items()}
     shares: list[BusShare] = []
@@ -117,69 +101,17 @@ def ours(
         shares.append(BusShare(kind, driver(kind, opened[kind], ids), places))
         goals += [6000 if kind == "maestro" else 2048] * len(ids)
     bus = MultiBus(shares) if len(shares) > 1 else shares[0].bus
-    now_s = next(iter(opened.values())).now_s
-    bus.open()
-    bus.enable_torque()
-
-    def tick(k: int) -> int:
-        feedback = bus.read(now_s())
-        bus.write([goal + k % 8 for goal in goals])
-        return len(goals) - len(feedback.missing)
-
-    try:
-        yield tick
-    finally:
-        bus.disable_torque()
-        bus.close()
+    return driven(bus, goals, next(iter(opened.values())).now_s)
 
 
-@contextmanager
-def sdk(ports: Ports) -> Iterator[Tick]:
-    """ROBOTIS' SDK: fast sync read of 10 bytes, sync write."""
-    given = ports["dynamixel"]
-    port = PortHandler(given) if isinstance(given, str) else given
-    port.setBaudRate(BAUD["dynamixel"])
-    packets = PacketHandler(2.0)
-    reads, writes = GroupSyncRead(port, packets, 126, 10), GroupSyncWrite(port, packets, 116, 4)
-    for servo_id in IDS:
-        reads.addParam(servo_id)
-
-    def tick(k: int) -> int:
-        reads.fastSyncRead()
-        values = [reads.getData(i, 132, 4) for i in IDS if reads.isAvailable(i, 132, 4)]
-        writes.clearParam()
-        for servo_id in IDS:
-            writes.addParam(servo_id, (2048 + k % 8).to_bytes(4, "little"))
-        writes.txPacket()
-        return len(values)
-
-    try:
-        yield tick
-    finally:
-        port.closePort()
+def sdk(ports: Ports) -> AbstractContextManager[Cycle]:
+    """Tick with ROBOTIS' SDK."""
+    return robotis(ports["dynamixel"], BAUD["dynamixel"], IDS)
 
 
-@contextmanager
-def rusty(kind: str, ports: Ports) -> Iterator[Tick]:
-    """rustypot: sync read of the position alone, sync write."""
-    path = str(ports[kind])
-    client: Sts3215PyController | Xl330PyController
-    if kind == "feetech":
-        client = Sts3215PyController(path, BAUD[kind], 0.2)
-    else:
-        client = fast = Xl330PyController(path, BAUD[kind], 0.2)
-        fast.set_fast_sync_read(True)
-    ids = list(IDS)
-
-    def tick(k: int) -> int:
-        values = len(client.sync_read_raw_present_position(ids))
-        client.sync_write_raw_goal_position(ids, [2048 + k % 8] * len(ids))
-        return values
-
-    try:
-        yield tick
-    finally:
-        client.close()
+def rusty(kind: str, ports: Ports) -> AbstractContextManager[Cycle]:
+    """Tick with rustypot."""
+    return rustypot(kind, str(ports[kind]), BAUD[kind], servo_ids=IDS)
 
 
 def of_ours(name: str, kinds: Mapping[str, tuple[int, ...]], reads: str) -> Client:
@@ -209,7 +141,7 @@ def clients() -> list[Client]:
 # --- measuring
 
 
-def a_round(tick: Tick, ticks: int, count: int, step: Callable[[], None]) -> Spans:
+def a_round(tick: Cycle, ticks: int, count: int, step: Callable[[], None]) -> Spans:
     """Run one round; ``step`` lets time pass where a clock has to be moved."""
     spans, lost = [], 0
     cpu = time.process_time()
@@ -226,7 +158,7 @@ def a_round(tick: Tick, ticks: int, count: int, step: Callable[[], None]) -> Spa
 
 
 def take_turns(
-    ticking: Mapping[str, tuple[Tick, int, Callable[[], None]]], rounds: int, ticks: int
+    ticking: Mapping[str, tuple[Cycle, int, Callable[[], None]]], rounds: int, ticks: int
 ) -> dict[str, list[Spans]]:
     """Let all run rounds in turn; the first, to warm up, is not counted."""
     found: dict[str, list[Spans]] = {name: [] for name in ticking}

@@ -14,6 +14,7 @@ from bench_bus_peers import emulated, in_turns, out
 from bus_clients import IDS, Cycle, clients, driver, ours
 from rich.table import Table
 
+from gazerig.drivers.serial.port import BlockingPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.sim_mock.pty.client import PtyBus
 
@@ -88,7 +89,7 @@ def main() -> None:
     for kind in ("dynamixel", "feetech"):
         with ExitStack() as stack:
             path = stack.enter_context(PtyBus()).start_device(emulated(kind, None))
-            bus = driver(kind, path, 1_000_000)
+            bus = driver(kind, BlockingPort(path), 1_000_000)
             bus.open()
             bus.enable_torque()
             cycles = layers(bus)

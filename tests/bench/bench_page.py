@@ -25,7 +25,6 @@ from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
-import zstandard
 from websockets.sync.client import ClientConnection
 from websockets.sync.connection import Connection
 
@@ -38,37 +37,21 @@ from gazerig.robot.control.loop import LoopCount, Tick, run
 
 TESTS = Path(__file__).parents[1]
 sys.path.insert(0, str(TESTS))
-from page_visitor import Visitor  # noqa: E402
+from page_visitor import LOOKING, Visitor, unpacked  # noqa: E402
 
 TRIES = 30
-CAMERA = msgspec.msgpack.encode(
-    {
-        "type": "ViewerCameraMessage",
-        "wxyz": [1.0, 0.0, 0.0, 0.0],
-        "position": [1.0, 0.0, 0.0],
-        "fov": 0.8,
-        "near": 0.01,
-        "far": 1000.0,
-        "image_height": 600,
-        "image_width": 800,
-        "look_at": [0.0, 0.0, 0.0],
-        "up_direction": [0.0, 0.0, 1.0],
-    }
-)
 
 
 def browser(url: str) -> ClientConnection:
     """Connect as a browser does, with a camera, so that the page is drawn for it."""
     there = Visitor(url).open()
-    there.send(CAMERA)
+    there.send(LOOKING)
     return there
 
 
 def messages(data: bytes) -> list[dict[str, Any]]:
-    """What viser sent: sizes, then packed messages."""
-    size, packed = (int.from_bytes(data[i : i + 8], "little") for i in (0, 8))
-    plain = zstandard.ZstdDecompressor().decompress(data[16 : 16 + packed], max_output_size=size)
-    found: list[dict[str, Any]] = msgspec.msgpack.decode(plain)["messages"]
+    """Return the messages in what viser sent."""
+    found: list[dict[str, Any]] = unpacked(data)["messages"]
     return found
 
 

@@ -8,7 +8,7 @@ import os
 import select
 import struct
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from typing import NamedTuple
 
@@ -23,7 +23,7 @@ from gazerig.drivers.dynamixel.protocol import sync_read as dynamixel_read
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.feetech.protocol import sync_read as feetech_read
-from gazerig.drivers.serial.port import BlockingPort
+from gazerig.drivers.serial.port import BlockingPort, BusPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoBus, ServoConfig
 
@@ -44,10 +44,11 @@ class Client(NamedTuple):
     opened: Callable[[str, int], AbstractContextManager[Cycle]]
 
 
-def driver(kind: str, path: str, baud: int, **chosen: object) -> SmartServoBus:
+def driver(
+    kind: str, port: BusPort, baud: int, ids: Sequence[int] = IDS, **chosen: object
+) -> SmartServoBus:
     """Make our driver of one bus."""
-    port = BlockingPort(path)
-    setups = [ServoConfig(i, MODELS[kind], 1000, 3000, 3000.0, f"joint_{i}") for i in IDS]
+    setups = [ServoConfig(i, MODELS[kind], 1000, 3000, 3000.0, f"joint_{i}") for i in ids]
     if kind == "dynamixel":
         # While others have their turn it is silent for longer than servos bear.
         params = DynamixelParams(baud=baud, watchdog_ms=0, **chosen)  # type: ignore[arg-type]
@@ -57,18 +58,20 @@ def driver(kind: str, path: str, baud: int, **chosen: object) -> SmartServoBus:
 
 def ours(kind: str, path: str, baud: int, **chosen: object) -> AbstractContextManager[Cycle]:
     """Return our driver, its torque on."""
-    return _driven(driver(kind, path, baud, **chosen))
+    bus = driver(kind, BlockingPort(path), baud, **chosen)
+    return driven(bus, [2048] * len(IDS), time.monotonic)
 
 
 @contextmanager
-def _driven(bus: ServoBus) -> Iterator[Cycle]:
+def driven(bus: ServoBus, goals: Sequence[int], now_s: Callable[[], float]) -> Iterator[Cycle]:
+    """Cycle with a driver of ours around these goals, torque on."""
     bus.open()
     bus.enable_torque()
 
     def cycle(k: int) -> int:
-        feedback = bus.read(time.monotonic())
-        bus.write([2048 + k % 8] * len(IDS))
-        return len(IDS) - len(feedback.missing)
+        feedback = bus.read(now_s())
+        bus.write([goal + k % 8 for goal in goals])
+        return len(goals) - len(feedback.missing)
 
     try:
         yield cycle
@@ -150,20 +153,19 @@ def _gathered(fd: int, length: int) -> bytes:
 
 
 @contextmanager
-def robotis(path: str, baud: int) -> Iterator[Cycle]:
+def robotis(port: str | BusPort, baud: int, ids: Sequence[int] = IDS) -> Iterator[Cycle]:
     """ROBOTIS' SDK: fast sync read of 10 bytes, sync write."""
-    port, packets = PortHandler(path), PacketHandler(2.0)
-    port.openPort()
-    port.setBaudRate(baud)
+    port, packets = PortHandler(port) if isinstance(port, str) else port, PacketHandler(2.0)
+    port.setBaudRate(baud)  # opens it
     reads, writes = GroupSyncRead(port, packets, 126, 10), GroupSyncWrite(port, packets, 116, 4)
-    for servo_id in IDS:
+    for servo_id in ids:
         reads.addParam(servo_id)
 
     def cycle(k: int) -> int:
         reads.fastSyncRead()
-        values = [reads.getData(i, 132, 4) for i in IDS if reads.isAvailable(i, 132, 4)]
+        values = [reads.getData(i, 132, 4) for i in ids if reads.isAvailable(i, 132, 4)]
         writes.clearParam()
-        for servo_id in IDS:
+        for servo_id in ids:
             writes.addParam(servo_id, (2048 + k % 8).to_bytes(4, "little"))
         writes.txPacket()
         return len(values)
@@ -175,7 +177,9 @@ def robotis(path: str, baud: int) -> Iterator[Cycle]:
 
 
 @contextmanager
-def rustypot(kind: str, path: str, baud: int, wait_s: float = WAIT_S) -> Iterator[Cycle]:
+def rustypot(
+    kind: str, path: str, baud: int, wait_s: float = WAIT_S, servo_ids: Sequence[int] = IDS
+) -> Iterator[Cycle]:
     """rustypot: (fast) sync read of the position alone, as it reads one register; sync write."""
     client: Sts3215PyController | Xl330PyController
     if kind == "feetech":
@@ -183,7 +187,7 @@ def rustypot(kind: str, path: str, baud: int, wait_s: float = WAIT_S) -> Iterato
     else:
         client = fast = Xl330PyController(path, baud, wait_s)
         fast.set_fast_sync_read(True)
-    ids = list(IDS)
+    ids = list(servo_ids)
 
     def cycle(k: int) -> int:
         try:

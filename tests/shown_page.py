@@ -1,0 +1,65 @@
+"""A page process to look at, and a snapshot for it to show."""
+
+import socket
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TypeVar
+
+from desk import JOINTS
+from page_visitor import PATIENCE_S
+
+from gazerig.robot.dashboard.page_process import PageProcess
+from gazerig.robot.model.types import Snapshot
+
+T = TypeVar("T")
+
+AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+SNAPSHOT = Snapshot(
+    t_s=1.0,
+    measured_rad=(0.1,) * 9,
+    desired_rad=(0.1,) * 9,
+    R_world_head=AHEAD,
+    p_world_head_m=(0.03, 0.0, 0.14),
+    p_world_eyes_m=((0.03, 0.031, 0.14), (0.03, -0.031, 0.14)),
+    gaze_world=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+    lids=(0.8, 0.8),
+    p_world_target_m=(0.9, 0.1, 0.25),
+    target_name="face 3: nose",
+    why="it is there",
+    phase="fixate",
+    level="ok",
+    reasons=(),
+    faces=(),
+    bodies=(),
+    rate_hz=200.0,
+    health="0 lost",
+    joints=JOINTS,
+)
+
+
+def wait_for(ready: Callable[[], T | None], what: str) -> T:
+    """Ask again and again until there is something that is neither None nor False."""
+    last_s = time.monotonic() + PATIENCE_S
+    while time.monotonic() < last_s:
+        found = ready()
+        if found is not None and found is not False:
+            return found
+        time.sleep(0.02)
+    raise AssertionError(f"{what} did not come within {PATIENCE_S:.0f} s")
+
+
+def free_port() -> int:
+    with socket.socket() as trial:
+        trial.bind(("127.0.0.1", 0))
+        return int(trial.getsockname()[1])
+
+
+@contextmanager
+def running_page(port: int | None = None) -> Iterator[tuple[PageProcess, str]]:
+    page = PageProcess("127.0.0.1", free_port() if port is None else port)
+    page.open()
+    try:
+        yield page, wait_for(page.url, "the page's address")
+    finally:
+        page.close()
