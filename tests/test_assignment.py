@@ -6,6 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.optimize import linear_sum_assignment
 
 from gazerig.robot.perception.data_association import FORBIDDEN, assign
 
@@ -40,3 +41,32 @@ def test_nobody_and_nothing_are_no_pairs() -> None:
     assert assign(np.zeros((0, 3))) == assign(np.zeros((2, 0))) == []
     assert assign(np.zeros((0,))) == []
     assert assign(np.full((2, 2), FORBIDDEN)) == []
+
+
+ANY_COSTS = st.tuples(st.integers(1, 12), st.integers(1, 12)).flatmap(
+    lambda shape: arrays(np.float64, shape, elements=st.floats(-50.0, 50.0))
+)
+
+
+@given(ANY_COSTS)
+def test_as_cheap_as_the_solver_of_scipy(costs: np.ndarray) -> None:
+    pairs = assign(costs)
+    rows, columns = linear_sum_assignment(costs)
+    assert len(pairs) == len(rows) and pairs == sorted(pairs)
+    ours = sum(costs[i, j] for i, j in pairs)
+    assert abs(ours - costs[rows, columns].sum()) < 1e-9
+
+
+def test_the_very_pairs_of_scipy_where_no_two_ways_cost_the_same() -> None:
+    dice = np.random.default_rng(3)
+    for _ in range(200):
+        costs = dice.normal(0.0, 10.0, dice.integers(1, 9, 2))
+        costs[dice.random(costs.shape) < 0.3] = FORBIDDEN
+        rows, columns = linear_sum_assignment(costs)
+        pairs = zip(rows.tolist(), columns.tolist(), strict=True)
+        assert assign(costs) == [(i, j) for i, j in pairs if costs[i, j] < FORBIDDEN]
+
+
+def test_a_cost_that_is_no_number_is_a_pair_that_cannot_be() -> None:
+    assert assign(np.array([[np.nan, 1.0], [2.0, np.inf]])) == [(0, 1), (1, 0)]
+    assert assign(np.array([[np.nan]])) == []

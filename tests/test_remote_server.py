@@ -27,6 +27,7 @@ from gazerig.robot.control.loop import Robot, Tick
 from gazerig.robot.model import lead, stop_latch
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import Tune, Value
+from gazerig.robot.remote import heartbeat
 from gazerig.robot.remote import socket_io as remote_socket
 from gazerig.robot.remote import socket_server as server_module
 from gazerig.robot.remote.budget import Budget, RequestRate
@@ -712,7 +713,8 @@ def test_a_rig_that_does_not_answer_is_told_so_and_not_asked_again(
 def test_a_program_leads_while_it_lives_and_is_named(
     rig: RobotClient, beat: Beat, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(lead, "HEARTBEAT_S", 10.0)  # simulated: time goes faster here
+    monkeypatch.setattr(lead, "HEARTBEAT_S", 2.0)  # simulated: time goes faster here
+    monkeypatch.setattr(heartbeat, "_EVERY_S", 0.05)
     with RobotClient.connect(who="a show") as show:
         reply = show.look_at(-1.0, 0.0, 0.3)
         assert 60.0 < reply.error_deg < 90.0 and "neck_yaw stays at" in reply.words()
@@ -720,9 +722,9 @@ def test_a_program_leads_while_it_lives_and_is_named(
         status = rig.status()
         assert status["led"] == f"a show (process {os.getpid()}): look at -1 0 0.3"
         count = len(beat.ticks)
-        assert beat.pulse.taken_up(20.0, ticks=4000)  # twice as long
+        assert beat.pulse.taken_up(20.0, ticks=800)  # twice as long
         assert show.leads and beat.ticks[-1].led and len(beat.ticks) > count
-    assert beat.pulse.taken_up(20.0, ticks=2500)
+    assert beat.pulse.taken_up(20.0, ticks=500)
     assert beat.ticks[-1].led == "" and rig.status()["led"] == ""
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from gazerig.gaze.angles import add, cross, norm, scale, sub, unit
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.track_params import TrackParams
-from gazerig.robot.perception.data_association import FORBIDDEN, assign, get_ready
+from gazerig.robot.perception.data_association import FORBIDDEN, assign
 from gazerig.robot.perception.kalman import Floats, ProcessNoise, TrackFilter, far_off, sight_cov
 
 # Two numbers of the detector for one thing, as a cost: 4 standard deviations.
@@ -105,7 +105,6 @@ class Tracker:
     """Keeps identities and velocities of faces and moving things."""
 
     def __init__(self, params: TrackParams) -> None:
-        get_ready()
         self._tracks: list[Track] = []
         self._next_id = 1
         self.retune(params)

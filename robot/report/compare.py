@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
 
 from gazerig.gaze.types import Floats
 from gazerig.robot.control.tick import Tick
@@ -112,6 +111,8 @@ def chance_of_shape(a: MeasuredValue, b: MeasuredValue) -> float:
     """Return the Kolmogorov-Smirnov chance of two distributions, nan of rows that are none."""
     if a.rows.ndim != 1 or len(np.unique(np.concatenate([a.rows, b.rows]))) <= 2:
         return nan
+    from scipy import stats  # a second of processor, which other commands need not wait for
+
     return float(stats.ks_2samp(a.rows, b.rows).pvalue)
 
 
