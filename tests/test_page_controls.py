@@ -27,22 +27,22 @@ from gazerig.robot.control.command_handler import plain
 from gazerig.robot.dashboard.control_tabs import LeadView
 from gazerig.robot.dashboard.inbox import (
     MESSAGE_BYTES,
-    TELL,
+    REQUEST,
     Inbox,
     overtaken,
-    telling,
-    told,
+    parse_request,
+    request_message,
     urgent,
 )
 from gazerig.robot.dashboard.jog_panel import ESTIMATED, MEASURED, JogPanel, measured_table
 from gazerig.robot.dashboard.outbox import Outbox
 from gazerig.robot.dashboard.page_feed import News, drain
 from gazerig.robot.dashboard.page_process import (
+    ALL_USERS,
     CHOICES,
-    EVERYBODY,
-    KNOBS,
+    MESSAGE,
+    PARAMS,
     VALUES,
-    WORDS,
     PageProcess,
 )
 from gazerig.robot.dashboard.param_control import (
@@ -93,9 +93,9 @@ def test_what_is_asked_is_heard_and_answered() -> None:
     with linked(hear) as (_, theirs):
         teller = Outbox(theirs)
         assert teller.command(Ask("behaviour", "guard"), "7")
-        assert sent(theirs) == (WORDS, ["7", None])
+        assert sent(theirs) == (MESSAGE, ["7", None])
         assert teller.ask({"pick": {"x": 0.5, "y": 0.5}}, "8:tuning")
-        assert sent(theirs) == (WORDS, ["8:tuning", "refused: too far"])
+        assert sent(theirs) == (MESSAGE, ["8:tuning", "refused: too far"])
         assert heard == [as_json(Ask("behaviour", "guard")), {"pick": {"x": 0.5, "y": 0.5}}]
 
 
@@ -112,9 +112,9 @@ def test_a_request_that_goes_wrong_leaves_ears_for_a_stop() -> None:
         teller = Outbox(theirs)
         teller.ask({"pick": {}}, "7")
         kind, (who, words) = sent(theirs)
-        assert (kind, who) == (WORDS, "7") and "a fault in this program" in words
-        theirs.send(telling("7", b'{"do": no JSON'))
-        theirs.send(TELL + b"7 no JSON either")
+        assert (kind, who) == (MESSAGE, "7") and "a fault in this program" in words
+        theirs.send(request_message("7", b'{"do": no JSON'))
+        theirs.send(REQUEST + b"7 no JSON either")
         teller.command(Stop("a test"), "7")
         wait_for(lambda: heard == ["stop"], "the stop")
 
@@ -160,15 +160,18 @@ def test_of_a_slider_that_is_dragged_the_last_word_counts() -> None:
 
 def test_only_the_same_change_by_the_same_person_is_overtaken() -> None:
     def change(who: str, key: str) -> bytes:
-        return telling(who, b'{"do":"set","changes":{"%s":1}}' % key.encode())
+        return request_message(who, b'{"do":"set","changes":{"%s":1}}' % key.encode())
 
     assert overtaken(change("7", "a"), change("7", "a"))
     assert not overtaken(change("7", "a"), change("8", "a"))
     assert not overtaken(change("7", "a"), change("7", "b"))
-    assert not overtaken(telling("7", b'{"do":"save","path":null}'), change("7", "a"))
-    assert told(telling("7:tuning", b'{"a":"b c"}')) == ("7:tuning", b'{"a":"b c"}')
-    assert urgent(telling("7", b'{"do":"stop","why":""}'))
-    assert not urgent(telling("7", b'{"do":"revert"}'))
+    assert not overtaken(request_message("7", b'{"do":"save","path":null}'), change("7", "a"))
+    assert parse_request(request_message("7:tuning", b'{"a":"b c"}')) == (
+        "7:tuning",
+        b'{"a":"b c"}',
+    )
+    assert urgent(request_message("7", b'{"do":"stop","why":""}'))
+    assert not urgent(request_message("7", b'{"do":"revert"}'))
 
 
 def test_answers_wait_until_the_page_has_room() -> None:
@@ -200,7 +203,7 @@ def test_words_menus_and_their_way() -> None:
         news = drain(theirs)
     assert news.others == (
         (CHOICES, {"behaviour": ["wait", "guard"]}),
-        (WORDS, [EVERYBODY, "the disk is full"]),
+        (MESSAGE, [ALL_USERS, "the disk is full"]),
     )
 
 
@@ -229,7 +232,7 @@ class Saved(NamedTuple):
     changes: tuple[object, ...] = ()
 
 
-class OneKnob(StandIn):
+class OneParam(StandIn):
     """The parameters of a rig that has one."""
 
     path = Path("/rigs/mine.yaml")
@@ -256,7 +259,7 @@ class OneKnob(StandIn):
         return ()
 
     def parameters(self) -> tuple[ParamInfo, ...]:
-        return tuple(KNOB._replace(key=f"a.{n}") for n in range(100))
+        return tuple(PARAM._replace(key=f"a.{n}") for n in range(100))
 
     def values(self) -> dict[str, Value]:
         return {f"a.{n}": (1.0, 2.0) for n in range(99)} | {"a.b": self.value}
@@ -277,13 +280,13 @@ class OneKnob(StandIn):
         return self.values()
 
 
-KNOB = ParamInfo("a.b", "a", "deg", "how far", 0.0, 10.0, (), "number", 1.0, "next tick")
+PARAM = ParamInfo("a.b", "a", "deg", "how far", 0.0, 10.0, (), "number", 1.0, "next tick")
 
 
 class Heard(NamedTuple):
     hear: PageRequestHandler
     orders: list[Command]
-    tuning: OneKnob
+    tuning: OneParam
     saved: list[Path]
 
 
@@ -291,7 +294,7 @@ class Heard(NamedTuple):
 def heard() -> Heard:
     orders: list[Command] = []
     saved: list[Path] = []
-    tuning = OneKnob()
+    tuning = OneParam()
 
     def point(x: float, y: float) -> Vec3 | None:
         return (1.0, x, y) if x < 0.9 else None
@@ -355,7 +358,7 @@ def test_saving_says_where(heard: Heard) -> None:
 
 
 def test_the_feed_tells_all_once_and_then_what_changed() -> None:
-    tuning, sent, room = OneKnob(), [], [5]
+    tuning, sent, room = OneParam(), [], [5]
 
     def send(message: bytes) -> bool:
         assert len(message) < MESSAGE_BYTES
@@ -370,7 +373,7 @@ def test_the_feed_tells_all_once_and_then_what_changed() -> None:
     assert len(sent) == 5  # the page was full; nothing is lost
     room[0] = 100
     feed.step()
-    keys = [knob["key"] for kind, data in sent if kind == KNOBS for knob in data]
+    keys = [param["key"] for kind, data in sent if kind == PARAMS for param in data]
     assert keys == [f"a.{n}" for n in range(100)]
     values = {k: v for kind, d in sent if kind == VALUES for k, v in d["values"].items()}
     assert len(values) == 100 and values["a.0"] == [1.0, 2.0]
@@ -394,17 +397,17 @@ def server() -> Iterator[viser.ViserServer]:
 
 
 class Mouth:
-    """Keeps what is told."""
+    """Keeps what is parse_request."""
 
     def __init__(self) -> None:
-        self.told: list[tuple[object, str]] = []
+        self.parse_request: list[tuple[object, str]] = []
 
     def command(self, command: Command, who: str) -> bool:
-        self.told.append((command, who))
+        self.parse_request.append((command, who))
         return True
 
     def ask(self, data: Mapping[str, object], who: str) -> bool:
-        self.told.append((dict(data), who))
+        self.parse_request.append((dict(data), who))
         return True
 
 
@@ -427,7 +430,7 @@ def test_menus_become_buttons_that_ask(server: viser.ViserServer) -> None:
     touch(server, lead._menus["steer"], "left")
     assert lead._characters is not None
     touch(server, lead._characters, "calm")
-    assert mouth.told == [
+    assert mouth.parse_request == [
         (Ask("behaviour", "guard"), "5"),
         ({"steer": "left"}, "5"),
         ({"do": "character", "name": "calm"}, "5"),
@@ -457,9 +460,11 @@ def test_a_slider_jogs_and_then_follows_its_joint(server: viser.ViserServer) -> 
     slider = view._sliders["neck_yaw"]
     yaw = JOINTS.index("neck_yaw")
     view.show(replace(SNAPSHOT, t_s=1.0))
-    assert slider.value == pytest.approx(5.7) and mouth.told == []  # 0.1 rad, and nobody asked
+    assert (
+        slider.value == pytest.approx(5.7) and mouth.parse_request == []
+    )  # 0.1 rad, and nobody asked
     touch(server, slider, 20.0)
-    assert mouth.told == [(Jog((("neck_yaw", radians(20.0)),)), "5")]
+    assert mouth.parse_request == [(Jog((("neck_yaw", radians(20.0)),)), "5")]
 
     def wished(t_s: float, desired_deg: float, stopped: str = "") -> float:
         desired = tuple(radians(desired_deg) if i == yaw else 0.1 for i in range(9))
@@ -506,23 +511,23 @@ def test_sliders_are_those_of_the_rig(server: viser.ViserServer) -> None:
     view.show(of_six(SNAPSHOT))
     assert view._sliders["eyes_pan"].value == pytest.approx(20.0)
     touch(server, lid, 5.0)
-    assert mouth.told == [(Jog((("left_lower_lid", radians(5.0)),)), "5")]
+    assert mouth.parse_request == [(Jog((("left_lower_lid", radians(5.0)),)), "5")]
     view.show(SNAPSHOT)  # of another rig: nothing to follow, and nothing breaks
 
 
 # --- parameters ---------------------------------------------------------------------------------
 
 
-def test_a_knob_is_read_as_the_rig_writes_it() -> None:
-    data = {**KNOB._asdict(), "choices": [1, -1], "length": None, "items": None}
-    assert ParamInfo.from_json(json.loads(json.dumps(data))) == KNOB._replace(choices=(1, -1))
+def test_a_parameter_is_read_as_the_rig_writes_it() -> None:
+    data = {**PARAM._asdict(), "choices": [1, -1], "length": None, "items": None}
+    assert ParamInfo.from_json(json.loads(json.dumps(data))) == PARAM._replace(choices=(1, -1))
 
 
 def test_a_hint_says_all_there_is_to_know() -> None:
-    words = hint(KNOB._replace(choices=("a", "b")))
+    words = hint(PARAM._replace(choices=("a", "b")))
     for part in ("a.b", "how far", "0 to 10 deg", "a, b", "default 1.0 deg", "next tick"):
         assert part in words
-    assert label(KNOB, True) == "● a.b (deg)" and label(KNOB, False) == "a.b (deg)"
+    assert label(PARAM, True) == "● a.b (deg)" and label(PARAM, False) == "a.b (deg)"
 
 
 @pytest.mark.parametrize(("low", "high"), [(0.0, 1.0), (-35.0, 35.0), (0.3, 0.7), (10.0, 1e5)])
@@ -533,13 +538,13 @@ def test_a_slider_has_some_hundred_round_steps(low: float, high: float) -> None:
 
 
 def test_what_a_slider_cannot_set_finely_is_typed() -> None:
-    assert slides(KNOB, 1.0)
-    assert not slides(KNOB._replace(high=1e6), 1.0)
-    assert not slides(KNOB, 11.0)
-    assert not slides(KNOB._replace(optional=True, default=None), 1.0)
-    assert slides(KNOB._replace(optional=True), 1.0)
-    assert not slides(KNOB._replace(optional=True), None)
-    assert not slides(KNOB._replace(kind="list"), (1.0, 2.0))
+    assert slides(PARAM, 1.0)
+    assert not slides(PARAM._replace(high=1e6), 1.0)
+    assert not slides(PARAM, 11.0)
+    assert not slides(PARAM._replace(optional=True, default=None), 1.0)
+    assert slides(PARAM._replace(optional=True), 1.0)
+    assert not slides(PARAM._replace(optional=True), None)
+    assert not slides(PARAM._replace(kind="list"), (1.0, 2.0))
 
 
 @pytest.mark.parametrize(
@@ -547,22 +552,22 @@ def test_what_a_slider_cannot_set_finely_is_typed() -> None:
     [("number", 1e-7), ("number", 3.0), ("whole", 7), ("text", "a b"), ("list", [1.0, 2.5])],
 )
 def test_what_is_written_is_read_again(kind: str, value: JsonValue) -> None:
-    knob = KNOB._replace(kind=kind, default=value)
-    assert read(knob, written(knob, value)) == value
+    param = PARAM._replace(kind=kind, default=value)
+    assert read(param, written(param, value)) == value
 
 
 def test_what_cannot_be_read_is_refused_with_an_example() -> None:
     with pytest.raises(ValueError, match=r"a\.b: '1,5' is no number; write it like 1\.0"):
-        read(KNOB, "1,5")
-    assert read(KNOB._replace(optional=True), "null") is None
+        read(PARAM, "1,5")
+    assert read(PARAM._replace(optional=True), "null") is None
 
 
 def test_a_slider_makes_room_where_null_comes_into_force(server: viser.ViserServer) -> None:
-    knob = KNOB._replace(optional=True)
+    param = PARAM._replace(optional=True)
     tab = server.gui.add_tab_group().add_tab("null")
     with tab:
-        slider = ParamControl(server.gui, knob, 1.0, False, ignore, ignored, 0.0)
-        typed = ParamControl(server.gui, knob, None, False, ignore, ignored, 1.0)
+        slider = ParamControl(server.gui, param, 1.0, False, ignore, ignored, 0.0)
+        typed = ParamControl(server.gui, param, None, False, ignore, ignored, 1.0)
     assert slider.can_show(2.0) and not slider.can_show(None)
     assert typed.can_show(None) and typed.can_show(2.0)
     typed.show(2.0, False)
@@ -576,26 +581,28 @@ def test_every_parameter_of_every_rig_becomes_a_control(
     rig = load_rig(name)
     now, texts = values(rig), {}
     sent = json.loads(
-        json.dumps([plain(knob._asdict()) for knob in parameters(rig, load_rig("desk"))])
+        json.dumps([plain(param._asdict()) for param in parameters(rig, load_rig("desk"))])
     )
     places = [ParamInfo.from_json(data) for data in sent]
-    assert {knob.key for knob in places} == set(now)
+    assert {param.key for param in places} == set(now)
     tab = server.gui.add_tab_group().add_tab(name)
     refused: list[str] = []
     with tab:
-        for knob in places:
-            if knob.kind in ("list", "mapping") or knob.key.startswith("joints."):
-                value = json.loads(json.dumps(plain(now[knob.key])))
-                control = ParamControl(server.gui, knob, value, False, ignore, refused.append, 0.0)
+        for param in places:
+            if param.kind in ("list", "mapping") or param.key.startswith("joints."):
+                value = json.loads(json.dumps(plain(now[param.key])))
+                control = ParamControl(server.gui, param, value, False, ignore, refused.append, 0.0)
                 control.show(value, True)
-                assert hint(knob).startswith(knob.key)
+                assert hint(param).startswith(param.key)
                 if control._form is not None:
-                    texts[knob.key] = str(control._handle.value)
-                    assert read(knob, texts[knob.key]) == value
+                    texts[param.key] = str(control._handle.value)
+                    assert read(param, texts[param.key]) == value
                 control.remove()
     if name == "maker":
         assert texts["joints.eyes_pan.transmission_points"].startswith("[[-32.0, 1068.0], [")
-        linkage = next(knob for knob in places if knob.key == "joints.eyes_pan.transmission_points")
+        linkage = next(
+            param for param in places if param.key == "joints.eyes_pan.transmission_points"
+        )
         assert "next start" in hint(linkage) and "default" not in hint(linkage)
     assert refused == []
 
@@ -610,15 +617,17 @@ def ignore(key: str, value: object) -> None:
 
 
 def test_search_takes_every_word() -> None:
-    parameters = (KNOB, KNOB._replace(key="guard.speed", group="guard", says="how fast"))
+    parameters = (PARAM, PARAM._replace(key="guard.speed", group="guard", says="how fast"))
     assert found("how FAR", parameters) == ["a.b"]
     assert found("how", parameters) == ["a.b", "guard.speed"] and found("how not", parameters) == []
-    assert group_of(KNOB._replace(group="joints.neck_yaw.more")) == "joints.neck_yaw"
-    assert group_of(KNOB._replace(group="")) == "rig"
+    assert group_of(PARAM._replace(group="joints.neck_yaw.more")) == "joints.neck_yaw"
+    assert group_of(PARAM._replace(group="")) == "rig"
 
 
 def test_orders_survive_the_way_of_the_page() -> None:
     order = Jog((("neck_yaw", 0.25),))
-    data = told(telling("7", json.dumps(as_json(order), separators=(",", ":")).encode()))[1]
+    data = parse_request(
+        request_message("7", json.dumps(as_json(order), separators=(",", ":")).encode())
+    )[1]
     assert from_json(json.loads(data)) == order
     assert News((), None, False).others == ()

@@ -22,7 +22,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli import replay as cli_replay
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.dashboard.inbox import MESSAGE_BYTES
-from gazerig.robot.dashboard.page_process import PICTURE, REPLAY, SNAPSHOT, unpack
+from gazerig.robot.dashboard.page_process import FRAME, REPLAY, SNAPSHOT, unpack
 from gazerig.robot.dashboard.replay import ReplayView, clock, event_list, strip
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.commands import Ask
@@ -202,7 +202,7 @@ def test_playing_shows_all_snapshots_in_order_and_each_picture_once(
     states = shown(replay, screen, time_, SECONDS + 1.0)
     times = screen.times_s(ticks[0].t_s)
     assert len(set(times)) == len(frames) and times == sorted(times)
-    assert screen.of(PICTURE) == [b"jpeg at 1", b"jpeg at 3", b"jpeg at 5"]
+    assert screen.of(FRAME) == [b"jpeg at 1", b"jpeg at 3", b"jpeg at 5"]
     assert not states[-1].playing and states[-1].at_s == frames.duration_s
     assert screen.states()[-1]["playing"] is False
 
@@ -299,7 +299,7 @@ def test_a_leap_shows_only_where_it_lands(frames: SnapshotIndex, ticks: list[Tic
         replay.ask({"seek_s": seek_s})
         replay.show(screen, time_.now_s())
         assert screen.times_s(ticks[0].t_s) == [pytest.approx(seek_s, abs=0.021)]
-        assert screen.of(PICTURE) == [b"jpeg at %d" % seek_s]
+        assert screen.of(FRAME) == [b"jpeg at %d" % seek_s]
         (state,) = screen.states()
         assert state["at_s"] == state["sought_s"] == seek_s
 
@@ -317,7 +317,7 @@ def test_what_a_full_page_did_not_take_comes_later(
     (at_s,) = set(screen.times_s(ticks[0].t_s))
     assert at_s == pytest.approx(3.5, abs=0.021)
     assert "marks" in screen.states()[0] and screen.states()[0]["at_s"] == 3.5
-    assert screen.of(PICTURE) == [b"jpeg at 3"]
+    assert screen.of(FRAME) == [b"jpeg at 3"]
 
 
 def test_the_page_is_told_once_what_there_is_and_in_one_message(frames: SnapshotIndex) -> None:
@@ -335,11 +335,14 @@ def test_the_page_is_told_once_what_there_is_and_in_one_message(frames: Snapshot
 
 def test_requests_are_obeyed_or_refused_in_words(frames: SnapshotIndex) -> None:
     replay = Replay(frames, SimulatedClock())
-    assert replay.hear({"replay": {"seek_s": 2.0}}) is None
-    assert replay.hear({"replay": {"step": "next saccade"}}) is None
-    assert "between 0.05 and 8" in (replay.hear({"replay": {"speed": 100}}) or "")
-    assert "cannot be meant" in (replay.hear({"replay": None}) or "")
-    assert replay.hear({"do": "stop", "why": ""}) == "this is a recording: nothing moves here"
+    assert replay.handle_request({"replay": {"seek_s": 2.0}}) is None
+    assert replay.handle_request({"replay": {"step": "next saccade"}}) is None
+    assert "between 0.05 and 8" in (replay.handle_request({"replay": {"speed": 100}}) or "")
+    assert "cannot be meant" in (replay.handle_request({"replay": None}) or "")
+    assert (
+        replay.handle_request({"do": "stop", "why": ""})
+        == "this is a recording: nothing moves here"
+    )
 
 
 # --- the page's side
@@ -424,7 +427,7 @@ def test_a_player_takes_every_place_the_slider_can_ask_for(
     replay = Replay(frames, SimulatedClock())
     shelf.by_hand("time, s", 3.725)
     (_, asked) = shelf.asked[0]
-    assert replay.hear(json.loads(json.dumps(asked))) is None
+    assert replay.handle_request(json.loads(json.dumps(asked))) is None
     screen = Screen()
     replay.show(screen, 0.0)
     shelf.view.show(screen.states()[0])

@@ -135,12 +135,12 @@ class ParamStore:
         """Return all parameters in the order of the file."""
         state, made = self._state, self._described
         # All but which entries there are stays as it is.
-        if [knob.key for knob in made] != list(state.values):
+        if [param.key for param in made] != list(state.values):
             made = self._described = described(state.rig, self._defaults)
         return made
 
     def values(self) -> dict[str, Value]:
-        """Return key -> value in force of every knob."""
+        """Return key -> value in force of every param."""
         return dict(self._state.values)
 
     def get(self, prefix: str = "") -> dict[str, Value]:

@@ -93,7 +93,7 @@ class RunObservers:
 
     def _made_page(self, address: tuple[str, int]) -> PageProcess:
         command, steer = self._made.robot.command, self._steer
-        hear = PageRequestHandler(
+        page_requests = PageRequestHandler(
             command if steer is None else only_stops(command),
             params=self._tuning,
             point=self._picking.point,
@@ -103,7 +103,7 @@ class RunObservers:
             depth=self._show_depth,
             paths=self._tuning.confined if self._tuning is not None else None,
         )
-        return PageProcess(*address, hear)
+        return PageProcess(*address, page_requests)
 
     def _made_onlooker(self, status: Callable[[str], None] | None) -> Publisher:
         page, made, tuning = self._page, self._made, self._tuning

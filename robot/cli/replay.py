@@ -181,7 +181,7 @@ def _show(
             read,
         )
     replaying = Replay(frames, clock)
-    page = PageProcess(*address, replaying.hear)
+    page = PageProcess(*address, replaying.handle_request)
     began_s, urls, starts = clock.now_s(), [""], [0]
 
     def over(_: PlaybackState) -> bool:

@@ -43,7 +43,7 @@ def complete_key(incomplete: str) -> list[str]:
         from gazerig.config.schema import load_rig
 
         desk = load_rig("desk")
-        return [knob.key for knob in parameters(desk, desk) if knob.key.startswith(incomplete)]
+        return [param.key for param in parameters(desk, desk) if param.key.startswith(incomplete)]
 
 
 def complete_pair(context: typer.Context, incomplete: str) -> list[str]:
@@ -53,10 +53,10 @@ def complete_pair(context: typer.Context, incomplete: str) -> list[str]:
         return complete_key(incomplete)
     try:
         with RobotClient.connect() as rig:
-            knob = rig.parameter(given[-1])
+            param = rig.parameter(given[-1])
     except DriverError:
         return []
-    values = ("true", "false") if knob.kind == "bool" else tuple(map(_written, knob.choices))
+    values = ("true", "false") if param.kind == "bool" else tuple(map(_written, param.choices))
     return [value for value in values if value.startswith(incomplete)]
 
 
@@ -102,14 +102,14 @@ def get(
     """Show the running rig's parameters: value, unit, default; * marks what is not saved."""
     with clear_errors(), RobotClient.connect(pid) as rig:
         values = rig.get(prefix)
-        found = [knob for knob in rig.parameters() if knob.key in values]
+        found = [param for param in rig.parameters() if param.key in values]
         if differs:
             other = {change.key for change in rig.differs()}
-            found = [knob for knob in found if knob.key in other]
+            found = [param for param in found if param.key in other]
         if not found and not differs:
             raise SetupError(f"{prefix}: no key begins so; gazerig ctl get lists all")
         if as_json:
-            print(json.dumps({knob.key: values[knob.key] for knob in found}, indent=2))
+            print(json.dumps({param.key: values[param.key] for param in found}, indent=2))
             return
         unsaved = {change.key for change in rig.unsaved()}
     for line in _table(found, values, unsaved):
@@ -294,17 +294,17 @@ def _table(
 ) -> list[str]:
     """Lay parameters out in columns, never cut: the lines are also read by programs."""
     rows = [("", "key", "value", "unit", "default", "")]
-    for knob in found:
-        value = _written(values[knob.key])
-        default = _written(knob.default)
+    for param in found:
+        value = _written(values[param.key])
+        default = _written(param.default)
         rows.append(
             (
-                "*" if knob.key in unsaved else "",
-                knob.key,
+                "*" if param.key in unsaved else "",
+                param.key,
                 value,
-                knob.unit,
+                param.unit,
                 "" if default == value else default,
-                "next start" if knob.live.startswith("next start") else "",
+                "next start" if param.live.startswith("next start") else "",
             )
         )
     widths = [min(max(map(len, column)), 40) for column in zip(*rows, strict=True)]
@@ -314,12 +314,12 @@ def _table(
     ]
 
 
-def _rule(knob: ParamInfo) -> str:
+def _rule(param: ParamInfo) -> str:
     """Return what one parameter is, its range, and when a change takes effect."""
-    bounds = "" if knob.low is None or knob.high is None else f"{knob.low:g} .. {knob.high:g}"
-    choices = ", ".join(map(_written, knob.choices))
-    allowed = " ".join(part for part in (bounds, knob.unit if bounds else "") if part) or choices
-    return "; ".join(part for part in (knob.says, allowed, f"changes at the {knob.live}") if part)
+    bounds = "" if param.low is None or param.high is None else f"{param.low:g} .. {param.high:g}"
+    choices = ", ".join(map(_written, param.choices))
+    allowed = " ".join(part for part in (bounds, param.unit if bounds else "") if part) or choices
+    return "; ".join(part for part in (param.says, allowed, f"changes at the {param.live}") if part)
 
 
 def _written(value: object) -> str:

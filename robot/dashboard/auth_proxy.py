@@ -238,10 +238,10 @@ class AuthProxy:
         """Hand what is asked for to the rig, and say whether it was taken."""
         async with asyncio.timeout(_READ_S):
             body = await request.read()
-        status, words = await self._heard(body, self._who(request))
+        status, words = await self._handle(body, self._who(request))
         return web.Response(status=status, text=f"{words}\n" if words else None, headers=_HEADERS)
 
-    async def _heard(self, body: bytes | str, who: str) -> tuple[int, str]:
+    async def _handle(self, body: bytes | str, who: str) -> tuple[int, str]:
         """Hand on what a browser asks; return an HTTP status, and words of a refusal."""
         asked = from_browser(body, who)
         if asked is None:
@@ -272,8 +272,8 @@ class AuthProxy:
         try:
             with self.browsers.connected(who), self._lines.take(who) as leave:
                 await until_one_ends(
-                    self._tell_line(line, news, who),
-                    self._hear_line(line, who),
+                    self._send_state(line, news, who),
+                    self._receive_line(line, who),
                     self._over.wait(),
                     leave.wait(),
                 )
@@ -284,7 +284,7 @@ class AuthProxy:
                 await line.close()
         return line
 
-    async def _tell_line(self, line: web.WebSocketResponse, news: asyncio.Event, who: str) -> None:
+    async def _send_state(self, line: web.WebSocketResponse, news: asyncio.Event, who: str) -> None:
         while not line.closed:
             news.clear()
             async with asyncio.timeout(TAKES_S):
@@ -292,11 +292,11 @@ class AuthProxy:
             with suppress(TimeoutError):
                 await asyncio.wait_for(news.wait(), _BEAT_S)
 
-    async def _hear_line(self, line: web.WebSocketResponse, who: str) -> None:
+    async def _receive_line(self, line: web.WebSocketResponse, who: str) -> None:
         async for message in line:
             if message.type is not aiohttp.WSMsgType.TEXT:
                 continue
-            status, words = await self._heard(message.data, who)
+            status, words = await self._handle(message.data, who)
             async with asyncio.timeout(TAKES_S):
                 await line.send_str(json.dumps({"answer": status, "words": words}))
 

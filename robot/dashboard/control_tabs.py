@@ -42,9 +42,9 @@ class ControlTabs:
         for name, choices in menus.items():
             self._lead.offer(name, choices)
 
-    def knobs(self, knobs: Sequence[Mapping[str, object]]) -> None:
+    def params(self, params: Sequence[Mapping[str, object]]) -> None:
         """Add parameters that can be tuned, as the rig describes them."""
-        self._tuning.knobs(knobs)
+        self._tuning.params(params)
 
     def values(self, state: Mapping[str, object]) -> None:
         """Update the values in force: changed values, what is not saved, the file, characters."""

@@ -1,8 +1,8 @@
-"""Listens to the page beside the control loop: what is urgent is heard at once.
+"""Receives requests of the page beside the control loop: urgent ones are handled at once.
 
-One thread waits on the socket and hears commands the moment they come, so that a stop is
+One thread waits on the socket and handles commands the moment they come, so that a stop is
 obeyed at the next tick. What may take long, such as checking a changed parameter, is
-heard by a second thread, and a stop never waits behind it.
+handled by a second thread, and a stop never waits behind it.
 """
 
 import contextlib
@@ -15,8 +15,8 @@ from collections.abc import Callable
 
 from gazerig.robot.model.commands import COMMANDS
 
-TELL = b"t"
-"""First byte of a message from a person at the page."""
+REQUEST = b"t"
+"""First byte of a request of a user of the page."""
 MESSAGE_BYTES = 200_000
 """No message is longer: a socket's default send buffer in Linux holds 212,992 bytes."""
 
@@ -30,25 +30,25 @@ _CHANGES_EVERY_S = 0.1
 _CLOSE_PATIENCE_S = 2.0
 
 
-def telling(who: str, data: bytes) -> bytes:
-    """Return the message for what a person asks for.
+def request_message(who: str, data: bytes) -> bytes:
+    """Return the message with a request of a user.
 
     who: a word that comes back with the answer
     data: a JSON object, compact (no blanks between its parts), its "do" first
     """
-    return TELL + who.encode() + b" " + data
+    return REQUEST + who.encode() + b" " + data
 
 
-def told(message: bytes) -> tuple[str, bytes]:
-    """Return who asks and the JSON object of a message that ``telling`` made."""
+def parse_request(message: bytes) -> tuple[str, bytes]:
+    """Return the user and the JSON object of a message of ``request_message``."""
     who, _, data = message[1:].partition(b" ")
     return who.decode(), data
 
 
 def overtaken(earlier: bytes, later: bytes) -> bool:
     """Return whether a change of a parameter need not be made, as a later one makes it again."""
-    who, first = told(earlier)
-    again, second = told(later)
+    who, first = parse_request(earlier)
+    again, second = parse_request(later)
     if who != again or not (first.startswith(_CHANGE) and second.startswith(_CHANGE)):
         return False
     keys: set[str] = set(json.loads(first)["changes"])
@@ -56,12 +56,12 @@ def overtaken(earlier: bytes, later: bytes) -> bool:
 
 
 def urgent(message: bytes) -> bool:
-    """Return whether a message cannot wait: a command, or the page's own words."""
-    return message[:1] != TELL or told(message)[1].startswith(_URGENT)
+    """Return whether a message cannot wait: a command, or a message of the page itself."""
+    return message[:1] != REQUEST or parse_request(message)[1].startswith(_URGENT)
 
 
 class Inbox:
-    """Two threads that hear what comes over one socket."""
+    """Two threads that receive the messages of one socket."""
 
     def __init__(
         self,
@@ -83,8 +83,8 @@ class Inbox:
         self._over = threading.Event()
         self._later: queue.Queue[bytes] = queue.Queue(_MOST_WAITING)
         self._threads = [
-            threading.Thread(target=self._listen, name="page ear", daemon=True),
-            threading.Thread(target=self._hear_later, name="page ear, slow", daemon=True),
+            threading.Thread(target=self._listen, name="page inbox", daemon=True),
+            threading.Thread(target=self._handle_later, name="page inbox, slow", daemon=True),
         ]
         for thread in self._threads:
             thread.start()
@@ -128,7 +128,7 @@ class Inbox:
             else:
                 return
 
-    def _hear_later(self) -> None:
+    def _handle_later(self) -> None:
         waiting = [self._later.get()]
         while waiting[0]:
             while len(waiting) < _MOST_WAITING and not self._later.empty():
@@ -137,7 +137,7 @@ class Inbox:
             message = waiting.pop(0)
             if not any(overtaken(message, later) for later in waiting if later):
                 self._take(message)
-                if told(message)[1].startswith(_CHANGE):
+                if parse_request(message)[1].startswith(_CHANGE):
                     self._over.wait(_CHANGES_EVERY_S)
             if not waiting:
                 waiting.append(self._later.get())

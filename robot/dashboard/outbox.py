@@ -5,7 +5,7 @@ import socket
 import threading
 from collections.abc import Callable, Mapping
 
-from gazerig.robot.dashboard.inbox import MESSAGE_BYTES, telling
+from gazerig.robot.dashboard.inbox import MESSAGE_BYTES, request_message
 from gazerig.robot.dashboard.token_bucket import TokenBucket
 from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.model.commands import Command, Jog, LookAt, as_json
@@ -46,7 +46,7 @@ class Outbox:
 
     def hand_on(self, data: bytes, who: str = DOOR) -> bool:
         """Hand on a compact JSON object."""
-        message = telling(who, data)
+        message = request_message(who, data)
         with self._lock:
             if len(message) > MESSAGE_BYTES or not self._rate.take(self._clock.now_s()):
                 return False

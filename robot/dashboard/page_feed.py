@@ -7,12 +7,12 @@ from typing import NamedTuple
 from gazerig.robot.dashboard.inbox import MESSAGE_BYTES
 from gazerig.robot.dashboard.page_process import (
     CHOICES,
-    KNOBS,
-    PICTURE,
+    FRAME,
+    MESSAGE,
+    PARAMS,
     REPLAY,
     SNAPSHOT,
     VALUES,
-    WORDS,
     unpack,
 )
 from gazerig.robot.model.types import Snapshot
@@ -46,8 +46,8 @@ def drain(feed: socket.socket) -> News:
         kind, body = message[:1], message[1:]
         if kind == SNAPSHOT:
             snapshots.append(unpack(message))
-        elif kind == PICTURE:
+        elif kind == FRAME:
             jpeg = body
-        elif kind in (CHOICES, KNOBS, VALUES, WORDS, REPLAY):
+        elif kind in (CHOICES, PARAMS, VALUES, MESSAGE, REPLAY):
             others.append((kind, json.loads(body)))
     return News(tuple(snapshots), jpeg, ended, tuple(others))

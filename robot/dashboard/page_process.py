@@ -24,15 +24,15 @@ from operator import attrgetter
 from urllib.parse import urlsplit
 
 from gazerig.drivers import child_process
-from gazerig.robot.dashboard.inbox import MESSAGE_BYTES, TELL, Inbox, told
+from gazerig.robot.dashboard.inbox import MESSAGE_BYTES, REQUEST, Inbox, parse_request
 from gazerig.robot.dashboard.stop_channel import StopListener
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
 
 # The first byte of a message says what follows it. To the page: a snapshot, a picture, menus,
-# what can be tuned, its values, an answer or words for everybody, where a replay stands.
-SNAPSHOT, PICTURE, CHOICES, KNOBS, VALUES, WORDS, REPLAY = b"s", b"p", b"c", b"k", b"v", b"w", b"r"
-# From the page: its address, words for the terminal, and TELL, what people ask of the rig.
+# the parameters, their values, a reply or a message to all users, the position of a replay.
+SNAPSHOT, FRAME, CHOICES, PARAMS, VALUES, MESSAGE, REPLAY = b"s", b"p", b"c", b"k", b"v", b"w", b"r"
+# From the page: its address, a message for the terminal, and REQUEST, a user's request.
 URL, NOTICE = b"u", b"n"
 TOKEN_VARIABLE = "GAZERIG_PAGE_TOKEN"
 """Of the page's environment: what browsers must show."""
@@ -40,15 +40,15 @@ FOLDER_VARIABLE = "GAZERIG_PAGE_FOLDER"
 """Of the page's environment: a folder of this user's alone, for its server's socket."""
 CANNOT_OPEN = 3
 """Exit code of a page that cannot have its address: it need not be tried again."""
-EVERYBODY = "*"
-"""In the place of the word that says who asked."""
+ALL_USERS = "*"
+"""Takes the place of the user's name in messages to all users of the page."""
 SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
 """What the page offers; any speed between the ends can be asked for."""
 MARK_KINDS = ("saccade", "blink", "event")
 """What a replay can be led to, one after the other."""
 
-Hear = Callable[[dict[str, object]], str | None]
-"""Takes what a person at the page asks for; gives what there is to say about it, or None."""
+OnRequest = Callable[[dict[str, object]], str | None]
+"""Carries out a request of a user of the page; returns the reply, or None."""
 
 _CLOSE_PATIENCE_S = 2.0
 _LAST_WORDS_BYTES = 4096
@@ -101,14 +101,14 @@ class PageProcess:
     gone: it has ended and is not started again
     """
 
-    def __init__(self, host: str, port: int, hear: Hear | None = None) -> None:
+    def __init__(self, host: str, port: int, on_request: OnRequest | None = None) -> None:
         """Prepare a page for this address and port; a busy port moves on to the next.
 
-        hear: takes what people do on the page; None: nobody listens
+        on_request: called with each request of a user of the page; None: requests are dropped
         """
         self._host = host
         self._port = port
-        self._hear = hear
+        self._on_request = on_request
         self._token = secrets.token_urlsafe(_TOKEN_BYTES)
         self._socket: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
@@ -181,7 +181,7 @@ class PageProcess:
 
     def show_picture(self, jpeg: bytes) -> None:
         """Hand over an encoded camera picture with what was found already drawn in."""
-        if not self.send(PICTURE + jpeg):
+        if not self.send(FRAME + jpeg):
             self.pictures_dropped += 1
 
     def offer(self, choices: Mapping[str, tuple[str, ...]]) -> None:
@@ -191,7 +191,7 @@ class PageProcess:
 
     def say(self, words: str) -> None:
         """Show a message to all users of the page."""
-        self._answer(EVERYBODY, words)
+        self._answer(ALL_USERS, words)
 
     def send(self, message: bytes) -> bool:
         """Hand over a message as it is; False where the page does not take it now."""
@@ -219,9 +219,9 @@ class PageProcess:
             self._take_url(body.decode())
         elif kind == NOTICE:
             self._notices.append(body.decode())
-        elif kind == TELL:
-            who, data = told(message)
-            self._answer(who, self._heard(data))
+        elif kind == REQUEST:
+            who, data = parse_request(message)
+            self._answer(who, self._handle(data))
 
     def _take_url(self, url: str) -> None:
         """Record that the page is ready; a restarted page is sent its initial state."""
@@ -235,24 +235,24 @@ class PageProcess:
             self._notices.append(f"the page is there again, at {url}")
 
     def _refuse(self, message: bytes) -> None:
-        self._answer(told(message)[0], "refused: too many requests at once; try again")
+        self._answer(parse_request(message)[0], "refused: too many requests at once; try again")
 
     def _stop(self, asked: Mapping[str, object]) -> str:
         """Execute a stop; return "" if it succeeded."""
-        return self._heard(json.dumps(asked).encode()) or ""
+        return self._handle(json.dumps(asked).encode()) or ""
 
-    def _heard(self, data: bytes) -> str | None:
-        """Have the rig hear a request; what goes wrong with it must not make it deaf."""
+    def _handle(self, data: bytes) -> str | None:
+        """Carry out a request; an error of it must not end the handling of requests."""
         try:
             asked = json.loads(data)
-            return self._hear(asked) if self._hear is not None else None
-        except Exception as error:  # a stop must still be heard after any fault
+            return self._on_request(asked) if self._on_request is not None else None
+        except Exception as error:  # a stop must still be obeyed after any fault
             return f"the rig could not do that: {type(error).__name__}: {error}"
 
     def _answer(self, who: str, words: str | None) -> None:
         """Acknowledge a request, with the reply."""
         words = words[:_MOST_WORDS] if words is not None else None
-        self._owed.append(WORDS + json.dumps((who, words)).encode())
+        self._owed.append(MESSAGE + json.dumps((who, words)).encode())
         self._pay()
 
     def _pay(self) -> None:

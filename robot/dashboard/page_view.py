@@ -10,7 +10,7 @@ from gazerig.robot.dashboard.head_model import FLOOR_M, HeadModel
 from gazerig.robot.dashboard.outbox import Outbox
 from gazerig.robot.dashboard.overlays import OverlayPanel
 from gazerig.robot.dashboard.page_feed import News
-from gazerig.robot.dashboard.page_process import CHOICES, EVERYBODY, KNOBS, REPLAY, VALUES, WORDS
+from gazerig.robot.dashboard.page_process import ALL_USERS, CHOICES, MESSAGE, PARAMS, REPLAY, VALUES
 from gazerig.robot.dashboard.panel import PanelView
 from gazerig.robot.dashboard.people import PeopleView
 from gazerig.robot.dashboard.replay import ReplayView
@@ -58,7 +58,7 @@ class PageView:
         self._add_views()
 
     def _ask_depth(self, on: bool) -> None:
-        self._teller.ask({"show": {"depth": on}}, EVERYBODY)
+        self._teller.ask({"show": {"depth": on}}, ALL_USERS)
 
     def _add_views(self) -> None:
         buttons = self._server.gui.add_button_group("view", tuple(VIEWS), order=9)
@@ -99,11 +99,11 @@ class PageView:
 
     def _take(self, kind: bytes, data: object) -> None:
         """Apply messages of the rig other than snapshots and frames."""
-        if kind == WORDS and isinstance(data, list):
+        if kind == MESSAGE and isinstance(data, list):
             who, words = data
             self._controls.answered(who, words)
-        elif kind == KNOBS and isinstance(data, list):
-            self._controls.knobs(data)
+        elif kind == PARAMS and isinstance(data, list):
+            self._controls.params(data)
         elif isinstance(data, dict):
             if kind == CHOICES:
                 self._controls.offer(data)

@@ -18,24 +18,24 @@ _FAR = 20.0
 """A range this many times wider than the value needs a number typed, not a slider."""
 
 
-def hint(knob: ParamInfo) -> str:
+def hint(param: ParamInfo) -> str:
     """Return the tooltip of a parameter: description, range and default."""
-    parts = [f"{knob.key}: {knob.says}" if knob.says else knob.key]
-    unit = f" {knob.unit}" if knob.unit else ""
-    if knob.low is not None and knob.high is not None:
-        parts.append(f"from {knob.low:g} to {knob.high:g}{unit}")
-    if knob.choices:
-        parts.append("one of " + ", ".join(map(str, knob.choices)))
-    if knob.default is not None or knob.optional:  # else the shipped rig has no such joint or bus
-        parts.append(f"default {written(knob, knob.default)}{unit}")
-    parts.append(f"in force at the {knob.live}")
+    parts = [f"{param.key}: {param.says}" if param.says else param.key]
+    unit = f" {param.unit}" if param.unit else ""
+    if param.low is not None and param.high is not None:
+        parts.append(f"from {param.low:g} to {param.high:g}{unit}")
+    if param.choices:
+        parts.append("one of " + ", ".join(map(str, param.choices)))
+    if param.default is not None or param.optional:  # else the shipped rig has no such joint or bus
+        parts.append(f"default {written(param, param.default)}{unit}")
+    parts.append(f"in force at the {param.live}")
     return "; ".join(parts)
 
 
-def label(knob: ParamInfo, unsaved: bool) -> str:
+def label(param: ParamInfo, unsaved: bool) -> str:
     """Name a control: the last parts of the key, its unit, a mark where it is not saved."""
-    unit = f" ({knob.unit})" if knob.unit else ""
-    name = ".".join(knob.key.split(".")[-2:])
+    unit = f" ({param.unit})" if param.unit else ""
+    name = ".".join(param.key.split(".")[-2:])
     return f"{'● ' if unsaved else ''}{name}{unit}"
 
 
@@ -46,44 +46,46 @@ def step_of(low: float, high: float) -> float:
     return next(n * ten for n in (1.0, 2.0, 5.0, 10.0) if n * ten >= fine * (1.0 - 1e-9))
 
 
-def slides(knob: ParamInfo, value: object) -> bool:
+def slides(param: ParamInfo, value: object) -> bool:
     """Return whether a slider can set a parameter finely enough."""
-    if knob.kind not in ("number", "whole") or isinstance(value, bool):
+    if param.kind not in ("number", "whole") or isinstance(value, bool):
         return False
-    if knob.optional and knob.default is None:  # a slider cannot be put back to null
+    if param.optional and param.default is None:  # a slider cannot be put back to null
         return False
-    low, high = knob.low, knob.high
+    low, high = param.low, param.high
     if low is None or high is None or not low < high or not isinstance(value, int | float):
         return False
-    usual = max(abs(v) for v in (value, knob.default) if isinstance(v, int | float))
+    usual = max(abs(v) for v in (value, param.default) if isinstance(v, int | float))
     return low <= value <= high and (usual == 0.0 or high - low <= _FAR * usual)
 
 
-def written(knob: ParamInfo, value: object) -> str:
+def written(param: ParamInfo, value: object) -> str:
     """Write a value as a person types it: text as it is, everything else as in the file."""
-    if isinstance(value, str) and knob.kind in ("text", "choice"):
+    if isinstance(value, str) and param.kind in ("text", "choice"):
         return value
     if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
         return f"{value:.1f}"
     return json.dumps(value)
 
 
-def read(knob: ParamInfo, text: str) -> object:
+def read(param: ParamInfo, text: str) -> object:
     """Read what a person typed.
 
     Raises:
         ValueError: it is nothing of the kind; the message says what would be.
     """
     text = text.strip()
-    if knob.optional and text in ("null", ""):
+    if param.optional and text in ("null", ""):
         return None
-    if knob.kind in ("text", "choice"):
+    if param.kind in ("text", "choice"):
         return text
     try:
         return json.loads(text)
     except ValueError:
-        like = written(knob, knob.default)
-        raise ValueError(f"{knob.key}: {text!r} is no {knob.kind}; write it like {like}") from None
+        like = written(param, param.default)
+        raise ValueError(
+            f"{param.key}: {text!r} is no {param.kind}; write it like {like}"
+        ) from None
 
 
 class ParamControl:
@@ -92,7 +94,7 @@ class ParamControl:
     def __init__(
         self,
         gui: viser.GuiApi,
-        knob: ParamInfo,
+        param: ParamInfo,
         value: object,
         unsaved: bool,
         put: Put,
@@ -103,13 +105,13 @@ class ParamControl:
 
         put: called when a person asks for another value; refuse: when it cannot be read
         """
-        self.knob = knob
+        self.param = param
         self.order = order
         self._put = put
         self._refuse = refuse
         self._unsaved = unsaved
         self._form: viser.GuiFormHandle | None = None
-        words = label(knob, unsaved)
+        words = label(param, unsaved)
         self._handle = self._add(gui, words, value, order)
         if self._form is None:
             self._listen()
@@ -119,61 +121,61 @@ class ParamControl:
     def _add(
         self, gui: viser.GuiApi, words: str, value: object, order: float
     ) -> viser.GuiInputHandle[object]:
-        knob, says = self.knob, hint(self.knob)
+        param, says = self.param, hint(self.param)
         handle: object
-        if knob.kind == "bool" and not knob.optional:
+        if param.kind == "bool" and not param.optional:
             handle = gui.add_checkbox(words, bool(value), hint=says, order=order)
-        elif knob.choices and not knob.optional and value in knob.choices:
-            names = tuple(map(str, knob.choices))
+        elif param.choices and not param.optional and value in param.choices:
+            names = tuple(map(str, param.choices))
             handle = gui.add_dropdown(
                 words, names, initial_value=str(value), hint=says, order=order
             )
-        elif slides(knob, value):
+        elif slides(param, value):
             handle = self._slider(gui, words, value, order)
         else:
             # A number on its way to what is meant is another number: only Enter counts.
             self._form = gui.add_form(None, order=order)
             with self._form:
-                handle = gui.add_text(words, written(knob, value), hint=f"{says}; Enter sets it")
+                handle = gui.add_text(words, written(param, value), hint=f"{says}; Enter sets it")
         return cast("viser.GuiInputHandle[object]", handle)
 
     def _slider(self, gui: viser.GuiApi, words: str, value: object, order: float) -> object:
-        knob = self.knob
-        assert knob.low is not None and knob.high is not None  # slides() has seen to it
-        if knob.kind == "whole":
-            low, high, now = int(knob.low), int(knob.high), int(cast(int, value))
+        param = self.param
+        assert param.low is not None and param.high is not None  # slides() has seen to it
+        if param.kind == "whole":
+            low, high, now = int(param.low), int(param.high), int(cast(int, value))
             step: float = max(1, round(step_of(low, high))) if high - low > 500 else 1
-            return gui.add_slider(words, low, high, int(step), now, hint=hint(knob), order=order)
-        low_, high_, now_ = float(knob.low), float(knob.high), float(cast(float, value))
+            return gui.add_slider(words, low, high, int(step), now, hint=hint(param), order=order)
+        low_, high_, now_ = float(param.low), float(param.high), float(cast(float, value))
         step = step_of(low_, high_)
-        return gui.add_slider(words, low_, high_, step, now_, hint=hint(knob), order=order)
+        return gui.add_slider(words, low_, high_, step, now_, hint=hint(param), order=order)
 
     def _listen(self) -> None:
         @self._handle.on_update
         async def _(event: viser.GuiEvent[viser.GuiInputHandle[object]]) -> None:
             if event.client_id is not None:  # else it was set from here
-                self._put(self.knob.key, self._meant(event.target.value))
+                self._put(self.param.key, self._meant(event.target.value))
 
     def _listen_to_enter(self, form: viser.GuiFormHandle) -> None:
         @form.on_submit
         async def _(event: viser.GuiEvent[viser.GuiFormHandle]) -> None:
             try:
-                value = read(self.knob, str(self._handle.value))
+                value = read(self.param, str(self._handle.value))
             except ValueError as error:
                 self._refuse(str(error))
             else:
-                self._put(self.knob.key, value)
+                self._put(self.param.key, value)
 
     def _meant(self, shown: object) -> object:
         """Return the choice that a name stands for; anything else is itself."""
-        return next((c for c in self.knob.choices if str(c) == shown), shown)
+        return next((c for c in self.param.choices if str(c) == shown), shown)
 
     def show(self, value: object, unsaved: bool) -> None:
         """Show the value in force."""
         shown: object = value
         if self._form is not None:
-            shown = written(self.knob, value)
-        elif self.knob.choices:
+            shown = written(self.param, value)
+        elif self.param.choices:
             shown = str(value)
         now = self._handle.value
         near = (
@@ -185,7 +187,7 @@ class ParamControl:
             put(self._handle, shown)
         if unsaved != self._unsaved:
             self._unsaved = unsaved
-            self._handle.label = label(self.knob, unsaved)
+            self._handle.label = label(self.param, unsaved)
 
     def can_show(self, value: object) -> bool:
         """Return whether this control can show a value: a slider cannot show null."""

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Protocol
 
 from gazerig.robot.control.command_handler import ChangedParam, DescribedParam, plain
-from gazerig.robot.dashboard.page_process import KNOBS, VALUES
+from gazerig.robot.dashboard.page_process import PARAMS, VALUES
 from gazerig.robot.model.commands import Value
 
 _PIECE = 40  # parameters a message: some 20 kB, a tenth of what a message may be
@@ -84,9 +84,9 @@ class ParamFeed:
         first = self._version is None
         self._version = self._tuning.version  # before reading: a change meanwhile is seen next
         if first:
-            knobs = [plain(knob._asdict()) for knob in self._tuning.parameters()]
-            for start in range(0, len(knobs), _PIECE):
-                self._due.append(KNOBS + json.dumps(knobs[start : start + _PIECE]).encode())
+            params = [plain(param._asdict()) for param in self._tuning.parameters()]
+            for start in range(0, len(params), _PIECE):
+                self._due.append(PARAMS + json.dumps(params[start : start + _PIECE]).encode())
         now = dict(self._tuning.values())
         gone = object()
         changed = [key for key, value in now.items() if self._known.get(key, gone) != value]

@@ -31,7 +31,7 @@ class ParamState:
     def __init__(self, server: viser.ViserServer, tab: viser.GuiTabHandle, teller: Outbox) -> None:
         self._tab = tab
         self._teller = teller
-        self._knobs: dict[str, ParamInfo] = {}
+        self._params: dict[str, ParamInfo] = {}
         self._panels: dict[str, ParamPanel] = {}
         # A tab takes one builder at a time, and browsers come and go in a thread of their own.
         self._lock = threading.RLock()
@@ -45,7 +45,7 @@ class ParamState:
     async def _greet(self, client: viser.ClientHandle) -> None:
         with self._lock:
             panel = ParamPanel(client, self._tab, self._teller, self._lock)
-            panel.offer(self._knobs)
+            panel.offer(self._params)
             panel.take(self.in_force, self._unsaved, self._path)
             self._panels[str(client.client_id)] = panel
 
@@ -53,14 +53,14 @@ class ParamState:
         with self._lock:
             self._panels.pop(str(client.client_id), None)
 
-    def knobs(self, knobs: Sequence[Mapping[str, object]]) -> None:
+    def params(self, params: Sequence[Mapping[str, object]]) -> None:
         """Add parameters that can be tuned."""
         with self._lock:
-            for data in knobs:
-                knob = ParamInfo.from_json(data)
-                self._knobs[knob.key] = knob
+            for data in params:
+                param = ParamInfo.from_json(data)
+                self._params[param.key] = param
             for panel in self._panels.values():
-                panel.offer(self._knobs)
+                panel.offer(self._params)
 
     def values(self, state: Mapping[str, object]) -> None:
         """Update changed values, what is not saved, and the file that save would write."""
@@ -103,7 +103,7 @@ class ParamPanel:
         self._teller = teller
         self._lock = lock
         self._who = f"{client.client_id}{_OF_TUNING}"
-        self._knobs: Mapping[str, ParamInfo] = {}
+        self._params: Mapping[str, ParamInfo] = {}
         self._values: Mapping[str, object] = {}
         self._unsaved: frozenset[str] = frozenset()
         self._controls: dict[str, ParamControl] = {}
@@ -147,17 +147,17 @@ class ParamPanel:
         async def _(event: viser.GuiEvent[viser.GuiFormHandle]) -> None:
             self._ask({"do": "save", "path": self._file.value.strip() or None})
 
-    def offer(self, knobs: Mapping[str, ParamInfo]) -> None:
+    def offer(self, params: Mapping[str, ParamInfo]) -> None:
         """Set the parameters that there are."""
-        self._knobs = knobs
-        groups = tuple(dict.fromkeys(group_of(knob) for knob in knobs.values()))
+        self._params = params
+        groups = tuple(dict.fromkeys(group_of(param) for param in params.values()))
         self._group.options = (NOTHING, UNSAVED, DIFFERENT, *groups)
 
     def take(self, values: Mapping[str, object], unsaved: frozenset[str], path: str) -> None:
         """Update the values in force; a control that is being moved keeps its value."""
         self._values, self._unsaved = values, unsaved
         some = f"<b>● {len(unsaved)} not saved</b>" if unsaved else "all saved"
-        words = _note(f"{len(self._knobs)} parameters, {some}<br>{escape(path)}")
+        words = _note(f"{len(self._params)} parameters, {some}<br>{escape(path)}")
         if self._words.content != words:
             self._words.content = words
         if not self._unanswered:
@@ -212,7 +212,7 @@ class ParamPanel:
     def _control(self, key: str, place: float) -> ParamControl:
         return ParamControl(
             self._gui,
-            self._knobs[key],
+            self._params[key],
             self._values[key],
             key in self._unsaved,
             self._put,
@@ -221,30 +221,30 @@ class ParamPanel:
         )
 
     def _chosen(self) -> list[str]:
-        known = [knob for key, knob in self._knobs.items() if key in self._values]
+        known = [param for key, param in self._params.items() if key in self._values]
         if self._find.value.strip():
             return found(self._find.value, known)
         match self._group.value:
             case str(name) if name == UNSAVED:
-                return [knob.key for knob in known if knob.key in self._unsaved]
+                return [param.key for param in known if param.key in self._unsaved]
             case str(name) if name == DIFFERENT:
                 return [k.key for k in known if self._values[k.key] != k.default]
             case group:
-                return [knob.key for knob in known if group_of(knob) == group]
+                return [param.key for param in known if group_of(param) == group]
 
 
-def group_of(knob: ParamInfo) -> str:
+def group_of(param: ParamInfo) -> str:
     """Return the group a parameter is listed in: as in the file, two names deep."""
-    return ".".join(knob.group.split(".")[:2]) if knob.group else "rig"
+    return ".".join(param.group.split(".")[:2]) if param.group else "rig"
 
 
-def found(text: str, knobs: Iterable[ParamInfo]) -> list[str]:
+def found(text: str, params: Iterable[ParamInfo]) -> list[str]:
     """Return the keys in which, with what they mean, every word of a text occurs."""
     words = text.lower().split()
     return [
-        knob.key
-        for knob in knobs
-        if all(word in f"{knob.key} {knob.says} {knob.unit}".lower() for word in words)
+        param.key
+        for param in params
+        if all(word in f"{param.key} {param.says} {param.unit}".lower() for word in words)
     ]
 
 

@@ -44,7 +44,7 @@ class StopSender:
 
     def attach(self, loop: asyncio.AbstractEventLoop) -> None:
         """Receive the replies in this event loop."""
-        loop.add_reader(self._link.fileno(), self._hear)
+        loop.add_reader(self._link.fileno(), self._receive)
 
     def _sent(self, why: str, who: str) -> asyncio.Future[str]:
         self._number += 1
@@ -54,7 +54,7 @@ class StopSender:
             self._link.send(json.dumps(stop).encode())
         return asyncio.get_running_loop().create_future()
 
-    def _hear(self) -> None:
+    def _receive(self) -> None:
         try:
             data = self._link.recv(_MESSAGE_BYTES)
         except BlockingIOError:

@@ -52,7 +52,7 @@ class Recorder:
         self._over = over
         self._link = WriterClient(patient)
         self._pictures = PictureEncoder(info.pictures_hz, at_once=patient)
-        self._heard: list[BodyRecord] = []
+        self._body_records: list[BodyRecord] = []
         self._percept: Percept | None = None
         self._percepts = 0
         self._last_s: float | None = None
@@ -97,7 +97,7 @@ class Recorder:
     def recorded(self, body: Body) -> Body:
         """Return a body to take the place of a robot's, so that all it says is recorded."""
         self._health = body.bus.health
-        return JointRecorder(body, self._heard.append)
+        return JointRecorder(body, self._body_records.append)
 
     def timed(self, stop: Callable[[float], str | None]) -> Callable[[float], str | None]:
         """Return a loop's ``stop`` that notes the time since the loop began."""
@@ -111,9 +111,13 @@ class Recorder:
     def record(self, tick: Tick) -> None:
         """Record a tick; called by the loop."""
         before = tuple(
-            [h for h in self._heard if not (type(h) is MeasuredJoints and h.joints is tick.joints)]
+            [
+                h
+                for h in self._body_records
+                if not (type(h) is MeasuredJoints and h.joints is tick.joints)
+            ]
         )
-        self._heard.clear()
+        self._body_records.clear()
         dt_s = tick.t_s - self._last_s if self._last_s is not None else self._seconds or 0.0
         self._last_s = tick.t_s
         if not self._link.alive or self._link.failed:

@@ -5,7 +5,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
-from gazerig.robot.dashboard.page_process import MARK_KINDS, PICTURE, REPLAY
+from gazerig.robot.dashboard.page_process import FRAME, MARK_KINDS, REPLAY
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.recording.playback_clock import Mark, PlaybackClock, PlaybackState
 from gazerig.robot.recording.snapshot_index import SnapshotIndex
@@ -45,7 +45,7 @@ class Replay:
         self._told: PlaybackState | None = None
         self._told_s, self._introduced = 0.0, False
 
-    def hear(self, data: Mapping[str, object]) -> str | None:
+    def handle_request(self, data: Mapping[str, object]) -> str | None:
         """Do what a person at the page asks for; give the refusal. From any thread."""
         if "replay" not in data:
             return "this is a recording: nothing moves here"
@@ -118,7 +118,7 @@ class Replay:
         number = self._frames.frame_at(at_s)
         if number is None or number == self._picture:
             return
-        if screen.send(PICTURE + self._frames.picture(number)):
+        if screen.send(FRAME + self._frames.picture(number)):
             self._picture = number
 
     def _due(self, state: PlaybackState, now_s: float) -> bool:

@@ -78,12 +78,12 @@ _FORMER = {
 _FORMER_LEVELS = {"limp": "torque_off"}
 """Guard levels in older recordings -> their present names."""
 
-_HEARD: dict[str, type[BodyRecord]] = {
+_BODY_RECORDS: dict[str, type[BodyRecord]] = {
     "engaged": TorqueEnabled,
     "measured": MeasuredJoints,
     "refused": TorqueRefused,
 }
-_HEARD_NAMES = {kind: name for name, kind in _HEARD.items()}
+_BODY_RECORD_NAMES = {kind: name for name, kind in _BODY_RECORDS.items()}
 _WORDS = {"nan": float("nan"), "inf": float("inf"), "-inf": float("-inf")}
 _ODD = "has_words_for_numbers"
 # A frozen dataclass with slots is pickled field by field; all fields at once cost a third.
@@ -121,7 +121,7 @@ def flat(
         [as_recorded(command) for command in tick.commands],
         tick.stopped,
         tick.led,
-        [(_HEARD_NAMES[type(one)], _plain(one)) for one in before],
+        [(_BODY_RECORD_NAMES[type(one)], _plain(one)) for one in before],
     )
 
 
@@ -154,7 +154,9 @@ def as_json(values: Flat) -> Json:
         "led": led,
     }
     if before:
-        data["before"] = [{"what": what, **_named(_HEARD[what], one)} for what, one in before]
+        data["before"] = [
+            {"what": what, **_named(_BODY_RECORDS[what], one)} for what, one in before
+        ]
     if not finite:
         data[_ODD] = True
     return data
@@ -208,7 +210,7 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> TickRecord:
         data["stopped"],
         data.get("led", ""),
     )
-    before = tuple([_heard(one) for one in data.get("before", ())])
+    before = tuple([_body_record(one) for one in data.get("before", ())])
     return TickRecord(tick, data["dt_s"], before)
 
 
@@ -258,9 +260,9 @@ def percept_from_json(data: Json) -> tuple[int, Percept]:
     return data["number"], Percept(data["captured_s"], bodies, faces)
 
 
-def _heard(data: Json) -> BodyRecord:
+def _body_record(data: Json) -> BodyRecord:
     """Read one thing that the machine said."""
-    kind = _HEARD[data["what"]]
+    kind = _BODY_RECORDS[data["what"]]
     fields = {name: data[name] for name in kind._fields}
     if kind is MeasuredJoints:
         return MeasuredJoints(fields["t_s"], _made(JointState, fields["joints"]))

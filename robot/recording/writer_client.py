@@ -105,7 +105,7 @@ class WriterClient:
             if not message:
                 self._lose("its writer has died")
                 return
-            self._hear(*pickle.loads(message))
+            self._receive(*pickle.loads(message))
 
     def close(self) -> None:
         """Send the end of the recording to the writer, and wait until it has closed the file."""
@@ -138,7 +138,7 @@ class WriterClient:
             self._queued -= len(self._queue.popleft()) - 1
             most -= 1
 
-    def _hear(self, kind: str, values: Any) -> None:
+    def _receive(self, kind: str, values: Any) -> None:
         if kind == writer.DONE:
             self.done = WrittenFile(*values)
         else:
