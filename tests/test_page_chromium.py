@@ -410,7 +410,7 @@ def test_what_is_in_force_is_saved_in_a_new_file_with_its_comments(
     person.click(saying("tuning"))
     wait_for(lambda: person.reads("not saved"), "the mark")
     file = tmp_path / "tuned at midnight.yaml"
-    cast(Any, present(rig.audience._page)._hear)._handler._paths = AllowedFolder(
+    cast(Any, present(rig.audience._page)._on_request)._handler._paths = AllowedFolder(
         tmp_path
     )  # as if the rig's file lay there
     person.click(beside("save as", "input"))
@@ -471,7 +471,7 @@ def test_names_are_words_and_never_run(at_the_rig: tuple[Rig, Person]) -> None:
 def test_a_stop_that_gets_lost_is_sent_again(at_the_rig: tuple[Rig, Person]) -> None:
     rig, person = at_the_rig
     lost: list[Any] = []
-    hear = present(present(rig.audience._page)._hear)
+    hear = present(present(rig.audience._page)._on_request)
 
     def deaf_at_first(asked: dict[str, object]) -> str | None:
         if asked.get("do") == "stop" and len(lost) < 3:
@@ -479,14 +479,14 @@ def test_a_stop_that_gets_lost_is_sent_again(at_the_rig: tuple[Rig, Person]) -> 
             return "refused: not now"
         return hear(asked)
 
-    present(rig.audience._page)._hear = deaf_at_first
+    present(rig.audience._page)._on_request = deaf_at_first
     try:
         person.click(STOP)
         wait_for(lambda: rig.robot.stopped, "the stop")
         wait_for(lambda: person.reads("Torque is off") and person.reads("STOP"), "the words")
         assert len(lost) == 3
     finally:
-        present(rig.audience._page)._hear = hear
+        present(rig.audience._page)._on_request = hear
     resumed(rig, person)
 
 

@@ -112,7 +112,7 @@ class PageProcess:
         self._token = secrets.token_urlsafe(_TOKEN_BYTES)
         self._socket: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
-        self._ear: Inbox | None = None
+        self._inbox: Inbox | None = None
         self._stops: StopListener | None = None
         self._choices: Mapping[str, tuple[str, ...]] = {}
         self._over = threading.Event()
@@ -167,7 +167,7 @@ class PageProcess:
         """
         link.setblocking(False)
         self._socket = link
-        self._ear = Inbox(link, self._take, self._lose, self._refuse)
+        self._inbox = Inbox(link, self._take, self._lose, self._refuse)
         self._stops = StopListener(stops, self._stop) if stops is not None else None
 
     def show(self, snapshot: Snapshot) -> None:
@@ -314,7 +314,7 @@ class PageProcess:
         """End the page; safe to call twice."""
         self._over.set()
         with self._beginning:
-            ear, self._ear = self._ear, None
+            ear, self._inbox = self._inbox, None
             if ear is not None:
                 ear.close()
             self._hang_up()
