@@ -1,6 +1,7 @@
 """Rules between the sections of a rig."""
 
 from collections.abc import Iterable
+from difflib import get_close_matches
 
 from gazerig.config.rig import BusConfig, Rig
 from gazerig.drivers.hobby_board.params import HobbyBoardParams
@@ -9,13 +10,20 @@ from gazerig.gaze.types import PARTS
 from gazerig.robot.model.forbidden_range import forbidden_pairs
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS
-from gazerig.robot.model.types import JOINTS
+from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME
 
 
 def _joint_names(rig: Rig) -> Iterable[tuple[str, str]]:
+    absent = [name for name in GAZE_JOINTS if name not in rig.joints]
     for name in rig.joints:
-        if name not in JOINTS:
-            yield f"joints.{name}", f"unknown joint; known are {', '.join(JOINTS)}"
+        if not JOINT_NAME.fullmatch(name):
+            yield (
+                f"joints.{name}",
+                "no name of a joint: small letters, digits and _, a letter first, at most 40",
+            )
+        elif name not in GAZE_JOINTS and (near := get_close_matches(name, absent, 1, 0.8)):
+            # A jaw may have any name; a neck that was misspelt would stand still without a word.
+            yield f"joints.{name}", f"did you mean {near[0]}? Other joints need less similar names"
     for way in ("pan", "tilt"):
         own = [name for name in (f"left_eye_{way}", f"right_eye_{way}") if name in rig.joints]
         both = f"eyes_{way}"

@@ -35,6 +35,20 @@ class LidOpenings(NamedTuple):
     lower_left: float
     lower_right: float
 
+    def scaled(self, factors: tuple[float, float, float, float]) -> "LidOpenings":
+        """Return the openings times factors, none wider than open.
+
+        factors: of the left and right upper, then of the left and right lower lid
+        """
+        left, right, lower_left, lower_right = factors
+        return LidOpenings(
+            min(1.0, self.left * left),
+            min(1.0, self.right * right),
+            self.blink,
+            min(1.0, self.lower_left * lower_left),
+            min(1.0, self.lower_right * lower_right),
+        )
+
 
 class Lids:
     """Openings of upper and lower lids as a function of time, with their own random generator."""

@@ -12,6 +12,7 @@ from typing import Annotated, NamedTuple, Protocol
 import numpy as np
 
 from gazerig.gaze.angles import add, angle_between, norm, rotate, scale, sub, unit
+from gazerig.gaze.animation import NO_OFFSET, PoseOffset
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.head import Head
 from gazerig.gaze.lids import LidOpenings, Lids
@@ -153,11 +154,19 @@ class Oculomotor:
         self.saccades = self.fixations = 0
         self._started = True
 
-    def step(self, target: Target, state: GazeState, t_s: float, dt_s: float) -> GazeCommand:
+    def step(
+        self,
+        target: Target,
+        state: GazeState,
+        t_s: float,
+        dt_s: float,
+        offset: PoseOffset = NO_OFFSET,
+    ) -> GazeCommand:
         """Return the command for this tick.
 
         state: head and eyes as measured now
         dt_s: time since the step before
+        offset: what gestures and expressions add
         """
         if not self._started:
             self.reset(t_s, state)
@@ -173,10 +182,15 @@ class Oculomotor:
         centre = facing if seen.centre is seen.point else self._geometry.facing(seen.centre)
         head = self._head.step(target, centre, facing, aside_rad, t_s - self._trigger.onset_s, t_s)
         wanted = self._geometry.eyes_on(self._gaze, R_world_head, p_head)
+        if offset.eyes_rad != (0.0, 0.0):
+            wanted = _turned(wanted[0], offset.eyes_rad), _turned(wanted[1], offset.eyes_rad)
         left, right = self._in_range(wanted)
         limited = () if wanted == (left, right) else self._limited(wanted, head, facing)
         lids = self._lids.step(t_s, 0.5 * (left[1] + right[1]), shift_rad)
-        return self._command(self._swayed(head, t_s), left, right, lids, seen, limited)
+        if offset.lids != NO_OFFSET.lids:
+            lids = lids.scaled(offset.lids)
+        head = self._swayed(head, offset.head_rad, t_s)
+        return self._command(head, left, right, lids, seen, limited)
 
     def reach(self, target: Target) -> ReachableGaze:
         """Return where head and eyes come to rest for a point that stands still."""
@@ -243,12 +257,13 @@ class Oculomotor:
             limited,
         )
 
-    def _swayed(self, head: Angles3, t_s: float) -> Angles3:
-        """Return the head's angles with breathing added, clipped to the neck's range."""
-        if self._breathing is None:
+    def _swayed(self, head: Angles3, offset: Angles3, t_s: float) -> Angles3:
+        """Return the head's angles with breathing and an offset, clipped to the neck's range."""
+        if self._breathing is not None:
+            head = add(head, self._breathing.step(t_s))
+        elif offset == NO_OFFSET.head_rad:
             return head
-        yaw, pitch, roll = self._breathing.step(t_s)
-        return self._head.in_range((head[0] + yaw, head[1] + pitch, head[2] + roll))
+        return self._head.in_range(add(head, offset))
 
     def _foreseen_head(self, state: GazeState) -> tuple[Mat3, Vec3]:
         """Return the head's pose at the time when an eye command of now takes effect."""
@@ -316,6 +331,11 @@ def _clip(eye: Angles2, limits: tuple[Angles2, Angles2]) -> Angles2:
     """Return eye angles clipped to their range."""
     (yaw_low, yaw_high), (pitch_low, pitch_high) = limits
     return (min(max(eye[0], yaw_low), yaw_high), min(max(eye[1], pitch_low), pitch_high))
+
+
+def _turned(eye: Angles2, offset: Angles2) -> Angles2:
+    """Return an eye's angles with an offset."""
+    return eye[0] + offset[0], eye[1] + offset[1]
 
 
 def _meeting_point(state: GazeState) -> Vec3:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeVar
 
-from desk import JOINTS
+from desk import GAZE_JOINTS
 from page_visitor import PATIENCE_S
 
 from gazerig.robot.dashboard.page_process import PageProcess
@@ -34,7 +34,7 @@ SNAPSHOT = Snapshot(
     bodies=(),
     rate_hz=200.0,
     health="0 lost",
-    joints=JOINTS,
+    joints=GAZE_JOINTS,
 )
 
 

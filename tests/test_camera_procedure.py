@@ -5,7 +5,7 @@ from math import radians
 
 import numpy as np
 import pytest
-from desk import JOINTS, LIDS
+from desk import GAZE_JOINTS, LIDS
 
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
@@ -29,7 +29,7 @@ from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.sim_mock.cameras.charuco_scene import BoardScene
 
 BOARD = CharucoBoard()
-KINEMATICS = Kinematics(GeometryParams(70.0, 38.0, 55.0), JOINTS, LIDS)
+KINEMATICS = Kinematics(GeometryParams(70.0, 38.0, 55.0), GAZE_JOINTS, LIDS)
 CAMERA = CameraParams()
 RANGES = ((-1.2, 1.2), (-0.5, 0.5), (-0.35, 0.35))
 FEW = NeckStepParams(pictures=2, patience_s=1.0)

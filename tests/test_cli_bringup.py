@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from command_line import invoked
-from desk import JOINTS
+from desk import GAZE_JOINTS
 from served_rigs import hide_real_ports, rig_files, served
 
 from gazerig.config.save import copy_shipped, save_rig
@@ -154,7 +154,7 @@ def test_doctor_on_a_port_served_elsewhere_names_what_is_wrong():
         code, out, _ = invoked("doctor", "--port", path, "--json")
         found = json.loads(out)
         assert {f["where"] for f in found if f["what"] == "does not answer"} == {
-            f"{name} (servo {i})" for i, name in enumerate(JOINTS, 1) if i not in (1, 7)
+            f"{name} (servo {i})" for i, name in enumerate(GAZE_JOINTS, 1) if i not in (1, 7)
         }
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from command_line import Invoked, answers_in, invoked
 from commands_started import hear, start, status
-from desk import JOINTS
+from desk import GAZE_JOINTS
 from served_rigs import rig_files
 
 from gazerig.config.save import save_rig
@@ -35,7 +35,7 @@ def rig(rigs: dict[str, str]) -> Path:
 def bus() -> Iterator[tuple[PtyBus, str]]:
     joints = load_rig("desk").joints
     with PtyBus() as served:
-        specs = [ServoSpec(joints[name].id, joints[name].model) for name in JOINTS]
+        specs = [ServoSpec(joints[name].id, joints[name].model) for name in GAZE_JOINTS]
         yield served, served.start(specs)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from command_line import invoked
 from commands_started import hear, start, status
-from desk import JOINTS
+from desk import GAZE_JOINTS
 from served_rigs import Served, rig_files, served
 
 from gazerig.config.schema import load_rig
@@ -46,7 +46,7 @@ def test_monitor_changes_nothing(desk: Served) -> None:
     before = desk.command("status")
     done = invoked("monitor", "--once", "--port", path)
     assert done.code == 0, done.err
-    assert [line.split()[0] for line in done.out.splitlines()[1:10]] == list(JOINTS)
+    assert [line.split()[0] for line in done.out.splitlines()[1:10]] == list(GAZE_JOINTS)
     after = json.loads(desk.command("status"))
     for servo, was in zip(after["servos"], json.loads(before)["servos"], strict=True):
         assert (servo["torque"], servo["goal"]) == (was["torque"], was["goal"])
@@ -90,7 +90,7 @@ def test_monitor_as_lines_of_json() -> None:
     done = invoked("monitor", "--mock", "--json", "--seconds", "1.5", "--rate", "10")
     lines = [json.loads(line) for line in done.out.splitlines()]
     assert done.code == 0 and 2 <= len(lines) <= 16
-    assert set(lines[0]["joints"]) == set(JOINTS)
+    assert set(lines[0]["joints"]) == set(GAZE_JOINTS)
     assert lines[-1]["t_s"] > lines[0]["t_s"] and lines[-1]["unanswered"] == 0
 
 

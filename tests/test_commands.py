@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from desk import JOINTS
+from desk import GAZE_JOINTS
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -36,7 +36,7 @@ from gazerig.robot.model.commands import (
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
-YAW = JOINTS.index("neck_yaw")
+YAW = GAZE_JOINTS.index("neck_yaw")
 
 
 @dataclass
@@ -119,7 +119,7 @@ def test_orders_cross_processes_as_json(order: Command) -> None:
         ({"do": "look_at", "p_world_m": [1.0, 2.0]}, "three finite numbers"),
         ({"do": "look_at", "p_world_m": [1.0, nan, 2.0]}, "three finite numbers"),
         ({"do": "look_at", "p_world_m": [1.0, True, 2.0]}, "three finite numbers"),
-        ({"do": "jog", "angles_rad": [["nose", 0.1]]}, "known are left_eye_pan"),
+        ({"do": "jog", "angles_rad": [["the nose", 0.1]]}, "no name of a joint"),
         ({"do": "jog", "angles_rad": [["neck_yaw", inf]]}, "finite angle"),
         ({"do": "jog", "angles_rad": "neck"}, "pairs"),
         ({"do": "stop", "why": None}, "text"),

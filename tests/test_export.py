@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from desk import JOINTS, LIDS
+from desk import GAZE_JOINTS, LIDS
 from present import present
 
 from gazerig.config.schema import load_rig
@@ -81,7 +81,7 @@ def face() -> Run:
 
 def pose(left_deg: tuple[float, float], right_deg: tuple[float, float], yaw: float) -> GazeState:
     """Eyes in the head, and the head's yaw."""
-    kinematics = Kinematics(GeometryParams(60.0, 40.0, 50.0), JOINTS, LIDS)
+    kinematics = Kinematics(GeometryParams(60.0, 40.0, 50.0), GAZE_JOINTS, LIDS)
     degs = (*left_deg, *right_deg, 0.0, 0.0, yaw, 0.0, 0.0)
     return kinematics.forward(JointState(tuple(map(radians, degs)), (0.0,) * 9, (0.0,) * 9, ()))
 
@@ -215,7 +215,7 @@ def test_a_row_a_sample_with_what_was_measured(face: Run, tables: tuple[Path, ..
         "seen_samples.csv", "seen_events.csv", "seen_fixations.csv", "seen_samples.json",
     ]  # fmt: skip
     read = rows(tables[0])
-    assert tuple(read[0]) == columns(JOINTS) and len(read) == len(face.ticks)
+    assert tuple(read[0]) == columns(GAZE_JOINTS) and len(read) == len(face.ticks)
     tick, row = face.ticks[2000], read[2000]
     space = in_space(tick.pose)
     assert float(row["left_x_deg"]) == pytest.approx(space.left_deg[0], abs=6e-5)

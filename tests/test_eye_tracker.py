@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from desk import JOINTS, LIDS
+from desk import GAZE_JOINTS, LIDS
 
 from gazerig.gaze.angles import add, scale, unit, yaw_pitch
 from gazerig.gaze.field_of_view import line_of_sight
@@ -69,7 +69,7 @@ def walk(rng: np.random.Generator) -> list[tuple[float, Vec3, Vec3]]:
 
 def look_about(seed: int, saccade: SaccadeParams) -> Trace:
     rng = np.random.default_rng(seed)
-    kinematics = Kinematics(GeometryParams(60.0, 40.0, 50.0), JOINTS, LIDS)
+    kinematics = Kinematics(GeometryParams(60.0, 40.0, 50.0), GAZE_JOINTS, LIDS)
     span, neck = (-radians(35.0), radians(35.0)), (-radians(70.0), radians(70.0))
     oculomotor = Oculomotor(
         OculomotorParams(eye_lag_ms=1000.0 / RATE_HZ),

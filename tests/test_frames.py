@@ -4,7 +4,7 @@ from math import radians
 from pathlib import Path
 
 import pytest
-from desk import JOINTS, LIDS
+from desk import GAZE_JOINTS, LIDS
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -22,7 +22,7 @@ from gazerig.robot.model.frames import (
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 
-KINEMATICS = Kinematics(GeometryParams(60.0, 40.0, 50.0), JOINTS, LIDS)
+KINEMATICS = Kinematics(GeometryParams(60.0, 40.0, 50.0), GAZE_JOINTS, LIDS)
 
 
 def test_poses_are_interpolated_at_the_instant_asked_for() -> None:

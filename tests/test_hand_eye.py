@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from desk import JOINTS, LIDS
+from desk import GAZE_JOINTS, LIDS
 
 from gazerig.gaze.types import Angles3
 from gazerig.robot.calibration.camera_calibration import CameraCalibrationRefused
@@ -26,7 +26,7 @@ from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.sim_mock.cameras.charuco_scene import BoardScene
 
 BOARD = CharucoBoard()
-KINEMATICS = Kinematics(GeometryParams(70.0, 38.0, 55.0), JOINTS, LIDS)
+KINEMATICS = Kinematics(GeometryParams(70.0, 38.0, 55.0), GAZE_JOINTS, LIDS)
 # The desk rig's neck.
 RANGES = ((-1.2, 1.2), (-0.5, 0.5), (-0.35, 0.35))
 

@@ -4,7 +4,7 @@ from math import cos, pi, radians, sin
 
 import numpy as np
 import pytest
-from desk import JOINTS
+from desk import GAZE_JOINTS
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -17,7 +17,7 @@ from gazerig.robot.model.types import JointState
 GEOMETRY = GeometryParams(62.0, 38.0, 51.0)
 KINEMATICS = Kinematics(
     GEOMETRY,
-    JOINTS,
+    GAZE_JOINTS,
     {
         "left_upper_lid": (radians(-25), radians(20)),
         "right_upper_lid": (radians(25), radians(-20)),

@@ -6,7 +6,7 @@ from math import radians
 import cv2
 import numpy as np
 import pytest
-from desk import JOINTS, LIDS
+from desk import GAZE_JOINTS, LIDS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -86,7 +86,7 @@ def test_a_face_is_placed_through_the_lens_as_measured() -> None:
     frontal = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
     landmarks = project(LANDMARKS_FACE_M @ frontal.T + where, BENT)
     found = Detections(0.0, 1, 640, 400, (DetectedFace((0.0, 0.0, 9.0, 9.0), landmarks, 0.9),))
-    kinematics = Kinematics(GeometryParams(60.0, 40.0, 50.0), JOINTS, LIDS)
+    kinematics = Kinematics(GeometryParams(60.0, 40.0, 50.0), GAZE_JOINTS, LIDS)
     poses = PoseHistory(kinematics)
     poses.remember(0.0, (0.0, 0.0, 0.0))
     mount = CameraMount(CameraParams("base", (0.0, 0.0, 0.0)))

@@ -31,7 +31,7 @@ from gazerig.robot.calibration.joint_calibration import (
     middle,
 )
 from gazerig.robot.model.joint import JointParams
-from gazerig.robot.model.types import JOINTS as EVERY
+from gazerig.robot.model.types import GAZE_JOINTS as EVERY
 
 JOINT = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
 TURN = 4096

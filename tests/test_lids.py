@@ -5,7 +5,7 @@ from math import radians
 
 import numpy as np
 import pytest
-from desk import JOINTS, LIDS
+from desk import GAZE_JOINTS, LIDS
 
 from gazerig.gaze.blink_statistics import blink_pause_s
 from gazerig.gaze.head import Head, HeadParams
@@ -137,7 +137,7 @@ def test_e53_no_blink_storm(literal: bool) -> None:
 
 @pytest.mark.parametrize("literal", [False, True])
 def test_e53_no_blink_storm_with_the_head_held_aside(literal: bool) -> None:
-    kinematics = Kinematics(GeometryParams(0.0, 0.0, 0.0), JOINTS, LIDS)
+    kinematics = Kinematics(GeometryParams(0.0, 0.0, 0.0), GAZE_JOINTS, LIDS)
     span = (-radians(55.0), radians(55.0))
     model = Oculomotor(
         OculomotorParams(),

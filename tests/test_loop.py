@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from desk import JOINTS, LIDS
+from desk import GAZE_JOINTS, LIDS
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
@@ -63,7 +63,7 @@ def test_every_goal_on_the_bus_is_inside_the_limits() -> None:
     run_of = assemble(rig, RunOptions(mock=True, fast=True, seed=3, scene="visitor"))
     commands = np.array([tick.guard_result.command_rad for tick in ticks(run_of, 30.0)])
     speeds = np.diff(commands, axis=0) / 0.010
-    for i, name in enumerate(JOINTS):
+    for i, name in enumerate(GAZE_JOINTS):
         limit = rig.joints[name].limit()
         assert commands[:, i].min() >= limit.low_rad and commands[:, i].max() <= limit.high_rad
         assert np.abs(speeds[:, i]).max() <= limit.speed_rad_s + 1e-6
@@ -157,7 +157,7 @@ def test_clocks() -> None:
     real.sleep_until(before)
 
 
-KINEMATICS = Kinematics(GeometryParams(60.0, 40.0, 50.0), JOINTS, LIDS)
+KINEMATICS = Kinematics(GeometryParams(60.0, 40.0, 50.0), GAZE_JOINTS, LIDS)
 MOUNT = CameraMount(CameraParams())
 
 

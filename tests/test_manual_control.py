@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import pytest
-from desk import JOINTS
+from desk import GAZE_JOINTS
 from emulated_rig import EmulatedRig, mixed_rig
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -36,7 +36,7 @@ class Bench(EmulatedRig):
     def __init__(self, rig: Rig = RIG, params: JogParams | None = None) -> None:
         lines = None
         if rig is RIG:  # without a rig's mechanical stops, where the test says
-            joints = ((name, rig.joints[name]) for name in JOINTS)
+            joints = ((name, rig.joints[name]) for name in GAZE_JOINTS)
             specs = tuple(
                 ServoSpec(j.id, j.model, round(j.steps(radians(CROOKED.get(name, 0.0)))))
                 for name, j in joints
@@ -123,7 +123,7 @@ def test_no_goal_is_faster_than_asked_nor_outside_the_range(
     bench = Bench(params=JogParams(speed_deg_s=speed))
     bench.control.start()
     moved = bench.control.pose({joint: angle})
-    i, params = JOINTS.index(joint), RIG.joints[joint]
+    i, params = GAZE_JOINTS.index(joint), RIG.joints[joint]
     low, high = radians(params.min_deg), radians(params.max_deg)
     sent = [(s.t_s, s.guard_result.command_rad[i]) for s in bench.steps]
     for (t0, a), (t1, b) in zip(sent, sent[1:], strict=False):
@@ -192,7 +192,7 @@ def test_several_joints_arrive_together(bench: Bench) -> None:
     assert where["neck_yaw"] == pytest.approx(10.0, abs=2.0)
     assert where["left_eye_pan"] == pytest.approx(-20.0, abs=2.0)
     halfway = bench.steps[len(bench.steps) // 3]
-    i, j = JOINTS.index("left_eye_pan"), JOINTS.index("neck_yaw")
+    i, j = GAZE_JOINTS.index("left_eye_pan"), GAZE_JOINTS.index("neck_yaw")
     assert halfway.desired_rad[i] < radians(6.0) and halfway.desired_rad[j] > radians(-12.0)
 
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from desk import JOINTS, LIDS
+from desk import GAZE_JOINTS, LIDS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -70,7 +70,7 @@ class Rig:
         breathing: Breathing | None = None,
         dice: int | None = None,
     ) -> None:
-        self.kinematics = Kinematics(geometry, JOINTS, LIDS)
+        self.kinematics = Kinematics(geometry, GAZE_JOINTS, LIDS)
         span = (-radians(eye_deg), radians(eye_deg))
         neck = (-radians(neck_deg), radians(neck_deg))
         self.oculomotor = Oculomotor(

@@ -26,7 +26,7 @@ from typing import TypeVar
 import cv2
 import numpy as np
 import pytest
-from desk import JOINTS
+from desk import GAZE_JOINTS
 from page_visitor import PATIENCE_S
 from present import present
 from shown_page import running_page, wait_for
@@ -133,7 +133,7 @@ def looking(
         bodies=(SeenBody(face.id, "face", face.p_world_m, 0.1), *bodies),
         rate_hz=200.0,
         health="bus: 61 200 reads, 3 lost, 0 faults",
-        joints=JOINTS,
+        joints=GAZE_JOINTS,
     )
 
 

@@ -17,7 +17,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from desk import JOINTS
+from desk import GAZE_JOINTS
 from present import present
 
 from gazerig.config.allowed_folder import AllowedFolder
@@ -51,7 +51,7 @@ def load_browser() -> ModuleType:
 browser_of_the_page = load_browser()
 wait_for, free_port = browser_of_the_page.wait_for, browser_of_the_page.free_port
 
-YAW = JOINTS.index("neck_yaw")
+YAW = GAZE_JOINTS.index("neck_yaw")
 TICK_S = 0.01
 PACE_S = 0.04  # real seconds a tick
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import pytest
 import viser
-from desk import JOINTS
+from desk import GAZE_JOINTS
 from page_visitor import PATIENCE_S
 from shown_page import SNAPSHOT, wait_for
 from six_joints import SIX, of_six
@@ -320,8 +320,8 @@ def test_orders_are_obeyed(heard: Heard) -> None:
 
 
 def test_what_is_no_order_is_refused_with_the_rule(heard: Heard) -> None:
-    words = heard.hear({"do": "jog", "angles_rad": [["tail", 0.1]]})
-    assert words is not None and words.startswith("refused: unknown joint 'tail'")
+    words = heard.hear({"do": "jog", "angles_rad": [["the tail", 0.1]]})
+    assert words is not None and words.startswith("refused: 'the tail' is no name")
     unchecked = {"do": "tune", "changes": [["guard.max_speed", 1e9]]}
     words = heard.hear(unchecked)
     assert words is not None and words.startswith("refused") and heard.orders == []
@@ -442,14 +442,16 @@ def test_menus_become_buttons_that_ask(server: viser.ViserServer) -> None:
 def jogging(server: viser.ViserServer) -> tuple[JogPanel, Mouth]:
     mouth = Mouth()
     view = JogPanel(server.gui, server.gui.add_tab_group().add_tab("joints"), mouth)  # type: ignore[arg-type]
-    ends = {f"joints.{j}.{end}_deg": v for j in JOINTS for end, v in (("min", -30), ("max", 40.0))}
+    ends = {
+        f"joints.{j}.{end}_deg": v for j in GAZE_JOINTS for end, v in (("min", -30), ("max", 40.0))
+    }
     view.values(ends)
     return view, mouth
 
 
 def test_every_joint_has_a_slider_with_its_limits(server: viser.ViserServer) -> None:
     view, _ = jogging(server)
-    assert tuple(view._sliders) == JOINTS
+    assert tuple(view._sliders) == GAZE_JOINTS
     assert {(s.min, s.max) for s in view._sliders.values()} == {(-30.0, 40.0)}
     view.values({"joints.neck_yaw.min_deg": -10.0, "joints.neck_yaw.max_deg": 10.0})
     assert (view._sliders["neck_yaw"].min, view._sliders["neck_yaw"].max) == (-10.0, 10.0)
@@ -458,7 +460,7 @@ def test_every_joint_has_a_slider_with_its_limits(server: viser.ViserServer) -> 
 def test_a_slider_jogs_and_then_follows_its_joint(server: viser.ViserServer) -> None:
     view, mouth = jogging(server)
     slider = view._sliders["neck_yaw"]
-    yaw = JOINTS.index("neck_yaw")
+    yaw = GAZE_JOINTS.index("neck_yaw")
     view.show(replace(SNAPSHOT, t_s=1.0))
     assert (
         slider.value == pytest.approx(5.7) and mouth.parse_request == []

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from desk import JOINTS
+from desk import GAZE_JOINTS
 
 from gazerig.gaze.types import PARTS
 from gazerig.robot.analysis.heatmap_face import on_canvas
@@ -30,7 +30,7 @@ def looking(t_s: float, name: str = "face 1: nose", part: str | None = "N") -> S
         gaze_world=((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)), lids=(0.8, 0.8),
         p_world_target_m=(1.0, 0.0, 0.0), target_name=name, why="", phase="fixate", level="ok",
         reasons=(), faces=(face,), bodies=(), rate_hz=200.0, health="",
-        target_kind=name.split()[0], target_id=1, target_part=part, joints=JOINTS,
+        target_kind=name.split()[0], target_id=1, target_part=part, joints=GAZE_JOINTS,
     )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from typing import TypeVar, cast
 
 import pytest
 import viser
-from desk import JOINTS
+from desk import GAZE_JOINTS
 from six_joints import SIX, TELLS_NOTHING, of_six
 
 from gazerig.gaze.types import Salience
@@ -64,7 +64,7 @@ def snapshot(t_s: float = 1.0) -> Snapshot:
         camera=SeenCamera(AHEAD, (0.05, 0.0, 0.18), 1.2, 1.6), field_deg=(100.0, 60.0, 60.0, 75.0),
         trail=(Trail(t_s, REST, REST, REST),),
         events=(SeenSaccade(0.5, 0.05, 5.0, 180.0), SeenFixation(0.2, 0.3, "LE")),
-        joints=JOINTS,
+        joints=GAZE_JOINTS,
     )  # fmt: skip
 
 
@@ -92,11 +92,11 @@ def test_voltage_is_told_by_both_ends(volts: float | None, strain: str) -> None:
 def test_without_limits_nothing_is_coloured() -> None:
     hot = WELL._replace(temperature_c=(90.0,) * 9, limits=None)
     assert strain_of_heat(hot, 0) == ""
-    assert AMBER not in servo_table(hot, JOINTS) and RED not in servo_table(hot, JOINTS)
+    assert AMBER not in servo_table(hot, GAZE_JOINTS) and RED not in servo_table(hot, GAZE_JOINTS)
 
 
 def test_a_healthy_rig_has_no_alarm_and_every_joint_a_row() -> None:
-    table = servo_table(WELL, JOINTS)
+    table = servo_table(WELL, GAZE_JOINTS)
     assert table.count("<tr") == 10
     assert AMBER not in table and RED not in table
     assert "neck roll" in table and "+10 %" in table
@@ -104,16 +104,18 @@ def test_a_healthy_rig_has_no_alarm_and_every_joint_a_row() -> None:
 
 def test_faults_and_silence_are_said_beside_the_joint() -> None:
     fault = ("", "overload <1>") + ("",) * 7
-    table = servo_table(WELL._replace(fault=fault, age_s=(0.0, 0.0, 1.25) + (0.0,) * 6), JOINTS)
+    table = servo_table(
+        WELL._replace(fault=fault, age_s=(0.0, 0.0, 1.25) + (0.0,) * 6), GAZE_JOINTS
+    )
     assert "left eye tilt<div" in table and "overload &lt;1&gt;" in table
     assert "right eye pan<div" in table and "silent for 1.2 s" in table
-    assert "torque off" in servo_table(WELL._replace(torque=(False,) * 9), JOINTS)
+    assert "torque off" in servo_table(WELL._replace(torque=(False,) * 9), GAZE_JOINTS)
     assert "nothing is known" in servo_table(Servos(), ())
 
 
 def test_what_was_not_measured_is_a_dash_and_no_zero() -> None:
     unread = WELL._replace(temperature_c=(None,) * 9, voltage_v=(None,) * 9, unanswered=())
-    assert servo_table(unread, JOINTS).count(">-</td>") == 27
+    assert servo_table(unread, GAZE_JOINTS).count(">-</td>") == 27
 
 
 def test_a_servo_that_tells_nothing_has_no_figures() -> None:
@@ -121,13 +123,13 @@ def test_a_servo_that_tells_nothing_has_no_figures() -> None:
     assert table.count(f">{NO_FEEDBACK}</td>") == 6 and "not noticed" in table
     assert " %" not in table and ">-</td>" not in table  # a load of 0 is none that was measured
     assert "eyes pan" in table and "neck" not in table
-    assert NO_FEEDBACK not in servo_table(WELL, JOINTS)
+    assert NO_FEEDBACK not in servo_table(WELL, GAZE_JOINTS)
 
 
 def test_only_the_joints_nobody_measures_are_without_figures() -> None:
-    table = servo_table(WELL, JOINTS, ("left_upper_lid",))
+    table = servo_table(WELL, GAZE_JOINTS, ("left_upper_lid",))
     assert table.count(f">{NO_FEEDBACK}</td>") == 1 and table.count("+10 %") == 8
-    silent = servo_table(WELL._replace(age_s=(1.25,) * 9), JOINTS, JOINTS)
+    silent = servo_table(WELL._replace(age_s=(1.25,) * 9), GAZE_JOINTS, GAZE_JOINTS)
     assert silent.count("silent for 1.2 s") == 9  # a board that is gone is told all the same
 
 

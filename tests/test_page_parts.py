@@ -6,7 +6,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
-from desk import JOINTS
+from desk import GAZE_JOINTS
 from present import present
 from six_joints import ESTIMATED_RAD, SIX, WISH_RAD, of_six
 
@@ -34,7 +34,7 @@ from gazerig.robot.dashboard.page_process import MESSAGE_BYTES
 from gazerig.robot.dashboard.people import fixated_part
 from gazerig.robot.dashboard.scene_node import along, quaternion, turned_up, upright_along
 from gazerig.robot.dashboard.status import drawn_together, status
-from gazerig.robot.model.types import JOINTS as EVERY_JOINT
+from gazerig.robot.model.types import GAZE_JOINTS as EVERY_JOINT
 from gazerig.robot.model.types import SeenFace, Snapshot, Trail
 
 AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -64,7 +64,7 @@ def snapshot(
         bodies=(),
         rate_hz=199.7,
         health="3 lost",
-        joints=JOINTS,
+        joints=GAZE_JOINTS,
     )
 
 
@@ -114,7 +114,9 @@ def test_what_stands_still_shouts() -> None:
 
 def moving(t_s: float, slope_deg: float = 1.0) -> Snapshot:
     """All joints at t degrees as wished, half as permitted, a quarter as measured."""
-    angles = [(slope_deg * math.radians(t_s) * share,) * len(JOINTS) for share in (1.0, 0.5, 0.25)]
+    angles = [
+        (slope_deg * math.radians(t_s) * share,) * len(GAZE_JOINTS) for share in (1.0, 0.5, 0.25)
+    ]
     return replace(snapshot(t_s), trail=(Trail(t_s, *angles),))
 
 
@@ -134,18 +136,19 @@ def test_traces_keep_half_a_minute_and_start_anew_with_the_clock() -> None:
 
 
 def test_a_group_is_the_mean_of_its_joints() -> None:
-    angles_deg = np.zeros((2, 3, len(JOINTS)))
-    angles_deg[:, 2, JOINTS.index("left_eye_pan")] = 4.0
-    angles_deg[:, 2, JOINTS.index("right_eye_pan")] = 2.0
-    eyes = groups_of(JOINTS)["yaw"][0]
-    assert mean_deg(angles_deg, eyes, JOINTS).tolist() == [[0.0, 0.0, 3.0]] * 2
+    angles_deg = np.zeros((2, 3, len(GAZE_JOINTS)))
+    angles_deg[:, 2, GAZE_JOINTS.index("left_eye_pan")] = 4.0
+    angles_deg[:, 2, GAZE_JOINTS.index("right_eye_pan")] = 2.0
+    eyes = groups_of(GAZE_JOINTS)["yaw"][0]
+    assert mean_deg(angles_deg, eyes, GAZE_JOINTS).tolist() == [[0.0, 0.0, 3.0]] * 2
     named = {name for groups in GROUPS.values() for group in groups for name in group.joints}
     assert named == set(EVERY_JOINT)
 
 
 def test_traces_are_of_the_joints_that_are_there() -> None:
     desk = {
-        name: [len(group.joints) for group in groups] for name, groups in groups_of(JOINTS).items()
+        name: [len(group.joints) for group in groups]
+        for name, groups in groups_of(GAZE_JOINTS).items()
     }
     assert desk == {
         "yaw": [2, 1, 2], "pitch": [2, 1, 2], "left eye": [1, 1, 1], "right eye": [1, 1, 1],

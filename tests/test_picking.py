@@ -5,7 +5,7 @@ from typing import cast
 
 import numpy as np
 import pytest
-from desk import JOINTS
+from desk import GAZE_JOINTS
 
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import Detections
@@ -28,7 +28,7 @@ def looking(
     """A head that was turned so when the picture was taken, and has turned on since."""
     kinematics = Kinematics(
         GeometryParams(pitch_axis_height_mm=90.0, eyes_ahead_mm=30.0, eyes_above_mm=50.0),
-        JOINTS,
+        GAZE_JOINTS,
         {"left_upper_lid": (0.0, 0.5), "right_upper_lid": (0.0, 0.5)},
     )
     poses = PoseHistory(kinematics)
@@ -58,7 +58,7 @@ def face_at(p_world_m: Vec3) -> Face:
 def test_without_a_picture_there_is_nothing_to_pick() -> None:
     kinematics = Kinematics(
         GeometryParams(pitch_axis_height_mm=90.0, eyes_ahead_mm=30.0, eyes_above_mm=50.0),
-        JOINTS,
+        GAZE_JOINTS,
         {"left_upper_lid": (0.0, 0.5), "right_upper_lid": (0.0, 0.5)},
     )
     picking = ClickToLook(CameraMount(CAMERA), PoseHistory(kinematics), lambda: CAMERA)

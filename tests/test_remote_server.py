@@ -317,7 +317,7 @@ def test_stop_and_resume(rig: RobotClient, beat: Beat) -> None:
 @pytest.mark.parametrize(
     ("ask", "words"),
     [
-        (lambda rig: rig.jog("nose", 1.0), "unknown joint 'nose'"),
+        (lambda rig: rig.jog("nose", 1.0), "this rig has no joint 'nose'; there is left_eye_pan"),
         (lambda rig: rig.jog("neck_yaw", float("nan")), "finite"),
         (lambda rig: rig.look_at(float("inf"), 0.0, 0.0), "finite"),
         (lambda rig: rig.ask("mood", "good"), "nothing called 'mood'"),

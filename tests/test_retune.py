@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from desk import JOINTS
+from desk import GAZE_JOINTS
 
 from gazerig.config.load import ConfigError, shipped, shipped_names
 from gazerig.config.parameters import NEXT_START, Parameter, changed, parameters, value_of
@@ -94,7 +94,7 @@ class Judge:
                 # A limit taken over in this tick was kept before it was.
                 top = max(limit.speed_rad_s * per_rad, before[i].speed_rad_s * old)
                 hard = max(limit.accel_rad_s2 * per_rad, before[i].accel_rad_s2 * old)
-                where = f"{JOINTS[i]} at {self.running.ticks[-1].t_s}"
+                where = f"{GAZE_JOINTS[i]} at {self.running.ticks[-1].t_s}"
                 assert isfinite(steps[i]), where
                 assert abs(speed[i]) <= top + 1e-3, where
                 # After a late tick servos have braked by themselves.

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import pytest
-from desk import JOINTS
+from desk import GAZE_JOINTS
 
 from gazerig.config.load import ConfigError, shipped, shipped_names
 from gazerig.config.save_text import comment
@@ -29,9 +29,9 @@ def broken(tmp_path: Path, *changes: tuple[str, str]) -> tuple[str, ...]:
 
 def test_the_desk_rig_is_the_head_described() -> None:
     rig = load_rig("desk")
-    assert [rig.joints[name].id for name in JOINTS] == list(range(1, 10))
-    assert {rig.joints[name].model for name in JOINTS[:6]} == {"xl330-m077"}
-    assert {rig.joints[name].model for name in JOINTS[6:]} == {"xc330-m288"}
+    assert [rig.joints[name].id for name in GAZE_JOINTS] == list(range(1, 10))
+    assert {rig.joints[name].model for name in GAZE_JOINTS[:6]} == {"xl330-m077"}
+    assert {rig.joints[name].model for name in GAZE_JOINTS[6:]} == {"xc330-m288"}
     assert rig.bus.dynamixel.baud == 1_000_000
     assert rig.geometry.interocular_mm == 61.9
     pan, tilt = rig.joints["left_eye_pan"], rig.joints["right_eye_tilt"]
@@ -44,7 +44,7 @@ SHORT = ("simple_order",)
 
 def test_every_key_of_the_desk_rig_is_commented() -> None:
     lines = DESK.read_text(encoding="utf-8").splitlines()
-    names = rf"\s*({'|'.join(JOINTS)}|wait|guard|attack):"
+    names = rf"\s*({'|'.join(GAZE_JOINTS)}|wait|guard|attack):"
     keys, plain = 0, []
     for above, line in pairwise(lines):
         if not re.match(r"\s*\w+:", line):

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 import orjson
 import pytest
-from desk import JOINTS
+from desk import GAZE_JOINTS
 from mcap.reader import make_reader
 from mcap.writer import Writer
 from typer.testing import CliRunner
@@ -262,7 +262,7 @@ def test_health_comes_once_a_second(recorded: Recorded) -> None:
     found = list(RunRecording(recorded.path).health())
     assert len(found) == 2
     assert found[1]["tx_bytes"] > found[0]["tx_bytes"] > 0
-    assert len(found[1]["temperature_c"]) == len(JOINTS) and found[1]["lost_ticks"] == 0
+    assert len(found[1]["temperature_c"]) == len(GAZE_JOINTS) and found[1]["lost_ticks"] == 0
 
 
 def test_other_programs_open_it(recorded: Recorded) -> None:
@@ -290,7 +290,7 @@ def test_other_programs_open_it(recorded: Recorded) -> None:
     assert set(seen) == set(fmt.SCHEMAS)
     assert base64.b64decode(seen[fmt.PICTURE]["data"])[:2] == b"\xff\xd8"
     states = {one["name"]: one["position"] for one in seen[fmt.JOINT_STATES]["joints"]}
-    assert tuple(states) == JOINTS
+    assert tuple(states) == GAZE_JOINTS
     frames = {one["child_frame_id"] for one in seen[fmt.TRANSFORMS]["transforms"]}
     assert frames == {"head", "left_eye", "right_eye"}
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from desk import JOINTS
+from desk import GAZE_JOINTS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -28,7 +28,7 @@ def measured(t_s: float, position: tuple[float, ...] = (0.0,) * 9) -> JointState
 
 
 def ready(start: tuple[float, ...] = (0.0,) * 9, limits: tuple[JointLimit, ...] = LIMITS) -> Guard:
-    guard = Guard(GuardParams(), limits, JOINTS)
+    guard = Guard(GuardParams(), limits, GAZE_JOINTS)
     guard.reset(0.0, start)
     guard._gentle = [False] * 9  # the slow start has tests of its own
     return guard
@@ -100,7 +100,7 @@ def test_range_is_swept_densely_at_its_edges(joint: int) -> None:
             verdict = driven(ready(but(joint, edge)), [but(joint, edge + off)])[0]
             assert limit.low_rad <= verdict.command_rad[joint] <= limit.high_rad
             beyond = max(limit.low_rad - edge - off, edge + off - limit.high_rad)
-            assert (verdict.applied(JOINTS[joint]).reason == "out of range") == (beyond > 1e-9)
+            assert (verdict.applied(GAZE_JOINTS[joint]).reason == "out of range") == (beyond > 1e-9)
             assert verdict.command_rad[joint - 1] == 0.0
 
 
@@ -112,7 +112,7 @@ def test_speed_is_swept_densely_at_its_limit(joint: int, way: float) -> None:
         step = way * LIMITS[joint].speed_rad_s * DT * share
         verdict = driven(ready(limits=soft), [but(joint, step)])[0]
         assert abs(verdict.command_rad[joint]) <= abs(step / share) * (1.0 + 1e-12)
-        assert (verdict.applied(JOINTS[joint]).reason == "too fast") == (share > 1.0 + 1e-9)
+        assert (verdict.applied(GAZE_JOINTS[joint]).reason == "too fast") == (share > 1.0 + 1e-9)
 
 
 @pytest.mark.parametrize("joint", range(9))
@@ -122,7 +122,7 @@ def test_acceleration_is_swept_densely_at_its_limit(joint: int, way: float) -> N
         step = way * LIMITS[joint].accel_rad_s2 * DT * DT * share
         verdict = driven(ready(), [but(joint, step)])[0]
         assert abs(verdict.command_rad[joint]) <= abs(step / share) * (1.0 + 1e-12)
-        assert (verdict.applied(JOINTS[joint]).reason == "too hard") == (share > 1.0 + 1e-9)
+        assert (verdict.applied(GAZE_JOINTS[joint]).reason == "too hard") == (share > 1.0 + 1e-9)
 
 
 @pytest.mark.parametrize("joint", range(9))
@@ -183,12 +183,12 @@ def test_ages_of_joints_and_picture_are_swept_densely(joint: int) -> None:
         ages = measured(t)._replace(measured_s=but(joint, t - 0.15 - off, t))
         verdict = guard.check((0.0001,) * 9, ages, 0.0, t)
         stale = not off <= 0.0
-        assert (verdict.applied(JOINTS[joint]).reason == "stale joints") == stale
+        assert (verdict.applied(GAZE_JOINTS[joint]).reason == "stale joints") == stale
         assert verdict.command_rad == but(joint, 0.0 if stale else 0.0001, 0.0001)
         verdict = ready().check((0.0001,) * 9, measured(t), 1.5 + off, t)
         assert (verdict.level == "hold") == stale
         moved = stale and joint >= 6
-        assert (verdict.applied(JOINTS[joint]).reason == "stale picture") == moved
+        assert (verdict.applied(GAZE_JOINTS[joint]).reason == "stale picture") == moved
 
 
 def test_stale_joints_hold_only_themselves() -> None:
@@ -202,14 +202,14 @@ def test_stale_joints_hold_only_themselves() -> None:
 def test_a_stale_picture_holds_the_neck_and_not_the_eyes() -> None:
     verdict = ready().check((0.0001,) * 9, measured(DT), 2.0, DT)
     held = {reason for reason in verdict.reasons if reason.endswith("stale picture")}
-    assert held == {f"{name}: stale picture" for name in JOINTS if name.startswith("neck")}
+    assert held == {f"{name}: stale picture" for name in GAZE_JOINTS if name.startswith("neck")}
     assert verdict.command_rad[6:] == (0.0,) * 3
     assert verdict.command_rad[0] == pytest.approx(0.0001)
 
 
 def test_it_starts_slowly_from_where_the_joints_are_until_each_has_met_its_wish() -> None:
     guard = Guard(
-        GuardParams(soft_start_speed_deg_s=60.0, soft_start_accel_deg_s2=300.0), LIMITS, JOINTS
+        GuardParams(soft_start_speed_deg_s=60.0, soft_start_accel_deg_s2=300.0), LIMITS, GAZE_JOINTS
     )
     guard.reset(0.0, (0.5,) * 9)
     path, t = [0.5], 0.0
@@ -241,7 +241,7 @@ def test_going_gently_in_flight_brakes_within_the_joints_own_strength() -> None:
 
 
 def test_a_start_outside_the_range_is_brought_to_its_edge() -> None:
-    guard = Guard(GuardParams(), LIMITS, JOINTS)
+    guard = Guard(GuardParams(), LIMITS, GAZE_JOINTS)
     guard.reset(0.0, (2.0,) * 9)
     assert guard.check((2.0,) * 9, measured(DT), 0.0, DT).command_rad[0] == EYE.high_rad
 

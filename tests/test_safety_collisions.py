@@ -5,7 +5,7 @@ from math import degrees, radians
 
 import numpy as np
 import pytest
-from desk import JOINTS
+from desk import GAZE_JOINTS
 
 from gazerig.config.bounds import validate
 from gazerig.robot.model.forbidden_range import CollisionParams
@@ -18,7 +18,9 @@ EYE = JointLimit(radians(-35), radians(35), radians(600), radians(45_000))
 NECK = JointLimit(radians(-60), radians(50), radians(200), radians(1_500))
 LIMITS = (EYE,) * 6 + (NECK,) * 3
 DT = 0.005
-LEFT, RIGHT, PITCH = (JOINTS.index(n) for n in ("left_upper_lid", "right_upper_lid", "neck_pitch"))
+LEFT, RIGHT, PITCH = (
+    GAZE_JOINTS.index(n) for n in ("left_upper_lid", "right_upper_lid", "neck_pitch")
+)
 LID = CollisionParams("neck_pitch", -30.0, -18.0, "left_upper_lid", 10.0, 25.0)
 OTHER_LID = CollisionParams("right_upper_lid", 10.0, 25.0, "neck_pitch", -30.0, -18.0)
 
@@ -27,9 +29,9 @@ class World:
     """Joints one tick behind their commands."""
 
     def __init__(self, *pairs: CollisionParams, **start_deg: float) -> None:
-        self.guard = Guard(GuardParams(collisions=pairs), LIMITS, JOINTS)
+        self.guard = Guard(GuardParams(collisions=pairs), LIMITS, GAZE_JOINTS)
         self.pairs = pairs
-        start = tuple(radians(start_deg.get(name, 0.0)) for name in JOINTS)
+        start = tuple(radians(start_deg.get(name, 0.0)) for name in GAZE_JOINTS)
         self.guard.reset(0.0, start)
         self.t_s = 0.0
         self.path = [start]
@@ -42,7 +44,7 @@ class World:
     def tick(self, dt_s: float = DT, **desired_deg: float) -> GuardResult:
         self.t_s += dt_s
         joints = JointState(self.measured(self.path[-1]), (0.0,) * 9, (self.t_s,) * 9, ())
-        desired = tuple(radians(desired_deg.get(name, 0.0)) for name in JOINTS)
+        desired = tuple(radians(desired_deg.get(name, 0.0)) for name in GAZE_JOINTS)
         verdict = self.guard.check(desired, joints, 0.0, self.t_s)
         self.path.append(verdict.command_rad)
         return verdict
@@ -57,8 +59,8 @@ class World:
         return any(
             bool(
                 touches(
-                    begin[:, [JOINTS.index(p.first), JOINTS.index(p.second)]],
-                    end[:, [JOINTS.index(p.first), JOINTS.index(p.second)]],
+                    begin[:, [GAZE_JOINTS.index(p.first), GAZE_JOINTS.index(p.second)]],
+                    end[:, [GAZE_JOINTS.index(p.first), GAZE_JOINTS.index(p.second)]],
                     np.array([p.first_min_deg, p.second_min_deg]),
                     np.array([p.first_max_deg, p.second_max_deg]),
                 ).any()
@@ -239,7 +241,7 @@ def test_pairs_come_from_the_rig_file_and_wrong_ones_are_refused() -> None:
     params, errors = validate(GuardParams, {"collisions": (pair,)})
     assert errors == [] and params is not None and params.collisions == (LID,)
     wrong: list[tuple[dict[str, object], str]] = [
-        ({"first": "ear"}, "neck_pitch"),
+        ({"first": "the ear"}, "no name of a joint"),
         ({"second": "neck_pitch"}, "first and second are both neck_pitch"),
         ({"first_max_deg": -30}, "first_min_deg -30.0 must be below first_max_deg -30.0"),
         ({"second_min_deg": 26}, "second_min_deg 26.0 must be below second_max_deg 25.0"),
@@ -248,11 +250,11 @@ def test_pairs_come_from_the_rig_file_and_wrong_ones_are_refused() -> None:
         params, errors = validate(GuardParams, {"collisions": ({**pair, **change},)})
         assert params is None and len(errors) == 1
         assert says in str(errors[0].get("ctx"))
-    with pytest.raises(ValueError, match="unknown joint 'ear'; known are left_eye_pan"):
-        CollisionParams("ear", 0.0, 1.0, "neck_yaw", 0.0, 1.0)
+    with pytest.raises(ValueError, match="'the ear' is no name of a joint"):
+        CollisionParams("the ear", 0.0, 1.0, "neck_yaw", 0.0, 1.0)
 
 
 def test_a_pair_that_leaves_no_pose_is_refused() -> None:
     whole = CollisionParams("neck_pitch", -60.0, 50.0, "left_upper_lid", -34.5, 34.5)
     with pytest.raises(ValueError, match="neck_pitch -60..50 deg of -60..50 with left_upper_lid"):
-        Guard(GuardParams(collisions=(whole,)), LIMITS, JOINTS)
+        Guard(GuardParams(collisions=(whole,)), LIMITS, GAZE_JOINTS)

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from desk import JOINTS
+from desk import GAZE_JOINTS
 
 from gazerig.robot.model.guard_params import GuardParams, HealthParams
 from gazerig.robot.model.joint_limit import JointLimit
@@ -17,14 +17,14 @@ NECK = JointLimit(radians(-60), radians(50), radians(200), radians(1_500), 70.0,
 LIMITS = (EYE,) * 6 + (NECK,) * 3
 DT = 0.005
 JOINT = 6
-NAME = JOINTS[JOINT]
+NAME = GAZE_JOINTS[JOINT]
 
 
 class World:
     """Joints that are where their commands were one tick ago, and whose servos say things."""
 
     def __init__(self) -> None:
-        self.guard = Guard(GuardParams(soft_start_ms=0.0), LIMITS, JOINTS)
+        self.guard = Guard(GuardParams(soft_start_ms=0.0), LIMITS, GAZE_JOINTS)
         self.guard.reset(0.0, (0.0,) * 9)
         self.guard._gentle = [False] * 9
         self.t_s = 0.0
@@ -229,7 +229,7 @@ def test_a_latched_fault_is_limp_with_its_words(torque: dict[str, bool]) -> None
 
 
 def test_the_gravest_reasons_stand_by_themselves() -> None:
-    guard = Guard(GuardParams(), LIMITS, JOINTS)  # all begin slowly
+    guard = Guard(GuardParams(), LIMITS, GAZE_JOINTS)  # all begin slowly
     fault = tuple("overload" if k == JOINT else "" for k in range(9))
     joints = JointState((0.0,) * 9, (0.0,) * 9, (DT,) * 9, (), (), fault)
     verdict = guard.check((0.5,) * 9, joints, 0.0, DT)

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from desk import JOINTS
+from desk import GAZE_JOINTS
 
 from gazerig.robot.model.forbidden_range import CollisionParams
 from gazerig.robot.model.guard_params import GuardParams
@@ -63,7 +63,7 @@ class Bench:
 
     def __init__(self, m: ModuleType, start_deg: float = 0.0, gentle: bool = False, **params: Any):
         limit = JointLimit(LOW, HIGH, TOP, ACCEL, 70.0, 3.5, 7.0)
-        self.guard = m.Guard(GuardParams(**params), (limit,) * 9, JOINTS)
+        self.guard = m.Guard(GuardParams(**params), (limit,) * 9, GAZE_JOINTS)
         self.guard.reset(0.0, (radians(start_deg),) * 9)
         if not gentle:
             self.guard._gentle = [False] * 9
@@ -97,7 +97,7 @@ class Bench:
             self.speed = tuple(0.0 if k == JOINT else v for k, v in enumerate(self.speed))
         self.path.append(verdict.command_rad)
         self._within(before)
-        self.why, self.level = verdict.applied(JOINTS[JOINT]).reason, verdict.level
+        self.why, self.level = verdict.applied(GAZE_JOINTS[JOINT]).reason, verdict.level
         return verdict.command_rad[JOINT]
 
     def _within(self, before: tuple[float, ...]) -> None:
@@ -169,7 +169,7 @@ def late(m: ModuleType) -> None:
     soft = radians(500.0)
     params = GuardParams(late_ms=50.0, late_accel_deg_s2=500.0)
     for missed in (2, 10, 400):
-        guard = m.Guard(params, (limit,) * 9, JOINTS, period_s=DT)
+        guard = m.Guard(params, (limit,) * 9, GAZE_JOINTS, period_s=DT)
         guard.reset(0.0, (LOW,) * 9)
         guard._gentle = [False] * 9
         t_s, before, speed = 0.0, LOW, 0.0
@@ -186,7 +186,7 @@ def late(m: ModuleType) -> None:
 def slow_host(m: ModuleType) -> None:
     """A loop that always takes two slots is a slower loop, and joints come to their speed."""
     limit = JointLimit(LOW, HIGH, TOP, ACCEL, 70.0, 3.5, 7.0)
-    guard = m.Guard(GuardParams(), (limit,) * 9, JOINTS, period_s=DT)
+    guard = m.Guard(GuardParams(), (limit,) * 9, GAZE_JOINTS, period_s=DT)
     guard.reset(0.0, (LOW,) * 9)
     guard._gentle = [False] * 9
     before = LOW
@@ -424,7 +424,7 @@ def collision_lag(m: ModuleType) -> None:
 def slow_joint(m: ModuleType) -> None:
     limit = JointLimit(LOW, HIGH, radians(20.0), radians(100.0))  # below the gentle ones
     pair = CollisionParams("neck_pitch", -20.0, 5.0, "left_upper_lid", -20.0, 15.0)
-    guard = m.Guard(GuardParams(collisions=(pair,)), (limit,) * 9, JOINTS)
+    guard = m.Guard(GuardParams(collisions=(pair,)), (limit,) * 9, GAZE_JOINTS)
     guard.reset(0.0, (0.0,) * 9)
     path, speed = [(0.0,) * 9], np.zeros(9)
     for k in range(1, 300):

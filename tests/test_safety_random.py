@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from desk import JOINTS
+from desk import GAZE_JOINTS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -50,7 +50,7 @@ class Trial:
     def __init__(self, limits: tuple[JointLimit, ...], boxes: tuple[CollisionParams, ...]) -> None:
         self.limits = np.array(limits)
         self.boxes = boxes
-        self.guard = Guard(GuardParams(collisions=boxes, soft_start_ms=100.0), limits, JOINTS)
+        self.guard = Guard(GuardParams(collisions=boxes, soft_start_ms=100.0), limits, GAZE_JOINTS)
         self.low, self.high = self.limits[:, 0], self.limits[:, 1]
         self.begin_p: list[Row] = []
         self.begin_v: list[Row] = []
@@ -95,7 +95,7 @@ class Trial:
 
     def _judge_box(self, box: CollisionParams, p0: Array, v0: Array, p1: Array, v1: Array) -> None:
         """Once a joint of the pair can stay out of its range, one always can, and does."""
-        i, j = JOINTS.index(box.first), JOINTS.index(box.second)
+        i, j = GAZE_JOINTS.index(box.first), GAZE_JOINTS.index(box.second)
         first = (radians(box.first_min_deg), radians(box.first_max_deg))
         second = (radians(box.second_min_deg), radians(box.second_max_deg))
         margin = radians(1.0)

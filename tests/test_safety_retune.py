@@ -7,7 +7,7 @@ from math import radians
 
 import numpy as np
 import pytest
-from desk import JOINTS
+from desk import GAZE_JOINTS
 from numpy.typing import NDArray
 
 from gazerig.robot.model.forbidden_range import CollisionParams
@@ -38,7 +38,7 @@ class Watched:
 
     def __init__(self, dice: np.random.Generator, params: GuardParams = GENTLE) -> None:
         self.dice = dice
-        self.guard = Guard(params, limits(dice), JOINTS)
+        self.guard = Guard(params, limits(dice), GAZE_JOINTS)
         self.guard.reset(0.0, (0.0,) * 9)
         self.p, self.v, self.t_s = np.zeros(9), np.zeros(9), 0.0
         self.desired = np.zeros(9)
@@ -120,7 +120,7 @@ def test_a_collision_that_leaves_no_pose_changes_nothing() -> None:
 
 def test_servos_that_keep_to_less_bound_what_is_in_force() -> None:
     first = tuple(JointLimit(-1.0, 1.0, 5.0, 50.0) for _ in range(9))
-    guard = Guard(GENTLE, first, JOINTS, lambda: first)
+    guard = Guard(GENTLE, first, GAZE_JOINTS, lambda: first)
     guard.reset(0.0, (0.0,) * 9)
     wider = tuple(JointLimit(-1.5, 0.5, 9.0, 90.0) for _ in range(9))
     guard.retune(GENTLE, wider)

@@ -5,7 +5,7 @@ from math import radians, sin
 
 import numpy as np
 import pytest
-from desk import JOINTS
+from desk import GAZE_JOINTS
 
 from gazerig.robot.model.guard_params import GuardParams, StallParams
 from gazerig.robot.model.joint_limit import JointLimit
@@ -24,7 +24,7 @@ class World:
 
     def __init__(self, joint: int, lag_s: float = 0.02, band_deg: float = 0.0) -> None:
         self.joint = joint
-        self.guard = Guard(GuardParams(), LIMITS, JOINTS)
+        self.guard = Guard(GuardParams(), LIMITS, GAZE_JOINTS)
         self.guard.reset(0.0, (0.0,) * 9)
         self.guard._gentle = [False] * 9
         self.t_s = 0.0
@@ -53,7 +53,7 @@ class World:
         self.verdict = self.guard.check(wishes, joints, 0.0, self.t_s)
         self.path.append(self.verdict.command_rad[self.joint])
         self._sent.append(self.path[-1])
-        return self.verdict.applied(JOINTS[self.joint]).reason
+        return self.verdict.applied(GAZE_JOINTS[self.joint]).reason
 
 
 @pytest.mark.parametrize("joint", range(9))
@@ -146,7 +146,7 @@ def test_a_slow_start_is_no_jam() -> None:
 @pytest.mark.parametrize("off_deg", np.linspace(2.5, 3.5, 21).tolist())
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_the_distance_is_swept_densely(off_deg: float, way: float) -> None:
-    guard = Guard(GuardParams(), LIMITS, JOINTS)
+    guard = Guard(GuardParams(), LIMITS, GAZE_JOINTS)
     guard.reset(0.0, (0.0,) * 9)
     guard._gentle = [False] * 9
     found = False
@@ -160,7 +160,7 @@ def test_the_distance_is_swept_densely(off_deg: float, way: float) -> None:
 
 @pytest.mark.parametrize("creep_deg_s", [1.0, 2.5, 3.0, 3.7, 4.0, 6.0, -1.0, -6.0, -20.0])
 def test_only_motion_towards_the_command_counts(creep_deg_s: float) -> None:
-    guard = Guard(GuardParams(), LIMITS, JOINTS)
+    guard = Guard(GuardParams(), LIMITS, GAZE_JOINTS)
     guard.reset(0.0, (0.6,) * 9)
     guard._gentle = [False] * 9
     found = False
@@ -180,7 +180,7 @@ def test_a_silent_joint_is_stale_and_not_stuck() -> None:
 
 
 def test_a_stuck_joint_lets_the_others_move() -> None:
-    guard = Guard(GuardParams(), LIMITS, JOINTS)
+    guard = Guard(GuardParams(), LIMITS, GAZE_JOINTS)
     guard.reset(0.0, (0.0,) * 9)
     command: tuple[float, ...] = (0.0,) * 9
     verdict = None

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from desk import JOINTS
+from desk import GAZE_JOINTS
 from mcap.reader import make_reader
 from mixed_rig import mixed_text
 from six_joints import SIX
@@ -152,7 +152,7 @@ def test_a_recording_without_names_is_of_the_joints_that_all_rigs_had(
     ticks = list(old.ticks())
     assert len(ticks) == len(desk.ticks)
     for tick, was in zip(ticks, desk.ticks, strict=True):
-        assert tick.guard_result.joints == JOINTS and tick.joints.measured == ()
+        assert tick.guard_result.joints == GAZE_JOINTS and tick.joints.measured == ()
         assert tick.pose.lower_left == tick.gaze.lower_right == 1.0
         assert (
             tick.guard_result == was.guard_result
@@ -241,7 +241,7 @@ def test_a_report_of_estimated_joints_says_so_everywhere(maker: Run, tmp_path: P
 
 def test_a_report_of_measured_joints_claims_it(desk: Run) -> None:
     run = gathered(desk.ticks)
-    assert run.joints == JointBasis(JOINTS, ())
+    assert run.joints == JointBasis(GAZE_JOINTS, ())
     assert run.joints.whole_basis == "measured"
     assert not any(run.joints.left_out(drawing.key) for drawing in build.DRAWINGS)
     assert np.isnan(run.column("lower_lid")).all() and np.isfinite(run.column("lid")).all()
@@ -287,10 +287,10 @@ def test_what_cannot_be_told_says_why(names: tuple[str, ...], key: str, words: s
 
 
 def test_a_rig_of_both_kinds_of_servos_is_measured_in_parts() -> None:
-    eyes = JointBasis(JOINTS, tuple(name for name in JOINTS if "eye" in name))
+    eyes = JointBasis(GAZE_JOINTS, tuple(name for name in GAZE_JOINTS if "eye" in name))
     assert eyes.basis("Saccades") == "partly estimated" and eyes.basis("Lids") == "measured"
     assert eyes.whole_basis == "partly estimated" and eyes.left_out("unasked")
-    lids = JointBasis(JOINTS, ("left_upper_lid", "right_upper_lid"))
+    lids = JointBasis(GAZE_JOINTS, ("left_upper_lid", "right_upper_lid"))
     assert lids.basis("Lids") == "estimated" and lids.basis("On the face") == "measured"
     assert not lids.left_out("unasked")
 

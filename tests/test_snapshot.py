@@ -6,7 +6,7 @@ from math import degrees, radians
 
 import numpy as np
 import pytest
-from desk import JOINTS
+from desk import GAZE_JOINTS
 from six_joints import SIX
 
 from gazerig.config.schema import Rig, load_rig
@@ -41,7 +41,7 @@ def visit(name: str = "desk", last_s: float = 8.0) -> tuple[Rig, Assembly, tuple
 
 def shown_rig() -> ShownRig:
     rig, made, _ = visit()
-    limits = tuple(rig.joints[name].limit() for name in JOINTS)
+    limits = tuple(rig.joints[name].limit() for name in GAZE_JOINTS)
     return ShownRig(
         gaze_parts(rig, 0)[0],
         limits,
@@ -140,7 +140,7 @@ def test_servos_come_with_their_limits_and_their_silences() -> None:
         snapshots.update(tick)
     shot = snapshots.take(SnapshotTexts())
     assert shot is not None and shot.servos.limits is not None
-    assert shot.servos.unanswered == tuple(int(name == "neck_yaw") for name in JOINTS)
+    assert shot.servos.unanswered == tuple(int(name == "neck_yaw") for name in GAZE_JOINTS)
     hottest = rig.joints["neck_yaw"].limit().hottest_c
     assert shot.servos.limits.hot_c[6] == hottest - rig.guard.health.hot_c
     assert shot.servos.limits.warm_c[6] < shot.servos.limits.hot_c[6]
@@ -212,7 +212,7 @@ def test_joints_of_servos_that_tell_nothing_are_shown_as_estimated() -> None:
     mixed = snapshot(ticks[-1]._replace(joints=one), 200.0, "", "")
     assert mixed.estimated == ("eyes_tilt", "right_lower_lid")
     measured = snapshot(visit()[2][-1], 200.0, "", "")
-    assert measured.joints == JOINTS and measured.estimated == ()
+    assert measured.joints == GAZE_JOINTS and measured.estimated == ()
 
 
 def test_lower_lids_are_shown_where_there_are_any() -> None:
@@ -235,4 +235,4 @@ def test_joints_whose_names_nobody_knows_are_numbered() -> None:
     tick = visit()[2][-1]
     nameless = tick._replace(guard_result=tick.guard_result._replace(joints=()))
     assert snapshot(nameless, 200.0, "", "").joints[:2] == ("joint 1", "joint 2")
-    assert snapshot(nameless, 200.0, "", "", rig=shown_rig()).joints == JOINTS
+    assert snapshot(nameless, 200.0, "", "", rig=shown_rig()).joints == GAZE_JOINTS

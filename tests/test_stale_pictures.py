@@ -6,7 +6,7 @@ from math import degrees, radians
 
 import numpy as np
 import pytest
-from desk import JOINTS
+from desk import GAZE_JOINTS
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.types import Camera, Detections
@@ -20,7 +20,7 @@ from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 
 GONE_S, BACK_S, END_S = 2.0, 9.0, 12.0
 LOST, FOUND = "camera lost: trying it again", "camera back after 7.0 s"
-NECK = slice(JOINTS.index("neck_yaw"), JOINTS.index("neck_roll") + 1)
+NECK = slice(GAZE_JOINTS.index("neck_yaw"), GAZE_JOINTS.index("neck_roll") + 1)
 
 
 class Passer:

@@ -16,7 +16,7 @@ from gazerig.robot.analysis.lid_opening import UPPER, openings
 from gazerig.robot.analysis.saccade_finder import Jump, SaccadeFinder
 from gazerig.robot.analysis.summary import cyclopean
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.types import JOINTS
+from gazerig.robot.model.types import GAZE_JOINTS
 
 NEAR_PART_M = 0.03
 """A line of sight that passes a part within this distance is on it."""
@@ -35,7 +35,7 @@ _SETTLING_S = 0.02
 
 _LONGEST_FORESEEN_S = 0.3
 _COMMAND_BEFORE_S, _COMMAND_AFTER_S = 0.12, 0.03
-_EYE_JOINTS = frozenset(name for name in JOINTS if "eye" in name)
+_EYE_JOINTS = frozenset(name for name in GAZE_JOINTS if "eye" in name)
 
 
 class Commanded(NamedTuple):

@@ -12,6 +12,7 @@ from gazerig.drivers.camera.depth_roi import depth_at
 from gazerig.drivers.camera.pose_buffer import PoseBuffer
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import Camera
+from gazerig.gaze.animation import Animation
 from gazerig.gaze.attention import Attention
 from gazerig.gaze.aversion import Aversion
 from gazerig.gaze.lids import Lids
@@ -43,7 +44,7 @@ from gazerig.robot.model.frames import (
 )
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.loop_params import LoopParams
-from gazerig.robot.model.types import JointAngles
+from gazerig.robot.model.types import JointAngles, further
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
 from gazerig.robot.safety.guard import Guard
@@ -233,6 +234,7 @@ def _components(
         head=moves.head,
         breathing=moves.breathing,
         lids=lids,
+        animation=Animation(further(rig.joints)),
     )
 
 
@@ -259,6 +261,7 @@ def _robot(
         parts.aversion,
         parts.oculomotor,
         parts.lids,
+        parts.animation,
         parts.guard,
         live,
     )

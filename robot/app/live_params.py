@@ -13,6 +13,7 @@ from gazerig.config.load import ConfigError
 from gazerig.config.parameters import NEXT_START, changed, differences, live
 from gazerig.config.schema import Rig, load_walk
 from gazerig.drivers.types import Camera
+from gazerig.gaze.animation import Animation
 from gazerig.gaze.attention import Attention
 from gazerig.gaze.aversion import Aversion
 from gazerig.gaze.bottom_up import BottomUp
@@ -71,6 +72,7 @@ class Components(NamedTuple):
     head: Head
     breathing: Breathing
     lids: Lids
+    animation: Animation
 
 
 class CameraPlacement(NamedTuple):

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from gazerig.drivers.errors import DriverError
 from gazerig.drivers.types import Camera
+from gazerig.gaze.animation import Animation
 from gazerig.gaze.aversion import Aversion
 from gazerig.gaze.lids import Lids
 from gazerig.gaze.oculomotor import Oculomotor
@@ -60,6 +61,7 @@ class Robot:
         aversion: Aversion,
         oculomotor: Oculomotor,
         lids: Lids,
+        animation: Animation,
         guard: Guard,
         tune: Callable[[Tune, float], tuple[str, ...]],
     ) -> None:
@@ -76,6 +78,7 @@ class Robot:
             aversion: looking away in a conversation.
             oculomotor: target to eyes, head and lids.
             lids: their blinks can be asked for.
+            animation: gestures and expressions laid over gaze.
             guard: between what is desired and the bus.
             tune: puts changed parameters in force and says what was done.
         """
@@ -89,6 +92,7 @@ class Robot:
         self._aversion = aversion
         self._oculomotor = oculomotor
         self._menus = Menus(aversion, lids)
+        self._animation = animation
         self._guard = guard
         self._settled = True
         self._commands = CommandQueue()
@@ -185,6 +189,7 @@ class Robot:
         self._scanpath.reset(t_s)
         self._aversion.reset(t_s)
         self._oculomotor.reset(t_s, pose)
+        self._animation.reset(t_s)
         self._last = goals
 
     def tick(self, t_s: float, dt_s: float) -> Tick:
@@ -205,9 +210,10 @@ class Robot:
         target = self._lead.target(self.attention.choose(percept, pose, t_s), t_s)
         target = self._scanpath.wander(target, percept, t_s, self._settled, pose.p_world_head_m)
         target = self._aversion.step(target, pose.p_world_head_m, t_s)
-        gaze = self._oculomotor.step(target, pose, t_s, dt_s)
+        offset = self._animation.step(t_s)
+        gaze = self._oculomotor.step(target, pose, t_s, dt_s, offset)
         self._settled = gaze.phase != "saccade"
-        desired = self._lead.pose_rad or self._kinematics.inverse(gaze)
+        desired = self._lead.pose_rad or self._kinematics.inverse(gaze, offset.joints_rad)
         if self.stopped:
             self._stop.keep_released(self.body, joints, t_s)
             guard_result = at_rest(joints, desired, self.stopped, self.body.names)

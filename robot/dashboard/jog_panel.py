@@ -9,9 +9,11 @@ import viser
 from gazerig.robot.dashboard.outbox import Outbox
 from gazerig.robot.dashboard.widget import put
 from gazerig.robot.model.commands import Jog, LookAt
-from gazerig.robot.model.types import JOINTS, Snapshot
+from gazerig.robot.model.types import Snapshot, in_order
 
 _STEP_DEG = 0.1
+_FIRST, _LAST = 1, 100
+"""Places of the sliders in the tab, and of what stands below them."""
 _FOLLOWS_DEG = 0.15
 """A slider nobody holds follows its joint in steps of this."""
 _FREE_AFTER_S = 0.5
@@ -41,8 +43,8 @@ class JogPanel:
                 "others where they are, slowly and inside the guard's limits.</div>",
                 order=0,
             )
-            free = gui.add_button("let go: look freely", order=20, icon=viser.Icon.EYE)
-            self._measured = gui.add_html("", order=21)
+            free = gui.add_button("let go: look freely", order=_LAST, icon=viser.Icon.EYE)
+            self._measured = gui.add_html("", order=_LAST + 1)
 
         @free.on_click
         async def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
@@ -51,7 +53,8 @@ class JogPanel:
 
     def values(self, in_force: Mapping[str, object]) -> None:
         """Create the sliders, and keep their ends at the joints' limits."""
-        for joint in JOINTS:
+        keys = [key.split(".") for key in in_force if key.startswith("joints.")]
+        for joint in in_order(path[1] for path in keys if path[2:] == ["min_deg"]):
             low, high = (in_force.get(f"joints.{joint}.{end}_deg") for end in ("min", "max"))
             if not (isinstance(low, int | float) and isinstance(high, int | float)):
                 continue
@@ -70,7 +73,7 @@ class JogPanel:
                 step=_STEP_DEG,
                 initial_value=0.0,
                 hint=f"{low_deg:g} to {high_deg:g} deg; + left, up, open, right ear down",
-                order=1 + JOINTS.index(joint),
+                order=_FIRST + len(self._sliders),
             )
 
         @slider.on_update

@@ -9,7 +9,7 @@ from math import pi
 from typing import NamedTuple
 
 from gazerig.gaze.types import Vec3
-from gazerig.robot.model.types import JOINTS
+from gazerig.robot.model.types import JOINT_NAME
 
 Value = float | int | bool | str | None | tuple["Value", ...] | Mapping[str, "Value"]
 """What a key of a rig's YAML can hold."""
@@ -88,6 +88,8 @@ MAX_COORDINATE_M = 1000.0
 """No point to look at lies farther away along any axis."""
 MAX_ANGLE_RAD = 2.0 * pi
 """No joint is sent farther than a turn to either side."""
+MAX_JOINTS = 64
+"""A command moves no more joints than this."""
 MAX_WORDS = 200
 """Longest name or reason that a command may carry, in characters."""
 
@@ -194,15 +196,15 @@ def _check_who(who: object, flag: object = False) -> None:
 
 
 def _check_angles(angles: object) -> None:
-    if not isinstance(angles, tuple) or len(angles) > len(JOINTS):
+    if not isinstance(angles, tuple) or len(angles) > MAX_JOINTS:
         raise ValueError("angles are pairs of a joint and an angle in radians, one a joint")
     for pair in angles:
         if not (isinstance(pair, tuple) and len(pair) == 2 and _within(pair[1], MAX_ANGLE_RAD)):
             raise ValueError(
                 "angles are pairs of a joint and a finite angle in radians within +-360 deg"
             )
-        if pair[0] not in JOINTS:
-            raise ValueError(f"unknown joint {pair[0]!r:.40}; known are {', '.join(JOINTS)}")
+        if not (isinstance(pair[0], str) and JOINT_NAME.fullmatch(pair[0])):
+            raise ValueError(f"{pair[0]!r:.40} is no name of a joint: such as neck_yaw or jaw")
 
 
 def _near(value: object) -> bool:

@@ -5,19 +5,19 @@ from dataclasses import dataclass
 from math import degrees, radians
 from typing import Annotated, NamedTuple
 
-from gazerig.params import Bounds, Choices
+from gazerig.params import Bounds
 from gazerig.robot.model.joint_limit import JointLimit
-from gazerig.robot.model.types import JOINTS
+from gazerig.robot.model.types import JOINT_NAME
 
 
 @dataclass(frozen=True)
 class CollisionParams:
     """Two joints that touch when both are in these ranges."""
 
-    first: Annotated[str, Choices(*JOINTS), "a joint"]
+    first: Annotated[str, "a joint"]
     first_min_deg: Annotated[float, Bounds(-180, 180), "from this angle"]
     first_max_deg: Annotated[float, Bounds(-180, 180), "to this one"]
-    second: Annotated[str, Choices(*JOINTS), "the other joint"]
+    second: Annotated[str, "the other joint"]
     second_min_deg: Annotated[float, Bounds(-180, 180), "from this angle"]
     second_max_deg: Annotated[float, Bounds(-180, 180), "to this one"]
 
@@ -28,8 +28,8 @@ class CollisionParams:
             ValueError: they are not; the message says why.
         """
         for name in (self.first, self.second):
-            if name not in JOINTS:
-                raise ValueError(f"unknown joint {name!r}; known are {', '.join(JOINTS)}")
+            if not JOINT_NAME.fullmatch(name):
+                raise ValueError(f"{name!r} is no name of a joint: such as neck_yaw or jaw")
         if self.first == self.second:
             raise ValueError(f"first and second are both {self.first}; name two joints")
         for key in ("first", "second"):
@@ -81,7 +81,10 @@ def forbidden_pairs(
 
 def _index(name: str, joints: tuple[str, ...]) -> int:
     if name not in joints:
-        raise ValueError(f"a collision names {name}, which this rig does not have: take it out")
+        raise ValueError(
+            f"a collision names {name}, which this rig does not have: take it out, or name one of "
+            f"{', '.join(joints)}"
+        )
     return joints.index(name)
 
 

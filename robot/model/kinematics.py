@@ -15,7 +15,7 @@ from typing import Annotated
 from gazerig.gaze.angles import add, rotate, rotate_back, rotation, sub, yaw_pitch
 from gazerig.gaze.types import Angles2, Angles3, GazeCommand, GazeState, Mat3, Vec3
 from gazerig.params import Bounds
-from gazerig.robot.model.types import JOINTS, JointAngles, JointState, in_order
+from gazerig.robot.model.types import GAZE_JOINTS, JointAngles, JointState, in_order
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ LIDS = ("left_upper_lid", "right_upper_lid", "left_lower_lid", "right_lower_lid"
 class Kinematics:
     """Forward and inverse geometry of one rig.
 
-    names: of its joints, in the order of every sequence of them
+    names: of its joints, in the order of every sequence of them; gaze moves the first of them
     one_pan, one_tilt: both eyes are turned by one linkage
     """
 
@@ -60,7 +60,8 @@ class Kinematics:
         )
         self._neck = tuple(place.get(name, absent) for name in NECK)
         self._lid_places = tuple(place.get(name, absent) for name in LIDS)
-        self._wanted = tuple(JOINTS.index(name) for name in self.names)
+        self._wanted = tuple(GAZE_JOINTS.index(name) for name in self.names if name in GAZE_JOINTS)
+        self._further = (0.0,) * (len(self.names) - len(self._wanted))
         self.retune(params, lids)
 
     def retune(self, params: GeometryParams, lids: Mapping[str, LidEnds]) -> None:
@@ -135,8 +136,13 @@ class Kinematics:
             *openings,
         )
 
-    def inverse(self, command: GazeCommand) -> JointAngles:
-        """Return the joint angles of a command."""
+    def inverse(self, command: GazeCommand, further_rad: JointAngles = ()) -> JointAngles:
+        """Return the joint angles of a command.
+
+        Args:
+            command: what gaze asks for.
+            further_rad: angles of the joints that gaze does not move; 0 where not given.
+        """
         left, right, shut, span = (
             command.eye_left_rad,
             command.eye_right_rad,
@@ -154,7 +160,7 @@ class Kinematics:
             shut[3] + command.lower_right * span[3],
             *command.head_rad,
         )
-        return tuple([every[i] for i in self._wanted])
+        return (*[every[i] for i in self._wanted], *(further_rad or self._further))
 
 
 def _between(one: float, other: float) -> float:

@@ -1,15 +1,16 @@
 """Values of the machine: joints as desired, commanded and measured, and what the page is shown.
 
-Radians, metres, seconds; joints in the order of JOINTS, those that the rig has.
+Radians, metres, seconds; joints in the order of ``in_order``.
 """
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from gazerig.gaze.types import Mat3, Salience, Vec3
 
-JOINTS = (
+GAZE_JOINTS = (
     "left_eye_pan",
     "left_eye_tilt",
     "right_eye_pan",
@@ -24,17 +25,30 @@ JOINTS = (
     "neck_pitch",
     "neck_roll",
 )
-"""Every joint that a head can have. A rig has some of them: eyes that turn each by itself
-or both by one linkage (``eyes_pan``, ``eyes_tilt``), any of the lids, any axes of the neck."""
+"""The joints that gaze moves. A rig has some of them: eyes that turn each by itself or both by
+one linkage (``eyes_pan``, ``eyes_tilt``), any of the lids, any axes of the neck. Joints of any
+other name (jaw, brows, ears) are moved by gestures, expressions, levels and programs."""
+
+JOINT_NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
+"""What a joint may be called."""
 
 JointAngles = tuple[float, ...]
 """One angle a joint, in the order of the rig's joints (``in_order``)."""
 
 
 def in_order(names: Iterable[str]) -> tuple[str, ...]:
-    """Return a rig's joints in the order in which all sequences of joints have them."""
+    """Return a rig's joints in the order in which all sequences of joints have them.
+
+    Those that gaze moves come first, in the order of ``GAZE_JOINTS``, then all others by name.
+    """
     there = set(names)
-    return tuple(name for name in JOINTS if name in there)
+    others = sorted(there.difference(GAZE_JOINTS))
+    return (*(name for name in GAZE_JOINTS if name in there), *others)
+
+
+def further(names: Iterable[str]) -> tuple[str, ...]:
+    """Return those of a rig's joints that gaze does not move, in the order of ``in_order``."""
+    return tuple(name for name in in_order(names) if name not in GAZE_JOINTS)
 
 
 Level = Literal["ok", "limited", "hold", "torque_off"]

@@ -25,7 +25,7 @@ from gazerig.gaze.types import (
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import as_recorded
 from gazerig.robot.model.commands import from_recording as command_from_json
-from gazerig.robot.model.types import JOINTS, GuardResult, JointAngles, JointState
+from gazerig.robot.model.types import GAZE_JOINTS, GuardResult, JointAngles, JointState
 
 Json = dict[str, Any]
 Flat = tuple[Any, ...]
@@ -66,7 +66,9 @@ class TickRecord(NamedTuple):
     before: tuple[BodyRecord, ...] = ()
 
 
-_ONCE_ALL = tuple([name for name in JOINTS if not name.startswith("eyes_") and "lower" not in name])
+_ONCE_ALL = tuple(
+    [name for name in GAZE_JOINTS if not name.startswith("eyes_") and "lower" not in name]
+)
 """The joints of a recording that does not name them: every rig had these."""
 
 _FORMER = {

@@ -1,0 +1,49 @@
+"""Joints of any name: a jaw, brows, ears."""
+
+from dataclasses import replace
+
+from gazerig.config.rig import Rig
+from gazerig.config.schema import RULES, load_rig
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.model.types import further, in_order
+
+
+def with_joint(name: str, **changes: object) -> Rig:
+    """Return the desk rig with one more joint, on a servo of its own."""
+    rig = load_rig("desk")
+    jaw = replace(rig.joints["left_upper_lid"], id=42, min_deg=-2.0, max_deg=25.0, **changes)
+    return replace(rig, joints={name: jaw, **rig.joints})
+
+
+def faults(rig: Rig) -> list[str]:
+    return [f"{key}: {text}" for rule in RULES for key, text in rule(rig)]
+
+
+def test_joints_of_gaze_come_first_and_others_follow_by_name() -> None:
+    rig = with_joint("jaw")
+    names = in_order({*rig.joints, "brow"})
+    assert names[-2:] == ("brow", "jaw") and set(names[:-2]) == set(load_rig("desk").joints)
+    assert further(names) == ("brow", "jaw")
+    assert in_order(reversed(names)) == names
+
+
+def test_a_jaw_is_a_joint_and_a_misspelt_neck_is_not() -> None:
+    assert faults(with_joint("jaw")) == []
+    rig = with_joint("nek_yaw")
+    without = replace(rig, joints={k: v for k, v in rig.joints.items() if k != "neck_yaw"})
+    assert any("joints.nek_yaw: did you mean neck_yaw" in fault for fault in faults(without))
+    assert any("joints.Jaw!: no name of a joint" in fault for fault in faults(with_joint("Jaw!")))
+
+
+def test_a_jaw_is_read_held_at_rest_and_written() -> None:
+    made = assemble(with_joint("jaw"), RunOptions(mock=True, fast=True, scene="visitor"))
+    try:
+        made.robot.start(made.clock)
+        tick = made.robot.tick(0.005, 0.005)
+        assert made.robot.body.names[-1] == "jaw"
+        assert tick.desired_rad[-1] == 0.0
+        assert len(tick.guard_result.command_rad) == len(tick.desired_rad) == 10
+        made.robot.stop()
+    finally:
+        made.close()
