@@ -9,10 +9,10 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.types import further, in_order
 
 
-def with_joint(name: str, **changes: object) -> Rig:
+def with_joint(name: str) -> Rig:
     """Return the desk rig with one more joint, on a servo of its own."""
     rig = load_rig("desk")
-    jaw = replace(rig.joints["left_upper_lid"], id=42, min_deg=-2.0, max_deg=25.0, **changes)
+    jaw = replace(rig.joints["left_upper_lid"], id=42, min_deg=-2.0, max_deg=25.0)
     return replace(rig, joints={name: jaw, **rig.joints})
 
 

@@ -94,7 +94,7 @@ def record(
         seen.append(tick)
 
     made.robot.start(made.clock)
-    goals = made.robot._last
+    goals = made.robot._executor.commanded_rad
     stop = recorder.timed(lambda s: "seconds" if s >= seconds - 1e-9 else None)
     count = run(made.robot, made.clock, made.loop, stop, watch)
     made.robot.stop()

@@ -21,18 +21,18 @@ from gazerig.robot.control.command_choices import (
     refuse_out_of_range,
     refuse_unknown,
 )
+from gazerig.robot.control.command_executor import CommandExecutor
 from gazerig.robot.control.command_queue import CommandQueue
-from gazerig.robot.control.reachability import jog_reply, look_reply
 from gazerig.robot.control.stop_control import StopControl
 from gazerig.robot.control.tick import Tick as Tick
 from gazerig.robot.control.tick import at_rest
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Renew, Resume, Stop, Tune, check
+from gazerig.robot.model.commands import Ask, Command, Jog, Tune, check
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.lead import Lead
 from gazerig.robot.model.loop_params import LoopParams
-from gazerig.robot.model.reply import CommandReply, Ticket
+from gazerig.robot.model.reply import Ticket
 from gazerig.robot.model.types import JointAngles
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.safety.guard import Guard
@@ -97,12 +97,12 @@ class Robot:
         self._settled = True
         self._commands = CommandQueue()
         self._lead = Lead()
-        self._last: JointAngles = ()
-        # The models lead again: they begin where this tick finds head and eyes.
-        self._takes_over = False
-        self._tune = tune
         self._told: list[str] = []
         self._stop = StopControl(self._told)
+        self._executor = CommandExecutor(
+            body, self._lead, self._stop, self._menus, attention, oculomotor, kinematics, guard,
+            tune, self._told,
+        )  # fmt: skip
 
     @property
     def stopped(self) -> str:
@@ -190,7 +190,7 @@ class Robot:
         self._aversion.reset(t_s)
         self._oculomotor.reset(t_s, pose)
         self._animation.reset(t_s)
-        self._last = goals
+        self._executor.commanded_rad = goals
 
     def tick(self, t_s: float, dt_s: float) -> Tick:
         """Read, see, choose, plan, guard, write.
@@ -202,8 +202,7 @@ class Robot:
         joints = self.body.read(t_s)
         pose = self._kinematics.forward(joints)
         self._poses.remember(t_s, pose.head_rad)
-        if self._takes_over:
-            self._takes_over = False
+        if self._executor.models_take_over():
             self._oculomotor.reset(t_s, pose)
         detections = self.camera.latest(t_s)
         percept = self.perception.see(detections, self._poses)
@@ -222,7 +221,7 @@ class Robot:
             age_s = 0.0 if self._lead.active else percept.age_s(t_s) if percept is not None else inf
             guard_result = self._guard.check(desired, joints, age_s, t_s)
             self.body.write(guard_result.command_rad)
-        self._last = guard_result.command_rad
+        self._executor.commanded_rad = guard_result.command_rad
         events = (*self._told, *self.body.bus.events(), *self.camera.events())
         self._told.clear()
         return Tick(
@@ -254,7 +253,7 @@ class Robot:
                 return False
             if stops := self._commands.stops():
                 for stop in stops:
-                    stop.ticket.answer(self._obey_one(stop.command, t_s))
+                    stop.ticket.answer(self._executor.execute(stop.command, t_s))
                 return False
             joints = self.body.read(t_s)
             # Parking goes home whatever the camera shows.
@@ -275,71 +274,9 @@ class Robot:
         """Execute the commands that wait, and end a lead that is not renewed."""
         taken = self._commands.take()
         for command, ticket in taken:
-            ticket.answer(self._obey_one(command, t_s))
-        if self._lead.lapsed(t_s):
-            self._told.append(f"{self._lead.words}: not renewed, so the gaze leads again")
-            self._let_lead(self._lead.end)
+            ticket.answer(self._executor.execute(command, t_s))
+        self._executor.end_lapsed_lead(t_s)
         return tuple([command for command, _ in taken])
-
-    def _obey_one(self, command: Command, t_s: float) -> CommandReply:
-        """Execute one command; return its reply."""
-        match command:
-            case Ask():
-                self._menus.choose(command, self.attention.top_down, t_s)
-            case LookAt() | Jog() if self.stopped:
-                return CommandReply(f"stopped ({self.stopped}): resume first")
-            case LookAt():
-                return self._look(command, t_s)
-            case Jog():
-                return self._jog(command, t_s)
-            case Renew():
-                if not self._lead.renew(command, t_s):
-                    return CommandReply(f"{command.who or 'you'} lead nothing now")
-            case Stop():
-                self._lead.end()
-                self._stop.halt(command, self.body, t_s)
-            case Resume():
-                return self._resume(command, t_s)
-            case Tune():
-                self._told += self._tune(command, t_s)
-        return CommandReply()
-
-    def _look(self, command: LookAt, t_s: float) -> CommandReply:
-        """Look at a point that a user chose, or freely again."""
-        self._let_lead(lambda: self._lead.look(command, t_s))
-        target = self._lead.puppet(t_s)
-        if target is None:
-            return CommandReply()
-        return look_reply(target, self._oculomotor, self._kinematics, self._guard.limits)
-
-    def _jog(self, command: Jog, t_s: float) -> CommandReply:
-        """Hold all joints but those given; without any, return the joints to the gaze models."""
-        self._let_lead(lambda: self._lead.jog(command, self.body.names, self._last, t_s))
-        if command.angles_rad:
-            # A slider can be torn from end to end in no time.
-            self._guard.go_gently()
-        return jog_reply(command, self.body.names, self._guard.limits)
-
-    def _let_lead(self, change: Callable[[], None]) -> None:
-        """Change who leads; the models begin gently where they take joints over."""
-        held, words = bool(self._lead.pose_rad), self._lead.words
-        change()
-        if held and not self._lead.pose_rad:
-            self._takes_over = True
-            self._guard.go_gently()
-        if self._lead.words and not words:
-            self._told.append(f"led by {self._lead.words}")
-
-    def _resume(self, command: Resume, t_s: float) -> CommandReply:
-        """Switch the torque on where the joints are; a servo that refuses leaves it off."""
-        if not self.stopped:
-            return CommandReply()
-        resumed = self._stop.resume(command, self.body, t_s)
-        if isinstance(resumed, CommandReply):
-            return resumed
-        self._guard.reset(t_s, resumed)
-        self._takes_over = True
-        return CommandReply()
 
 
 def run(

@@ -1,0 +1,128 @@
+"""Carries out commands at the beginning of a tick, and replies to each what became of it."""
+
+from collections.abc import Callable
+
+from gazerig.gaze.oculomotor import Oculomotor
+from gazerig.robot.control.body import Body
+from gazerig.robot.control.chooser import TargetChooser
+from gazerig.robot.control.command_choices import Menus
+from gazerig.robot.control.reachability import jog_reply, look_reply
+from gazerig.robot.control.stop_control import StopControl
+from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Renew, Resume, Stop, Tune
+from gazerig.robot.model.kinematics import Kinematics
+from gazerig.robot.model.lead import Lead
+from gazerig.robot.model.reply import CommandReply
+from gazerig.robot.model.types import JointAngles
+from gazerig.robot.safety.guard import Guard
+
+
+class CommandExecutor:
+    """Carries out commands on the components of one robot.
+
+    commanded_rad: joint angles last sent to the servos, where joints are held from
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        lead: Lead,
+        stop: StopControl,
+        menus: Menus,
+        attention: TargetChooser,
+        oculomotor: Oculomotor,
+        kinematics: Kinematics,
+        guard: Guard,
+        tune: Callable[[Tune, float], tuple[str, ...]],
+        told: list[str],
+    ) -> None:
+        """Take the components.
+
+        Args:
+            body: the joints on their bus.
+            lead: who leads gaze or joints.
+            stop: switches the torque off and on.
+            menus: what can be asked of the models.
+            attention: its behaviours can be asked for.
+            oculomotor: says how far eyes and head can follow.
+            kinematics: gaze to joint angles.
+            guard: begins slowly where joints are taken over.
+            tune: changes parameters and returns what was done, as text.
+            told: takes a line for people of whatever happens.
+        """
+        self._body, self._lead, self._stop, self._menus = body, lead, stop, menus
+        self._attention, self._oculomotor, self._kinematics = attention, oculomotor, kinematics
+        self._guard, self._tune, self._told = guard, tune, told
+        self._taken_over = False
+        self.commanded_rad: JointAngles = ()
+
+    def models_take_over(self) -> bool:
+        """Return once whether the gaze models lead again, from where head and eyes are."""
+        taken_over, self._taken_over = self._taken_over, False
+        return taken_over
+
+    def end_lapsed_lead(self, t_s: float) -> None:
+        """End a lead that nobody has renewed."""
+        if self._lead.lapsed(t_s):
+            self._told.append(f"{self._lead.words}: not renewed, so the gaze leads again")
+            self._let_lead(self._lead.end)
+
+    def execute(self, command: Command, t_s: float) -> CommandReply:
+        """Carry out one command; return its reply."""
+        match command:
+            case Ask():
+                self._menus.choose(command, self._attention.top_down, t_s)
+            case LookAt() | Jog() if self._stop.why:
+                return CommandReply(f"stopped ({self._stop.why}): resume first")
+            case LookAt():
+                return self._look(command, t_s)
+            case Jog():
+                return self._jog(command, t_s)
+            case Renew():
+                if not self._lead.renew(command, t_s):
+                    return CommandReply(f"{command.who or 'you'} lead nothing now")
+            case Stop():
+                self._lead.end()
+                self._stop.halt(command, self._body, t_s)
+            case Resume():
+                return self._resume(command, t_s)
+            case Tune():
+                self._told += self._tune(command, t_s)
+        return CommandReply()
+
+    def _look(self, command: LookAt, t_s: float) -> CommandReply:
+        """Look at a point that a user chose, or freely again."""
+        self._let_lead(lambda: self._lead.look(command, t_s))
+        target = self._lead.puppet(t_s)
+        if target is None:
+            return CommandReply()
+        return look_reply(target, self._oculomotor, self._kinematics, self._guard.limits)
+
+    def _jog(self, command: Jog, t_s: float) -> CommandReply:
+        """Hold all joints but those given; without any, return the joints to the gaze models."""
+        names = self._body.names
+        self._let_lead(lambda: self._lead.jog(command, names, self.commanded_rad, t_s))
+        if command.angles_rad:
+            # A slider can be torn from end to end in no time.
+            self._guard.go_gently()
+        return jog_reply(command, names, self._guard.limits)
+
+    def _let_lead(self, change: Callable[[], None]) -> None:
+        """Change who leads; the models begin gently where they take joints over."""
+        held, words = bool(self._lead.pose_rad), self._lead.words
+        change()
+        if held and not self._lead.pose_rad:
+            self._taken_over = True
+            self._guard.go_gently()
+        if self._lead.words and not words:
+            self._told.append(f"led by {self._lead.words}")
+
+    def _resume(self, command: Resume, t_s: float) -> CommandReply:
+        """Switch the torque on where the joints are; a servo that refuses leaves it off."""
+        if not self._stop.why:
+            return CommandReply()
+        resumed = self._stop.resume(command, self._body, t_s)
+        if isinstance(resumed, CommandReply):
+            return resumed
+        self._guard.reset(t_s, resumed)
+        self._taken_over = True
+        return CommandReply()
