@@ -142,7 +142,7 @@ class Beat:
         self.hold = threading.Event()
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._run)
-        self.robot._tune = lambda tune, t_s: (f"tuned {len(tune.changes)}",)
+        self.robot._executor._tune = lambda tune, t_s: (f"tuned {len(tune.changes)}",)
 
     def __enter__(self) -> "Beat":
         self.robot.start(self.clock)
