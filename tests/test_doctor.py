@@ -4,112 +4,16 @@ from dataclasses import replace
 from functools import cache
 
 import pytest
+from doctor_rig import BAUD, EYE, NECK, PAN, TILT, YAW, Rig, each, one, setups_of
 from present import present
 
-from gazerig.drivers.errors import PortError
-from gazerig.drivers.feetech.memory_table import REGISTERS, TABLE_END
-from gazerig.drivers.serial.list_ports import Access, Host, SerialPort
-from gazerig.drivers.servo_bus.discovery import FoundServo, ping
+from gazerig.drivers.servo_bus.discovery import ping
 from gazerig.drivers.servo_bus.registers import Registers
-from gazerig.drivers.types import ServoConfig
-from gazerig.robot.bringup.bus_search import SearchRound
-from gazerig.robot.bringup.doctor.checks import apply_fix, examine, take
-from gazerig.robot.bringup.doctor.diagnostics import Diagnostic, Fix, worst
+from gazerig.robot.bringup.doctor.checks import examine, take
+from gazerig.robot.bringup.doctor.diagnostics import worst
 from gazerig.robot.bringup.doctor.families import CHECKS
-from gazerig.robot.bringup.doctor.port import UDEV_RULE, PortFacts, examine_latency, examine_port
-from gazerig.robot.bringup.doctor.run import apply_fixes, check, check_all, fix_latency, look
-from gazerig.robot.bringup.doctor.text import grouped, summed_up, together
-from gazerig.robot.bringup.scan_report import remarks
 from gazerig.robot.bringup.servo_families import DYNAMIXEL, FEETECH, KINDS
-from gazerig.sim_mock.dynamixel.chain import build_dynamixel
-from gazerig.sim_mock.feetech.chain import build_feetech
-from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
-
-BAUD = 1_000_000
-RANGES = ((1, 1650, 2446, "left_eye_pan"), (2, 1650, 2446, "left_eye_tilt"),
-          (7, 1252, 2844, "neck_yaw"))  # fmt: skip
-EYE = {"dynamixel": "xl330-m077", "feetech": "sts3215"}
-NECK = {"dynamixel": "xc330-m288", "feetech": "sts3215"}
-SPEED = {"dynamixel": 6000.0, "feetech": 3000.0}
-PAN, TILT, YAW = "left_eye_pan (servo 1)", "left_eye_tilt (servo 2)", "neck_yaw (servo 7)"
-
-each = pytest.mark.parametrize("kind", [DYNAMIXEL, FEETECH], ids=lambda kind: kind.name)
-
-
-def setups_of(kind):
-    return tuple(
-        ServoConfig(i, (NECK if i == 7 else EYE)[kind.name], low, high,
-                   2000.0 if i == 7 else SPEED[kind.name], name)
-        for i, low, high, name in RANGES
-    )  # fmt: skip
-
-
-class Rig:
-    """Three servos in this process, set as the rig wants them; some may be spoilt."""
-
-    def __init__(self, kind, specs=None):
-        self.kind, self.setups, self.now_s = kind, setups_of(kind), 10.0
-        specs = specs or [ServoSpec(s.id, s.model, 2048) for s in self.setups]
-        build = build_feetech if kind is FEETECH else build_dynamixel
-        self.chain = build(specs, lambda: self.now_s, baud=BAUD)
-        self.port = InProcessPort(self.chain)
-        self.port.setBaudRate(BAUD)
-        self.told = []
-        for setup in self.setups:
-            if any(spec.id == setup.id for spec in specs):
-                self.set(setup.id, return_delay_time=0, min_position_limit=setup.min_steps,
-                         max_position_limit=setup.max_steps)  # fmt: skip
-
-    def set(self, servo_id, **values):
-        servo = self.chain[servo_id]
-        if self.kind is DYNAMIXEL:
-            for name, value in values.items():
-                servo.memory.set(name, value)
-        else:
-            servo.write(55, b"\0")
-            for name, value in values.items():
-                servo.write(REGISTERS[name].address, REGISTERS[name].encode(value))
-            servo.write(55, bytes((values.get("lock", 1),)))
-        self.pass_time()
-        self.chain.refresh()
-
-    def hold(self, servo_id):
-        self.chain[servo_id].write(64 if self.kind is DYNAMIXEL else 40, b"\x01")
-
-    def get(self, servo_id, name):
-        return Registers(self.port, self.kind.family).read(servo_id, name)
-
-    def command(self, text):
-        self.port.faults.command(text)
-        self.pass_time()
-
-    def pass_time(self, seconds=0.1):
-        self.now_s += seconds
-        self.chain.positions_steps()
-
-    def kept(self):
-        """Return what the servos hold, without what lives."""
-        end = 120 if self.kind is DYNAMIXEL else 56
-        return [bytes(self.chain[i].memory.bytes[:end]) for i in (1, 2, 7)]
-
-    def check(self):
-        self.told.clear()
-        return check(self.port, self.kind, self.setups, BAUD, self.told.append)
-
-    def fix(self, findings):
-        return list(apply_fixes(lambda fix: apply_fix(self.port, self.kind, fix), findings))
-
-    def check_all(self, host):
-        return check_all(self.port, host, self.check)
-
-
-def one(findings, level, where, words):
-    """Return the finding of this level at this place that says these words."""
-    named = [f for f in findings if f.level == level and f.where == where and words in f.what]
-    assert len(named) == 1, [str(f) for f in findings]
-    return named[0]
-
 
 FIRMWARE = {"dynamixel": 53, "feetech": 353}
 
@@ -153,6 +57,8 @@ BOTH_RULES = [
     ({"min_position_limit": 1700}, "warn", "1700..2446 cut the YAML's range 1650..2446", "--fix"),
     ({"max_position_limit": 4095}, "note", "1650..4095 are wider than the YAML's range", "--fix"),
 ]
+
+
 DYNAMIXEL_RULES = [
     ({"drive_mode": 1}, "warn", "Drive Mode 1 (reversed)", "--fix"),
     (
@@ -183,6 +89,8 @@ DYNAMIXEL_RULES = [
     ({"bus_watchdog": 255}, "warn", "bus watchdog has tripped", "--fix"),
     ({"baud_rate": 1}, "warn", "its Baud Rate is 57600", "gazerig setup"),
 ]
+
+
 FEETECH_RULES = [
     ({"status": 0x20}, "error", "reports: overload", "gazerig reboot 1"),
     ({"status": 0x08}, "error", "reports: overcurrent", "shorts"),
@@ -206,6 +114,7 @@ FEETECH_RULES = [
     ({"overload_torque": 100}, "warn", "overload protection cannot act", "Overload Torque (36)"),
     ({"protection_time": 0}, "warn", "overload protection cannot act", "Protection Time (35)"),
 ]
+
 
 RULES = [
     *((kind, *rule) for kind in (DYNAMIXEL, FEETECH) for rule in BOTH_RULES),
@@ -418,192 +327,3 @@ def test_reading_changes_nothing(kind):
     before = rig.kept()
     rig.check()
     assert rig.kept() == before
-
-
-# --- fixes
-
-
-def test_fix_mends_what_is_safe_and_says_it():
-    rig = Rig(DYNAMIXEL)
-    rig.set(
-        1, return_delay_time=250, drive_mode=1, operating_mode=4, secondary_id=9,
-        startup_configuration=1, min_position_limit=0, max_position_limit=4095,
-    )  # fmt: skip
-    rig.set(2, bus_watchdog=255)
-    before = rig.chain.positions_steps()
-    done = rig.fix(rig.check())
-    assert all(one.done for one in done)
-    assert f"{PAN}: return delay time 250 -> 0: done" in map(str, done)
-    assert f"{TILT}: bus watchdog 255 -> 0: done" in map(str, done)
-    assert worst(rig.check()) == "note" and not any(f.fixes for f in rig.check())
-    assert rig.chain.positions_steps() == before
-    assert rig.fix(rig.check()) == []
-
-
-def test_fix_mends_an_sts_servo_for_good():
-    rig = Rig(FEETECH)
-    rig.set(1, return_delay_time=250, operating_mode=1, phase=28, unloading_condition=0,
-            temperature_limit=90, min_position_limit=0, max_position_limit=0)  # fmt: skip
-    rig.set(2, lock=0, status_return_level=0)
-    before = rig.chain.positions_steps()
-    done = rig.fix(rig.check())
-    assert all(one.done for one in done), [str(one) for one in done]
-    assert f"{PAN}: return delay time 250 -> 0: done" in map(str, done)
-    assert f"{TILT}: lock 0 -> 1: done" in map(str, done)
-    assert not any(f.fixes for f in rig.check())
-    assert rig.chain.positions_steps() == before
-    for i in (1, 2):  # it outlives the power
-        rig.chain[i].restart()
-    rig.pass_time(1.0)
-    assert not any(f.fixes for f in rig.check()) and worst(rig.check()) == "note"
-    assert rig.chain[1].read(TABLE_END - 1, 1) and rig.chain[1].read(55, 1) == b"\1"
-
-
-def test_a_servo_that_answers_pings_alone_is_brought_to_speak():
-    rig = Rig(DYNAMIXEL)
-    servo = rig.chain[2]
-    servo.memory.set("status_return_level", 0)
-    servo.status_level = 0
-    found = one(rig.check(), "error", TILT, "answers pings and nothing else")
-    (done,) = rig.fix([found])
-    assert done.done and worst(rig.check()) == "note"
-
-
-@each
-def test_fix_leaves_a_servo_alone_whose_torque_is_on(kind):
-    rig = Rig(kind)
-    rig.set(1, return_delay_time=250)
-    rig.hold(1)
-    (done,) = rig.fix(rig.check())
-    assert str(done) == f"{PAN}: return delay time 250 -> 0: not done, its torque is on"
-    assert (rig.get(1, "return_delay_time"), rig.get(1, "torque_enable")) == (250, 1)
-
-
-@pytest.mark.parametrize(
-    ("kind", "fault", "says"),
-    [
-        (DYNAMIXEL, "refuse 7 7", "does not take it"),
-        (DYNAMIXEL, "lose 7", "does not answer"),
-        (FEETECH, "lose 7", "does not answer"),
-    ],
-)
-def test_a_servo_that_does_not_take_it_is_said(kind, fault, says):
-    rig = Rig(kind)
-    fix = Diagnostic("warn", "w", YAW, "", (Fix(7, "return_delay_time", 3, 0),))
-    rig.command(fault)
-    (done,) = rig.fix([fix])
-    assert not done.done and says in done.what
-
-
-# --- ports
-
-USB = SerialPort("/dev/ttyUSB0", "U2D2", "0403:6014", "/dev/serial/by-id/usb-FTDI-if00")
-
-
-def facts(access, holders=()):
-    return PortFacts("/dev/ttyUSB0", access, holders, (USB,))
-
-
-def test_a_good_port_and_its_lasting_name():
-    first, second = examine_port(facts(Access(True, True, True, "dialout", True)))
-    assert (first.level, second.level) == ("ok", "note")
-    assert "/dev/serial/by-id/usb-FTDI-if00" in second.remedy
-
-
-@pytest.mark.parametrize(
-    ("access", "holders", "words", "cure"),
-    [
-        (Access(False, False, False, "", False), (), "no such port", "by-id/usb-FTDI-if00 (U2D2)"),
-        (Access(True, False, True, "root", True), (), "no serial port", "gazerig scan"),
-        (Access(True, True, False, "dialout", False), (), "the group dialout only",
-         "sudo usermod -aG dialout $USER"),
-        (Access(True, True, False, "dialout", True), (), "the group dialout only",
-         "log out and in again"),
-        (Access(True, True, True, "dialout", True), ("minicom (process 12)",),
-         "held open by minicom (process 12)", "end it"),
-    ],
-)  # fmt: skip
-def test_a_port_that_cannot_be_used(access, holders, words, cure):
-    (only,) = examine_port(facts(access, holders))
-    assert only.level == "error" and words in only.what and cure in only.remedy
-
-
-def test_latency_timer(tmp_path):
-    host = Host(latency=tmp_path)
-    assert examine_latency("/dev/ttyUSB0", host) == []
-    file = tmp_path / "ttyUSB0" / "latency_timer"
-    file.parent.mkdir()
-    file.write_text("16\n")
-    (slow,) = examine_latency("/dev/ttyUSB0", host)
-    assert slow.level == "warn" and "16 ms" in slow.what
-    assert UDEV_RULE in slow.remedy and str(file) in slow.remedy
-    assert UDEV_RULE == (
-        'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", ATTR{latency_timer}="1"'
-    )
-    (done,) = fix_latency("/dev/ttyUSB0", host)
-    assert str(done) == "/dev/ttyUSB0: latency timer 16 -> 1 ms: done"
-    (good,) = examine_latency("/dev/ttyUSB0", host)
-    assert good.level == "ok" and fix_latency("/dev/ttyUSB0", host) == []
-    file.write_text("what?")
-    (unread,) = examine_latency("/dev/ttyUSB0", host)
-    assert unread.level == "note"
-
-
-def test_a_port_that_is_not_there_ends_the_examination(tmp_path):
-    rig = Rig(DYNAMIXEL)
-    rig.port.port_name = str(tmp_path / "ttyUSB9")
-    (only,) = rig.check_all(Host())
-    assert only.level == "error" and only.where.endswith("ttyUSB9")
-
-
-def test_what_goes_wrong_on_the_way_is_a_finding(tmp_path):
-    rig, host = Rig(DYNAMIXEL), Host(processes=tmp_path)
-    rig.port.port_name = "/dev/null"  # a character device that may be opened
-    rig.port.faults.command("deny on")
-    findings = rig.check_all(host)
-    assert worst(findings) == "error" and findings[-1].where == "/dev/null"
-    rig.port.faults.command("clear")
-    assert len(rig.check_all(host)) > 3
-    assert not rig.port.is_open
-    rig.port.setBaudRate = lambda baud: False  # type: ignore[assignment, method-assign]
-    with pytest.raises(PortError, match="cannot run at 1000000"):
-        look(rig.port, DYNAMIXEL, rig.setups, BAUD, lambda _: None)
-
-
-# --- words
-
-
-def test_findings_in_words():
-    finding = Diagnostic("warn", "hot", "neck_yaw (servo 7)", "let it cool")
-    assert str(finding) == "warn: neck_yaw (servo 7): hot: let it cool"
-    assert worst([]) == "ok"
-    same = [Diagnostic("note", "n", f"j{i} (servo {i})") for i in (1, 2, 4)]
-    worst_first = grouped([*same, finding])
-    assert [row[0] for row in worst_first] == ["warn", "note"]
-    assert worst_first[1] == ("note", "j1, j2, j4 (servos 1-2, 4)", "n", "")
-    assert together(["/dev/ttyUSB0", "j1 (servo 1)"]) == "/dev/ttyUSB0, j1 (servo 1)"
-    fixable = Diagnostic("warn", "w", "x", fixes=(Fix(1, "return_delay_time", 0, 250),))
-    assert summed_up([finding, fixable], "desk", False) == (
-        "desk: 2 warn; gazerig doctor --fix mends 1 of them"
-    )
-    assert "--fix" not in summed_up([fixable], "desk", True)
-
-
-def test_remarks_of_a_scan():
-    two = (FoundServo(1, 1190, 53, BAUD, "xl330-m077"), FoundServo(1, 1190, 53, BAUD, "xl330-m077"))
-    said = " ".join(remarks([SearchRound("dynamixel", BAUD, True, two)], "/dev/x"))
-    assert "2 servos on /dev/x" in said and "two or more servos have id 1 at 1000000" in said
-    merged = [SearchRound("dynamixel", BAUD, True, two[:1], shared=(1,))]
-    assert "two or more servos have id 1" in " ".join(remarks(merged, "/dev/x"))
-    rounds = [
-        SearchRound("dynamixel", 9600, junk=40),
-        SearchRound("dynamixel", 57_600, protocol_1=(5,)),
-        SearchRound("dynamixel", 1, possible=False),
-    ]
-    lines = list(remarks(rounds, "/dev/x"))
-    assert any("only pieces came" in line for line in lines)
-    assert any("Protocol 1 as id 5" in line for line in lines)
-    assert "asked dynamixel at 9600, 57600 bit/s" in lines[0] and "supply" in lines[-1]
-    # Feetech servos answer the old protocol's ping: that is no riddle where they were found.
-    sts = SearchRound("feetech", 57_600, True, two[:1])
-    assert not any("Protocol 1" in line for line in remarks([*rounds, sts], "/dev/x"))

@@ -1,8 +1,8 @@
 """Emulators that nobody asks for an hour: the next packet is answered at once, and truly."""
 
 import pytest
+from maestro_world import World, acceleration, speed, target
 from servo_bench import FeetechBench
-from test_maestro_board import World, acceleration, speed, target
 
 from gazerig.drivers.dynamixel.control_table import MODELS
 from gazerig.sim_mock.dynamixel.servo import DynamixelServo

@@ -1,0 +1,62 @@
+"""Bodies about a head that attends to them."""
+
+from math import radians
+from typing import Any
+
+import numpy as np
+
+from gazerig.gaze.angles import rotation
+from gazerig.gaze.attention import Attention, AttentionParams
+from gazerig.gaze.bottom_up import BottomUp, BottomUpParams
+from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
+from gazerig.gaze.idle import Idle, IdleParams
+from gazerig.gaze.top_down import TopDown, TopDownParams
+from gazerig.gaze.types import Bodies, GazeState, Percept
+
+IDENTITY = rotation((0.0, 0.0, 0.0))
+
+
+def looking(eye_yaw_deg: float = 0.0) -> GazeState:
+    eye = (radians(eye_yaw_deg), 0.0)
+    return GazeState(
+        (0, 0, 0), (0, 0, 0), eye, eye, IDENTITY, (0, 0, 0), (0, 0.03, 0), (0, -0.03, 0), 1.0, 1.0
+    )
+
+
+def body(
+    id: int, kind: str, p: tuple[float, float, float], v: tuple[float, float, float] = (0, 0, 0)
+) -> tuple[int, str, tuple[float, ...], tuple[float, ...]]:
+    return id, kind, p, v
+
+
+def percept(t: float, *rows: tuple[int, str, tuple[float, ...], tuple[float, ...]]) -> Percept:
+    ids, kinds, places, speeds = zip(*rows, strict=True) if rows else ((), (), (), ())
+    n = len(ids)
+    return Percept(
+        t,
+        Bodies(
+            ids,
+            kinds,
+            np.array(places, float).reshape(n, 3),
+            np.array(speeds, float).reshape(n, 3),
+            np.zeros((n, 3)),
+            np.full(n, 0.1),
+        ),
+    )
+
+
+def attention(**params: Any) -> Attention:
+    return Attention(
+        AttentionParams(**params),
+        FieldOfView(FieldOfViewParams()),
+        BottomUp(BottomUpParams(smoothing_s=0.0)),
+        TopDown(TopDownParams()),
+        Idle(IdleParams()),
+    )
+
+
+FACE = body(1, "face", (1.0, 0.0, 0.0))
+
+
+def waving(t: float, speed: float) -> Percept:
+    return percept(t, FACE, body(2, "hand", (0.8, 0.3, -0.1), (0.0, speed, 0.0)))

@@ -1,0 +1,229 @@
+"""What is attended to: rules, decisions as they are recorded, and a boxing match."""
+
+from collections.abc import Callable
+from math import hypot, pi, sin
+
+import numpy as np
+import pytest
+from attention_scene import FACE, attention, body, looking, percept, waving
+
+from gazerig.gaze.attention import Attention, AttentionParams
+from gazerig.gaze.bottom_up import BottomUp, BottomUpParams
+from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
+from gazerig.gaze.idle import Idle, IdleParams
+from gazerig.gaze.top_down import Rule, TopDown, TopDownParams
+from gazerig.gaze.types import Salience, Target
+
+
+def by(look_at: str, salience: float = 0.9, **point: tuple[float, float, float]) -> Attention:
+    rule = Rule(look_at, salience, **point)
+    model = attention()
+    model.top_down = TopDown(TopDownParams(behaviour="wait", rules={"wait": rule}))
+    return model
+
+
+def test_a_rule_may_name_one_body() -> None:
+    crowd = percept(0.0, FACE, body(7, "face", (2.0, 0.5, 0.0)))
+    target = by("id:7").choose(crowd, looking(), 0.0)
+    assert (target.id, target.salience, target.top_down) == (7, 0.9, True)
+    assert by("id:8").choose(crowd, looking(), 0.0).top_down is False
+
+
+def test_a_rule_may_name_a_place_with_or_without_bodies_about() -> None:
+    for seen in (percept(0.0), percept(0.0, FACE)):
+        target = by("point", point_world_m=(1.0, 0.5, 0.6)).choose(seen, looking(), 0.0)
+        assert (target.kind, target.id, target.p_world_m) == ("point", -1, (1.0, 0.5, 0.6))
+        assert (target.top_down, target.salience, target.why) == (
+            True,
+            0.9,
+            "point: rule wait 0.90",
+        )
+    model = by("point", point_world_m=(1.0, 0.5, 0.6))
+    model.choose(waving(0.0, 0.0), looking(), 0.0)
+    assert model.choose(waving(0.5, 2.0), looking(), 0.5).kind == "hand"
+
+
+@pytest.mark.parametrize(
+    ("look_at", "point", "rule"),
+    [("id:x", None, "names no id"), ("id:", None, "names no id"), ("point", None, "go together"),
+     ("face", (1.0, 0.0, 0.0), "go together")],
+)  # fmt: skip
+def test_a_rule_says_one_thing(
+    look_at: str, point: tuple[float, float, float] | None, rule: str
+) -> None:
+    with pytest.raises(ValueError, match=rule):
+        Rule(look_at, 0.5, point)
+
+
+def test_behaviours_are_listed_and_forgotten_at_a_reset() -> None:
+    model = TopDown(TopDownParams())
+    assert model.behaviours == ("wait", "guard", "attack")
+    model.behave("guard")
+    model.reset(0.0)
+    assert model.behaviour == "wait"
+
+
+def test_a_change_of_mind_does_not_wait_for_the_end_of_a_fixation() -> None:
+    model = attention(min_dwell_ms=5000.0)
+    rows = FACE, body(9, "attack_target", (0.8, -0.2, 0.0))
+    assert model.choose(percept(0.0, *rows), looking(), 0.0).kind == "face"
+    model.top_down.behave("attack")
+    assert model.choose(percept(0.05, *rows), looking(), 0.05).kind == "attack_target"
+
+
+def test_every_decision_carries_the_pulls_of_the_winner_and_the_next_three() -> None:
+    model = attention()
+    rows = [body(k, "hand", (1.0, 0.1 * k, 0.0), (0.0, 0.02 * k, 0.0)) for k in range(2, 9)]
+    target = model.choose(percept(0.0, FACE, *rows), looking(), 0.0)
+    assert [salience.id for salience in target.saliences] == [1, 8, 7, 6]
+    face, hand = target.saliences[:2]
+    assert face == Salience(1, "face", 0.0, 0.0, 0.0, 0.0, 0.5, 1.0, 0.5)
+    d = hypot(1.0, 0.8)
+    assert hand.translation == pytest.approx(0.16 / d / d / 0.5)
+    assert hand.looming == pytest.approx(0.16 * 0.8 / d / d / 0.5)
+    for salience in target.saliences:
+        moving = salience.translation + salience.looming + salience.rotation + salience.onset
+        assert salience.total == pytest.approx(max(moving, salience.rule) * salience.habituation)
+    assert len(model.choose(percept(0.1, FACE), looking(), 0.1).saliences) == 1
+
+
+def test_the_winner_comes_first_even_while_it_is_only_favoured() -> None:
+    model = attention()
+    model.choose(waving(0.0, 0.0), looking(), 0.0)
+    kept = model.choose(waving(0.1, 2.0), looking(), 0.1)
+    assert (kept.kind, kept.saliences[0].kind) == ("face", "face")
+    assert kept.saliences[1].total > kept.saliences[0].total
+
+
+def test_the_strongest_of_a_crowd_are_listed_in_order() -> None:
+    rng = np.random.default_rng(8)
+    rows = [body(k, "x", (2.0, 0.0, 0.0), (0.0, v, 0.0)) for k, v in enumerate(rng.random(500))]
+    target = attention().choose(percept(0.0, *rows), looking(), 0.0)
+    speeds = sorted((row[3][1] for row in rows), reverse=True)
+    assert [salience.translation for salience in target.saliences] == pytest.approx(speeds[:4])
+
+
+def test_boredom_changes_the_comparison_and_moves_no_head() -> None:
+    model = attention()
+    looks = [model.choose(waving(k / 30, 1.0), looking(), k / 30) for k in range(60)]
+    assert {look.kind for look in looks} == {"hand"}
+    assert looks[-1].salience == pytest.approx(looks[0].salience)
+    assert looks[-1].saliences[0].habituation == pytest.approx(1.0 - 0.2 * 59 / 30)
+
+
+def test_a_target_that_leaves_the_field_is_left() -> None:
+    model = attention()
+    moved = percept(0.0, FACE, body(2, "hand", (0.8, 0.3, -0.1), (0.0, 2.0, 0.0)))
+    assert model.choose(moved, looking(), 0.0).kind == "hand"
+    gone = percept(0.1, FACE, body(2, "hand", (-0.5, 0.3, -0.1), (0.0, 2.0, 0.0)))
+    assert model.choose(gone, looking(), 0.1).kind == "face"
+
+
+# The tests of Mitake et al. 4, on bodies alone: a face with two fists at the chin, looked at
+# 30 times a second. The same scenes with camera, tracker and head: test_behaviours.
+
+Row = tuple[int, str, tuple[float, ...], tuple[float, ...]]
+
+
+def boxer(t: float, face: tuple[float, float, float] = (1.0, 0.0, 0.0)) -> list[Row]:
+    x, y, z = face
+    return [
+        body(1, "face", face),
+        body(2, "hand", (x - 0.12, y + 0.12, z - 0.15)),
+        body(3, "hand", (x - 0.12, y - 0.12, z - 0.15)),
+    ]
+
+
+def lived(scene: Callable[[float], list[Row]], seconds: float) -> list[tuple[float, Target]]:
+    """Look at a scene of places; velocities are their differences."""
+    model = Attention(
+        AttentionParams(),
+        FieldOfView(FieldOfViewParams()),
+        BottomUp(BottomUpParams()),
+        TopDown(TopDownParams()),
+        Idle(IdleParams()),
+    )
+    looks = []
+    for k in range(round(30 * seconds)):
+        t = k / 30
+        before = {row[0]: row[2] for row in scene(t - 1 / 30)}
+        rows = []
+        for i, kind, p, _ in scene(t):
+            q = before.get(i, p)
+            rows.append((i, kind, p, tuple(30 * (a - b) for a, b in zip(p, q, strict=True))))
+        if 5.0 <= t < 5.6:  # the planner attacks then
+            rows.append(body(9, "attack_target", (0.9, 0.0, -0.3)))
+            model.top_down.behave("attack")
+        else:
+            model.top_down.behave("wait")
+        looks.append((t, model.choose(percept(t, *rows), looking(), t)))
+    return looks
+
+
+def moved(rows: list[Row], i: int, by: tuple[float, float, float]) -> list[Row]:
+    return [
+        (row[0], row[1], tuple(a + b for a, b in zip(row[2], by, strict=True)), row[3])
+        if row[0] == i
+        else row
+        for row in rows
+    ]
+
+
+def punching(t: float) -> list[Row]:
+    out = sin(pi * (t - 2.0) / 0.5) if 2.0 <= t < 2.5 else 0.0
+    return moved(boxer(t), 3, (-0.5 * out, 0.1 * out, 0.1 * out))
+
+
+def first(looks: list[tuple[float, Target]], kind: str, after_s: float) -> float:
+    return next(t for t, look in looks if t >= after_s and look.kind == kind) - after_s
+
+
+def test_e46_a_punch_is_seen_within_400_ms_and_the_face_again_after_it() -> None:
+    looks = lived(punching, 5.0)
+    assert first(looks, "hand", 2.0) <= 0.4
+    assert next(look.id for t, look in looks if look.kind == "hand" and t >= 2.0) == 3
+    assert first(looks, "face", 2.5) <= 0.5
+    assert sum(look.kind == "face" for _, look in looks) / len(looks) >= 0.6
+
+
+def test_e46_b_the_place_to_be_hit_is_looked_at_at_once() -> None:
+    looks = lived(boxer, 8.0)
+    assert first(looks, "attack_target", 5.0) <= 0.1
+    assert first(looks, "face", 5.6) <= 0.1
+
+
+def test_e46_c_the_face_is_kept_while_the_opponent_steps_left_and_right() -> None:
+    looks = lived(lambda t: boxer(t, (1.0, 0.2 * sin(2 * pi * t / 6.0), 0.0)), 5.0)
+    assert sum(look.kind == "face" for _, look in looks) / len(looks) >= 0.6
+
+
+def test_e46_d_a_waved_hand_is_seen_within_400_ms() -> None:
+    def waved(t: float) -> list[Row]:
+        swing = 0.15 * sin(2 * pi * 1.5 * (t - 2.0)) if 2.0 <= t < 4.0 else 0.0
+        return moved(boxer(t), 2, (0.0, swing, 0.0))
+
+    looks = lived(waved, 5.0)
+    assert first(looks, "hand", 2.0) <= 0.4
+    assert first(looks, "face", 4.0) <= 0.6
+
+
+def test_a_hand_that_reaches_in_is_noticed_though_it_holds_still() -> None:
+    def reaching(t: float) -> list[Row]:
+        return [*boxer(t), *([body(4, "hand", (0.6, 0.5, 0.0))] if t >= 2.0 else [])]
+
+    looks = lived(reaching, 4.0)
+    assert first(looks, "hand", 2.0) <= 0.05
+    noticed = next(look for t, look in looks if look.id == 4)
+    assert noticed.why == "hand 4: onset 1.00"
+    assert first(looks, "face", 2.0) <= 1.0
+
+
+def test_e48_the_face_again_within_a_second_of_a_distraction() -> None:
+    def distracted(t: float) -> list[Row]:
+        out = sin(pi * (t - 2.0) / 0.3) if 2.0 <= t < 2.3 else 0.0
+        return moved(boxer(t), 2, (0.0, 0.3 * out, 0.0))
+
+    looks = lived(distracted, 5.0)
+    away = [t for t, look in looks if look.kind != "face"]
+    assert away and away[0] >= 2.0
+    assert away[-1] - away[0] + 1 / 30 <= 1.0

@@ -1,0 +1,284 @@
+"""What befalls an emulated Maestro, on its line and inside."""
+
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from maestro_world import PROTOCOL, World, acceleration, speed, target
+
+from gazerig.drivers.errors import BusLost
+from gazerig.sim_mock.hobby_servo import HobbySpec
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.maestro.board import SIZES, build_board
+from gazerig.sim_mock.maestro.commands import ERRORS
+from gazerig.sim_mock.maestro.faults import COMMANDS
+
+
+@pytest.fixture
+def world():
+    return World()
+
+
+# --- who hears
+
+
+def test_a_mute_port_says_nothing(world):
+    world.do("set mode mute")
+    assert world.ask("AA A1") == b""
+    assert not world.board.hears(9600)
+    world.do("set mode usb-chained")
+    assert world.ask("A1") == bytes(2)
+
+
+def test_serial_pins_that_detect_the_rate_wait_for_its_sign():
+    world = World()
+    world.do("set mode uart-detect")
+    assert world.board.heed_baud
+    assert world.ask("A1", 115_200) == b""
+    (reply,) = world.board.exchange(bytes.fromhex("84 00 AA A1"), 115_200)
+    assert (reply.end, reply.pieces[0].data) == (4, bytes(2))
+    assert world.ask("A1", 9600) == b""
+    assert world.ask("A1", 115_200) == bytes((1, 0))
+    world.do("brown-out")
+    assert world.after(0.2).ask("A1", 9600) == b""
+    assert world.ask("AA A1", 9600) == bytes(2)
+
+
+def test_serial_pins_with_a_rate_of_their_own():
+    world = World(baud=57_600)
+    assert world.board.hears(57_600) and not world.board.hears(9600)
+    world.ask(target(0, 6000), 57_600)
+    assert world.ask("90 00", 57_600) == b"\x70\x17"
+    assert world.ask("A1", 9600) == b""
+    assert world.ask("90 00", 57_600) == bytes(2)
+    assert world.ask("A1", 57_600) == bytes((1, 0))
+
+
+# --- faults
+
+
+def test_a_brown_out_is_deafness_then_a_board_as_switched_on(world):
+    world.ask(target(0, 7000) + speed(0, 5) + acceleration(0, 3) + b"\x00")
+    world.ask(target(0, 7000))
+    world.after(1.0)
+    world.do("brown-out")
+    assert world.ask("A1") == b""
+    assert world.after(0.1).errors() == 0
+    assert world.positions() == [0] * 12
+    world.ask(target(0, 7000) + target(0, 4000))
+    assert world.position() == 4000
+    report = json.loads(world.do("status"))["servos"][0]
+    assert (report["speed"], report["acceleration"]) == (0, 0)
+
+
+def test_after_a_brown_out_channels_may_be_set_to_go_home(world):
+    world.do("set startup home")
+    world.do("brown-out")
+    assert world.after(0.05).board.body.channels[0].position == 0
+    assert world.after(0.05).positions() == [6000] * 12
+
+
+@pytest.mark.parametrize("name", ERRORS)
+def test_errors_at_will(world, name):
+    world.ask(target(0, 6000))
+    world.do(f"error {name}")
+    assert world.errors() == 1 << ERRORS.index(name)
+    assert world.position() == 0
+
+
+def test_a_script_runs_and_swings_a_channel_against_the_host(world):
+    assert world.ask("AE") == b"\x01"
+    world.do("script 2")
+    assert world.ask("AE") == b"\x00"
+    seen = {world.after(0.5).position(2) for _ in range(8)}
+    assert seen >= {3968, 8000}
+    world.ask("A4")
+    assert world.ask("AE") == b"\x01"
+    world.ask(target(2, 6000))
+    assert world.after(5.0).position(2) == 6000
+    world.do("script on")
+    assert (world.ask("AE"), world.after(3.0).position(2)) == (b"\x00", 6000)
+    world.ask("A7 00")
+    assert world.errors() == 1 << ERRORS.index("script-counter")
+    assert world.ask("AE") == b"\x01"
+
+
+def test_servos_without_their_supply_are_limp_and_the_board_notices_nothing(world):
+    world.ask(target(0, 7000))
+    world.after(1.0)
+    world.do("power off")
+    world.after(0.1).do("turn 0 -500")
+    fallen = world.after(1.0).board.positions_steps()[0]
+    assert fallen == pytest.approx(6490, abs=20)
+    assert (world.position(), world.errors()) == (7000, 0)
+    world.do("power on")
+    assert world.after(1.0).board.positions_steps()[0] == pytest.approx(7000, abs=20)
+
+
+def test_a_stuck_servo_shows_in_nothing_that_the_board_tells(world):
+    world.do("stick 4")
+    world.ask(target(4, 7600))
+    world.after(1.0)
+    assert world.position(4) == 7600
+    report = json.loads(world.do("status"))["servos"][4]
+    assert (report["place"], report["straining"]) == (6000.0, True)
+    world.do("free all")
+    assert world.after(1.0).board.positions_steps()[4] == pytest.approx(7600, abs=20)
+
+
+def test_commands_and_bytes_are_lost_on_their_way(world):
+    world.do("lose-writes 1")
+    assert world.ask("A1") == bytes(2)
+    world.ask(target(0, 6000))
+    assert world.position() == 0
+    world.ask(target(0, 6000))
+    assert world.position() == 6000
+    world.do("lose-bytes 1")
+    world.ask(target(0, 6000))
+    assert world.errors() == PROTOCOL
+    assert not world.board.faults.wire.any
+
+
+def test_answers_are_lost_spoilt_and_late_as_on_any_line(world):
+    world.ask(target(3, 6000))
+    world.do("lose 3 count 1")
+    assert (world.ask("90 03"), world.ask("90 03")) == (b"", b"\x70\x17")
+    world.do("drop all 0 count 1")
+    assert world.ask("90 03") == b"\x17"
+    world.do("corrupt 3 8 count 1")
+    assert world.ask("90 02 90 03") == bytes((0, 0, 0x70, 0x16))
+    world.do("noise before AA55 count 1")
+    assert world.ask("A1") == b"\xaa\x55\x00\x00"
+    world.do("delay 3 30 count 1")
+    assert world.board.exchange(b"\x90\x03")[0].pieces[0].late_s == 0.03
+    world.do("echo on")
+    assert world.ask("A1") == b"\xa1\x00\x00"
+
+
+def test_status_tells_channels_errors_and_faults(world):
+    world.ask(target(0, 6000))
+    world.do("set on-error ignore")
+    world.do("error crc")
+    world.do("lose all")
+    told = json.loads(world.do("status"))
+    assert (told["errors"], told["script"], told["faults"]) == (["crc"], False, ["lose all"])
+    assert [servo["position"] for servo in told["servos"]] == [6000] + [0] * 11
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("lose 12", "no channel 12; there is 0 to 11"),
+        ("lose x", "'x' is not a channel from 0 to 23"),
+        ("error heat", "'heat' is none of signal, overrun"),
+        ("overload 1", "'overload' is no command; there is lose"),
+        ("script 99", "'99' is not a channel"),
+        ("turn 1 far", "'far' is not quarter us"),
+        ("set mode loud", "it can be usb-dual-port, usb-chained"),
+        ("set crc maybe", "it can be on, off"),
+        ("set timeout-ms -1", "not a number of milliseconds from 0"),
+        ("set timeout-ms nan", "not a number of milliseconds from 0"),
+        ("set home-us 20", "not a pulse width from 64 to 3280 us"),
+        ("set min-us 2400", "min-us 2400 would be above max-us 2000"),
+        ("set afterwards skip", "unknown; there is mode, crc, timeout-ms"),
+    ],
+)
+def test_a_wrong_word_is_named_with_what_would_be_right(world, text, says):
+    with pytest.raises(ValueError) as error:
+        world.do(text)
+    assert says in str(error.value)
+
+
+def test_help_explains_every_command_and_case(world):
+    text = world.do("help")
+    assert all(COMMANDS.usage(name) in text for name in COMMANDS.verbs)
+    assert all(f"  {case} " in text for case in COMMANDS.cases)
+
+
+@pytest.mark.parametrize(
+    ("channels", "options", "says"),
+    [
+        (8, {}, "8 channels: a Maestro has 6, 12, 18, 24"),
+        (6, {"device": 128}, "0 to 127"),
+        (6, {"servos": [HobbySpec(6)]}, "there is 0 to 5"),
+        (6, {"servos": [(1,), (1,)]}, "two servos are on one channel"),
+    ],
+)
+def test_boards_that_do_not_exist(channels, options, says):
+    with pytest.raises(ValueError, match=says):
+        build_board(channels, lambda: 0.0, **options)
+
+
+# --- on a line
+
+
+def test_behind_a_port_answers_take_their_time_on_the_wire():
+    world = World(baud=9600)
+
+    def sleep_until(t_s):
+        world.now_s = t_s
+
+    port = InProcessPort(world.board, sleep_until=sleep_until)
+    slow = InProcessPort(world.board, sleep_until=sleep_until, wire_time=True)
+    port.setBaudRate(9600)
+    port.write(target(0, 6000) + b"\x90\x00")
+    assert (port.read_until(2, 0.0), world.now_s) == (b"\x70\x17", 0.0)
+    slow.setBaudRate(9600)
+    slow.write(b"\x90\x00")
+    assert slow.read_until(2, 1.0) == b"\x70\x17"
+    assert world.now_s == pytest.approx(4 * 10 / 9600)
+
+
+def test_an_unplugged_board_goes_on_as_it_was():
+    world = World()
+    port = InProcessPort(world.board)
+    port.setBaudRate(9600)
+    port.write(target(0, 6000))
+    world.do("unplug for 1")
+    with pytest.raises(BusLost):
+        port.write(b"\xa1")
+    world.after(1.0)
+    port.setBaudRate(9600)
+    port.write(b"\x90\x00")
+    assert port.read_until(2, world.now_s) == b"\x70\x17"
+
+
+# --- anything at all
+
+
+@given(
+    st.sampled_from(SIZES),
+    st.booleans(),
+    st.lists(st.tuples(st.binary(max_size=40), st.integers(0, 500)), max_size=12),
+)
+def test_no_bytes_break_it_and_no_pulse_leaves_its_limits(channels, crc, talk):
+    twins = [World(channels, crc=crc) for _ in range(2)]
+    for data, nap_ms in talk:
+        answers = []
+        for world in twins:
+            answers.append(world.ask(data))
+            world.now_s += nap_ms / 1000.0
+            for channel in world.board.body.channels:
+                assert channel.position == 0 or 3968 <= channel.position <= 8000
+        assert answers[0] == answers[1]
+    assert twins[0].board.positions_steps() == twins[1].board.positions_steps()
+
+
+_WORDS = st.sampled_from([*COMMANDS.verbs, "0", "1", "-1", "on", "off", "all", "crc", "mode", "5"])
+
+
+@given(st.lists(st.lists(_WORDS, min_size=1, max_size=4), max_size=6))
+def test_no_mixture_of_commands_breaks_the_board(lines):
+    world = World()
+    for line in lines:
+        try:
+            world.do(" ".join(line))
+        except ValueError as error:
+            assert str(error)
+        world.after(0.05).ask(target(0, 6000) + bytes.fromhex("90 00 A1"))
+    for text in ("clear", "set crc off", "script off", "set timeout-ms 0"):
+        world.do(text)
+    world.after(1.0).ask("A1")
+    world.ask(target(0, 6000))
+    assert world.position() == 6000
