@@ -40,7 +40,7 @@ _AT_START: dict[str, str] = {
     "buses.*": "the servo buses are opened with it",
     "joints.*.gains": "servos are set up while their torque is off; a stop and a resume will do",
     "joints.*.torque_limit": "servos are set up while their torque is off; a stop and a resume will do",
-    "camera.mount": "who looks at the pictures must know from the first whether they turn",
+    "camera.mount": "who looks at the frames must know from the first whether they turn",
     "webcam.*": _AT_OPENING,
     "oak.*": _AT_OPENING,
     "camera_care.*": _AT_OPENING,

@@ -169,7 +169,7 @@ def _exported(file: Path) -> object:
 def _shown(file: Path) -> object:
     with used(file):
         found = RunRecording(file)
-        frames = SnapshotIndex(found.ticks(), found.pictures(), found.info.rate_hz)
+        frames = SnapshotIndex(found.ticks(), found.frames(), found.info.rate_hz)
     try:
         return len(frames)
     finally:

@@ -140,7 +140,7 @@ def flat(view: SeenBoard) -> bool:
         (lambda: [v for v in some_views(count=90) if flat(v)], "tilt the board"),
         (
             lambda: [v for v in some_views(count=60) if v.corners_px[:, 0].min() > 90.0],
-            "left edge of the picture",
+            "left edge of the image",
         ),
     ],
 )
@@ -175,7 +175,7 @@ def test_coverage_says_what_to_do_next() -> None:
     left = middle._replace(left=0.05, tilt_right_deg=20.0)
     fewer = coverage([middle, left], params).missing
     assert set(wishes) - set(fewer) == {
-        "bring the board to the left edge of the picture",
+        "bring the board to the left edge of the image",
         "tilt the board, its right side nearer",
         "hold the board nearer",
         "show 1 more view, each a new one",

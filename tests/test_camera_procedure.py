@@ -32,7 +32,7 @@ BOARD = CharucoBoard()
 KINEMATICS = Kinematics(GeometryParams(70.0, 38.0, 55.0), GAZE_JOINTS, LIDS)
 CAMERA = CameraParams()
 RANGES = ((-1.2, 1.2), (-0.5, 0.5), (-0.35, 0.35))
-FEW = NeckStepParams(pictures=2, patience_s=1.0)
+FEW = NeckStepParams(frames=2, patience_s=1.0)
 
 
 class MovedNeck:
@@ -140,9 +140,9 @@ def test_pictures_from_before_the_head_stood_still_do_not_count(
     now_s = neck.clock.now_s
     old = scene.look(0.0)
     (step,) = neck_steps(neck, lambda: old, now_s, BOARD, KINEMATICS, [(0.1, 0.0, 0.0)], FEW)
-    assert step.view is None and step.why == "no new picture came"
+    assert step.view is None and step.why == "no new frame came"
     (step,) = neck_steps(neck, lambda: None, now_s, BOARD, KINEMATICS, [(0.1, 0.0, 0.0)], FEW)
-    assert step.view is None and step.why == "no new picture came"
+    assert step.view is None and step.why == "no new frame came"
 
 
 def test_a_head_that_trembles_is_not_believed(scene: BoardScene, neck: MovedNeck) -> None:
@@ -160,7 +160,7 @@ def test_a_head_that_trembles_is_not_believed(scene: BoardScene, neck: MovedNeck
 
 def test_a_board_out_of_sight_is_said(scene: BoardScene, neck: MovedNeck) -> None:
     now_s = neck.clock.now_s
-    quick = NeckStepParams(pictures=1, patience_s=0.3)
+    quick = NeckStepParams(frames=1, patience_s=0.3)
     (step,) = neck_steps(
         neck, lambda: scene.look(now_s()), now_s, BOARD, KINEMATICS, [(1.2, 0.0, 0.0)], quick
     )

@@ -93,14 +93,14 @@ def test_a_printer_that_shrinks_is_reckoned_with() -> None:
 
 
 def test_a_board_half_out_of_the_picture_is_known_by_its_corners() -> None:
-    picture = cv2.copyMakeBorder(BOARD.picture(2.0), 20, 20, 20, 20, cv2.BORDER_CONSTANT, value=255)
+    picture = cv2.copyMakeBorder(BOARD.image(2.0), 20, 20, 20, 20, cv2.BORDER_CONSTANT, value=255)
     seen = BOARD.find(np.ascontiguousarray(picture[:, : picture.shape[1] // 2 + 40]))
     assert seen is not None and 6 <= len(seen.ids) < 24
     assert seen.corners_px == pytest.approx(seen.corners_board_m[:, :2] * 2000.0 + 19.5, abs=0.1)
 
 
 def test_one_row_of_corners_is_no_view() -> None:
-    picture = cv2.copyMakeBorder(BOARD.picture(2.0), 20, 20, 20, 20, cv2.BORDER_CONSTANT, value=255)
+    picture = cv2.copyMakeBorder(BOARD.image(2.0), 20, 20, 20, 20, cv2.BORDER_CONSTANT, value=255)
     assert BOARD.find(np.ascontiguousarray(picture[: 20 + 72 + 60])) is None
 
 
@@ -115,6 +115,6 @@ def test_pictures_without_a_board_hold_none(shape: tuple[int, ...]) -> None:
 
 @pytest.mark.parametrize("channels", [1, 3, 4])
 def test_grey_colour_and_alpha_are_all_understood(channels: int) -> None:
-    grey = cv2.copyMakeBorder(BOARD.picture(2.0), 20, 20, 20, 20, cv2.BORDER_CONSTANT, value=255)
+    grey = cv2.copyMakeBorder(BOARD.image(2.0), 20, 20, 20, 20, cv2.BORDER_CONSTANT, value=255)
     seen = BOARD.find(np.repeat(grey[:, :, None], channels, axis=2))
     assert seen is not None and len(seen.ids) == 24

@@ -29,7 +29,7 @@ def test_film_is_recorded_and_can_be_read(film, tmp_path):
     assert done.exit_code == 0, done.output
     recording = Recording(out)
     assert recording.note == ""
-    assert f"{len(recording.times_s)} pictures (" in done.output
+    assert f"{len(recording.times_s)} frames (" in done.output
     assert recording.shot(0).image.shape == (48, 64, 3)
 
 

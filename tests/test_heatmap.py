@@ -107,7 +107,7 @@ def test_what_cannot_be_mapped_is_refused(tmp_path: Path) -> None:
         heatmap([(0.0, 0.0), (0.0, 0.0)], [1.0, -0.5], out)
     with pytest.raises(ValueError, match="finite"):
         heatmap([(0.0, float("nan"))], [1.0], out)
-    with pytest.raises(SetupError, match="is no picture that can be read"):
+    with pytest.raises(SetupError, match="is no image that can be read"):
         heatmap(CENTRES, np.ones(8), out, tmp_path / "absent.png")
     cv2.imwrite(str(blank), np.full((200, 200, 3), 128, np.uint8))
     with pytest.raises(SetupError, match="no face found"):

@@ -262,7 +262,7 @@ def feeding(page: PageProcess, source: Callable[[float], Snapshot]) -> Iterator[
         for tick in itertools.count():
             page.show(source(0.01 * tick))
             if tick % 5 == 0:
-                page.show_picture(jpeg)
+                page.show_frame(jpeg)
             if done.wait(0.01):
                 return
 
@@ -311,7 +311,7 @@ def test_page_shows_a_head_that_turns() -> None:
     with browsing(WINDOW_SMALL_PX) as browser, running_page() as (page, url):
         # All is sent before the browser comes: who is late sees the whole scene.
         page.show(looking(1.0, face_at((0.9, -0.2, 0.25))))
-        page.show_picture(encode(PICTURE))
+        page.show_frame(encode(PICTURE))
         browser.go(url + CLOSE_TO_THE_RIG)
         wait_for(lambda: reads("nothing has come from the rig", "camera"), "the silence")
         before = wait_for(eyes, "the rig's eyes").mean(axis=0)

@@ -334,7 +334,7 @@ def test_a_click_in_the_picture_is_looked_at(heard: Heard) -> None:
     assert heard.hear({"pick": {"x": 0.5, "y": 1}}) is None
     assert heard.orders == [LookAt((1.0, 0.5, 1.0), PAGE)]
     words = heard.hear({"pick": {"x": 0.95, "y": 0.5}})
-    assert words is not None and "no camera picture" in words
+    assert words is not None and "no camera image" in words
 
 
 def test_parameters_are_put_in_force_or_refused(heard: Heard) -> None:

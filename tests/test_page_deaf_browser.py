@@ -87,7 +87,7 @@ class Rig:
         while not self._over.wait(0.02):
             self.rounds += 1
             self.page.show(replace(self.snapshot, t_s=0.02 * self.rounds))
-            self.page.show_picture(jpegs[self.rounds % len(jpegs)])
+            self.page.show_frame(jpegs[self.rounds % len(jpegs)])
 
     def feed_no_more(self) -> None:
         self._over.set()

@@ -168,7 +168,7 @@ def test_gaze_meets_the_face_where_it_points() -> None:
 def test_a_face_that_moves_is_met_where_it_is_by_now() -> None:
     shot = looking(0.0)
     walking = replace(shot.faces[0], v_world_m_s=(0.0, 0.5, 0.0))
-    point = gaze_on_face(replace(shot, faces=(walking,), picture_age_s=0.1))
+    point = gaze_on_face(replace(shot, faces=(walking,), frame_age_s=0.1))
     assert point == pytest.approx((0.05, 0.0))
 
 
@@ -177,7 +177,7 @@ def test_the_map_is_brightest_where_the_gaze_was() -> None:
     for k in range(51):
         heat.update(looking(0.04 * k))
     assert heat.seconds == pytest.approx(2.0)
-    picture = heat.picture().astype(int)
+    picture = heat.image().astype(int)
     assert picture.shape == (HIGH_PX, WIDE_PX, 3)
     yellow = picture[..., 0] + picture[..., 1] - 2 * picture[..., 2]
     row, column = np.unravel_index(yellow.argmax(), yellow.shape)

@@ -59,7 +59,7 @@ def snapshot(t_s: float = 1.0) -> Snapshot:
         p_world_target_m=(1.0, 0.0, 0.14), target_name="thing <4>", why="slide <0.4>",
         phase="pursue", level="ok", reasons=(), faces=(), bodies=(), rate_hz=200.0,
         health="bus ok", behaviour="wait", servos=WELL,
-        timing=LoopFigures(200.0, 0.04, 0.21, 0.9, 0, 3, 5.0), picture_age_s=0.06,
+        timing=LoopFigures(200.0, 0.04, 0.21, 0.9, 0, 3, 5.0), frame_age_s=0.06,
         ghost=CommandedPose(AHEAD, (0.03, 0.0, 0.14), eyes, sight, (0.8, 0.8)),
         camera=SeenCamera(AHEAD, (0.05, 0.0, 0.18), 1.2, 1.6), field_deg=(100.0, 60.0, 60.0, 75.0),
         trail=(Trail(t_s, REST, REST, REST),),
@@ -140,7 +140,7 @@ def test_loop_figures_are_told_and_coloured_when_late() -> None:
     assert AMBER not in said
     late = replace(snapshot(), timing=LoopFigures(200.0, 0.1, 2.0, 4.0, 2, 2, 5.0))
     assert health(late).count(f"background:{AMBER}") == 2
-    assert "no picture yet" in health(replace(snapshot(), picture_age_s=None))
+    assert "no frame yet" in health(replace(snapshot(), frame_age_s=None))
 
 
 def test_the_winner_comes_first_term_by_term_and_runs_no_markup() -> None:

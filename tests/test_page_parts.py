@@ -14,9 +14,9 @@ from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.angles import rotation
 from gazerig.robot.dashboard.camera_overlay import (
     FARTHEST_M,
+    IMAGE_WIDTH_PX,
     NEAREST_M,
-    PICTURE_WIDTH_PX,
-    depth_picture,
+    depth_image,
     draw_detections,
     encode,
     ground,
@@ -108,8 +108,8 @@ def test_what_stands_still_shouts() -> None:
     held = status(replace(snapshot(reasons=("neck_yaw: hot",)), level="hold"))
     assert "font-weight:700'>guard: hold" in held and "neck_yaw: hot" in held
     assert "font-weight:700" not in status(snapshot())
-    assert "the picture is 2.5 s old" in status(replace(snapshot(), picture_age_s=2.5))
-    assert "s old" not in status(replace(snapshot(), picture_age_s=0.08))
+    assert "the frame is 2.5 s old" in status(replace(snapshot(), frame_age_s=2.5))
+    assert "s old" not in status(replace(snapshot(), frame_age_s=0.08))
 
 
 def moving(t_s: float, slope_deg: float = 1.0) -> Snapshot:
@@ -250,7 +250,7 @@ def test_detections_are_drawn_small_and_into_a_copy() -> None:
     picture, detections = camera_picture()
     before = picture.copy()
     drawn = draw_detections(picture, detections, (500.0, 100.0), focal_px=300.0)
-    assert drawn.shape == (240, PICTURE_WIDTH_PX, 3)
+    assert drawn.shape == (240, IMAGE_WIDTH_PX, 3)
     assert np.array_equal(picture, before)
     plain = draw_detections(picture, Detections(1.0, 1, 640, 480), None, focal_px=300.0)
     changed = np.abs(drawn.astype(int) - plain).sum(axis=2) > 60
@@ -281,8 +281,8 @@ def test_encoded_picture_is_a_jpeg_that_fits_a_message() -> None:
 def test_depth_is_shown_in_colours_near_red_far_blue_unknown_dark() -> None:
     depth_m = np.full((480, 640), 1.0, np.float32)
     depth_m[:, :160], depth_m[:, 160:320], depth_m[:, 480:] = NEAREST_M / 2, np.nan, 2 * FARTHEST_M
-    drawn = depth_picture(depth_m)
-    assert drawn.shape == (240, PICTURE_WIDTH_PX, 3)
+    drawn = depth_image(depth_m)
+    assert drawn.shape == (240, IMAGE_WIDTH_PX, 3)
     near, unknown, middle, far = (drawn[100, x].astype(int) for x in (40, 120, 200, 300))
     assert near[2] > near[0] + 60 and far[0] > far[2] - 5
     assert len(set(unknown.tolist())) == 1 and unknown[0] < 60
@@ -293,7 +293,7 @@ def test_depth_is_drawn_on_only_where_it_is_wanted_and_there() -> None:
     picture, found = camera_picture()
     assert ground(found, depth=False) is picture
     told = ground(found, depth=True)
-    assert told is not None and told.shape == (240, PICTURE_WIDTH_PX, 3)
+    assert told is not None and told.shape == (240, IMAGE_WIDTH_PX, 3)
     assert (np.abs(told.astype(int) - 90).max(axis=2) > 60)[215:].any()  # words at the foot
     assert not (np.abs(told.astype(int) - 90).max(axis=2) > 60)[:200].any()
     deep = replace(found, depth_m=np.full((480, 640), 1.0, np.float32))

@@ -78,8 +78,8 @@ def test_sending_side_needs_no_viewer_and_no_opencv() -> None:
 def test_unopened_page_drops() -> None:
     page = PageProcess("127.0.0.1", 8080)
     page.show(SNAPSHOT)
-    page.show_picture(b"jpeg")
-    assert (page.dropped, page.pictures_dropped, page.url(), page.notice()) == (1, 1, None, None)
+    page.show_frame(b"jpeg")
+    assert (page.dropped, page.frames_dropped, page.url(), page.notice()) == (1, 1, None, None)
     page.close()
 
 
@@ -138,11 +138,11 @@ def test_frozen_page_holds_up_nobody_and_wakes_again(shared: tuple[PageProcess, 
     os.kill(process, signal.SIGSTOP)
     assert in_time(show_many)
     assert 2000 < page.dropped < 3000
-    assert in_time(lambda: page.show_picture(bytes(100_000)))
-    assert page.pictures_dropped == 1
+    assert in_time(lambda: page.show_frame(bytes(100_000)))
+    assert page.frames_dropped == 1
     os.kill(process, signal.SIGCONT)
     wait_for(taken, "room for a snapshot")
-    page.show_picture(b"no picture at all")
+    page.show_frame(b"no picture at all")
     assert page.url() is not None
 
 

@@ -142,7 +142,7 @@ def test_a_snapshot_is_what_the_live_page_would_have_shown(
 
 def test_pictures_come_with_their_time(frames: SnapshotIndex) -> None:
     assert frames.frame_at(0.9) is None
-    found = [frames.picture(present(frames.frame_at(s))) for s in (1.0, 2.9, 3.1, 99.0)]
+    found = [frames.frame(present(frames.frame_at(s))) for s in (1.0, 2.9, 3.1, 99.0)]
     assert found == [b"jpeg at 1", b"jpeg at 1", b"jpeg at 3", b"jpeg at 5"]
 
 
@@ -501,7 +501,7 @@ def test_a_replay_knows_how_the_recorded_rig_was_built(
 ) -> None:
     built = cli_replay._built(RunRecording(recorded).info.config_yaml)
     recording = RunRecording(recorded)
-    frames = SnapshotIndex(recording.ticks(), recording.pictures(), RATE_HZ, "shy", built)
+    frames = SnapshotIndex(recording.ticks(), recording.frames(), RATE_HZ, "shy", built)
     shown = unpack(frames.message(frames.at(1.5)))
     assert shown.ghost is not None and shown.character == "shy" and shown.trail
     assert cli_replay._built("name: desk\n") is None

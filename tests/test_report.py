@@ -221,10 +221,10 @@ def test_the_whole_report_is_written(walking: GazeTrace, tmp_path: Path) -> None
     raw = out.read_text(encoding="utf-8")
     page = unescape(raw)
     assert "a &lt;run&gt;" in raw and "cut &amp; short" in raw
-    assert page.count("data:image/png;base64,") == len(DRAWINGS) == len(made.pictures)
+    assert page.count("data:image/png;base64,") == len(DRAWINGS) == len(made.figures)
     assert not re.search(r'(src|href)="(?!data:)', page)  # it needs no other file
     assert "by design: Mitake et al. eq 5" in page
-    for path in made.pictures:
+    for path in made.figures:
         picture = cv2.imread(str(path))
         assert picture is not None and picture.std() > 5.0
     numbers = json.loads(made.data.read_text(encoding="utf-8"))

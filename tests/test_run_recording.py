@@ -35,7 +35,7 @@ from gazerig.robot.model import stop_latch
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop, Tune
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording import tick_record as moments
-from gazerig.robot.recording.picture_encoder import PictureEncoder
+from gazerig.robot.recording.frame_encoder import FrameEncoder
 from gazerig.robot.recording.read import BadRecording, RunRecording
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text, end_of, info_of, versions
@@ -197,7 +197,7 @@ def test_info_and_end(recorded: Recorded) -> None:
     assert recording.duration_s == pytest.approx(1.49, abs=1e-6)
     assert recording.end.stopped_by == "seconds" and recording.end.ran_s == 1.5
     assert len(recording.end.tx_sha256) == 64
-    assert recorded.said.startswith("299 ticks, 6 pictures (0.")
+    assert recorded.said.startswith("299 ticks, 6 frames (0.")
     assert recorded.said.endswith(f"recorded in {recorded.path}")
     assert recording.info.versions["numpy"] == np.__version__
 
@@ -214,7 +214,7 @@ def test_the_configuration_in_it_is_the_one_that_ran(recorded: Recorded, tmp_pat
 
 
 def test_pictures_come_at_their_rate_with_their_exposure(recorded: Recorded) -> None:
-    found = list(RunRecording(recorded.path).pictures())
+    found = list(RunRecording(recorded.path).frames())
     times = [at_s for at_s, _ in found]
     assert times[0] == recorded.ticks[0].t_s - 0.03
     assert np.diff(times) == pytest.approx([0.25] * 5, abs=0.051)
@@ -224,7 +224,7 @@ def test_pictures_come_at_their_rate_with_their_exposure(recorded: Recorded) -> 
 
 def test_no_pictures_where_none_are_asked_for() -> None:
     made = assembly()
-    encoder = PictureEncoder(0.0, at_once=True)
+    encoder = FrameEncoder(0.0, at_once=True)
     made.robot.start(made.clock)
     encoder.look(with_picture(made.robot.tick(0.005, 0.005), 0))
     assert list(encoder.taken()) == []
@@ -240,7 +240,7 @@ def test_a_picture_larger_than_a_message_arrives_whole(tmp_path: Path) -> None:
     found = Detections(0.001, 1, 1200, 900, image=noise)
     recorder.record(made.robot.tick(0.005, 0.005)._replace(detections=found))
     recorder.close("seconds")
-    ((at_s, jpeg),) = RunRecording(path).pictures()
+    ((at_s, jpeg),) = RunRecording(path).frames()
     assert at_s == 0.001 and len(jpeg) > 2 * PIECE_BYTES
     assert jpeg == encode(noise)
 
@@ -249,7 +249,7 @@ def test_pictures_are_encoded_beside_the_loop() -> None:
     made = assembly()
     made.robot.start(made.clock)
     tick = with_picture(made.robot.tick(0.005, 0.005), 0)
-    encoder = PictureEncoder(2.0)
+    encoder = FrameEncoder(2.0)
     encoder.start()
     encoder.look(tick)
     encoder.look(tick)
@@ -288,7 +288,7 @@ def test_other_programs_open_it(recorded: Recorded) -> None:
                 wall_s = datetime.fromisoformat(STARTED).timestamp() + since_s
                 assert message.log_time / 1e9 == pytest.approx(wall_s, abs=1e-6)
     assert set(seen) == set(fmt.SCHEMAS)
-    assert base64.b64decode(seen[fmt.PICTURE]["data"])[:2] == b"\xff\xd8"
+    assert base64.b64decode(seen[fmt.FRAME]["data"])[:2] == b"\xff\xd8"
     states = {one["name"]: one["position"] for one in seen[fmt.JOINT_STATES]["joints"]}
     assert tuple(states) == GAZE_JOINTS
     frames = {one["child_frame_id"] for one in seen[fmt.TRANSFORMS]["transforms"]}

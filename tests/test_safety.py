@@ -188,7 +188,7 @@ def test_ages_of_joints_and_picture_are_swept_densely(joint: int) -> None:
         verdict = ready().check((0.0001,) * 9, measured(t), 1.5 + off, t)
         assert (verdict.level == "hold") == stale
         moved = stale and joint >= 6
-        assert (verdict.applied(GAZE_JOINTS[joint]).reason == "stale picture") == moved
+        assert (verdict.applied(GAZE_JOINTS[joint]).reason == "stale frame") == moved
 
 
 def test_stale_joints_hold_only_themselves() -> None:
@@ -201,8 +201,8 @@ def test_stale_joints_hold_only_themselves() -> None:
 
 def test_a_stale_picture_holds_the_neck_and_not_the_eyes() -> None:
     verdict = ready().check((0.0001,) * 9, measured(DT), 2.0, DT)
-    held = {reason for reason in verdict.reasons if reason.endswith("stale picture")}
-    assert held == {f"{name}: stale picture" for name in GAZE_JOINTS if name.startswith("neck")}
+    held = {reason for reason in verdict.reasons if reason.endswith("stale frame")}
+    assert held == {f"{name}: stale frame" for name in GAZE_JOINTS if name.startswith("neck")}
     assert verdict.command_rad[6:] == (0.0,) * 3
     assert verdict.command_rad[0] == pytest.approx(0.0001)
 

@@ -218,7 +218,7 @@ def stale_picture(m: ModuleType) -> None:
         for age_s, held in ((1.499, False), (1.501, True), (inf, True), (nan, True)):
             bench = Bench(m)
             assert (bench.tick(desired, age_s) == 0.0) == held
-            assert (bench.why == "stale picture") == held
+            assert (bench.why == "stale frame") == held
             assert bench.path[-1][0] > 0.0
 
 
@@ -542,8 +542,8 @@ MUTATIONS: tuple[Mutation, ...] = (
     (GUARD, "        if not fresh:", "        if False:", stale_joints),
     (GUARD, "fresh = fresh and isfinite(position)", "pass", stale_joints),
     (GUARD, "at_s >= stale_s and not unseen and", "at_s >= stale_s and", stale_picture),
-    (GUARD, '_Hold("stale picture") if unseen else None', "None", stale_picture),
-    (GUARD, "blind = not picture_age_s <=", "blind = picture_age_s >", stale_picture),
+    (GUARD, '_Hold("stale frame") if unseen else None', "None", stale_picture),
+    (GUARD, "blind = not frame_age_s <=", "blind = frame_age_s >", stale_picture),
     # heat
     (HEALTH, "self._hot[i] = celsius >= (", "self._hot[i] = celsius >= 99.0 + (", hot),
     (HEALTH, "hot - _COOLER_C if", "hot if", hot),

@@ -258,7 +258,7 @@ def test_a_measured_run_beside_a_estimated_one_is_warned_of(
     page = unescape(made.page.read_text(encoding="utf-8"))
     assert made.warning in page and "maker: Nothing here is measured" in page
     assert "maker: This rig has no neck" in page
-    assert len(made.pictures) == 3  # the desk rig has a neck to draw
+    assert len(made.figures) == 3  # the desk rig has a neck to draw
     rows = json.loads(made.data.read_text())
     assert {tuple(row["basis"]) for row in rows} == {("measured", "estimated")}
     assert not {"vor", "vergence"} & {row["key"] for row in rows}

@@ -129,7 +129,7 @@ def test_what_a_tick_does_not_tell_is_said() -> None:
     assert shot.timing.rate_hz == pytest.approx(RATE_HZ)
     assert shot.rate_hz == shot.timing.rate_hz
     assert shot.target_kind == "face" and shot.target_id == shot.faces[0].id
-    assert shot.picture_age_s is not None and 0.0 < shot.picture_age_s < 0.2
+    assert shot.frame_age_s is not None and 0.0 < shot.frame_age_s < 0.2
 
 
 def test_servos_come_with_their_limits_and_their_silences() -> None:

@@ -169,7 +169,7 @@ def test_the_neck_does_not_move_on_a_stale_picture(
     blind = between(ticks, blind_s + 0.02, BACK_S)
     commands = {tick.guard_result.command_rad[NECK] for tick in blind}
     assert len(commands) == 1
-    assert all("neck_yaw: stale picture" in tick.guard_result.reasons for tick in blind)
+    assert all("neck_yaw: stale frame" in tick.guard_result.reasons for tick in blind)
     wishes = [degrees(tick.desired_rad[NECK][0]) for tick in blind]
     assert max(wishes) - min(wishes) > 3.0  # it would have moved
     eyes = [degrees(tick.joints.position_rad[0]) for tick in blind]

@@ -1,4 +1,4 @@
-"""Where on a face somebody has looked, as a picture (Nakamoto & Tsuruno 4.3, figs 8 and 9).
+"""Where on a face somebody has looked, as an image (Nakamoto & Tsuruno 4.3, figs 8 and 9).
 
 Gaze points lie in the face's own frame, y to the owner's left and z up, in metres from the
 tip of the nose. Each is spread by a bell as wide as what is
@@ -21,7 +21,7 @@ from gazerig.robot.analysis.heatmap_face import HEIGHT_PX, PX_PER_M, WIDTH_PX, d
 from gazerig.robot.analysis.heatmap_legend import with_legend
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PARTS_FACE_M
 
-Picture = NDArray[np.uint8]
+Image = NDArray[np.uint8]
 
 # A gaze point counts for the nearest part within this distance.
 _NEAR_M = 0.03
@@ -53,27 +53,27 @@ def heatmap(
     points_face_m: ArrayLike,
     seconds: ArrayLike,
     out: Path,
-    picture: Path | None = None,
+    image: Path | None = None,
     force: bool = False,
 ) -> dict[str, float]:
-    """Write the heat map as a PNG over a drawn face or a face picture; give the shares.
+    """Write the heat map as a PNG over a drawn face or a face image; give the shares.
 
     points_face_m: (n, 2) y, z; seconds: (n,) time on each
-    picture: a photograph of one face from its front; force: replace a file that is there
+    image: a photograph of one face from its front; force: replace a file that is there
 
     Raises:
-        SetupError: no face in the picture, or a file cannot be read or written.
+        SetupError: no face in the image, or a file cannot be read or written.
         ValueError: as of ``share_per_part``.
     """
     points, times = _checked(points_face_m, seconds)
     shares = share_per_part(points, times)
-    canvas = draw_face() if picture is None else face_from(picture)
+    canvas = draw_face() if image is None else face_from(image)
     per_m2 = density_s_m2(points, times)
     painted = _painted(canvas, per_m2)
     whole = with_legend(painted, float(per_m2.max()) / 1e4, float(times.sum()), shares)
     ok, data = cv2.imencode(".png", whole)
     if not ok:
-        raise SetupError(f"{out}: the picture cannot be written as PNG")
+        raise SetupError(f"{out}: the image cannot be written as PNG")
     write_file(out, data.tobytes(), force)
     return shares
 
@@ -89,27 +89,27 @@ def density_s_m2(points_face_m: Floats, seconds: Floats) -> Floats:
     return np.asarray(spread, dtype=np.float64) * PX_PER_M**2
 
 
-def face_from(picture: Path) -> Picture:
+def face_from(photo: Path) -> Image:
     """Bring the largest face of a photograph to the canvas, by its eyes and mouth.
 
     Raises:
         SetupError: it cannot be read, or no face is found in it.
     """
     try:
-        data = np.frombuffer(read_limited(picture, _LARGEST), np.uint8)
+        data = np.frombuffer(read_limited(photo, _LARGEST), np.uint8)
     except OSError as error:
         raise SetupError(
-            f"{picture}: is no picture that can be read ({error.strerror}); give a JPEG or PNG"
+            f"{photo}: is no image that can be read ({error.strerror}); give a JPEG or PNG"
         ) from None
     try:
         image = cv2.imdecode(data, cv2.IMREAD_COLOR) if len(data) else None
-    except cv2.error:  # larger than a picture may be
+    except cv2.error:  # larger than an image may be
         image = None
     if image is None:
-        raise SetupError(f"{picture}: is no picture that can be read; give a JPEG or PNG")
+        raise SetupError(f"{photo}: is no image that can be read; give a JPEG or PNG")
     faces = face_detector(FaceDetectorParams()).find(np.asarray(image, dtype=np.uint8))
     if not faces:
-        raise SetupError(f"{picture}: no face found; give a picture of one face from its front")
+        raise SetupError(f"{photo}: no face found; give an image of one face from its front")
     flat = [0, 1, 3, 4]  # without the nose, which stands out of the plane
     there = faces[0].landmarks_px[flat]
     here = on_canvas(LANDMARKS_FACE_M[flat, 1:])
@@ -124,7 +124,7 @@ def face_from(picture: Path) -> Picture:
     return np.asarray(cv2.addWeighted(grey, 0.8, grey, 0.0, 40.0), dtype=np.uint8)
 
 
-def _painted(canvas: Picture, density: Floats) -> Picture:
+def _painted(canvas: Image, density: Floats) -> Image:
     """Lay the map over the canvas: from nothing over purple and orange to yellow."""
     top = float(density.max())
     share = density / top if top > 0.0 else density

@@ -1,4 +1,4 @@
-"""The colour scale of a heat map, and how long each part was looked at, beside the picture."""
+"""The colour scale of a heat map, and how long each part was looked at, beside the image."""
 
 from collections.abc import Mapping
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from gazerig.gaze.types import PART_NAMES
 
-Picture = NDArray[np.uint8]
+Image = NDArray[np.uint8]
 
 _PANEL_PX = 300
 _PAPER, _INK, _SOFT, _BAR = (255, 255, 255), (60, 60, 62), (130, 130, 134), (168, 122, 84)
@@ -16,14 +16,14 @@ _SCALE_TOP, _SCALE_HIGH, _ROWS_TOP, _ROW_PX = 96, 260, 448, 38
 
 
 def with_legend(
-    picture: Picture, most_s_cm2: float, total_s: float, shares: Mapping[str, float]
-) -> Picture:
-    """Return the picture with a panel to its right.
+    image: Image, most_s_cm2: float, total_s: float, shares: Mapping[str, float]
+) -> Image:
+    """Return the image with a panel to its right.
 
     most_s_cm2: what the top of the colour scale stands for
     shares: of the time, per part code and "elsewhere"
     """
-    panel: Picture = np.full((picture.shape[0], _PANEL_PX, 3), _PAPER, np.uint8)
+    panel: Image = np.full((image.shape[0], _PANEL_PX, 3), _PAPER, np.uint8)
     _scale(panel, most_s_cm2, total_s)
     _write(panel, "share of the time", (28, _ROWS_TOP - 22), 0.55, _INK)
     ordered = sorted(shares.items(), key=lambda item: (item[0] == "elsewhere", -item[1]))
@@ -32,10 +32,10 @@ def with_legend(
         _row(panel, _ROWS_TOP + row * _ROW_PX, PART_NAMES.get(part, part), share, largest)
     note = (28, _ROWS_TOP + len(ordered) * _ROW_PX + 20)
     _write(panel, "left and right: the face's own", note, 0.42, _SOFT)
-    return np.hstack([picture, panel])
+    return np.hstack([image, panel])
 
 
-def _scale(panel: Picture, most_s_cm2: float, total_s: float) -> None:
+def _scale(panel: Image, most_s_cm2: float, total_s: float) -> None:
     _write(panel, f"{total_s:.0f} s of gaze", (28, 40), 0.6, _INK)
     _write(panel, "seconds per square cm", (28, 70), 0.5, _SOFT)
     ramp = np.linspace(255, 0, _SCALE_HIGH).astype(np.uint8)[:, None].repeat(34, axis=1)
@@ -47,7 +47,7 @@ def _scale(panel: Picture, most_s_cm2: float, total_s: float) -> None:
         _write(panel, f"{share * most_s_cm2:.2g}", (78, row + 5), 0.48, _INK)
 
 
-def _row(panel: Picture, top: int, name: str, share: float, largest: float) -> None:
+def _row(panel: Image, top: int, name: str, share: float, largest: float) -> None:
     _write(panel, name, (28, top + 12), 0.48, _INK)
     figure = f"{100.0 * share:.1f} %"
     (wide, _), _ = cv2.getTextSize(figure, cv2.FONT_HERSHEY_SIMPLEX, 0.48, 1)
@@ -59,6 +59,6 @@ def _row(panel: Picture, top: int, name: str, share: float, largest: float) -> N
 
 
 def _write(
-    panel: Picture, text: str, at: tuple[int, int], size: float, ink: tuple[int, int, int]
+    panel: Image, text: str, at: tuple[int, int], size: float, ink: tuple[int, int, int]
 ) -> None:
     cv2.putText(panel, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, ink, 1, cv2.LINE_AA)

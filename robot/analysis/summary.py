@@ -58,7 +58,7 @@ class Summary:
         return angle_between(before, self._gaze) < _FIXATION_RAD_S * dt_s
 
     def figures(self) -> dict[str, object]:
-        """Return what the ticks themselves tell; the caller adds bus, loop and pictures."""
+        """Return what the ticks themselves tell; the caller adds bus, loop and frames."""
         last = self._last
         return {
             "seconds": round(last.t_s - (self._first_s or 0.0), 6) if last else 0.0,

@@ -120,7 +120,7 @@ def _path(options: RunOptions) -> str:
 
 
 class _MotionOfDrawn:
-    """Finds what moves in drawn pictures, which know how the camera was turned."""
+    """Finds what moves in drawn frames, which know how the camera was turned."""
 
     def __init__(self, params: MotionParams) -> None:
         self._enabled = params.enabled
@@ -135,7 +135,7 @@ class _MotionOfDrawn:
             self._detector.forget()
 
     def __call__(self, shot: Exposure, lens: Intrinsics) -> tuple[MovingBlob, ...]:
-        """Find what has moved since the picture before; nothing while not enabled."""
+        """Find what has moved since the frame before; nothing while not enabled."""
         before, self._before = self._before, shot.R_world_camera
         if not self._enabled:
             return ()

@@ -28,7 +28,7 @@ class RunOptions:
         behaviour, conversation: in force at the start.
         seconds: how long to run.
         page: HOST:PORT of the live page; no_page: without it.
-        heatmap: PNG to write; heatmap_face: picture of a face to lay it over.
+        heatmap: PNG to write; heatmap_face: image of a face to lay it over.
         record: file to record to; record_pictures: camera frames a second in it.
         force: write over older files.
         summary: file of the figures, "-" for standard output.

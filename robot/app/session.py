@@ -286,7 +286,7 @@ def _figures(
     wall_s: float,
     faults: JointFaults,
 ) -> dict[str, object]:
-    """Join the figures of the ticks, the loop, the pictures and the bus."""
+    """Join the figures of the ticks, the loop, the frames and the bus."""
     robot = made.robot
     health = robot.body.bus.health()
     bus: dict[str, object] = {

@@ -233,7 +233,7 @@ class ManualControl:
         t_s = self._clock.now_s()
         joints = self.body.read(t_s)
         wanted = desired(joints, t_s, t_s - last_s)
-        # No camera is used here, so no picture can be too old.
+        # No camera is used here, so no frame can be too old.
         guard_result = self._guard.check(wanted, joints, 0.0, t_s)
         self.body.write(guard_result.command_rad)
         step = Step(t_s, wanted, guard_result, joints)

@@ -1,7 +1,7 @@
 """Which views of the board a lens calibration needs, and what is still missing. Pure.
 
 A lens shows its focal length only on a tilted board, its centre and distortion only near
-the edges of the picture: many views of a board held the same way fit well and tell little.
+the edges of the image: many views of a board held the same way fit well and tell little.
 """
 
 from collections.abc import Sequence
@@ -24,10 +24,10 @@ class ViewParams:
     # fmt: off
     least_views: Annotated[int, Bounds(4, 200), "fewer are refused"] = 12
     most_views: Annotated[int, Bounds(4, 500), "more are not kept"] = 60
-    edge_share: Annotated[float, Bounds(0.01, 0.4), "a corner nearer to an edge, as a share of the picture, has reached it"] = 0.12
+    edge_share: Annotated[float, Bounds(0.01, 0.4), "a corner nearer to an edge, as a share of the image, has reached it"] = 0.12
     least_tilt_deg: Annotated[float, Bounds(2, 60), "counts as tilted"] = 15.0
     near_share: Annotated[float, Bounds(0.05, 1), "the board is near where its corners span this share of width or height"] = 0.4
-    new_share: Annotated[float, Bounds(0, 0.5), "a view is new if the board has moved or grown by this share of the picture"] = 0.07
+    new_share: Annotated[float, Bounds(0, 0.5), "a view is new if the board has moved or grown by this share of the image"] = 0.07
     new_tilt_deg: Annotated[float, Bounds(0, 60), "or tilted by this angle"] = 8.0
     # fmt: on
 
@@ -35,7 +35,7 @@ class ViewParams:
 class Held(NamedTuple):
     """How the board was held in one view.
 
-    left, right, top, bottom: of its corners in the picture, 0..1
+    left, right, top, bottom: of its corners in the image, 0..1
     tilt_right_deg: right edge nearer; tilt_down_deg: bottom edge nearer
     """
 
@@ -88,7 +88,7 @@ def coverage(views: Sequence[Held], params: ViewParams) -> Coverage:
     """Return what is missing."""
     edge, tilt = params.edge_share, params.least_tilt_deg
     wishes = {
-        "bring the board to the left edge of the picture": any(v.left <= edge for v in views),
+        "bring the board to the left edge of the image": any(v.left <= edge for v in views),
         "bring the board to the right edge": any(v.right >= 1.0 - edge for v in views),
         "bring the board to the upper edge": any(v.top <= edge for v in views),
         "bring the board to the lower edge": any(v.bottom >= 1.0 - edge for v in views),

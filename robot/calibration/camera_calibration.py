@@ -23,7 +23,7 @@ from gazerig.robot.model.intrinsics import project, rays
 
 Floats = NDArray[np.float64]
 
-# Limits in pixels are for pictures of this width and grow with it.
+# Limits in pixels are for images of this width and grow with it.
 _WIDTH_PX = 640
 # The third radial coefficient is kept where the views prove it: so many times its spread.
 _PROVEN = 4.0
@@ -34,7 +34,7 @@ _MOST_DROPPED = 0.2
 
 
 class CameraCalibrationRefused(SetupError):
-    """The pictures do not make a calibration; the message says why and what to do."""
+    """The frames do not make a calibration; the message says why and what to do."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class LensCalibrationParams:
 
     # fmt: off
     most_error_px: Annotated[float, Bounds(0.05, 20),
-        "root mean square reprojection error above which the result is refused, in pictures 640 px wide"] = 0.7
+        "root mean square reprojection error above which the result is refused, in images 640 px wide"] = 0.7
     most_focal_error_percent: Annotated[float, Bounds(0.01, 20),
         "standard deviation of the focal length above which the result is refused"] = 0.2
     outlier_ratio: Annotated[float, Bounds(1.2, 100), "a view so many times worse than the usual one is dropped"] = 2.5
@@ -55,7 +55,7 @@ class LensCalibrationParams:
 class LensCalibration:
     """A measured lens.
 
-    width_px, height_px: size of the pictures it was measured on
+    width_px, height_px: size of the frames it was measured on
     rms_px: root mean square reprojection error of all corners; view_rms_px: of each view kept
     kept, dropped: numbers of the views given, from 0
     focal_std_px, centre_std_px: standard deviations of fx, fy and of cx, cy
@@ -209,13 +209,13 @@ def _judge(fit: _Fit, width: int, height: int, params: LensCalibrationParams) ->
         )
     if _folds(fit.lens, width, height):
         raise CameraCalibrationRefused(
-            "the distortion found makes no sense in the picture's corners: bring the board "
+            "the distortion found makes no sense in the image's corners: bring the board "
             "into the corners as well"
         )
 
 
 def _folds(lens: Intrinsics, width: int, height: int) -> bool:
-    """Return whether a pixel near the picture's edge is reached from two directions or none."""
+    """Return whether a pixel near the image's edge is reached from two directions or none."""
     x, y = np.linspace(0.0, width - 1.0, 9), np.linspace(0.0, height - 1.0, 9)
     pixels = np.stack(np.meshgrid(x, y), axis=-1).reshape(-1, 2)
     back = project(rays(pixels, lens), lens)

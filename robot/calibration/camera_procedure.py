@@ -1,7 +1,7 @@
-"""Calibrating a camera, step by step: pictures in, what to do next and the result out.
+"""Calibrating a camera, step by step: frames in, what to do next and the result out.
 
 Nothing is printed and nothing waits on its own: who runs the steps shows them, brings the
-pictures and moves the head.
+frames and moves the head.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -27,7 +27,7 @@ from gazerig.robot.calibration.hand_eye import NeckView
 from gazerig.robot.model.charuco_board import LEAST_CORNERS, CharucoBoard, SeenBoard
 
 Look = Callable[[], Shot | None]
-"""Returns the newest picture at once, None before the first."""
+"""Returns the newest frame at once, None before the first."""
 
 # Shares of the neck's way (yaw, pitch, roll): pairs of axes mixed, both ways alike.
 _PATTERN = (
@@ -46,16 +46,16 @@ class NeckStepParams:
     yaw_deg: Annotated[float, Bounds(2, 60), "farthest to each side"] = 18.0
     pitch_deg: Annotated[float, Bounds(2, 60), "farthest up and down"] = 11.0
     roll_deg: Annotated[float, Bounds(0, 60), "farthest roll to each side"] = 12.0
-    pictures: Annotated[int, Bounds(1, 50), "pictures averaged at each angle"] = 3
-    still_deg: Annotated[float, Bounds(0.01, 5), "a head that moved more while the picture was taken makes it useless"] = 0.2
-    patience_s: Annotated[float, Bounds(0.1, 60), "time for the pictures at each angle"] = 4.0
+    frames: Annotated[int, Bounds(1, 50), "frames averaged at each angle"] = 3
+    still_deg: Annotated[float, Bounds(0.01, 5), "a head that moved more while the frame was taken makes it useless"] = 0.2
+    patience_s: Annotated[float, Bounds(0.1, 60), "time for the frames at each angle"] = 4.0
     # fmt: on
 
 
 class LensStep(NamedTuple):
-    """What one picture added.
+    """What one frame added.
 
-    number: of the picture; corners: how many were seen; kept: it counts as a view
+    number: of the frame; corners: how many were seen; kept: it counts as a view
     why: it was not kept; coverage: what is there and what to do next
     """
 
@@ -81,7 +81,7 @@ class LensSteps:
         """Detect the board in a frame and keep the view if it is new.
 
         Raises:
-            CameraError: the pictures have changed their size.
+            CameraError: the frames have changed their size.
         """
         height, width = shot.image.shape[:2]
         if self._collector is None:
@@ -91,7 +91,7 @@ class LensSteps:
         if self._size != (width, height):
             raise CameraError(
                 f"the camera changed from {self._size[0]} x {self._size[1]} to {width} x {height} "
-                "pixels: a lens is measured on pictures of one size; begin anew"
+                "pixels: a lens is measured on images of one size; begin anew"
             )
         seen = self._board.find(shot.image)
         why = self._collector.offer(seen)
@@ -150,7 +150,7 @@ class NeckStep(NamedTuple):
     """What one neck angle added.
 
     number, of: which of how many angles; asked_rad: yaw, pitch, roll wished
-    corners: how many were seen in every picture; view: what counts, or None and why not
+    corners: how many were seen in every frame; view: what counts, or None and why not
     """
 
     number: int
@@ -168,7 +168,7 @@ def neck_angles(
     height_px: int,
     params: NeckStepParams | None = None,
 ) -> tuple[Angles3, ...]:
-    """Plan angles at which a board straight ahead stays in the picture.
+    """Plan angles at which a board straight ahead stays in the image.
 
     ranges_rad: lowest and highest yaw, pitch and roll that the neck may have
     """
@@ -218,16 +218,16 @@ def _seen_at_rest(
     board: CharucoBoard,
     params: NeckStepParams,
 ) -> tuple[SeenBoard | None, Angles3, str]:
-    """Average the board over some pictures taken while the head was still."""
+    """Average the board over some frames taken while the head was still."""
     sights: list[SeenBoard] = []
     stood: list[Angles3] = []
     last_s = start_s = now_s()
-    why = "no new picture came"
-    while len(sights) < params.pictures and now_s() - start_s < params.patience_s:
+    why = "no new frame came"
+    while len(sights) < params.frames and now_s() - start_s < params.patience_s:
         before = neck.angles()
         neck.rest(0.04)
         shot = look()
-        # A picture from before the head came to rest shows the board from elsewhere.
+        # A frame from before the head came to rest shows the board from elsewhere.
         if shot is None or shot.captured_s <= last_s:
             continue
         last_s = shot.captured_s
@@ -242,7 +242,7 @@ def _seen_at_rest(
             continue
         sights.append(seen)
         stood.append(after)
-    mean = _mean(sights) if len(sights) == params.pictures else None
+    mean = _mean(sights) if len(sights) == params.frames else None
     if mean is None:
         return None, neck.angles(), why
     yaw, pitch, roll = np.mean(stood, axis=0).tolist()
@@ -250,7 +250,7 @@ def _seen_at_rest(
 
 
 def _mean(sights: Sequence[SeenBoard]) -> SeenBoard | None:
-    """Average the corners that are in every picture, None where they are too few."""
+    """Average the corners that are in every frame, None where they are too few."""
     common = set.intersection(*(set(seen.ids.tolist()) for seen in sights))
     kept = [np.isin(seen.ids, sorted(common)) for seen in sights]
     if len(common) < LEAST_CORNERS:

@@ -43,7 +43,7 @@ def page(board: CharucoBoard, paper: str) -> ImageArray:
             f"has room for {room_mm[0]:.0f} x {room_mm[1]:.0f} mm: take smaller or fewer squares"
         )
     sheet = np.full((round(high_mm * _PX_PER_MM), round(wide_mm * _PX_PER_MM)), 255, np.uint8)
-    drawn = board.picture(_PX_PER_MM)
+    drawn = board.image(_PX_PER_MM)
     left = (sheet.shape[1] - drawn.shape[1]) // 2
     top = round((_EDGE_MM + (room_mm[1] - board_mm[1]) / 2) * _PX_PER_MM)
     sheet[top : top + drawn.shape[0], left : left + drawn.shape[1]] = drawn

@@ -1,4 +1,4 @@
-"""Where the board is in the camera frame, from one picture of it. Pure.
+"""Where the board is in the camera frame, from one image of it. Pure.
 
 Frames as in gazerig.robot.model.charuco_board and gazerig.robot.model.intrinsics. A flat
 board seen from far has two poses that explain it nearly as well, mirrored about the line of sight;

@@ -18,7 +18,7 @@ AIMED_DEG = 1.0
 """Eyes nearer than this to the part look at it."""
 
 STALE_S = 0.4
-"""No face is seen in a picture older than this."""
+"""No face is seen in an image older than this."""
 
 WAIT_S = 1.5
 """So long an Enter waits for eyes that are on their way."""

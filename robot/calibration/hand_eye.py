@@ -4,7 +4,7 @@ Hand-eye calibration, AX = XB: the head moves by what the joints say, the board 
 move by what the camera sees, and only one place of the camera on the head makes both
 agree. OpenCV's closed forms (manual, cv2.calibrateHandEye) start the search; they trust
 every single pose of the board, whose tilt is poorly seen, so the answer is the place of
-camera and board that brings all corners of all pictures nearest to where they are seen.
+camera and board that brings all corners of all frames nearest to where they are seen.
 Frames as in gazerig.robot.model.frames; the board's as in gazerig.robot.model.charuco_board.
 """
 
@@ -35,7 +35,7 @@ _METHODS = (
     cv2.CALIB_HAND_EYE_HORAUD,
 )
 _MOST_DROPPED = 0.2
-# Limits in pixels are for pictures of this width and grow with it.
+# Limits in pixels are for images of this width and grow with it.
 _WIDTH_PX = 640
 # A search that ends worse than this is tried from the other starts too.
 _DOUBTFUL_PX = 1.0
@@ -54,19 +54,19 @@ class HandEyeParams:
     least_turn_deg: Annotated[float, Bounds(0.5, 60),
         "root mean square turn of the head from view to view that is needed about a second axis"] = 4.0
     most_error_px: Annotated[float, Bounds(0.1, 50),
-        "root mean square reprojection error above which the result is refused, in pictures 640 px wide"] = 5.0
+        "root mean square reprojection error above which the result is refused, in images 640 px wide"] = 5.0
     most_position_std_mm: Annotated[float, Bounds(0.1, 100), "standard deviation of the place above which the result is refused"] = 5.0
     most_angle_std_deg: Annotated[float, Bounds(0.01, 20), "standard deviation of the direction above which the result is refused"] = 0.6
     joint_error_deg: Annotated[float, Bounds(0.001, 5), "how far a neck joint usually is from where it says: steps, play"] = 0.15
     lens_error_percent: Annotated[float, Bounds(0.0001, 10), "how far the calibrated focal length usually is from the true one"] = 0.15
     centre_error_px: Annotated[float, Bounds(0.0001, 100),
-        "how far the calibrated centre usually is from the true one, in pictures 640 px wide"] = 1.0
+        "how far the calibrated centre usually is from the true one, in images 640 px wide"] = 1.0
     outlier_ratio: Annotated[float, Bounds(1.2, 100), "a view so many times worse than the usual one is dropped"] = 3.0
     # fmt: on
 
 
 class NeckView(NamedTuple):
-    """The head's pose while a picture was taken, and the board in it."""
+    """The head's pose while a frame was taken, and the board in it."""
 
     R_world_head: Mat3
     p_world_head_m: Vec3
@@ -127,7 +127,7 @@ def camera_on_head(
 ) -> HandEye:
     """Find where the camera sits on the head.
 
-    width_px: of the pictures; limits in pixels grow with it
+    width_px: of the frames; limits in pixels grow with it
 
     Raises:
         CameraCalibrationRefused: too few views, turns about one axis only, or the result is
@@ -204,7 +204,7 @@ def _judge(fit: Fit, params: HandEyeParams, width_px: int) -> None:
     if not fit.rms_px <= most_px:
         raise CameraCalibrationRefused(
             f"reprojection error {fit.rms_px:.2f} px, wanted at most {most_px:.2f}: see that the "
-            "board hangs still, the lens is calibrated at this picture size, and the neck "
+            "board hangs still, the lens is calibrated at this image size, and the neck "
             "joints' zeros and signs and the rig's geometry are right"
         )
     spread = fit.spread()
@@ -226,7 +226,7 @@ def _outlier(fit: Fit, ratio: float) -> int | None:
 
 
 def _fit(views: Sequence[NeckView], lens: Intrinsics, width_px: int, params: HandEyeParams) -> Fit:
-    """Refine the start that explains the pictures best."""
+    """Refine the start that explains the frames best."""
     centre_px = params.centre_error_px * width_px / _WIDTH_PX
     sights = Sights.of(
         [(v.R_world_head, v.p_world_head_m, v.seen) for v in views],
@@ -237,7 +237,7 @@ def _fit(views: Sequence[NeckView], lens: Intrinsics, width_px: int, params: Han
     starts = sorted(_starts(views, lens), key=lambda found: _off(sights, *found))
     if not starts:
         raise CameraCalibrationRefused(
-            "the pictures of the board do not agree with any place of the camera: see that "
+            "the images of the board do not agree with any place of the camera: see that "
             "board, lens and joints are the ones calibrated"
         )
     best = refined(sights, start(sights, *starts[0]))

@@ -176,7 +176,7 @@ class _Job(NamedTuple):
 
 
 class _Eye(NamedTuple):
-    """Where pictures come from, and the simulated camera behind it where there is one."""
+    """Where frames come from, and the simulated camera behind it where there is one."""
 
     look: Callable[[], Shot | None]
     now_s: Callable[[], float]
@@ -260,7 +260,7 @@ def _mount(job: _Job, eye: _Eye, neck: Neck, camera: CameraParams, good: HandEye
     height, width = shot.image.shape[:2]
     if (camera.lens.width_px, camera.lens.height_px) != (width, height):
         raise SetupError(
-            f"pictures are {width} x {height}, the lens was measured on {camera.lens.width_px} x "
+            f"frames are {width} x {height}, the lens was measured on {camera.lens.width_px} x "
             f"{camera.lens.height_px}: calibrate it anew (--what all)"
         )
     lens = intrinsics_of_lens(camera.lens, radians(camera.horizontal_field_deg), width, height)
@@ -293,7 +293,7 @@ def _tell_step(step: NeckStep) -> None:
 
 
 def _first(job: _Job, eye: _Eye) -> Shot:
-    """Wait for a picture."""
+    """Wait for a frame."""
     give_up_s = eye.now_s() + 5.0
     while eye.now_s() < give_up_s:
         go_on(job.stopped)
@@ -301,7 +301,7 @@ def _first(job: _Job, eye: _Eye) -> Shot:
         if shot is not None:
             return shot
         eye.rest(0.02)
-    raise SetupError("the camera gives no pictures: check its cable, or name another (--camera N)")
+    raise SetupError("the camera gives no frames: check its cable, or name another (--camera N)")
 
 
 def _kinematics(rig: Rig) -> Kinematics:

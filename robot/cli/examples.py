@@ -46,7 +46,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     ),
     "monitor": (("monitor my.yaml", "watch temperatures, loads and positions"),),
     "record-camera": (
-        ("record-camera seen.mcap --oak", "keep pictures, depth and times of a camera"),
+        ("record-camera seen.mcap --oak", "keep frames, depth and times of a camera"),
     ),
     "emulate": (
         ("emulate --servos 1-9:xl330-m077", "servos on a pseudo-terminal"),
@@ -95,7 +95,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("export evening.mcap --bids --out study", "a BIDS data set"),
     ),
     "report": (
-        ("report evening.mcap", "how human was the gaze? one HTML file and pictures"),
+        ("report evening.mcap", "how human was the gaze? one HTML file and frames"),
         ("report --scene face-to-face --seconds 120", "the same of a simulated scene"),
     ),
     "compare": (("compare shy.mcap bold.mcap", "two recordings side by side"),),

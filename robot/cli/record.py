@@ -16,7 +16,7 @@ from gazerig.robot.model.clock import RealClock
 
 app = typer.Typer(add_completion=False)
 
-_NEVER = threading.Event()  # a picture comes soon enough to look for Ctrl-C in between
+_NEVER = threading.Event()  # a frame comes soon enough to look for Ctrl-C in between
 
 
 @app.command("record-camera")
@@ -34,7 +34,7 @@ def record_camera(
     height: Annotated[
         int | None, typer.Option(min=16, help="Height (default: 400 for --oak, else 480).")
     ] = None,
-    rate: Annotated[float, typer.Option(min=1.0, help="Pictures a second asked for.")] = 30.0,
+    rate: Annotated[float, typer.Option(min=1.0, help="Frames a second asked for.")] = 30.0,
     jpeg: Annotated[
         int | None,
         typer.Option(min=1, max=100, help="JPEG of this quality; default: PNG, which is exact."),
@@ -101,12 +101,12 @@ def _record(
                 say(line)
             depth = "with depth" if shot is not None and shot.depth_m is not None else "no depth"
             if sys.stderr.isatty():
-                status(f"{past_s:7.1f} s  {recorder.written} pictures, {depth}: Ctrl-C ends")
+                status(f"{past_s:7.1f} s  {recorder.written} frames, {depth}: Ctrl-C ends")
     finally:
         recorder.close()
         recorder.finish()
         size_mb = file.stat().st_size / 1e6
         left = f", {recorder.left_out} left out" if recorder.left_out else ""
-        say(f"{recorder.written} pictures ({size_mb:.1f} MB{left}) in {file}")
+        say(f"{recorder.written} frames ({size_mb:.1f} MB{left}) in {file}")
     if recorder.failure:
         raise SetupError(recorder.failure)

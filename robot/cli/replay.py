@@ -174,7 +174,7 @@ def _show(
     with used(file), _progress("reading", recording.duration_s) as read:
         frames = SnapshotIndex(
             recording.ticks(),
-            recording.pictures(),
+            recording.frames(),
             recording.info.rate_hz,
             recording.info.character or "",
             _built(recording.info.config_yaml),

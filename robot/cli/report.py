@@ -96,7 +96,7 @@ def report(
         if words := banner(run.joints):
             say(words)
         _tell_findings(made.findings)
-        say(f"{made.page}: the whole report; {len(made.pictures)} figures beside it")
+        say(f"{made.page}: the whole report; {len(made.figures)} figures beside it")
 
 
 @app.command()

@@ -16,7 +16,7 @@ Scene = Annotated[
         autocompletion=complete_scene,
     ),
 ]
-Video = Annotated[Path | None, typer.Option(help="Look at a film or picture, looped.")]
+Video = Annotated[Path | None, typer.Option(help="Look at a film or frame, looped.")]
 Camera = Annotated[int | None, typer.Option(help="Look through webcam N.")]
 Oak = Annotated[bool, typer.Option(help="Look through an OAK-D camera.")]
 Replay = Annotated[
@@ -26,7 +26,7 @@ Replay = Annotated[
     ),
 ]
 Pixels = Annotated[
-    bool, typer.Option(help="Draw the scene and find faces and motion in the pictures.")
+    bool, typer.Option(help="Draw the scene and find faces and motion in the frames.")
 ]
 Seconds = Annotated[float | None, typer.Option(min=0.0, help="Stop after S seconds.")]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of all dice.")]
@@ -76,14 +76,12 @@ NoPage = Annotated[bool, typer.Option(help="Without the live page.")]
 Heatmap = Annotated[
     Path | None, typer.Option(help="Write a heat map of the gaze on the face as PNG.")
 ]
-HeatmapFace = Annotated[
-    Path | None, typer.Option(help="Picture of a face to lay the heat map over.")
-]
+HeatmapFace = Annotated[Path | None, typer.Option(help="Frame of a face to lay the heat map over.")]
 Record = Annotated[
     Path | None, typer.Option(help="Record every tick, to replay and judge: FILE.mcap.")
 ]
 RecordPictures = Annotated[
-    float, typer.Option(min=0.0, max=60.0, help="Camera pictures a second in the recording.")
+    float, typer.Option(min=0.0, max=60.0, help="Camera frames a second in the recording.")
 ]
 Force = Annotated[
     bool,

@@ -14,12 +14,12 @@ from gazerig.robot.perception.egomotion_residual import ResidualFigures
 def seeing_words(tick: Tick, residual: ResidualFigures) -> str:
     """Return age of the frame, distance of faces and its source, and the ego-motion residual.
 
-    e.g. "picture 63 ms old | face 1 at 0.98 m by camera, +- 1 cm | still things seem to move
+    e.g. "frame 63 ms old | face 1 at 0.98 m by camera, +- 1 cm | still things seem to move
     0.3 deg/s while the head turns"
     """
     if tick.percept is None:
-        return "no picture yet"
-    parts = [f"picture {1e3 * tick.percept.age_s(tick.t_s):.0f} ms old"]
+        return "no frame yet"
+    parts = [f"frame {1e3 * tick.percept.age_s(tick.t_s):.0f} ms old"]
     head = tick.pose.p_world_head_m
     for face in tick.percept.faces:
         by = f" by {face.distance_from}" if face.distance_from else ""

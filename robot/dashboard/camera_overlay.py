@@ -1,4 +1,4 @@
-"""Draw what was found into the camera picture, small enough for the page."""
+"""Draw what was found into the camera image, small enough for the page."""
 
 from typing import cast
 
@@ -7,9 +7,9 @@ import numpy as np
 
 from gazerig.drivers.types import Depth, DetectedFace, Detections, ImageArray, MovingBlob
 
-PICTURE_WIDTH_PX = 320
+IMAGE_WIDTH_PX = 320
 NEAREST_M, FARTHEST_M = 0.3, 6.0
-"""Ends of the colour scale of the depth picture: an arm's reach and the end of a room."""
+"""Ends of the colour scale of the depth image: an arm's reach and the end of a room."""
 
 _JPEG_QUALITY = 80
 _FACE = (120, 220, 90)  # BGR
@@ -23,20 +23,20 @@ Point = tuple[int, int]
 
 
 def draw_detections(
-    picture: ImageArray | None,
+    image: ImageArray | None,
     detections: Detections,
     gaze_px: tuple[float, float] | None,
     focal_px: float,
 ) -> ImageArray:
     """Draw faces, landmarks, moving blobs and the gaze point into a small copy.
 
-    picture: the camera's picture, or None where the source has none: a dark ground
-    gaze_px: where the rig looks, pixels of the full picture; None draws none
+    image: the camera's image, or None where the source has none: a dark ground
+    gaze_px: where the rig looks, pixels of the full image; None draws none
     focal_px: focal length that places the blobs (pinhole, principal point in the middle)
-    Returns a picture of at most PICTURE_WIDTH_PX; the one given is left as it is.
+    Returns an image of at most IMAGE_WIDTH_PX; the one given is left as it is.
     """
-    scale = min(1.0, PICTURE_WIDTH_PX / detections.width_px)
-    drawn = _small(picture, detections, scale)
+    scale = min(1.0, IMAGE_WIDTH_PX / detections.width_px)
+    drawn = _small(image, detections, scale)
     for face in detections.faces:
         _draw_face(drawn, face, scale)
     for blob in detections.blobs:
@@ -47,27 +47,27 @@ def draw_detections(
 
 
 def ground(detections: Detections, depth: bool) -> ImageArray | None:
-    """Return what ``draw_detections`` is to draw on: the picture, or the depth as asked for.
+    """Return what ``draw_detections`` is to draw on: the image, or the depth as asked for.
 
-    A camera that measures no depth gives its picture with words that say so.
+    A camera that measures no depth gives its image with words that say so.
     """
     if not depth:
         return detections.image
     if detections.depth_m is not None:
-        return depth_picture(detections.depth_m)
-    scale = min(1.0, PICTURE_WIDTH_PX / detections.width_px)
+        return depth_image(detections.depth_m)
+    scale = min(1.0, IMAGE_WIDTH_PX / detections.width_px)
     drawn = _small(detections.image, detections, scale)
     _write(drawn, "this camera measures no depth", (6, drawn.shape[0] - 8), _LANDMARK)
     return drawn
 
 
-def depth_picture(depth_m: Depth) -> ImageArray:
-    """Return distances as colours, at most PICTURE_WIDTH_PX wide, with their scale at the foot.
+def depth_image(depth_m: Depth) -> ImageArray:
+    """Return distances as colours, at most IMAGE_WIDTH_PX wide, with their scale at the foot.
 
     depth_m: (height, width), NaN where unknown, which is shown dark. Red is NEAREST_M or less,
     blue FARTHEST_M or more; equal ratios of distance are equal steps of colour.
     """
-    scale = min(1.0, PICTURE_WIDTH_PX / depth_m.shape[1])
+    scale = min(1.0, IMAGE_WIDTH_PX / depth_m.shape[1])
     size = (max(1, round(depth_m.shape[1] * scale)), max(1, round(depth_m.shape[0] * scale)))
     # Not averaged: between a hand and the wall behind it there is nothing.
     small = cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST)
@@ -92,22 +92,22 @@ def _draw_scale(drawn: ImageArray) -> None:
         )  # fmt: skip
 
 
-def encode(picture: ImageArray) -> bytes:
-    """Encode a BGR picture as JPEG."""
-    done, jpeg = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+def encode(image: ImageArray) -> bytes:
+    """Encode a BGR image as JPEG."""
+    done, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
     if not done:
-        raise ValueError(f"a picture of shape {picture.shape} cannot be written as JPEG")
+        raise ValueError(f"an image of shape {image.shape} cannot be written as JPEG")
     return jpeg.tobytes()
 
 
-def _small(picture: ImageArray | None, detections: Detections, scale: float) -> ImageArray:
+def _small(image: ImageArray | None, detections: Detections, scale: float) -> ImageArray:
     width = max(1, round(detections.width_px * scale))
     height = max(1, round(detections.height_px * scale))
-    if picture is None:
+    if image is None:
         return np.full((height, width, 3), _DARK_GROUND, np.uint8)
-    if picture.shape[:2] == (height, width):
-        return picture.copy()
-    return cast(ImageArray, cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA))
+    if image.shape[:2] == (height, width):
+        return image.copy()
+    return cast(ImageArray, cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA))
 
 
 def _draw_face(drawn: ImageArray, face: DetectedFace, scale: float) -> None:

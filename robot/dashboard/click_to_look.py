@@ -1,4 +1,4 @@
-"""A click in the camera picture -> the point of the world that was clicked on."""
+"""A click in the camera image -> the point of the world that was clicked on."""
 
 from collections.abc import Callable
 from math import hypot, radians
@@ -19,11 +19,11 @@ NEAR_RAD = 0.12
 USUAL_M = 1.5
 """How far away a thing counts as where nobody knows: across a desk and a step more."""
 
-_PATCH = 0.03  # of the picture's width, the square whose depth is read
+_PATCH = 0.03  # of the image's width, the square whose depth is read
 
 
 class ClickToLook:
-    """Knows the newest picture and where the camera was when it was taken."""
+    """Knows the newest image and where the camera was when it was taken."""
 
     def __init__(
         self, mount: CameraMount, poses: PoseHistory, camera: Callable[[], CameraParams]
@@ -38,7 +38,7 @@ class ClickToLook:
         self._tick = tick
 
     def point(self, x: float, y: float) -> Vec3 | None:
-        """Return the point of the world at a place of the newest picture, None without one.
+        """Return the point of the world at a place of the newest image, None without one.
 
         x, y: 0..1 from the left and from the top
         """
@@ -85,7 +85,7 @@ def distance_m(percept: Percept | None, p_world_m: Vec3, way_world: Vec3) -> flo
 
 
 def _depth_m(found: Detections, pixel: tuple[float, float]) -> float | None:
-    """Read the depth picture about a pixel of the camera picture, None where it says nothing."""
+    """Read the depth image about a pixel of the camera image, None where it says nothing."""
     if found.depth_m is None:
         return None
     height, width = found.depth_m.shape[:2]

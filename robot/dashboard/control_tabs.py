@@ -80,7 +80,7 @@ class LeadView:
             self._words = server.gui.add_html("", order=1)
             self._leader = server.gui.add_html(_leader(""), order=1.5)
             server.gui.add_html(
-                _note("Click in the camera picture, or drag a target: the head looks there."),
+                _note("Click in the camera image, or drag a target: the head looks there."),
                 order=3,
             )
             self._drag = server.gui.add_checkbox("drag a target", False, order=4)

@@ -25,7 +25,7 @@ _LONGEST_GAP_S = 0.2
 _LONGEST_FORESEEN_S = 0.3
 _FAINT, _PLAIN, _COVER = 0.02, 0.45, 0.82
 
-Picture = NDArray[np.uint8]
+Image = NDArray[np.uint8]
 
 
 class GazeMap:
@@ -52,7 +52,7 @@ class GazeMap:
             self._time[row, column] += snapshot.t_s - last_s
             self.seconds += snapshot.t_s - last_s
 
-    def picture(self) -> Picture:
+    def image(self) -> Image:
         """Return the map over a drawn face, RGB (HIGH_PX, WIDE_PX, 3): yellow is where most was."""
         blurred = cv2.GaussianBlur(self._time, (0, 0), _SPREAD_M * PX_PER_M / SHRINK)
         top = float(blurred.max())
@@ -73,7 +73,7 @@ def gaze_on_face(snapshot: Snapshot) -> tuple[float, float] | None:
     face = next((face for face in snapshot.faces if face.id == snapshot.target_id), None)
     if face is None:
         return None
-    since_s = min(max(0.0, snapshot.picture_age_s or 0.0), _LONGEST_FORESEEN_S)
+    since_s = min(max(0.0, snapshot.frame_age_s or 0.0), _LONGEST_FORESEEN_S)
     centre = add(face.p_world_m, scale(face.v_world_m_s, since_s))
     plane = add(centre, rotate(face.R_world_face, (_PLANE_M, 0.0, 0.0)))
     way = unit(add(*snapshot.gaze_world))
@@ -81,7 +81,7 @@ def gaze_on_face(snapshot: Snapshot) -> tuple[float, float] | None:
 
 
 @cache
-def _face() -> Picture:
+def _face() -> Image:
     """Draw the face once, small."""
     small = cv2.resize(draw_face(), (WIDE_PX, HIGH_PX), interpolation=cv2.INTER_AREA)
     return np.asarray(small, dtype=np.uint8)

@@ -44,7 +44,7 @@ def pill(words: str, colour: str) -> str:
 
 
 def heading(words: str, aside: str = "") -> str:
-    """Return a line above a picture or table, with something smaller at its right end."""
+    """Return a line above a frame or table, with something smaller at its right end."""
     return (
         "<div style='font-size:12px;font-weight:600;margin-top:4px'>"
         f"<span style='float:right;font-weight:400;opacity:.7'>{escape(aside)}</span>"

@@ -21,7 +21,7 @@ _FREE_AFTER_S = 0.5
 _SAME_DEG = 0.3
 MEASURED, ESTIMATED = "measured", "estimated (not measured)"
 _RIGHT = "text-align:right"
-_TABLE_EVERY = 5  # with every fifth picture, some 5 times a second: figures are to be read
+_TABLE_EVERY = 5  # with every fifth frame, some 5 times a second: figures are to be read
 
 
 class JogPanel:
@@ -33,7 +33,7 @@ class JogPanel:
         self._tab = tab
         self._teller = teller
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
-        # Joint -> angle asked for and the time of the last picture in which it was wished.
+        # Joint -> angle asked for and the time of the last frame in which it was wished.
         self._held: dict[str, tuple[float, float]] = {}
         self._now_s = 0.0
         self._table, self._shown = "", 0

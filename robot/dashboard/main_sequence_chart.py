@@ -50,18 +50,18 @@ class MainSequenceChart:
         self.count += 1
 
     def drawing(self) -> str:
-        """Return both pictures as HTML."""
+        """Return both images as HTML."""
         sizes = [s.amplitude_deg for s in self._seen]
         widest = _room(_WIDEST_DEG, sizes)
         speeds = [s.peak_deg_s for s in self._seen]
         lengths = [1e3 * s.duration_s for s in self._seen]
         return frame(
             heading("peak speed, deg/s, against size, deg", counted(self.count, "saccade"))
-            + _picture(
+            + _image(
                 sizes, speeds, widest, _room(_FASTEST_DEG_S, speeds), slowest_peak, fastest_peak
             )
             + heading("duration, ms, against size, deg")
-            + _picture(sizes, lengths, widest, _room(_LONGEST_MS, lengths), shortest_ms, longest_ms)
+            + _image(sizes, lengths, widest, _room(_LONGEST_MS, lengths), shortest_ms, longest_ms)
             + note(
                 "grey: people, from Baloh et al. 1975 less 15 % to Bahill et al. 1975 and "
                 "Collewijn et al. 1988 and 15 % (speed); 21 ms + 2.2 ms/deg less a quarter to "
@@ -77,7 +77,7 @@ def _room(choices: tuple[float, ...], values: list[float]) -> float:
     return next((choice for choice in choices if choice >= most), choices[-1])
 
 
-def _picture(
+def _image(
     x: list[float], y: list[float], widest: float, highest: float, low: Curve, high: Curve
 ) -> str:
     def at(size: float, value: float) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.model.commands import Command, Jog, LookAt, as_json
 
 DOOR = "door"
-"""Who asks where it is the stop button or a click in the picture."""
+"""Who asks where it is the stop button or a click in the image."""
 
 
 _PER_S, _BURST = 100.0, 200.0

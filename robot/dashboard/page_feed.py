@@ -19,7 +19,7 @@ from gazerig.robot.model.types import Snapshot
 
 
 class News(NamedTuple):
-    """What was waiting on the socket: all snapshots, the last picture, whether it has closed.
+    """What was waiting on the socket: all snapshots, the last frame, whether it has closed.
 
     others: what must not be lost or passed over, as (kind, what its JSON holds), oldest first
     """

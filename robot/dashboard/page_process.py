@@ -29,7 +29,7 @@ from gazerig.robot.dashboard.stop_channel import StopListener
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
 
-# The first byte of a message says what follows it. To the page: a snapshot, a picture, menus,
+# The first byte of a message says what follows it. To the page: a snapshot, a frame, menus,
 # the parameters, their values, a reply or a message to all users, the position of a replay.
 SNAPSHOT, FRAME, CHOICES, PARAMS, VALUES, MESSAGE, REPLAY = b"s", b"p", b"c", b"k", b"v", b"w", b"r"
 # From the page: its address, a message for the terminal, and REQUEST, a user's request.
@@ -96,7 +96,7 @@ class PageProcess:
 
     A page process that dies is started again, at the same address, after a while that grows.
 
-    dropped: snapshots the page did not take; pictures_dropped: the same for pictures
+    dropped: snapshots the page did not take; frames_dropped: the same for frames
     started: how often the page has come up; who feeds it begins anew when this changes
     gone: it has ended and is not started again
     """
@@ -131,7 +131,7 @@ class PageProcess:
         self._paying = threading.Lock()
         self._shown_s = nan
         self.dropped = 0
-        self.pictures_dropped = 0
+        self.frames_dropped = 0
 
     def open(self) -> str:
         """Start the page and return at once, with the words to say meanwhile."""
@@ -179,10 +179,10 @@ class PageProcess:
         if not self.send(pack(snapshot)):
             self.dropped += 1
 
-    def show_picture(self, jpeg: bytes) -> None:
-        """Hand over an encoded camera picture with what was found already drawn in."""
+    def show_frame(self, jpeg: bytes) -> None:
+        """Hand over an encoded camera image with what was found already drawn in."""
         if not self.send(FRAME + jpeg):
-            self.pictures_dropped += 1
+            self.frames_dropped += 1
 
     def offer(self, choices: Mapping[str, tuple[str, ...]]) -> None:
         """Set the menus of the page: name of the menu -> choices, the present one first."""

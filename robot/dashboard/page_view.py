@@ -138,7 +138,7 @@ class PageView:
                 self._controls.show(self._newest)
             self._drawn = True
         if self._jpeg is not None:
-            self._panel.show_picture(self._jpeg)
+            self._panel.show_frame(self._jpeg)
         self._newest = self._jpeg = None
 
     def silent(self) -> None:
@@ -163,7 +163,7 @@ def _furnish(server: viser.ViserServer) -> None:
     server.gui.configure_theme(show_logo=False, show_share_button=False)
     server.gui.main_panel.dock_right()
     server.gui.main_panel.set_width(360)
-    # A room's picture as light would fade the scene in slowly, and shadows cost a browser
+    # A room's frame as light would fade the scene in slowly, and shadows cost a browser
     # without a graphics card, often on the rig's own computer, three quarters of its rate.
     server.scene.configure_environment_map(None)
     server.scene.configure_default_lights(cast_shadow=False)

@@ -1,4 +1,4 @@
-"""The page's words and pictures: status and camera on one side, reasons and figures on the other.
+"""The page's texts and images: status and camera on one side, reasons and figures on the other.
 
 What the rig does stands above the controls. Reasons, traces, statistics and health are tabs
 of a window of their own at the other side, which can be moved, shrunk or closed up.
@@ -23,22 +23,22 @@ from gazerig.robot.dashboard.servo_health import health
 from gazerig.robot.dashboard.status import silence, status
 from gazerig.robot.model.types import SeenFixation, SeenSaccade, Snapshot
 
-# What is shown by and by, in pictures of the page of which there are at most 25 a second.
+# What is shown by and by, in frames of the page, of which there are at most 25 a second.
 _WORDS_EVERY, _TRACES_EVERY, _STRIP_EVERY, _FIGURES_EVERY = 3, 4, 8, 25
 _WIDTH_PX = 340
 
 
 class PanelView:
-    """Status, camera picture, and a window of tabs: why, traces, statistics, health, view.
+    """Status, camera image, and a window of tabs: why, traces, statistics, health, view.
 
     layers: what is to be drawn into the scene, as chosen in the tab "view"
-    depth: is told whenever somebody asks for the depth picture or for the plain one
+    depth: is told whenever somebody asks for the depth image or for the plain one
     """
 
     def __init__(self, gui: viser.GuiApi) -> None:
         self._gui = gui
         self._status = gui.add_html(frame("<b>waiting for the rig</b>"), order=1)
-        self._picture: viser.GuiImageHandle | None = None
+        self._image: viser.GuiImageHandle | None = None
         self._shown = 0
         self.depth: Callable[[bool], None] = _nobody
         self._begin()
@@ -61,7 +61,7 @@ class PanelView:
             self._health = gui.add_html(frame("nothing yet"), order=1)
         with window.add_tab("view"):
             self.layers = self._add_layers()
-        self._map_picture: viser.GuiImageHandle | None = None
+        self._map_image: viser.GuiImageHandle | None = None
         self._draw_figures()
 
     def _begin(self) -> None:
@@ -114,18 +114,18 @@ class PanelView:
         self.draw_all()
 
     def draw_all(self) -> None:
-        """Draw everything at the next picture, whoever's turn it is."""
+        """Draw everything at the next frame, whoever's turn it is."""
         self._shown = 0
 
-    def show_picture(self, jpeg: bytes) -> None:
-        """Draw the camera picture; one that cannot be decoded is skipped."""
+    def show_frame(self, jpeg: bytes) -> None:
+        """Draw the camera image; one that cannot be decoded is skipped."""
         bgr = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
         if bgr is None:
             return
         rgb = cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
-        if self._picture is None:
-            self._picture = self._gui.add_image(rgb, label="camera", format="jpeg", order=2)
-        self._picture.image = rgb
+        if self._image is None:
+            self._image = self._gui.add_image(rgb, label="camera", format="jpeg", order=2)
+        self._image.image = rgb
 
     def _add_map_title(self) -> None:
         says = "where on the face the gaze has been; yellow is where it was longest"
@@ -137,19 +137,19 @@ class PanelView:
         self._saccades.content = self._sequence.drawing()
         if self._map.seconds <= 0.0:
             return
-        picture = self._map.picture()
-        if self._map_picture is None:
+        image = self._map.image()
+        if self._map_image is None:
             with self._statistics:
-                self._map_picture = self._gui.add_image(picture, format="jpeg", order=4)
+                self._map_image = self._gui.add_image(image, format="jpeg", order=4)
         else:
-            self._map_picture.image = picture
+            self._map_image.image = image
 
     def _add_layers(self) -> OverlayChoices:
         layers = OverlayChoices()
         for order, (name, says) in enumerate(OverlayChoices.NAMES.items()):
             box = self._gui.add_checkbox(says, initial_value=getattr(layers, name), order=order)
             box.on_update(_setter(layers, name))
-        depth = self._gui.add_checkbox("depth instead of the camera picture", False, order=9)
+        depth = self._gui.add_checkbox("depth instead of the camera image", False, order=9)
 
         @depth.on_update
         def _(event: viser.GuiEvent[viser.GuiCheckboxHandle]) -> None:

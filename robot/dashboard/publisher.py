@@ -1,7 +1,7 @@
 """Shows a running robot to people, beside the control loop and never inside it.
 
 The loop leaves its newest tick in one slot. A thread turns it into the status line,
-the page's snapshots and the camera picture with what was found in it; a slow terminal
+the page's snapshots and the camera image with what was found in it; a slow terminal
 or browser delays nobody but itself.
 """
 
@@ -33,7 +33,7 @@ from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
 _SNAPSHOT_S = 0.04
-_PICTURE_S = 0.1
+_FRAME_S = 0.1
 _LINE_S = 0.2
 
 
@@ -118,7 +118,7 @@ class Publisher:
 
     def _watch(self) -> None:
         rate = _Rate()
-        round_number, picture_number = 0, 0
+        round_number, frame_number = 0, 0
         while not self._over.wait(_SNAPSHOT_S):
             tick = self._slot
             if tick is None:
@@ -133,9 +133,9 @@ class Publisher:
             with self._spared("the page's notices"):
                 if self._page is not None:
                     self._tell_of(self._page)
-            with self._spared("the page's picture"):
-                if round_number % round(_PICTURE_S / _SNAPSHOT_S) == 0:
-                    picture_number = self._show_picture(tick, picture_number)
+            with self._spared("the page's frame"):
+                if round_number % round(_FRAME_S / _SNAPSHOT_S) == 0:
+                    frame_number = self._show_frame(tick, frame_number)
             with self._spared("the status line"):
                 if self._say is not None and round_number % round(_LINE_S / _SNAPSHOT_S) == 0:
                     self._say(self._line(tick, rate.hz))
@@ -170,8 +170,8 @@ class Publisher:
         while (note := page.notice()) is not None:
             self._tell(note)
 
-    def _show_picture(self, tick: Tick, shown: int) -> int:
-        """Send the camera picture unless it was sent already; give its number."""
+    def _show_frame(self, tick: Tick, shown: int) -> int:
+        """Send the camera image unless it was sent already; give its number."""
         found = tick.detections
         if self._page is None or found is None or found.number == shown:
             return shown
@@ -180,13 +180,13 @@ class Publisher:
         drawn = draw_detections(
             ground(found, self.depth), found, self._gaze_px(tick, found, lens), lens.fx_px
         )
-        self._page.show_picture(encode(drawn))
+        self._page.show_frame(encode(drawn))
         return found.number
 
     def _gaze_px(
         self, tick: Tick, found: Detections, lens: Intrinsics
     ) -> tuple[float, float] | None:
-        """Return where in the picture the gaze goes, None when it is outside."""
+        """Return where in the image the gaze goes, None when it is outside."""
         R, p = self._mount.pose(*self._poses.head_pose(found.captured_s))
         x, y, z = rotate_back(R, sub(tick.gaze.gaze_point_world_m, p))
         if z < 0.05:

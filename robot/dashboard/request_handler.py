@@ -1,4 +1,4 @@
-"""What people ask for on the page, handed to the rig: commands, tuning, clicks in the picture."""
+"""What people ask for on the page, handed to the rig: commands, tuning, clicks in the image."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -28,7 +28,7 @@ PAGE = "the page"
 """Who asks, where a browser does not say which one it is."""
 
 Point = Callable[[float, float], Vec3 | None]
-"""Place in the picture, 0..1 from the left and from the top -> point in the world."""
+"""Place in the image, 0..1 from the left and from the top -> point in the world."""
 
 
 class PageRequestHandler:
@@ -127,10 +127,10 @@ class PageRequestHandler:
 
     def _pick(self, x: float, y: float, who: str) -> str | None:
         if not (0.0 <= x <= 1.0 and 0.0 <= y <= 1.0):
-            raise ValueError("a place in the picture is 0 to 1 from the left and from the top")
+            raise ValueError("a place in the image is 0 to 1 from the left and from the top")
         point = self._point(x, y) if self._point is not None else None
         if point is None:
-            return "refused: there is no camera picture to look into yet"
+            return "refused: there is no camera image to look into yet"
         return self._replied(self._handler.give(LookAt(point, who)))
 
 

@@ -1,10 +1,10 @@
-"""The machine's health: guard, loop and picture in a few lines, every servo in a table."""
+"""The machine's health: guard, loop and frame in a few lines, every servo in a table."""
 
 from html import escape
 from typing import Literal
 
 from gazerig.robot.dashboard.html import AMBER, GREEN, GREY, LEVELS, RED, frame, heading, note, pill
-from gazerig.robot.dashboard.status import OLD_PICTURE_S
+from gazerig.robot.dashboard.status import OLD_FRAME_S
 from gazerig.robot.model.types import LoopFigures, Servos, Snapshot
 
 Strain = Literal["", "near", "over"]
@@ -35,9 +35,9 @@ def health(snapshot: Snapshot) -> str:
         f"<div style='min-height:3em'>{pill(f'guard: {level}', LEVELS[level])}{said}</div>"
         + heading("servos")
         + servo_table(snapshot.servos, snapshot.joints, snapshot.estimated)
-        + heading("loop and picture")
+        + heading("loop and frame")
         + _timing(snapshot.timing)
-        + _picture(snapshot.picture_age_s)
+        + _frame(snapshot.frame_age_s)
         + f"<div>{escape(snapshot.health)}</div>"
         + f"<div style='opacity:.8;font-size:12px'>{escape(snapshot.seeing)}</div>"
     )
@@ -149,11 +149,11 @@ def _timing(timing: LoopFigures | None) -> str:
     return f"<table style='{_TABLE}'><tr>{head}</tr><tr>{''.join(cells)}</tr></table>{note(said)}"
 
 
-def _picture(age_s: float | None) -> str:
+def _frame(age_s: float | None) -> str:
     if age_s is None:
-        return "<div>no picture yet</div>"
-    colour = AMBER if age_s >= OLD_PICTURE_S else GREEN
-    return f"<div>picture <b style='color:{colour}'>{1e3 * age_s:.0f} ms</b> old</div>"
+        return "<div>no frame yet</div>"
+    colour = AMBER if age_s >= OLD_FRAME_S else GREEN
+    return f"<div>frame <b style='color:{colour}'>{1e3 * age_s:.0f} ms</b> old</div>"
 
 
 def _cell(words: str, strain: Strain) -> str:

@@ -182,7 +182,7 @@ def snapshot(
         target_part=target.part,
         stopped=tick.stopped,
         led=lead_words(tick),
-        picture_age_s=percept.age_s(tick.t_s) if percept is not None else None,
+        frame_age_s=percept.age_s(tick.t_s) if percept is not None else None,
         ghost=_ghost(tick, rig) if rig is not None else None,
         camera=_camera(tick, rig) if rig is not None else None,
         field_deg=_field_deg(rig.field) if rig is not None else None,
@@ -250,7 +250,7 @@ def _ghost(tick: Tick, rig: ShownRig) -> CommandedPose:
 
 
 def _camera(tick: Tick, rig: ShownRig) -> SeenCamera | None:
-    """Return where the camera is now, None before its first picture, whose shape it needs."""
+    """Return where the camera is now, None before its first frame, whose shape it needs."""
     found = tick.detections
     if found is None:
         return None

@@ -16,8 +16,8 @@ from gazerig.robot.dashboard.html import (
 from gazerig.robot.model.types import Snapshot
 
 _REASONS_SHOWN = 4
-OLD_PICTURE_S = 0.5
-"""From this age on a picture is called old: the guard stops the neck at three times that."""
+OLD_FRAME_S = 0.5
+"""From this age on a frame is called old: the guard stops the neck at three times that."""
 
 
 def status(snapshot: Snapshot) -> str:
@@ -29,7 +29,7 @@ def status(snapshot: Snapshot) -> str:
         + f"<span style='float:right'>{snapshot.rate_hz:.0f} Hz</span>"
     )
     return frame(
-        f"{_guard(snapshot)}{_old_picture(snapshot.picture_age_s)}"
+        f"{_guard(snapshot)}{_old_frame(snapshot.frame_age_s)}"
         f"<div style='font-size:17px;font-weight:600'>{escape(snapshot.target_name)}</div>"
         f"<div style='opacity:.8;min-height:1.5em'>{escape(snapshot.why)}</div>"
         f"<div style='margin:6px 0'>{pills}</div>{_without_feedback(snapshot)}"
@@ -91,10 +91,10 @@ def _banner(words: str, reasons: tuple[str, ...], colour: str) -> str:
     )
 
 
-def _old_picture(age_s: float | None) -> str:
-    if age_s is None or age_s < OLD_PICTURE_S:
+def _old_frame(age_s: float | None) -> str:
+    if age_s is None or age_s < OLD_FRAME_S:
         return ""
-    return _banner(f"the picture is {age_s:.1f} s old", (), ORANGE)
+    return _banner(f"the frame is {age_s:.1f} s old", (), ORANGE)
 
 
 def _without_feedback(snapshot: Snapshot) -> str:

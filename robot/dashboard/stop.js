@@ -3,7 +3,7 @@
 // It stands outside of everything that viser draws, and talks to the rig over the page's
 // door by a connection of its own, which stands before it is needed. The space bar does the
 // same, unless somebody types. A stop is sent again until the rig has taken it. A click into
-// the camera picture makes the head look there.
+// the camera image makes the head look there.
 
 (() => {
   "use strict";
@@ -212,7 +212,7 @@
     if (event.type === "keydown" && !event.repeat) halt("somebody pressed the space bar");
   }
 
-  // The camera picture is the one that is called so, in the panel or laid out large.
+  // The camera image is the one that is called so, in the panel or laid out large.
   function isCamera(image) {
     const title = image.closest(".mantine-Modal-content")?.querySelector(".mantine-Modal-title")
       ?? image.parentElement?.previousElementSibling;

@@ -13,14 +13,14 @@ from gazerig.robot.model.types import Snapshot
 _CAMERA: Colour = (120, 128, 140)
 _FIELD: dict[str, Colour] = {"left": (20, 150, 120), "right": (190, 90, 30)}
 _DEPTH_M = 0.12
-"""How far from the camera its picture's frame is drawn."""
+"""How far from the camera its frame's frame is drawn."""
 _RADIUS_M = 0.22
 """How far from the eye the edge of its field is drawn."""
 _AROUND = 72
 
 
 class CameraField:
-    """The camera as a pyramid as wide as its picture."""
+    """The camera as a pyramid as wide as its frame."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene

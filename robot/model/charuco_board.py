@@ -1,7 +1,7 @@
-"""The ChArUco board that cameras are calibrated with: its measures, and finding it in pictures.
+"""The ChArUco board that cameras are calibrated with: its measures, and finding it in images.
 
 A chessboard whose white squares carry ArUco markers, so that every corner is known by
-number even where part of the board is outside the picture (OpenCV manual, "Detection of
+number even where part of the board is outside the image (OpenCV manual, "Detection of
 ChArUco Boards"). Board frame: origin at its upper left corner, x right, y down, z into
 the board, metres. Pixels have their centres at whole numbers.
 """
@@ -63,7 +63,7 @@ class BoardParams:
 
 
 class SeenBoard(NamedTuple):
-    """Corners of the board found in one picture.
+    """Corners of the board found in one image.
 
     ids: (n,) numbers of the inner corners, row by row from 0
     corners_px: (n, 2); corners_board_m: (n, 3), z = 0
@@ -75,7 +75,7 @@ class SeenBoard(NamedTuple):
 
 
 class CharucoBoard:
-    """One board: what it looks like, and where it is in a picture."""
+    """One board: what it looks like, and where it is in an image."""
 
     def __init__(self, params: BoardParams | None = None) -> None:
         self.params = par = params if params is not None else BoardParams()
@@ -89,12 +89,12 @@ class CharucoBoard:
         self.corners_m: Floats = np.array(self._board.getChessboardCorners(), dtype=np.float64)
         self.size_m = (par.columns * par.square_mm / 1e3, par.rows * par.square_mm / 1e3)
 
-    def find(self, picture: ImageArray) -> SeenBoard | None:
+    def find(self, image: ImageArray) -> SeenBoard | None:
         """Find the board's inner corners, None where too few are seen.
 
-        picture: (h, w), (h, w, 1), BGR or BGRA
+        image: (h, w), (h, w, 1), BGR or BGRA
         """
-        grey = _grey(picture)
+        grey = _grey(image)
         if grey is None:
             return None
         corners, ids, _, _ = self._detector.detectBoard(grey)
@@ -105,7 +105,7 @@ class CharucoBoard:
         seen = SeenBoard(numbers, places, self.corners_m[numbers])
         return seen if _spread(seen.corners_board_m) and np.isfinite(places).all() else None
 
-    def picture(self, px_per_mm: float) -> ImageArray:
+    def image(self, px_per_mm: float) -> ImageArray:
         """Draw the board itself, edge to edge, black on white.
 
         px_per_mm: squares and marker modules are exact where their sides are whole pixels
@@ -116,14 +116,14 @@ class CharucoBoard:
         return np.asarray(self._board.generateImage((width, height)), dtype=np.uint8)
 
 
-def _grey(picture: ImageArray) -> ImageArray | None:
-    """Return a grey picture, None where there is none to speak of."""
-    if picture.ndim not in (2, 3) or min(picture.shape[:2]) < 16:
+def _grey(image: ImageArray) -> ImageArray | None:
+    """Return a grey image, None where there is none to speak of."""
+    if image.ndim not in (2, 3) or min(image.shape[:2]) < 16:
         return None
-    if picture.ndim == 2 or picture.shape[2] == 1:
-        return np.ascontiguousarray(picture.reshape(picture.shape[:2]))
-    code = {3: cv2.COLOR_BGR2GRAY, 4: cv2.COLOR_BGRA2GRAY}.get(picture.shape[2])
-    return None if code is None else np.asarray(cv2.cvtColor(picture, code), dtype=np.uint8)
+    if image.ndim == 2 or image.shape[2] == 1:
+        return np.ascontiguousarray(image.reshape(image.shape[:2]))
+    code = {3: cv2.COLOR_BGR2GRAY, 4: cv2.COLOR_BGRA2GRAY}.get(image.shape[2])
+    return None if code is None else np.asarray(cv2.cvtColor(image, code), dtype=np.uint8)
 
 
 def _spread(corners_m: Floats) -> bool:

@@ -1,6 +1,6 @@
 """Where the head was at an instant in the past, and where the camera sits on it. Pure.
 
-A picture tells of the moment of its exposure. Placing it with the head's pose of now
+A frame tells of the moment of its exposure. Placing it with the head's pose of now
 throws targets off by the head's motion in between, so poses are remembered.
 """
 
@@ -24,7 +24,7 @@ MountedOn = Literal["head", "base"]
 
 @dataclass(frozen=True)
 class LensParams:
-    """A lens as measured, on pictures of one size."""
+    """A lens as measured, on images of one size."""
 
     # fmt: off
     width_px: Annotated[int, Bounds(16, 16384), "image width at which the lens was calibrated"]
@@ -107,8 +107,8 @@ class PoseHistory:
 class NewestPose(PoseHistory):
     """Returns the newest pose for any time: for comparison only, it makes heads overshoot.
 
-    This is what placing a picture by where the head is now does, instead of by where it
-    was when the picture was taken.
+    This is what placing a frame by where the head is now does, instead of by where it
+    was when the frame was taken.
     """
 
     def head_pose(self, t_s: float) -> tuple[Mat3, Vec3]:

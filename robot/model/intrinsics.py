@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 # Undistorting is a search; with strong lenses OpenCV's usual five rounds leave a pixel.
 _UNTIL = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-10)
-# Two sizes of picture show the same field if their shapes differ by no more than rounding.
+# Two sizes of image show the same field if their shapes differ by no more than rounding.
 _SAME_SHAPE = 0.01
 
 
@@ -27,18 +27,18 @@ def intrinsics_of_lens(
     height_px: int,
     own: Intrinsics | None = None,
 ) -> Intrinsics:
-    """Return the intrinsics of pictures of a size: as measured, as the camera says, or by its view.
+    """Return the intrinsics of images of a size: as measured, as the camera says, or by its view.
 
-    Pictures of another size but the same shape are taken for the measured ones scaled.
+    Images of another size but the same shape are taken for the measured ones scaled.
     Of another shape it is unknown which edges the camera cut off, so the field of view
     has to do, as where nothing was measured.
 
     Args:
         lens: as measured.
         view_rad: horizontal field of view, from edge to edge.
-        width_px: of the pictures.
-        height_px: of the pictures.
-        own: as the camera says of this picture; it counts where nothing was measured.
+        width_px: of the images.
+        height_px: of the images.
+        own: as the camera says of this image; it counts where nothing was measured.
     """
     if lens is None and own is not None:
         return own
@@ -49,7 +49,7 @@ def intrinsics_of_lens(
 
 
 def fits(lens: LensParams, width_px: int, height_px: int) -> bool:
-    """Return whether pictures of a size show the field that the lens was measured on."""
+    """Return whether images of a size show the field that the lens was measured on."""
     if width_px <= 0 or height_px <= 0:
         return False
     shape = (width_px * lens.height_px) / (height_px * lens.width_px)

@@ -136,7 +136,7 @@ class GuardResult(NamedTuple):
 class SeenFace:
     """A face as the page draws it: identity, centre, axes and the eight parts, world frame.
 
-    v_world_m_s: velocity of the centre; places are those at the picture's capture
+    v_world_m_s: velocity of the centre; places are those at the frame's capture
     """
 
     id: int
@@ -170,7 +170,7 @@ class CommandedPose(NamedTuple):
 class SeenCamera(NamedTuple):
     """Where the camera is (optical axes: x right, y down, z forward) and what it covers.
 
-    horizontal_rad: field of view from side to side; aspect: the picture's width over height
+    horizontal_rad: field of view from side to side; aspect: the image's width over height
     """
 
     R_world_camera: Mat3
@@ -278,12 +278,12 @@ class Snapshot:
     target_name: e.g. "face 3: left eye"; why: why it won
     rate_hz: control rate of the last second; health: bus figures in words
     behaviour: the behaviour in force; saliences: of the winner and the next bodies, highest first
-    seeing: age of the picture, distances and what they rest on, still things that seem to move
+    seeing: age of the frame, distances and what they rest on, still things that seem to move
     target_kind, target_id, target_part: the target as in gaze.types.Target
     character, conversation: those in force, "" where nobody says
     stopped: why somebody stopped the robot, "" while it moves
     led: who leads gaze or joints and how well the head can follow, "" while nobody does
-    picture_age_s: None before the first picture
+    frame_age_s: None before the first frame
     ghost: where the wish would have head and eyes; camera: where the camera is
     field_deg: what an eye can see, towards temple, nose, above and below
     servos, timing: health of servos and loop
@@ -320,7 +320,7 @@ class Snapshot:
     conversation: str = ""
     stopped: str = ""
     led: str = ""
-    picture_age_s: float | None = None
+    frame_age_s: float | None = None
     ghost: CommandedPose | None = None
     camera: SeenCamera | None = None
     field_deg: tuple[float, float, float, float] | None = None

@@ -1,6 +1,6 @@
 """How fast still things seem to move while the head turns: what is left of a wrong time or place.
 
-A picture placed by the head's pose of another moment puts everything off by the head's
+A frame placed by the head's pose of another moment puts everything off by the head's
 speed times the error in time. As the head's speed changes, the world seems to move with
 it: the seen shifts against the changes of the head's speed give that time. Both figures
 are 0 for a camera whose times, mounting and lens are as the rig says.
@@ -32,8 +32,8 @@ class ResidualFigures(NamedTuple):
     """The figures so far; None before anything still was seen while the head turned.
 
     speed_deg_s: median speed at which still things seemed to move
-    late_ms: time by which pictures seem to be older than they say; below 0: younger
-    samples: how many pairs of pictures the median is of
+    late_ms: time by which frames seem to be older than they say; below 0: younger
+    samples: how many pairs of frames the median is of
     """
 
     speed_deg_s: float | None
@@ -42,7 +42,7 @@ class ResidualFigures(NamedTuple):
 
 
 class TrackedPoint(NamedTuple):
-    """A tracked thing in one picture: where this picture alone puts it, and its speed."""
+    """A tracked thing in one image: where this frame alone puts it, and its speed."""
 
     id: int
     p_world_m: Vec3
@@ -54,7 +54,7 @@ class _Turn:
     """What one thing seemed to do since the head stood last.
 
     shifts: (seen shift, shift that the head's change of speed makes in a second, seconds
-    between the pictures, whether the head was turning)
+    between the frames, whether the head was turning)
     """
 
     since_s: float
@@ -63,7 +63,7 @@ class _Turn:
 
 
 class EgomotionResidual:
-    """Gathers the figures picture by picture."""
+    """Gathers the figures frame by frame."""
 
     def __init__(self) -> None:
         self._speeds: deque[float] = deque(maxlen=_SAMPLES)

@@ -1,4 +1,4 @@
-"""Five landmarks in a picture -> where a face is, how it is turned, and its eight parts.
+"""Five landmarks in an image -> where a face is, how it is turned, and its eight parts.
 
 Face frame: origin at the tip of the nose, x out of the face, y to the owner's left, z up.
 Camera frame: optical, x right, y down, z forward. Metres; pixels have their centres at
@@ -36,8 +36,8 @@ Floats = NDArray[np.float64]
 
 _PARTS_FACE_M: Floats = np.array([PARTS_FACE_M[part] for part in PARTS])
 
-# A face that looks straight into a camera: its left is the picture's right, its up the
-# picture's up, and what comes out of it comes towards the camera.
+# A face that looks straight into a camera: its left is the image's right, its up the
+# image's up, and what comes out of it comes towards the camera.
 _R_FRONTAL = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
 _LANDMARKS_FRONTAL_M = LANDMARKS_FACE_M @ _R_FRONTAL.T
 _PLAIN_CAMERA = np.eye(3)

@@ -20,7 +20,7 @@ from gazerig.gaze.types import Vec3
 Floats = NDArray[np.float64]
 
 # Accelerations are taken to last this long, which makes the noise one of the time and not
-# of the rate of pictures.
+# of the rate of frames.
 _ACCELERATION_LASTS_S = 0.1
 # Squared Mahalanobis distance that one innovation of 3 numbers in 100 exceeds by chance.
 _SURPRISING = 11.3

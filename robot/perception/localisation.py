@@ -1,4 +1,4 @@
-"""What a picture shows -> sightings in the world, each with how well it is known.
+"""What a frame shows -> sightings in the world, each with how well it is known.
 
 Across the line of view a place is known to about a pixel. Along it, a distance is as good
 as the camera's depth where it has one there, else as what is known of the size of faces.
@@ -28,7 +28,7 @@ DepthReader = Callable[[Box], Reading]
 _FACE_RADIUS_M = 0.1
 # Error of a face's centre from five landmarks: part of a pixel, and of the eyes' distance.
 _CENTRE_PX, _CENTRE_OF_EYES = 0.4, 0.015
-# Error of its size from picture to picture, the same way. People's eyes themselves lie 6 %
+# Error of its size from frame to frame, the same way. People's eyes themselves lie 6 %
 # nearer or farther apart than usual (Gordon et al., ANSUR): that stays, and no filter helps.
 _SIZE_PX, _SIZE_OF_EYES = 0.7, 0.03
 SIZE_SPREAD = 0.06
@@ -54,7 +54,7 @@ def face_sighting(
 ) -> LocalisedDetection | None:
     """Place a face in the world, None where its landmarks show none from its front.
 
-    depth: reads the depth picture that belongs to the landmarks' picture
+    depth: reads the depth image that belongs to the landmarks' frame
     """
     pose = face_pose(face.landmarks_px, lens)
     if pose is None:
@@ -140,7 +140,7 @@ def reader_of(
     depth_m: NDArray[Any] | None,
     depth_at: Callable[[NDArray[Any], Box], Reading] | None,
 ) -> DepthReader | None:
-    """Return what reads one depth picture, None where there is none or nothing reads it."""
+    """Return what reads one depth image, None where there is none or nothing reads it."""
     if depth_m is None or depth_at is None:
         return None
     return lambda box: depth_at(depth_m, box)

@@ -1,4 +1,4 @@
-"""What moves in a picture, the camera's own turn taken out by where the head was."""
+"""What moves in an image, the camera's own turn taken out by where the head was."""
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from gazerig.robot.model.intrinsics import intrinsics_of_lens
 
 
 class MotionSource:
-    """Finds what moves from one picture to the next."""
+    """Finds what moves from one frame to the next."""
 
     def __init__(
         self,
@@ -25,7 +25,7 @@ class MotionSource:
     ) -> None:
         """Take how to look.
 
-        lens, field_rad: for pictures that do not bring their own lens
+        lens, field_rad: for frames that do not bring their own lens
         turns: how a camera that turns with the head was turned when; None: it stands still
         """
         self._enabled, self._lens, self._field_rad = params.enabled, lens, field_rad
@@ -40,7 +40,7 @@ class MotionSource:
             self._detector.forget()
 
     def __call__(self, shot: Shot) -> tuple[MovingBlob, ...]:
-        """Find what has moved since the picture before; nothing while not enabled."""
+        """Find what has moved since the frame before; nothing while not enabled."""
         if not self._enabled:
             return ()
         height, width = shot.image.shape[:2]
@@ -55,7 +55,7 @@ class MotionSource:
 def motion_finder(
     params: MotionParams, lens: LensParams | None, field_rad: float, turns: PoseBuffer | None
 ) -> Motion:
-    """Return what finds motion, for the process that will look at the pictures."""
+    """Return what finds motion, for the process that will look at the frames."""
     return MotionSource(params, lens, field_rad, turns)
 
 

@@ -1,7 +1,7 @@
 """Detections and the head's pose at their capture time to a percept in the world.
 
 Faces and moving things are placed in the world (sightings) by where the camera was when
-the picture was taken, not where it is now; each person's own motion is told from other
+the frame was taken, not where it is now; each person's own motion is told from other
 things (same_person); tracks give all of them identities and velocities (tracks).
 """
 
@@ -37,14 +37,14 @@ from gazerig.robot.perception.localisation import (
 from gazerig.robot.perception.tracker import LocalisedDetection, Track, Tracker
 
 DepthAt = Callable[[NDArray[Any], Box], Reading]
-"""Reads the distance of what a box of pixels shows from a depth picture."""
+"""Reads the distance of what a box of pixels shows from a depth image."""
 
 # The head's turn at a capture is taken over so long before and after it.
 _HALF_TURN_S = 0.015
 
 
 class Perception:
-    """Sees: one percept for each new picture."""
+    """Sees: one percept for each new frame."""
 
     def __init__(
         self,
@@ -59,8 +59,8 @@ class Perception:
 
         parts_face_m: a person's own places of some parts in the face's frame, instead of
             the canonical ones (Nakamoto & Tsuruno 3.7)
-        lens: as measured, used for pictures of the shape it was measured on
-        depth_at: reads depth pictures; without it, distances come from the size of faces
+        lens: as measured, used for images of the shape it was measured on
+        depth_at: reads depth images; without it, distances come from the size of faces
         """
         self._mount = mount
         self.retune(horizontal_field_deg, parts_face_m, lens)
@@ -90,7 +90,7 @@ class Perception:
         self._intrinsics: Intrinsics | None = None
 
     def see(self, detections: Detections | None, poses: PoseHistory) -> Percept | None:
-        """Return the percept of the newest picture, None before the first."""
+        """Return the percept of the newest frame, None before the first."""
         if detections is None or detections.number == self._number:
             return self._percept
         self._number = detections.number
@@ -125,7 +125,7 @@ class Perception:
         return [f for f in faces if f is not None], [t for t in things if t is not None]
 
     def _known(self, t_s: float) -> list[Known]:
-        """Return where the faces of the last picture are expected now."""
+        """Return where the faces of the last frame are expected now."""
         return [
             (add(t.p_world_m, scale(t.v_world_m_s, t_s - t.at_s)), t.v_world_m_s)
             for t in self._tracks
@@ -168,7 +168,7 @@ class Perception:
         )
 
     def _lens(self, found: Detections) -> Intrinsics:
-        """Return the intrinsics of a picture: as measured, as the camera says, or by its field."""
+        """Return the intrinsics of a frame: as measured, as the camera says, or by its field."""
         width_px, height_px = found.width_px, found.height_px
         if found.lens is not None:
             measured, field_rad = self._measured, self._field_rad
@@ -184,7 +184,7 @@ class Perception:
 def _deviations(track: Track, p_camera: Vec3) -> tuple[float, float]:
     """Return how well a face's place is known, across and along the view.
 
-    The filter knows of what changes from picture to picture; that this person's face is
+    The filter knows of what changes from frame to frame; that this person's face is
     not of the usual size is the same in all of them.
     """
     way = sub(track.p_world_m, p_camera)
@@ -197,7 +197,7 @@ def _deviations(track: Track, p_camera: Vec3) -> tuple[float, float]:
 
 
 def _bodies(tracks: tuple[Track, ...], p_camera: Vec3) -> Bodies:
-    """List faces and moving things alike; a spin seen in the picture is about the view line."""
+    """List faces and moving things alike; a spin seen in the image is about the view line."""
     spins = [
         scale(unit(sub(track.p_world_m, p_camera)), track.sighting.spin_rad_s) for track in tracks
     ]

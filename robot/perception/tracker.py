@@ -1,4 +1,4 @@
-"""Who is who from picture to picture: identities, places and velocities of what is seen.
+"""Who is who from frame to frame: identities, places and velocities of what is seen.
 
 World frame, metres. Every sighting brings its own uncertainty, which along the line of
 view may be many times that across it; a pair of track and sighting is judged by the
@@ -26,14 +26,14 @@ _NEAREST_M = 0.05
 
 @dataclass(slots=True)
 class LocalisedDetection:
-    """One thing as one picture shows it, placed in the world.
+    """One thing as one frame shows it, placed in the world.
 
     R_world_face: axes of a face, None of anything else
     face_length: of a face, in lengths of the canonical one
     depth_measured: whether the distance was measured by the camera; else a face's is from
         its size and a thing's is assumed
     across_sd_m, along_sd_m: standard deviations of the place, across and along the view
-    v_world_m_s: velocity as measured in the picture, None where only the place is known;
+    v_world_m_s: velocity as measured in the image, None where only the place is known;
         across_sd_m_s, along_sd_m_s: its standard deviations
     size_depth: of a face, its distance if it were of an adult's size, over the distance
         measured; None where the camera measured none
@@ -122,7 +122,7 @@ class Tracker:
     def step(
         self, sightings: list[LocalisedDetection], p_world_camera_m: Vec3, t_s: float
     ) -> tuple[Track, ...]:
-        """Join one picture's sightings to the tracks; give those that are there now."""
+        """Join one image's sightings to the tracks; give those that are there now."""
         par = self._params
         for track in self._tracks:
             track.filter.predict(t_s - track.at_s, seen=track.seen_s == track.at_s)
@@ -172,7 +172,7 @@ class Tracker:
     def _gate_m(self, track: Track, sighting: LocalisedDetection, far_m: float) -> float:
         """Return the farthest from its expected place that something is taken for the same.
 
-        A detector that tells things apart in the picture has already judged; what it gave
+        A detector that tells things apart in the image has already judged; what it gave
         another number is the same only about where the track's own outline is.
         """
         widest = self._params.gate_m * max(1.0, far_m)

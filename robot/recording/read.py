@@ -115,7 +115,7 @@ class RunRecording:
         return f"{name} lacks {lost} ticks that could not be kept" if lost else ""
 
     def ticks(self) -> Iterator[Tick]:
-        """Return the ticks, bit for bit, but for detections and pictures (``detections=None``).
+        """Return the ticks, bit for bit, but for detections and frames (``detections=None``).
 
         Raises:
             BadRecording: the file is damaged.
@@ -144,17 +144,17 @@ class RunRecording:
                 before_s = moment.tick.t_s
             yield moment
 
-    def pictures(self) -> Iterator[tuple[float, bytes]]:
-        """Return the camera's pictures: time of the exposure and JPEG.
+    def frames(self) -> Iterator[tuple[float, bytes]]:
+        """Return the camera's frames: time of the exposure and JPEG.
 
         Raises:
             BadRecording: the file is damaged.
         """
-        for _, data in self._messages({fmt.PICTURE}):
+        for _, data in self._messages({fmt.FRAME}):
             with _damage(self.path):
                 message = orjson.loads(data)
-                picture = float(message["captured_s"]), base64.b64decode(message["data"])
-            yield picture
+                frame = float(message["captured_s"]), base64.b64decode(message["data"])
+            yield frame
 
     def health(self) -> Iterator[dict[str, Any]]:
         """Return the bus counts and the servos' figures, as recorded once a second.

@@ -47,11 +47,11 @@ class RecordRouter:
         self._faces = [face["p_world_m"] for face in data["faces"]]
         self._add(fmt.PERCEPT, data)
 
-    def picture(self, captured_s: float, jpeg: bytes) -> None:
-        """Write a picture of the camera."""
+    def frame(self, captured_s: float, jpeg: bytes) -> None:
+        """Write an image of the camera."""
         first_s = self._first_s if self._first_s is not None else captured_s
         exposed_ns = self._writer.time_ns(captured_s - first_s)
-        self._add(fmt.PICTURE, viewers.image(jpeg, captured_s, exposed_ns))
+        self._add(fmt.FRAME, viewers.image(jpeg, captured_s, exposed_ns))
 
     def health(self, bus: BusHealth, lost: int) -> None:
         """Write the counts of the bus and the servos' figures of the newest tick."""

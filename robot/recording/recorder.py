@@ -18,8 +18,8 @@ from gazerig.gaze.types import Percept
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.recording import writer_process as writer
+from gazerig.robot.recording.frame_encoder import FrameEncoder
 from gazerig.robot.recording.joint_recorder import JointRecorder
-from gazerig.robot.recording.picture_encoder import PictureEncoder
 from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text, started_ns
 from gazerig.robot.recording.tick_record import BodyRecord, MeasuredJoints, flat, flat_percept
 from gazerig.robot.recording.writer_client import WriterClient
@@ -51,7 +51,7 @@ class Recorder:
         self._health: Callable[[], BusHealth] = _no_counts
         self._over = over
         self._link = WriterClient(patient)
-        self._pictures = PictureEncoder(info.pictures_hz, at_once=patient)
+        self._frames = FrameEncoder(info.pictures_hz, at_once=patient)
         self._body_records: list[BodyRecord] = []
         self._percept: Percept | None = None
         self._percepts = 0
@@ -79,7 +79,7 @@ class Recorder:
             os.close(file_fd)
         self._link.post(writer.BEGIN, (as_text(self._info), started_ns(self._info)))
         self._link.flush()
-        self._pictures.start()
+        self._frames.start()
 
     def begin(self) -> None:
         """Replace an older recording, now that the run has begun.
@@ -126,8 +126,8 @@ class Recorder:
         known = number is not None or tick.percept is None
         if not known or not self._link.post(writer.TICK, flat(tick, number, dt_s, before)):
             self.lost += 1
-        self._pictures.look(tick)
-        self._post_pictures()
+        self._frames.look(tick)
+        self._post_frames()
         if tick.t_s - self._checked_s >= _HEALTH_S:
             self._checked_s = tick.t_s
             self._link.post(writer.HEALTH, (tuple(self._health()), self.lost))
@@ -151,8 +151,8 @@ class Recorder:
 
         stopped_by: what ended the run; tx_sha256: of all bytes on an emulated bus
         """
-        self._pictures.stop()
-        self._post_pictures()
+        self._frames.stop()
+        self._post_frames()
         self._link.drain()  # there is always room for how it ended
         end = RunEnd(stopped_by, self.lost, self._seconds, tx_sha256 or "")
         self._link.post(writer.END, {name: getattr(end, name) for name in RunEnd.__slots__})
@@ -167,10 +167,10 @@ class Recorder:
         done = self._link.done
         if done is None:
             return f"recording in {self._path} is not whole: {self._link.failed}"
-        pictures = f", {done.pictures} pictures" if done.pictures else ""
+        frames = f", {done.frames} frames" if done.frames else ""
         lost = f"; {self.lost} ticks could not be kept" if self.lost else ""
         size_mb = done.size / 1e6
-        return f"{done.ticks} ticks{pictures} ({size_mb:.1f} MB) recorded in {self._path}{lost}"
+        return f"{done.ticks} ticks{frames} ({size_mb:.1f} MB) recorded in {self._path}{lost}"
 
     @property
     def unwritten(self) -> Path | None:
@@ -187,9 +187,9 @@ class Recorder:
             self._percept, self._percepts = percept, self._percepts + 1
         return self._percepts
 
-    def _post_pictures(self) -> None:
-        for picture in self._pictures.taken():
-            self._link.post(writer.PICTURE, picture)
+    def _post_frames(self) -> None:
+        for frame in self._frames.taken():
+            self._link.post(writer.FRAME, frame)
 
 
 def _no_counts() -> BusHealth:

@@ -1,4 +1,4 @@
-"""Shows a recording on the page: what the player says, as snapshots, pictures and a slider."""
+"""Shows a recording on the page: what the player says, as snapshots, frames and a slider."""
 
 import json
 import threading
@@ -39,7 +39,7 @@ class Replay:
         self._clock = clock
         self._player = PlaybackClock(frames.duration_s, frames.marks)
         self._lock = threading.Lock()
-        self._number, self._picture = -1, -1
+        self._number, self._frame = -1, -1
         self._still = 0
         self._missing: int | None = None
         self._told: PlaybackState | None = None
@@ -78,7 +78,7 @@ class Replay:
         with self._lock:
             state = self._player.state(now_s)
         self._show_frames(screen, self._frames.at(state.at_s))
-        self._show_picture(screen, state.at_s)
+        self._show_frame(screen, state.at_s)
         if self._due(state, now_s):
             self._tell(screen, state, now_s)
         return state
@@ -114,12 +114,12 @@ class Replay:
         elif screen.send(self._frames.recalled(self._missing, self._number)):
             self._missing = None
 
-    def _show_picture(self, screen: Screen, at_s: float) -> None:
+    def _show_frame(self, screen: Screen, at_s: float) -> None:
         number = self._frames.frame_at(at_s)
-        if number is None or number == self._picture:
+        if number is None or number == self._frame:
             return
-        if screen.send(FRAME + self._frames.picture(number)):
-            self._picture = number
+        if screen.send(FRAME + self._frames.frame(number)):
+            self._frame = number
 
     def _due(self, state: PlaybackState, now_s: float) -> bool:
         """Return whether the page is to know: at once what a person changed, else now and then."""

@@ -7,7 +7,7 @@ again in the shapes that viewers draw (Foxglove documentation, message schemas).
 from typing import Any, NamedTuple
 
 TICK, PERCEPT, HEALTH = "/rig/tick", "/rig/percept", "/rig/health"
-PICTURE, LOG, ORDER = "/camera/picture", "/log", "/rig/order"
+FRAME, LOG, ORDER = "/camera/picture", "/log", "/rig/order"
 JOINT_STATES, TRANSFORMS, SCENE = "/joint_states", "/tf", "/scene"
 
 RUN, END = "gazerig.run", "gazerig.end"
@@ -125,7 +125,7 @@ _PERCEPT = _says(
             along_sd_m=_NUMBER,
         )),
     ),
-    "what one picture showed, placed in the world by the head's pose at its capture",
+    "what one frame showed, placed in the world by the head's pose at its capture",
 )  # fmt: skip
 _HEALTH = _says(
     _object(
@@ -169,7 +169,7 @@ SCHEMAS: dict[str, tuple[str, Schema]] = {
     HEALTH: ("gazerig.Health", _HEALTH),
     ORDER: ("gazerig.Order", _ORDER),
     LOG: ("foxglove.Log", _LINE),
-    PICTURE: ("foxglove.CompressedImage", _IMAGE),
+    FRAME: ("foxglove.CompressedImage", _IMAGE),
     JOINT_STATES: ("foxglove.JointStates", _STATES),
     TRANSFORMS: ("foxglove.FrameTransforms", _FRAMES),
     SCENE: ("foxglove.SceneUpdate", _ENTITIES),

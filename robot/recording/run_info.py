@@ -22,7 +22,7 @@ class RunInfo:
     config_yaml: everything in force at the start, of one piece; walk_yaml: the face walk's file
     scene: what was simulated, None where a camera looked; eyes: what looked, in words
     mock: emulated servos; fast: simulated time
-    rate_hz: control rate at the start; pictures_hz: rate of the recorded pictures
+    rate_hz: control rate at the start; pictures_hz: rate of the recorded frames
     started_utc: wall clock at the start, ISO 8601
     versions: name -> version of the packages whose arithmetic counts
     """

@@ -20,10 +20,10 @@ _WHOLE_NS = 1_000_000_000
 
 
 class WrittenFile(NamedTuple):
-    """What is in a recording: ticks, pictures, bytes."""
+    """What is in a recording: ticks, frames, bytes."""
 
     ticks: int
-    pictures: int
+    frames: int
     size: int
 
 
@@ -57,7 +57,7 @@ class RunWriter:
     def written(self) -> WrittenFile:
         """Count what is in the file."""
         count = self._counts.get
-        return WrittenFile(count(fmt.TICK, 0), count(fmt.PICTURE, 0), self._file.tell())
+        return WrittenFile(count(fmt.TICK, 0), count(fmt.FRAME, 0), self._file.tell())
 
     def time_ns(self, at_s: float) -> int:
         """Return the wall clock at a time since the first tick."""

@@ -1,7 +1,7 @@
 """A recording as the page shows it: snapshots made once, packed small, found by their time.
 
 Some 50 snapshots a second are kept, each as the message that goes to the page, compressed;
-the camera's pictures lie in a file without a name that goes with the program.
+the camera's frames lie in a file without a name that goes with the program.
 """
 
 import tempfile
@@ -35,7 +35,7 @@ _TELL_EVERY = 50
 
 
 class SnapshotIndex:
-    """The snapshots and pictures of one recording.
+    """The snapshots and images of one recording.
 
     duration_s: from the first tick to the last; marks: what can be stepped to
     """
@@ -43,7 +43,7 @@ class SnapshotIndex:
     def __init__(
         self,
         ticks: Iterable[Tick],
-        pictures: Iterable[tuple[float, bytes]],
+        frames: Iterable[tuple[float, bytes]],
         rate_hz: float,
         character: str = "",
         rig: ShownRig | None = None,
@@ -65,11 +65,11 @@ class SnapshotIndex:
         self._read_ticks(ticks, SnapshotBuilder(rate_hz, rig), character, progress)
         if not self._packed:
             raise SetupError("the recording holds no tick: there is nothing to show")
-        self._picture_times, self._places = array("d"), array("Q", (0,))
-        self._pictures = tempfile.TemporaryFile()  # noqa: SIM115  # open as long as the frames are
-        for t_s, jpeg in pictures:
-            self._picture_times.append(t_s - self._start_s)
-            self._pictures.write(jpeg)
+        self._frame_times, self._places = array("d"), array("Q", (0,))
+        self._frames = tempfile.TemporaryFile()  # noqa: SIM115  # open as long as the frames are
+        for t_s, jpeg in frames:
+            self._frame_times.append(t_s - self._start_s)
+            self._frames.write(jpeg)
             self._places.append(self._places[-1] + len(jpeg))
 
     def __len__(self) -> int:
@@ -109,18 +109,18 @@ class SnapshotIndex:
         return pack(shown)
 
     def frame_at(self, at_s: float) -> int | None:
-        """Return the number of the picture in force at a time, None before the first."""
-        number = bisect_right(self._picture_times, at_s + 1e-9) - 1
+        """Return the number of the frame in force at a time, None before the first."""
+        number = bisect_right(self._frame_times, at_s + 1e-9) - 1
         return number if number >= 0 else None
 
-    def picture(self, number: int) -> bytes:
-        """Return a picture as JPEG."""
-        self._pictures.seek(self._places[number])
-        return self._pictures.read(self._places[number + 1] - self._places[number])
+    def frame(self, number: int) -> bytes:
+        """Return a frame as JPEG."""
+        self._frames.seek(self._places[number])
+        return self._frames.read(self._places[number + 1] - self._places[number])
 
     def close(self) -> None:
         """Free the frames."""
-        self._pictures.close()
+        self._frames.close()
 
     def _read_ticks(
         self,

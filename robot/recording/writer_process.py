@@ -23,7 +23,7 @@ from gazerig.robot.recording.run_info import RunEnd
 from gazerig.robot.recording.run_writer import RunWriter
 
 MORE, LAST = b"+", b"."
-BEGIN, TICK, PERCEPT, PICTURE, HEALTH, END = "begin", "tick", "percept", "picture", "health", "end"
+BEGIN, TICK, PERCEPT, FRAME, HEALTH, END = "begin", "tick", "percept", "picture", "health", "end"
 """What may be handed over."""
 FAILED, DONE = "failed", "done"
 """What is answered: why nothing more can be written; what was written."""
@@ -85,8 +85,8 @@ def _take(scribe: RecordRouter, kind: str, values: Any) -> None:
         scribe.tick(values)
     elif kind == PERCEPT:
         scribe.percept(values)
-    elif kind == PICTURE:
-        scribe.picture(*values)
+    elif kind == FRAME:
+        scribe.frame(*values)
     elif kind == HEALTH:
         counts, lost = values
         scribe.health(BusHealth(*counts), lost)

@@ -41,7 +41,7 @@ class Comparison(NamedTuple):
 
     differences: tuple[MeasureDifference, ...]
     page: Path
-    pictures: tuple[Path, ...]
+    figures: tuple[Path, ...]
     data: Path
     warning: str
 
@@ -68,9 +68,9 @@ def compare(
         Shown(about.name, run, colour, about.model)
         for about, run, colour in zip(abouts, runs, COLOURS, strict=True)
     ]
-    pictures = drawn(shown, progress)
-    page = compare_page(abouts, runs, differences, pictures)
-    written = write_all(out, page, pictures, [_numbers(d, runs) for d in differences], force)
+    figures = drawn(shown, progress)
+    page = compare_page(abouts, runs, differences, figures)
+    written = write_all(out, page, figures, [_numbers(d, runs) for d in differences], force)
     return Comparison(differences, out, *written, mixed(abouts, runs))
 
 

@@ -8,7 +8,7 @@ from gazerig.robot.control.feedback_basis import Basis
 from gazerig.robot.report.gaze_trace import GazeTrace
 from gazerig.robot.report.norm_bands import GROUPS
 from gazerig.robot.report.page import (
-    Picture,
+    Figure,
     banner,
     left_out,
     line_of,
@@ -96,7 +96,7 @@ class ComparedSection(NamedTuple):
 
     name: str
     rows: tuple[ComparedRow, ...]
-    pictures: tuple[Picture, ...]
+    figures: tuple[Figure, ...]
     left_out: tuple[str, ...]
     basis: tuple[str, ...]
 
@@ -105,14 +105,14 @@ def compare_page(
     abouts: tuple[RunHeader, RunHeader],
     runs: Sequence[GazeTrace],
     differences: Sequence[MeasureDifference],
-    pictures: Sequence[Picture],
+    figures: Sequence[Figure],
 ) -> str:
     """Return the page as HTML that needs no other file."""
     sections = tuple(
         ComparedSection(
             group,
             tuple(_row(d, abouts) for d in differences if d.a.band.group == group),
-            tuple(p for p in pictures if p.drawing.group == group),
+            tuple(p for p in figures if p.drawing.group == group),
             _left_out(abouts, runs, group),
             tuple(_basis(run.joints.basis(group)) for run in runs),
         )

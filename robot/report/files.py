@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gazerig.drivers.file_output import make_folder, refuse_existing, write_file
-from gazerig.robot.report.page import Picture
+from gazerig.robot.report.page import Figure
 
 
 def numbers_file(out: Path) -> Path:
@@ -16,11 +16,11 @@ def numbers_file(out: Path) -> Path:
 def write_all(
     out: Path,
     page: str,
-    pictures: Sequence[Picture],
+    figures: Sequence[Figure],
     numbers: Sequence[dict[str, object]],
     force: bool = False,
 ) -> tuple[tuple[Path, ...], Path]:
-    """Write page, pictures and numbers; give the pictures' paths and that of the numbers.
+    """Write page, figures and numbers; give the figures' paths and that of the numbers.
 
     force: replace files that are there
 
@@ -28,11 +28,11 @@ def write_all(
         SetupError: something is there already or cannot be written.
     """
     folder, data = out.with_name(f"{out.stem}_figures"), numbers_file(out)
-    paths = tuple(folder / f"{picture.drawing.key}.png" for picture in pictures)
+    paths = tuple(folder / f"{figure.drawing.key}.png" for figure in figures)
     refuse_existing(*paths, data, out, force=force)
     make_folder(folder)
-    for path, picture in zip(paths, pictures, strict=True):
-        write_file(path, picture.png, force)
+    for path, figure in zip(paths, figures, strict=True):
+        write_file(path, figure.png, force)
     write_file(data, json.dumps(list(numbers), indent=1) + "\n", force)
     write_file(out, page, force)
     return paths, data

@@ -1,4 +1,4 @@
-"""The page of a report: words, numbers and pictures put into the HTML templates."""
+"""The page of a report: words, numbers and figures put into the HTML templates."""
 
 from base64 import b64encode
 from collections import Counter
@@ -20,7 +20,7 @@ from gazerig.robot.report.statistics import MeasureResult
 _CLASSES = {"pass": "pass", "outside": "outside", "too few events": "few"}
 
 
-class Picture(NamedTuple):
+class Figure(NamedTuple):
     """A drawn figure, and its caption for the runs in it."""
 
     drawing: Drawing
@@ -67,13 +67,13 @@ class PageSection(NamedTuple):
 
     name: str
     lines: tuple[TextLine, ...]
-    pictures: tuple[Picture, ...]
+    figures: tuple[Figure, ...]
     left_out: tuple[str, ...]
     basis: Basis
 
 
 def report_page(
-    about: RunHeader, run: GazeTrace, findings: Sequence[MeasureResult], pictures: Sequence[Picture]
+    about: RunHeader, run: GazeTrace, findings: Sequence[MeasureResult], figures: Sequence[Figure]
 ) -> str:
     """Return the page of one run as HTML that needs no other file."""
     styles = about.styles | {f"conversation {run.mode}"} | run.joints.styles
@@ -81,7 +81,7 @@ def report_page(
         PageSection(
             group,
             tuple(line_of(f, styles) for f in findings if f.band.group == group),
-            tuple(p for p in pictures if p.drawing.group == group),
+            tuple(p for p in figures if p.drawing.group == group),
             left_out(run.joints, group),
             run.joints.basis(group),
         )

@@ -22,7 +22,7 @@ from gazerig.robot.report import (
 from gazerig.robot.report.files import write_all
 from gazerig.robot.report.gaze_trace import GazeTrace, GazeTraceBuilder
 from gazerig.robot.report.norm_bands import BY_KEY, applies
-from gazerig.robot.report.page import Picture, report_page
+from gazerig.robot.report.page import Figure, report_page
 from gazerig.robot.report.plotting import COLOURS, Drawing, Shown, caption_of, png
 from gazerig.robot.report.run_header import RunHeader
 from gazerig.robot.report.statistics import MeasuredValue, MeasureResult, judged
@@ -46,7 +46,7 @@ class Report(NamedTuple):
 
     findings: tuple[MeasureResult, ...]
     page: Path
-    pictures: tuple[Path, ...]
+    figures: tuple[Path, ...]
     data: Path
 
 
@@ -73,9 +73,9 @@ def report_of(
         SetupError: a file cannot be written.
     """
     findings = found(run)
-    pictures = drawn([Shown(about.name, run, COLOURS[0], about.model)], progress)
-    page = report_page(about, run, findings, pictures)
-    written = write_all(out, page, pictures, [_numbers(f, run) for f in findings], force)
+    figures = drawn([Shown(about.name, run, COLOURS[0], about.model)], progress)
+    page = report_page(about, run, findings, figures)
+    written = write_all(out, page, figures, [_numbers(f, run) for f in findings], force)
     return Report(findings, out, *written)
 
 
@@ -118,16 +118,16 @@ def found(run: GazeTrace) -> tuple[MeasureResult, ...]:
     return tuple(judged(m, BY_KEY[m.key]) for m in measured(run))
 
 
-def drawn(runs: Sequence[Shown], progress: Progress) -> tuple[Picture, ...]:
+def drawn(runs: Sequence[Shown], progress: Progress) -> tuple[Figure, ...]:
     """Draw every figure of one run, or of two beside each other, of those that it can show."""
-    pictures = []
+    figures = []
     for count, drawing in enumerate(DRAWINGS):
         progress(DRAWING, count / len(DRAWINGS))
         able = [shown for shown in runs if not shown.run.joints.left_out(drawing.key)]
         if able:
-            pictures.append(Picture(drawing, png(drawing, able), caption_of(drawing, able)))
+            figures.append(Figure(drawing, png(drawing, able), caption_of(drawing, able)))
     progress(DRAWING, 1.0)
-    return tuple(pictures)
+    return tuple(figures)
 
 
 def _numbers(finding: MeasureResult, run: GazeTrace) -> dict[str, object]:

@@ -192,12 +192,12 @@ class Guard:
         return any(self._gentle)
 
     def check(
-        self, desired_rad: JointAngles, joints: JointState, picture_age_s: float, t_s: float
+        self, desired_rad: JointAngles, joints: JointState, frame_age_s: float, t_s: float
     ) -> GuardResult:
         """Return what may be sent now.
 
         desired_rad: any numbers at all
-        picture_age_s: age of the newest picture; infinity before the first
+        frame_age_s: age of the newest frame; infinity before the first
         """
         if True in joints.rearmed:
             self._rearm(joints)
@@ -215,7 +215,7 @@ class Guard:
         if self._collisions:
             self._collisions.look(self._motion, desired_rad, joints.position_rad, self._held)
         stale_s = t_s - self._params.joint_timeout_ms / 1e3
-        blind = not picture_age_s <= self._params.frame_timeout_ms / 1e3
+        blind = not frame_age_s <= self._params.frame_timeout_ms / 1e3
         usual = self._all_well(joints)
         far, command, watched = self._stuck.far_rad, self._motion.command, self._stuck.watched
         columns = zip(desired_rad, joints.position_rad, joints.measured_s, strict=True)
@@ -331,7 +331,7 @@ class Guard:
             return _Hold("outside its new range", end, True, "slowly")
         if not isfinite(desired):
             return _Hold("not finite")
-        return _Hold("stale picture") if unseen else None
+        return _Hold("stale frame") if unseen else None
 
     def _is_stuck(self, i: int, joints: JointState, fresh: bool) -> bool:
         """Return whether a joint is told to move and does not."""

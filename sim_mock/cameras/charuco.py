@@ -56,7 +56,7 @@ class BoardCamera:
         self.params, self.lens, self.board = params, lens, board
         self._rng = rng
         edge = round(_PAPER_EDGE_MM * _TEXTURE_PX_PER_MM)
-        drawn = board.picture(_TEXTURE_PX_PER_MM).astype(np.float32) / 255.0
+        drawn = board.image(_TEXTURE_PX_PER_MM).astype(np.float32) / 255.0
         grey = params.black + (params.white - params.black) * drawn
         self._paper = cv2.copyMakeBorder(
             grey, edge, edge, edge, edge, cv2.BORDER_CONSTANT, value=params.white

@@ -1,4 +1,4 @@
-"""Camera pictures to JPEG beside the control loop: now and then one, in a thread of its own.
+"""Camera frames to JPEG beside the control loop: now and then one, in a thread of its own.
 
 The encoder lets go of the interpreter while it works, so the loop does not wait for it.
 """
@@ -13,7 +13,7 @@ from gazerig.robot.control.tick import Tick
 from gazerig.robot.dashboard.camera_overlay import encode
 
 
-class PictureEncoder:
+class FrameEncoder:
     """Encodes the frames of ticks as JPEG, at a given rate."""
 
     def __init__(self, rate_hz: float, at_once: bool = False) -> None:
@@ -34,7 +34,7 @@ class PictureEncoder:
     def start(self) -> None:
         """Begin to encode."""
         if self._every_s < inf and not self._at_once:
-            self._thread = threading.Thread(target=self._work, name="picture encoder", daemon=True)
+            self._thread = threading.Thread(target=self._work, name="frame encoder", daemon=True)
             self._thread.start()
 
     def look(self, tick: Tick) -> None:
@@ -45,7 +45,7 @@ class PictureEncoder:
         self._number = found.number
         if found.captured_s < self._due_s or self._every_s == inf:
             return
-        # A picture that came late does not put off those that follow.
+        # A frame that came late does not put off those that follow.
         late_s = found.captured_s - self._due_s
         began_s = self._due_s if late_s < self._every_s else found.captured_s
         self._due_s = began_s + self._every_s - 1e-3
