@@ -1,122 +1,31 @@
-"""Tuning a running rig from a shell: gazerig ctl get, set, save ... on a rig in another process.
-
-``python tests/test_cli_tune.py RIG`` is that process: a loop before an emulated bus, in simulated
-time that passes slower than real, so that it leaves the processor to the commands.
-"""
+"""Tuning a running rig from a shell: gazerig ctl get, set, save ... on a rig in another process."""
 
 import contextlib
 import io
 import json
 import os
-import shutil
-import signal
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
-from present import present
+from tuned_rig import Running, a_rig, a_rig_beside
 from typer.testing import CliRunner
 
-from gazerig.config.load import ConfigError
 from gazerig.config.parameters import Parameter, parameters
-from gazerig.config.save import copy_shipped
 from gazerig.config.schema import load_rig
-from gazerig.drivers.errors import SetupError
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.param_store import ParamStore
-from gazerig.robot.cli.entry_point import MOVED, QUICK, as_now, is_quick
 from gazerig.robot.cli.entry_point import main as quick_main
-from gazerig.robot.cli.lead import app as lead_app
-from gazerig.robot.cli.lead import read_point
-from gazerig.robot.cli.tune import app, ctl, read_pairs, read_value, state_lines
-from gazerig.robot.control.loop import Tick
-from gazerig.robot.control.loop import run as run_loop
-from gazerig.robot.model import stop_latch
+from gazerig.robot.cli.tune import app, state_lines
 from gazerig.robot.remote.client import RobotClient, running
-from gazerig.robot.remote.live_server import LiveServer
 
 GAZERIG = (
     "import sys; sys.argv[0] = 'gazerig'; from gazerig.robot.cli.entry_point import main; main()"
 )
 SPEED = "gaze.saccade.max_speed_deg_s"
 RATE = "loop.rate_hz"
-PACE_S = 0.02  # real seconds a tick
-
-
-def serve(path: Path) -> None:
-    """Run until SIGTERM; says what the rig says on standard error."""
-    stop_latch.MIN_HOLD_S = stop_latch.MIN_RESUME_GAP_S = 0.0  # time is slow here
-    over: list[str] = []
-    signal.signal(signal.SIGTERM, lambda *_: over.append("SIGTERM"))
-    made = assemble(load_rig(str(path)), RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
-    robot = made.robot
-
-    def say(line: str) -> None:
-        print(line, file=sys.stderr, flush=True)
-
-    about = {"rig": str(path), "pid": os.getpid()}
-    tuning = ParamStore(made.live, robot.command, str(path))
-    live = LiveServer(robot, tuning, (ConfigError,), made.clock, about, say)
-
-    def watch(tick: Tick) -> None:
-        live.update(tick)
-        for event in tick.events:
-            say(event)
-        time.sleep(PACE_S)
-
-    robot.start(made.clock)
-    live.open()
-    print("open", flush=True)
-    try:
-        run_loop(robot, made.clock, made.loop, lambda _: over[0] if over else None, watch)
-    finally:
-        live.close()
-        robot.stop()
-        made.close()
-
-
-class Running(NamedTuple):
-    """A rig in another process."""
-
-    process: subprocess.Popen[str]
-    path: Path
-    log: Path
-
-    def hears(self, words: str) -> bool:
-        """Wait until it says something."""
-        for _ in range(400):
-            if words in self.log.read_text(encoding="utf-8"):
-                return True
-            time.sleep(0.05)
-        return False
-
-
-@contextlib.contextmanager
-def a_rig() -> Iterator[Running]:
-    folder = Path(tempfile.mkdtemp(prefix="gz-", dir="/tmp"))
-    path, log = copy_shipped("desk", folder / "my.yaml"), folder / "log"
-    with log.open("w") as said:
-        process = subprocess.Popen(
-            [sys.executable, __file__, str(path)],
-            stdout=subprocess.PIPE,
-            stderr=said,
-            text=True,
-            env={**os.environ, "XDG_RUNTIME_DIR": str(folder)},
-        )
-        try:
-            assert process.stdout is not None
-            assert process.stdout.readline() == "open\n", log.read_text(encoding="utf-8")
-            yield Running(process, path, log)
-        finally:
-            process.terminate()
-            process.communicate(timeout=20.0)
-            shutil.rmtree(folder)
 
 
 ROOT = Path(__file__).parents[1]
@@ -304,25 +213,6 @@ def test_stop_stops_every_rig_that_runs() -> None:
         assert str(other.pid) in refused.stderr
 
 
-@contextlib.contextmanager
-def a_rig_beside() -> Iterator[subprocess.Popen[str]]:
-    """A second one whose sockets are in the same folder."""
-    folder = os.environ["XDG_RUNTIME_DIR"]
-    process = subprocess.Popen(
-        [sys.executable, __file__, str(Path(folder) / "my.yaml")],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-        env=dict(os.environ),
-    )
-    try:
-        assert process.stdout is not None and process.stdout.readline() == "open\n"
-        yield process
-    finally:
-        process.terminate()
-        process.communicate(timeout=20.0)
-
-
 def test_look_and_character() -> None:
     done = gazerig("ctl", "look", "1", "-0.2", "0.3", "--stay")
     assert done.returncode == 0 and "it looks there, until: gazerig ctl look free" in done.stderr
@@ -475,61 +365,3 @@ def test_without_a_rig_a_shell_completes_keys_of_the_shipped_one(
 def knobs_of_desk() -> tuple[Parameter, ...]:
     desk = load_rig("desk")
     return parameters(desk, desk)
-
-
-# Without a process
-
-
-@pytest.mark.parametrize(
-    ("text", "value"),
-    [
-        ("1", 1), ("1.5", 1.5), ("-3", -3), ("1e3", 1000.0), ("true", True), ("null", None),
-        ("markov", "markov"), ("'1'", "1"), ("[1, 2.5]", (1, 2.5)), ("{a: 1}", {"a": 1}),
-        ("", None), ("200 # Hz", 200), ("2026-01-31", "2026-01-31"),
-    ],
-)  # fmt: skip
-def test_values_are_read_as_in_the_file(text: str, value: object) -> None:
-    read = read_value("key", text)
-    assert read == value and type(read) is type(value)
-
-
-def test_pairs_and_points() -> None:
-    assert read_pairs(["a", "1", "b", "x"]) == {"a": 1, "b": "x"}
-    assert read_point(["1", "-0.5", "2e-1"]) == (1.0, -0.5, 0.2)
-    assert read_point(["free"]) is None
-    with pytest.raises(SetupError):
-        read_point(["1", "2"])
-
-
-def test_the_quick_way_knows_all_its_commands_and_no_other() -> None:
-    here = {c.name or c.callback.__name__ for c in app.registered_commands if c.callback}
-    groups = {present(group.typer_instance).info.name for group in app.registered_groups}
-    assert here | groups == QUICK
-    assert is_quick(["stop"], {}) and is_quick(["ctl", "set", "a", "1"], {})
-    for words in ([], ["run"], ["stop", "--help"], ["--debug", "stop"], ["ctl", "get", "--debug"]):
-        assert not is_quick(words, {})
-    for typed, quick in (
-        ("gazerig ctl set a", True),
-        ("gazerig st", False),
-        ("gazerig ctl", False),
-    ):
-        environ = {"_GAZERIG_COMPLETE": "complete_bash", "COMP_WORDS": typed}
-        assert is_quick([], environ) is quick
-
-
-def test_commands_of_before_work_and_name_their_new_place(
-    capfd: pytest.CaptureFixture[str],
-) -> None:
-    grouped = (*ctl.registered_commands, *lead_app.registered_commands)
-    names = {c.name or c.callback.__name__ for c in grouped if c.callback}
-    assert names - {"stop"} == MOVED
-    for name in sorted(MOVED):
-        assert as_now([name, "x"]) == ["ctl", name, "x"]
-        assert capfd.readouterr().err == f"gazerig {name} is now gazerig ctl {name}\n"
-    for words in ([], ["stop"], ["run"], ["ctl", "get"], ["--debug", "get"]):
-        assert as_now(words) == words
-    assert not capfd.readouterr().err
-
-
-if __name__ == "__main__":
-    serve(Path(sys.argv[1]))

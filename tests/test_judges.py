@@ -7,12 +7,11 @@ None of them knows that there are no servos. The older SDK lives beside the envi
 import os
 import subprocess
 import sys
-import termios
-import threading
 import time
 from pathlib import Path
 
 import pytest
+from judged_servos import BAUD, IDS, PLACES, SPECS, X430
 from starvation import eventually
 
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
@@ -21,14 +20,16 @@ from gazerig.sim_mock.pty.client import PtyBus
 
 pytestmark = pytest.mark.own_timeouts
 
+
 ROOT = Path(__file__).parents[1]
+
+
 OTHER_SDK = ROOT / ".venv" / "other-sdk"
-BAUD = 1_000_000
-IDS = (1, 2, 3)
-PLACES = (2048, 1000, 3000)
-SPECS = [(i, "xl330-m288", place) for i, place in zip(IDS, PLACES, strict=True)]
-X430 = [(11, "xl430-w250", 1024), (12, "xm430-w350", 2048)]
+
+
 ABSENT = {"acceleration_limit", "torque_limit", "moving_speed", "current_limit", "goal_current"}
+
+
 STEADY_STEPS = 12
 """Friction keeps a servo with factory gains so far from its goal."""
 
@@ -302,144 +303,3 @@ def test_the_vendors_easy_sdk(monkeypatch):
     port.let_pass(0.45)
     assert one.isLEDOn() == 0
     connector.closePort()
-
-
-# --- what else a client may do with a port
-
-
-PING = bytes.fromhex("FFFFFD0001030001194E")
-PONG = 14
-
-
-def answers(fd, expected, patience_s=5.0):
-    got, deadline = b"", time.monotonic() + patience_s
-    while len(got) < expected and time.monotonic() < deadline:
-        try:
-            got += os.read(fd, 4096)
-        except BlockingIOError:
-            time.sleep(0.001)
-    return len(got)
-
-
-@pytest.fixture(scope="module")
-def shared():
-    with PtyBus() as bus:
-        yield bus.start([*SPECS, *X430], baud=BAUD)
-
-
-@pytest.fixture
-def terminal(shared):
-    fd = os.open(shared, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-    yield fd
-    os.close(fd)
-
-
-def test_a_client_that_opens_a_file_and_sets_nothing(terminal):
-    os.write(terminal, PING)
-    assert answers(terminal, PONG) == PONG
-
-
-def test_bytes_one_by_one_and_packets_all_at_once(terminal):
-    for byte in PING:
-        os.write(terminal, bytes((byte,)))
-    assert answers(terminal, PONG) == PONG
-    os.write(terminal, PING * 20)
-    assert answers(terminal, 20 * PONG) == 20 * PONG
-    os.write(terminal, PING + PING[:4])
-    assert answers(terminal, PONG) == PONG
-    os.write(terminal, PING[4:])
-    assert answers(terminal, PONG) == PONG
-
-
-def test_flushes_breaks_and_modem_lines_do_no_harm(terminal):
-    termios.tcflush(terminal, termios.TCIOFLUSH)
-    termios.tcdrain(terminal)
-    termios.tcsendbreak(terminal, 0)
-    os.write(terminal, PING)
-    termios.tcdrain(terminal)
-    assert answers(terminal, PONG) == PONG
-
-
-def test_every_byte_value_passes_in_both_directions(terminal):
-    from fastcrc.crc16 import umts
-
-    for start in range(0, 256, 16):
-        values = bytes(range(start, start + 16))
-        head = b"\xff\xff\xfd\x00\x01" + (16 + 5).to_bytes(2, "little")
-        packet = head + b"\x03" + (224).to_bytes(2, "little") + values
-        os.write(terminal, packet + umts(packet).to_bytes(2, "little"))
-        assert answers(terminal, 11) == 11
-        packet = head[:5] + b"\x07\x00\x02" + (224).to_bytes(2, "little") + b"\x10\x00"
-        os.write(terminal, packet + umts(packet).to_bytes(2, "little"))
-        got, deadline = b"", time.monotonic() + 30.0
-        while len(got) < 27 and time.monotonic() < deadline:
-            try:
-                got += os.read(terminal, 4096)
-            except BlockingIOError:
-                time.sleep(0.001)
-        assert got[9:-2] == values
-
-
-def test_answers_that_a_client_did_not_read_are_not_the_next_ones(path):
-    fd = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-    os.write(fd, PING)
-    time.sleep(0.05)
-    os.close(fd)
-    time.sleep(0.05)
-    fd = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-    with pytest.raises(BlockingIOError):
-        os.read(fd, 100)
-    os.write(fd, PING)
-    assert answers(fd, 2 * PONG, 0.1) == PONG
-    os.close(fd)
-
-
-def test_a_client_killed_with_a_lock_leaves_the_port_to_the_next(path):
-    """A client locks the terminal for itself and dies; the lock goes with time."""
-    import fcntl
-
-    fd = os.open(path, os.O_RDWR | os.O_NOCTTY)
-    fcntl.ioctl(fd, termios.TIOCEXCL)
-    os.close(fd)
-    assert eventually(lambda: not locked(path))
-
-
-def locked(path):
-    """Return whether a terminal is locked, without being kept out by the lock oneself."""
-    import fcntl
-    import struct
-
-    try:
-        fd = os.open(path, os.O_RDWR | os.O_NOCTTY)
-    except OSError:
-        return True
-    try:
-        get_lock = 0x80045440  # TIOCGEXCL
-        return bool(struct.unpack("i", fcntl.ioctl(fd, get_lock, bytes(4)))[0])
-    finally:
-        os.close(fd)
-
-
-def test_two_threads_of_one_client_do_not_upset_the_server(path):
-    """Nonsense from one side, questions from the other: the questions are answered again after."""
-    stop = threading.Event()
-
-    def shout():
-        fd = os.open(path, os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
-        while not stop.is_set():
-            try:
-                os.write(fd, b"\xff\xff\xfd\x00\x01\x10")
-            except BlockingIOError:
-                time.sleep(0.001)
-        os.close(fd)
-
-    thread = threading.Thread(target=shout)
-    thread.start()
-    time.sleep(0.05)
-    stop.set()
-    thread.join()
-    time.sleep(0.1)
-    fd = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-    os.write(fd, PING)
-    assert answers(fd, PONG) == PONG
-    os.close(fd)

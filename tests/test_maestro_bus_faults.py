@@ -30,9 +30,6 @@ def held(bench):
     return bench
 
 
-# --- what goes wrong
-
-
 def test_a_restart_is_noticed_within_a_tick_and_held_anew_where_it_was(held):
     held.run(1.0, [5500, 5600, 6600])
     held.board.faults.command("brown-out")

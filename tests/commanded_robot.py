@@ -1,0 +1,37 @@
+"""A robot that runs tick by tick and is given commands."""
+
+from dataclasses import dataclass, field
+
+from desk import GAZE_JOINTS
+
+from gazerig.robot.app.assemble import Assembly
+from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.model.commands import (
+    Command,
+)
+
+YAW = GAZE_JOINTS.index("neck_yaw")
+
+
+@dataclass
+class Running:
+    """A simulated rig that ticks on when asked."""
+
+    made: Assembly
+    ticks: list[Tick] = field(default_factory=list)
+
+    def go(self, seconds: float) -> list[Tick]:
+        """Run on; give the new ticks."""
+        began = len(self.ticks)
+        self.count = run(
+            self.made.robot,
+            self.made.clock,
+            self.made.loop,
+            lambda s: "seconds" if s >= seconds else None,
+            self.ticks.append,
+        )
+        return self.ticks[began:]
+
+    def order(self, order: Command) -> None:
+        """Ask."""
+        self.made.robot.command(order)

@@ -1,0 +1,46 @@
+"""A simulated run before a face, to be exported."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gazerig.config.schema import load_rig
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.recording.gaze_angles import GazeAngles, trace_of
+from gazerig.robot.recording.gaze_labels import (
+    LabelledInterval,
+    Labels,
+    labels_of,
+    stretches_of,
+)
+
+RATE_HZ = 200.0
+
+
+def seen(scene: str, seconds: float) -> list[Tick]:
+    """Run a simulated head and give its ticks."""
+    made = assemble(load_rig("desk"), RunOptions(mock=True, fast=True, seed=0, scene=scene))
+    ticks: list[Tick] = []
+    made.robot.start(made.clock)
+    try:
+        run(made.robot, made.clock, made.loop, lambda s: "over" if s > seconds else None,
+            ticks.append)  # fmt: skip
+    finally:
+        made.robot.stop()
+        made.close()
+    return ticks
+
+
+class Run:
+    """One run with all that is made of it."""
+
+    def __init__(self, ticks: Sequence[Tick]) -> None:
+        self.ticks = ticks
+        self.trace: GazeAngles = trace_of(ticks)
+        self.labels: Labels = labels_of(self.trace)
+        self.stretches: tuple[LabelledInterval, ...] = stretches_of(self.trace, self.labels)
+
+    def onsets_s(self, event: str) -> np.ndarray:
+        return np.array([s.onset_s for s in self.stretches if s.event == event])

@@ -1,0 +1,61 @@
+"""Values, points and commands of gazerig ctl as they are typed, without a rig."""
+
+import pytest
+from present import present
+
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.cli.entry_point import MOVED, QUICK, as_now, is_quick
+from gazerig.robot.cli.lead import app as lead_app
+from gazerig.robot.cli.lead import read_point
+from gazerig.robot.cli.tune import app, ctl, read_pairs, read_value
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1", 1), ("1.5", 1.5), ("-3", -3), ("1e3", 1000.0), ("true", True), ("null", None),
+        ("markov", "markov"), ("'1'", "1"), ("[1, 2.5]", (1, 2.5)), ("{a: 1}", {"a": 1}),
+        ("", None), ("200 # Hz", 200), ("2026-01-31", "2026-01-31"),
+    ],
+)  # fmt: skip
+def test_values_are_read_as_in_the_file(text: str, value: object) -> None:
+    read = read_value("key", text)
+    assert read == value and type(read) is type(value)
+
+
+def test_pairs_and_points() -> None:
+    assert read_pairs(["a", "1", "b", "x"]) == {"a": 1, "b": "x"}
+    assert read_point(["1", "-0.5", "2e-1"]) == (1.0, -0.5, 0.2)
+    assert read_point(["free"]) is None
+    with pytest.raises(SetupError):
+        read_point(["1", "2"])
+
+
+def test_the_quick_way_knows_all_its_commands_and_no_other() -> None:
+    here = {c.name or c.callback.__name__ for c in app.registered_commands if c.callback}
+    groups = {present(group.typer_instance).info.name for group in app.registered_groups}
+    assert here | groups == QUICK
+    assert is_quick(["stop"], {}) and is_quick(["ctl", "set", "a", "1"], {})
+    for words in ([], ["run"], ["stop", "--help"], ["--debug", "stop"], ["ctl", "get", "--debug"]):
+        assert not is_quick(words, {})
+    for typed, quick in (
+        ("gazerig ctl set a", True),
+        ("gazerig st", False),
+        ("gazerig ctl", False),
+    ):
+        environ = {"_GAZERIG_COMPLETE": "complete_bash", "COMP_WORDS": typed}
+        assert is_quick([], environ) is quick
+
+
+def test_commands_of_before_work_and_name_their_new_place(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    grouped = (*ctl.registered_commands, *lead_app.registered_commands)
+    names = {c.name or c.callback.__name__ for c in grouped if c.callback}
+    assert names - {"stop"} == MOVED
+    for name in sorted(MOVED):
+        assert as_now([name, "x"]) == ["ctl", name, "x"]
+        assert capfd.readouterr().err == f"gazerig {name} is now gazerig ctl {name}\n"
+    for words in ([], ["stop"], ["run"], ["ctl", "get"], ["--debug", "get"]):
+        assert as_now(words) == words
+    assert not capfd.readouterr().err

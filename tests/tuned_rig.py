@@ -1,0 +1,123 @@
+"""A running rig in another process, to be tuned from a shell.
+
+``python tests/tuned_rig.py RIG`` is that process: a loop before an emulated bus, in simulated
+time that passes slower than real, so that it leaves the processor to the commands.
+"""
+
+import contextlib
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+from gazerig.config.load import ConfigError
+from gazerig.config.save import copy_shipped
+from gazerig.config.schema import load_rig
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.param_store import ParamStore
+from gazerig.robot.control.loop import Tick
+from gazerig.robot.control.loop import run as run_loop
+from gazerig.robot.model import stop_latch
+from gazerig.robot.remote.live_server import LiveServer
+
+PACE_S = 0.02  # real seconds a tick
+
+
+def serve(path: Path) -> None:
+    """Run until SIGTERM; says what the rig says on standard error."""
+    stop_latch.MIN_HOLD_S = stop_latch.MIN_RESUME_GAP_S = 0.0  # time is slow here
+    over: list[str] = []
+    signal.signal(signal.SIGTERM, lambda *_: over.append("SIGTERM"))
+    made = assemble(load_rig(str(path)), RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
+    robot = made.robot
+
+    def say(line: str) -> None:
+        print(line, file=sys.stderr, flush=True)
+
+    about = {"rig": str(path), "pid": os.getpid()}
+    tuning = ParamStore(made.live, robot.command, str(path))
+    live = LiveServer(robot, tuning, (ConfigError,), made.clock, about, say)
+
+    def watch(tick: Tick) -> None:
+        live.update(tick)
+        for event in tick.events:
+            say(event)
+        time.sleep(PACE_S)
+
+    robot.start(made.clock)
+    live.open()
+    print("open", flush=True)
+    try:
+        run_loop(robot, made.clock, made.loop, lambda _: over[0] if over else None, watch)
+    finally:
+        live.close()
+        robot.stop()
+        made.close()
+
+
+class Running(NamedTuple):
+    """A rig in another process."""
+
+    process: subprocess.Popen[str]
+    path: Path
+    log: Path
+
+    def hears(self, words: str) -> bool:
+        """Wait until it says something."""
+        for _ in range(400):
+            if words in self.log.read_text(encoding="utf-8"):
+                return True
+            time.sleep(0.05)
+        return False
+
+
+@contextlib.contextmanager
+def a_rig() -> Iterator[Running]:
+    folder = Path(tempfile.mkdtemp(prefix="gz-", dir="/tmp"))
+    path, log = copy_shipped("desk", folder / "my.yaml"), folder / "log"
+    with log.open("w") as said:
+        process = subprocess.Popen(
+            [sys.executable, __file__, str(path)],
+            stdout=subprocess.PIPE,
+            stderr=said,
+            text=True,
+            env={**os.environ, "XDG_RUNTIME_DIR": str(folder)},
+        )
+        try:
+            assert process.stdout is not None
+            assert process.stdout.readline() == "open\n", log.read_text(encoding="utf-8")
+            yield Running(process, path, log)
+        finally:
+            process.terminate()
+            process.communicate(timeout=20.0)
+            shutil.rmtree(folder)
+
+
+@contextlib.contextmanager
+def a_rig_beside() -> Iterator[subprocess.Popen[str]]:
+    """A second one whose sockets are in the same folder."""
+    folder = os.environ["XDG_RUNTIME_DIR"]
+    process = subprocess.Popen(
+        [sys.executable, __file__, str(Path(folder) / "my.yaml")],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+        env=dict(os.environ),
+    )
+    try:
+        assert process.stdout is not None and process.stdout.readline() == "open\n"
+        yield process
+    finally:
+        process.terminate()
+        process.communicate(timeout=20.0)
+
+
+if __name__ == "__main__":
+    serve(Path(sys.argv[1]))
