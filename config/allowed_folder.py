@@ -1,8 +1,8 @@
 """Files that a browser may name: shipped ones, and those in the rig's folder.
 
-Whoever steers a running rig from a page names characters, walks, profiles and files to save
-in. The program reads and writes them with the rights of its own user, so that only those in
-one folder may be named.
+A page that controls a running rig names characters, walks, profiles and files to save in. The
+program reads and writes them with the rights of its own user, so that only those in one folder
+may be named.
 """
 
 import os

@@ -195,7 +195,7 @@ def _frozen(params: type) -> Any:
 
 
 def _printable(text: str) -> str:
-    """Refuse text that cannot be shown, written to a file or told from other text."""
+    """Refuse text that cannot be shown, written to a file or distinguished from other text."""
     if len(text) > _LONGEST_TEXT:
         raise PydanticCustomError(
             "value_error", "", {"error": f"is longer than {_LONGEST_TEXT} characters; shorten it"}

@@ -22,7 +22,7 @@ from gazerig.config.renamed import renamed
 
 T = TypeVar("T")
 Check = Callable[[T], Iterable[tuple[str, str]]]
-"""Gives (dotted key path, rule that is broken) for what no single field can know."""
+"""Returns (dotted key path, broken rule) for rules between several fields."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,7 +1,7 @@
 """Every parameter of a rig: meaning, bounds, default, and when a change takes effect.
 
 A key is the dotted path of the YAML. A rig is changed by keys as a file would change it:
-what is wrong is said in the same words, and nothing is changed then. Pure.
+errors have the same texts, and nothing is changed then. Pure.
 
 A changed rig shares with the one it was made of every section in which nothing changed, and
 only what is not shared is checked and compared: a slider that is dragged makes ten rigs a
@@ -90,7 +90,7 @@ def value_of(rig: Rig, key: str) -> Value:
     """Return the value at a dotted key; of a group, a mapping.
 
     Raises:
-        gazerig.config.load.ConfigError: there is no such key; the message says which there are.
+        gazerig.config.load.ConfigError: there is no such key; the message lists those that exist.
     """
     key, value = renamed_key(key), rig
     for done, step in enumerate(steps := key.split(".")):
@@ -135,7 +135,7 @@ def changed(rig: Rig, changes: Mapping[str, Value]) -> Rig:
     mapping whose entries cannot be null.
 
     Raises:
-        gazerig.config.load.ConfigError: with every fault, in the words of loading a file.
+        gazerig.config.load.ConfigError: with every fault, as in loading a file.
     """
     changes = renamed_changes(changes)
     made = _judged(rig, changes)
@@ -157,7 +157,7 @@ def _judged(rig: Rig, changes: Mapping[str, Value]) -> Rig | None:
 
 
 def _weighed(rig: Rig, changes: Mapping[str, Value]) -> Rig:
-    """Return the changed rig, or raise every fault; all is checked again."""
+    """Return the changed rig with all rules checked, or raise every fault."""
     data, faults = plain(rig), []
     for key, value in changes.items():
         faults += _put(data, key, _frozen(value))

@@ -86,7 +86,7 @@ def renamed(root: Entry, into: type, faults: list[ConfigFault], report: bool = T
         root: the file's top level
         into: the Params dataclass that it is read into
         faults: takes what is wrong: a key under its old and its new name at once
-        report: say each old name once, with the file, the line and the new name
+        report: whether each old name is logged once, with the file, the line and the new name
     """
     table = _TABLES.get(into)
     return _renamed(root, table, (), faults, report) if table else root

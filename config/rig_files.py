@@ -1,7 +1,7 @@
 """The files of a running rig: read together, and written only if they can be loaded again.
 
 What is written starts from the text that was last read without a fault: a rig's file that
-somebody has spoilt by hand meanwhile is kept beside it, and is never the base of what is saved.
+was broken by hand meanwhile is kept beside it, and is never the base of what is saved.
 """
 
 import os
@@ -87,7 +87,7 @@ def save_copy(
     """Write values into a new copy of a rig's file, which is not there if that fails.
 
     Returns:
-        What ``save_over`` gives.
+        What ``save_over`` returns.
 
     Raises:
         gazerig.config.load.ConfigError: see gazerig.config.save.save; or ``to`` exists or is no

@@ -24,7 +24,7 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.file_input import read_limited
 
 Check = Callable[[str], Any]
-"""Loads a file by its path and gives what it holds; raises gazerig.config.load.ConfigError."""
+"""Loads a file by its path and returns its value; raises gazerig.config.load.ConfigError."""
 
 
 @dataclass(frozen=True, slots=True)

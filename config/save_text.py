@@ -1,7 +1,7 @@
 """Changing values inside YAML text; every other byte stays as it is.
 
 The text is parsed only to learn where each value stands. Comments, order, indentation,
-quotes, anchors and line ends survive because nobody writes them again.
+quotes, anchors and line ends survive because they are not rewritten.
 """
 
 import json

@@ -1,1 +1,1 @@
-"""Wires: servo buses, serial ports, cameras and detectors; imports vendor packages only."""
+"""I/O: servo buses, serial ports, cameras and detectors; imports only vendor packages."""

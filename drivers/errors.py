@@ -1,4 +1,4 @@
-"""What can go wrong at the wires, by what the caller can do about it."""
+"""Errors of the drivers, by what the caller can do about them."""
 
 
 class DriverError(Exception):
@@ -30,4 +30,4 @@ class BusLost(DriverError):
 
 
 class ServoFault(DriverError):
-    """A servo has latched a hardware error: stop, park what still moves, tell the person."""
+    """A servo has latched a hardware error: stop, park what still moves, report it."""

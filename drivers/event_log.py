@@ -1,4 +1,4 @@
-"""What has happened on the bus, as text, and how a servo is called in it."""
+"""Events of a bus as text, and the labels of servos in them."""
 
 from collections import deque
 from math import inf
@@ -8,11 +8,11 @@ if TYPE_CHECKING:  # the guardian, which names servos too, starts without numpy
     from gazerig.drivers.types import ServoConfig
 
 MOST = 200
-"""More than so many lines that nobody has asked for are not kept."""
+"""Most lines kept until they are drained."""
 
 
 class EventLog:
-    """Lines to be drained by whoever shows or records them."""
+    """Events as lines of text, drained by the status line, the page and the recorder."""
 
     def __init__(self) -> None:
         self._lines: deque[str] = deque(maxlen=MOST)
@@ -31,11 +31,11 @@ class EventLog:
 
 
 SELDOM_S = 10.0
-"""The same is not said again within such a time."""
+"""Shortest time between two lines of one kind."""
 
 
 class RateLimitedLog:
-    """Adds what happens again and again once in a while, and how often it has happened since."""
+    """Logs a repeated event at most every ``SELDOM_S``, with the number of repeats."""
 
     def __init__(self, log: EventLog) -> None:
         self._log = log
@@ -43,7 +43,7 @@ class RateLimitedLog:
         self._since: dict[str, int] = {}
 
     def add(self, text: str, now_s: float, kind: str = "") -> None:
-        """Add a line unless one of its kind was added of late; a later one tells how many."""
+        """Add a line unless one of its kind is recent; the next one counts those left out."""
         if now_s - self._said_s.get(kind, -inf) < SELDOM_S:
             self._since[kind] = self._since.get(kind, 0) + 1
             return
@@ -53,7 +53,7 @@ class RateLimitedLog:
 
 
 def servo_label(setup: "ServoConfig", noun: str = "servo") -> str:
-    """Return how people know a servo: its joint and its id, or its id where it has no name."""
+    """Return a servo's label for messages: its joint and id, or its id alone."""
     return f"{setup.name} ({noun} {setup.id})" if setup.name else f"{noun} {setup.id}"
 
 

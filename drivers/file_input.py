@@ -1,6 +1,6 @@
 """Reading files that a user named: regular files only, and never more than is wanted.
 
-A named pipe would be waited for, a device has no end, and opening a serial port moves its lines.
+A named pipe would block, a device has no end, and opening a serial port toggles its control lines.
 """
 
 import os

@@ -1,8 +1,8 @@
-"""Is it this computer that is late, or the bus? Pure.
+"""Whether this computer is late, or the bus. Pure.
 
 A busy computer looks like bad plugs: answers arrive after waiting for them has ended, and
-servos whose own watchdog was not fed stop. Answers that do arrive, whole and late, tell it
-from a servo that is silent.
+servos whose own watchdog was not fed stop. Answers that arrive whole but late distinguish it
+from a silent servo.
 """
 
 from collections import deque
@@ -44,7 +44,7 @@ class HostLateness:
         return self._last_s >= begin_s
 
     def forget(self) -> None:
-        """Begin to count again."""
+        """Reset the count."""
         self._late.clear()
 
     def busy(self, now_s: float) -> int:

@@ -18,9 +18,9 @@ as a rule, and while it lasts the servos of the other buses wait for their goals
 
 
 class BusShare(NamedTuple):
-    """One of the buses: what it is called, and which servos of the whole are on it.
+    """One of the buses: its name and its servos.
 
-    places: for each of its own servos the place in the whole
+    places: for each of its servos the index in the whole rig
     """
 
     name: str
@@ -39,7 +39,7 @@ class _PollTimer:
         return now_s >= self._due_s
 
     def update(self, feedback: Feedback, now_s: float) -> None:
-        """Record what it gave."""
+        """Record the feedback that it returned."""
         if len(feedback.missing) < len(feedback.at_s):
             self._in_vain = 0
             return
@@ -51,12 +51,12 @@ class _PollTimer:
 class MultiBus:
     """Buses that are opened, read, written and released together; implements ServoBus.
 
-    What one bus says or suffers stays its own: while one port is gone, the servos of the
+    Events and faults of one bus do not affect the others: while one port is gone, the servos of the
     others are read and moved as ever. A bus that gives up ends the run for all, as a head
     of which a part no longer obeys must not go on.
 
     Args:
-        shares: together they hold every place from 0 on, once.
+        shares: together they hold every index from 0 on, once.
 
     Raises:
         ValueError: they do not.
@@ -94,34 +94,34 @@ class MultiBus:
     def read(self, now_s: float) -> Feedback:
         """Read all servos of all buses.
 
-        A bus of which nobody answers is asked five times a second until somebody does: the
-        servos of the others are not to wait for it.
+        A bus without any answer is read only five times a second until a servo answers, so that
+        the servos of the others do not wait for it.
 
         Raises:
-            BusLost: nobody has answered on a bus for longer than its patience.
+            BusLost: no servo of a bus has answered for longer than its ``give_up_s``.
         """
-        told = list(self._nothing)
+        feedbacks = list(self._nothing)
         lost: list[BusLost] = []
         for i, (share, patience) in enumerate(zip(self._shares, self._patience, strict=True)):
             if not patience.due(now_s):
                 continue
             try:
-                told[i] = share.bus.read(now_s)
+                feedbacks[i] = share.bus.read(now_s)
             except BusLost as error:  # the others are read all the same, and may come back
                 lost.append(error)
                 continue
-            patience.update(told[i], now_s)
+            patience.update(feedbacks[i], now_s)
         if lost:
             raise lost[0]
-        return self._together(told)
+        return self._together(feedbacks)
 
-    def _together(self, told: Sequence[Feedback]) -> Feedback:
+    def _together(self, feedbacks: Sequence[Feedback]) -> Feedback:
         """Return the feedback of all buses as one."""
         order = self._order
-        columns = [list(chain.from_iterable(parts)) for parts in zip(*told, strict=True)]
+        columns = [list(chain.from_iterable(parts)) for parts in zip(*feedbacks, strict=True)]
         missing = [
             share.places[i]
-            for share, feedback in zip(self._shares, told, strict=True)
+            for share, feedback in zip(self._shares, feedbacks, strict=True)
             for i in feedback.missing
         ]
         ordered = [tuple([column[k] for k in order]) for column in columns[:-1]]
@@ -170,7 +170,7 @@ class MultiBus:
         return tuple([event for share in self._shares for event in share.bus.events()])
 
     def retune(self, setups: Sequence[ServoConfig]) -> None:
-        """Set the servos up so when the torque comes on the next time.
+        """Set the setups that apply when the torque comes on the next time.
 
         Raises:
             ValueError: these are other servos.

@@ -1,4 +1,4 @@
-"""What every bus of servos does alike with its port: torque off, a port that goes away, counts."""
+"""What every servo bus shares: torque off, a port that is unplugged, byte and error counts."""
 
 from abc import ABC, abstractmethod
 from collections import Counter
@@ -23,12 +23,12 @@ class Exchange(Protocol):
 
     @property
     def errors(self) -> Counter[str]:
-        """Return the errors by kind; who finds more adds them."""
+        """Return the errors by kind; other parts of the bus may add to them."""
         ...
 
 
 class BusSupervisor(Protocol):
-    """Whoever looks after the servos.
+    """The supervisor of a bus, as far as ``PortBus`` needs it.
 
     engaged: goals are followed
     """
@@ -36,15 +36,15 @@ class BusSupervisor(Protocol):
     engaged: bool
 
     def torque_disabled(self) -> None:
-        """Leave servos without torque alone."""
+        """Stop the supervision of servos without torque."""
 
 
 class PortBus(ABC):
     """The servos behind one port; part of an implementation of gazerig.drivers.types.ServoBus.
 
-    A bus makes its parts before any of these methods is called; it may make them again.
+    A bus creates its parts before any of these methods is called, and may replace them.
 
-    holding, mute: what is said of a servo whose torque is not off, or that does not confirm it
+    holding, mute: texts about a servo whose torque is not off, or that does not confirm it
     """
 
     holding: ClassVar[str] = "still reports torque"
@@ -62,7 +62,7 @@ class PortBus(ABC):
 
     @abstractmethod
     def _check_setups(self, setups: Sequence[ServoConfig]) -> None:
-        """See that servos can be set up so.
+        """Check that servos can have these setups.
 
         Raises:
             ValueError: one cannot.
@@ -78,14 +78,14 @@ class PortBus(ABC):
 
     @abstractmethod
     def _servo_label(self, servo_id: int) -> str:
-        """Return how people know a servo."""
+        """Return a servo's label for messages."""
 
     @abstractmethod
     def _cannot_release(self) -> str:
         """Return what the servos do when their torque cannot be switched off."""
 
     def retune(self, setups: Sequence[ServoConfig]) -> None:
-        """Set the servos up so when the torque comes on the next time; the same ids and models.
+        """Set the setups that apply when the torque comes on the next time; same ids and models.
 
         Under torque everything stays as it is.
 
@@ -123,13 +123,13 @@ class PortBus(ABC):
         self._switch_all_off()
 
     def close(self) -> None:
-        """Close the port; safe to call twice. Servos go on as they were last told."""
+        """Close the port; safe to call twice. Servos keep their last goals."""
         self._opened = False
         self._supervisor.torque_disabled()
         self._port.closePort()
 
     def _reachable(self, now_s: float) -> bool:
-        """Return whether the port is there, opened again if need be, and no torque is due off.
+        """Return whether the port is open, reopened if needed, and no release of torque is pending.
 
         Raises:
             BusLost: it has been gone for longer than ``give_up_s``.

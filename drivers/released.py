@@ -1,10 +1,10 @@
-"""What became of servos whose torque was taken off; no more than an emergency needs."""
+"""Result of switching torque off; imports no more than the guardian needs."""
 
 from typing import NamedTuple
 
 
 class ReleaseResult(NamedTuple):
-    """Ids that still report torque or pulses, and those of which nothing was heard."""
+    """Ids that still report torque or pulses, and those that did not answer."""
 
     holding: tuple[int, ...]
     mute: tuple[int, ...]

@@ -12,4 +12,4 @@ FAMILIES: dict[str, Family] = {one.name: one for one in (DYNAMIXEL, FEETECH, FEE
 FAMILY_OF: dict[str, Family] = {
     model: FAMILIES[facts.family] for model, facts in SERVOS.items() if facts.family
 }
-"""By the name that a rig's YAML gives a model."""
+"""By the model name in a rig's YAML."""

@@ -24,16 +24,16 @@ SmartModel = DynamixelModel | FeetechModel
 
 
 class ServoModelInfo(NamedTuple):
-    """What people and joints must know of a servo model.
+    """What is known of a servo model.
 
     bus: kind of bus it is on; of a hobby servo one of the boards that move it
     steps_per_turn: of its shaft; lowest, highest: first and last step it can be sent to
-    unit, unit_steps: what people measure its place in, "steps" or "us", and how many steps
-        that is
+    unit, unit_steps: unit in which its position is shown, "steps" or "us", and how many
+        steps that is
     middle: of its travel, in that unit
     family: of a smart servo, by its name; "" for a hobby servo
-    measured: it tells its position; one that does not has no other readings either
-    hottest_c, lowest_v, highest_v: where it switches itself off, as far as it does
+    measured: whether it measures its position; without that it has no other feedback either
+    hottest_c, lowest_v, highest_v: limits at which it switches itself off, if it does
     """
 
     bus: BusKind
@@ -55,7 +55,7 @@ class ServoModelInfo(NamedTuple):
 
 
 def _smart(bus: BusKind, family: str, model: SmartModel, steps: int) -> ServoModelInfo:
-    """Return the facts of a smart servo that counts so many steps."""
+    """Return the model information of a smart servo with so many steps."""
     return ServoModelInfo(
         bus,
         model.steps_per_turn,
@@ -87,9 +87,9 @@ SERVOS: dict[str, ServoModelInfo] = {
         for name, model in HOBBY.items()
     },
 }
-"""By the name that a rig's YAML gives a model."""
+"""By the model name in a rig's YAML."""
 
 
 def servo_label(setup: "ServoConfig") -> str:
-    """Return how people know a servo: its joint and its id, or its channel."""
+    """Return a servo's label for messages: its joint and its id, or its channel."""
     return label_with(setup, "channel" if setup.model in HOBBY else "servo")

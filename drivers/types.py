@@ -24,10 +24,10 @@ Depth = NDArray[np.float32]
 
 
 class Feedback(NamedTuple):
-    """What all servos of a bus told in one exchange: a column a quantity, a value a servo.
+    """Feedback of all servos of a bus in one exchange: a column a quantity, a value a servo.
 
     All columns are in the order of the setups. A servo without a fresh answer has NaN for
-    position, velocity and load, and -inf for time: nothing of it can be taken for new.
+    position, velocity and load, and -inf for time: none of it is new.
 
     position_steps: present position, a whole number of steps
     velocity_steps_s: present velocity
@@ -37,14 +37,14 @@ class Feedback(NamedTuple):
     What follows may be some cycles old, as it is read in turn:
 
     temperature_c, voltage_v: None before they were read first
-    torque: the torque is on
-    fault: latched hardware errors in words, "overload and input voltage"; "" where none
+    torque: whether the torque is on
+    fault: latched hardware errors as text, "overload and input voltage"; "" where none
 
-    measured: False where the servo tells nothing and position and velocity are its goal
-        moved by the speed it is known to have
+    measured: False if the servo has no feedback and position and velocity are its goal moved
+        at its known speed
     rearmed: True in the first answer after the torque came on again with the present
         position as goal (a restarted servo, a port that was unplugged), and in every answer
-        of a servo on its slow way into its limits: whoever plans goals begins there
+        of a servo on its slow way into its limits: new plans must begin there
     missing: indices of the servos without a fresh answer, rising
     """
 
@@ -62,7 +62,7 @@ class Feedback(NamedTuple):
 
     @classmethod
     def of_none(cls, count: int) -> "Feedback":
-        """Return what is told when no servo has answered."""
+        """Return the feedback of an exchange in which no servo has answered."""
         unknown, never, no = (nan,) * count, (-inf,) * count, (False,) * count
         return cls(
             unknown, unknown, unknown, never, (None,) * count, (None,) * count, no,
@@ -88,12 +88,12 @@ class BusHealth(NamedTuple):
 
 
 class ServoConfig(NamedTuple):
-    """What a bus must know of one servo.
+    """Configuration of one servo on a bus.
 
     model: name as in the control table, e.g. "xl330-m077"
     min_steps, max_steps: no goal outside is ever sent
     max_speed_steps_s: armed in the servo's own profile
-    name: what people call it, e.g. "neck_yaw", for messages; "" where it has no name
+    name: its joint, e.g. "neck_yaw", for messages; "" where it has no name
     firmware_min: oldest firmware that will do
     gains: the servo's P, I and D of position (Dynamixel: registers 84, 82, 80; STS: 21, 23,
         22), None where they stay as they are
@@ -143,7 +143,7 @@ class ServoBus(Protocol):
         when it is back the servos hold where they are, marked ``rearmed``.
 
         Raises:
-            BusLost: nobody has answered for longer than the bus's patience.
+            BusLost: no servo has answered for longer than ``give_up_s``.
         """
         ...
 
@@ -242,7 +242,7 @@ class Detections:
     image: the BGR image itself where there is one (never written to after this)
     depth_m: distances seen from where the image was taken, where the camera measures
         them: (height_px, width_px), NaN where unknown
-    lens: the lens where the camera tells it; such images are without distortion
+    lens: the lens if the camera reports it; such images are without distortion
     """
 
     captured_s: float
@@ -263,7 +263,7 @@ class Camera(Protocol):
         """Start looking.
 
         Raises:
-            CameraError: it cannot; the message names the thing and the remedy.
+            CameraError: it cannot; the message names the device and the remedy.
         """
         ...
 

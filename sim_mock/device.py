@@ -41,7 +41,7 @@ class Device(Protocol):
     now_s: Callable[[], float]
 
     @property
-    def heed_baud(self) -> bool:
+    def check_baud(self) -> bool:
         """True if only a client at its baud rate is heard."""
         ...
 
@@ -50,7 +50,7 @@ class Device(Protocol):
         """Return the faults of the device and its line."""
         ...
 
-    def hears(self, client_baud: int) -> bool:
+    def at_baud(self, client_baud: int) -> bool:
         """True if a client at this baud rate is understood."""
         ...
 
@@ -59,7 +59,7 @@ class Device(Protocol):
         ...
 
     def choose(self, case: str, value: str) -> None:
-        """Choose what the device does where documents and devices differ.
+        """Choose the device's behaviour where documents and devices differ.
 
         Raises:
             ValueError: there is no such case or value.

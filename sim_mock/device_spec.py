@@ -23,7 +23,7 @@ _MODELS = [name for name, facts in SERVOS.items() if facts.bus in _LINES]
 
 
 def line_of(text: str, firmware: int | None, baud: int) -> DynamixelLine | FeetechLine:
-    """Read the servos of one line; ``firmware``: of all of them, None: as from the shop.
+    """Read the servos of one line; ``firmware``: of all of them, None: as delivered.
 
     Raises:
         SetupError: names the part that is wrong and what would be right.
@@ -79,8 +79,8 @@ def _see_one_kind(specs: Iterable[ServoSpec]) -> None:
     for spec in specs:
         one.setdefault(SERVOS[spec.model].bus, spec)
     if len(one) > 1:
-        told = [f"{s.model} (id {s.id}) {_SPEECH[kind]}" for kind, s in one.items()]
+        named = [f"{s.model} (id {s.id}) {_SPEECH[kind]}" for kind, s in one.items()]
         raise SetupError(
-            f"--servos: {' and '.join(told)}; one line carries one protocol: "
+            f"--servos: {' and '.join(named)}; one line carries one protocol: "
             "start a second `gazerig emulate`"
         )

@@ -45,7 +45,7 @@ class _SmartServoLine:
 
     Attributes:
         servos: one specification each.
-        baud: the servos' rate, clients at another are not heard; None: every client is.
+        baud: the servos' rate, clients at another get no answer; None: any rate works.
     """
 
     servos: tuple[ServoSpec, ...]
@@ -73,8 +73,8 @@ class MaestroLine:
 
     channels: 6, 12, 18 or 24; device: its number in the Pololu protocol
     crc: it expects a CRC behind every command
-    servos: those that are not as they come from the shop, by their channel
-    baud: rate of its serial pins; None: its USB port, where every client is heard
+    servos: those that differ from the default one, by their channel
+    baud: rate of its serial pins; None: its USB port, where any rate works
     """
 
     channels: int = 12
@@ -92,8 +92,8 @@ class Pca9685Line:
 
     addresses: of the boards; the channels of the second begin at 16
     oscillator_hz: of their clocks
-    servos: those that are not as they come from the shop, by their channel
-    baud: of the bridge's line, where nobody asks
+    servos: those that differ from the default one, by their channel
+    baud: of the bridge's line, if it matters
     """
 
     addresses: tuple[int, ...] = (0x40,)
@@ -128,18 +128,18 @@ def build(what: Emulated, now_s: Callable[[], float], seed: int = 0) -> Device:
 
 
 def packed(what: Emulated) -> dict[str, object]:
-    """Return a device as what JSON can carry."""
+    """Return a device as JSON data."""
     return {"kind": what.kind, **asdict(what)}
 
 
-def unpacked(told: Mapping[str, Any]) -> Emulated:
+def unpacked(data: Mapping[str, Any]) -> Emulated:
     """Return the device that ``packed`` was given; servos may be as short as [1, "xl330-m077"].
 
     Raises:
         ValueError: there is no such kind of device.
         TypeError: it has no such setting.
     """
-    settings = dict(told)
+    settings = dict(data)
     kind = settings.pop("kind", None)
     if kind not in _KINDS:
         raise ValueError(f"no device of kind {kind!r}: there is {', '.join(_KINDS)}")
@@ -148,6 +148,6 @@ def unpacked(told: Mapping[str, Any]) -> Emulated:
     return _KINDS[kind](**settings)
 
 
-def _servo(told: Any) -> ServoSpec:
-    spec = ServoSpec(*told)
+def _servo(data: Any) -> ServoSpec:
+    spec = ServoSpec(*data)
     return spec._replace(physics=Physics(*spec.physics), quirks=Quirks(*spec.quirks))

@@ -1,9 +1,9 @@
-"""A hobby servo: pulses in, a shaft that follows them, and nothing that tells where it is.
+"""A hobby servo: pulses in, a shaft that follows them, no feedback.
 
 Widths and places are quarter microseconds of the pulse that would hold the shaft there.
-A servo hears one pulse every 20 ms and moves in steps of 10 ms: towards the pulse as fast
+A servo gets one pulse every 20 ms and moves in steps of 10 ms: towards the pulse as fast
 as it can, with a lag near the end, and not at all within its dead band. Without pulses it
-is limp and stays where friction leaves it. Inertia, load and noise are left out.
+has no torque and stays where friction leaves it. Inertia, load and noise are left out.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ STEP_S = 0.01
 class HobbySpec(NamedTuple):
     """How to build one servo, and what its channel lets through to it.
 
-    channel: where it is plugged in
+    channel: its channel on the board
     start_steps: where its shaft is before the first pulse
     speed_steps_s: its own top speed; 22000 is 60 deg in 0.12 s, from data sheets of SG90
     lag_s: time constant of the last bit of the way [A]
@@ -52,7 +52,7 @@ class HobbyServo:
         self._share = 1.0 - exp(-STEP_S / self.spec.lag_s) if self.spec.lag_s > 0.0 else 1.0
 
     @property
-    def limp(self) -> bool:
+    def unpowered(self) -> bool:
         """Return whether no pulses come: a hand can turn it."""
         return self.width_steps == 0
 
@@ -63,7 +63,7 @@ class HobbyServo:
 
     @property
     def straining(self) -> bool:
-        """Return whether it pushes against something that does not give way."""
+        """Return whether it pushes against an obstacle."""
         return not self._content() and self.resting
 
     def step(self) -> None:
@@ -81,7 +81,7 @@ class HobbyServo:
         self.place_steps = self._within(self.place_steps + steps)
 
     def _content(self) -> bool:
-        return self.limp or abs(self.width_steps - self.place_steps) <= self.spec.dead_steps
+        return self.unpowered or abs(self.width_steps - self.place_steps) <= self.spec.dead_steps
 
     def _next_steps(self) -> float:
         if self.stuck or self._content():

@@ -23,7 +23,7 @@ KNOWN_BAUDS = frozenset((*DYNAMIXEL_BAUDS, *FEETECH_BAUDS))
 
 BITS_PER_BYTE = 10
 WRITE_S = 0.25
-"""A write to an adapter that takes nothing gives up after so long."""
+"""Time-out of a write to an adapter that accepts nothing."""
 
 
 class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
@@ -32,7 +32,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
     Args:
         chain: a chain of servos, or a board; its clock is the port's clock.
         tap: gets every byte string the host sends.
-        sleep_until: moves that clock on, for waiting; without it nobody waits.
+        sleep_until: advances that clock, for waiting; without it no call waits.
         wire_time: bytes take their time on the line, return delays count.
     """
 
@@ -89,7 +89,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         return taken
 
     def drain(self) -> int:
-        """Throw away what waits; return the number of bytes."""
+        """Discard received bytes; return their number."""
         self._see()
         dropped = len(self._waiting)
         self._waiting = b""
@@ -111,7 +111,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
             self._waiting += self.line.arrived()
 
     def _wait(self, until_s: float) -> None:
-        """Let the device's clock reach a time, where somebody can move it."""
+        """Advance the device's clock to a time, if it can be advanced."""
         if self._sleep_until is not None and until_s > self.now_s():
             self._sleep_until(until_s)
         self._see()
@@ -146,7 +146,7 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         self.is_open = False
 
     def clearPort(self) -> None:
-        """Throw away what waits."""
+        """Discard received bytes."""
         self.drain()
 
     def getBytesAvailable(self) -> int:

@@ -15,11 +15,11 @@ from gazerig.sim_mock.smart_servo.physics import ServoSpec
 class Rig(MovingBus):
     """A bus of emulated servos, read in one of several ways."""
 
-    def __init__(self, fast=True, indirect=True, heed_baud=False, servo_baud=None, **params):
+    def __init__(self, fast=True, indirect=True, check_baud=False, servo_baud=None, **params):
         super().__init__()
         specs = [ServoSpec(i, "xl330-m077", 2000) for i in IDS]
         self.chain = build_dynamixel(specs, lambda: self.now_s)
-        self.chain.heed_baud = heed_baud
+        self.chain.check_baud = check_baud
         for servo in self.chain.servos if servo_baud else ():
             servo.memory.set("baud_rate", BAUD_RATES.index(servo_baud))
         self.chain.refresh()

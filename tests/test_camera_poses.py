@@ -18,7 +18,7 @@ def turn(deg: float) -> np.ndarray:
 def filled(count: int, rate_deg_s: float = 100.0) -> PoseBuffer:
     ring = PoseBuffer()
     for k in range(count):
-        ring.remember(10.0 + k * 0.005, turn(rate_deg_s * k * 0.005))
+        ring.record(10.0 + k * 0.005, turn(rate_deg_s * k * 0.005))
     return ring
 
 
@@ -54,7 +54,7 @@ def test_turn_between_two_pictures():
 def test_another_process_shares_it():
     ring = filled(40)
     context = multiprocessing.get_context("spawn")
-    other = context.Process(target=ring.remember, args=(10.3, turn(42.0)))
+    other = context.Process(target=ring.record, args=(10.3, turn(42.0)))
     other.start()
     other.join()
     assert ring.at(10.3) == pytest.approx(turn(42.0), abs=1e-6)

@@ -257,7 +257,7 @@ def test_27_a_watchdog_that_tripped_unnoticed_is_found_where_servos_were_read_wi
 
 
 def test_30_factory_defaults():
-    rig = Rig(heed_baud=True)
+    rig = Rig(check_baud=True)
     for servo in rig.chain.servos:
         servo.memory.set("baud_rate", 3)
     rig.chain.refresh()

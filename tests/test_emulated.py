@@ -60,8 +60,8 @@ def test_what_cannot_be_is_refused():
 @KINDS
 def test_what_is_built_heeds_its_rate_and_knows_its_cases(line):
     device = build(line, lambda: 0.0)
-    assert device.heed_baud is (line.baud is not None)
-    assert device.hears(line.baud or 115_200)
+    assert device.check_baud is (line.baud is not None)
+    assert device.at_baud(line.baud or 115_200)
     assert len(device.positions_steps()) == len(line.servos) or line.kind == "maestro"
     for case in CASES[line.kind]:
         assert case in device.faults.command("help")
@@ -74,7 +74,7 @@ def test_every_rate_of_a_kind_can_be_built_and_opened(line):
         device = build(type(line)(servos=servos, baud=baud), lambda: 0.0)
         port = InProcessPort(device)
         assert port.setBaudRate(baud)
-        assert device.hears(port.baudrate)
+        assert device.at_baud(port.baudrate)
     assert not InProcessPort(device).setBaudRate(12)
 
 

@@ -44,7 +44,7 @@ def columns():
 
 def test_an_exchange_begins_with_nobody_and_takes_servo_by_servo(columns):
     assert columns.now.missing == (0, 1, 2)
-    columns._take_one(1, 2048, 3.0, 0.5, 7.0)
+    columns._apply_one(1, 2048, 3.0, 0.5, 7.0)
     told = columns.now
     assert told.missing == (0, 2) and told.position_steps[1] == 2048 and told.at_s[1] == 7.0
     assert columns.position(1) == 2048 and columns.position(0) is None
@@ -58,7 +58,7 @@ def test_what_is_read_in_turn_stays_from_one_exchange_to_the_next(columns):
     columns.name_fault(0, "overload")
     columns.begin()
     for slot in range(3):
-        columns._take_one(slot, 1 + slot, 0.0, 0.0, 9.0)
+        columns._apply_one(slot, 1 + slot, 0.0, 0.0, 9.0)
     told = columns.now
     assert told.torque == (False, False, True) and told.fault == ("overload", "", "")
     assert told.missing == () and told.at_s == (9.0,) * 3

@@ -41,7 +41,7 @@ def test_a_change_within_the_dead_band_does_not_move_it():
 def test_without_pulses_it_is_limp_and_a_hand_turns_it():
     servo = HobbyServo(HobbySpec(0, 6000))
     servo.turn(-500)
-    assert servo.limp
+    assert servo.unpowered
     assert run(servo, 0, 50)[-1] == 5500
     servo.turn(1e5)
     assert servo.place_steps == 10_000

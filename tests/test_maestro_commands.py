@@ -4,7 +4,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gazerig.drivers.maestro.commands import MaestroCodec, crc7, name_errors, runs, split, words
+from gazerig.drivers.maestro.commands import (
+    MaestroCodec,
+    crc7,
+    decode_words,
+    name_errors,
+    runs,
+    split,
+)
 
 COMPACT = MaestroCodec()
 POLOLU = MaestroCodec("pololu")
@@ -64,7 +71,7 @@ def test_runs():
 
 
 def test_positions_are_two_full_bytes_low_byte_first():
-    assert words(bytes.fromhex("70 17 FF 1F 00 00")) == (6000, 8191, 0)
+    assert decode_words(bytes.fromhex("70 17 FF 1F 00 00")) == (6000, 8191, 0)
 
 
 def test_error_names():

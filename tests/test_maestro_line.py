@@ -128,7 +128,7 @@ def test_an_end_of_the_board_is_believed_when_it_was_met_twice():
 def test_a_servo_is_rearmed_once():
     channel = held()
     channel.rearm()
-    assert [channel.take_rearmed() for _ in range(2)] == [True, False]
+    assert [channel.pop_rearmed() for _ in range(2)] == [True, False]
 
 
 @pytest.mark.parametrize(("rest", "place"), [(None, 6000), (5000, 5000), (9000, 7600), (0, 4400)])
@@ -140,9 +140,9 @@ def test_where_a_servo_without_pulses_is_taken_to_be(rest, place):
 
 def test_new_limits_bring_the_guess_inside_but_leave_a_known_place():
     channel = Channel(SETUP)
-    channel.want(SETUP._replace(rest_steps=5000))
+    channel.set_target(SETUP._replace(rest_steps=5000))
     assert round(channel.ramp.shaft_steps) == 5000
     channel.settle(7000)
-    channel.want(SETUP._replace(max_steps=6500))
+    channel.set_target(SETUP._replace(max_steps=6500))
     assert round(channel.ramp.shaft_steps) == 7000
     assert channel.start(7000, 0.0) == 6500

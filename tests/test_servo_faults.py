@@ -159,7 +159,7 @@ def test_opening_is_forbidden(make):
 @pytest.mark.parametrize(
     "away",
     [
-        partial(DynamixelRig, heed_baud=True, servo_baud=1_000_000, baud=57_600),
+        partial(DynamixelRig, check_baud=True, servo_baud=1_000_000, baud=57_600),
         partial(sts_rig.Rig, baud=500_000),
     ],
     ids=["dynamixel", "feetech"],

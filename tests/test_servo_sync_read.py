@@ -17,7 +17,7 @@ from gazerig.drivers.feetech.family import FEETECH, window
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.feetech.protocol import checksum
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
-from gazerig.drivers.servo_bus.poll_list import AGAIN_FIRST_S, AGAIN_LAST_S, PollList, silent_ones
+from gazerig.drivers.servo_bus.poll_list import AGAIN_FIRST_S, AGAIN_LAST_S, PollList, silent_servos
 from gazerig.drivers.servo_bus.sync_packets import SyncRead
 from gazerig.drivers.servo_bus.sync_read import GroupReply, ServoReply
 from gazerig.drivers.types import ServoConfig
@@ -229,7 +229,7 @@ def both_ways(group, raw, *columns):
             each.places.place(slot, 900, 0.99)
             assert each.places.one(slot, 900, 1.0)
     whole = GroupReply(group, raw, group.whole(raw), 1.01)
-    taken, each = one.take_whole(whole), whole.each()
+    taken, each = one.apply_whole(whole), whole.each()
     for slot, servo_id in enumerate(group.ids):
         other.take(slot, each[servo_id])
     return taken
@@ -286,23 +286,23 @@ def test_an_answer_in_which_anything_is_amiss_is_looked_at(
 def test_a_place_that_no_joint_can_have_come_to_must_be_said_twice():
     columns = FeedbackColumns(FEETECH, [ServoConfig(1, "sts3215", 0, 4095, 3000.0)])
 
-    def believes(position, at_s):
+    def is_plausible(position, at_s):
         sample = SENSED.sample(0, struct.pack("<H", position) + BLOCK[2:])
-        return columns.believes(0, ServoReply(sample, at_s))
+        return columns.is_plausible(0, ServoReply(sample, at_s))
 
-    assert believes(1000, 0.0)
-    assert not believes(3000, 0.01)
-    assert believes(1010, 0.02)
-    assert not believes(3000, 0.03)
-    assert not believes(200, 0.04)
-    assert not believes(3000, 0.05)
-    assert not believes(2990, 0.06)
+    assert is_plausible(1000, 0.0)
+    assert not is_plausible(3000, 0.01)
+    assert is_plausible(1010, 0.02)
+    assert not is_plausible(3000, 0.03)
+    assert not is_plausible(200, 0.04)
+    assert not is_plausible(3000, 0.05)
+    assert not is_plausible(2990, 0.06)
     # Three in a row that agree: somebody has turned it by hand.
-    assert believes(2980, 0.07)
+    assert is_plausible(2980, 0.07)
     # What the motor can do in a second is no leap, nor is anything after a port was gone.
-    assert believes(200, 1.07)
+    assert is_plausible(200, 1.07)
     columns.places.forget()
-    assert believes(4000, 1.08)
+    assert is_plausible(4000, 1.08)
 
 
 # --- who is asked
@@ -321,7 +321,7 @@ def test_a_place_that_no_joint_can_have_come_to_must_be_said_twice():
     ],
 )
 def test_only_those_who_kept_silent_themselves_are_blamed(heard, blamed):
-    assert silent_ones(IDS, heard) == blamed
+    assert silent_servos(IDS, heard) == blamed
 
 
 def test_a_silent_servo_is_asked_at_once_then_ever_more_seldom():

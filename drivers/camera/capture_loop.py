@@ -16,14 +16,14 @@ LOST, BACK = "camera lost", "camera back"
 class CaptureLoop:
     """A source of frames with the detectors that look for faces and motion in them.
 
-    A source that is lost in service is reopened until it is back or ``care.give_up_s`` is
+    A source that is lost in service is reopened until it is back or ``recovery.give_up_s`` is
     over. Frame numbers go on counting meanwhile.
 
     Args:
         source: the frames.
         detector: finds faces.
         now_s: the host's monotonic clock, seconds.
-        care: how a lost source is reopened.
+        recovery: how a lost source is reopened.
         motion: finds motion, None for none.
         tell: gets each event as one line, at once.
     """
@@ -33,17 +33,17 @@ class CaptureLoop:
         source: FrameSource,
         detector: FaceDetector,
         now_s: Callable[[], float],
-        care: CameraRecoveryParams,
+        recovery: CameraRecoveryParams,
         motion: Motion | None,
-        tell: Callable[[str], None],
+        report: Callable[[str], None],
     ) -> None:
         self._source = source
         self._frames = FrameAnalyzer(detector, motion)
         self._now_s = now_s
-        self._care = care
+        self._recovery = recovery
         self._counted = 0  # frames of the source before it was last opened
         self._number = 0
-        self._tell = tell
+        self._report = report
 
     def open(self) -> None:
         """Open the source and begin at frame 1.
@@ -66,7 +66,7 @@ class CaptureLoop:
         self._number = self._counted + shot.number
         found = self._frames.look(shot._replace(number=self._number))
         for line in self._source.events():
-            self._tell(line)
+            self._report(line)
         return found
 
     def retune(
@@ -84,7 +84,7 @@ class CaptureLoop:
     def _take(self, stop: threading.Event) -> Shot | None:
         """Return the next frame, reopening a lost source; None where ``stop`` was set."""
         lost_s: float | None = None
-        wait_s = self._care.retry_ms / 1e3
+        wait_s = self._recovery.retry_ms / 1e3
         while True:
             try:
                 if lost_s is not None:
@@ -94,21 +94,21 @@ class CaptureLoop:
                 if lost_s is None:
                     lost_s = self._lose(error)
                 self._source.close()
-                if self._now_s() - lost_s >= self._care.give_up_s:
+                if self._now_s() - lost_s >= self._recovery.give_up_s:
                     raise
                 if stop.wait(wait_s):
                     return None
-                wait_s = min(2.0 * wait_s, self._care.longest_retry_ms / 1e3)
+                wait_s = min(2.0 * wait_s, self._recovery.longest_retry_ms / 1e3)
                 continue
             if shot is not None and lost_s is not None:
-                self._tell(f"{BACK} after {self._now_s() - lost_s:.1f} s")
+                self._report(f"{BACK} after {self._now_s() - lost_s:.1f} s")
             return shot
 
     def _lose(self, error: CameraError) -> float:
         """Report the loss, keep the frame numbers going, and return the time of the loss."""
         self._counted = self._number
-        if self._care.give_up_s > 0.0:
-            self._tell(f"{LOST} ({error}): trying it again")
+        if self._recovery.give_up_s > 0.0:
+            self._report(f"{LOST} ({error}): trying it again")
         return self._now_s()
 
 

@@ -1,4 +1,4 @@
-"""The distance of a thing from a depth frame with holes, edges and nonsense in it."""
+"""The distance of an object from a depth image with holes, edges and outliers."""
 
 from typing import NamedTuple
 
@@ -19,7 +19,7 @@ _MOST_PIXELS = 4096
 
 
 class DepthReading(NamedTuple):
-    """What a depth frame says of one thing.
+    """The distance of one object in a depth image.
 
     distance_m: None where nothing is known
     spread_m: standard deviation of its pixels, robust; valid_share: of its pixels, 0..1
@@ -85,7 +85,7 @@ def millimetres(depth_m: Depth) -> NDArray[np.uint16]:
 
 
 def resized(depth_m: Depth, width_px: int, height_px: int) -> Depth:
-    """Bring a depth frame to the size of its colour frame, without inventing distances."""
+    """Resize a depth image to its colour image, without inventing distances."""
     if depth_m.shape == (height_px, width_px):
         return depth_m
     size = width_px, height_px

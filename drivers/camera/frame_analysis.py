@@ -10,7 +10,7 @@ Motion = Callable[[Shot], tuple[MovingBlob, ...]]
 
 
 class FrameAnalyzer:
-    """Looks at one frame after another, with detectors that may be changed in between.
+    """Runs the detectors on one frame after another; they may be changed in between.
 
     Args:
         detector: finds faces.
@@ -42,11 +42,11 @@ class FrameAnalyzer:
         detector: Callable[[], FaceDetector] | None,
         motion: Callable[[Motion | None], Motion | None] | None,
     ) -> None:
-        """Look otherwise from the next frame on.
+        """Change the detectors from the next frame on.
 
         Args:
-            detector: makes another one; None: as it is.
-            motion: returns what finds motion from what did; None: as it is.
+            detector: makes another one; None: no change.
+            motion: returns a motion detector from the present one; None: no change.
 
         Raises:
             SetupError: the detector cannot be made; the old one goes on.

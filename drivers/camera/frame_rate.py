@@ -1,4 +1,4 @@
-"""How many frames a second a camera really gives, against what it says."""
+"""The measured frame rate of a camera against the stated one."""
 
 from collections import deque
 from math import isfinite
@@ -12,7 +12,7 @@ _PROMPT = 0.5
 
 
 class FrameRateMonitor:
-    """Measures the rate from the times of frames, and tells once when it is not as stated.
+    """Measures the frame rate and reports once when it differs from the stated one.
 
     Only intervals in which the reader was back in time count: a slow reader misses
     frames, and that is no fault of the camera.
@@ -27,7 +27,7 @@ class FrameRateMonitor:
 
     @property
     def measured_hz(self) -> float | None:
-        """Return the measured rate, None before there is enough to tell."""
+        """Return the measured rate, None before there are enough frames."""
         if len(self._intervals_s) < _LEAST:
             return None
         return 1.0 / median(self._intervals_s)

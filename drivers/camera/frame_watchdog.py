@@ -1,4 +1,4 @@
-"""When a camera whose process is alive counts as lost, or as hung: numbers in, a verdict out."""
+"""When a camera whose process is alive counts as lost, or as hung: pure."""
 
 from typing import Literal
 
@@ -19,12 +19,12 @@ class FrameWatchdog:
     """Compares the time since the last frame with what is usual.
 
     Args:
-        care: how long is too long.
+        recovery: how long is too long.
         now_s: when the waiting for the first frame begins, monotonic seconds.
     """
 
-    def __init__(self, care: CameraRecoveryParams, now_s: float) -> None:
-        self._care = care
+    def __init__(self, recovery: CameraRecoveryParams, now_s: float) -> None:
+        self._recovery = recovery
         self._last_s = now_s
         self._period_s: float | None = None
         self._first = True
@@ -40,7 +40,7 @@ class FrameWatchdog:
             self._period_s += _SHARE * (period_s - self._period_s)
         self._last_s = now_s
 
-    def record_life(self, now_s: float) -> None:
+    def record_activity(self, now_s: float) -> None:
         """Record that the process is busy with something else than frames."""
         self._last_s = now_s
 
@@ -50,8 +50,8 @@ class FrameWatchdog:
         if self._first:
             return "hung" if silent_s >= FIRST_FRAME_S else ""
         lost_s = self._lost_after_s()
-        hung_s = max(lost_s, self._care.restart_s, HUNG_PERIODS * (self._period_s or 0.0))
+        hung_s = max(lost_s, self._recovery.restart_s, HUNG_PERIODS * (self._period_s or 0.0))
         return "hung" if silent_s >= hung_s else "lost" if silent_s >= lost_s else ""
 
     def _lost_after_s(self) -> float:
-        return max(self._care.silent_s, LOST_PERIODS * (self._period_s or 0.0))
+        return max(self._recovery.silent_s, LOST_PERIODS * (self._period_s or 0.0))

@@ -1,4 +1,4 @@
-"""What every camera can be told about being lost, and a webcam about its frames."""
+"""Parameters of reopening a lost camera, and of a webcam."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -8,7 +8,7 @@ from gazerig.params import Bounds
 
 @dataclass(frozen=True)
 class CameraRecoveryParams:
-    """How a camera that went away is tried again."""
+    """How a lost camera is reopened."""
 
     # fmt: off
     retry_ms: Annotated[float, Bounds(1, 60000), "delay before a lost camera is opened again; it doubles with each attempt"] = 250.0
@@ -24,7 +24,7 @@ class CameraRecoveryParams:
 
 @dataclass(frozen=True)
 class WebcamParams:
-    """What is asked of a webcam; it gives what comes nearest."""
+    """The format requested of a webcam, which delivers its nearest one."""
 
     # fmt: off
     width_px: Annotated[int, Bounds(16, 16384), "image width requested from the camera"] = 640

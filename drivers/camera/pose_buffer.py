@@ -1,6 +1,6 @@
-"""How the camera was turned when: written by the control loop, read by the camera's process.
+"""The camera's orientation over time: written by the control loop, read by the camera's process.
 
-Whoever looks for motion must know how the camera itself turned between two frames. The ring
+Motion detection needs the camera's own rotation between two frames. The ring
 is shared memory without a lock: the loop writes an entry and then counts it; the reader looks at
 the count before and after, and leaves out what may have been overwritten meanwhile.
 """
@@ -30,7 +30,7 @@ class PoseBuffer:
         self._count = context.RawValue("q", 0)
         self._entries = context.RawArray("d", _ENTRIES * _WIDTH)
 
-    def remember(self, t_s: float, R_world_camera: Floats) -> None:
+    def record(self, t_s: float, R_world_camera: Floats) -> None:
         """Record an orientation; times rise. R_world_camera: (3, 3)."""
         count = self._count.value
         start = count % _ENTRIES * _WIDTH

@@ -1,11 +1,11 @@
-"""Frames looked at in a process of its own: nothing of it can hold up or end the control loop.
+"""Detection in a process of its own, which can neither delay nor end the control loop.
 
 Python runs one thread of a process at a time, so what finds faces would cost a loop in the
 same process milliseconds now and then; and where processors are few, the loop's process is
 to go first. What was found comes back through a pipe, frames through shared memory.
 
 A process that crashes, or is blocked in a camera's driver, is started again while the loop
-goes on without frames: the last detections stay, and their age tells.
+goes on without frames: the last detections stay, and their age shows the loss.
 """
 
 import multiprocessing
@@ -29,8 +29,8 @@ from gazerig.drivers.errors import CameraError, SetupError
 from gazerig.drivers.types import Detections, FaceDetector
 
 _LONGEST_START_S = 60.0
-_LOOK_S = 0.1
-_SOUND_S = 10.0
+_POLL_S = 0.1
+_STABLE_S = 10.0
 """A process that lived for so long is well: the next end is news, and tried again quickly."""
 _MOST_EVENTS = 100
 _BLOB_IDS = 1_000_000
@@ -38,7 +38,7 @@ _BLOB_IDS = 1_000_000
 
 
 class _End(NamedTuple):
-    """Why a process gives no more frames; final: no other one is started."""
+    """Why a process delivers no more frames; final: no other one is started."""
 
     reason: str
     final: bool = False
@@ -47,13 +47,13 @@ class _End(NamedTuple):
 class CameraProcess:
     """A camera, or a film paced by the real clock, watched from another process.
 
-    The same calls as a camera thread; while a lost source is tried again the last detections
-    stay, and their age tells.
+    The same calls as a camera thread; while a lost source is reopened the last detections
+    stay, and their age shows the loss.
 
     Args:
-        parts: how to make what gives frames and what finds things; nothing starts yet.
+        parts: how to make source and detectors; nothing starts yet.
         now_s: the host's monotonic clock, picklable; all processes share its zero.
-        care: how a camera that is lost is tried again.
+        recovery: how a lost camera is reopened.
 
     frames, frames_with_face: counts of frames looked at since open
     """
@@ -62,11 +62,11 @@ class CameraProcess:
         self,
         parts: CameraParts,
         now_s: Callable[[], float],
-        care: CameraRecoveryParams | None = None,
+        recovery: CameraRecoveryParams | None = None,
     ) -> None:
         self._parts = parts
         self._now_s = now_s
-        self._care = care or CameraRecoveryParams()
+        self._recovery = recovery or CameraRecoveryParams()
         self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
         self._thread: threading.Thread | None = None
@@ -121,12 +121,17 @@ class CameraProcess:
         detector: Callable[[], FaceDetector] | None,
         motion: Callable[[Motion | None], Motion | None] | None,
     ) -> bool:
-        """Let the process look otherwise from one of the next frames on.
+        """Change the detectors of the process from one of the next frames on.
 
-        Never waits; return whether the process has room for the word. A detector that cannot
-        be made there is told of as an event, and the old one goes on.
+        Never waits. A detector that cannot be made there is reported as an event, and the old
+        one goes on.
 
-        detector: makes another one; motion: gives what finds motion from what did; None: as is
+        Args:
+            detector: makes another one; None: no change.
+            motion: returns a motion detector from the present one; None: no change.
+
+        Returns:
+            Whether the process has room for the request.
         """
         pipe = self._pipe
         try:
@@ -166,7 +171,7 @@ class CameraProcess:
         pipe, theirs = context.Pipe()
         process = context.Process(
             target=run,
-            args=(theirs, self._parts, self._now_s, self._care),
+            args=(theirs, self._parts, self._now_s, self._recovery),
             name="camera",
             daemon=True,
         )
@@ -176,13 +181,13 @@ class CameraProcess:
         self._starts += 1
         end_s = self._now_s() + _LONGEST_START_S
         try:
-            while not pipe.poll(_LOOK_S):
+            while not pipe.poll(_POLL_S):
                 if self._closing.is_set() or self._now_s() >= end_s:
-                    return _no_word()
-            word = pipe.recv()
+                    return _no_reply()
+            message = pipe.recv()
         except (EOFError, OSError):
-            return _no_word()
-        return word if isinstance(word, SetupError) else None
+            return _no_reply()
+        return message if isinstance(message, SetupError) else None
 
     def _end(self, patience_s: float) -> None:
         """End the process, by force where it does not end in time; safe to call twice."""
@@ -200,22 +205,22 @@ class CameraProcess:
 
     def _supervise(self) -> None:
         """Receive results of a process and restart it when it ends, until retrying is over."""
-        wait_s = self._care.retry_ms / 1e3
+        wait_s = self._recovery.retry_ms / 1e3
         while not self._closing.is_set():
             began_s = self._now_s()
             end = self._receive()
             if self._closing.is_set():
                 return
-            if self._now_s() - began_s >= _SOUND_S:
-                wait_s = self._care.retry_ms / 1e3
+            if self._now_s() - began_s >= _STABLE_S:
+                wait_s = self._recovery.retry_ms / 1e3
             while not self._closing.is_set():
-                if not self._may_go_on(end):
+                if not self._may_restart(end):
                     self._failure = end.reason
                     return
                 self._end(0.0)
                 if self._closing.wait(wait_s):
                     return
-                wait_s = min(2.0 * wait_s, self._care.longest_retry_ms / 1e3)
+                wait_s = min(2.0 * wait_s, self._recovery.longest_retry_ms / 1e3)
                 error = self._start()
                 if error is None:
                     break
@@ -224,18 +229,18 @@ class CameraProcess:
                 with suppress(OSError):
                     self._pipe.send(Retune(None, self._motion))
 
-    def _may_go_on(self, end: _End) -> bool:
+    def _may_restart(self, end: _End) -> bool:
         """Report the end of a process; return whether another may be started."""
         if self._lost_s is None:
             self._lose(end.reason, "starting its process again")
         gone_s = self._now_s() - (self._lost_s or 0.0)
-        return not end.final and gone_s < self._care.give_up_s
+        return not end.final and gone_s < self._recovery.give_up_s
 
     def _lose(self, reason: str, remedy: str) -> None:
-        """Record that no frames come; a loss soon after another one is told once at most."""
+        """Record that no frames come; losses that soon follow one another are reported once."""
         self._lost_s = self._now_s()
         self._losses += 1
-        if self._care.give_up_s > 0.0 and self._losses == 1:
+        if self._recovery.give_up_s > 0.0 and self._losses == 1:
             self._owes_back = True
             self._events.append(f"{LOST} ({reason}): {remedy}")
         elif self._losses == 2:
@@ -246,28 +251,30 @@ class CameraProcess:
         pipe = self._pipe
         assert pipe is not None
         slots = SlotReader(), SlotReader()
-        silence = FrameWatchdog(self._care, self._now_s())
+        silence = FrameWatchdog(self._recovery, self._now_s())
         retrying = False  # the process itself opens a lost source again and again
         self._counted = self._number
         try:
             while True:
-                if not pipe.poll(_LOOK_S):
+                if not pipe.poll(_POLL_S):
                     if self._closing.is_set() and not self._alive():
                         return _End("closed")
                     if not retrying and self._is_hung(silence):
                         return _End("no new picture, and its process does not go on")
                     continue
-                word = pipe.recv()
-                if isinstance(word, Ended):
-                    return _End(word.reason, word.final)
-                if isinstance(word, str):
-                    retrying = word.startswith(LOST) or (retrying and not word.startswith(BACK))
-                    silence.record_life(self._now_s())
-                    self._events.append(word)
+                message = pipe.recv()
+                if isinstance(message, Ended):
+                    return _End(message.reason, message.final)
+                if isinstance(message, str):
+                    retrying = message.startswith(LOST) or (
+                        retrying and not message.startswith(BACK)
+                    )
+                    silence.record_activity(self._now_s())
+                    self._events.append(message)
                 else:
                     retrying = False
                     silence.record_frame(self._now_s())
-                    self._note(word, slots)
+                    self._publish(message, slots)
         except (EOFError, OSError):
             return _End("the process that looks at pictures has ended")
         finally:
@@ -286,14 +293,14 @@ class CameraProcess:
             self._events.append("still no picture: starting the camera's process again")
         return verdict == "hung"
 
-    def _note(self, word: Found, slots: tuple[SlotReader, SlotReader]) -> None:
-        """Leave what was found in the slot, with the frame if it is still there."""
-        found = word.detections
+    def _publish(self, message: Found, slots: tuple[SlotReader, SlotReader]) -> None:
+        """Publish detections, with the frame if it is still in its slot."""
+        found = message.detections
         self.frames += 1
         self.frames_with_face += bool(found.faces)
         self._number = self._counted + found.number
-        image = slots[0].take(word.image) if word.image is not None else None
-        depth = slots[1].take(word.depth) if word.depth is not None else None
+        image = slots[0].take(message.image) if message.image is not None else None
+        depth = slots[1].take(message.depth) if message.depth is not None else None
         blobs = found.blobs
         if self._starts > 1:
             first = (self._starts - 1) * _BLOB_IDS
@@ -304,9 +311,9 @@ class CameraProcess:
             if self._owes_back:
                 self._events.append(f"{BACK} after {now_s - self._lost_s:.1f} s")
             self._lost_s, self._owes_back, self._back_s = None, False, now_s
-        elif self._losses and now_s - self._back_s >= _SOUND_S:
+        elif self._losses and now_s - self._back_s >= _STABLE_S:
             self._losses = 0
 
 
-def _no_word() -> SetupError:
+def _no_reply() -> SetupError:
     return CameraError("the process that looks at pictures did not start: start anew")

@@ -83,7 +83,7 @@ _COLOUR_PNG = [*_DEPTH_PNG, cv2.IMWRITE_PNG_STRATEGY, cv2.IMWRITE_PNG_STRATEGY_R
 
 
 class BadMessage(ValueError):
-    """A message holds not what its topic says; the text says what is wrong."""
+    """A message does not hold what its topic requires; the text names the error."""
 
 
 def nanoseconds(time_s: float) -> int:

@@ -103,10 +103,10 @@ class Recording:
         return bytes(Message.read(ReadDataStream(BytesIO(content)), place.length).data)
 
     def _index(self) -> bool:
-        """Record where the frames are; return whether the file was closed as it should.
+        """Index the frames; return whether the file was closed properly.
 
         Raises:
-            CameraError: a record says what none can.
+            CameraError: a record is invalid.
         """
         try:
             return self._indexed()
@@ -114,7 +114,7 @@ class Recording:
             raise CameraError(f"{self._path} is damaged: copy the file anew") from error
 
     def _indexed(self) -> bool:
-        """Record where the frames are; return whether the file was closed as it should."""
+        """Index the frames; return whether the file was closed properly."""
         waiting: dict[str, _MessagePlace] = {}
         stamp_ns = -1
         for kind, place in self._records():
@@ -138,7 +138,7 @@ class Recording:
             self._pictures.append(_FrameIndex(stamp_ns, places))
 
     def _meet(self, kind: int, place: _MessagePlace) -> None:
-        """Read the records that say what the file is."""
+        """Read the records that describe the file."""
         if kind == Opcode.CHUNK:
             raise CameraError(
                 f"{self._path} was packed into chunks by another program: play the file as recorded"

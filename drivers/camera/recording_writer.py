@@ -94,7 +94,7 @@ class RecordingWriter:
 
 
 def _create(path: Path, over: bool) -> IO[bytes]:
-    """Create the file, or say why not."""
+    """Create the file."""
     try:
         return path.open("wb" if over else "xb")
     except FileExistsError as error:

@@ -1,7 +1,7 @@
 """Frames from one process to another through shared memory: a few slots, written in turn.
 
 The reader copies a slot out and looks at its stamp before and after; a slot that was written
-meanwhile is given up. Nobody waits for anybody.
+meanwhile is given up. Neither side waits.
 """
 
 from contextlib import suppress
@@ -16,7 +16,7 @@ _STAMP_BYTES = 64  # one line of the processor's cache
 
 
 class SlotAddress(NamedTuple):
-    """Where an array lies.
+    """The position of an array in shared memory.
 
     memory: its name; slot, slot_bytes: which, and how large slots are; stamp: of this writing;
     shape, dtype: of the array

@@ -1,4 +1,4 @@
-"""What gives frames in real time: a camera, a film paced by the clock, or a recording."""
+"""Sources of frames in real time: a camera, a film paced by the clock, or a recording."""
 
 import threading
 from collections.abc import Callable
@@ -21,7 +21,7 @@ class Shot(NamedTuple):
 
     depth_m: distances, aligned with the frame and of its size, NaN where unknown
     lens: the lens of this frame, which is then without distortion
-    faces: what the camera itself has found; nobody need look again
+    faces: those that the camera itself has found; no detector runs then
     """
 
     captured_s: float

@@ -29,7 +29,7 @@ class CameraThread:
         source: the frames.
         detector: finds faces.
         now_s: the host's monotonic clock, seconds.
-        care: how a lost source is reopened.
+        recovery: how a lost source is reopened.
         motion: called in the camera's thread with every frame, None for none.
 
     frames, frames_with_face: counts of frames looked at since open
@@ -40,12 +40,12 @@ class CameraThread:
         source: FrameSource,
         detector: FaceDetector,
         now_s: Callable[[], float],
-        care: CameraRecoveryParams | None = None,
+        recovery: CameraRecoveryParams | None = None,
         motion: Motion | None = None,
     ) -> None:
         self._events: deque[str] = deque(maxlen=_MOST_EVENTS)
         self._camera = CaptureLoop(
-            source, detector, now_s, care or CameraRecoveryParams(), motion, self._events.append
+            source, detector, now_s, recovery or CameraRecoveryParams(), motion, self._events.append
         )
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None

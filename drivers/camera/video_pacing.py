@@ -24,7 +24,7 @@ class VideoPacing:
     def wait(
         self, times: VideoTimestamps, now_s: Callable[[], float], stop: threading.Event
     ) -> Due | None:
-        """Wait until the next frame is due and return the newest; None where told to stop."""
+        """Wait until the next frame is due and return the newest; None if stopped."""
         if self._zero_s is None:
             self._zero_s = now_s()
         wait_s = self._zero_s + times.due_s(self._taken + 1) - now_s()

@@ -22,7 +22,7 @@ class VideoTimestamps(NamedTuple):
     """Due times of a film that is repeated for ever; numbers are from 1.
 
     rate_hz: frames a second, the mean where they come unevenly
-    starts_s: due time of each frame of one showing, or () where the rate says it all
+    starts_s: due time of each frame of one showing, or () if the rate is constant
     length_s: of one showing, where there is a table
     note: what a person should know, or ""
     """
@@ -88,7 +88,7 @@ def measured_rate_hz(times_s: Sequence[float]) -> float | None:
 def at_a_rate(stated_hz: float, note: str, times_s: Sequence[float]) -> VideoTimestamps | None:
     """Judge by the first frames; None where they come unevenly.
 
-    stated_hz, note: the rate to use by what the container says, and what was assumed for it
+    stated_hz, note: the rate to use from the container's header, and what was assumed for it
     """
     if even(times_s, stated_hz) and (not note or measured_rate_hz(times_s) is None):
         return VideoTimestamps(stated_hz, note=note)

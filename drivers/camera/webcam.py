@@ -71,7 +71,7 @@ class Webcam:
         """Open the camera and fetch one frame as a proof.
 
         Raises:
-            CameraError: it is absent, forbidden, busy or gives no frame.
+            CameraError: it is absent, not permitted, busy or delivers no frame.
         """
         self.close()
         self._check_file()
@@ -94,7 +94,7 @@ class Webcam:
         """Wait for the next frame; its time is the kernel's stamp, else that of its arrival.
 
         Raises:
-            CameraError: the camera is not open or gives no more frames.
+            CameraError: the camera is not open or delivers no more frames.
         """
         if self._capture is None:
             raise CameraError(f"camera {self._file} is not open: call open() before taking")
@@ -129,7 +129,7 @@ class Webcam:
         self._capture = None
 
     def _check_file(self) -> None:
-        """Refuse a device file that is absent or forbidden, and say what there is."""
+        """Refuse a device file that is absent or not permitted; the message lists the others."""
         if not self._file.exists():
             there = ", ".join(sorted(str(f) for f in self._file.parent.glob("video*")))
             raise CameraError(

@@ -1,4 +1,4 @@
-"""The process that looks at frames, from its start to its end (see ``process``)."""
+"""The camera's process, from its start to its end (see ``process``)."""
 
 import os
 import signal
@@ -22,7 +22,7 @@ from gazerig.drivers.types import Detections, FaceDetector
 
 NICE = 10  # the loop goes first
 LONGEST_END_S = 12.0
-"""A process that was told to end, or whose program is gone, ends after this whatever blocks it."""
+"""A process that was stopped, or whose program is gone, ends after this whatever blocks it."""
 
 
 class CameraParts(NamedTuple):
@@ -37,7 +37,7 @@ class CameraParts(NamedTuple):
 
 
 class Found(NamedTuple):
-    """What the process tells of a frame."""
+    """Detections in one frame, and where the frame is in shared memory."""
 
     detections: Detections  # without frame and depth
     image: SlotAddress | None
@@ -45,7 +45,7 @@ class Found(NamedTuple):
 
 
 class Retune(NamedTuple):
-    """How to look from now on; None: as before. All must be picklable."""
+    """Request to change detectors; None: no change. All must be picklable."""
 
     detector: Callable[[], FaceDetector] | None
     motion: Callable[[Motion | None], Motion | None] | None
@@ -62,9 +62,9 @@ class Ended(NamedTuple):
 
 
 def run(
-    pipe: Connection, parts: CameraParts, now_s: Callable[[], float], care: CameraRecoveryParams
+    pipe: Connection, parts: CameraParts, now_s: Callable[[], float], recovery: CameraRecoveryParams
 ) -> None:
-    """Be the process: open, look, tell, until stopped or the other side is gone."""
+    """Run the process: open, detect and report, until stopped or the other side is gone."""
     # Ctrl-C reaches all processes of a terminal; it is the loop's to end this one.
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
@@ -74,20 +74,20 @@ def run(
     cv2.setNumThreads(max(1, (os.cpu_count() or 1) - 1))
     try:
         motion = parts.motion() if parts.motion is not None else None
-        camera = CaptureLoop(parts.source(), parts.detector(), now_s, care, motion, pipe.send)
+        camera = CaptureLoop(parts.source(), parts.detector(), now_s, recovery, motion, pipe.send)
         camera.open()
     except SetupError as error:
         pipe.send(error)
         return
     stop = threading.Event()
-    words: deque[Retune] = deque()
+    requests: deque[Retune] = deque()
     pipe.send(None)
-    threading.Thread(target=_heed, args=(pipe, stop, words), daemon=True).start()
+    threading.Thread(target=_receive_requests, args=(pipe, stop, requests), daemon=True).start()
     slots = SlotWriter(), SlotWriter()
     try:
         while (found := camera.next(stop)) is not None:
-            pipe.send(_told(found, slots))
-            _retune(camera, words, pipe)
+            pipe.send(_message(found, slots))
+            _retune(camera, requests, pipe)
     except OSError:  # nobody listens any more
         pass
     except Exception as failure:
@@ -98,8 +98,8 @@ def run(
             slot.close()
 
 
-def _told(found: Detections, slots: tuple[SlotWriter, SlotWriter]) -> Found:
-    """Put frame and depth into shared memory, and the rest into words."""
+def _message(found: Detections, slots: tuple[SlotWriter, SlotWriter]) -> Found:
+    """Copy frame and depth into shared memory; return the message to send."""
     image, depth = found.image, found.depth_m
     return Found(
         replace(found, image=None, depth_m=None),
@@ -108,24 +108,24 @@ def _told(found: Detections, slots: tuple[SlotWriter, SlotWriter]) -> Found:
     )
 
 
-def _heed(pipe: Connection, stop: threading.Event, words: deque[Retune]) -> None:
-    """Pass words on until the one to stop comes, or the other side is gone."""
+def _receive_requests(pipe: Connection, stop: threading.Event, requests: deque[Retune]) -> None:
+    """Queue requests until the one to stop comes or the other side is gone."""
     with suppress(EOFError, OSError):
-        while isinstance(word := pipe.recv(), Retune):
-            words.append(word)
+        while isinstance(message := pipe.recv(), Retune):
+            requests.append(message)
     stop.set()
     # Whoever is blocked in a camera's driver would hold that camera for ever.
     threading.Event().wait(LONGEST_END_S)
     os._exit(1)
 
 
-def _retune(camera: CaptureLoop, words: deque[Retune], pipe: Connection) -> None:
-    """Look otherwise, as asked for; of several detectors only the last is made."""
+def _retune(camera: CaptureLoop, requests: deque[Retune], pipe: Connection) -> None:
+    """Apply queued requests; of several detectors only the last is made."""
     detector: Callable[[], FaceDetector] | None = None
-    while words:
-        word = words.popleft()
-        detector = word.detector or detector
-        camera.retune(None, word.motion)
+    while requests:
+        message = requests.popleft()
+        detector = message.detector or detector
+        camera.retune(None, message.motion)
     if detector is None:
         return
     try:

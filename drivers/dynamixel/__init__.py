@@ -1,1 +1,1 @@
-"""Dynamixel X servos: Protocol 2.0, from bytes to a bus that looks after itself."""
+"""Dynamixel X servos: Protocol 2.0, from bytes to a bus that recovers by itself."""

@@ -63,7 +63,7 @@ def wanted_settings(setup: "ServoConfig") -> dict[str, int]:
 
 
 def _target(name: str, found: int, wanted: int) -> int:
-    """A higher velocity limit than needed may stay."""
+    """Return the wanted value; a velocity limit that is higher than needed may stay."""
     return max(found, wanted) if name == "velocity_limit" else wanted
 
 

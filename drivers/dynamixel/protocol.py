@@ -1,4 +1,4 @@
-"""Packets of Dynamixel Protocol 2.0 as bytes: build instructions, take statuses apart.
+"""Packets of Dynamixel Protocol 2.0 as bytes: build instructions, parse statuses.
 
 The SDK's own builder does not stuff what it sends and its group reads lose every answer
 after a missing one, so the exchanges of the control loop are made here.
@@ -63,14 +63,14 @@ identify = ping
 
 
 def identity(status: Status) -> Identity | None:
-    """Return what a servo's answer to a ping says it is, None where this is none."""
+    """Return model and firmware from the answer to a ping, None if it is not one."""
     if len(status.params) != IDENTITY_LENGTH or status.error & ERROR_NUMBER:
         return None
     return Identity(*_IDENTITY.unpack(status.params))
 
 
 def reboot(servo_id: int) -> bytes:
-    """Build an order to restart."""
+    """Build a reboot instruction."""
     return instruction(servo_id, REBOOT)
 
 
@@ -80,7 +80,7 @@ def read(servo_id: int, address: int, length: int) -> bytes:
 
 
 def write(servo_id: int, address: int, data: bytes) -> bytes:
-    """Build an order to write registers of one servo."""
+    """Build a write to registers of one servo."""
     return instruction(servo_id, WRITE, address.to_bytes(2, "little") + data)
 
 
@@ -91,7 +91,7 @@ def sync_read(ids: Sequence[int], address: int, length: int, fast: bool = False)
 
 
 def sync_write(ids: Sequence[int], address: int, size: int, rows: Iterable[bytes]) -> bytes:
-    """Build an order to write the same registers of several servos, ``size`` bytes each."""
+    """Build a write to the same registers of several servos, ``size`` bytes each."""
     body = b"".join(bytes((i,)) + row for i, row in zip(ids, rows, strict=True))
     return instruction(BROADCAST, SYNC_WRITE, _SPAN.pack(address, size) + body)
 
@@ -154,7 +154,7 @@ def all_intact(parts: Sequence[bytes], checks: tuple[int, ...]) -> bool:
 def bytes_missing(raw: bytes, count: int, length: int) -> int:
     """Count the bytes still to come of ``count`` statuses with ``length`` bytes of params each.
 
-    Stuffing makes a status longer than that; its own length field tells, once it is here.
+    Stuffing makes a status longer than that; its own length field counts once it has arrived.
     """
     nominal = length + STATUS_OVERHEAD
     seen, done = 0, 0

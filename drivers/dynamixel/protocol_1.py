@@ -1,4 +1,4 @@
-"""Dynamixel Protocol 1.0, as far as it tells of servos that are set to it.
+"""Dynamixel Protocol 1.0, as far as needed to find servos that are set to it.
 
 Other makers' servos speak it, too. Source of the packets: ROBOTIS e-Manual, Protocol 1.0.
 """

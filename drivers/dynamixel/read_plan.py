@@ -7,7 +7,7 @@ much voltage) lies apart; servos with an indirect block can lay it beside the th
     146 | 64 70 126..135 | 144 145 | 120..124
     temperature | torque, hardware error, current, velocity, position | voltage | live bytes
 
-Reading 13 bytes from the first or 14 from the second gives temperature and voltage in turn.
+Reading 13 bytes from the first or 14 from the second returns temperature and voltage in turn.
 """
 
 import struct
@@ -88,7 +88,7 @@ def _all_fast(setups: "Sequence[ServoConfig]", firmware: Mapping[int, int] | Non
 def _common_block(
     setups: "Sequence[ServoConfig]", firmware: Mapping[int, int] | None
 ) -> IndirectBlock | None:
-    """Return the indirect block that all have in the same place, None where there is none."""
+    """Return the indirect block that all have at the same address, None if there is none."""
     if not firmware:
         return None
     blocks = [indirect_blocks(MODELS[s.model], firmware[s.id])[0] for s in setups]

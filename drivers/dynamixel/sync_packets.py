@@ -54,7 +54,7 @@ class FastSyncRead:
         return max(0, at + self.reply_length - len(raw))
 
     def pieces(self, raw: bytes) -> PartialReply:
-        """Return what can be proved right.
+        """Return the blocks whose CRC is right.
 
         Every block's CRC continues from the CRC before it as it was sent, so a damaged
         block does not spoil the proof of the next. Of several damaged in a row the first

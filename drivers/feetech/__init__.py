@@ -1,1 +1,1 @@
-"""Feetech STS servos: packets, registers, and a bus with the same promises."""
+"""Feetech STS servos: packets, registers, and their bus."""

@@ -64,7 +64,7 @@ _END = REGISTERS["present_current"].address + REGISTERS["present_current"].size
 def window(address: int) -> ReadWindow:
     """Return a window up to Present Current (69).
 
-    address: 56 or below; from 40 or below torque and armed limits are told too
+    address: 56 or below; from 40 or below torque and armed limits are read as well
     """
     armed = address <= ARMED_AT
     pad = (ARMED_AT if armed else SENSED_AT) - address
@@ -78,8 +78,8 @@ def read_plan(
 ) -> ReadPlan:
     """Return how servos are read: what a loop needs every tick lies side by side in 56..70.
 
-    Torque and the armed limits lie before it, so now and then the reading begins at 40 and tells
-    them too.
+    Torque and the armed limits lie before it, so now and then the reading begins at 40 and
+    includes them.
     """
     return plan_of(window, params.torque_every)
 
@@ -89,7 +89,7 @@ def plan_of(window: Callable[[int], ReadWindow], every: int) -> ReadPlan:
 
     Args:
         window: makes a window from its address.
-        every: so many readings also tell the torque.
+        every: the torque is read in every so many readings.
     """
     armed, sensed = window(ARMED_AT), (window(SENSED_AT), window(SENSED_AT - 1))
     usual = [armed, *sensed * every][:every]
@@ -108,14 +108,14 @@ def plan_of(window: Callable[[int], ReadWindow], every: int) -> ReadPlan:
 
 
 def armed_limits(setup: "ServoConfig") -> dict[str, int | None]:
-    """Return what is written before the torque comes on, as a reading tells it."""
+    """Return what is written before the torque comes on, in units of the readings."""
     limit = None if setup.strength is None else round(setup.strength * TORQUE_FULL)
     acceleration = acceleration_units(setup.max_accel_steps_s2)
     return {"acceleration": acceleration, "torque_limit": limit}
 
 
 def _target(name: str, found: int, wanted: int) -> int:
-    """One bit of Phase is of several others, which belong to the servo's own making."""
+    """Return the wanted value; of Phase only one bit is changed, the others are the maker's."""
     return found & ~MULTI_TURN if name == "phase" else wanted
 
 

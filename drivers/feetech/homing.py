@@ -1,6 +1,6 @@
-"""Making the present place of an STS servo its middle, where the encoder's zero is far away.
+"""Setting the present position of an STS servo as its middle, away from the encoder's zero.
 
-The servo reckons the offset (31) itself when it is told so (Torque Enable := 128) and keeps
+The servo computes the offset (31) itself on request (Torque Enable := 128) and keeps
 it in its EEPROM. Everything that was calibrated in steps before is void afterwards.
 Source: Feetech memory table STS3215, register 40.
 """
@@ -17,11 +17,11 @@ NEAR_STEPS = 8
 
 
 def set_middle(port: BusPort, family: Family, servo_id: int) -> int:
-    """Let a servo without torque call its present place 2048; return its offset in steps.
+    """Make the present position of a servo without torque 2048; return its offset in steps.
 
     Raises:
         ServoMissing: it does not answer.
-        ServoFault: its torque is on, or it does not take the order.
+        ServoFault: its torque is on, or it rejects the instruction.
         BusLost: the port is gone.
     """
     registers = Registers(port, family)

@@ -1,4 +1,4 @@
-"""Packets of the Feetech STS servos as bytes: build instructions, take statuses apart.
+"""Packets of the Feetech STS servos as bytes: build instructions, parse statuses.
 
 instruction  FF FF | id | length | instruction | params | checksum
 status       FF FF | id | length | error       | params | checksum
@@ -9,7 +9,7 @@ whoever asks asks for a length that the question does not have.
 
 The checksum is one byte wide and a sum: a lost byte whose place the next header takes
 passes it now and then. Such a status overlaps the next one, so statuses that overlap are
-not believed.
+rejected.
 
 Source: Feetech, communication protocol of the SCS and STS series.
 """
@@ -73,17 +73,17 @@ def ping(servo_id: int) -> bytes:
 
 
 def reboot(servo_id: int) -> bytes:
-    """Build an order to restart."""
+    """Build a reboot instruction."""
     return instruction(servo_id, REBOOT)
 
 
 def identify(servo_id: int) -> bytes:
-    """Build a question about what a servo is: its first registers."""
+    """Build a read of the first registers, which hold model and firmware."""
     return read(servo_id, 0, IDENTITY_LENGTH)
 
 
 def identity(status: Status) -> Identity | None:
-    """Return what a servo's first registers say it is, None where these are others.
+    """Return model and firmware from the first registers, None if the status holds others.
 
     The firmware is a hundred times the major version and the minor one, 310 for 3.10. The model
     number of an SCS servo has the high byte first.
@@ -101,12 +101,12 @@ def read(servo_id: int, address: int, length: int) -> bytes:
 
 
 def write(servo_id: int, address: int, data: bytes) -> bytes:
-    """Build an order to write registers of one servo."""
+    """Build a write to registers of one servo."""
     return instruction(servo_id, WRITE, bytes((address,)) + data)
 
 
 def reg_write(servo_id: int, address: int, data: bytes) -> bytes:
-    """Build an order to write registers of one servo at the next action."""
+    """Build a write to registers of one servo that takes effect at the next action."""
     return instruction(servo_id, REG_WRITE, bytes((address,)) + data)
 
 
@@ -116,7 +116,7 @@ def sync_read(ids: Sequence[int], address: int, length: int) -> bytes:
 
 
 def sync_write(ids: Sequence[int], address: int, size: int, rows: Iterable[bytes]) -> bytes:
-    """Build an order to write the same registers of several servos, ``size`` bytes each."""
+    """Build a write to the same registers of several servos, ``size`` bytes each."""
     body = b"".join(bytes((i,)) + row for i, row in zip(ids, rows, strict=True))
     return instruction(BROADCAST, SYNC_WRITE, bytes((address, size)) + body)
 

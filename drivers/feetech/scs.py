@@ -71,7 +71,7 @@ class ScsGoalWrite(GoalWrite):
 def window(address: int) -> ReadWindow:
     """Return a window up to Moving (66).
 
-    address: 56 or below; from 40 or below the torque is told too
+    address: 56 or below; from 40 or below the torque is read as well
     """
     armed = address <= ARMED_AT
     pad = (ARMED_AT if armed else SENSED_AT) - address

@@ -1,4 +1,4 @@
-"""What is asked of a board that sends pulses to hobby servos: one class a make implements this.
+"""Interface of a board that sends pulses to hobby servos: each make implements it in one class.
 
 A board either leads its pulses to their goals itself, at limits that are armed in it (Maestro), or
 takes pulses as they are, and the driver leads them (PCA9685): then ``send_goals`` sends where
@@ -18,7 +18,7 @@ from gazerig.drivers.types import ServoConfig
 
 
 class BoardLine(Exchange, Protocol):
-    """Where bytes go: as for every bus, and answers that come late."""
+    """The line to the board: counts of every bus, and answers that came late."""
 
     @property
     def lateness(self) -> HostLateness:
@@ -32,13 +32,13 @@ class BoardLine(Exchange, Protocol):
 
 
 class BoardTexts(NamedTuple):
-    """What people are told of a make of board.
+    """Texts of messages about a make of board.
 
     name: of the board, with its number or address
     no_pulses, other_pulse: the remedy where a channel gives no pulses, or others than it is sent
     noise: the remedy where its line is disturbed
     no_answer: the remedy where it does not answer
-    left_alone: what it does that cannot be reached any more
+    left_alone: what the servos do when the board cannot be reached any more
     """
 
     name: str
@@ -50,7 +50,7 @@ class BoardTexts(NamedTuple):
 
 
 class ChannelStatus(NamedTuple):
-    """What a board has said of one channel and of itself.
+    """What a board has reported of one channel and of itself.
 
     pulse_steps: what the channel gives now, quarter microseconds; 0: none
     errors: that it has found since it was asked last, by name
@@ -61,12 +61,12 @@ class ChannelStatus(NamedTuple):
 
 
 class Timing(NamedTuple):
-    """How a board is dealt with in time.
+    """Times and rates of a board.
 
     baud: bit/s of its port
-    watch_s: it is looked at so often
+    watch_s: period of its status requests
     stagger_s: between the first pulses of two servos
-    give_up_s: it may be silent or away for so long
+    give_up_s: longest silence or absence
     longest_lead_s: pulses that the driver leads go on for no longer than this where nothing was
         sent for a while; inf where the board itself leads them
     """
@@ -81,8 +81,8 @@ class Timing(NamedTuple):
 class Board(Protocol):
     """One board, or several on one line; all may raise BusLost.
 
-    line: what carries the bytes; texts: what people are told
-    damage: the kinds of errors that noise makes
+    line: carries the bytes; texts: of messages
+    damage: kinds of errors that noise causes
     """
 
     @property
@@ -92,7 +92,7 @@ class Board(Protocol):
 
     @property
     def texts(self) -> BoardTexts:
-        """Return the board's words in messages."""
+        """Return the texts of messages about the board."""
         ...
 
     @property
@@ -102,7 +102,7 @@ class Board(Protocol):
 
     @property
     def damage(self) -> Sequence[str]:
-        """Return what was found broken since the last call."""
+        """Return the kinds of errors that noise causes."""
         ...
 
     @property
@@ -147,11 +147,11 @@ class Board(Protocol):
         ...
 
     def steady(self, channels: Sequence[Channel]) -> None:
-        """Keep pulses where they are while the board is not heard, where that does no harm."""
+        """Hold the pulses while the board does not answer, if that is harmless."""
         ...
 
     def lead(self, channels: Sequence[Channel]) -> None:
-        """Send pulses that are on their way a little farther, where the board does not itself."""
+        """Move pulses on towards their goals if the board does not do so itself."""
         ...
 
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:

@@ -2,7 +2,7 @@
 
 What such a board cannot do, and so this bus cannot promise:
 
-- Nobody measures a servo. Positions are goals moved by known speeds (``measured`` is
+- Servo positions are not measured. They are goals moved at known speeds (``measured`` is
   False), no load and no current is known, and a stuck servo is not noticed.
 - Where a servo is before its pulses begin is unknown. It goes to the first pulse at its
   own speed, whatever limit is armed.
@@ -61,7 +61,7 @@ class HobbyBoardBus(PortBus):
         self._begin()
 
     def _begin(self) -> None:
-        """Make the parts that have memory, with a clean sheet."""
+        """Create the stateful parts in their initial state."""
         timing = self._board.timing
         self._channels = tuple(Channel(setup, timing.longest_lead_s) for setup in self._setups)
         self._supervisor = BoardSupervisor(self._board, self._channels, self._log)
@@ -97,9 +97,9 @@ class HobbyBoardBus(PortBus):
         self._opened = True
 
     def read(self, now_s: float) -> Feedback:
-        """Ask the board for its errors and one pulse, and say where all servos must be.
+        """Ask the board for its errors and one pulse; return the estimated state of all servos.
 
-        All are missing where the board did not answer, and so are channels that lost their
+        All are missing if the board did not answer, and so are channels that lost their
         pulses until they are held again. Whatever is wrong, a read takes a bounded time. While
         the port is gone all are missing, and the port is tried again now and then.
 
@@ -119,7 +119,7 @@ class HobbyBoardBus(PortBus):
         return self._feedback(self._heard_s)
 
     def _feedback(self, at_s: float) -> Feedback:
-        """Return where all servos are taken to be; never measured."""
+        """Return the estimated positions of all servos; never measured."""
         channels, nothing = self._channels, self._nothing
         sure = [self._supervisor.is_known(channel) for channel in channels]
         each = tuple(zip(channels, sure, strict=True))
@@ -133,14 +133,14 @@ class HobbyBoardBus(PortBus):
             tuple([c.on for c in channels]),
             tuple([c.fault for c in channels]),
             (False,) * len(channels),
-            tuple([known and c.take_rearmed() for c, known in each]),
+            tuple([known and c.pop_rearmed() for c, known in each]),
             tuple([i for i, known in enumerate(sure) if not known]),
         )
 
     def enable_torque(self) -> tuple[int, ...]:
         """Hold every channel at the pulse that it gives, clipped to its limits.
 
-        A channel without pulses begins at its servo's last place, or at its rest where it
+        A channel without pulses begins at its servo's last position, or at rest if it
         has not been held yet: the servo goes there at once, at its own speed, and the next
         such channel follows ``stagger_ms`` later. A joint outside its limits is brought
         inside at 30 deg/s. Returns the goals that are now in force, in steps.
@@ -150,7 +150,7 @@ class HobbyBoardBus(PortBus):
             ServoMissing: the board does not answer, or a channel does not take
                 its goal.
         """
-        self._take_wanted()
+        self._apply_wanted()
         try:
             if not self._told:
                 self._told = True
@@ -195,7 +195,7 @@ class HobbyBoardBus(PortBus):
             self._lose(lost)
 
     def faults(self) -> tuple[str, ...]:
-        """Name what channels suffer from now, and the board's errors of the last 10 s."""
+        """Return the present faults of channels and the board's errors of the last 10 s."""
         channels = (f"{channel_label(c.setup)}: {c.fault}" for c in self._channels if c.fault)
         errors = self._supervisor.recent_errors(self._port.now_s())
         return (*channels, *(f"{self._board.texts.name}: {name}" for name in errors))
@@ -206,11 +206,11 @@ class HobbyBoardBus(PortBus):
         for setup in setups:
             self._board.params.check(setup)
 
-    def _take_wanted(self) -> None:
-        """Put in force what was asked for since the servos were held last."""
+    def _apply_wanted(self) -> None:
+        """Apply the setups requested since the servos were held last."""
         self._setups = self._wanted
         for channel, setup in zip(self._channels, self._setups, strict=True):
-            channel.want(setup)
+            channel.set_target(setup)
 
     # --- reading
 
@@ -242,7 +242,7 @@ class HobbyBoardBus(PortBus):
         return True
 
     def _any_byte_s(self, now_s: float) -> float:
-        """Return when anything at all came last, damaged or not."""
+        """Return when any byte was received last, damaged or not."""
         if self._board.line.rx_bytes != self._rx_bytes:
             self._rx_bytes, self._byte_s = self._board.line.rx_bytes, now_s
         return self._byte_s
@@ -264,7 +264,7 @@ class HobbyBoardBus(PortBus):
     # --- a port that goes away
 
     def _reset_trust(self) -> None:
-        """Begin again with a port that was away."""
+        """Reset after the port has come back."""
         self._supervisor.mark_all_for_recovery()
 
     def _switch_off(self) -> ReleaseResult:

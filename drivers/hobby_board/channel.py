@@ -1,4 +1,4 @@
-"""One channel of a board as the driver knows it: what it was sent to and where it must be."""
+"""One channel of a board: its commanded pulse and its servo's estimated position."""
 
 from collections import deque
 from math import inf
@@ -17,14 +17,14 @@ FINE_STEPS = 8
 
 
 class Channel:
-    """A servo that gives no feedback; its place is what the ramp computes.
+    """A servo without feedback; its position is computed by the ramp.
 
-    on: it gives pulses, as far as known
+    on: whether it gives pulses, as far as known
     held: it follows the goals that are written
     entering: it is on its slow way into its limits
     rearmed: it was enabled again, not yet reported
     fault: why it stays without pulses; "" where nothing is wrong
-    told: a person has been told that it does not give the pulses it should
+    told: whether it has been reported that it does not give the pulses it should
     sent_steps: the pulse that it was sent last, where the driver leads it
 
     Args:
@@ -37,7 +37,7 @@ class Channel:
         self._longest_lead_s = longest_lead_s
         self.setup = setup
         self.id = setup.id
-        self.on = self.held = self.entering = self.rearmed = self.told = False
+        self.on = self.held = self.entering = self.rearmed = self.off_goal_reported = False
         self.fault = ""
         self.goal_steps = self.clip(_rest(setup))
         self.ramp = Ramp(self.goal_steps, _own_speed(setup))
@@ -49,7 +49,7 @@ class Channel:
         self._end_steps = 0
         self.sent_steps = 0
 
-    def want(self, setup: ServoConfig) -> None:
+    def set_target(self, setup: ServoConfig) -> None:
         """Apply a changed setup of the same servo."""
         self.setup = setup
         self.ramp.shaft_speed_steps_s = _own_speed(setup)
@@ -86,7 +86,7 @@ class Channel:
         if not (self.on and pulse_steps):
             # A first pulse is not ramped: there is nothing to ramp it from.
             self.ramp.begin(pulse_steps or self.goal_steps)
-        self.on, self.fault, self.told = True, "", False
+        self.on, self.fault, self.off_goal_reported = True, "", False
         self._at_s = now_s
         self._settled_s = inf
         self._recent.clear()
@@ -216,8 +216,8 @@ class Channel:
         self.rearmed = True
         self.ramp.shaft_steps = self.ramp.pulse_steps
 
-    def take_rearmed(self) -> bool:
-        """Return whether plans must begin at its pulse; after it was enabled, once."""
+    def pop_rearmed(self) -> bool:
+        """Return once, after it was enabled, whether plans must begin at its pulse."""
         anew, self.rearmed = self.rearmed, False
         return anew or self.entering
 

@@ -1,7 +1,7 @@
-"""Switching a channel's pulses on, so that nothing moves that need not.
+"""Switching a channel's pulses on with as little motion as possible.
 
-Where a channel gives pulses already it is held there. Where it gives none nobody can know
-where its servo is, and a first pulse is not ramped: the servo goes there at its own speed.
+Where a channel gives pulses already it is held there. Where it gives none its
+servo's position is unknown, and a first pulse is not ramped: the servo goes there at its own speed.
 """
 
 from enum import Enum
@@ -20,7 +20,7 @@ class Outcome(Enum):
 
 
 def take(board: Board, channel: Channel, pulse_steps: int) -> Outcome:
-    """Hold a channel at the pulse that it gives, or at its last place where it gives none.
+    """Hold a channel at the pulse that it gives, or at its last position if it gives none.
 
     Speed and acceleration are armed before the goal is sent, and the pulse is asked for
     after. A joint outside its limits comes inside at 30 deg/s.

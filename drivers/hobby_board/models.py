@@ -32,5 +32,5 @@ HOBBY = {
 
 
 def channel_label(setup: "ServoConfig") -> str:
-    """Return how people know a hobby servo: its joint and its channel."""
+    """Return a hobby servo's label for messages: its joint and its channel."""
     return servo_label(setup, "channel")

@@ -13,7 +13,7 @@ if TYPE_CHECKING:  # the guardian starts without numpy
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HobbyBoardParams(ABC):
-    """How long a board is waited for, how often it is looked at, and how its servos start."""
+    """Time-outs of a board, the period of its checks, and how its servos start."""
 
     # fmt: off
     reply_timeout_ms: Annotated[float, Bounds(1, 200),
@@ -39,7 +39,7 @@ class HobbyBoardParams(ABC):
         """Refuse a servo that no channel can have.
 
         Raises:
-            ValueError: so it is; the message names the channel and what would be right.
+            ValueError: no channel can have it; the message names the channel and what is possible.
         """
         if not 0 <= setup.id < self.channels:
             raise ValueError(f"channel {setup.id}: the board has channels 0 to {self.channels - 1}")

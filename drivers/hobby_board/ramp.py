@@ -1,7 +1,7 @@
-"""Where a channel's pulse and the shaft behind it are, as far as known speeds tell.
+"""Estimate of a channel's pulse and of its servo's shaft, from known speeds.
 
 A pulse is led towards its goal at a limited speed and acceleration, by the board or by the driver;
-the servo's shaft moves towards the pulse as fast as it can. Nobody measures the shaft: what is
+the servo's shaft moves towards the pulse as fast as it can. The shaft is not measured: what is
 computed here is an estimate that a stuck or loaded servo does not keep.
 Steps are quarter microseconds.
 """
@@ -39,7 +39,7 @@ class Ramp:
         self.begin(self.shaft_steps)
 
     def found(self, pulse_steps: float) -> None:
-        """Record the width that the board says it gives now."""
+        """Record the width that the board reports."""
         self.pulse_steps = pulse_steps
 
     def longest_s(self, way_steps: float) -> float:

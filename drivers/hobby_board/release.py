@@ -1,4 +1,4 @@
-"""Letting go of hobby servos: no more than whoever does it in an emergency needs."""
+"""Releasing hobby servos; imports no more than the guardian needs in an emergency."""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -8,23 +8,23 @@ from gazerig.drivers.released import ReleaseResult
 from gazerig.drivers.serial.port import BusPort
 
 TRIES = 3
-"""So often is asked or told again what must not fail."""
+"""Attempts of what must not fail."""
 
 
 class Stoppable(Protocol):
-    """As much of a board as letting go needs."""
+    """The part of a board that a release needs."""
 
     def stop(self, channels: Sequence[int], last_try: bool = False) -> None:
         """Ask the board to send no more pulses to channels."""
         ...
 
     def pulses(self, channels: Sequence[int]) -> tuple[int, ...] | None:
-        """Return the pulses that the board sends now, None where it cannot tell."""
+        """Return the pulses that the board sends now, None if it does not answer."""
         ...
 
 
 def switch_off(board: Stoppable, channels: Sequence[int]) -> ReleaseResult:
-    """Stop the pulses, and see that they are gone.
+    """Stop the pulses and verify that they are gone.
 
     Raises:
         BusLost: the port is gone.

@@ -1,4 +1,4 @@
-"""A board that does not answer: when to ask again, and what people are told."""
+"""A board that does not answer: when to ask again, and what is reported."""
 
 from math import inf
 
@@ -16,7 +16,7 @@ OWED_S = 0.1
 
 
 class SilenceMonitor:
-    """Counts answers that stayed out.
+    """Counts missing answers.
 
     missed: how many in a row
     """
@@ -34,7 +34,7 @@ class SilenceMonitor:
         return now_s >= self._due_s
 
     def miss(self, now_s: float, heard_s: float = -inf) -> None:
-        """Record an answer that stayed out, or could not be read; anything came last at heard_s."""
+        """Record a missing or damaged answer; ``heard_s``: when any byte was received last."""
         if not self.missed:
             self._wait_s = AGAIN_FIRST_S
             if self._back_s is None:
@@ -73,5 +73,5 @@ class SilenceMonitor:
         self._told, self._back_s = False, None
 
     def seconds(self, now_s: float) -> float:
-        """Return for how long nothing has been heard; 0 where the last answer came."""
+        """Return how long no answer has come; 0 if the last one came."""
         return now_s - self._since_s if self.missed else 0.0

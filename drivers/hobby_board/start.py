@@ -1,4 +1,4 @@
-"""Taking hold of a board's channels, with every trouble named for a person."""
+"""Enabling a board's channels, with a message for every problem."""
 
 from collections.abc import Sequence
 from math import inf

@@ -1,8 +1,8 @@
-"""Looking after a board between the goals: errors, restarts, channels that lost their pulses.
+"""Supervision of a board: errors, restarts, channels that lost their pulses.
 
 On an error a board may send its channels home: to no pulses, or a place of its own. A restart does
 the same and forgets how it was set up. Both show in one short question a tick: a channel's pulse
-and what the board says of itself.
+and the board's own status.
 """
 
 from collections.abc import Sequence
@@ -21,11 +21,11 @@ REST_S, LONGEST_REST_S = 0.1, 1.0
 """Channels that noise sends home more often than that wait so long, and longer each time."""
 
 SAME_S = 1.0
-"""The same error is not told again within such a time."""
+"""Shortest time between two reports of the same error."""
 
 
 class BoardSupervisor:
-    """What the board says about itself, and what is done about it.
+    """Checks the board's status and recovers its channels.
 
     engaged: goals are followed
     """
@@ -48,7 +48,7 @@ class BoardSupervisor:
         self._damaged_s = self._hold_at_s = self._told_s = -inf
 
     def torque_enabled(self) -> None:
-        """Begin to look after channels that are held."""
+        """Start the supervision of enabled channels."""
         self.engaged = True
         self._restarts.clear()
         self._disturbed.clear()
@@ -57,14 +57,14 @@ class BoardSupervisor:
         self._unsure, self._unhandled = False, ()
 
     def torque_disabled(self) -> None:
-        """Leave the channels alone."""
+        """Stop the supervision."""
         self.engaged = False
         self._pending.clear()
         for channel in self._channels:
             channel.release()
 
     def mark_all_for_recovery(self) -> None:
-        """Trust no channel to be as it was left: each is enabled again."""
+        """Mark every channel to be enabled again."""
         self._unsure = True
         if self.engaged:
             for channel in self._channels:
@@ -79,15 +79,16 @@ class BoardSupervisor:
             self._errors_s[name] = now_s
 
     def recent_errors(self, now_s: float) -> tuple[str, ...]:
-        """Name the errors that the board has reported of late."""
+        """Return the errors that the board has reported recently."""
         return tuple(name for name, at_s in self._errors_s.items() if now_s - at_s < WITHIN_S)
 
     # --- in every read
 
     def watch(self) -> bool:
-        """Ask for the errors and one channel's pulse, and do what they call for.
+        """Read the errors and one channel's pulse, and act on them.
 
-        Gives whether the board answered.
+        Returns:
+            Whether the board answered.
 
         Raises:
             BusLost: the port is gone.
@@ -189,19 +190,19 @@ class BoardSupervisor:
         self._board.send_goals(held)
 
     def _off_goal(self, channel: Channel, pulse: int) -> None:
-        """Record that a channel stays elsewhere: it meets an end of the board's own range."""
+        """Record that a channel stays off its goal, at an end of the board's own range."""
         if self._led:
             # Boards that are led have no range of their own: what was sent was lost.
             self._line.errors["other pulse"] += 1
             channel.found(pulse)
             return
-        if channel.off_goal(pulse) and not channel.told:
-            channel.told = True
+        if channel.off_goal(pulse) and not channel.off_goal_reported:
+            channel.off_goal_reported = True
             self._line.errors["other pulse"] += 1
             self._log.add(refusal(self._board, channel))
 
     def _lost_hold(self, lost: Sequence[Channel], errors: Sequence[str], now_s: float) -> None:
-        """Record that channels are not where they were sent, and that they are to be held again."""
+        """Record that channels have lost their goals and are to be enabled again."""
         named = " and ".join(errors)
         who = (
             "the board"
@@ -222,7 +223,7 @@ class BoardSupervisor:
             self._log.add(f"{who} restarted: set up anew")
 
     def _recent_noise(self, now_s: float) -> bool:
-        """Return whether bytes have been damaged of late, to the board or from it."""
+        """Return whether bytes to or from the board have been damaged recently."""
         errors = self._line.errors
         damages = sum(errors[name] for name in self._board.damage)
         if damages != self._damages:
@@ -230,9 +231,9 @@ class BoardSupervisor:
         return now_s - self._damaged_s < WITHIN_S
 
     def _wait_for_quiet(self, who: str, named: str, now_s: float) -> None:
-        """Hold again who was sent home by noise: at once, but ever later where it does not end.
+        """Delay enabling channels that noise has sent home: at once, then later and later.
 
-        Without pulses nothing moves; a servo that is held and let go all the time jerks.
+        Without pulses nothing moves; a servo that is enabled and released all the time jerks.
         """
         self._disturbed = [at_s for at_s in self._disturbed if now_s - at_s < WITHIN_S]
         self._disturbed.append(now_s)
@@ -279,7 +280,7 @@ class BoardSupervisor:
             channel.rearm()
             self._pending.remove(channel)
 
-    # --- what others may know
+    # --- state for the bus
 
     def is_known(self, channel: Channel) -> bool:
         """Return whether anything is known of where a channel is."""

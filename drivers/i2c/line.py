@@ -1,6 +1,6 @@
 """Exchanges on one I2C bus: bounded waiting, every transfer confirmed, counts.
 
-I2C has no check bytes: who acts upon an answer asks twice.
+I2C has no check bytes: an answer that is acted upon is read twice.
 """
 
 from collections import Counter
@@ -19,7 +19,7 @@ class I2cLine:
     tx_bytes, rx_bytes: counts since it was made
     errors: counts by kind
     lateness: answers that came after waiting had ended
-    why: what was wrong with the last exchange; "" where nothing was
+    failure: error of the last exchange, "" for none
     """
 
     def __init__(self, port: BusPort, baud: int, reply_timeout_ms: float) -> None:
@@ -27,18 +27,18 @@ class I2cLine:
         self.tx_bytes = self.rx_bytes = 0
         self.errors: Counter[str] = Counter()
         self.lateness = HostLateness()
-        self.why = ""
+        self.failure = ""
         self._byte_s = BITS_PER_BYTE / baud
         self._patience_s = reply_timeout_ms / 1000.0
         self._late = False
 
     def send(self, packet: bytes) -> None:
-        """Send transfers that only write; nobody asks how they ended."""
+        """Send transfers that only write, without asking for their status."""
         self.port.write(packet)
         self.tx_bytes += len(packet)
 
     def ask(self, transfers: Sequence[tuple[bytes, int]]) -> list[bytes] | None:
-        """Send transfers and return what each of them read; None where one did not succeed.
+        """Send transfers and return what each of them read; None if one failed.
 
         Args:
             transfers: each with the number of bytes that it reads.
@@ -46,7 +46,7 @@ class I2cLine:
         port = self.port
         if self._late:
             dropped = port.drain()
-            if dropped and self.why == "timeout":
+            if dropped and self.failure == "timeout":
                 self.lateness.late_answer(port.now_s())
         else:
             port.clearPort()
@@ -56,10 +56,10 @@ class I2cLine:
         wire_s = (len(packet) + wanted) * self._byte_s
         answer = port.read_until(wanted, port.now_s() + wire_s + self._patience_s)
         self.rx_bytes += len(answer)
-        self.why = self._trouble(answer, [length for _, length in transfers])
-        self._late = self.why in ("timeout", "incomplete", "damaged")
-        if self.why:
-            self.errors[self.why] += 1
+        self.failure = self._trouble(answer, [length for _, length in transfers])
+        self._late = self.failure in ("timeout", "incomplete", "damaged")
+        if self.failure:
+            self.errors[self.failure] += 1
             return None
         found, at = [], 0
         for _, length in transfers:
@@ -69,23 +69,23 @@ class I2cLine:
 
     @staticmethod
     def _trouble(answer: bytes, lengths: Sequence[int]) -> str:
-        """Name what is wrong with an answer; "" where nothing is."""
+        """Return the error in an answer, "" for none."""
         if not answer:
             return "timeout"
         if len(answer) < sum(lengths) + len(lengths):
             # Of a transfer that failed there is a status and nothing else.
             failed = [OUTCOMES.get(byte, "incomplete") for byte in answer]
-            return next((why for why in failed if why), "incomplete")
+            return next((reason for reason in failed if reason), "incomplete")
         at = -1
         for length in lengths:
             at += length + 1
-            why = OUTCOMES.get(answer[at], "damaged")
-            if why:
-                return why
+            reason = OUTCOMES.get(answer[at], "damaged")
+            if reason:
+                return reason
         return ""
 
-    def tell(self, *packets: bytes) -> bool:
-        """Send transfers that only write; returns whether all were acknowledged."""
+    def write_confirmed(self, *packets: bytes) -> bool:
+        """Send transfers that only write; return whether all were acknowledged."""
         return self.ask([(packet, 0) for packet in packets]) is not None
 
     def wait(self, until_s: float) -> None:

@@ -47,7 +47,7 @@ class I2cPort:
 
     Args:
         port_name: its path, e.g. /dev/i2c-1.
-        exclusive: no other program of this kind may use it meanwhile; sensors' may.
+        exclusive: whether other programs of this kind are locked out; those of sensors are not.
         on_traffic: called whenever bytes are sent or waited for; None if not needed.
         open_bus: opens it.
     """
@@ -137,7 +137,7 @@ class I2cPort:
                 self._waiting += bytes(message)
 
     def _see_free(self, address: int) -> None:
-        """See that no driver of the kernel has taken an address for itself.
+        """Check that no kernel driver has claimed an address.
 
         Raises:
             BusLost: it is; the message says how to free it.
@@ -179,16 +179,16 @@ class I2cPort:
         return len(self._waiting)
 
     def clearPort(self) -> None:
-        """Throw away what waits."""
+        """Discard received bytes."""
         self.drain()
 
     def drain(self) -> int:
-        """Throw away what waits; returns the number of bytes."""
+        """Discard received bytes; return their number."""
         dropped, self._waiting = len(self._waiting), b""
         return dropped
 
-    def _lost(self, why: object) -> BusLost:
-        return BusLost(f"{self.port_name} is gone ({why}): check the adapter and its cable")
+    def _lost(self, reason: object) -> BusLost:
+        return BusLost(f"{self.port_name} is gone ({reason}): check the adapter and its cable")
 
 
 def explain(path: str, code: int | None) -> str:

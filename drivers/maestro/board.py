@@ -85,7 +85,7 @@ class MaestroBoard:
         )
 
     def prepare(self, log: EventLog) -> None:
-        """Stop the board's own script where one runs: it would move servos against us."""
+        """Stop the board's own script if one runs: it would move servos against this program."""
         if self.line.ask(self.line.speech.script_status(), 1) == b"\0":
             self.line.send(self.line.speech.stop_script())
             log.add("the board ran a script of its own: stopped")

@@ -28,7 +28,7 @@ class MaestroBus(HobbyBoardBus):
         super().__init__(self._maestro, setups)
 
     def go_home(self) -> None:
-        """Send all channels to their home as set in Pololu's program, and let go of them.
+        """Send all channels to their home as set in Pololu's program, and release them.
 
         Home may be a place, to which servos go at the armed speed, or no pulses at all.
 
@@ -39,9 +39,9 @@ class MaestroBus(HobbyBoardBus):
         self._maestro.line.send(self._maestro.line.speech.go_home())
 
     def moving(self) -> bool | None:
-        """Return whether any channel with a limit is on its way; None where nobody can say.
+        """Return whether any channel with a limit is on its way; None if unknown.
 
-        The Micro Maestro knows no such question.
+        The Micro Maestro has no such request.
 
         Raises:
             BusLost: the port is gone.

@@ -74,7 +74,7 @@ def name_errors(register: int) -> tuple[str, ...]:
     return (*named, "unknown error") if register >> len(ERRORS) else tuple(named)
 
 
-def words(answer: bytes) -> tuple[int, ...]:
+def decode_words(answer: bytes) -> tuple[int, ...]:
     """Return the 16-bit words of an answer."""
     return tuple(
         int.from_bytes(answer[i : i + WORD], "little") for i in range(0, len(answer), WORD)
@@ -83,11 +83,11 @@ def words(answer: bytes) -> tuple[int, ...]:
 
 @dataclass(frozen=True, slots=True)
 class MaestroCodec:
-    """Puts commands into the form that one board wants.
+    """Encodes commands in the form that one board expects.
 
     form: "compact" or "pololu"; device: its number, 0..127, for the Pololu form
     crc: every command ends in a check byte
-    channels: its size, which says what it understands
+    channels: its size, which decides the commands it knows
     """
 
     form: Form = "compact"

@@ -1,14 +1,14 @@
 """Exchanges with one Maestro: bounded waiting, clean lines, counts.
 
 Answers carry no address and no check, so an answer that came too late looks like any
-other. After one that stayed out the line is emptied before anything is asked again.
+other. After a missing answer the line is drained before the next request.
 """
 
 from collections import Counter
 from collections.abc import Sequence
 
 from gazerig.drivers.host_lateness import HostLateness
-from gazerig.drivers.maestro.commands import MOST, PROTOCOL_ERROR, WORD, MaestroCodec, words
+from gazerig.drivers.maestro.commands import MOST, PROTOCOL_ERROR, WORD, MaestroCodec, decode_words
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.serial.port import BITS_PER_BYTE, QUIET_S, BusPort
 
@@ -26,7 +26,7 @@ ALIKE_STEPS, FASTEST_STEPS_S = 200, 40_000.0
 class MaestroLink:
     """A port with one board behind it; every method may raise BusLost.
 
-    speech: how the board wants its commands
+    speech: encodes the board's commands
     tx_bytes, rx_bytes: counts since it was made
     errors: counts by kind
     lateness: answers that came after waiting had ended
@@ -53,7 +53,7 @@ class MaestroLink:
         self.tx_bytes += len(packet)
 
     def ask(self, packet: bytes, length: int) -> bytes | None:
-        """Send questions and return their answers; None where they do not come in time."""
+        """Send requests and return their answers; None if they do not come in time."""
         port = self.port
         if self._late or self._owed:
             # After a silence the answer to an older question may come first, and more behind it.
@@ -76,11 +76,11 @@ class MaestroLink:
         return answer
 
     def ask_words(self, packet: bytes, count: int) -> tuple[int, ...] | None:
-        """Send questions that are answered by words; None where they are not."""
+        """Send requests that are answered by 16-bit words; None if they are not."""
         answer = self.ask(packet, WORD * count)
         if answer is None:
             return None
-        found = words(answer)
+        found = decode_words(answer)
         if max(found) > MOST:
             # No pulse width and no error register is so large: bytes were lost or added.
             self.errors["damaged"] += 1
@@ -110,9 +110,9 @@ class MaestroLink:
         self.send(b"".join(self.speech.target(channel, 0) for channel in channels))
 
     def greet(self) -> int | None:
-        """Ask for the errors until the board answers; None where it keeps silent.
+        """Ask for the errors until the board answers; None if it stays silent.
 
-        A board that is still to detect its baud rate is given the byte it waits for.
+        A board that has yet to detect its baud rate is sent the byte it waits for.
         """
         for attempt in range(GREETINGS):
             packet = self._waking if attempt % 2 else self.speech.errors()
@@ -122,7 +122,7 @@ class MaestroLink:
         return None
 
     def takes_crc(self) -> bool:
-        """Return whether the board wants the check bytes that it is sent.
+        """Return whether the board expects the check bytes that it is sent.
 
         One that does not answers too, but finds an error in every command.
         """
@@ -141,8 +141,8 @@ class MaestroLink:
         """Ask for the pulse widths of some channels, quarter microseconds; 0: no pulses.
 
         Asked twice, as answers carry no check, and much follows from what they are: where a
-        channel is held. None where they did not come, where both differ, or where more came
-        than was asked for: who has been answered twice takes the next ones' pulses for his own.
+        channel is held. None if they did not come, if both differ, or if more came than was
+        asked for: after a doubled answer every pulse would be taken for the next channel's.
         """
         first, began_s = self._pulses_once(channels), self.port.now_s()
         second = None if first is None else self._pulses_once(channels)

@@ -1,10 +1,10 @@
-"""Is there a Maestro at a port, and how does it want to be spoken to? Nothing is moved on purpose.
+"""Detection of a Maestro at a port and of its command form. Nothing is moved on purpose.
 
-One thing is changed: a board clears its error register when it tells it, so what it held
+One thing is changed: a board clears its error register when it is read, so what it held
 is in the answer. Commands that a board does not understand are errors to it, and on an
 error it sends its channels home; so forms other than the chosen one are tried only where
-it keeps silent, and channels that may not exist are asked for only where that was wished
-and no channel gives pulses.
+it keeps silent, and channels that may not exist are read only on request
+and if no channel gives pulses.
 """
 
 from collections.abc import Callable
@@ -31,9 +31,9 @@ class DetectedMaestro(NamedTuple):
     forms: those of the commands that it answers; "pololu" with the device number given
     crc: it wants a check byte after every command
     errors: what its error register held, which is cleared now
-    script: its own script runs; None where it did not say
+    script: whether its own script runs, None if unknown
     pulses: by channel, quarter microseconds; 0: no pulses
-    channels: how many there are; None where that was not asked
+    channels: how many there are, None if not asked
     """
 
     forms: tuple[Form, ...]
@@ -45,11 +45,11 @@ class DetectedMaestro(NamedTuple):
 
 
 def probe(port: BusPort, params: MaestroParams, count: bool = False) -> DetectedMaestro | None:
-    """Ask whether a Maestro is there; None where nothing answers as one. The port is left open.
+    """Return the Maestro at a port, None if nothing answers as one. The port is left open.
 
     count: find the number of channels by asking for some that may not exist, on which a
         board sends its channels home; never done while any gives pulses. On USB the product
-        id tells it: ``USB_CHANNELS``.
+        id shows it: ``USB_CHANNELS``.
 
     Raises:
         PortError: the port cannot be opened.
@@ -71,7 +71,7 @@ def probe(port: BusPort, params: MaestroParams, count: bool = False) -> Detected
 def _look(
     line: MaestroLink, params: MaestroParams, register: int, count: bool
 ) -> DetectedMaestro | None:
-    """Ask a board that answers for what else it tells."""
+    """Read the rest of the state of a board that answers."""
     crc = line.speech.crc
     forms: tuple[Form, ...] = ()
     # Where several boards share a line all of them answer the compact form.
@@ -102,7 +102,7 @@ def _patiently(ask: Callable[[], tuple[int, ...] | None]) -> tuple[int, ...] | N
 
 
 def _count(line: MaestroLink) -> int:
-    """Count the channels: the first of each larger board is asked for until it is not there."""
+    """Count the channels: read the first one of each larger board until it does not exist."""
     for channels in sorted(USB_CHANNELS.values())[:-1]:
         question = line.speech.position(channels) + line.speech.errors()
         found = line.ask_words(question, 2)

@@ -1,7 +1,7 @@
 """PCA9685 boards as a board of hobby servos: sixteen channels each, led by the driver.
 
-They hold pulses and know nothing of speed: each goal is sent as a place on the way to it, and a
-goal that is not followed up stands. What a servo's id is: sixteen times its board, and channel.
+They hold pulses without any speed limit: each goal is sent as a position on the way to it, and the
+last one stays. A servo's id is sixteen times the number of its board, plus its channel.
 """
 
 from collections import defaultdict
@@ -113,7 +113,7 @@ class Pca9685Board:
     # --- finding
 
     def find(self, setups: Sequence[ServoConfig], log: EventLog) -> tuple[int, ...]:
-        """See that the boards are there and return the pulses of these servos; nothing changes.
+        """Check that the boards are there and return the pulses of these servos; nothing changes.
 
         Raises:
             BusLost: the port is gone.
@@ -130,7 +130,7 @@ class Pca9685Board:
         """Prepare nothing: boards are set up where they need it, before their first pulse."""
 
     def _ready(self, address: int) -> bool:
-        """See that a board is set up, and set it up where it is not; all its pulses end then."""
+        """Set a board up if it is not, which ends all its pulses; return whether it is set up."""
         now = self._modes(address)
         if now is None:
             return False
@@ -139,7 +139,7 @@ class Pca9685Board:
             return True
         if mode1 & (SLEEP | RESTART) or prescale != self._clocks[address].prescale:
             return self._set_up(address)
-        return self.line.tell(
+        return self.line.write_confirmed(
             bridge.write(address, MODE1, bytes((AWAKE,))),
             bridge.write(address, MODE2, bytes((TOTEM_POLE,))),
         )
@@ -160,7 +160,7 @@ class Pca9685Board:
     def _set_up(self, address: int) -> bool:
         """Set a board up from any state: no pulses, asleep, the prescaler, then awake."""
         self._forget(address)
-        asleep = self.line.tell(
+        asleep = self.line.write_confirmed(
             bridge.write(address, ALL_LED + BYTES - 1, bytes((FULL_OFF,))),
             bridge.write(address, MODE1, bytes((SLEEP | AUTO_INCREMENT,))),
             bridge.write(address, PRESCALE, bytes((self._clocks[address].prescale,))),
@@ -171,7 +171,7 @@ class Pca9685Board:
             return False
         self.line.wait(self.line.port.now_s() + START_S)
         # What slept with pulses on holds them back until this; there are none now.
-        self.line.tell(bridge.write(address, MODE1, bytes((RESTART | AWAKE,))))
+        self.line.write_confirmed(bridge.write(address, MODE1, bytes((RESTART | AWAKE,))))
         return self._modes(address) == (AWAKE, TOTEM_POLE, self._clocks[address].prescale)
 
     def _forget(self, address: int) -> None:
@@ -206,7 +206,7 @@ class Pca9685Board:
         return self._look_closer(channel)
 
     def _look_closer(self, channel: Channel) -> ChannelStatus | None:
-        """Look again at a board that is not as it was set up, or was not heard well."""
+        """Check once more a board that has lost its setup or was read badly."""
         address, _ = self._place(channel.id)
         now, pulses = self._modes(address), self.pulses((channel.id,))
         if now is None or pulses is None:
@@ -219,7 +219,7 @@ class Pca9685Board:
         return ChannelStatus(pulses[0], changed)
 
     def _told(self, servo_id: int, counts: int, prescale: int) -> int:
-        """Return the pulse that counts make: as it was sent, where they are what was sent."""
+        """Return the pulse of counts: exactly the one sent if the counts are those sent."""
         sent, clock = self._sent.get(servo_id), self._clock(servo_id)
         if sent is not None and sent[0] == counts and prescale == clock.prescale:
             return sent[1]

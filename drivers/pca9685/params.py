@@ -36,7 +36,7 @@ class Pca9685Params(HobbyBoardParams):
         """Check that the values fit each other.
 
         Raises:
-            ValueError: they do not; the message says which.
+            ValueError: they do not; the message names them.
         """
         for address in self.addresses:
             if address in RESERVED:

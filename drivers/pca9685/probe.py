@@ -37,13 +37,13 @@ def probe(port: BusPort, params: Pca9685Params) -> tuple[int, ...]:
             registers = _registers(line, address)
             if registers is not None and plausible(*registers):
                 found.append(address)
-        elif line.why != "not acknowledged":
+        elif line.failure != "not acknowledged":
             break  # no I2C bus, or one that is stuck
     return tuple(found)
 
 
 def see_board(line: I2cLine, address: int) -> None:
-    """See that what answers at an address is a PCA9685.
+    """Check that what answers at an address is a PCA9685.
 
     Raises:
         ServoMissing: it is not, or nothing answers.
@@ -68,14 +68,14 @@ def see_board(line: I2cLine, address: int) -> None:
 
 def _mute(line: I2cLine, address: int) -> str:
     """Return why nothing was read, with the remedy."""
-    if line.why == "bus stuck":
+    if line.failure == "bus stuck":
         return (
             "the I2C bus is stuck, its data or clock line is held down: switch what "
             "hangs on it off and on, check SDA and SCL for a short"
         )
-    if line.why != "not acknowledged":
+    if line.failure != "not acknowledged":
         return (
-            f"nobody answers as an I2C bus ({line.why}): a PCA9685 is reached over "
+            f"nobody answers as an I2C bus ({line.failure}): a PCA9685 is reached over "
             "an I2C bus such as /dev/i2c-1: write it under bus.port"
         )
     return (

@@ -36,7 +36,7 @@ def prescale_of(frequency_hz: float, oscillator_hz: float) -> int:
 
 
 class PulseClock(NamedTuple):
-    """What makes the time of a board's pulses: its oscillator, and the prescaler behind it."""
+    """The clock of a board's pulses: its oscillator and prescaler."""
 
     oscillator_hz: float
     prescale: int
@@ -68,7 +68,7 @@ def counts_of(registers: bytes) -> int:
 
 
 def plausible(first_six: bytes, outputs: bytes, prescale: int) -> bool:
-    """Return whether registers can be those of a PCA9685: bits that are always 0 are.
+    """Return whether registers can be those of a PCA9685: reserved bits are 0.
 
     Args:
         first_six: MODE1 to ALLCALLADR.
@@ -81,7 +81,7 @@ def plausible(first_six: bytes, outputs: bytes, prescale: int) -> bool:
 
 
 def counts_within(steps: int, low_steps: int, high_steps: int, grain_steps: float) -> int:
-    """Return the counts nearest to a pulse; of one inside limits such as are inside, too.
+    """Return the counts nearest to a pulse; those of a pulse inside the limits stay inside.
 
     Args:
         steps: the pulse, quarter microseconds.

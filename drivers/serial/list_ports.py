@@ -1,7 +1,7 @@
 """Serial ports of this computer as the system shows them: who may open them, who holds them.
 
-Nothing is opened here. ``Host`` names the places of the system that are looked into, so
-that another tree can stand in for them.
+Nothing is opened here. ``Host`` names the system folders that are read, so
+that tests can use others.
 """
 
 import contextlib
@@ -20,7 +20,7 @@ WISHED_LATENCY_MS = 1
 
 @dataclass(frozen=True, slots=True)
 class Host:
-    """Where the system tells about ports.
+    """System folders that describe ports.
 
     latency: one folder a USB serial device, with its latency_timer in ms
     by_id: links named after the adapter, the same after every plugging
@@ -35,7 +35,7 @@ class Host:
 class SerialPort(NamedTuple):
     """One serial port.
 
-    device: path to open; by_id: the same by its lasting name, None where it has none
+    device: path to open; by_id: its persistent name, None if it has none
     usb: USB vendor and product id, "0403:6014"; "" for a port that is not on USB
     """
 
@@ -76,14 +76,14 @@ def serial_ports(host: Host | None = None) -> tuple[SerialPort, ...]:
 
 
 def _lasting_names(by_id: Path) -> dict[str, str]:
-    """Return the lasting name of every device that has one."""
+    """Return the persistent name of every device that has one."""
     if not by_id.is_dir():
         return {}
     return {os.path.realpath(link): str(link) for link in sorted(by_id.iterdir())}
 
 
 def lasting_name(device: str, by_id: Path | None = None) -> str | None:
-    """Return the name of a port that stays the same after every plugging; None without one."""
+    """Return the persistent name of a port, the same after every plugging; None without one."""
     return _lasting_names(by_id or Host().by_id).get(os.path.realpath(device))
 
 
@@ -157,7 +157,7 @@ def latency_ms(file: Path) -> int | None:
 
 
 def set_latency(file: Path, ms: int = WISHED_LATENCY_MS) -> bool:
-    """Write a latency timer; return whether the adaptor has it now. Needs the right to write."""
+    """Write a latency timer; return whether the adaptor has it. Needs write permission."""
     try:
         file.write_text(f"{ms}\n", encoding="ascii")
     except OSError:

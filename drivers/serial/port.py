@@ -27,7 +27,7 @@ QUIET_S = 0.003
 """A line without a byte for so long is quiet: three turns of a 1 ms latency timer."""
 
 BABBLE_S = 0.06
-"""Draining gives up on a line that never falls silent."""
+"""Longest draining of a line that never falls silent."""
 
 MORE_RATES = (38_400, 76_800, 128_000, 250_000)
 """Bit/s that servos and adaptors know and the SDK's list of rates lacks."""
@@ -215,10 +215,10 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
             raise self._lost("it hung up")
         return data
 
-    def _lost(self, why: object) -> BusLost:
+    def _lost(self, reason: object) -> BusLost:
         """Make the error; the SDK's busy flag is freed, so that a reopened port works."""
         self.is_using = False
-        return BusLost(f"{self.port_name} is gone ({why}): check USB cable and servo power")
+        return BusLost(f"{self.port_name} is gone ({reason}): check USB cable and servo power")
 
     # --- what the SDK uses
 
@@ -324,7 +324,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
 
 
 def ask_low_latency(port: Any) -> None:
-    """Ask a USB adapter to hand over bytes after 1 ms instead of 16; others know no such thing."""
+    """Ask a USB adapter to hand over bytes after 1 ms instead of 16; other adapters ignore it."""
     try:
         port.set_low_latency_mode(True)
     except (ValueError, OSError):

@@ -1,4 +1,4 @@
-"""Whose a serial port is, by its USB vendor: servo packets must not reach a Maestro.
+"""The device behind a serial port, by its USB vendor: servo packets must not reach a Maestro.
 
 To a Maestro FF, with which the packets of smart servos begin, is a command that moves a
 servo. Source: Pololu Maestro User's Guide (0J40), section 5.c.
@@ -27,10 +27,10 @@ def usb_of(device: str, ports: Sequence[SerialPort]) -> str:
 
 
 def refuse_owner(device: str, kind: str, ports: Sequence[SerialPort]) -> None:
-    """See that a port is one that packets of this kind of bus may be sent to.
+    """Check that packets of this kind of bus may be sent to a port.
 
     Raises:
-        PortError: it is a board that they would move.
+        PortError: it belongs to a board whose servos they would move.
     """
     if is_i2c(device) and kind != "pca9685":
         raise PortError(

@@ -1,4 +1,4 @@
-"""A port that may be unplugged while in use: noted, tried again now and then, opened again."""
+"""Reconnection of a port that was unplugged while in use."""
 
 from collections.abc import Callable
 
@@ -11,7 +11,7 @@ FIRST_S, LAST_S = 0.1, 1.0
 
 
 class Reconnect:
-    """The state of a port: there, or gone since when and to be tried when.
+    """The state of a port: open, or since when it is gone and when it is tried again.
 
     down: the port is gone
     """
@@ -32,7 +32,7 @@ class Reconnect:
         return now_s >= self._next_s
 
     def failed(self, now_s: float, longest_s: float = LAST_S) -> None:
-        """Record an attempt in vain; the next one comes within ``longest_s``."""
+        """Record a failed attempt; the next one follows within ``longest_s``."""
         self._wait_s = min(longest_s, 2.0 * self._wait_s)
         self._next_s = now_s + self._wait_s
 
@@ -47,17 +47,17 @@ class Reconnect:
 
 
 class ReconnectingPort:
-    """The way back to a port of one bus.
+    """Reopens the port of one bus after it was unplugged.
 
     Args:
         port: opened once already.
         baud: bit/s to open it with.
-        give_up_s: it may stay away for so long.
-        log: where its going and coming is told.
-        again: called when it is open again: nobody on it may be trusted.
+        give_up_s: longest absence, seconds.
+        log: gets the events of loss and return.
+        anew: called when it is open again: every servo must be checked.
 
     down: the port is gone
-    release_due: torque has to be taken off as soon as the port is there, before all else; set
+    release_due: torque must be switched off first as soon as the port is open; set
         and cleared by the bus
     """
 
@@ -103,11 +103,11 @@ class ReconnectingPort:
         return False
 
     def refused_release(self) -> None:
-        """Record that torque could not be taken off: it is as soon as the port is back."""
+        """Record that torque could not be switched off: it is when the port is back."""
         self.release_due = True
 
     def released(self) -> None:
-        """Record that torque was taken off on everything that answers."""
+        """Record that torque was switched off on every servo that answers."""
         if self.release_due:
             self._log.add("torque switched off, as was asked for while the port was gone")
         self.release_due = False

@@ -1,11 +1,11 @@
 """How long to wait for an answer beyond the time its bytes take on the wire.
 
 A bus without a USB adapter answers within microseconds, an adapter with a latency timer
-of 1 ms within about two, one left at 16 ms within 16. None says which it is, so it is
+of 1 ms within about two, one left at 16 ms within 16. The adapter does not report which, so it is
 measured: the prompt time-out is twice the worst delay of late but for a few, within bounds.
 
-Those few are delays of a host that was busy elsewhere for a moment, which says nothing
-about the bus. No time-out that is prompt can cover them, so there is a reserve beyond it: it
+Those few are delays of a host that was busy elsewhere for a moment, not of the
+bus. No time-out that is prompt can cover them, so there is a reserve beyond it: it
 is spent only by waiting in vain, and fills up again with one hundredth of the time that
 passes. So a computer that pauses now and then costs no value, and servos that keep silent
 cost one hundredth of the time, whatever they do, beyond their prompt time-outs.

@@ -35,7 +35,7 @@ RESTART_S = 0.1
 class SmartServoBus(PortBus):
     """A chain of smart servos in position mode; implements gazerig.drivers.types.ServoBus.
 
-    Where faults latch, who looks after the servos asks for them; else every answer tells.
+    Latched faults are requested by the supervisor; other faults are in every answer.
 
     Args:
         family: the make of the servos.
@@ -83,7 +83,7 @@ class SmartServoBus(PortBus):
         self._assemble(None)
 
     def _assemble(self, firmware: Mapping[int, int] | None) -> None:
-        """Make the parts, with a clean sheet, for what the servos can do.
+        """Create the parts in their initial state, for the capabilities of the servos.
 
         firmware: of each servo, None before it is known
         """
@@ -122,31 +122,31 @@ class SmartServoBus(PortBus):
         answer = self._reader.read(now_s)
         if not isinstance(answer, GroupReply):
             self._take(answer, now_s)
-        elif not self._take_whole(answer, now_s):
+        elif not self._apply_whole(answer, now_s):
             self._take(answer.each(), now_s)
         elif self._health.returning:
-            self._health.heard_again(now_s, self._line.lateness)
+            self._health.answered_again(now_s, self._line.lateness)
         self._supervisor.service(self._poll_list.group, now_s)
 
-    def _take_whole(self, answer: GroupReply, now_s: float) -> bool:
+    def _apply_whole(self, answer: GroupReply, now_s: float) -> bool:
         """Apply an answer without any error; return False if it must be checked servo by servo."""
         if self._family.weak_check and (
             self._disturbed(now_s) or self._reader.any_answer_owed(now_s)
         ):
             return False
-        return self._supervisor.at_ease and self._feedback.take_whole(answer)
+        return self._supervisor.at_ease and self._feedback.apply_whole(answer)
 
-    def _take(self, heard: dict[int, ServoReply], now_s: float) -> None:
+    def _take(self, replies: dict[int, ServoReply], now_s: float) -> None:
         """Apply an answer servo by servo, each with its errors."""
         supervisor, feedback = self._supervisor, self._feedback
         feedback.begin()
-        if heard and self._health.silent_for_s(now_s) >= RESTART_S:
+        if replies and self._health.silent_for_s(now_s) >= RESTART_S:
             # All were silent together: their power may have been cut.
             supervisor.mark_all_for_recovery()
         if self._family.weak_check:
-            heard = self._without_doubtful(heard, now_s)
-        believed, dark = feedback.all_believed(heard), not self._poll_list.group
-        for servo_id, one in heard.items():
+            replies = self._confirm_doubtful(replies, now_s)
+        believed, dark = feedback.all_plausible(replies), not self._poll_list.group
+        for servo_id, one in replies.items():
             slot = self._slot[servo_id]
             was_out = self._poll_list.answered(servo_id)
             if was_out:
@@ -158,14 +158,14 @@ class SmartServoBus(PortBus):
                 continue  # the first answer after long silence may be an old one
             elif one.sample.blank:
                 supervisor.check_status(servo_id, one.sample, now_s)
-            elif believed or feedback.believes(slot, one):
+            elif believed or feedback.is_plausible(slot, one):
                 supervisor.check_status(servo_id, one.sample, now_s)
                 feedback.take(slot, one)
             else:
                 self._line.errors["implausible"] += 1
         supervisor.record_out(self._poll_list.out, now_s)
         self._health.record_silent(
-            self._poll_list.out, now_s, self._poll_list.garbling, self._line.lateness, bool(heard)
+            self._poll_list.out, now_s, self._poll_list.garbling, self._line.lateness, bool(replies)
         )
 
     def _disturbed(self, now_s: float) -> bool:
@@ -176,22 +176,22 @@ class SmartServoBus(PortBus):
             places.damaged(now_s)
         return places.disturbed(now_s)
 
-    def _without_doubtful(
-        self, heard: dict[int, ServoReply], now_s: float
+    def _confirm_doubtful(
+        self, replies: dict[int, ServoReply], now_s: float
     ) -> dict[int, ServoReply]:
-        """Ask servos whose answers may be damaged or late once more; keep what both answers say.
+        """Ask servos with a doubtful answer once more; keep values that both answers agree on.
 
         Raises:
             BusLost: the port is gone.
         """
         disturbed = self._disturbed(now_s)
-        doubtful = [i for i in heard if disturbed or self._reader.answer_owed(i, now_s)]
+        doubtful = [i for i in replies if disturbed or self._reader.answer_owed(i, now_s)]
         again = self._reader.again(doubtful) if doubtful else {}
-        kept = {i: one for i, one in heard.items() if i not in doubtful}
+        kept = {i: one for i, one in replies.items() if i not in doubtful}
         for servo_id in doubtful:
             self._poll_list.answered(servo_id)
             second = again.get(servo_id)
-            slot, first = self._slot[servo_id], heard[servo_id]
+            slot, first = self._slot[servo_id], replies[servo_id]
             both = second and self._feedback.confirmed(slot, first, second)
             if both:
                 kept[servo_id] = both
@@ -226,7 +226,7 @@ class SmartServoBus(PortBus):
             PortError: the port cannot be opened.
             ServoMissing: servos are absent, of another model or refuse.
         """
-        self._take_wanted()
+        self._apply_wanted()
         where, baud = self._port.port_name, self._params.baud
         if not self._port.setBaudRate(baud):
             raise PortError(
@@ -281,7 +281,7 @@ class SmartServoBus(PortBus):
                 stands beyond its encoder's zero, from where it would go the wrong way.
         """
         try:
-            self._take_wanted()
+            self._apply_wanted()
             # A servo may have restarted since it was prepared.
             self._provisioning.apply(self._ids)
             goals, outside = self._recovery.enable(self._ids)
@@ -316,8 +316,8 @@ class SmartServoBus(PortBus):
         except BusLost as lost:
             self._lose(lost)
 
-    def _take_wanted(self) -> None:
-        """Put in force what was asked for since the torque was on last."""
+    def _apply_wanted(self) -> None:
+        """Apply the setups requested since the torque was on last."""
         if self._wanted == self._setups:
             return
         self._setups = self._wanted
@@ -328,7 +328,7 @@ class SmartServoBus(PortBus):
         self._feedback.set_limits(self._setups)
 
     def faults(self) -> tuple[str, ...]:
-        """Name every fault that servos suffer from now, e.g. "neck_yaw (servo 7): overload"."""
+        """Return every present fault, e.g. "neck_yaw (servo 7): overload"."""
         return tuple(
             f"{self._line.label(i)}: {fault}" for i, fault in sorted(self._health.faults.items())
         )
@@ -366,13 +366,13 @@ class SmartServoBus(PortBus):
             )
 
     def _reset_after_reconnect(self) -> None:
-        """Begin again with a port that was away."""
+        """Reset after the port has come back."""
         self._poll_list = self._reader.poll_list = PollList(self._ids)
         self._line.starved = False
         self._supervisor.mark_all_for_recovery()
 
     def _check_setups(self, setups: Sequence[ServoConfig]) -> None:
-        """See that ranges lie within one turn: beyond, positions mean nothing after a restart.
+        """Check that ranges lie within one turn: beyond it positions are void after a restart.
 
         Raises:
             ValueError: one does not.

@@ -1,4 +1,4 @@
-"""Who is on a bus: servos looked for at every baud rate, and those found against those expected.
+"""Search for servos at every baud rate, and comparison of found and expected servos.
 
 Where a ping to all servos is answered by one after the other that is what is asked. Elsewhere all
 would answer at once, over each other, so every id is asked for what it is; an answer names its id,
@@ -20,14 +20,14 @@ FIND_QUIET_S = 0.04
 """All servos of a rig have answered a ping to all when nothing came for so long."""
 
 BABBLE_S = 2.0
-"""Listening gives up on a line that never falls silent."""
+"""Longest listening to a line that never falls silent."""
 
 SHARED, ANSWERS = 2, 6
 """So many of so many answers in pieces are no accident."""
 
 _ROOM = 1 << 12
 _MOST = 1 << 13
-"""More bytes than all ids can say."""
+"""More bytes than the answers of all ids."""
 
 Progress = Callable[[int, int], None]
 """Called with the baud rate and the id that is asked."""
@@ -48,9 +48,9 @@ class FoundServo(NamedTuple):
 
 
 class BaudScan(NamedTuple):
-    """What one baud rate has brought.
+    """Result of the search at one baud rate.
 
-    possible: the adaptor can run at it; junk: bytes that made no sense
+    possible: whether the adaptor can run at it; junk: bytes outside any packet
     shared: ids that two servos seem to have, as their longer answers come in pieces
     protocol_1: ids that answer to Protocol 1.0 only
     """
@@ -72,7 +72,7 @@ def scan(
     ids: Sequence[int] | None = None,
     family_of: Mapping[str, Family] | None = None,
 ) -> Iterator[BaudScan]:
-    """Ask at one baud rate after the other who is there; the port is left open at the last.
+    """Search at one baud rate after another; the port is left open at the last.
 
     Args:
         port: it is opened.
@@ -110,7 +110,7 @@ def scan_ids(
     progress: Progress | None = None,
     ids: Sequence[int] | None = None,
 ) -> tuple[tuple[FoundServo, ...], int]:
-    """Ask all servos who is there; return them and the number of bytes that made no sense.
+    """Search for servos at one baud rate; return them and the number of bytes outside any packet.
 
     Two servos with one id answer over each other; whole answers that differ are two servos.
 
@@ -150,15 +150,15 @@ def any_reply(port: BusPort, family: Family) -> bool:
     question = family.codec.ping(family.codec.BROADCAST)
     port.drain()
     port.write(question)
-    heard = port.read_until(_ROOM, port.now_s() + REPLY_S)
+    received = port.read_until(_ROOM, port.now_s() + REPLY_S)
     # An adapter that echoes puts the question before the answers.
-    return bool(heard.replace(question, b"", 1))
+    return bool(received.replace(question, b"", 1))
 
 
 def ping(
     port: BusPort, family: Family, servo_id: int, baud: int, tries: int = 2
 ) -> FoundServo | None:
-    """Ask one servo what it is; None where no whole answer came."""
+    """Return model and firmware of one servo, None if no whole answer came."""
     codec = family.codec
     for _ in range(tries):
         port.drain()
@@ -171,7 +171,7 @@ def ping(
 
 
 def corrupt(port: BusPort, family: Family, servo_id: int, tries: int = ANSWERS) -> int:
-    """Count how many of some answers of one servo came in pieces, or disagreed about where it is.
+    """Count the answers of one id that were corrupt or disagreed about its position.
 
     Two servos with one id speak at the same time: where their bytes differ they spoil
     each other. Their pings are often equal, their positions hardly ever.
@@ -214,7 +214,7 @@ def read_until_quiet(port: BusPort, quiet_s: float) -> bytes:
 
 
 def _found(family: Family, status: Status, baud: int) -> FoundServo | None:
-    """Return the servo that told what it is, None where this is no such answer."""
+    """Return the servo that an answer identifies, None if it identifies none."""
     identity = family.codec.identity(status)
     if identity is None:
         return None
@@ -222,7 +222,7 @@ def _found(family: Family, status: Status, baud: int) -> FoundServo | None:
 
 
 def identities(line: Transactions) -> dict[int, Identity]:
-    """Ask all servos of a bus who is there, expected or not."""
+    """Return the identities of all servos on a bus, expected or not."""
     quiet_s = min(line.family.quiet_s, FIND_QUIET_S)
     found, _ = scan_ids(line.port, line.family, line.baud, quiet_s)
     return {one.id: Identity(one.number, one.firmware) for one in found}
@@ -233,25 +233,24 @@ def find(
 ) -> dict[int, int]:
     """Find every servo and check its model and firmware; return the firmware of each.
 
-    Servos that no setup names are left alone, and noted in the log where one question to all
-    tells of them.
+    Servos without a setup are left alone, and logged if a ping to all finds them.
 
     Raises:
         ServoMissing: some are absent, of another model or too old; all are
             named at once, with those that are there and not expected.
     """
     family = line.family
-    heard = identities(line) if family.broadcast_ping else {}
+    identified = identities(line) if family.broadcast_ping else {}
     found = {
         # Two with one id, or a noisy line, spoil an answer to everybody: asked alone as well.
-        setup.id: heard.get(setup.id) or registers.identify(setup.id)
+        setup.id: identified.get(setup.id) or registers.identify(setup.id)
         for setup in setups
     }
     problems = [text for setup in setups if (text := _problem(family, setup, found[setup.id]))]
     if problems and not family.broadcast_ping:
         # Another one may be the one that is missing; only now is it worth asking every id.
-        heard = identities(line)
-    strangers = {i: identity for i, identity in heard.items() if i not in found}
+        identified = identities(line)
+    strangers = {i: identity for i, identity in identified.items() if i not in found}
     where = line.port.port_name
     if not any(found.values()) and not strangers:
         raise ServoMissing(f"{where}: no servo answers: check servo power, cable and baud rate")

@@ -1,4 +1,4 @@
-"""What the engine must know of a make of servo: everything that makes differ in, as one value.
+"""The interface between the bus engine and a make of servo: all differences in one value.
 
 The engine (gazerig.drivers.servo_bus) knows no make by name. A make is a protocol file (the
 codec), a table file and one ``Family`` made of both; docs/servo-families.md explains it field by
@@ -60,7 +60,7 @@ class Model(Protocol):
 
     @property
     def number(self) -> int:
-        """Number that the servo itself tells."""
+        """Number in the servo's own register."""
 
     @property
     def no_load_steps_s(self) -> float:
@@ -80,7 +80,7 @@ class Model(Protocol):
 
 
 class Identity(NamedTuple):
-    """What a servo says it is: the model number and the firmware version."""
+    """Model number and firmware version of a servo."""
 
     model_number: int
     firmware: int
@@ -103,11 +103,11 @@ class Codec(Protocol):
 
     @property
     def REFUSAL(self) -> int:
-        """Bits of an answer's error byte that say that nothing was done."""
+        """Bits of an answer's error byte that mean a rejected instruction."""
 
     @property
     def ALERT(self) -> int:
-        """Bits of an answer's error byte that say that something ails the servo."""
+        """Bits of an answer's error byte that mean a fault of the servo."""
 
     @property
     def ECHO_LENGTH(self) -> int | None:
@@ -135,7 +135,7 @@ class Codec(Protocol):
         """Build a question about what a servo is."""
 
     def identity(self, status: Status) -> Identity | None:
-        """Return what a servo says it is, None where an answer does not tell."""
+        """Return model and firmware from an answer, None if it does not hold them."""
 
     def ping(self, servo_id: int) -> bytes:
         """Build a ping."""
@@ -202,8 +202,8 @@ class Family:
     Reading:
         read_plan: windows and packets for some servos, a rig's choice (params) and the servos'
             firmware by id, None before it is known
-        effort_register: the one that tells load or current
-        armed: fields of a ``Sample`` that tell whether a servo is armed as it was left, and what
+        effort_register: the one that holds load or current
+        armed: fields of a ``Sample`` that show whether a servo is still armed, and what
             they should be; None where anything will do
         weak_check: the check over an answer lets some damage pass
 
@@ -216,15 +216,15 @@ class Family:
         lock: register that must be 0 while EEPROM is written, None where the torque is the lock
 
     Traits:
-        error_register: tells what ails a servo
+        error_register: holds a servo's faults
         faults_latch: a fault stays until the servo is restarted; else its bit comes and goes
-        torque_faults: bits of faults that take the torque away, where they come and go
+        torque_faults: bits of faults that switch the torque off, where they come and go
         watchdog_unit_s: of Bus Watchdog; None where there is no watchdog
         goal_speed: a goal carries the speed that may be used for it
         single_turn: beyond its encoder's zero a servo would go the long way round
         broadcast_ping: a ping to all is answered one after the other; else each id is asked
-        quiet_s, thorough_s: patience of a search: silence after a ping to all, or for each id
-        telling: first and last of registers in which two servos with one id differ
+        quiet_s, thorough_s: time-outs of a search: silence after a ping to all, or for each id
+        telling: first and last of registers in which two servos with the same id differ
         protocol_1: ids that answer to Protocol 1.0 only, where they may have been set to it
         arming: what is written before the torque comes on
         most_goals: so many servos' goals fit into one packet

@@ -1,4 +1,4 @@
-"""What ails each servo: latched errors, restarts that do not stop, long silence."""
+"""Faults of each servo: latched errors, repeated restarts, long silence."""
 
 from collections.abc import Collection, Mapping, Sequence
 
@@ -24,9 +24,9 @@ SAY_SILENT_S = 0.25
 
 
 class ServoHealth:
-    """The state of every servo, in words.
+    """The present faults of every servo, as text.
 
-    faults: what a servo suffers from now, by id
+    faults: present fault of a servo, by id
     latches: those of them that the servo itself has latched
     """
 
@@ -37,14 +37,14 @@ class ServoHealth:
         self.latches: set[int] = set()
         self._restarts: dict[int, list[float]] = {}
         self._silent_since: dict[int, float] = {}
-        self._told: set[int] = set()
+        self._reported: set[int] = set()
         self._all_silent = False
-        self._nobody_since: float | None = None
+        self._all_silent_since_s: float | None = None
         self._back_s: float | None = None
         self._seldom = RateLimitedLog(log)
 
     def latched(self, servo_id: int, errors: Sequence[str]) -> bool:
-        """Record latched errors; return whether that is news."""
+        """Record latched errors; return whether they are new."""
         fault = " and ".join(errors)
         if self.faults.get(servo_id) == fault:
             return False
@@ -65,7 +65,7 @@ class ServoHealth:
             self._log.add(f"{servo_label(self._setups[servo_id])}: the fault is gone")
 
     def exhausted(self, servo_id: int, now_s: float) -> bool:
-        """Return whether a servo has restarted too often of late; that is a fault then."""
+        """Return whether a servo has restarted too often recently, which is then a fault."""
         lately = [t_s for t_s in self._restarts.get(servo_id, []) if now_s - t_s < WITHIN_S]
         self._restarts[servo_id] = lately
         if len(lately) < MOST_RESTARTS:
@@ -74,7 +74,7 @@ class ServoHealth:
         return True
 
     def restarted(self, servo_id: int, now_s: float) -> None:
-        """Record that a servo had restarted and is well again."""
+        """Record that a servo had restarted and works again."""
         self._restarts.setdefault(servo_id, []).append(now_s)
         self._log.add(f"{servo_label(self._setups[servo_id])} restarted: set up anew")
 
@@ -84,25 +84,25 @@ class ServoHealth:
         now_s: float,
         garbling: Collection[int],
         lateness: HostLateness,
-        heard: bool,
+        answered: bool,
     ) -> None:
-        """Record who is out now; speaks of those who have been so for a while, once.
+        """Record the silent servos; report once those that have been silent for a while.
 
-        lateness: answers that came late: then it is this computer that is to blame, at first
-        heard: anybody at all has answered
+        lateness: answers that came late, which at first blame this computer
+        heard: whether any servo has answered
         """
-        if not heard and out:
+        if not answered and out:
             self._back_s = None
-            if self._nobody_since is None:
-                self._nobody_since = now_s
-        elif heard and self._nobody_since is not None:
-            self.heard_again(now_s, lateness)
+            if self._all_silent_since_s is None:
+                self._all_silent_since_s = now_s
+        elif answered and self._all_silent_since_s is not None:
+            self.answered_again(now_s, lateness)
             # While nobody was heard, nobody in particular was silent.
             self._silent_since = {i: max(t, now_s) for i, t in self._silent_since.items()}
         for servo_id in [i for i in self._silent_since if i not in out]:
             since_s = self._silent_since.pop(servo_id)
-            if servo_id in self._told:
-                self._told.discard(servo_id)
+            if servo_id in self._reported:
+                self._reported.discard(servo_id)
                 who = servo_label(self._setups[servo_id])
                 self._log.add(f"{who} answers again after {now_s - since_s:.1f} s")
         for servo_id in out:
@@ -111,40 +111,40 @@ class ServoHealth:
         if late and out and now_s - min(self._silent_since.values()) < BUSY_S:
             self._seldom.add(f"this computer is busy: {late} answers late in the last s", now_s)
             return
-        if self._nobody_since is None:
+        if self._all_silent_since_s is None:
             self._tell(out, now_s, garbling)
-        elif not self._all_silent and now_s - self._nobody_since >= BLAME_S:
+        elif not self._all_silent and now_s - self._all_silent_since_s >= BLAME_S:
             self._all_silent = True
             self._log.add("no servo answers: check servo power and cable")
 
     @property
     def returning(self) -> bool:
-        """Return whether it is still to be said what a silence of all was."""
-        return self._nobody_since is not None
+        """Return whether a silence of all servos is still to be reported."""
+        return self._all_silent_since_s is not None
 
-    def heard_again(self, now_s: float, lateness: HostLateness) -> None:
+    def answered_again(self, now_s: float, lateness: HostLateness) -> None:
         """Report what a silence of all servos was, a moment later: late answers first."""
-        if self._nobody_since is None:
+        if self._all_silent_since_s is None:
             return
         if self._back_s is None:
             self._back_s = now_s
         if now_s - self._back_s < OWED_S:
             return
-        silent_s = self._back_s - self._nobody_since
-        if silent_s >= SILENCE_S and lateness.any_since(self._nobody_since):
+        silent_s = self._back_s - self._all_silent_since_s
+        if silent_s >= SILENCE_S and lateness.any_since(self._all_silent_since_s):
             self._log.add(STOOD_STILL.format(silent_s))
         elif self._all_silent:
             who = "servos" if self._silent_since else "all servos"
             self._log.add(f"{who} answer again after {silent_s:.1f} s")
         elif silent_s >= SILENCE_S:
             self._log.add(f"no servo answered for {silent_s:.1f} s: check servo power and cable")
-        self._nobody_since = self._back_s = None
+        self._all_silent_since_s = self._back_s = None
         self._all_silent = False
 
     def stopped(self, count: int, asleep_s: float, now_s: float) -> None:
         """Record that servos were stopped by their own watchdog and go on from where they are.
 
-        asleep_s: for so long this computer has sent nothing; 0 where it has
+        asleep_s: how long this computer has sent nothing; 0 if it has
         """
         servos = f"the watchdog of {count} servo{'s' if count > 1 else ''}"
         if asleep_s:
@@ -161,13 +161,13 @@ class ServoHealth:
     def _tell(self, out: Collection[int], now_s: float, garbling: Collection[int]) -> None:
         for servo_id in out:
             silent_s = now_s - self._silent_since[servo_id]
-            if servo_id not in self._told and silent_s >= SAY_SILENT_S:
-                self._told.add(servo_id)
+            if servo_id not in self._reported and silent_s >= SAY_SILENT_S:
+                self._reported.add(servo_id)
                 what = GARBLES if servo_id in garbling else "does not answer"
                 self._log.add(f"{servo_label(self._setups[servo_id])} {what}")
 
     def silent_for_s(self, now_s: float) -> float:
-        """Return for how long nobody at all has answered."""
+        """Return how long no servo has answered."""
         if len(self._silent_since) < len(self._setups):
             return 0.0
         return now_s - max(self._silent_since.values())

@@ -1,9 +1,9 @@
-"""What is known of all servos of a bus, column by column, from one exchange to the next.
+"""Feedback of all servos of a bus, column by column, from one exchange to the next.
 
 Where the check over an answer is weak (a sum of one byte), bytes spoilt in two places pass it now
-and then. So a position that no joint can have come to since the last one is not given
+and then. So a position that no joint can have reached since the last one is withheld
 (``gazerig.drivers.plausibility``), and on a disturbed line every answer needs a second one that
-says the same.
+agrees with it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,7 +33,7 @@ class FeedbackColumns:
         family: the make of the servos.
         setups: the servos.
 
-    places: which positions can be true
+    places: which positions are plausible
     now: all columns as they are now
     """
 
@@ -65,7 +65,7 @@ class FeedbackColumns:
             fault=now.fault,
         )
 
-    def _take_one(
+    def _apply_one(
         self, slot: int, position: float, velocity: float, load: float, at_s: float
     ) -> None:
         """Apply one servo's feedback."""
@@ -89,7 +89,7 @@ class FeedbackColumns:
 
     # --- an answer of all servos
 
-    def take_whole(self, answer: GroupReply) -> bool:
+    def apply_whole(self, answer: GroupReply) -> bool:
         """Apply an answer without any error; return False if it must be checked servo by servo."""
         group, _, values, at_s = answer
         at, now, none = group.columns, self.now, self._none
@@ -138,7 +138,7 @@ class FeedbackColumns:
     def _armed_as_left(
         self, values: tuple[Any, ...], torque: slice, at: Columns, position: Sequence[int]
     ) -> bool:
-        """Return whether an answer tells of all servos what they were left with."""
+        """Return whether torque and limits of all servos are still as they were set."""
         if values[torque] != self._armed or not self._keeps_limits(values, at):
             return False
         # Without torque a zero may be that of an indirect block without addresses.
@@ -156,7 +156,7 @@ class FeedbackColumns:
         )
 
     def _keeps_limits(self, values: tuple[Any, ...], at: Columns) -> bool:
-        """Return whether an answer tells the limits that were armed, as far as it tells them."""
+        """Return whether the limits in an answer, if it has them, are those that were armed."""
         if not self._engaged:
             return True
         for name, wanted in self._limits.items():
@@ -168,11 +168,11 @@ class FeedbackColumns:
 
     # --- answers servo by servo
 
-    def all_believed(self, heard: Mapping[int, ServoReply]) -> bool:
-        """Return whether all servos have answered in one exchange, and all of it can be true."""
-        if len(heard) < len(self._ids):
+    def all_plausible(self, replies: Mapping[int, ServoReply]) -> bool:
+        """Return whether all servos have answered plausibly in one exchange."""
+        if len(replies) < len(self._ids):
             return False
-        answers = [heard[i] for i in self._ids]
+        answers = [replies[i] for i in self._ids]
         at_s = answers[0].at_s
         if any(one.at_s != at_s for one in answers):
             return False
@@ -180,12 +180,12 @@ class FeedbackColumns:
             [self._near(slot, one.sample.position) for slot, one in enumerate(answers)], at_s
         )
 
-    def believes(self, slot: int, heard: ServoReply) -> bool:
-        """Return whether one servo's answer can be true; to be asked once for every answer."""
-        return self.places.one(slot, self._near(slot, heard.sample.position), heard.at_s)
+    def is_plausible(self, slot: int, reply: ServoReply) -> bool:
+        """Return whether one servo's answer is plausible; to be called once for every answer."""
+        return self.places.one(slot, self._near(slot, reply.sample.position), reply.at_s)
 
     def confirmed(self, slot: int, first: ServoReply, second: ServoReply) -> ServoReply | None:
-        """Return what two answers right after one another both say; None where they differ."""
+        """Return the values that two consecutive answers agree on, None if they differ."""
         one, other = first.sample, second.sample
         alike = (
             abs((one.temperature or 0) - (other.temperature or 0)) <= ALIKE_C
@@ -205,9 +205,9 @@ class FeedbackColumns:
             )
         )
 
-    def take(self, slot: int, heard: ServoReply) -> None:
+    def take(self, slot: int, reply: ServoReply) -> None:
         """Apply one servo's answer, which was accepted."""
-        sample = heard.sample
+        sample = reply.sample
         if sample.torque is not None:
             self.set_torque(slot, sample.torque == 1)
         if not sample.blank:
@@ -218,16 +218,16 @@ class FeedbackColumns:
                 self._set_voltage(slot, sample.voltage)
         load = max(-1.0, min(1.0, sample.effort * self._load_units[slot]))
         position = self._near(slot, sample.position)
-        self._take_one(slot, position, sample.velocity * self._velocity_unit, load, heard.at_s)
+        self._apply_one(slot, position, sample.velocity * self._velocity_unit, load, reply.at_s)
 
     def _near(self, slot: int, position: int) -> int:
-        """Return a position, whole turns added, where turns cannot be told apart."""
+        """Return a position with whole turns added if turns are ambiguous."""
         return nearest_turn(position, *self._ranges[slot], self._turn) if self._turn else position
 
     # --- one servo
 
     def position(self, slot: int) -> float | None:
-        """Return where a servo is, None where it has not answered in this exchange."""
+        """Return a servo's position, None if it has not answered in this exchange."""
         return None if slot in self.now.missing else self.now.position_steps[slot]
 
     def mark_rearmed(self, slot: int) -> None:
@@ -235,7 +235,7 @@ class FeedbackColumns:
         self.now = self.now._replace(rearmed=with_value(self.now.rearmed, slot, True))
 
     def name_fault(self, slot: int, fault: str) -> None:
-        """Record what a servo suffers from, "" for nothing."""
+        """Record a servo's fault, "" for none."""
         self.now = self.now._replace(fault=with_value(self.now.fault, slot, fault))
 
     def set_torque(self, slot: int, on: bool) -> None:
@@ -267,7 +267,7 @@ class FeedbackColumns:
         near = self._near(slot, position)
         self.set_torque(slot, torque)
         self.places.place(slot, near, at_s)
-        self._take_one(slot, near, 0.0, 0.0, at_s)
+        self._apply_one(slot, near, 0.0, 0.0, at_s)
 
 
 def with_value(column: tuple[Value, ...], slot: int, value: Value) -> tuple[Value, ...]:

@@ -1,4 +1,4 @@
-"""Looking after servos whose faults latch: an alert bit tells of them, a restart ends them."""
+"""Supervision of servos whose faults latch: an alert bit shows them, a restart ends them."""
 
 from collections.abc import Collection, Sequence
 from math import inf
@@ -26,26 +26,26 @@ class LatchedFaultSupervisor(Supervisor):
         self._slow = 0
 
     def mark_all_for_recovery(self) -> None:
-        """Trust no servo to be as it was left."""
+        """Mark every servo for recovery."""
         super().mark_all_for_recovery()
         self._due_s = -inf
 
     def torque_enabled(self, entering: Collection[int]) -> None:
-        """Begin to look after servos under torque; some of them are outside their limits."""
+        """Start the supervision under torque; ``entering``: servos outside their limits."""
         super().torque_enabled(entering)
         self._due_s = -inf  # from now on one is checked in turn
 
     def look_first(self) -> None:
-        """Look at servos that have just been prepared."""
+        """Check servos that have just been prepared."""
         self._find_alerts(self._ids)
 
     def answers_again(self, servo_id: int) -> None:
-        """Look at a servo that had been out of the group: is it still armed?"""
+        """Check whether a servo that had been out of the group is still armed."""
         if self.engaged:
             self._check(servo_id)
 
     def check_status(self, servo_id: int, sample: Sample, now_s: float) -> None:
-        """Look at one servo's answer: its faults, and whether it is armed as it was left."""
+        """Check one servo's answer for faults and for lost torque or limits."""
         if sample.status:
             # Damaged bytes may pass for a fault, which ends a run: the servo is asked once more.
             if servo_id in self._health.latches:
@@ -68,7 +68,7 @@ class LatchedFaultSupervisor(Supervisor):
             self._due_s = -inf
 
     def _is_limp(self, servo_id: int, torque: int | None) -> bool:
-        """Return whether a servo has no torque that should, and nothing known is the reason."""
+        """Return whether a servo's torque is off without a known reason."""
         return self.engaged and torque == 0 and servo_id not in self._health.faults
 
     def _suspect(self, servo_id: int) -> None:
@@ -83,7 +83,7 @@ class LatchedFaultSupervisor(Supervisor):
     # --- after every read
 
     def service(self, group: Collection[int], now_s: float) -> None:
-        """Do what is due after a read; servos that are well again are taken here.
+        """Do what is due after a read; servos that work again are recovered here.
 
         Raises:
             BusLost: the port is gone.
@@ -130,7 +130,7 @@ class LatchedFaultSupervisor(Supervisor):
     # --- asking in turn
 
     def _check(self, servo_id: int) -> None:
-        """See that a servo is still armed; after a restart its RAM is as from the factory."""
+        """Check that a servo is still armed; a restart resets its RAM."""
         name, armed = ("bus_watchdog", self._watchdog) if self._watchdog else ("torque_enable", 1)
         state = self._line.ask((servo_id,), name).get(servo_id, armed)
         if state == TRIPPED:

@@ -1,4 +1,4 @@
-"""Looking after servos whose faults come and go: every answer tells them, none latches."""
+"""Supervision of servos whose faults come and go: every answer holds them, none latches."""
 
 from collections.abc import Collection
 from typing import Any
@@ -25,14 +25,14 @@ class PassingFaultSupervisor(Supervisor):
         self._limp: set[int] = set()
         self._out_since_s: dict[int, float] = {}
         self._seen_s: dict[int, dict[int, float]] = {}
-        self._told_before: dict[int, int] = {}
+        self._last_errors: dict[int, int] = {}
         self._doubted: set[int] = set()
 
     @property
     def at_ease(self) -> bool:
         """Return whether nothing is known of any servo that an answer could change."""
         doubts = self._limp or self._doubted or self._seen_s or self._health.faults
-        return not (doubts or any(self._told_before.values()))
+        return not (doubts or any(self._last_errors.values()))
 
     def torque_enabled(self, entering: Collection[int]) -> None:
         """Begin to look after servos under torque; some of them are outside their limits."""
@@ -51,7 +51,7 @@ class PassingFaultSupervisor(Supervisor):
         self._doubted.clear()
 
     def look_first(self) -> None:
-        """Look at servos that have just been prepared: every answer tells their faults."""
+        """Check servos that have just been prepared: every answer holds their faults."""
 
     def withheld(self, now_s: float) -> frozenset[int]:
         """Return the servos that must get no goals now.
@@ -71,13 +71,13 @@ class PassingFaultSupervisor(Supervisor):
         self._limp.discard(servo_id)
 
     def check_status(self, servo_id: int, sample: Sample, now_s: float) -> None:
-        """Look at one servo's answer: its faults, and whether it is armed as it was left."""
+        """Check one servo's answer for faults and for lost torque or limits."""
         error = sample.error | (sample.status or 0)
         # Damaged bytes may pass for a fault, which ends a run: it must be told twice in a row.
-        told = error & self._told_before.get(servo_id, 0)
-        self._told_before[servo_id] = error
-        if told or servo_id in self._seen_s:
-            self._record_bits(servo_id, told, now_s)
+        confirmed = error & self._last_errors.get(servo_id, 0)
+        self._last_errors[servo_id] = error
+        if confirmed or servo_id in self._seen_s:
+            self._record_bits(servo_id, confirmed, now_s)
         if not self.engaged:
             return
         if self._health.faults.get(servo_id) == FAR_SIDE:
@@ -95,7 +95,7 @@ class PassingFaultSupervisor(Supervisor):
             self._out_since_s.setdefault(servo_id, now_s)
 
     def _record_bits(self, servo_id: int, error: int, now_s: float) -> None:
-        """Name faults as they come, and say when they are gone."""
+        """Report faults as they come and go."""
         seen_s = self._seen_s.setdefault(servo_id, {})
         before = self._bits(servo_id)
         for bit in range(8):
@@ -170,7 +170,7 @@ class PassingFaultSupervisor(Supervisor):
         """On a disturbed line compare one servo's settings, the next at the next time.
 
         An order that noise has changed may pass the sum of one byte and be written anywhere:
-        limits, gains, mode. A servo that differs is set up again, softly.
+        limits, gains, mode. A servo that differs is set up again at low speed.
 
         Raises:
             BusLost: the port is gone.

@@ -17,7 +17,7 @@ class PollList:
     """The servos by id, in the order of the bus.
 
     group: those asked together
-    troubled: somebody is out of the group, or has answered badly of late
+    troubled: whether a servo is out of the group or has answered badly recently
     garbling: those who are out because what they answer arrives damaged
     """
 
@@ -79,13 +79,13 @@ class PollList:
         self.troubled = bool(self._due_s or self._damaged)
 
 
-def silent_ones(ids: Sequence[int], heard: Collection[int]) -> tuple[int, ...]:
+def silent_servos(ids: Sequence[int], answered: Collection[int]) -> tuple[int, ...]:
     """Name the servos that kept silent of their own accord.
 
     A servo waits for the one before it, so behind the last one heard only the first is
     to blame; what is missing before the last one heard has nobody else to blame.
     """
-    missing = [i for i, servo_id in enumerate(ids) if servo_id not in heard]
-    last_heard = max((i for i, servo_id in enumerate(ids) if servo_id in heard), default=-1)
+    missing = [i for i, servo_id in enumerate(ids) if servo_id not in answered]
+    last_heard = max((i for i, servo_id in enumerate(ids) if servo_id in answered), default=-1)
     behind = [i for i in missing if i > last_heard][:1]
     return tuple(ids[i] for i in [i for i in missing if i < last_heard] + behind)

@@ -20,8 +20,8 @@ class ReadPlan(NamedTuple):
     together, alone: of the reading of all servos, and of servos that are asked alone
     second: of readings that confirm others, and have other lengths than they
     packets: makes the read of some servos with a window, where it is not a plain sync read
-    armed: window that tells whether a servo is armed as it was left
-    covered: every reading tells torque and faults
+    armed: window with torque and limits, to check that a servo is still armed
+    covered: every reading holds torque and faults
     block: what indirect blocks must hold, None where there are none
     """
 

@@ -18,7 +18,7 @@ class Sample(NamedTuple):
     """One servo's answer in register units; None where the reading did not cover it.
 
     error: error byte of the answer
-    effort: present load or current, whichever the servo tells its effort by
+    effort: present load or current, whichever the servo measures
     status: the register that has what ails the servo
     acceleration, torque_limit: as they were written before the torque came on
     blank: every byte is zero, as in an indirect block whose addresses are lost

@@ -1,6 +1,6 @@
 """Bringing servos back that have restarted, or whose bus had been gone.
 
-Nothing of what they were told before is trusted: settings are compared again, the goal
+Nothing that was written to them before is relied on: settings are compared again, the goal
 becomes the present position, and only then comes the torque.
 """
 
@@ -27,8 +27,8 @@ class Recovery:
         provisioning: what its servos must be like.
         setups: the servos by id.
         watchdog: Bus Watchdog to arm, in its units; 0 for none.
-        health: told what was found.
-        log: told what was done.
+        health: records the faults found.
+        log: gets the events.
     """
 
     def __init__(

@@ -130,7 +130,7 @@ class Registers:
     def _let_late_ones_pass(self, servo_id: int) -> None:
         """Wait until no answer to an earlier question can come any more.
 
-        An answer does not say which register it is of.
+        An answer does not name its register.
         """
         until_s = self._late_until_s.pop(servo_id, None)
         if until_s is not None:

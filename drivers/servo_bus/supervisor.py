@@ -1,4 +1,4 @@
-"""Looking after servos between the exchanges: what does not depend on how a family tells faults."""
+"""Supervision of servos between the exchanges, independent of how a family reports faults."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping
@@ -25,7 +25,7 @@ class Supervisor(ABC):
         line: the bus.
         setups: the servos by id.
         recovery: sets them up again.
-        health: told what ails them.
+        health: their faults.
         feedback: what is known of them.
         plan: how they are read.
         watchdog: Bus Watchdog that is armed, in its units; 0 for none.
@@ -92,11 +92,11 @@ class Supervisor(ABC):
 
     @abstractmethod
     def look_first(self) -> None:
-        """Look at servos that have just been prepared."""
+        """Check servos that have just been prepared."""
 
     @abstractmethod
     def check_status(self, servo_id: int, sample: Sample, now_s: float) -> None:
-        """Look at one servo's answer: its faults, and whether it is armed as it was left."""
+        """Check one servo's answer for faults and for lost torque or limits."""
 
     @abstractmethod
     def service(self, group: Collection[int], now_s: float) -> None:
@@ -111,7 +111,7 @@ class Supervisor(ABC):
         return frozenset()
 
     def answers_again(self, servo_id: int) -> None:  # noqa: B027  # some have nothing to do
-        """Look at a servo that had been out of the group."""
+        """Check a servo that had been out of the group."""
 
     def record_out(self, out: Collection[int], now_s: float) -> None:  # noqa: B027
         """Record who is out of the group now."""
@@ -157,7 +157,7 @@ class Supervisor(ABC):
         self._line.asleep_s = 0.0
 
     def _name_fault(self, servo_id: int) -> None:
-        """Let the feedback tell what a servo suffers from."""
+        """Copy a servo's fault to the feedback."""
         self._feedback.name_fault(self._slot[servo_id], self._health.faults.get(servo_id, ""))
 
     def _next_to_check(self, group: Collection[int], again_s: float) -> int | None:
@@ -170,7 +170,7 @@ class Supervisor(ABC):
     # --- marks on answers
 
     def _mark_rearmed(self) -> None:
-        """Mark the first answer of servos whose torque came on again."""
+        """Mark the first feedback of servos whose torque came on again."""
         for servo_id in tuple(self._rearmed):
             slot = self._slot[servo_id]
             if self._feedback.position(slot) is not None:
@@ -178,7 +178,7 @@ class Supervisor(ABC):
                 self._feedback.mark_rearmed(slot)
 
     def _mark_entering(self, now_s: float) -> None:
-        """Mark the answers of servos on their slow way; give those that arrive their speed back."""
+        """Mark the feedback of servos moving slowly into limits; restore speed on arrival."""
         for slot, servo_id in enumerate(self._ids):
             if servo_id not in self.entering:
                 continue
@@ -189,7 +189,7 @@ class Supervisor(ABC):
                     self.entering.end(servo_id)
 
     def _full_speed(self, servo_id: int) -> bool:
-        """Return whether a servo may be as fast as ever; that goes with the next goal or is told.
+        """Restore a servo's full speed, with its next goal or by a write; return whether it has it.
 
         Raises:
             BusLost: the port is gone.

@@ -12,7 +12,7 @@ from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.read_windows import Columns, ReadWindow, Sample
 
 Values = tuple[Any, ...]
-"""All numbers of a whole answer; ``columns`` says which are whose."""
+"""All numbers of a whole answer; ``columns`` maps them to servos."""
 
 
 class PartialReply(NamedTuple):

@@ -8,7 +8,7 @@ from collections.abc import Collection, Sequence
 from math import inf
 from typing import NamedTuple
 
-from gazerig.drivers.servo_bus.poll_list import PollList, silent_ones
+from gazerig.drivers.servo_bus.poll_list import PollList, silent_servos
 from gazerig.drivers.servo_bus.read_plan import ReadPlan
 from gazerig.drivers.servo_bus.read_windows import ReadWindow, Sample, WindowSchedule
 from gazerig.drivers.servo_bus.sync_packets import GroupRead, SyncRead, Values
@@ -47,7 +47,7 @@ class SyncReader:
 
     Args:
         line: the bus.
-        polled: who is asked; told who failed.
+        polled: the servos that are read; gets those that failed.
         plan: how they are read.
     """
 
@@ -79,9 +79,9 @@ class SyncReader:
         values = group.whole(raw)
         if values is not None:
             return GroupReply(group, raw, values, at_s)
-        heard: dict[int, ServoReply] = {}
-        self._save(group, raw, at_s, heard, now_s, self._together)
-        return heard
+        replies: dict[int, ServoReply] = {}
+        self._save(group, raw, at_s, replies, now_s, self._together)
+        return replies
 
     def answer_owed(self, servo_id: int, now_s: float) -> bool:
         """Return whether a servo has left a question unanswered of late.
@@ -102,7 +102,7 @@ class SyncReader:
         Raises:
             BusLost: the port is gone.
         """
-        heard: dict[int, ServoReply] = {}
+        replies: dict[int, ServoReply] = {}
         window = self._second.next()
         for asked in self._line.family.asked_together(ids):
             group = self._group(asked, window)
@@ -111,27 +111,27 @@ class SyncReader:
             samples = group.pieces(raw).samples
             if len(samples) < len(group.ids) and not self._line.quiet:
                 self._line.drain(self._line.timeout.seconds)
-            heard |= {servo_id: ServoReply(sample, at_s) for servo_id, sample in samples.items()}
-        return heard
+            replies |= {servo_id: ServoReply(sample, at_s) for servo_id, sample in samples.items()}
+        return replies
 
     def _read_troubled(self, now_s: float) -> dict[int, ServoReply]:
         """Read the group, and one of those who are out of it."""
-        heard: dict[int, ServoReply] = {}
+        replies: dict[int, ServoReply] = {}
         together, due = self.poll_list.group, self.poll_list.due(now_s)
         self._until_s = inf
         if together:
             window = self._together.next()
             for asked in self._line.family.asked_together(together):
                 if self._line.port.now_s() < self._until_s:
-                    self._read(asked, heard, now_s, self._together, window)
+                    self._read(asked, replies, now_s, self._together, window)
         if due is not None and self._line.port.now_s() < self._until_s:
-            self._read((due,), heard, now_s, self._alone, self._alone.next())
-        return heard
+            self._read((due,), replies, now_s, self._alone, self._alone.next())
+        return replies
 
     def _read(
         self,
         ids: tuple[int, ...],
-        heard: dict[int, ServoReply],
+        replies: dict[int, ServoReply],
         now_s: float,
         turns: WindowSchedule,
         window: ReadWindow,
@@ -142,7 +142,7 @@ class SyncReader:
         raw, at_s = self._line.exchange(group.request, group.reply_length, reserve)
         # The whole read has one time limit, that of its first exchange at its most patient.
         self._until_s = min(self._until_s, self._line.whole_s + self._line.most_s)
-        self._save(group, raw, at_s, heard, now_s, turns)
+        self._save(group, raw, at_s, replies, now_s, turns)
 
     def _group(self, ids: tuple[int, ...], window: ReadWindow) -> GroupRead:
         """Return the prepared exchange for some servos."""
@@ -173,7 +173,7 @@ class SyncReader:
         group: GroupRead,
         raw: bytes,
         at_s: float,
-        heard: dict[int, ServoReply],
+        replies: dict[int, ServoReply],
         now_s: float,
         turns: WindowSchedule,
     ) -> None:
@@ -182,17 +182,17 @@ class SyncReader:
             raw = self._line.complete(raw, group.missing, self._line.deadline_s)
             samples, damaged, unproved = group.pieces(raw)
             for servo_id, sample in samples.items():
-                heard[servo_id] = ServoReply(sample, at_s)
+                replies[servo_id] = ServoReply(sample, at_s)
             if len(samples) == len(group.ids):
                 return
             for servo_id in group.ids:
                 if servo_id not in samples:
                     self._unanswered_s[servo_id] = now_s
-            silent = silent_ones(group.ids, samples.keys() | damaged | unproved)
+            silent = silent_servos(group.ids, samples.keys() | damaged | unproved)
             if not samples and not damaged and self._header in raw:
                 self._line.lateness.late_answer(now_s)  # that of an earlier question
             self._blame(damaged, silent, now_s, turns)
-            done = heard.keys() | damaged | frozenset(silent)
+            done = replies.keys() | damaged | frozenset(silent)
             left = tuple(servo_id for servo_id in group.ids if servo_id not in done)
             if not left or self._line.port.now_s() >= self._until_s:
                 return

@@ -8,7 +8,7 @@ from gazerig.drivers.host_lateness import HostLateness
 from gazerig.drivers.serial.port import BABBLE_S, BITS_PER_BYTE, QUIET_S, BusPort
 from gazerig.drivers.servo_bus.adaptive_timeout import AdaptiveTimeout
 from gazerig.drivers.servo_bus.family import Family
-from gazerig.drivers.servo_bus.poll_list import silent_ones
+from gazerig.drivers.servo_bus.poll_list import silent_servos
 
 TRIES, HURRIED = 3, 4.0
 
@@ -56,7 +56,7 @@ class Transactions:
         self.starved = False
         self.asleep_s = 0.0
         self.lateness = HostLateness()
-        self._unheard = self._owed = False
+        self._silent = self._reply_owed = False
         self.quiet = True
         self.whole_s = self.deadline_s = 0.0
         self.baud, self._byte_s = baud, BITS_PER_BYTE / baud
@@ -97,7 +97,7 @@ class Transactions:
         """
         port, timeout = self.port, self.timeout
         # What is here before the question cannot be its answer: it is that of an earlier one.
-        waited = self._owed and bool(port.getBytesAvailable())
+        waited = self._reply_owed and bool(port.getBytesAvailable())
         if waited:
             self._note_late(port.read_until(_ROOM, port.now_s()))
         port.clearPort()
@@ -116,8 +116,8 @@ class Transactions:
         at_s = port.now_s()
         self.rx_bytes += len(raw)
         # The first that is heard after a silence may be owed, too: more of that may follow.
-        self._owed = not raw or (self._owed and (self._unheard or waited))
-        self._unheard = not raw
+        self._reply_owed = not raw or (self._reply_owed and (self._silent or waited))
+        self._silent = not raw
         if len(raw) == length:
             timeout.update(at_s - whole_s)
         else:
@@ -138,7 +138,7 @@ class Transactions:
     def drain(self, quiet_s: float = QUIET_S) -> int:
         """Throw away what arrives until the line is quiet; return the number of bytes.
 
-        Gives up on a line that never falls silent.
+        Stops after a while on a line that never falls silent.
         """
         end_s = self.port.now_s() + BABBLE_S
         dropped = b""
@@ -147,9 +147,9 @@ class Transactions:
             dropped += more
             self.rx_bytes += len(more)
             if not more or self.port.now_s() >= end_s or len(dropped) >= 16 * _ROOM:
-                if dropped and self._owed:
+                if dropped and self._reply_owed:
                     self._note_late(dropped)
-                    self._unheard = False
+                    self._silent = False
                 return len(dropped)
 
     def _note_late(self, raw: bytes) -> None:
@@ -167,11 +167,11 @@ class Transactions:
         values: dict[int, bytes] = {}
         left, silent = tuple(ids), list[int]()
         while left:
-            heard = self._ask(left, address, length)
-            values.update(heard)
-            if self.tries == 1 and not heard:
+            answered = self._ask(left, address, length)
+            values.update(answered)
+            if self.tries == 1 and not answered:
                 break
-            blamed = silent_ones(left, values)
+            blamed = silent_servos(left, values)
             silent += blamed
             left = tuple(i for i in left if i not in values and i not in blamed)
         for servo_id in silent:
@@ -194,7 +194,7 @@ class Transactions:
         self.send(self.family.codec.sync_write(ids, register.address, register.size, rows))
 
     def _ask(self, ids: Sequence[int], address: int, length: int) -> dict[int, bytes]:
-        """Read the same bytes of several servos once; return those of who answered well."""
+        """Read the same bytes of several servos once; return those of servos that answered well."""
         found: dict[int, bytes] = {}
         alone = not self.family.sync_read
         # Where a question's echo looks like an answer the answer must be of another length.

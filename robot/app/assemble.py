@@ -322,7 +322,7 @@ def _teller(
         return None
 
     def tell(t_s: float, head_rad: Angles3) -> None:
-        turns.remember(t_s, np.array(mount.pose(*kinematics.head_pose(head_rad))[0]))
+        turns.record(t_s, np.array(mount.pose(*kinematics.head_pose(head_rad))[0]))
 
     return tell
 

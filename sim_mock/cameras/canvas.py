@@ -1,4 +1,4 @@
-"""Draws flat pieces of the world as a camera sees them.
+"""Rendering of flat pieces of the world as a camera sees them.
 
 Whatever is drawn later covers what was drawn before, so the farthest comes first. The lens
 does not distort. World frame, metres; camera frame optical, x right, y down, z forward.
@@ -34,7 +34,7 @@ class TexturedQuad(NamedTuple):
 
 
 class Canvas:
-    """What one camera sees from one place: colours and distances along its axis.
+    """The image of one camera at one position: colours and distances along its axis.
 
     image: (h, w, 3) BGR; depth_m: (h, w) float32, infinite where nothing was drawn
     """

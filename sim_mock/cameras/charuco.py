@@ -1,6 +1,6 @@
-"""A camera that looks at a ChArUco board whose place is known to the millimetre.
+"""A camera in front of a ChArUco board whose pose is known exactly.
 
-It gives frames as a camera would: the lens distorts, edges are soft, the light falls
+Its frames are like those of a camera: the lens distorts, edges are soft, the light falls
 off to one side, pixels have noise. Not modelled: motion blur, rolling shutter, glare,
 paper that is not flat.
 """

@@ -1,7 +1,7 @@
-"""The board before an emulated head: held by somebody at first, hanging still after that.
+"""The board in front of an emulated head: held by hand at first, hanging still after that.
 
-Whoever holds it brings it everywhere, near and far, and tilts it to all sides, as a
-person does who follows what the calibration asks for. The camera's true lens and mount
+The hand moves it everywhere, near and far, and tilts it to all sides, as the calibration
+asks for. The camera's true lens and mount
 are a little off those of the rig file, so that there is something to find.
 """
 
@@ -32,7 +32,7 @@ _OFF_DEG: Angles3 = (2.0, -3.0, 1.5)
 class BoardScene:
     """Frames of the board, taken when they are asked for.
 
-    head_rad: where the emulated head is; whoever moves it keeps this true
+    head_rad: angles of the emulated head; to be set whenever it moves
     mount, lens: the camera as it truly is
     """
 

@@ -1,6 +1,6 @@
 """A camera that looks into a simulated scene from where the emulated head is.
 
-It gives what a detector would find, not pixels: landmarks with noise, hands and things
+Its output is what a detector would find, not pixels: landmarks with noise, hands and things
 with a place in depth; late by its latency, at its own rate, inside its own field, and
 now and then nothing. Not modelled: motion blur, light, occlusion, false detections.
 """

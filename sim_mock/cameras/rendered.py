@@ -1,7 +1,7 @@
-"""A camera that draws what it would see from where the emulated head is, and really looks at it.
+"""A camera that renders the view from the emulated head and runs the real detectors on it.
 
-Where scene_camera gives what a detector would find, this one gives pixels, and the real
-detectors find what they find: a room with texture, people with faces, things, distances.
+gazerig.sim_mock.cameras.detections simulates what a detector would find; here the real
+detectors work on pixels: a room with texture, people with faces, things, distances.
 Frames come late, at their own rate, noisy, and smeared by the camera's turn during the
 exposure; a depth frame has the noise of stereo and holes at edges. Not modelled: lens
 distortion, rolling shutter, light, the smear of things that move themselves.
@@ -39,7 +39,7 @@ _BLIND_PX, _JUMP = 5, 0.08
 class Exposure(NamedTuple):
     """One frame as taken.
 
-    frame: (h, w, 3) BGR; depth_m: (h, w) metres along the axis, NaN in holes, None without
+    image: (h, w, 3) BGR; depth_m: (h, w) metres along the axis, NaN in holes, None without
     R_world_camera, p_world_camera_m: where the camera truly was
     """
 
@@ -136,9 +136,11 @@ class PixelCamera:
         detector: Callable[[], FaceDetector] | None,
         motion: Callable[[FindMotion | None], FindMotion | None] | None,
     ) -> bool:
-        """Look otherwise from the next frame on; always possible.
+        """Change the detectors from the next frame on; always possible.
 
-        detector: makes another one; motion: gives what finds motion from what did; None: as is
+        Args:
+            detector: makes another one; None: no change.
+            motion: returns a motion detector from the present one; None: no change.
 
         Raises:
             SetupError: the detector cannot be made; the old one goes on.
@@ -157,7 +159,7 @@ class PixelCamera:
         """Stop; there is nothing to free."""
 
     def _looked_at(self, shot: Exposure) -> Detections:
-        """Let the detectors look at a frame."""
+        """Return the detections in a frame."""
         blobs = self._find_motion(shot, self.lens) if self._find_motion is not None else ()
         height, width = shot.image.shape[:2]
         return Detections(

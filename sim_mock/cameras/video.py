@@ -94,7 +94,7 @@ class FilmCamera:
         detector: Callable[[], FaceDetector] | None,
         motion: Callable[[Motion | None], Motion | None] | None,
     ) -> bool:
-        """Look otherwise from the next frame on, as in FrameAnalyzer; always possible."""
+        """Change the detectors from the next frame on, as in FrameAnalyzer; always possible."""
         self._frames.retune(detector, motion)
         return True
 

@@ -79,7 +79,7 @@ class DynamixelDrive(Drive):
 
     @property
     def position_steps(self) -> float:
-        """Return the true position of the shaft in the registers' terms, finer than they are."""
+        """Return the true position of the shaft in the registers' unit, with fractions."""
         return self._side * self.shaft.x + self._shift
 
     @property

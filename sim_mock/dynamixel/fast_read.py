@@ -1,6 +1,6 @@
 """Fast sync read in one tight loop, for unique ids and a line without faults.
 
-It gives the same bytes as gazerig.sim_mock.dynamixel.packets.fast_pieces in half the time; a
+It returns the same bytes as gazerig.sim_mock.dynamixel.packets.fast_pieces in half the time; a
 test compares the two.
 """
 

@@ -1,4 +1,4 @@
-"""Where an emulated Dynamixel servo has the registers that change by themselves."""
+"""Addresses of an emulated Dynamixel servo's registers that change by themselves."""
 
 import struct
 
@@ -14,4 +14,4 @@ REFERENCE, REFERENCE_AT = struct.Struct("<ii"), 136
 SENSED_SPAN = SENSED_AT, REFERENCE_AT
 SURROUNDINGS_SPAN = SURROUNDINGS_AT, SURROUNDINGS_AT + SURROUNDINGS.size
 PROFILED = ((MOTION_AT, SENSED_AT), (REFERENCE_AT, SURROUNDINGS_AT))
-"""Their addresses; the last two tell of the profile, which a control loop seldom reads."""
+"""Their addresses; the last two are the profile's, which a control loop rarely reads."""

@@ -39,8 +39,8 @@ class ResolvedRange(NamedTuple):
     """Real addresses behind a range, resolved through the indirect windows.
 
     runs: of real addresses
-    sensed, surroundings, profiled: whether any of them tells what is sensed, voltage or
-        temperature, or what the profile does
+    sensed, surroundings, profiled: whether any of them holds sensor values, voltage or
+        temperature, or the state of the profile
     """
 
     runs: tuple[slice, ...]

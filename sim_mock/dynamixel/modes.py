@@ -1,7 +1,7 @@
 """Operating modes of an emulated servo: from registers to what its controller does.
 
 Gains are divided as the ROBOTIS e-Manual says (P 128, D 16, I 65536, feed-forward 4). On
-what they act it does not tell; assumed here: positions in steps, speeds in steps/ms,
+which units they act is not documented; assumed here: positions in steps, speeds in steps/ms,
 accelerations in steps/ms2, sums per ms, in the velocity mode units of 0.229 rev/min; what
 comes out is in units of PWM (885 are 100 %).
 """

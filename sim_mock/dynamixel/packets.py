@@ -33,8 +33,7 @@ def status(servo_id: int, error: int, params: bytes) -> bytes:
 def fast_pieces(answers: Sequence[Answer], length: int) -> list[Piece]:
     """Send answers as blocks of one packet whose length field says ``length``.
 
-    The first servo sends the head. Nobody can take the place of a missing block: the
-    packet ends where the answers end.
+    The first servo sends the head. A missing block ends the packet.
     """
     head = HEAD.pack(HEADER, BROADCAST, length, STATUS)
     crc = umts(head)

@@ -15,7 +15,7 @@ NOBODY = -1
 
 BABBLE_BYTES_S = 20_000
 BABBLE_MOST = 2000
-"""A babbling node fills no more than so many bytes at once, however long nobody looked."""
+"""Most bytes of a babbling node at once, however long ago the last call was."""
 
 
 @dataclass
@@ -42,7 +42,7 @@ class LineFault:
 class ActiveFaults:
     """The faults in force, and what they do to answers and bytes.
 
-    ``any`` is False while nothing is wrong: then nobody needs to ask.
+    ``any`` is False while no fault is in force, which saves further calls.
     header: what packets on this line begin with
     """
 
@@ -211,7 +211,7 @@ class ActiveFaults:
         return self._rng.randbytes(8) if fault.data is None else fault.data
 
     def babble(self, now_s: float) -> bytes:
-        """Return what a babbling node has sent since the last look: headers and noise."""
+        """Return what a babbling node has sent since the last call: headers and noise."""
         if not self.on("babble", now_s):
             self._babbled_s = now_s
             return b""

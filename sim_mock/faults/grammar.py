@@ -24,13 +24,13 @@ class Verb(NamedTuple):
     """One command. lasting: it may end with ``count N`` and ``for S``."""
 
     do: Callable[..., str]
-    words: tuple[Argument, ...]
-    says: str
+    arguments: tuple[Argument, ...]
+    description: str
     lasting: tuple[str, ...] = ()
 
 
 class CommandTable(NamedTuple):
-    """All that can be asked of one kind of device.
+    """All fault commands of one kind of device.
 
     cases: what ``set`` can choose, and the values as they are typed
     ids: what the word ID stands for, e.g. "a servo's id"
@@ -46,13 +46,15 @@ class CommandTable(NamedTuple):
         Raises:
             ValueError: names the word that is wrong and what would be right.
         """
-        words = text.split()
-        if not words or words[0] == "help":
-            return self.help(words[1] if len(words) > 1 else None)
-        name, rest = words[0].replace("_", "-"), words[1:]
+        arguments = text.split()
+        if not arguments or arguments[0] == "help":
+            return self.help(arguments[1] if len(arguments) > 1 else None)
+        name, rest = arguments[0].replace("_", "-"), arguments[1:]
         verb = self.verbs.get(name)
         if verb is None:
-            raise ValueError(f"{words[0]!r} is no command; there is {', '.join(self.verbs)}, help")
+            raise ValueError(
+                f"{arguments[0]!r} is no command; there is {', '.join(self.verbs)}, help"
+            )
         try:
             rest, lasting = _lasting(verb, rest)
             return verb.do(faults, *_arguments(verb, rest), **lasting)
@@ -62,15 +64,15 @@ class CommandTable(NamedTuple):
     def usage(self, name: str) -> str:
         """Show how a command is typed."""
         verb = self.verbs[name]
-        shown = [f"[{w.shown}]" if w.optional else w.shown for w in verb.words]
+        shown = [f"[{w.shown}]" if w.optional else w.shown for w in verb.arguments]
         ends = {"count": "[count N]", "for": "[for SECONDS]"}
         return " ".join([name, *shown, *(ends[word] for word in verb.lasting)])
 
     def help(self, name: str | None = None) -> str:
         """Explain one command or all of them, one a line."""
         if name is not None and name in self.verbs:
-            return f"{self.usage(name)}: {self.verbs[name].says}"
-        lines = [f"{self.usage(verb):46} {self.verbs[verb].says}" for verb in self.verbs]
+            return f"{self.usage(name)}: {self.verbs[name].description}"
+        lines = [f"{self.usage(verb):46} {self.verbs[verb].description}" for verb in self.verbs]
         lines.append(
             f"ID is {self.ids} or all; a fault lasts until clear, or as [..] says; set takes"
         )
@@ -78,9 +80,9 @@ class CommandTable(NamedTuple):
         return "\n".join(lines)
 
 
-def _lasting(verb: Verb, words: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
+def _lasting(verb: Verb, arguments: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
     """Split ``count N`` and ``for S`` off the end; return the other words and these values."""
-    left, found = list(words), dict[str, Any]()
+    left, found = list(arguments), dict[str, Any]()
     while len(left) >= 2 and left[-2] in BOTH:
         value, word = left.pop(), left.pop()
         if word not in verb.lasting:
@@ -92,20 +94,20 @@ def _lasting(verb: Verb, words: Sequence[str]) -> tuple[list[str], dict[str, Any
     return left, found
 
 
-def _arguments(verb: Verb, words: Sequence[str]) -> list[Any]:
-    needed = [word for word in verb.words if not word.optional]
-    if len(words) < len(needed):
-        raise ValueError(f"{needed[len(words)].shown} is missing")
-    if len(words) > len(verb.words):
-        raise ValueError(f"{words[len(verb.words)]!r} is too much")
-    return [word.read(text) for word, text in zip(verb.words, words, strict=False)]
+def _arguments(verb: Verb, arguments: Sequence[str]) -> list[Any]:
+    needed = [word for word in verb.arguments if not word.optional]
+    if len(arguments) < len(needed):
+        raise ValueError(f"{needed[len(arguments)].shown} is missing")
+    if len(arguments) > len(verb.arguments):
+        raise ValueError(f"{arguments[len(verb.arguments)]!r} is too much")
+    return [word.read(text) for word, text in zip(verb.arguments, arguments, strict=False)]
 
 
 # --- words
 
 
 def number(low: float, high: float, what: str) -> Callable[[str], float]:
-    """Make a reader of numbers; ``what`` is told with the range where a word is none."""
+    """Make a reader of numbers; ``what`` and the range are in the error of a word that is none."""
 
     def read(text: str) -> float:
         try:

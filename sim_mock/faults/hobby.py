@@ -1,4 +1,4 @@
-"""What befalls the hobby servos behind an emulated board, whatever board that is."""
+"""Faults of the hobby servos behind an emulated board of any kind."""
 
 from collections.abc import Mapping, Sequence
 from typing import Protocol
@@ -66,12 +66,12 @@ class HobbyFaults(LineFaults):
         self._hobby = board
 
     def brown_out(self) -> str:
-        """Let the board restart as a dip of the supply makes it: no answer tells."""
+        """Let the board restart as after a dip of the supply, which no answer shows."""
         self._hobby.restart()
         return "the board restarts"
 
     def power(self, on: bool = True) -> str:
-        """Return the servos their supply, or take it; what gives the pulses notices nothing."""
+        """Switch the servos' supply on or off; the board does not notice."""
         self._hobby.body.advance()
         self._hobby.body.servo_power = on
         return f"the servos have {'their' if on else 'no'} supply"
@@ -80,13 +80,13 @@ class HobbyFaults(LineFaults):
         """Jam a servo where it is."""
         for servo in self._servos(channel):
             servo.stuck = True
-        return f"{self.who(channel)} is stuck"
+        return f"{self.label(channel)} is stuck"
 
     def free(self, channel: int | None) -> str:
-        """Let a jammed servo go."""
+        """Release a jammed servo."""
         for servo in self._servos(channel):
             servo.stuck = False
-        return f"{self.who(channel)} is free"
+        return f"{self.label(channel)} is free"
 
     def turn(self, channel: int | None, steps: float) -> str:
         """Turn a servo by hand.
@@ -96,7 +96,7 @@ class HobbyFaults(LineFaults):
         """
         for servo in self._servos(channel):
             servo.turn(steps)
-        return f"{self.who(channel)} was turned by {steps:g} quarter us"
+        return f"{self.label(channel)} was turned by {steps:g} quarter us"
 
     def _servos(self, channel: int | None) -> Sequence[HobbyServo]:
         """Return a servo, or all (None), brought up to now."""
@@ -126,14 +126,14 @@ def channel_word(highest: int) -> Argument:
 
 # fmt: off
 def hobby_verbs(one: Argument, writes: str, own: Mapping[str, Verb]) -> dict[str, Verb]:
-    """Return what can be asked of a board of hobby servos.
+    """Return the fault commands of a board of hobby servos.
 
     Args:
         one: reads a channel.
         writes: what is sent to it without an answer, for "lose-writes".
-        own: what can be asked of this make of board beside.
+        own: further commands of this make of board.
     """
-    who = Argument(one.shown, or_all(one.read))
+    label = Argument(one.shown, or_all(one.read))
     return {
         **line_verbs(one),
         "lose-writes": lost("lose_writes", writes),
@@ -144,9 +144,9 @@ def hobby_verbs(one: Argument, writes: str, own: Mapping[str, Verb]) -> dict[str
                           "the board restarts as a dip of its supply makes it"),
         "power": Verb(HobbyFaults.power, (SWITCH,),
                       "supply of the servos; the board notices nothing"),
-        "stick": Verb(HobbyFaults.stick, (who,), "jam the servo where it is"),
-        "free": Verb(HobbyFaults.free, (who,), "let a jammed servo go"),
-        "turn": Verb(HobbyFaults.turn, (who, Argument("STEPS", number(-1e5, 1e5, "quarter us"))),
+        "stick": Verb(HobbyFaults.stick, (label,), "jam the servo where it is"),
+        "free": Verb(HobbyFaults.free, (label,), "let a jammed servo go"),
+        "turn": Verb(HobbyFaults.turn, (label, Argument("STEPS", number(-1e5, 1e5, "quarter us"))),
                      "turn the servo by hand; with pulses it goes back"),
         **closing_verbs(one),
     }

@@ -1,6 +1,6 @@
-"""All that can go wrong on an emulated line, whatever device is at its other end.
+"""Faults of an emulated line with any device at its other end.
 
-What is asked for is a line of text (gazerig.sim_mock.faults.verbs). What happens to answers lasts
+A command is a line of text (gazerig.sim_mock.faults.verbs). A fault of answers lasts
 for ``count`` of them, for ``seconds`` of the device's time, or until ``clear``; the id None stands
 for every servo.
 """
@@ -17,7 +17,7 @@ from gazerig.sim_mock.replies import Piece
 
 
 class FaultTarget(Protocol):
-    """What faults need of the device they strike."""
+    """The interface of a device to its faults."""
 
     now_s: Callable[[], float]
 
@@ -59,7 +59,7 @@ class LineFaults(ABC):
         """Return the state of every servo, for ``status``."""
 
     def board(self) -> dict[str, object]:
-        """Return what else ``status`` tells, where there is more than servos."""
+        """Return further entries of ``status`` of devices that are more than servos."""
         return {}
 
     def command(self, text: str) -> str:
@@ -70,26 +70,26 @@ class LineFaults(ABC):
         """
         return self.commands.obey(self, text)
 
-    def who(self, servo_id: int | None) -> str:
-        """Name a servo for people."""
+    def label(self, servo_id: int | None) -> str:
+        """Return a servo's label for messages."""
         return "everybody" if servo_id is None else f"{self.noun} {servo_id}"
 
     def begin(
         self,
         kind: str,
         servo_id: int | None,
-        says: str,
+        text: str,
         count: int | None = None,
         seconds: float | None = None,
         numbers: tuple[float, ...] = (),
         data: bytes | None = None,
     ) -> str:
-        """Let a fault begin; return what was done.
+        """Start a fault; return what was done.
 
         Args:
             kind: its name among the faults in force.
             servo_id: whose answers; None for those of all servos.
-            says: what happens now.
+            text: what is done, for the reply.
             count: for so many answers.
             seconds: for so long.
             numbers: what the kind needs.
@@ -104,14 +104,14 @@ class LineFaults(ABC):
         self.wire.add(LineFault(kind, servo_id, numbers, data, count, until_s))
         span = "" if count is None else f" {count} times"
         span += "" if seconds is None else f" for {seconds:g} s"
-        return says + (span or " until cleared")
+        return text + (span or " until cleared")
 
-    def switch(self, kind: str, on: bool, says: str, seconds: float | None = None) -> str:
-        """Let a fault of the whole line begin or end; return what was done."""
+    def switch(self, kind: str, on: bool, text: str, seconds: float | None = None) -> str:
+        """Start or end a fault of the whole line; return what was done."""
         self.wire.remove(kind)
         if on:
-            return self.begin(kind, None, says, None, seconds)
-        return f"no longer: {says}"
+            return self.begin(kind, None, text, None, seconds)
+        return f"no longer: {text}"
 
     # --- all
 
@@ -129,7 +129,7 @@ class LineFaults(ABC):
         return f"{case} is {value}"
 
     def clear(self, servo_id: int | None = None) -> str:
-        """End every fault of the line (of one servo's answers); what servos suffered stays."""
+        """End every fault of the line (of one servo's answers); faults of servos stay."""
         return f"{self.wire.remove(None, servo_id)} faults cleared"
 
     def status(self) -> str:
@@ -141,7 +141,7 @@ class LineFaults(ABC):
         return json.dumps({"servos": self.reports(), **self.board(), "faults": faults})
 
     def around(self, replies: list[DeviceReply], data: bytes) -> list[DeviceReply]:
-        """Let the host hear itself and a babbling node, where the line has such faults."""
+        """Add the host's echo and a babbling node to replies, if the line has such faults."""
         now_s = self._chain.now_s()
         if self.wire.on("echo", now_s):
             replies.insert(0, DeviceReply(len(data), [Piece(NOBODY, data)]))

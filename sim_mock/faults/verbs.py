@@ -1,4 +1,4 @@
-"""What can be asked of an emulated line as text, in the parts that devices choose from."""
+"""Fault commands of an emulated line, in groups from which devices choose."""
 
 from collections.abc import Callable
 
@@ -27,8 +27,8 @@ _TIMES = Argument("N", count, True)
 Do = Callable[..., str]
 
 
-def answers(kind: str, says: str) -> Do:
-    """Return what lets the answers of a servo, or all, suffer; ``says`` shows who and numbers."""
+def answers(kind: str, text: str) -> Do:
+    """Return a command that disturbs the answers of one servo or all; ``text``: its reply."""
 
     def do(
         faults: LineFaults,
@@ -37,14 +37,14 @@ def answers(kind: str, says: str) -> Do:
         count: int | None = None,
         seconds: float | None = None,
     ) -> str:
-        told = says.format(*numbers, who=faults.who(servo_id))
-        return faults.begin(kind, servo_id, told, count, seconds, numbers)
+        done = text.format(*numbers, label=faults.label(servo_id))
+        return faults.begin(kind, servo_id, done, count, seconds, numbers)
 
     return do
 
 
-def everything(kind: str, says: str) -> Do:
-    """Return what lets a fault of the whole line begin; ``says`` shows its numbers."""
+def everything(kind: str, text: str) -> Do:
+    """Return a command that starts a fault of the whole line; ``text``: its reply."""
 
     def do(
         faults: LineFaults,
@@ -52,25 +52,25 @@ def everything(kind: str, says: str) -> Do:
         count: int | None = None,
         seconds: float | None = None,
     ) -> str:
-        return faults.begin(kind, None, says.format(*numbers), count, seconds, numbers)
+        return faults.begin(kind, None, text.format(*numbers), count, seconds, numbers)
 
     return do
 
 
-def times(kind: str, says: str) -> Do:
-    """Return what lets the next so many, or all, suffer."""
+def times(kind: str, text: str) -> Do:
+    """Return a command that hits the next so many, or all."""
 
     def do(faults: LineFaults, count: int | None = None, seconds: float | None = None) -> str:
-        return faults.begin(kind, None, says, count, seconds)
+        return faults.begin(kind, None, text, count, seconds)
 
     return do
 
 
-def switched(kind: str, says: str) -> Do:
-    """Return what switches a fault of the whole line on or off."""
+def switched(kind: str, text: str) -> Do:
+    """Return a command that switches a fault of the whole line on or off."""
 
     def do(faults: LineFaults, on: bool = True, seconds: float | None = None) -> str:
-        return faults.switch(kind, on, says, seconds)
+        return faults.switch(kind, on, text, seconds)
 
     return do
 
@@ -83,8 +83,8 @@ def _noise(
     seconds: float | None = None,
 ) -> str:
     what = "random bytes" if data is None else data.hex(" ")
-    says = f"noise ({what}) {where} answers"
-    return faults.begin(f"noise_{where}", None, says, count, seconds, (), data)
+    text = f"noise ({what}) {where} answers"
+    return faults.begin(f"noise_{where}", None, text, count, seconds, (), data)
 
 
 def _plug(faults: LineFaults) -> str:
@@ -93,25 +93,25 @@ def _plug(faults: LineFaults) -> str:
 
 # fmt: off
 def line_verbs(one: Argument) -> dict[str, Verb]:
-    """Return what can be asked of any line; ``one`` reads an id."""
-    who = Argument(one.shown, or_all(one.read))
+    """Return the commands of any line; ``one`` reads an id."""
+    target = Argument(one.shown, or_all(one.read))
     return {
-        "lose": Verb(answers("lose", "{who} does not answer"), (who,),
+        "lose": Verb(answers("lose", "{label} does not answer"), (target,),
                      "stay silent though it obeys", BOTH),
-        "delay": Verb(answers("delay", "{who} answers {:g} ms late"), (who, MS),
+        "delay": Verb(answers("delay", "{label} answers {:g} ms late"), (target, MS),
                       "answer late; in a group those behind wait as well", BOTH),
-        "truncate": Verb(answers("truncate", "only {} bytes arrive of what {who} answers"),
-                         (who, _BYTES), "only the first BYTES of an answer arrive", BOTH),
-        "duplicate": Verb(answers("duplicate", "what {who} answers arrives twice"), (who,),
+        "truncate": Verb(answers("truncate", "only {} bytes arrive of what {label} answers"),
+                         (target, _BYTES), "only the first BYTES of an answer arrive", BOTH),
+        "duplicate": Verb(answers("duplicate", "what {label} answers arrives twice"), (target,),
                           "answers arrive twice", BOTH),
-        "corrupt": Verb(answers("corrupt", "a bit flips in what {who} answers"),
-                        (who, Argument("BIT", whole(0, 8191, "a bit"), True)),
+        "corrupt": Verb(answers("corrupt", "a bit flips in what {label} answers"),
+                        (target, Argument("BIT", whole(0, 8191, "a bit"), True)),
                         "a bit flips, at random where none is named", BOTH),
-        "drop": Verb(answers("drop", "byte {} is lost of what {who} answers"),
-                     (who, Argument("BYTE", whole(-1024, 1023, "a byte"))),
+        "drop": Verb(answers("drop", "byte {} is lost of what {label} answers"),
+                     (target, Argument("BYTE", whole(-1024, 1023, "a byte"))),
                      "byte BYTE of an answer is lost; -1 the last", BOTH),
-        "stall": Verb(answers("stall", "{who} stops for {:g} ms half-way through its answer"),
-                      (who, MS), "stop half-way through an answer", BOTH),
+        "stall": Verb(answers("stall", "{label} stops for {:g} ms half-way through its answer"),
+                      (target, MS), "stop half-way through an answer", BOTH),
         "noise": Verb(_noise, (Argument("before|after", one_of("before", "after")),
                                Argument("HEX|random", hex_bytes, True)),
                       "bytes around whatever is answered", BOTH),
@@ -124,34 +124,34 @@ def line_verbs(one: Argument) -> dict[str, Verb]:
 
 
 def packet_verbs(one: Argument) -> dict[str, Verb]:
-    """Return what can be asked where many servos answer with packets; ``one`` reads an id."""
-    who = Argument(one.shown, or_all(one.read))
+    """Return the commands of lines with many servos; ``one`` reads an id."""
+    target = Argument(one.shown, or_all(one.read))
     return {
-        "fragment": Verb(answers("fragment", "a loose header before what {who} answers"),
-                         (who._replace(optional=True),),
+        "fragment": Verb(answers("fragment", "a loose header before what {label} answers"),
+                         (target._replace(optional=True),),
                          "a loose header before the real one", BOTH),
         "reorder": Verb(everything("reorder", "groups answer in reverse order"), (),
                         "groups answer in reverse order", BOTH),
-        "wrong-id": Verb(answers("wrong_id", "{who} answers as {}"),
-                         (who, Argument("AS", whole(0, 255, "an id"))), "answer under another id", BOTH),
-        "short": Verb(answers("short", "{who} answers {} bytes too few"), (who, _N),
+        "wrong-id": Verb(answers("wrong_id", "{label} answers as {}"),
+                         (target, Argument("AS", whole(0, 255, "an id"))), "answer under another id", BOTH),
+        "short": Verb(answers("short", "{label} answers {} bytes too few"), (target, _N),
                       "N bytes of data too few, checksum right", BOTH),
-        "long": Verb(answers("long", "{who} answers {} bytes too many"), (who, _N),
+        "long": Verb(answers("long", "{label} answers {} bytes too many"), (target, _N),
                      "N bytes of data too many, checksum right", BOTH),
-        "refuse": Verb(answers("refuse", "{who} answers with error {} and no data"),
-                       (who, Argument("NUMBER", whole(0, 255, "an error number"))),
+        "refuse": Verb(answers("refuse", "{label} answers with error {} and no data"),
+                       (target, Argument("NUMBER", whole(0, 255, "an error number"))),
                        "answer with an error number and no data", BOTH),
         "lose-writes": lost("lose_writes", "group writes"),
     }
 
 
 def lost(kind: str, what: str) -> Verb:
-    """Return what loses things on their way to the device, of which no answer tells."""
+    """Return the command that loses data on its way to the device, which no answer shows."""
     return Verb(times(kind, f"{what} are lost"), (_TIMES,), f"the next N {what} are lost", TIME)
 
 
 def adapter_verbs() -> dict[str, Verb]:
-    """Return what can be asked of the line and adapter as a whole."""
+    """Return the commands of the line and adapter as a whole."""
     return {
         "echo": Verb(switched("echo", "the line echoes the host"), (SWITCH,),
                      "the host hears its own bytes", TIME),
@@ -167,7 +167,7 @@ def adapter_verbs() -> dict[str, Verb]:
 
 
 def closing_verbs(one: Argument) -> dict[str, Verb]:
-    """Return what can be asked of every device; these stand last in its help."""
+    """Return the commands of every device, which are last in its help."""
     return {
         "set": Verb(LineFaults.choose, (Argument("CASE", anything), Argument("VALUE", anything)),
                     "choose where documents and devices differ: see below"),

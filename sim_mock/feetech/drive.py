@@ -1,8 +1,8 @@
 """Modes, goals and origin of an emulated Feetech servo, between its registers and its shaft.
 
 The registers' position is ``shaft.x + shift``;
-where turns are not counted it is told within one turn. Shaft and motor are those of
-gazerig.sim_mock.smart_servo.motor. What not documented of the controller is assumed, so that a
+where turns are not counted it is within one turn. Shaft and motor are those of
+gazerig.sim_mock.smart_servo.motor. What is not documented of the controller is assumed, so that a
 servo with factory gains needs all its duty at 50 steps of error and does not overshoot:
 owners measure 20-30 steps at half the stall torque. Left out: the starting force (24) and the
 dead zones (26, 27), so that friction keeps it up to 2 steps from its goal, as it does in fact.
@@ -48,7 +48,7 @@ SPEED_P_SHARE, SPEED_I_SHARE = 1 / 50, 1 / 40_000
 
 
 class SensedMotion(NamedTuple):
-    """What the servo tells of its motion, in register units with their signs."""
+    """The servo's measured motion, in register units with their signs."""
 
     position: int
     speed: int
@@ -93,7 +93,7 @@ class FeetechDrive(Drive):
 
     @property
     def position_steps(self) -> float:
-        """Return the true position in the registers' terms, finer than they are."""
+        """Return the true position in the registers' unit, with fractions."""
         at = self.shaft.x + self._shift
         goes_on = self.counts_turns or self.torque or self._last is not None
         return (at if goes_on else at % TURN) * self._scale

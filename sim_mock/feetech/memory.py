@@ -85,7 +85,7 @@ class FeetechMemory(ServoMemory[EmulatedFeetechRegister]):
         return bytes(self.bytes[address : min(SIZE, address + length)]).ljust(length, b"\0")
 
     def write(self, address: int, data: bytes, changed: Callable[[int], None]) -> None:
-        """Write what can be written; ``changed`` is told of every address that was."""
+        """Write what can be written; ``changed`` is called with every address that was."""
         keeps, highest = self.bytes[self.table.lock_at] == 0, self.table.highest
         for at, byte in enumerate(data, address):
             if at not in self._writable or byte > highest.get(at, 0xFF):

@@ -41,8 +41,8 @@ class FeetechServo(EmulatedServo):
     """One Feetech servo on the chain.
 
     The spec's ``firmware`` is the number behind 3; its ``quirks`` are those of Dynamixel
-    servos and mean nothing here, nor do ``overload_share`` and ``overload_s`` of its physics:
-    registers say so.
+    servos and are ignored, as are ``overload_share`` and ``overload_s`` of its physics: these
+    are registers here.
 
     Raises:
         ValueError: there is no such model, or the spec's physics cannot exist.
@@ -170,7 +170,7 @@ class FeetechServo(EmulatedServo):
         drive.follow(new_goal)
 
     def _goal_after_overload(self) -> None:
-        """End the overload on a new goal, if the quirks say so."""
+        """End the overload on a new goal, if the quirks do so."""
         ends = self.quirks.overload_ends
         ahead = self.memory.get("goal_position") - self.position_steps
         if ends == "new-goal" or (ends == "goal-away" and ahead * self._pushed < 0.0):

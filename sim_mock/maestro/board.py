@@ -64,7 +64,7 @@ class EmulatedMaestro:
         self.faults = MaestroFaults(self, self.body, COMMANDS, seed)
         self._wire = self.faults.wire
         self._parser = CommandParser(device, len(servos) > SIZES[0])
-        self._told_baud: int | None = None
+        self._detected_baud: int | None = None
         self._set_up(self.body.settings)
         self._do: dict[int, Callable[[bytes], bytes | None]] = {
             SET_TARGET: lambda data: self._at(data, EmulatedChannel.aim),
@@ -74,7 +74,7 @@ class EmulatedMaestro:
             SET_PWM: lambda data: None,
             GET_POSITION: self._get_position,
             GET_MOVING: lambda data: bytes((any(c.led for c in self.body.channels),)),
-            GET_ERRORS: lambda data: self.body.told_errors().to_bytes(2, "little"),
+            GET_ERRORS: lambda data: self.body.read_errors().to_bytes(2, "little"),
             GO_HOME: lambda data: self.body.send_all(self.body.settings.on_error),
             STOP_SCRIPT: lambda data: self.body.stop_script(),
             RUN_SCRIPT: lambda data: self._run_script(),
@@ -85,13 +85,13 @@ class EmulatedMaestro:
 
     # --- what it is, and who is heard
 
-    def hears(self, client_baud: int) -> bool:
+    def at_baud(self, client_baud: int) -> bool:
         """Return whether a client at this baud rate is understood, once it has sent AA."""
         mode = self.body.settings.mode
         if mode == "uart-fixed":
             return client_baud == self.body.settings.baud
         if mode == "uart-detect":
-            return self._told_baud in (None, client_baud)
+            return self._detected_baud in (None, client_baud)
         return mode != "mute"
 
     def choose(self, case: str, value: str) -> None:
@@ -115,11 +115,11 @@ class EmulatedMaestro:
         self.body.settings = settings
         self._parser.crc = settings.crc
         # The client's rate matters at the serial pins alone.
-        self.heed_baud = settings.mode in ("uart-fixed", "uart-detect")
+        self.check_baud = settings.mode in ("uart-fixed", "uart-detect")
 
     def _forget(self) -> None:
         self._parser.forget()
-        self._told_baud = None
+        self._detected_baud = None
 
     def restart(self) -> None:
         """Restart as a dip of the supply makes it."""
@@ -165,17 +165,17 @@ class EmulatedMaestro:
         self.body.advance()
         came = self._what_comes(data, client_baud)
         missing, replies = len(data) - len(came), []
-        for heard in self._parser.feed(came):
-            pieces = self._execute(heard)
+        for command in self._parser.feed(came):
+            pieces = self._execute(command)
             if pieces:
-                replies.append(DeviceReply(missing + heard.end, pieces))
+                replies.append(DeviceReply(missing + command.end, pieces))
         return self.faults.around(replies, data) if self._wire.any else replies
 
     def _what_comes(self, data: bytes, client_baud: int | None) -> bytes:
         """Return what the board understands of a client's bytes."""
         if not self.body.awake or self.body.settings.mode == "mute":
             return b""
-        if self.heed_baud and client_baud is not None:
+        if self.check_baud and client_baud is not None:
             data = self._through_pins(data, client_baud)
         now_s = self.now_s()
         if not self._wire.any or not self._wire.on("lose_bytes", now_s):
@@ -183,31 +183,31 @@ class EmulatedMaestro:
         return bytes(b for b in data if self._wire.take("lose_bytes", None, now_s) is None)
 
     def _through_pins(self, data: bytes, client_baud: int) -> bytes:
-        """Return what the serial pins understand: nothing before AA tells the rate, if it must."""
-        if self.body.settings.mode == "uart-detect" and self._told_baud is None:
+        """Return the bytes understood at the serial pins: none before AA in uart-detect."""
+        if self.body.settings.mode == "uart-detect" and self._detected_baud is None:
             sign = data.find(POLOLU)
             if sign < 0:
                 return b""
-            self._told_baud = client_baud
+            self._detected_baud = client_baud
             return data[sign:]
-        if self.hears(client_baud):
+        if self.at_baud(client_baud):
             return data
         if data:
             self.body.fail("signal")
         return b""
 
-    def _execute(self, heard: ParsedCommand) -> list[Piece]:
+    def _execute(self, command: ParsedCommand) -> list[Piece]:
         """Carry out one command; return what is answered."""
-        if heard.trouble:
-            self.body.fail(heard.trouble)
+        if command.trouble:
+            self.body.fail(command.trouble)
             return []
-        if self._wire.any and heard.code not in ASKING and self._lost():
+        if self._wire.any and command.code not in ASKING and self._lost():
             return []
-        answer = self._do[heard.code](heard.data)
+        answer = self._do[command.code](command.data)
         self.body.feed()
         if answer is None:
             return []
-        asked = heard.data[0] if heard.code == GET_POSITION else NOBODY
+        asked = command.data[0] if command.code == GET_POSITION else NOBODY
         return self._sent(Piece(asked, answer))
 
     def _lost(self) -> bool:
@@ -253,7 +253,7 @@ class EmulatedMaestro:
             self.body.channels[data[0]].aim(6000 + (data[1] - 127) * 15)
 
     def _run_script(self) -> None:
-        """Meet the wish for a script where there is none [A]."""
+        """Handle the start of a script although there is none [A]."""
         self.body.stop_script()
         self.body.fail("script-counter")
 
@@ -267,10 +267,10 @@ def build_board(
     seed: int = 0,
     servos: Sequence[HobbySpec | Sequence[float]] = (),
 ) -> EmulatedMaestro:
-    """Build a board; channels without a spec have a servo as from the shop.
+    """Build a board; channels without a spec have a default servo.
 
     With a baud rate the host is at its serial pins, set to that rate; without one it is at
-    the USB command port, where every client is heard.
+    the USB command port, where any rate works.
 
     Raises:
         ValueError: such a board or servo does not exist.

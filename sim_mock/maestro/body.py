@@ -14,7 +14,7 @@ from gazerig.sim_mock.maestro.settings import OnError, Settings
 PERIODS_S = 100
 """Periods in a second; a pulse goes out in every second one."""
 RESTART_S = 0.1
-"""From a dip of the supply until it hears again [A]."""
+"""From a dip of the supply until it receives again [A]."""
 PAUSE = 1000
 """So many periods without being looked at are not lived through one by one."""
 SWING = 100
@@ -86,10 +86,10 @@ class MaestroBody:
         self.errors |= 1 << ERRORS.index(error)
         self.send_all(self.settings.on_error)
 
-    def told_errors(self) -> int:
+    def read_errors(self) -> int:
         """Return the register of errors, which is empty after that."""
-        told, self.errors = self.errors, 0
-        return told
+        errors, self.errors = self.errors, 0
+        return errors
 
     def restart(self) -> None:
         """Restart as a dip of the supply makes it; the register of errors begins empty."""
@@ -141,13 +141,13 @@ class MaestroBody:
         return now if due is None else max(self._period + 1, min(now, due))
 
     def _due(self) -> int | None:
-        """Return the period in which patience with the host ends, None for never."""
+        """Return the period in which the serial time-out ends, None for never."""
         if not self.settings.timeout_s or self._timed_out:
             return None
         return self._fed + round(self.settings.timeout_s * PERIODS_S)
 
     def _at_rest(self, but: int | None = None) -> bool:
-        """Return whether every servo, ``but`` one, has heard its last pulse and obeyed."""
+        """Return whether every servo, ``but`` one, has followed its last pulse."""
         return all(
             not channel.moving and servo.width_steps == self._pulse(channel) and servo.resting
             for k, (channel, servo) in enumerate(zip(self.channels, self.servos, strict=True))

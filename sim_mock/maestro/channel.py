@@ -4,7 +4,7 @@ Widths are quarter microseconds. The board moves what it sends every 10 ms: by n
 the speed limit (quarter microseconds per 10 ms), while the speed changes by no more than
 the acceleration limit (the same per 80 ms), so that it comes to rest on the target. Sums
 are kept in eighths, in which both limits are whole numbers. Source: Pololu Maestro User's
-Guide (0J40), sections 4.b and 5.e; how it brakes there is not told: as late as it may [A].
+Guide (0J40), sections 4.b and 5.e; how it brakes there is not documented: as late as possible [A].
 """
 
 from math import isqrt
@@ -16,7 +16,7 @@ EIGHTHS = 8
 class EmulatedChannel:
     """A channel set up as a servo.
 
-    target, position: what it was told and what it sends now; 0: no pulses
+    target, position: commanded width and the one it sends now; 0: no pulses
     speed, acceleration: limits in the board's units; 0: unlimited
     low, high: targets are clipped to these
     """

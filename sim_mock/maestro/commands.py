@@ -1,10 +1,10 @@
-"""Commands as an emulated Maestro finds them among the bytes that it is sent.
+"""Parsing of the commands in the bytes that an emulated Maestro receives.
 
 Command bytes have bit 7 set, data bytes have not. Three forms: compact ``84 ch lo hi``,
 Pololu ``AA device 04 ch lo hi``, Mini SSC ``FF servo target``, whose last two bytes are
 0..254. Source: Pololu Maestro User's Guide (0J40), sections 5.c to 5.f. Where it is silent:
 AA followed at once by another command byte is taken as the sign that it also is, from
-which the baud rate is told, and no error [A]; what follows the number of another device
+which the baud rate is detected, and no error [A]; what follows the number of another device
 is ignored until the next command byte [A].
 """
 
@@ -65,7 +65,7 @@ class ParsedCommand(NamedTuple):
 
 
 class CommandParser:
-    """Keeps what has been heard of a command that is not complete yet.
+    """Keeps the received bytes of a command that is not complete yet.
 
     Args:
         device: the number that Pololu forms must name.
@@ -90,8 +90,8 @@ class CommandParser:
     def feed(self, data: bytes) -> Iterator[ParsedCommand]:
         """Yield the commands that bytes complete, fed one by one."""
         for end, byte in enumerate(data, 1):
-            for heard in self._take(byte):
-                yield heard._replace(end=end)
+            for command in self._take(byte):
+                yield command._replace(end=end)
 
     def _take(self, byte: int) -> tuple[ParsedCommand, ...]:
         packet = self._packet

@@ -24,7 +24,7 @@ class Settings:
     """The choices.
 
     mode: where the host is and what the board makes of it. At its USB command port with
-        usb-dual-port or usb-chained every client is heard; at its serial pins with
+        usb-dual-port or usb-chained any rate works; at its serial pins with
         uart-fixed only one at its rate, with uart-detect one that has sent AA; mute is the
         USB command port of a board in either uart mode: what is sent there is ignored.
     crc: a CRC is expected behind every command but those of the Mini SSC protocol
@@ -107,7 +107,7 @@ def _timeout_ms(value: str) -> float:
 
 
 def width_steps(case: str, value: str) -> int:
-    """Read a pulse width in microseconds; return quarters.
+    """Read a pulse width in microseconds; return quarter microseconds.
 
     Raises:
         ValueError: it is none that the board can send.

@@ -1,6 +1,6 @@
 """Emulated PCA9685 boards with a hobby servo on each channel, and the I2C bus they are on.
 
-Time passes in whole steps of 10 ms; a servo hears a new pulse once a period of its board.
+Time passes in whole steps of 10 ms; a servo gets a new pulse once a period of its board.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -37,7 +37,7 @@ class Pca9685Body:
         servos: sixteen a board, in the order of the boards.
 
     servo_power: the servos have their supply
-    stuck: somebody holds the data line down
+    stuck: a device holds the data line low
     absent: boards are not there; foreign: a chip of another kind is in their place
     """
 
@@ -83,10 +83,10 @@ class Pca9685Body:
         Raises:
             NotAcknowledged: there is none.
         """
-        heard = [c for own, c in self.chips.items() if address in (own, *c.further_addresses)]
-        if self.absent or not heard:
+        chips = [c for own, c in self.chips.items() if address in (own, *c.further_addresses)]
+        if self.absent or not chips:
             raise NotAcknowledged
-        return heard
+        return chips
 
     def read(self, address: int, length: int) -> bytes:
         """Read up to a stop condition.
@@ -98,11 +98,11 @@ class Pca9685Body:
         self.advance()
         if self.stuck:
             raise BusStuck
-        heard = self._addressed(address)
+        chips = self._addressed(address)
         if self.foreign:
             return bytes([STRANGE] * length)
         # Where several answer at once a 0 of any pulls the line down.
-        return bytes(map(_wired_and, *(chip.read(length) for chip in heard)))
+        return bytes(map(_wired_and, *(chip.read(length) for chip in chips)))
 
     def restart(self) -> None:
         """Restart all boards as a dip of their supply makes it."""
@@ -134,19 +134,19 @@ class Pca9685Body:
             self._pass(self._step)
 
     def _settle(self) -> None:
-        """Let pulses that have ended end at once: a servo hears none from then on."""
+        """Let pulses that have ended end at once: a servo gets none from then on."""
         now_s = self.now_s()
         for place, servo in enumerate(self.servos):
-            if servo.width_steps and not self._heard(place, now_s):
+            if servo.width_steps and not self._pulse_steps(place, now_s):
                 servo.width_steps = 0
 
-    def _heard(self, place: int, now_s: float) -> int:
+    def _pulse_steps(self, place: int, now_s: float) -> int:
         return self.width_steps(place, now_s) if self.servo_power else 0
 
     def _at_rest(self) -> bool:
         now_s = self.now_s()
         return all(
-            servo.resting and servo.width_steps == self._heard(place, now_s)
+            servo.resting and servo.width_steps == self._pulse_steps(place, now_s)
             for place, servo in enumerate(self.servos)
         )
 
@@ -155,5 +155,5 @@ class Pca9685Body:
         for place, servo in enumerate(self.servos):
             period_s = self._outputs[place][0].period_s
             if int(now_s / period_s) != int((now_s - 1.0 / STEPS_S) / period_s):
-                servo.width_steps = self._heard(place, now_s)
+                servo.width_steps = self._pulse_steps(place, now_s)
             servo.step()

@@ -57,11 +57,11 @@ class Bridge:
         self._unread = b""
         self._status = OK
         self._pointers: dict[int, int] = {}
-        self.heed_baud = False
+        self.check_baud = False
 
     # --- what it is
 
-    def hears(self, client_baud: int) -> bool:
+    def at_baud(self, client_baud: int) -> bool:
         """Return True: it takes any baud rate."""
         return True
 
@@ -221,7 +221,7 @@ def build_bridge(
     seed: int = 0,
     servos: Sequence[HobbySpec | Sequence[float]] = (),
 ) -> Bridge:
-    """Build the boards of one bus; channels without a spec have a servo as from the shop.
+    """Build the boards of one bus; channels without a spec have a default servo.
 
     Raises:
         ValueError: such boards or servos do not exist.

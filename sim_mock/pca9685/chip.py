@@ -1,4 +1,4 @@
-"""An emulated PCA9685, register by register: what it is sent, and which pulses it gives.
+"""An emulated PCA9685, register by register: from written registers to pulses.
 
 Left out: inverted and open-drain outputs (kept, no effect), the output enable pin (tied to
 ground), an external clock (there is none, so choosing it ends the pulses), and that reserved

@@ -1,4 +1,4 @@
-"""An emulated I2C bus as smbus2 gives a real one: the same methods, errors and messages."""
+"""An emulated I2C bus with the interface of smbus2: the same methods, errors and messages."""
 
 import errno
 import os

@@ -34,11 +34,11 @@ class _Served:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
         )
-        told = [self._hear() for _ in buses]
-        if not all(told):
+        lines = [self._read_line() for _ in buses]
+        if not all(lines):
             self.stop()
             raise RuntimeError("the emulated bus did not start: its message is above")
-        return [str(json.loads(line)["path"]) for line in told]
+        return [str(json.loads(line)["path"]) for line in lines]
 
     @property
     def pid(self) -> int:
@@ -59,13 +59,13 @@ class _Served:
         line = f"{bus}: {text}" if bus else text
         self._server.stdin.write(line.replace("\n", " ").encode() + b"\n")
         self._server.stdin.flush()
-        answer = json.loads(self._hear() or '{"error": "the emulated bus has ended"}')
+        answer = json.loads(self._read_line() or '{"error": "the emulated bus has ended"}')
         if "error" in answer:
             raise ValueError(answer["error"])
         answer.pop("bus", None)
         return json.dumps(answer) if len(answer) > 1 else str(answer["ok"])
 
-    def _hear(self) -> bytes:
+    def _read_line(self) -> bytes:
         assert self._server is not None and self._server.stdout is not None
         return self._server.stdout.readline()
 

@@ -1,4 +1,4 @@
-"""One emulated device on a pseudo-terminal: passes bytes to and fro until it is closed."""
+"""One emulated device on a pseudo-terminal, which passes bytes until it is closed."""
 
 import json
 import os
@@ -26,8 +26,8 @@ LOOK_S = 0.005
 class BusSettings:
     """What to emulate on one terminal.
 
-    device: what it is; clients at another baud rate than its own are not heard
-    name: tells several buses of one process apart; None: it is the only one
+    device: its specification; clients at another baud rate than its own get no answer
+    name: of this bus among several in one process; None: it is the only one
     wire_time, turnaround_us: as in gazerig.sim_mock.wire
     link: name under which the terminal can be opened, also after it was unplugged
     choices: cases of the device by name
@@ -50,7 +50,7 @@ class TerminalLine:
         settings: what to emulate, and how.
         now_s: the clock of device and line.
         say: gets the bus's new path as JSON when it was plugged in again without a link.
-        warn: told once for each wrong baud rate at which a client speaks.
+        warn: called once for each wrong baud rate of a client.
 
     Raises:
         ValueError, OSError: the settings cannot be met.
@@ -78,10 +78,10 @@ class TerminalLine:
         """Return as JSON the path to open, the baud rate, and the name where there is one."""
         return self.labelled({"path": self.terminal.path, "baud": self.settings.device.baud})
 
-    def labelled(self, told: Mapping[str, object]) -> str:
-        """Return as JSON what is told of this bus."""
+    def labelled(self, message: Mapping[str, object]) -> str:
+        """Return a message about this bus as JSON, with the bus's name."""
         name = self.settings.name
-        return json.dumps(told if name is None else {"bus": name, **told})
+        return json.dumps(message if name is None else {"bus": name, **message})
 
     def close(self) -> None:
         """Remove the link and the terminal; safe to call twice."""
@@ -118,12 +118,12 @@ class TerminalLine:
     def _take_bytes(self, now_s: float) -> None:
         """Return the client's bytes to the line, and back what is answered at once."""
         data = self.terminal.read()
-        careful = self.device.heed_baud or self.line.wire_time
+        careful = self.device.check_baud or self.line.wire_time
         baud = self.terminal.client_baud() if careful else 0
         answer = self.line.send(data, baud or 1, now_s)
         if answer:
             self.terminal.write(answer)
-        if self.device.heed_baud and self._warn is not None and data:
+        if self.device.check_baud and self._warn is not None and data:
             self._warn_of(baud, self._warn)
 
     def _deliver(self) -> None:
@@ -140,7 +140,7 @@ class TerminalLine:
 
     def _warn_of(self, baud: int, warn: Callable[[str], None]) -> None:
         """Warn once for each baud rate that a client uses a wrong one."""
-        if baud == self._warned or self.device.hears(baud):
+        if baud == self._warned or self.device.at_baud(baud):
             return
         self._warned = baud
         device = self.settings.device

@@ -64,7 +64,7 @@ class Server:
             line.close()
 
     def serve(self, commands: int | None) -> None:
-        """Serve until ``commands`` ends, where the settings say so, or a signal stops it."""
+        """Serve until ``commands`` ends, if the settings require it, or a signal stops it."""
         try:
             while not self.over:
                 watched = [fd for line in self.lines for fd in line.watched()]
@@ -151,18 +151,18 @@ def say(line: str) -> None:
     sys.stdout.flush()
 
 
-def settings_of(told: Mapping[str, Any]) -> ServerSettings:
+def settings_of(settings: Mapping[str, Any]) -> ServerSettings:
     """Return the settings decoded from JSON.
 
     Raises:
         ValueError, TypeError: there is no such device, or it has no such setting.
     """
-    buses = [BusSettings(**{**bus, "device": unpacked(bus["device"])}) for bus in told["buses"]]
-    return ServerSettings(tuple(buses), told.get("until_eof", False))
+    buses = [BusSettings(**{**bus, "device": unpacked(bus["device"])}) for bus in settings["buses"]]
+    return ServerSettings(tuple(buses), settings.get("until_eof", False))
 
 
 def main() -> None:
-    """Serve what the settings on the command line say."""
+    """Serve the buses of the settings on the command line."""
     run(settings_of(json.loads(sys.argv[1])), say, heed_ctrl_c=False)
 
 

@@ -56,7 +56,7 @@ class Event(NamedTuple):
 
 
 class Scene(Protocol):
-    """Who and what is there at an instant; it begins again after every round.
+    """The people and things at an instant; it repeats after every round.
 
     behaviours: every behaviour that its planner may put in force, so that a rig without a
         rule for one can be refused before it moves
@@ -67,7 +67,7 @@ class Scene(Protocol):
     behaviours: tuple[str, ...]
 
     def people(self, t_s: float) -> tuple[ScenePerson, ...]:
-        """Return everybody present, who may be far outside every field of view."""
+        """Return all people present, also those outside every field of view."""
         ...
 
     def things(self, t_s: float) -> tuple[Thing, ...]:

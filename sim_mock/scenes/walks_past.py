@@ -1,6 +1,6 @@
-"""The scene ``walks-past``: somebody walks by, 1.5 m before the robot, at 1 m/s, and back.
+"""The scene ``walks-past``: a person walks by, 1.5 m before the robot, at 1 m/s, and back.
 
-The face is turned to the robot all the way, as of somebody who looks while passing.
+The face is turned to the robot all the way, as of a person who looks while passing.
 """
 
 from math import atan2

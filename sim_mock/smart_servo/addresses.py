@@ -1,4 +1,4 @@
-"""Servos that hear a client, by id: shared ids, secondary ids, baud rates."""
+"""Servos at a client's baud rate, by id: shared ids, secondary ids, baud rates."""
 
 from collections.abc import Iterable
 from typing import Generic, TypeVar
@@ -22,7 +22,7 @@ class AddressTable(Generic[S]):
         self.shadows: dict[int, list[S]] = {}
         self.delay_s: dict[int, float] = {}
         for servo in servos:
-            if hears(servo, client_baud):
+            if at_baud(servo, client_baud):
                 self._enter(servo)
 
     def _enter(self, servo: S) -> None:
@@ -36,10 +36,10 @@ class AddressTable(Generic[S]):
             self.shadows.setdefault(shadow, []).append(servo)
 
     def all(self) -> list[S]:
-        """Return all servos that hear the client."""
+        """Return all servos at the client's baud rate."""
         return [*self.by_id.values(), *(twin for pair in self.twins.values() for twin in pair)]
 
 
-def hears(servo: EmulatedServo, client_baud: int | None) -> bool:
+def at_baud(servo: EmulatedServo, client_baud: int | None) -> bool:
     """True if a servo and a client at this baud rate (None: any) understand each other."""
     return client_baud is None or servo.baud == client_baud

@@ -1,7 +1,7 @@
 """The device side of a bus of smart servos: bytes in, bytes out, nothing opened.
 
 Where documents and devices are silent or differ, the choice is one of ``ChainQuirks``. A
-client whose baud rate is not a servo's neither hears it nor is heard.
+client at another baud rate than a servo's gets no answer from it.
 """
 
 from collections.abc import Callable, Iterable
@@ -11,7 +11,7 @@ from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.active import NOBODY
 from gazerig.sim_mock.faults.grammar import CommandTable
 from gazerig.sim_mock.replies import BROADCAST, Answer, Piece, merge
-from gazerig.sim_mock.smart_servo.addresses import AddressTable, hears
+from gazerig.sim_mock.smart_servo.addresses import AddressTable, at_baud
 from gazerig.sim_mock.smart_servo.faults import ServoFaults
 from gazerig.sim_mock.smart_servo.framing import (
     PING,
@@ -44,7 +44,7 @@ class ServoChain(Generic[S, Q]):
         servos: any order; servos with one id answer at the same time.
         now_s: the chain's clock.
         quirks: what servos do where documents and devices differ; None: the first of each case.
-        heed_baud: only a client at a servo's baud rate is heard; else every client is.
+        check_baud: whether only clients at a servo's baud rate get answers; else all do.
         seed: of the random numbers that faults draw.
     """
 
@@ -64,13 +64,13 @@ class ServoChain(Generic[S, Q]):
         servos: Iterable[S],
         now_s: Callable[[], float],
         quirks: Q | None = None,
-        heed_baud: bool = False,
+        check_baud: bool = False,
         seed: int = 0,
     ) -> None:
         self.servos = tuple(servos)
         self.now_s = now_s
         self.quirks = quirks or self.quirks_type()
-        self.heed_baud = heed_baud
+        self.check_baud = check_baud
         self.faults = ServoFaults(self, self.commands, seed, self.header)
         self._wire = self.faults.wire
         self._now_s = now_s()
@@ -88,7 +88,7 @@ class ServoChain(Generic[S, Q]):
     def refresh(self) -> None:
         """Read ids, baud rates and return delays again; needed after changes from outside."""
         self._stale = False
-        known = AddressTable(self.servos, self._client_baud if self.heed_baud else None)
+        known = AddressTable(self.servos, self._client_baud if self.check_baud else None)
         self._known = known
         self._by_id, self._twins, self._delay_s = known.by_id, known.twins, known.delay_s
 
@@ -96,9 +96,9 @@ class ServoChain(Generic[S, Q]):
         """Read addresses again before the next instruction; until then the old ones hold."""
         self._stale = True
 
-    def hears(self, client_baud: int) -> bool:
+    def at_baud(self, client_baud: int) -> bool:
         """True if any servo understands a client at this baud rate."""
-        return not self.heed_baud or any(hears(servo, client_baud) for servo in self.servos)
+        return not self.check_baud or any(at_baud(servo, client_baud) for servo in self.servos)
 
     def __getitem__(self, servo_id: int) -> S:
         """Return a servo by its id, as it was when last looked at."""
@@ -139,7 +139,7 @@ class ServoChain(Generic[S, Q]):
         if case == "baud":
             if value not in ("heed", "any"):
                 raise ValueError(f"baud {value!r}: it can be heed, any")
-            self.heed_baud = value == "heed"
+            self.check_baud = value == "heed"
             self.refresh()
             return
         self.quirks = decided(self.quirks, case, value)
@@ -337,7 +337,7 @@ def build_chain(
         specs: a plain tuple is (id, model, start position in steps).
         now_s: the clock.
         baud: the servos are set to it, all else as from the factory, and only clients at their
-            rate are heard; without one every client is.
+            rate get answers; without one any rate works.
         quirks: what servos do where documents and devices differ.
         seed: of the random numbers that faults draw.
 

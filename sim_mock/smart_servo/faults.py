@@ -51,7 +51,7 @@ class ServoFaults(LineFaults):
         return [self.chain.here(one) for one in ids]
 
     def reports(self) -> list[dict[str, object]]:
-        """Return what every servo tells of itself."""
+        """Return the state of every servo."""
         return [servo.report() for servo in self.servos(None)]
 
 
@@ -73,20 +73,20 @@ def _fails(error: str) -> Do:
     return lambda faults, servo_id: f"servo {servo_id} {faults.chain.here(servo_id).fail(error)}"
 
 
-def _suffers(do: Callable[..., None], says: str) -> Do:
-    """Return what one servo suffers, or all; ``says`` shows who and the number."""
+def _suffers(do: Callable[..., None], text: str) -> Do:
+    """Return a command that acts on one servo or all; ``text``: its reply."""
 
     def strike(faults: ServoFaults, servo_id: int | None, *numbers: float) -> str:
         for servo in faults.servos(servo_id):
             do(servo, *numbers)
-        return says.format(*numbers, who=faults.who(servo_id))
+        return text.format(*numbers, label=faults.label(servo_id))
 
     return strike
 
 
 def _has(attribute: str, unit: str) -> Do:
     """Return what sets a quantity of one servo, or of all."""
-    return _suffers(lambda s, value: setattr(s, attribute, value), f"{{who}} has {{:g}} {unit}")
+    return _suffers(lambda s, value: setattr(s, attribute, value), f"{{label}} has {{:g}} {unit}")
 
 
 # fmt: off
@@ -112,7 +112,7 @@ def commands_of(
         "overheat": Verb(_fails("overheating"), (one,), "the motor is too hot"),
         "encoder": Verb(_fails("encoder"), (one,), "the angle sensor is broken"),
         "shock": Verb(_fails("electrical shock"), (one,), "latch the electrical shock error"),
-        "brown-out": Verb(_suffers(EmulatedServo.restart, "{who} restarts"), (one,),
+        "brown-out": Verb(_suffers(EmulatedServo.restart, "{label} restarts"), (one,),
                           "restart as a dip of the supply makes it: no status tells"),
         "reset": Verb(_reset, (one,), f"as from the factory: {reset}"),
         "voltage": Verb(_has("supply_v", "V"), (some, Argument("V", number(0.0, 30.0, "volts"))),
@@ -120,14 +120,14 @@ def commands_of(
         "temperature": Verb(_has("temperature_c", "degC"),
                             (some, Argument("C", number(-40.0, 200.0, "degC"))),
                             "give the motor a temperature; it drifts on by itself"),
-        "stick": Verb(_suffers(lambda servo: servo.jam(True), "{who} is stuck"), (some,),
+        "stick": Verb(_suffers(lambda servo: servo.jam(True), "{label} is stuck"), (some,),
                       "jam the joint where it is"),
-        "free": Verb(_suffers(lambda servo: servo.jam(False), "{who} is free"), (some,),
+        "free": Verb(_suffers(lambda servo: servo.jam(False), "{label} is free"), (some,),
                      "let a jammed joint go"),
-        "load": Verb(_suffers(EmulatedServo.set_load, "{who} carries {:g} Nm"),
+        "load": Verb(_suffers(EmulatedServo.set_load, "{label} carries {:g} Nm"),
                      (some, Argument("NM", number(-100.0, 100.0, "Nm"))),
                      "hang a constant torque on the joint"),
-        "turn": Verb(_suffers(EmulatedServo.turn, "{who} was turned by {:g} steps"),
+        "turn": Verb(_suffers(EmulatedServo.turn, "{label} was turned by {:g} steps"),
                      (some, Argument("STEPS", number(-1e6, 1e6, "steps"))), "turn the joint by hand"),
         **closing_verbs(one),
     }

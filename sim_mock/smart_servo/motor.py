@@ -121,7 +121,7 @@ def long_pause(now_ms: int, until_ms: int, unit_ms: int) -> tuple[int, int]:
 def flicker(now_ms: int, seed: int, current: int, velocity: int) -> tuple[int, int]:
     """Return the noise of current and velocity of a servo that holds still.
 
-    A number of time and seed alone, so that nobody changes it by looking; velocity is
+    A number of time and seed alone, so that reading does not change it; velocity is
     mostly 0.
     """
     mixed = (now_ms * 0x9E3779B1 ^ seed * 0x27D4EB2F) & 0xFFFFFFFF
@@ -238,7 +238,7 @@ class Shaft:
         self.quiet = False
 
     def start(self, profile: PositionProfile | SpeedProfile) -> None:
-        """Switch on with an empty integrator; ``profile`` gives the reference."""
+        """Switch on with an empty integrator; ``profile``: the reference."""
         self.profile = profile
         self._rv = self._integral = 0.0
         self.quiet = False

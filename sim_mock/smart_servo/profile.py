@@ -2,7 +2,7 @@
 
 Units: steps and milliseconds. The path to a goal is planned once, in closed form, from
 where the generator is and how fast it moves: a phase that reaches the cruise speed, one
-that holds it, one that brakes. So what it gives does not depend on how it is asked.
+that holds it, one that brakes. So its values do not depend on when it is called.
 Source: ROBOTIS e-Manual, X series, "What is the Profile".
 """
 

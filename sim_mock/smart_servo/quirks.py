@@ -20,7 +20,7 @@ class ChainQuirks:
 
     after_missing: what servos do that come after a silent one in a plain group read:
         never answer, answer at once, or answer after ``slot_timeout_s`` [A]
-    wrong_baud: a client at another baud rate hears nothing, or garbage
+    wrong_baud: a client at another baud rate receives nothing, or garbage
     packet_gap_s: a packet that stays unfinished so long is dropped [A]
     """
 

@@ -34,7 +34,7 @@ class EmulatedServo(ABC):
 
     Attributes:
         id: what it is spoken to by.
-        errors: bits of what is wrong, as in the register that tells them.
+        errors: bits of its faults, as in their register.
         baud_rates: bit/s by the value of their register.
         on_address: called when id, baud rate or return delay are other than before.
 
@@ -259,7 +259,7 @@ class EmulatedServo(ABC):
         return self.drive.position_steps
 
     def report(self) -> dict[str, object]:
-        """Return its state, as ``status`` tells it."""
+        """Return its state for ``status``."""
         return {
             "id": self.id,
             "model": self.model.name,

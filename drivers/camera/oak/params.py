@@ -1,4 +1,4 @@
-"""What an OAK-D camera can be told."""
+"""Parameters of an OAK-D camera."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal

@@ -1,8 +1,8 @@
 """The one place where depthai is imported: only when asked for, and quietly.
 
 depthai sends usage figures unless DEPTHAI_TELEMETRY is 0, and logs to the standard output,
-which belongs to what a person asked to be printed. Both are read at its import. Whoever
-wants its log sets DEPTHAI_LEVEL.
+which belongs to the output that the user asked for. Both are read at its import; the
+environment variable DEPTHAI_LEVEL brings its log back.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""What every face detector can be told."""
+"""Parameters of every face detector."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal

@@ -1,7 +1,7 @@
 """A point of a moving patch that is on the thing itself, not on the ground seen through it.
 
 Plain ground between two people who walk together, or between legs, goes along with them in
-the flow. It is told by its looks: it is as bright as the ground around the patch.
+the flow. It is recognised by its appearance: it is as bright as the ground around the patch.
 """
 
 import cv2

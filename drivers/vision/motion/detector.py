@@ -135,7 +135,7 @@ class MotionDetector:
         depth_m: NDArray[Any] | None,
         t_now_before_m: Floats | None,
     ) -> MotionReport:
-        """Compare two images, or say why they cannot be."""
+        """Compare two images; return the motion, or why they cannot be compared."""
         if not searchable(now.grey):
             return MotionReport(silent="picture too small")
         if before is None or before.grey.shape != now.grey.shape:
@@ -257,7 +257,7 @@ def _measured(group: Group, frames: Blurred, room: Room) -> tuple[Floats, PatchM
 
 
 def _believed(value: float, sd: float) -> float:
-    """Draw a measurement towards 0 by its noise: what is not told from 0 is 0.
+    """Shrink a measurement towards 0 by its noise; one within the noise is 0.
 
     The positive part of James and Stein's estimator for one number; attention takes the
     length of it, which noise would otherwise always make longer.

@@ -1,4 +1,4 @@
-"""What the motion detector can be told.
+"""Parameters of the motion detector.
 
 Lengths in pixels are of the small image in which the search is done.
 """
