@@ -225,12 +225,12 @@ def test_the_joint_lags_behind_the_encoder_by_half_the_play():
 
 
 def test_a_hand_turns_a_limp_shaft_and_a_driven_one_springs_back():
-    limp, driven = shaft(loop=DISABLED), shaft()
-    for made in (limp, driven):
+    unpowered, driven = shaft(loop=DISABLED), shaft()
+    for made in (unpowered, driven):
         run(made, 5)
         made.turn(100.0)
         run(made, 1000)
-    assert limp.x == 100.0
+    assert unpowered.x == 100.0
     assert abs(driven.x) < 10.0
 
 

@@ -104,11 +104,11 @@ def test_where_home_is_reached_at_once_they_are_held_there():
 
 
 def test_errors_again_and_again_leave_the_servos_limp_until_the_line_is_quiet(held):
-    limp = 0
+    unpowered = 0
     for _ in range(14):
         held.raw("55")
-        limp += sum(None in readings for readings in held.run(0.1, [5500, 5600, 6600]))
-    assert limp > 40
+        unpowered += sum(None in readings for readings in held.run(0.1, [5500, 5600, 6600]))
+    assert unpowered > 40
     assert not any("channel" in fault for fault in held.bus.faults())
     said = [event for event in held.bus.events() if "again and again" in event]
     assert len(said) == 1

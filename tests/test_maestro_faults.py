@@ -26,7 +26,7 @@ def world():
 def test_a_mute_port_says_nothing(world):
     world.do("set mode mute")
     assert world.ask("AA A1") == b""
-    assert not world.board.hears(9600)
+    assert not world.board.at_baud(9600)
     world.do("set mode usb-chained")
     assert world.ask("A1") == bytes(2)
 
@@ -34,7 +34,7 @@ def test_a_mute_port_says_nothing(world):
 def test_serial_pins_that_detect_the_rate_wait_for_its_sign():
     world = World()
     world.do("set mode uart-detect")
-    assert world.board.heed_baud
+    assert world.board.check_baud
     assert world.ask("A1", 115_200) == b""
     (reply,) = world.board.exchange(bytes.fromhex("84 00 AA A1"), 115_200)
     assert (reply.end, reply.pieces[0].data) == (4, bytes(2))
@@ -47,7 +47,7 @@ def test_serial_pins_that_detect_the_rate_wait_for_its_sign():
 
 def test_serial_pins_with_a_rate_of_their_own():
     world = World(baud=57_600)
-    assert world.board.hears(57_600) and not world.board.hears(9600)
+    assert world.board.at_baud(57_600) and not world.board.at_baud(9600)
     world.ask(target(0, 6000), 57_600)
     assert world.ask("90 00", 57_600) == b"\x70\x17"
     assert world.ask("A1", 9600) == b""
