@@ -58,6 +58,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if "tab" in getattr(item, "fixturenames", ()):
             item.add_marker("browser")
+        if "simulated_wires" in getattr(item, "fixturenames", ()):
+            continue
         if _PTY & vars(getattr(item, "module", object)).keys():
             item.add_marker("pty")
 
@@ -122,4 +124,19 @@ def ideal_servos() -> Iterator[None]:
     from ideal_bus import ideal_buses
 
     with ideal_buses():
+        yield
+
+
+@pytest.fixture
+def simulated_wires(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Have emulated buses in this process and in simulated time; see simulated_wires.py.
+
+    A test that is itself marked ``pty`` has them on pseudo-terminals all the same.
+    """
+    from simulated_wires import simulated_wires as served_here
+
+    if request.node.get_closest_marker("pty") is not None:
+        yield
+        return
+    with served_here():
         yield

@@ -8,11 +8,13 @@ from command_line import invoked
 from served_rigs import hide_real_ports, rig_files, served
 
 from gazerig.config.schema import load_rig
+from gazerig.drivers.i2c.port import port_of
 from gazerig.drivers.serial.list_ports import SerialPort
-from gazerig.drivers.serial.port import BlockingPort
 from gazerig.robot.cli import progress
 from gazerig.sim_mock.devices import MaestroLine
 from gazerig.sim_mock.pty.client import PtyBus
+
+pytestmark = pytest.mark.usefixtures("simulated_wires")
 
 
 @pytest.fixture(autouse=True)
@@ -92,6 +94,7 @@ def test_setup_of_a_maestro_finds_a_range_that_cuts_and_a_servo_on_another_chann
         assert first["position"] == 0
 
 
+@pytest.mark.pty
 def test_setup_of_a_maestro_with_yes_does_not_guess_about_the_supply():
     code, _, err = invoked("setup", "maker", "--mock", "--yes", "--joint", "eyes_tilt")
     assert code == 0 and "--yes cannot know that the supply is off" in err and "done: 1 of 1" in err
@@ -144,7 +147,7 @@ def test_setup_of_a_pca9685_with_yes_measures_nothing(on_pca9685):
 
 def test_reboot_of_a_maestro_says_what_there_is_instead():
     with served("maker") as (port, _, command):
-        line = BlockingPort(port)
+        line = port_of(port)
         line.setBaudRate(115_200)
         line.write(bytes.fromhex("84 00 70 2E 2B"))
         line.closePort()

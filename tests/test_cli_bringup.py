@@ -1,4 +1,7 @@
-"""scan, doctor, setup and reboot of smart servos as people type them, on pseudo-terminals."""
+"""scan, doctor, setup and reboot of smart servos as people type them.
+
+Most in simulated time; of each command one is on a pseudo-terminal too, and marked so.
+"""
 
 import json
 import re
@@ -19,6 +22,8 @@ from gazerig.robot.cli import progress
 from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
 from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
+
+pytestmark = pytest.mark.usefixtures("simulated_wires")
 
 SMALL = [ServoSpec(1, "xl330-m077", 2048), ServoSpec(7, "xc330-m288", 2048)]
 LINE = {"desk": DynamixelLine, "feetech": FeetechLine}
@@ -81,6 +86,7 @@ def test_scan_of_a_port_where_nobody_answers():
     assert code == 1 and "no servo answers" in out and "supply" in out
 
 
+@pytest.mark.pty
 def test_fresh_servos_all_connected_at_once_are_noticed():
     with PtyBus() as bus:
         path = bus.start([ServoSpec(1, "xl330-m077", 700 * n) for n in range(3)], baud=57_600)
@@ -121,6 +127,7 @@ def test_scan_asks_which_port_where_there_are_several(monkeypatch):
 # --- doctor
 
 
+@pytest.mark.pty
 def test_doctor_finds_and_fixes():
     code, out, _ = invoked("doctor", "--mock")
     assert code == 0
@@ -188,6 +195,7 @@ def test_doctor_of_a_bus_that_is_not_there_still_examines_the_others(mixed):
     assert code == 1 and "there is no such port" in out
 
 
+@pytest.mark.pty
 def test_a_port_that_another_program_uses():
     with PtyBus() as bus:
         port = BlockingPort(bus.start(SMALL, baud=1_000_000))
@@ -200,6 +208,7 @@ def test_a_port_that_another_program_uses():
 # --- setup
 
 
+@pytest.mark.pty
 def test_setup_with_flags_alone():
     code, _, err = invoked(
         "setup", "--mock", "--yes", "--joint", "left_eye_pan", "--joint", "neck_roll"
@@ -293,6 +302,7 @@ def test_reboot_clears_an_error(rig, before, after):
     assert "back after" in err and after in err
 
 
+@pytest.mark.pty
 def test_reboot_asks_before_a_joint_goes_limp():
     with PtyBus() as bus:
         path = bus.start(SMALL, baud=1_000_000)

@@ -18,6 +18,8 @@ from gazerig.config.schema import load_rig
 from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
+pytestmark = pytest.mark.usefixtures("simulated_wires")
+
 
 @pytest.fixture
 def rigs(tmp_path: Path) -> dict[str, str]:
@@ -231,6 +233,7 @@ def test_what_cannot_be_is_said(
 # --- on a port that another program serves, from a process of its own
 
 
+@pytest.mark.pty
 def test_by_hand_over_a_port_with_answers_through_a_pipe(
     rig: Path, bus: tuple[PtyBus, str]
 ) -> None:
@@ -253,6 +256,7 @@ def test_by_hand_over_a_port_with_answers_through_a_pipe(
     assert found.sign == 1 and found.zero_step == pytest.approx(2088, abs=8)
 
 
+@pytest.mark.pty
 def test_ctrl_c_while_calibrating_lets_go_and_writes_nothing(
     rig: Path, bus: tuple[PtyBus, str]
 ) -> None:

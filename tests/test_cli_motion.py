@@ -16,6 +16,8 @@ from served_rigs import Served, rig_files, served
 from gazerig.config.schema import load_rig
 from gazerig.robot.cli.manual_session import holding, left_alone
 
+pytestmark = pytest.mark.usefixtures("simulated_wires")
+
 
 @pytest.fixture
 def rigs(tmp_path: Path) -> dict[str, str]:
@@ -29,6 +31,7 @@ def desk() -> Iterator[Served]:
         yield buses
 
 
+@pytest.mark.pty
 def test_sigterm_while_jogging_parks_and_lets_go(desk: Served) -> None:
     path = desk.ports
     process = start("jog", "neck_yaw", "60", "--speed", "60", "--port", path)

@@ -20,6 +20,8 @@ from gazerig.sim_mock.feetech.chain import build_feetech
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
+pytestmark = pytest.mark.usefixtures("simulated_wires")
+
 
 @pytest.fixture(autouse=True)
 def no_real_ports(monkeypatch, tmp_path):

@@ -18,6 +18,8 @@ from gazerig.robot.cli.suggestions import completed, speaking_of
 from gazerig.robot.cli.terminal import _writer
 from gazerig.sim_mock.pty.client import PtyBus
 
+pytestmark = pytest.mark.usefixtures("simulated_wires")
+
 DESK = Path(__file__).parents[1] / "config/rigs/desk.yaml"
 GIVEN = {"rig": "my rig.yaml", "port": "/dev/ttyACM3", "mock": False}
 

@@ -1,0 +1,110 @@
+"""Emulated buses of the commands in this process and in simulated time: a silence costs nothing.
+
+`with simulated_wires():` has what would be served on a pseudo-terminal by another process answer
+here, whoever starts it: a test, or a command with --mock. The clock of the commands is that of
+the servos, so that a search through 254 silent ids or a slow motion takes as long as its
+arithmetic. What is not served here is opened as ever.
+"""
+
+import json
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+
+import pytest
+
+from gazerig.drivers.i2c import port as ports
+from gazerig.drivers.serial.port import BlockingPort
+from gazerig.robot.model.clock import RealClock, SimulatedClock
+from gazerig.sim_mock.device import Device
+from gazerig.sim_mock.devices import build, unpacked
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.pty.client import _Served
+
+START_S = 1000.0
+"""No port was opened at the beginning of time."""
+
+
+class _Port(InProcessPort):
+    """The host's end of an emulated device, by the path that it is served at."""
+
+    def __init__(
+        self, path: str, device: Device, clock: SimulatedClock, on_traffic: Callable[[], None]
+    ) -> None:
+        super().__init__(device, name=path, sleep_until=clock.sleep_until)
+        self.opened_as = path
+        self._on_traffic = on_traffic
+
+    def write(self, data: bytes) -> None:
+        self._on_traffic()
+        super().write(data)
+
+    def read_until(self, length: int, deadline_s: float) -> bytes:
+        self._on_traffic()
+        return super().read_until(length, deadline_s)
+
+
+class _Wires:
+    """The devices that are served, by path, and those of one server by the names of its buses."""
+
+    def __init__(self, clock: SimulatedClock) -> None:
+        self._clock = clock
+        self._devices: dict[str, Device] = {}
+        self._of: dict[_Served, dict[str, str]] = {}
+        self._terminals: dict[str, tuple[int, int]] = {}
+
+    def start(self, server: _Served, buses: Sequence[Mapping[str, object]]) -> list[str]:
+        """Stands for _Served._start."""
+        paths: dict[str, str] = {}
+        for bus in buses:
+            assert not bus.get("wire_time") and not bus.get("turnaround_us")
+            # The doctor looks whether a path is a serial port; nothing goes through this one.
+            ends = os.openpty()
+            path = os.ttyname(ends[1])
+            device = build(unpacked(bus["device"]), self._clock.now_s, bus.get("seed", 0))  # type: ignore[arg-type]
+            for case, value in bus.get("choices", {}).items():  # type: ignore[attr-defined]
+                device.choose(case, value)
+            paths[str(bus.get("name", ""))] = path
+            self._devices[path], self._terminals[path] = device, ends
+        self._of[server] = paths
+        return list(paths.values())
+
+    def command(self, server: _Served, text: str, bus: str = "") -> str:
+        """Stands for _Served.command."""
+        if server not in self._of:
+            raise RuntimeError("the emulated bus is not running: start it first")
+        done = self._devices[self._of[server][bus]].faults.command(text)
+        return json.dumps({"ok": "status", **json.loads(done)}) if done[:1] == "{" else done
+
+    def stop(self, server: _Served) -> None:
+        """Stands for _Served.stop."""
+        for path in self._of.pop(server, {}).values():
+            del self._devices[path]
+            for end in self._terminals.pop(path):
+                os.close(end)
+
+    def port(
+        self, path: str, exclusive: bool = True, on_traffic: Callable[[], None] | None = None
+    ) -> InProcessPort | BlockingPort:
+        """Stands for BlockingPort."""
+        if path not in self._devices:
+            return BlockingPort(path, exclusive, on_traffic)
+        heard = on_traffic if on_traffic is not None else lambda: None
+        return _Port(path, self._devices[path], self._clock, heard)
+
+
+@contextmanager
+def simulated_wires() -> Iterator[SimulatedClock]:
+    """Serve emulated buses in this process meanwhile; give the time that commands live in."""
+    clock = SimulatedClock(START_S)
+    with pytest.MonkeyPatch.context() as patch:
+        wires = _Wires(clock)
+        patch.setattr(_Served, "_start", lambda server, buses: wires.start(server, buses))
+        patch.setattr(
+            _Served, "command", lambda server, text, bus="": wires.command(server, text, bus)
+        )
+        patch.setattr(_Served, "stop", lambda server: wires.stop(server))
+        patch.setattr(ports, "BlockingPort", wires.port)
+        patch.setattr(RealClock, "now_s", lambda _: clock.now_s())
+        patch.setattr(RealClock, "sleep_until", lambda _, t_s: clock.sleep_until(t_s))
+        yield clock
