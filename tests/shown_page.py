@@ -11,6 +11,7 @@ from page_visitor import PATIENCE_S
 
 from gazerig.robot.dashboard.page_process import PageProcess
 from gazerig.robot.model.types import Snapshot
+from gazerig.robot.remote.param_info import ParamInfo
 
 T = TypeVar("T")
 
@@ -36,6 +37,7 @@ SNAPSHOT = Snapshot(
     health="0 lost",
     joints=GAZE_JOINTS,
 )
+PARAM = ParamInfo("a.b", "a", "deg", "how far", 0.0, 10.0, (), "number", 1.0, "next tick")
 
 
 def wait_for(ready: Callable[[], T | None], what: str) -> T:

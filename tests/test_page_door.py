@@ -9,140 +9,30 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import msgspec
 import pytest
 import viser
+from page_at_the_door import ELSEWHERE, OPENED, PATIENCE_S, VISER, Rig, opened
 from page_visitor import LOOKING
 from websockets.exceptions import ConnectionClosed, InvalidStatus
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import ClientConnection
 
-from gazerig.robot.dashboard.auth_proxy import MOST_LINES, AuthProxy
+from gazerig.robot.dashboard.auth_proxy import MOST_LINES
 from gazerig.robot.dashboard.browser_requests import from_browser
 from gazerig.robot.dashboard.browsers import TabLimits
 from gazerig.robot.dashboard.connection_limits import MOST as MOST_CONNECTIONS
-from gazerig.robot.dashboard.stop_channel import StopListener, StopSender
 from gazerig.robot.dashboard.token_bucket import TokenBucket
-from gazerig.robot.dashboard.viser_server import FROM_BROWSER_BYTES, browser_of, open_server
-
-PATIENCE_S = 20.0
-VISER = [f"viser-v{viser.__version__}"]
-TOKEN = "what-only-the-terminal-shows"
-ELSEWHERE = "http://elsewhere.example"
-
-
-OPENED: list[str] = []
-"""The addresses of all doors of these tests."""
-
-
-class Opener(urllib.request.HTTPRedirectHandler):
-    """Follows no redirect, so that it can be looked at."""
-
-    def redirect_request(self, *_: object) -> None:
-        return None
-
-
-def fetch(
-    url: str, headers: dict[str, str] | None = None, body: bytes | None = None
-) -> tuple[int, dict[str, str], str]:
-    """Status, headers and text of an answer, whatever the status is."""
-    request = urllib.request.Request(url, data=body, headers=headers or {})
-    try:
-        answer = urllib.request.build_opener(Opener).open(request, timeout=PATIENCE_S)
-    except urllib.error.HTTPError as error:
-        answer = error
-    with answer:
-        return answer.status, dict(answer.headers), answer.read().decode()
-
-
-class Rig:
-    """A door with a server behind it, and what was asked through it."""
-
-    def __init__(self, host: str, folder: Path) -> None:
-        self.asked: list[dict[str, Any]] = []
-        self.stops: list[dict[str, Any]] = []
-        self.takes = True
-        self.stop_answer = ""
-        with socket.socket() as trial:
-            trial.bind((host, 0))
-            port = trial.getsockname()[1]
-        self.server = open_server(folder / "page.sock")
-        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._listener = StopListener(ours, self.stop)
-        self._sender = theirs
-        self.door = AuthProxy(
-            host, port, folder / "page.sock", self.take, StopSender(theirs), TOKEN
-        )  # fmt: skip
-        self.door.open()
-        self.address = f"{host}:{port}"
-        self.url = f"http://{self.address}"
-        self.cookie = f"{self.door._cookie}={TOKEN}"
-
-    def take(self, data: bytes) -> bool:
-        self.asked.append(json.loads(data))
-        return self.takes
-
-    def stop(self, asked: Any) -> str:
-        self.stops.append(dict(asked))
-        return self.stop_answer
-
-    def get(self, path: str = "", **headers: str) -> tuple[int, dict[str, str], str]:
-        """Get something as a browser does that has shown the token before."""
-        return fetch(self.url + path, {"Cookie": self.cookie, **headers})
-
-    def post(self, body: bytes, **headers: str | None) -> tuple[int, dict[str, str], str]:
-        """Ask for something as the page's script does, with other headers as given."""
-        given = {"Cookie": self.cookie, "Origin": self.url, **headers}
-        words = {k: v for k, v in given.items() if v is not None}
-        return fetch(f"{self.url}/rig/ask", words, body)
-
-    def knock(self, path: str = "/", **headers: str | None) -> ClientConnection:
-        """Open a websocket as a browser does, with other headers as given."""
-        given: dict[str, Any] = {"Cookie": self.cookie, **headers}
-        origin = given.pop("origin", self.url)
-        return connect(
-            f"ws://{self.address}{path}",
-            origin=origin,
-            subprotocols=VISER if path == "/" else None,  # type: ignore[arg-type]
-            max_size=None,
-            compression=None,
-            open_timeout=PATIENCE_S,
-            additional_headers={k: v for k, v in given.items() if v is not None},
-        )
-
-    def close(self) -> None:
-        self.door.close()
-        self.server.stop()
-        self._listener.close()
-        self._sender.close()
-
-
-@contextmanager
-def opened(host: str) -> Iterator[Rig]:
-    with TemporaryDirectory() as folder:
-        rig = Rig(host, Path(folder))
-        OPENED.append(rig.address)
-        try:
-            yield rig
-        finally:
-            rig.close()
+from gazerig.robot.dashboard.viser_server import FROM_BROWSER_BYTES, browser_of
 
 
 @pytest.fixture(scope="module")
 def near() -> Iterator[Rig]:
     """A page for this machine alone."""
     with opened("127.0.0.1") as rig:
-        yield rig
-
-
-@pytest.fixture(scope="module")
-def far() -> Iterator[Rig]:
-    """A page as other machines see it: at an address that has no name of the loopback."""
-    with opened("127.0.0.2") as rig:
         yield rig
 
 
@@ -332,86 +222,6 @@ def test_a_stop_that_the_rig_does_not_answer_is_said_and_the_next_one_is_sent() 
                 break
         else:
             raise AssertionError("no stop was taken")
-
-
-# --- the token ------------------------------------------------------------------------------
-
-
-@pytest.fixture(params=["127.0.0.1", "127.0.0.2"])
-def either(request: pytest.FixtureRequest, near: Rig, far: Rig) -> Rig:
-    """The page for this machine, which has other users, and the one for others."""
-    return near if request.param == "127.0.0.1" else far
-
-
-@pytest.mark.parametrize(
-    "path", ["/", "/rig/line", "/rig/stop.js", "/?token=wrong", "/?token=", "/?token=%ff"]
-)
-def test_without_the_token_nothing_is_seen(either: Rig, path: str) -> None:
-    status, headers, text = fetch(either.url + path)
-    assert status == 403 and text.startswith("refused") and len(text.splitlines()) == 1
-    assert "Set-Cookie" not in headers
-
-
-@pytest.mark.parametrize("cookie", [None, "wrong", "", "\xff"])
-def test_without_the_token_nothing_moves(either: Rig, cookie: str | None) -> None:
-    either.asked.clear()
-    either.stops.clear()
-    given = None if cookie is None else f"{either.door._cookie}={cookie}"
-    for body in (b'{"do":"resume"}', b'{"do":"stop","why":"x"}'):
-        assert either.post(body, Cookie=given)[0] == 403
-    for path in ("/", "/rig/line"):
-        with pytest.raises(InvalidStatus) as refused:
-            either.knock(path, Cookie=given)
-        assert refused.value.response.status_code == 403
-    assert either.asked == either.stops == []
-
-
-def test_the_token_becomes_a_cookie_and_leaves_the_address(either: Rig) -> None:
-    status, headers, text = fetch(f"{either.url}/?look=here&token={TOKEN}")
-    assert (status, headers["Location"], text) == (302, "/?look=here", "")
-    cookie = headers["Set-Cookie"]
-    assert "HttpOnly" in cookie and "SameSite=Strict" in cookie
-    assert either.get()[0] == 200
-    with either.knock() as socket_:
-        assert socket_.recv(timeout=PATIENCE_S)
-
-
-@pytest.mark.parametrize(
-    "path", ["//evil/", "/%5Cevil/", "/\\evil/", "///evil", "//evil/%2e%2e//x"]
-)
-def test_the_token_leads_to_this_page_and_nowhere_else(near: Rig, path: str) -> None:
-    with socket.create_connection(tuple(near.address.split(":"))) as there:  # type: ignore[arg-type]
-        there.sendall(
-            f"GET {path}?token={TOKEN} HTTP/1.1\r\nHost: {near.address}\r\n"
-            "Connection: close\r\n\r\n".encode()
-        )
-        answer = there.recv(4096).decode()
-    place = next(line for line in answer.splitlines() if line.startswith("Location: "))
-    assert place.startswith("Location: /") and place[11:12] not in ("/", "\\")
-
-
-def test_the_token_does_not_help_another_origin(either: Rig) -> None:
-    either.asked.clear()
-    with pytest.raises(InvalidStatus):
-        either.knock(origin=ELSEWHERE)
-    assert either.post(b'{"do":"resume"}', Origin=ELSEWHERE)[0] == 403
-    assert either.asked == []
-
-
-@pytest.mark.parametrize(
-    "path",
-    ["/../../../../etc/passwd", "/%2e%2e/%2e%2e/%2e%2e/etc/passwd", "/..%2f..%2f..%2fetc%2fpasswd",
-     "//etc/passwd", "/assets/../../../../../../etc/passwd", "/\\..\\etc\\passwd"],
-)  # fmt: skip
-def test_no_path_leads_out_of_the_pages_own_files(near: Rig, path: str) -> None:
-    with socket.create_connection(tuple(near.address.split(":"))) as there:  # type: ignore[arg-type]
-        there.settimeout(PATIENCE_S)
-        there.sendall(
-            f"GET {path} HTTP/1.1\r\nHost: {near.address}\r\nCookie: {near.cookie}\r\n"
-            "Connection: close\r\n\r\n".encode()
-        )
-        answer = b"".join(iter(lambda: there.recv(1 << 16), b""))
-    assert b"root:" not in answer and b" 500 " not in answer.splitlines()[0]
 
 
 # --- limits -----------------------------------------------------------------------------------

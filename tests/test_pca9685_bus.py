@@ -2,84 +2,19 @@
 
 import errno
 from dataclasses import replace
-from typing import Any
 
 import pytest
-from board_rig import on_pca9685
-from servo_rows import rows
+from pca9685_world import GRAIN, QUICK, SPEED_STEPS_S, World, setup
 from smbus2 import i2c_msg
 
-from gazerig.config.schema import load_rig
-from gazerig.drivers.errors import BusLost, PortError, ServoMissing
+from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.hobby_board.release import stop_pulses
-from gazerig.drivers.i2c import port as i2c_port
 from gazerig.drivers.i2c.bridge import ASK_STATUS, Part, commands, read, write
-from gazerig.drivers.i2c.port import I2cPort, explain, port_of
 from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
 from gazerig.drivers.pca9685.probe import probe
 from gazerig.drivers.pca9685.registers import AWAKE, MODE1, PRESCALE, counts_of, prescale_of, pulse
-from gazerig.drivers.serial.port import BlockingPort
-from gazerig.drivers.serial.port_owner import refuse_owner
-from gazerig.drivers.types import ServoConfig
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
-from gazerig.sim_mock.hobby_servo import HobbySpec
-from gazerig.sim_mock.in_process_port import InProcessPort
-from gazerig.sim_mock.pca9685.bridge import build_bridge
 from gazerig.sim_mock.pca9685.smbus import EmulatedSMBus
-
-SPEED_STEPS_S = 4000.0
-GRAIN = 20
-QUICK = Pca9685Params(stagger_ms=0.0)
-
-
-def setup(servo_id, **changes):
-    made = ServoConfig(servo_id, "hobby", 4400, 7600, SPEED_STEPS_S, f"joint {servo_id}")
-    return made._replace(rest_steps=6000, **changes)
-
-
-class World:
-    """Boards in this process, and a bus on them."""
-
-    def __init__(self, ids=(0, 1, 5), params=QUICK, addresses=(0x40,), oscillator_hz=25e6, **more):
-        self.now = [10.0]
-        specs = [HobbySpec(i) for i in ids]
-        self.device = build_bridge(addresses, lambda: self.now[0], oscillator_hz, 0, specs)
-        self.sent: list[Any] = []
-        self.port = InProcessPort(self.device, self.sent.append, "emulated", self._sleep_until)
-        self.setups = [setup(i, **more) for i in ids]
-        self.bus = Pca9685Bus(self.port, self.setups, params)
-
-    def _sleep_until(self, t_s):
-        self.now[0] = max(self.now[0], t_s)
-
-    def held(self):
-        self.bus.open()
-        self.bus.enable_torque()
-        self.bus.events()
-        return self
-
-    def run(self, seconds, goals=None, period_s=0.01):
-        for _ in range(round(seconds / period_s)):
-            readings = rows(self.bus.read(self.now[0]))
-            if goals is not None:
-                self.bus.write(goals)
-            self.now[0] += period_s
-        return readings
-
-    def chip(self, address=0x40):
-        return self.device.body.chips[address]
-
-    def widths(self):
-        return [self.device.body.width_steps(s.id, self.now[0]) for s in self.setups]
-
-    def places(self):
-        positions = self.device.positions_steps()
-        return [positions[s.id] for s in self.setups]
-
-    def command(self, text):
-        return self.device.faults.command(text)
 
 
 @pytest.fixture
@@ -388,129 +323,3 @@ def test_channels_and_pulses_outside_the_board_are_refused(world):
             Pca9685Bus(world.port, [wrong], QUICK)
     with pytest.raises(ValueError, match="each can move one servo only"):
         Pca9685Bus(world.port, [setup(0), setup(0)], QUICK)
-
-
-# --- the kernel's bus
-
-
-class Kernel:
-    """A bus of the kernel: opened by its path, and what the kernel says of it."""
-
-    def __init__(self, world):
-        self.bus, self.refuses = EmulatedSMBus(world.device.body), None
-
-    def open(self, path):
-        if self.refuses is not None:
-            raise OSError(self.refuses, "refused")
-        self.bus.gone = False
-        return self.bus
-
-
-@pytest.fixture
-def kernel(world, monkeypatch):
-    made = Kernel(world)
-    port = I2cPort("/dev/i2c-7", open_bus=made.open)
-    clock = type("Clock", (), {"monotonic": lambda: world.now[0], "sleep": world._wait})
-    monkeypatch.setattr(i2c_port, "time", clock)
-    made.servos = Pca9685Bus(port, world.setups, replace(QUICK, give_up_s=2.0))  # type: ignore[attr-defined]
-    return made
-
-
-World._wait = staticmethod(lambda seconds: None)  # type: ignore[attr-defined]
-
-
-def ticks(world, bus, seconds, goals=None):
-    world.bus = bus
-    return world.run(seconds, goals)
-
-
-def test_the_kernels_bus_is_driven_as_a_bridge_is(world, kernel):
-    bus = kernel.servos
-    bus.open()
-    # Its oscillator's start is waited for by the clock of this world.
-    world.now[0] += 0.01
-    bus.enable_torque()
-    world.now[0] += 0.01
-    ticks(world, bus, 0.6, [5000, 6500, 7000])
-    assert world.widths() == pytest.approx([5000, 6500, 7000], abs=GRAIN / 2)
-    assert bus.health().errors == {}
-    bus.disable_torque()
-    assert world.widths() == [0, 0, 0]
-    bus.close()
-
-
-def test_an_adapter_that_goes_comes_back_and_holds(world, kernel):
-    bus = kernel.servos
-    bus.open()
-    bus.enable_torque()
-    ticks(world, bus, 0.3, [6500] * 3)
-    kernel.bus.gone, kernel.refuses = True, errno.ENOENT
-    assert ticks(world, bus, 0.3, [6500] * 3) == (None,) * 3
-    kernel.refuses = None
-    readings = ticks(world, bus, 1.0, [6500] * 3)
-    assert all(r is not None and r.torque for r in readings)
-    told = " ".join(bus.events())
-    assert "port lost: /dev/i2c-7 is gone" in told and "port back after" in told
-    kernel.bus.gone, kernel.refuses = True, errno.ENOENT
-    with pytest.raises(BusLost, match="has been gone for 2"):
-        ticks(world, bus, 3.0)
-
-
-@pytest.mark.parametrize(
-    ("code", "told"),
-    [
-        (errno.ENOENT, "no I2C bus /dev/i2c-7: switch I2C on"),
-        (errno.EACCES, "'sudo usermod -aG i2c [$]USER'"),
-        (errno.EBUSY, "is busy: close the other program"),
-        (errno.ENOTTY, "is no I2C bus"),
-    ],
-)
-def test_a_bus_that_cannot_be_opened_is_named_with_its_cure(kernel, code, told):
-    kernel.refuses = code
-    with pytest.raises(PortError, match=told) as caught:
-        kernel.servos.open()
-    assert "\n" not in str(caught.value)
-
-
-def test_a_path_says_what_kind_of_port_it_is(tmp_path):
-    assert isinstance(port_of("/dev/i2c-1"), I2cPort)
-    assert isinstance(port_of("/dev/ttyUSB0"), BlockingPort)
-    link = tmp_path / "servos"
-    link.symlink_to("/dev/i2c-3")
-    assert isinstance(port_of(str(link)), I2cPort)
-    assert "no I2C bus" in explain("/dev/i2c-99", errno.ENOENT)
-
-
-def test_a_maestros_yaml_on_an_i2c_bus_is_refused():
-    for kind in ("maestro", "dynamixel"):
-        with pytest.raises(PortError, match="is an I2C bus and no serial port.*pca9685"):
-            refuse_owner("/dev/i2c-1", kind, ())
-    refuse_owner("/dev/i2c-1", "pca9685", ())
-
-
-# --- the same head on either board
-
-
-def test_the_makers_rig_runs_on_either_board_by_one_section(tmp_path):
-    file = on_pca9685(tmp_path)
-    seen = {}
-    for name in ("maker", file):
-        rig = load_rig(name)
-        made = assemble(rig, RunOptions(mock=True, fast=True, seed=3, scene="boxing"))
-        clock, head, poses = made.clock, made.robot, []
-        head.start(clock)
-        for k in range(1, 501):
-            clock.sleep_until(k * 0.01)
-            poses.append(head.tick(clock.now_s(), 0.01).joints.position_rad)
-        head.stop()
-        made.close()
-        seen[name] = rig.joints, poses
-    (joints, one), (same, other) = seen.values()
-    assert joints == same
-    span = [max(column) - min(column) for column in zip(*one, strict=True)]
-    assert max(span) > 0.3
-    apart = [
-        max(abs(a - b) for a, b in zip(*rows, strict=True)) for rows in zip(one, other, strict=True)
-    ]
-    # Two estimates of the same goals: a board's ramp is 10 ms behind, a fast eye moves then.
-    assert sorted(apart)[len(apart) // 2] < 0.02

@@ -1,113 +1,19 @@
 """Every knob turned while the rig runs: no jump on the bus, nothing forgotten, nothing idle."""
 
-import json
 import os
-from collections import deque
-from collections.abc import Iterator, Mapping
-from math import isfinite, pi
+from collections.abc import Iterator
 from pathlib import Path
-from types import FunctionType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
-from desk import GAZE_JOINTS
+from retuned_run import DT_S, RIG, Judge, fresh, inside, put, started
 
 from gazerig.config.load import ConfigError, shipped, shipped_names
 from gazerig.config.parameters import NEXT_START, Parameter, changed, parameters, value_of
-from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.app.assemble import Assembly, assemble
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.loop import Tick, run
-from gazerig.robot.model.commands import Jog, Resume, Stop, Tune, Value, as_json, from_json
-
-RIG = load_rig("desk")
-DT_S = 1.0 / 200.0
-STEPS_PER_RAD = 4096.0 / (2.0 * pi)
-
-
-class Running(NamedTuple):
-    """A simulated rig that ticks by hand, and every goal that went to the bus."""
-
-    made: Assembly
-    goals: list[list[int]]
-    ticks: list[Tick]
-
-    @property
-    def rig(self) -> Rig:
-        return self.made.live.rig
-
-    def go(self, count: int, dt_s: float = DT_S) -> Tick:
-        for _ in range(count):
-            self.made.clock.sleep_until(self.made.clock.now_s() + dt_s)
-            self.ticks.append(self.made.robot.tick(self.made.clock.now_s(), dt_s))
-        return self.ticks[-1]
-
-    def tune(self, changes: dict[str, Value]) -> None:
-        base = self.rig
-        self.made.robot.command(self.made.live.prepare(base, changed(base, changes)))
-
-
-def started(scene: str = "visitor", rig: Rig = RIG) -> Running:
-    made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene=scene))
-    goals: list[list[int]] = []
-    write = made.robot.body.bus.write
-
-    def noted(steps: Any) -> None:
-        goals.append(list(steps))
-        write(steps)
-
-    made.robot.body.bus.write = noted  # type: ignore[method-assign,assignment]
-    made.robot.start(made.clock)
-    return Running(made, goals, [])
-
-
-class Judge:
-    """Asserts of every command, in servo steps, that it keeps the limits in force."""
-
-    def __init__(self, running: Running) -> None:
-        self.running = running
-        self.guard = running.made.live.parts.guard
-        joints, speeds = running.made.robot.body._joints, self.guard._motion.speed
-        self.steps = self._steps()
-        self.speed = np.array(
-            [j.steps(v) - j.steps(0.0) for j, v in zip(joints, speeds, strict=True)]
-        )
-        self.seen = len(running.goals)
-
-    def _steps(self) -> np.ndarray:
-        joints = self.running.made.robot.body._joints
-        command = self.guard._motion.command
-        return np.array([j.steps(q) for j, q in zip(joints, command, strict=True)])
-
-    def go(self, count: int, dt_s: float = DT_S) -> None:
-        for _ in range(count):
-            before = self.guard.limits
-            joints_before = self.running.made.robot.body._joints
-            self.running.go(1, dt_s)
-            joints = self.running.made.robot.body._joints
-            steps = self._steps()
-            speed = (steps - self.steps) / dt_s
-            for i, limit in enumerate(self.guard.limits):
-                per_rad = joints[i].ratio * STEPS_PER_RAD
-                old = joints_before[i].ratio * STEPS_PER_RAD
-                # A limit taken over in this tick was kept before it was.
-                top = max(limit.speed_rad_s * per_rad, before[i].speed_rad_s * old)
-                hard = max(limit.accel_rad_s2 * per_rad, before[i].accel_rad_s2 * old)
-                where = f"{GAZE_JOINTS[i]} at {self.running.ticks[-1].t_s}"
-                assert isfinite(steps[i]), where
-                assert abs(speed[i]) <= top + 1e-3, where
-                # After a late tick servos have braked by themselves.
-                late = self.guard._soft
-                assert late or abs(speed[i] - self.speed[i]) <= hard * dt_s + 0.02, where
-            assert len(self.running.goals) == self.seen + 1
-            self.seen += 1
-            sent = np.array(self.running.goals[-1])
-            assert (np.abs(sent - steps) <= 0.5 + 1e-6).all()
-            bus: Any = self.running.made.robot.body.bus
-            for goal, low, high in zip(sent, bus._lowest, bus._highest, strict=True):
-                assert low - 1 <= goal <= high + 1  # rounding; the bus clips that
-            self.steps, self.speed = steps, speed
+from gazerig.config.schema import Rig
+from gazerig.robot.app.assemble import Assembly
+from gazerig.robot.model.commands import Value
 
 
 def some_changes(
@@ -211,50 +117,16 @@ def test_every_knob_at_any_time_keeps_every_limit_on_the_bus(seed: int, walk: st
     assert len(turned) > 0.8 * len(todo)
 
 
-# What is not a parameter but what the running parts have come to know and do.
-STATE = {
-    "_motion", "_limits", "_gentle", "_gentle_until_s", "_waiting", "_outside", "_set_up",
-    "_next_s", "_until_s", "_search_until_s", "_redraw", "_left", "_shown", "_retuned_s",
-    "_rng", "_droop_from", "_droop_to", "_droop_since_s", "_offset_rad", "_started", "_ready",
-    "_part", "_at", "_keeper", "_counting", "_shift", "_heated", "_outside_s", "_last",
-    "_behaviour", "bus", "_nothing",
-}  # fmt: skip
-
-
-def inside(thing: Any, path: str, seen: dict[int, Any]) -> dict[str, Any]:
-    """Return path -> value of all parameters that a part holds, functions with what they hold."""
-    if isinstance(thing, str | int | float | bool | None | type):
-        return {path: thing}
-    if id(thing) in seen or isinstance(thing, np.random.Generator):
-        return {}  # told already; kept in ``seen``, so that no other thing gets its id
-    seen[id(thing)] = thing
-    if isinstance(thing, np.ndarray):
-        return {path: thing.tolist()}
-    if isinstance(thing, Mapping):
-        items = [(str(key), item) for key, item in thing.items()]
-    elif isinstance(thing, set | frozenset):
-        return {path: sorted(map(str, thing))}
-    elif isinstance(thing, list | tuple | deque):
-        items = [(str(i), item) for i, item in enumerate(thing)]
-    elif isinstance(thing, FunctionType):
-        cells = [cell.cell_contents for cell in thing.__closure__ or ()]
-        return {path: thing.__qualname__, **inside(cells, path, seen)}
-    elif hasattr(thing, "__dict__"):
-        items = [(k, v) for k, v in vars(thing).items() if k not in STATE]
-    else:
-        return {}
-    out: dict[str, Any] = {}
-    for key, item in items:
-        out |= inside(item, f"{path}.{key}", seen)
-    return out
-
-
 # Where the parameters of a section are; what bends or limits joints concerns both worlds.
 OF_GAZE = (
     "field_of_view", "bottom_up", "top_down", "attention", "idle", "scanpath", "aversion",
     "oculomotor", "saccade", "pursuit", "head", "breathing", "lids",
 )  # fmt: skip
+
+
 OF_BODY = ("guard", "body", "kinematics", "head", "oculomotor")
+
+
 OF_SIGHT = ("mount", "perception", "tracker", "kinematics", "head", "oculomotor")
 
 
@@ -265,11 +137,9 @@ def running_parameters(made: Assembly, names: tuple[str, ...]) -> dict[str, Any]
     return {**held, "park": made.park_rad, "loop": (made.loop.rate_hz, made.loop.park_s)}
 
 
-def fresh(rig: Rig) -> Assembly:
-    return assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
-
-
 IN_PICTURES = ("detector.", "motion.")
+
+
 SECTIONS = [("gaze", OF_GAZE), ("joints", OF_BODY), ("guard", OF_BODY), ("", OF_SIGHT)]
 
 
@@ -302,12 +172,6 @@ def test_every_live_knob_has_an_effect_on_the_running_parts(
         put(made, base)
         left = running_parameters(made, names)
         assert left == first, f"{knob.key} leaves something behind"
-
-
-def put(made: Assembly, rig: Rig) -> tuple[str, ...]:
-    """Put a rig in force at once."""
-    live = made.live
-    return live(live.prepare(live.rig, rig), 0.0)
 
 
 @pytest.mark.parametrize(("section", "names"), SECTIONS)
@@ -352,156 +216,3 @@ def acceptable(knob: Parameter, base: Rig, dice: np.random.Generator, walk: str)
         if value_of(other, knob.key) != value_of(base, knob.key):
             return other
     raise AssertionError(f"no value will do for {knob.key}")
-
-
-def test_a_tune_of_nothing_different_touches_nothing() -> None:
-    quiet, tuned = started(), started()
-    quiet.go(200)
-    tuned.go(100)
-    same = {key: value_of(RIG, key) for key in ("gaze.lids.blinks_per_min", "guard.soft_start_ms")}
-    tuned.made.robot.command(Tune(tuple(same.items())))
-    tuned.go(100)
-    assert tuned.goals == quiet.goals
-    assert tuned.ticks[100].events == tuple(f"tuned: {key} = {same[key]}" for key in same)
-
-
-def test_a_tune_is_in_force_at_the_very_next_tick_and_in_its_record() -> None:
-    running = started()
-    running.go(10)
-    running.tune({"loop.park_s": 1.5, "bus.port": "/dev/ttyACM0"})
-    tick = running.go(1)
-    assert tick.commands == (Tune((("bus.port", "/dev/ttyACM0"), ("loop.park_s", 1.5))),)
-    assert running.made.loop.park_s == 1.5
-    assert tick.events[1] == "tuned: loop.park_s = 1.5"
-    assert "next start: the servo bus is opened with it" in tick.events[0]
-
-
-def test_an_order_that_crossed_processes_is_checked_in_its_tick() -> None:
-    running = started()
-    running.go(10)
-    order = from_json(json.loads(json.dumps(as_json(Tune((("gaze.lids.close_ms", 90.0),))))))
-    running.made.robot.command(order)
-    running.go(1)
-    assert running.rig.gaze.lids.close_ms == 90.0
-    running.made.robot.command(Tune((("gaze.lids.close_ms", 9000.0), ("gaze.lid.x", 1))))
-    tick = running.go(1)
-    assert running.rig.gaze.lids.close_ms == 90.0
-    assert "not tuned: gaze.lids.close_ms: 9000.0 is above 500 (unit ms)" in tick.events
-    assert any("gaze.lid: unknown key" in line for line in tick.events)
-
-
-def test_orders_of_a_run_do_it_again_bit_for_bit() -> None:
-    def play() -> list[list[int]]:
-        running = started("boxing")
-        running.go(50)
-        running.made.robot.command(
-            Tune((("joints.neck_yaw.max_deg", 5.0), ("gaze.head.align", 1.0)))
-        )
-        running.go(100)
-        running.made.robot.command(Tune((("gaze.scanpath.model", "random"),)))
-        running.go(100)
-        return running.goals
-
-    assert play() == play()
-
-
-def test_a_joint_outside_its_new_range_is_led_inside_slowly() -> None:
-    running = started()
-    jog(running, "neck_yaw", 40.0, 300)
-    assert running.ticks[-1].guard_result.command_rad[6] == pytest.approx(
-        np.radians(40.0), abs=1e-3
-    )
-    running.tune({"joints.neck_yaw.max_deg": 20.0, "joints.neck_yaw.min_deg": -20.0})
-    judge = Judge(running)
-    first = running.ticks[-1].guard_result.command_rad[6]
-    judge.go(1)
-    verdict = running.ticks[-1].guard_result
-    assert abs(verdict.command_rad[6] - first) < np.radians(60.0) * DT_S
-    assert "neck_yaw: outside its new range" in verdict.reasons
-    judge.go(300)
-    assert running.ticks[-1].guard_result.command_rad[6] == pytest.approx(
-        np.radians(20.0), abs=1e-3
-    )
-    speeds = np.diff([t.guard_result.command_rad[6] for t in running.ticks[-300:]]) / DT_S
-    assert np.abs(speeds).max() <= np.radians(60.0) + 1e-6
-
-
-def jog(running: Running, joint: str, deg: float, ticks: int) -> None:
-    """Send one joint somewhere by hand, beyond its range as well."""
-    running.made.robot.replay_command(Jog(((joint, float(np.radians(deg))),), stay=True))
-    running.go(ticks)
-
-
-def test_a_wider_range_waits_until_the_servos_are_set_up_anew() -> None:
-    running = started()
-    running.tune({"joints.neck_yaw.max_deg": 73.0, "joints.neck_yaw.max_speed_deg_s": 250.0})
-    running.go(1)
-    assert "neck_yaw: all of the range and speed come with a stop and a resume" in (
-        running.ticks[-1].events
-    )
-    jog(running, "neck_yaw", 80.0, 500)
-    held = np.degrees(running.ticks[-1].guard_result.command_rad[6])
-    assert held == pytest.approx(70.0, abs=0.1)
-    running.made.robot.command(Stop("test"))
-    running.go(401)
-    running.made.robot.command(Resume())
-    running.go(200)
-    jog(running, "neck_yaw", 80.0, 800)
-    assert np.degrees(running.ticks[-1].guard_result.command_rad[6]) == pytest.approx(73.0, abs=0.1)
-    measured = np.degrees(running.ticks[-1].joints.position_rad[6])
-    assert measured == pytest.approx(73.0, abs=1.0)
-    assert max(goals[6] for goals in running.goals) > 2844  # the old end in steps
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"joints.neck_pitch.zero_step": 2200},
-        {"joints.neck_pitch.sign": -1},
-        {"joints.neck_pitch.ratio": 1.5},
-        {"joints.left_eye_pan.zero_step": 1900, "joints.left_eye_pan.sign": -1},
-    ],
-)
-def test_a_changed_zero_moves_the_joint_without_a_jump(changes: dict[str, Value]) -> None:
-    running = started()
-    running.go(300)
-    judge = Judge(running)
-    before = list(running.goals[-1])
-    running.tune(changes)
-    judge.go(1)
-    # A lid in a blink goes 27 steps in a tick.
-    assert np.abs(np.subtract(running.goals[-1], before)).max() <= 30
-    judge.go(500)
-    tick = running.ticks[-1]
-    assert tick.guard_result.level in ("ok", "limited")
-    off = np.subtract(tick.guard_result.command_rad, tick.joints.position_rad)
-    assert np.degrees(np.abs(off)).max() < 4.0
-
-
-def test_another_rate_goes_on_from_the_last_slot() -> None:
-    made = fresh(RIG)
-    made.robot.start(made.clock)
-    times: list[float] = []
-
-    def watch(tick: Tick) -> None:
-        times.append(tick.t_s)
-        if len(times) == 100:
-            made.robot.command(Tune((("loop.rate_hz", 50.0),)))
-
-    run(made.robot, made.clock, lambda: made.loop, lambda s: "over" if s > 1.5 else None, watch)
-    gaps = np.diff(times)
-    assert gaps[:99] == pytest.approx(0.005)
-    # The tick that reads the order is at its old slot, all after it at new ones.
-    assert gaps[100:] == pytest.approx(0.02)
-
-
-def test_what_looks_at_pictures_is_retuned_too() -> None:
-    made = assemble(RIG, RunOptions(True, True, 0, "visitor", pixels=True))
-    camera = made.live.parts.camera
-    other = changed(RIG, {"detector.min_face_px": 60, "motion.max_blobs": 3})
-    put(made, other)
-    held = inside(vars(camera), "", {})
-    assert 60 in [v for k, v in held.items() if k.endswith("_params.min_face_px")]
-    assert 3 in [v for k, v in held.items() if k.endswith("_params.max_blobs")]
-    said = put(made, changed(other, {"detector.kind": "yunet"}))
-    assert "the detector stays as it was" in said[-1]

@@ -1,0 +1,122 @@
+"""Eyes and head that follow targets, and a trace of them."""
+
+from collections.abc import Callable
+from math import degrees, radians
+from typing import Any, NamedTuple
+
+import numpy as np
+from desk import GAZE_JOINTS, LIDS
+
+from gazerig.gaze.angles import (
+    add,
+    angle_between,
+    direction,
+    scale,
+    sub,
+    unit,
+)
+from gazerig.gaze.breathing import Breathing
+from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.head import Head, HeadParams
+from gazerig.gaze.lids import LidParams, Lids
+from gazerig.gaze.oculomotor import Oculomotor, OculomotorParams
+from gazerig.gaze.pursuit import Pursuit, PursuitParams
+from gazerig.gaze.saccade import SaccadeModel, SaccadeParams
+from gazerig.gaze.types import GazeCommand, Target
+from gazerig.robot.model.kinematics import GeometryParams, Kinematics
+from gazerig.robot.model.types import JointState
+
+DT = 0.005
+
+
+CENTRED = GeometryParams(0.0, 0.0, 0.0)
+
+
+DESK = GeometryParams(60.0, 40.0, 50.0)
+
+
+NO_RELIEF = HeadParams(recentre_after_ms=60_000.0)
+
+
+AT_ONCE = OculomotorParams(eye_lag_ms=DT * 1e3)
+
+
+SACCADE = SaccadeParams()
+
+
+HUMAN = SaccadeParams(profile="main_sequence")
+
+
+class Trace(NamedTuple):
+    """One row a tick: time, head yaw, mean eye yaw, gaze error to the target (degrees)."""
+
+    t: np.ndarray
+    head: np.ndarray
+    eye: np.ndarray
+    error: np.ndarray
+    commands: list[GazeCommand]
+
+
+class Rig:
+    """A head that does at once what it is told."""
+
+    def __init__(
+        self,
+        eye_deg: float = 55.0,
+        geometry: GeometryParams = CENTRED,
+        head: HeadParams = NO_RELIEF,
+        neck_deg: float = 90.0,
+        params: OculomotorParams = AT_ONCE,
+        saccade: SaccadeParams = SACCADE,
+        breathing: Breathing | None = None,
+        dice: int | None = None,
+    ) -> None:
+        self.kinematics = Kinematics(geometry, GAZE_JOINTS, LIDS)
+        span = (-radians(eye_deg), radians(eye_deg))
+        neck = (-radians(neck_deg), radians(neck_deg))
+        self.oculomotor = Oculomotor(
+            params,
+            self.kinematics,
+            ((span, span), (span, span)),
+            SaccadeModel(saccade),
+            Pursuit(PursuitParams()),
+            Head(head, radians(eye_deg), (neck, neck)),
+            Lids(LidParams(), np.random.default_rng(0)),
+            breathing,
+            None if dice is None else np.random.default_rng(dice),
+        )
+        self.joints = JointState((0.0,) * 9, (0.0,) * 9, (0.0,) * 9, ())
+
+    def run(self, where: Callable[[float], Target], seconds: float) -> Trace:
+        rows, commands = [], []
+        for k in range(round(seconds / DT)):
+            t = k * DT
+            commands.append(self.tick(where(t), t, DT))
+            rows.append(self.row(t, where(t)))
+        columns: Any = (*np.array(rows).T, commands)
+        return Trace(*columns)
+
+    def tick(self, target: Target, t: float, dt: float) -> GazeCommand:
+        state = self.kinematics.forward(self.joints)
+        command = self.oculomotor.step(target, state, t, dt)
+        now = self.kinematics.inverse(command)
+        rates = tuple((a - b) / dt for a, b in zip(now, self.joints.position_rad, strict=True))
+        self.joints = JointState(now, rates, (t,) * 9, ())
+        return command
+
+    def row(self, t: float, target: Target) -> tuple[float, ...]:
+        state = self.kinematics.forward(self.joints)
+        gaze = unit(add(line_of_sight(state, True), line_of_sight(state, False)))
+        point = add(target.p_world_m, scale(target.v_world_m_s, t - target.at_s))
+        error = angle_between(gaze, sub(point, state.p_world_head_m))
+        eye = 0.5 * (state.eye_left_rad[0] + state.eye_right_rad[0])
+        return t, degrees(state.head_rad[0]), degrees(eye), degrees(error)
+
+
+def still(
+    yaw_deg: float, salience: float = 1.0, top_down: bool = False, pitch_deg: float = 0.0
+) -> Callable[[float], Target]:
+    point = scale(direction((radians(yaw_deg), radians(pitch_deg))), 10.0)
+    ahead = Target((10.0, 0, 0), (0, 0, 0), 0.0, "thing", 0, salience, top_down, None, 1, "")
+    there = ahead._replace(p_world_m=point, id=1, shift=2)
+    return lambda t: there if t >= 0.1 else ahead

@@ -1,0 +1,126 @@
+"""A page with its door, on this machine and on another address."""
+
+import json
+import socket
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import viser
+from websockets.sync.client import ClientConnection, connect
+
+from gazerig.robot.dashboard.auth_proxy import AuthProxy
+from gazerig.robot.dashboard.stop_channel import StopListener, StopSender
+from gazerig.robot.dashboard.viser_server import open_server
+
+PATIENCE_S = 20.0
+
+
+VISER = [f"viser-v{viser.__version__}"]
+
+
+TOKEN = "what-only-the-terminal-shows"
+
+
+ELSEWHERE = "http://elsewhere.example"
+
+
+OPENED: list[str] = []
+"""The addresses of all doors of these tests."""
+
+
+class Opener(urllib.request.HTTPRedirectHandler):
+    """Follows no redirect, so that it can be looked at."""
+
+    def redirect_request(self, *_: object) -> None:
+        return None
+
+
+def fetch(
+    url: str, headers: dict[str, str] | None = None, body: bytes | None = None
+) -> tuple[int, dict[str, str], str]:
+    """Status, headers and text of an answer, whatever the status is."""
+    request = urllib.request.Request(url, data=body, headers=headers or {})
+    try:
+        answer = urllib.request.build_opener(Opener).open(request, timeout=PATIENCE_S)
+    except urllib.error.HTTPError as error:
+        answer = error
+    with answer:
+        return answer.status, dict(answer.headers), answer.read().decode()
+
+
+class Rig:
+    """A door with a server behind it, and what was asked through it."""
+
+    def __init__(self, host: str, folder: Path) -> None:
+        self.asked: list[dict[str, Any]] = []
+        self.stops: list[dict[str, Any]] = []
+        self.takes = True
+        self.stop_answer = ""
+        with socket.socket() as trial:
+            trial.bind((host, 0))
+            port = trial.getsockname()[1]
+        self.server = open_server(folder / "page.sock")
+        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._listener = StopListener(ours, self.stop)
+        self._sender = theirs
+        self.door = AuthProxy(
+            host, port, folder / "page.sock", self.take, StopSender(theirs), TOKEN
+        )  # fmt: skip
+        self.door.open()
+        self.address = f"{host}:{port}"
+        self.url = f"http://{self.address}"
+        self.cookie = f"{self.door._cookie}={TOKEN}"
+
+    def take(self, data: bytes) -> bool:
+        self.asked.append(json.loads(data))
+        return self.takes
+
+    def stop(self, asked: Any) -> str:
+        self.stops.append(dict(asked))
+        return self.stop_answer
+
+    def get(self, path: str = "", **headers: str) -> tuple[int, dict[str, str], str]:
+        """Get something as a browser does that has shown the token before."""
+        return fetch(self.url + path, {"Cookie": self.cookie, **headers})
+
+    def post(self, body: bytes, **headers: str | None) -> tuple[int, dict[str, str], str]:
+        """Ask for something as the page's script does, with other headers as given."""
+        given = {"Cookie": self.cookie, "Origin": self.url, **headers}
+        words = {k: v for k, v in given.items() if v is not None}
+        return fetch(f"{self.url}/rig/ask", words, body)
+
+    def knock(self, path: str = "/", **headers: str | None) -> ClientConnection:
+        """Open a websocket as a browser does, with other headers as given."""
+        given: dict[str, Any] = {"Cookie": self.cookie, **headers}
+        origin = given.pop("origin", self.url)
+        return connect(
+            f"ws://{self.address}{path}",
+            origin=origin,
+            subprotocols=VISER if path == "/" else None,  # type: ignore[arg-type]
+            max_size=None,
+            compression=None,
+            open_timeout=PATIENCE_S,
+            additional_headers={k: v for k, v in given.items() if v is not None},
+        )
+
+    def close(self) -> None:
+        self.door.close()
+        self.server.stop()
+        self._listener.close()
+        self._sender.close()
+
+
+@contextmanager
+def opened(host: str) -> Iterator[Rig]:
+    with TemporaryDirectory() as folder:
+        rig = Rig(host, Path(folder))
+        OPENED.append(rig.address)
+        try:
+            yield rig
+        finally:
+            rig.close()

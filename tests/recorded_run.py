@@ -1,0 +1,105 @@
+"""A recorded run, and what it was recorded from."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from gazerig.config.schema import load_rig
+from gazerig.config.text import rig_text, walk_text
+from gazerig.drivers.types import Detections
+from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop, Tune
+from gazerig.robot.recording.recorder import Recorder
+from gazerig.robot.recording.run_info import RunInfo, versions
+
+STARTED = "2026-01-31T23:59:59.250000+00:00"
+
+
+def assembly(recorder: Recorder | None = None) -> Assembly:
+    options = RunOptions(mock=True, fast=True, seed=7, scene="visitor")
+    recorded = Substitutes(body=recorder.recorded) if recorder is not None else RIGS_OWN
+    return assemble(load_rig("desk"), options, recorded)
+
+
+def info_for(pictures_hz: float = 4.0) -> RunInfo:
+    rig = load_rig("desk")
+    return RunInfo(
+        rig="desk",
+        profile=rig.profile,
+        config_yaml=rig_text(rig),
+        walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix),
+        seed=7,
+        rate_hz=rig.loop.rate_hz,
+        started_utc=STARTED,
+        scene="visitor",
+        eyes="scene visitor",
+        mock=True,
+        fast=True,
+        pictures_hz=pictures_hz,
+        versions=versions(),
+    )
+
+
+class Recorded(NamedTuple):
+    path: Path
+    ticks: list[Tick]
+    info: RunInfo
+    said: str
+    goals_rad: tuple[float, ...]
+
+
+def record(
+    path: Path, seconds: float, at: Callable[[int, Assembly], None] = lambda n, made: None
+) -> Recorded:
+    """Record a simulated run with a drawn picture in every tenth tick."""
+    info = info_for()
+    recorder = Recorder(path, info, patient=True)
+    recorder.open()
+    made = assembly(recorder)
+    seen: list[Tick] = []
+
+    def watch(tick: Tick) -> None:
+        at(len(seen), made)
+        recorder.record(with_picture(tick, len(seen)))
+        seen.append(tick)
+
+    made.robot.start(made.clock)
+    goals = made.robot._executor.commanded_rad
+    stop = recorder.timed(lambda s: "seconds" if s >= seconds - 1e-9 else None)
+    count = run(made.robot, made.clock, made.loop, stop, watch)
+    made.robot.stop()
+    said = recorder.close(count.stopped_by, made.sent_digest())
+    made.close()
+    assert recorder.events() == () and recorder.lost == 0
+    return Recorded(path, seen, info, said, goals)
+
+
+def with_picture(tick: Tick, number: int) -> Tick:
+    if number % 10:
+        return tick
+    picture = np.full((40, 60, 3), number % 250, np.uint8)
+    return tick._replace(detections=Detections(tick.t_s - 0.03, number + 1, 60, 40, image=picture))
+
+
+def ordered(number: int, made: Assembly) -> None:
+    """Ask for one of everything."""
+    orders: dict[int, Command] = {
+        50: Ask("behaviour", "guard"),
+        60: LookAt((1.0, 0.2, 0.3)),
+        80: Jog((("neck_yaw", 0.1),)),
+        100: Jog(()),
+        110: Stop("look at this"),
+        140: Resume(),
+        160: Tune((("gaze.saccade.profile", "min_jerk"), ("loop.park_s", 3.5))),
+    }
+    if number in orders:
+        made.robot.command(orders[number])
+
+
+def exact(tick: Tick) -> str:
+    """Write a tick so that two are the same only where every bit is; arrays apart."""
+    return repr(tick._replace(detections=None, percept=None))

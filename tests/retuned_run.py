@@ -1,0 +1,157 @@
+"""A running head whose parameters are changed."""
+
+from collections import deque
+from collections.abc import Mapping
+from math import isfinite, pi
+from types import FunctionType
+from typing import Any, NamedTuple
+
+import numpy as np
+from desk import GAZE_JOINTS
+
+from gazerig.config.parameters import changed
+from gazerig.config.schema import Rig, load_rig
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.control.loop import Tick
+from gazerig.robot.model.commands import Value
+
+RIG = load_rig("desk")
+
+
+DT_S = 1.0 / 200.0
+
+
+STEPS_PER_RAD = 4096.0 / (2.0 * pi)
+
+
+class Running(NamedTuple):
+    """A simulated rig that ticks by hand, and every goal that went to the bus."""
+
+    made: Assembly
+    goals: list[list[int]]
+    ticks: list[Tick]
+
+    @property
+    def rig(self) -> Rig:
+        return self.made.live.rig
+
+    def go(self, count: int, dt_s: float = DT_S) -> Tick:
+        for _ in range(count):
+            self.made.clock.sleep_until(self.made.clock.now_s() + dt_s)
+            self.ticks.append(self.made.robot.tick(self.made.clock.now_s(), dt_s))
+        return self.ticks[-1]
+
+    def tune(self, changes: dict[str, Value]) -> None:
+        base = self.rig
+        self.made.robot.command(self.made.live.prepare(base, changed(base, changes)))
+
+
+def started(scene: str = "visitor", rig: Rig = RIG) -> Running:
+    made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene=scene))
+    goals: list[list[int]] = []
+    write = made.robot.body.bus.write
+
+    def noted(steps: Any) -> None:
+        goals.append(list(steps))
+        write(steps)
+
+    made.robot.body.bus.write = noted  # type: ignore[method-assign,assignment]
+    made.robot.start(made.clock)
+    return Running(made, goals, [])
+
+
+class Judge:
+    """Asserts of every command, in servo steps, that it keeps the limits in force."""
+
+    def __init__(self, running: Running) -> None:
+        self.running = running
+        self.guard = running.made.live.parts.guard
+        joints, speeds = running.made.robot.body._joints, self.guard._motion.speed
+        self.steps = self._steps()
+        self.speed = np.array(
+            [j.steps(v) - j.steps(0.0) for j, v in zip(joints, speeds, strict=True)]
+        )
+        self.seen = len(running.goals)
+
+    def _steps(self) -> np.ndarray:
+        joints = self.running.made.robot.body._joints
+        command = self.guard._motion.command
+        return np.array([j.steps(q) for j, q in zip(joints, command, strict=True)])
+
+    def go(self, count: int, dt_s: float = DT_S) -> None:
+        for _ in range(count):
+            before = self.guard.limits
+            joints_before = self.running.made.robot.body._joints
+            self.running.go(1, dt_s)
+            joints = self.running.made.robot.body._joints
+            steps = self._steps()
+            speed = (steps - self.steps) / dt_s
+            for i, limit in enumerate(self.guard.limits):
+                per_rad = joints[i].ratio * STEPS_PER_RAD
+                old = joints_before[i].ratio * STEPS_PER_RAD
+                # A limit taken over in this tick was kept before it was.
+                top = max(limit.speed_rad_s * per_rad, before[i].speed_rad_s * old)
+                hard = max(limit.accel_rad_s2 * per_rad, before[i].accel_rad_s2 * old)
+                where = f"{GAZE_JOINTS[i]} at {self.running.ticks[-1].t_s}"
+                assert isfinite(steps[i]), where
+                assert abs(speed[i]) <= top + 1e-3, where
+                # After a late tick servos have braked by themselves.
+                late = self.guard._soft
+                assert late or abs(speed[i] - self.speed[i]) <= hard * dt_s + 0.02, where
+            assert len(self.running.goals) == self.seen + 1
+            self.seen += 1
+            sent = np.array(self.running.goals[-1])
+            assert (np.abs(sent - steps) <= 0.5 + 1e-6).all()
+            bus: Any = self.running.made.robot.body.bus
+            for goal, low, high in zip(sent, bus._lowest, bus._highest, strict=True):
+                assert low - 1 <= goal <= high + 1  # rounding; the bus clips that
+            self.steps, self.speed = steps, speed
+
+
+# What is not a parameter but what the running parts have come to know and do.
+STATE = {
+    "_motion", "_limits", "_gentle", "_gentle_until_s", "_waiting", "_outside", "_set_up",
+    "_next_s", "_until_s", "_search_until_s", "_redraw", "_left", "_shown", "_retuned_s",
+    "_rng", "_droop_from", "_droop_to", "_droop_since_s", "_offset_rad", "_started", "_ready",
+    "_part", "_at", "_keeper", "_counting", "_shift", "_heated", "_outside_s", "_last",
+    "_behaviour", "bus", "_nothing",
+}  # fmt: skip
+
+
+def inside(thing: Any, path: str, seen: dict[int, Any]) -> dict[str, Any]:
+    """Return path -> value of all parameters that a part holds, functions with what they hold."""
+    if isinstance(thing, str | int | float | bool | None | type):
+        return {path: thing}
+    if id(thing) in seen or isinstance(thing, np.random.Generator):
+        return {}  # told already; kept in ``seen``, so that no other thing gets its id
+    seen[id(thing)] = thing
+    if isinstance(thing, np.ndarray):
+        return {path: thing.tolist()}
+    if isinstance(thing, Mapping):
+        items = [(str(key), item) for key, item in thing.items()]
+    elif isinstance(thing, set | frozenset):
+        return {path: sorted(map(str, thing))}
+    elif isinstance(thing, list | tuple | deque):
+        items = [(str(i), item) for i, item in enumerate(thing)]
+    elif isinstance(thing, FunctionType):
+        cells = [cell.cell_contents for cell in thing.__closure__ or ()]
+        return {path: thing.__qualname__, **inside(cells, path, seen)}
+    elif hasattr(thing, "__dict__"):
+        items = [(k, v) for k, v in vars(thing).items() if k not in STATE]
+    else:
+        return {}
+    out: dict[str, Any] = {}
+    for key, item in items:
+        out |= inside(item, f"{path}.{key}", seen)
+    return out
+
+
+def fresh(rig: Rig) -> Assembly:
+    return assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
+
+
+def put(made: Assembly, rig: Rig) -> tuple[str, ...]:
+    """Put a rig in force at once."""
+    live = made.live
+    return live(live.prepare(live.rig, rig), 0.0)

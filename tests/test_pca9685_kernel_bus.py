@@ -1,0 +1,147 @@
+"""PCA9685 boards on the I2C bus of the kernel, and one rig on either board."""
+
+import errno
+from dataclasses import replace
+
+import pytest
+from board_rig import on_pca9685
+from pca9685_world import GRAIN, QUICK, World
+
+from gazerig.config.schema import load_rig
+from gazerig.drivers.errors import BusLost, PortError
+from gazerig.drivers.i2c import port as i2c_port
+from gazerig.drivers.i2c.port import I2cPort, explain, port_of
+from gazerig.drivers.pca9685.bus import Pca9685Bus
+from gazerig.drivers.serial.port import BlockingPort
+from gazerig.drivers.serial.port_owner import refuse_owner
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.sim_mock.pca9685.smbus import EmulatedSMBus
+
+
+@pytest.fixture
+def world():
+    return World()
+
+
+# --- the kernel's bus
+
+
+class Kernel:
+    """A bus of the kernel: opened by its path, and what the kernel says of it."""
+
+    def __init__(self, world):
+        self.bus, self.refuses = EmulatedSMBus(world.device.body), None
+
+    def open(self, path):
+        if self.refuses is not None:
+            raise OSError(self.refuses, "refused")
+        self.bus.gone = False
+        return self.bus
+
+
+@pytest.fixture
+def kernel(world, monkeypatch):
+    made = Kernel(world)
+    port = I2cPort("/dev/i2c-7", open_bus=made.open)
+    clock = type("Clock", (), {"monotonic": lambda: world.now[0], "sleep": lambda seconds: None})
+    monkeypatch.setattr(i2c_port, "time", clock)
+    made.servos = Pca9685Bus(port, world.setups, replace(QUICK, give_up_s=2.0))  # type: ignore[attr-defined]
+    return made
+
+
+def ticks(world, bus, seconds, goals=None):
+    world.bus = bus
+    return world.run(seconds, goals)
+
+
+def test_the_kernels_bus_is_driven_as_a_bridge_is(world, kernel):
+    bus = kernel.servos
+    bus.open()
+    # Its oscillator's start is waited for by the clock of this world.
+    world.now[0] += 0.01
+    bus.enable_torque()
+    world.now[0] += 0.01
+    ticks(world, bus, 0.6, [5000, 6500, 7000])
+    assert world.widths() == pytest.approx([5000, 6500, 7000], abs=GRAIN / 2)
+    assert bus.health().errors == {}
+    bus.disable_torque()
+    assert world.widths() == [0, 0, 0]
+    bus.close()
+
+
+def test_an_adapter_that_goes_comes_back_and_holds(world, kernel):
+    bus = kernel.servos
+    bus.open()
+    bus.enable_torque()
+    ticks(world, bus, 0.3, [6500] * 3)
+    kernel.bus.gone, kernel.refuses = True, errno.ENOENT
+    assert ticks(world, bus, 0.3, [6500] * 3) == (None,) * 3
+    kernel.refuses = None
+    readings = ticks(world, bus, 1.0, [6500] * 3)
+    assert all(r is not None and r.torque for r in readings)
+    told = " ".join(bus.events())
+    assert "port lost: /dev/i2c-7 is gone" in told and "port back after" in told
+    kernel.bus.gone, kernel.refuses = True, errno.ENOENT
+    with pytest.raises(BusLost, match="has been gone for 2"):
+        ticks(world, bus, 3.0)
+
+
+@pytest.mark.parametrize(
+    ("code", "told"),
+    [
+        (errno.ENOENT, "no I2C bus /dev/i2c-7: switch I2C on"),
+        (errno.EACCES, "'sudo usermod -aG i2c [$]USER'"),
+        (errno.EBUSY, "is busy: close the other program"),
+        (errno.ENOTTY, "is no I2C bus"),
+    ],
+)
+def test_a_bus_that_cannot_be_opened_is_named_with_its_cure(kernel, code, told):
+    kernel.refuses = code
+    with pytest.raises(PortError, match=told) as caught:
+        kernel.servos.open()
+    assert "\n" not in str(caught.value)
+
+
+def test_a_path_says_what_kind_of_port_it_is(tmp_path):
+    assert isinstance(port_of("/dev/i2c-1"), I2cPort)
+    assert isinstance(port_of("/dev/ttyUSB0"), BlockingPort)
+    link = tmp_path / "servos"
+    link.symlink_to("/dev/i2c-3")
+    assert isinstance(port_of(str(link)), I2cPort)
+    assert "no I2C bus" in explain("/dev/i2c-99", errno.ENOENT)
+
+
+def test_a_maestros_yaml_on_an_i2c_bus_is_refused():
+    for kind in ("maestro", "dynamixel"):
+        with pytest.raises(PortError, match="is an I2C bus and no serial port.*pca9685"):
+            refuse_owner("/dev/i2c-1", kind, ())
+    refuse_owner("/dev/i2c-1", "pca9685", ())
+
+
+# --- the same head on either board
+
+
+def test_the_makers_rig_runs_on_either_board_by_one_section(tmp_path):
+    file = on_pca9685(tmp_path)
+    seen = {}
+    for name in ("maker", file):
+        rig = load_rig(name)
+        made = assemble(rig, RunOptions(mock=True, fast=True, seed=3, scene="boxing"))
+        clock, head, poses = made.clock, made.robot, []
+        head.start(clock)
+        for k in range(1, 501):
+            clock.sleep_until(k * 0.01)
+            poses.append(head.tick(clock.now_s(), 0.01).joints.position_rad)
+        head.stop()
+        made.close()
+        seen[name] = rig.joints, poses
+    (joints, one), (same, other) = seen.values()
+    assert joints == same
+    span = [max(column) - min(column) for column in zip(*one, strict=True)]
+    assert max(span) > 0.3
+    apart = [
+        max(abs(a - b) for a, b in zip(*rows, strict=True)) for rows in zip(one, other, strict=True)
+    ]
+    # Two estimates of the same goals: a board's ramp is 10 ms behind, a fast eye moves then.
+    assert sorted(apart)[len(apart) // 2] < 0.02

@@ -1,0 +1,240 @@
+"""Recordings of runs that cannot be read, and what goes wrong while one is written."""
+
+import resource
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from mcap.writer import Writer
+from recorded_run import Recorded, assembly, exact, info_for, ordered, record
+from typer.testing import CliRunner
+
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.cli.main import app
+from gazerig.robot.cli.terminal import BAD_INPUT, FAULT, _writer
+from gazerig.robot.model import stop_latch
+from gazerig.robot.recording.read import BadRecording, RunRecording
+from gazerig.robot.recording.recorder import Recorder
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(stop_latch, "MIN_HOLD_S", 0.1)  # a shorter run
+        return record(tmp_path_factory.mktemp("runs") / "run.mcap", 1.5, ordered)
+
+
+# --- what cannot be read
+
+
+def test_a_recording_cut_anywhere_opens_and_keeps_what_is_whole(
+    recorded: Recorded, tmp_path: Path
+) -> None:
+    data = recorded.path.read_bytes()
+    cut = tmp_path / "cut.mcap"
+    counts = []
+    for share in (0.9, 0.6, 0.4):
+        cut.write_bytes(data[: int(share * len(data))])
+        recording = RunRecording(cut)
+        assert not recording.whole and "was not closed" in recording.note
+        assert recording.info == recorded.info
+        back = list(recording.ticks())
+        for was, now in zip(recorded.ticks, back, strict=False):
+            assert exact(now) == exact(was)
+        counts.append(len(back))
+    assert counts == sorted(counts, reverse=True) and counts[-1] < 299
+
+
+def test_damage_is_told_in_one_line(recorded: Recorded, tmp_path: Path) -> None:
+    data = bytearray(recorded.path.read_bytes())
+    data[len(data) // 3] ^= 0xFF
+    broken = tmp_path / "broken.mcap"
+    broken.write_bytes(data)
+    with pytest.raises(BadRecording, match="damaged") as found:
+        list(RunRecording(broken).ticks())
+    assert "\n" not in str(found.value)
+
+
+def written(path: Path, profile: str) -> Path:
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile, "test")
+        writer.finish()
+    return path
+
+
+def test_what_is_no_recording_of_a_run_is_refused_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "text").write_text("not at all a recording")
+    (tmp_path / "empty").touch()
+    wrong = {
+        tmp_path / "nothing": "no recording at .*nothing: check the path",
+        tmp_path: "is not a file",
+        tmp_path / "text": "is no recording: make one with gazerig run --record",
+        tmp_path / "empty": "is no recording",
+        written(tmp_path / "camera", "gazerig-camera-1"): "a recording of a camera, not of a run",
+        written(tmp_path / "newer", "gazerig-run-9"): "of format 9, .* up to 1: update gazerig",
+        written(tmp_path / "other", "ros2"): r"no recording of gazerig \(its profile is 'ros2'\)",
+        written(tmp_path / "bare", "gazerig-run-1"): "nothing of the run is in it",
+    }
+    for path, words in wrong.items():
+        with pytest.raises(SetupError, match=words) as found:
+            RunRecording(path)
+        assert "\n" not in str(found.value)
+
+
+def test_a_file_is_not_written_over_unasked(tmp_path: Path) -> None:
+    there = tmp_path / "there.mcap"
+    there.write_text("precious")
+    with pytest.raises(SetupError, match="is there already: choose another name or --force"):
+        refused = Recorder(there, info_for())
+        refused.open()
+    refused.close()
+    assert there.read_text() == "precious"
+    with pytest.raises(SetupError, match="cannot write .*: choose a folder"):
+        Recorder(tmp_path / "no" / "r", info_for()).open()
+
+
+# --- what goes wrong while it runs
+
+
+def test_a_run_that_never_began_leaves_no_file(tmp_path: Path) -> None:
+    path = tmp_path / "never.mcap"
+    recorder = Recorder(path, info_for())
+    recorder.open()
+    assert recorder.close("fault") == f"nothing was recorded: {path} is not made"
+    assert not path.exists()
+
+
+@pytest.fixture
+def small_disk() -> Iterator[None]:
+    """Let no file grow beyond 60 kB, as on a disk that is nearly full."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (60_000, before[1]))
+    yield
+    resource.setrlimit(resource.RLIMIT_FSIZE, before)
+
+
+def test_a_full_disk_ends_the_recording_and_not_the_run(small_disk: None, tmp_path: Path) -> None:
+    path = tmp_path / "full.mcap"
+    recorder = Recorder(path, info_for(), patient=True)
+    recorder.open()
+    made = assembly(recorder)
+    made.robot.start(made.clock)
+    said: list[str] = []
+    goes_on = 0
+    for number in range(1, 2001):
+        made.clock.sleep_until(0.005 * number)
+        recorder.record(made.robot.tick(0.005 * number, 0.005))
+        said += recorder.events()
+        goes_on += bool(said)
+        if goes_on == 100:
+            break
+    last = recorder.close("seconds")
+    said += recorder.events()
+    assert goes_on == 100
+    assert said == ["recording stopped (File too large); the run goes on without it"]
+    assert last == f"recording in {path} is not whole: File too large"
+    recording = RunRecording(path)
+    assert not recording.whole
+    assert path.stat().st_size <= 60_000
+    list(recording.ticks())  # what is there is not damaged
+
+
+def test_a_run_whose_recording_stopped_is_a_fault(small_disk: None, tmp_path: Path) -> None:
+    path = tmp_path / "full.mcap"
+    words = ["run", "--mock", "--fast", "--seconds", "5", "--record", str(path)]
+    made = CliRunner().invoke(app, words)
+    _writer.flush(20.0)
+    assert made.exit_code == FAULT, made.output
+    assert made.exception is None or isinstance(made.exception, SystemExit)
+
+
+def test_an_older_recording_stays_until_a_run_has_begun(tmp_path: Path) -> None:
+    path = tmp_path / "older.mcap"
+    path.write_bytes(b"older")
+    path.chmod(0o600)
+    recorder = Recorder(path, info_for(), over=True)
+    recorder.open()
+    assert path.read_bytes() == b"older"
+    assert recorder.close("it could not start") == f"nothing was recorded: {path} is as it was"
+    assert [one.name for one in tmp_path.iterdir()] == ["older.mcap"]
+
+    recorder = Recorder(path, info_for(), over=True)
+    recorder.open()
+    recorder.begin()
+    assert path.read_bytes() != b"older" and path.stat().st_mode & 0o777 == 0o600
+    assert [one.name for one in tmp_path.iterdir()] == ["older.mcap"]
+    recorder.close("seconds")
+
+
+def test_a_robot_that_cannot_start_leaves_an_older_recording(tmp_path: Path) -> None:
+    path = tmp_path / "older.mcap"
+    path.write_bytes(b"older")
+    words = ["run", "--port", "/dev/absent", "--scene", "visitor", "--no-page", "--force"]
+    made = CliRunner().invoke(app, [*words, "--record", str(path)])
+    assert made.exit_code == BAD_INPUT, made.output
+    assert path.read_bytes() == b"older"
+
+
+def test_a_writer_that_stops_delays_nothing_and_loses_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "late.mcap"
+    recorder = Recorder(path, info_for())
+    recorder.open()
+    made = assembly(recorder)
+    made.robot.start(made.clock)
+    process = recorder._link._process
+    assert process is not None
+    process.send_signal(19)  # SIGSTOP
+    seen = []
+    for number in range(1, 401):
+        made.clock.sleep_until(0.005 * number)
+        seen.append(made.robot.tick(0.005 * number, 0.005))
+        recorder.record(seen[-1])  # would never return if it waited
+    process.send_signal(18)  # SIGCONT
+    assert recorder.close("seconds").startswith("400 ticks")
+    assert recorder.lost == 0
+    back = list(RunRecording(path).ticks())
+    assert list(map(exact, back)) == list(map(exact, seen))
+
+
+def test_what_the_queue_cannot_hold_is_lost_and_counted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gazerig.robot.recording.writer_client.QUEUE_BYTES", 150_000)
+    path = tmp_path / "lost.mcap"
+    recorder = Recorder(path, info_for())
+    recorder.open()
+    made = assembly(recorder)
+    made.robot.start(made.clock)
+    process = recorder._link._process
+    assert process is not None
+    process.send_signal(19)
+    for number in range(1, 401):
+        made.clock.sleep_until(0.005 * number)
+        recorder.record(made.robot.tick(0.005 * number, 0.005))
+    process.send_signal(18)
+    said = recorder.close("seconds")
+    assert recorder.lost > 0
+    assert f"; {recorder.lost} ticks could not be kept" in said
+    recording = RunRecording(path)
+    assert recording.end.lost == recorder.lost
+    assert f"lacks {recorder.lost} ticks" in recording.note
+    assert len(list(recording.ticks())) == 400 - recorder.lost
+
+
+def test_a_writer_that_dies_is_told_once_and_the_run_goes_on(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "dead.mcap", info_for())
+    recorder.open()
+    made = assembly(recorder)
+    made.robot.start(made.clock)
+    process = recorder._link._process
+    assert process is not None
+    process.kill()
+    process.wait()
+    said: list[str] = []
+    for number in range(1, 200):
+        made.clock.sleep_until(0.005 * number)
+        recorder.record(made.robot.tick(0.005 * number, 0.005))
+        said += recorder.events()
+    assert said == ["recording stopped (its writer has died); the run goes on without it"]
+    assert "not whole: its writer has died" in recorder.close("seconds")
