@@ -1,7 +1,7 @@
 """Breathing: a slow sway of the neck, as of a living person at rest.
 
 Pitch of 0.5 to 1.5 deg at 0.2 to 0.3 Hz; heads that breathe slowly while idle are
-judged more alive. The sway is added to what the head model wishes, and as the eyes
+judged more alive. The sway is added to the head model's angles, and as the eyes
 take whatever the head does not, they compensate it and the gaze stays where it is.
 """
 

@@ -63,7 +63,7 @@ class ConjugateChannel:
             self._seen = target_rad
 
     def step(self, target_rad: float | None, gaze_rad: float, dt_s: float) -> float:
-        """Return the velocity wish; None: no target, what speed there was fades."""
+        """Return the desired velocity; None: no target, the present speed decays."""
         if target_rad is None:
             self.speed_rad_s *= exp(-dt_s / self._fade_s)
             return self._Gp * clip(self.speed_rad_s, self._max_speed)

@@ -18,7 +18,7 @@ TELLS_NOTHING = Servos(
 
 def of_six(shot: Snapshot, estimated: tuple[str, ...] = SIX) -> Snapshot:
     """Show the same of such a rig; estimated: which of its servos tell nothing."""
-    ghost = shot.ghost
+    ghost = shot.commanded_pose
     return replace(
         shot,
         joints=SIX,
@@ -29,6 +29,6 @@ def of_six(shot: Snapshot, estimated: tuple[str, ...] = SIX) -> Snapshot:
         lids=(0.9, 0.5),
         lower_lids=(0.75, 0.25),
         servos=TELLS_NOTHING,
-        ghost=ghost._replace(lower_lids=(0.75, 0.25)) if ghost is not None else None,
+        commanded_pose=ghost._replace(lower_lids=(0.75, 0.25)) if ghost is not None else None,
         trail=(Trail(shot.t_s, WISH_RAD, WISH_RAD, ESTIMATED_RAD),),
     )

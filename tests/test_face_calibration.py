@@ -12,7 +12,7 @@ from gazerig.gaze.types import PARTS, Angles3, Vec3
 from gazerig.robot.calibration.face_calibration import (
     FARTHEST_MM,
     ORDER,
-    PART_WORDS,
+    PART_NAMES_TEXT,
     STEPS_MM,
     FaceCalibration,
     Key,
@@ -70,7 +70,7 @@ def test_no_keys_lead_off_the_face_or_out_of_its_plane(keys: list[Key]) -> None:
 
 
 def test_every_part_is_asked_for_once_and_named() -> None:
-    assert sorted(ORDER) == sorted(PARTS) and set(PART_WORDS) == set(PARTS)
+    assert sorted(ORDER) == sorted(PARTS) and set(PART_NAMES_TEXT) == set(PARTS)
 
 
 def test_left_is_the_owners_left_and_up_is_up_whatever_the_face_does() -> None:

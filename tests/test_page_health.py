@@ -60,7 +60,7 @@ def snapshot(t_s: float = 1.0) -> Snapshot:
         phase="pursue", level="ok", reasons=(), faces=(), bodies=(), rate_hz=200.0,
         health="bus ok", behaviour="wait", servos=WELL,
         timing=LoopFigures(200.0, 0.04, 0.21, 0.9, 0, 3, 5.0), frame_age_s=0.06,
-        ghost=CommandedPose(AHEAD, (0.03, 0.0, 0.14), eyes, sight, (0.8, 0.8)),
+        commanded_pose=CommandedPose(AHEAD, (0.03, 0.0, 0.14), eyes, sight, (0.8, 0.8)),
         camera=SeenCamera(AHEAD, (0.05, 0.0, 0.18), 1.2, 1.6), field_deg=(100.0, 60.0, 60.0, 75.0),
         trail=(Trail(t_s, REST, REST, REST),),
         events=(SeenSaccade(0.5, 0.05, 5.0, 180.0), SeenFixation(0.2, 0.3, "LE")),
@@ -255,7 +255,7 @@ def test_who_comes_late_sees_all_panels_as_they_are_now(
         view.show(News((snapshot(1.1 + 0.1 * k),), None, ended=False))
     last = replace(of_six(snapshot(4.0)), target_name="the last", stopped="a test")
     view.show(News((last,), None, ended=False))
-    assert button.told == {"stopped": "a test", "silent": False, "blind": 6}
+    assert button.told == {"stopped": "a test", "silent": False, "without_feedback": 6}
     assert "the first" in view._panel._status.content
     people[0] = object()
     view.show(News((), None, ended=False))
@@ -347,6 +347,7 @@ def test_layers_are_seen_where_they_are_wanted(server: viser.ViserServer) -> Non
     view.show(snapshot(), OverlayChoices(ghost=False, camera=True, eyes=False))
     assert seen() == {"camera"}
     view.show(
-        replace(snapshot(), ghost=None, camera=None, field_deg=None), OverlayChoices(eyes=True)
+        replace(snapshot(), commanded_pose=None, camera=None, field_deg=None),
+        OverlayChoices(eyes=True),
     )
     assert seen() == set()

@@ -28,7 +28,7 @@ from gazerig.robot.report import report as build
 from gazerig.robot.report.compare import differences_of
 from gazerig.robot.report.compare_page import compare_page
 from gazerig.robot.report.gaze_trace import GazeTrace, GazeTraceBuilder, TraceRow
-from gazerig.robot.report.page import band_words, gauge, number, report_page
+from gazerig.robot.report.page import band_text, gauge, number, report_page
 from gazerig.robot.report.plotting import COLOURS, Shown, png
 from gazerig.robot.report.reference_walk import own, published
 from gazerig.robot.report.report import DRAWINGS, found, measured, report_of
@@ -230,7 +230,7 @@ def test_the_whole_report_is_written(walking: GazeTrace, tmp_path: Path) -> None
     numbers = json.loads(made.data.read_text(encoding="utf-8"))
     assert {row["key"] for row in numbers} == {f.band.key for f in made.findings}
     for finding in made.findings:
-        assert finding.band.title in page and band_words(finding.band) in page
+        assert finding.band.title in page and band_text(finding.band) in page
     assert told[-1] == (build.DRAWING, 1.0)
     assert [share for _, share in told] == sorted(share for _, share in told)
 

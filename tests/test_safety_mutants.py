@@ -543,7 +543,7 @@ MUTATIONS: tuple[Mutation, ...] = (
     (GUARD, "fresh = fresh and isfinite(position)", "pass", stale_joints),
     (GUARD, "at_s >= stale_s and not unseen and", "at_s >= stale_s and", stale_picture),
     (GUARD, '_Hold("stale frame") if unseen else None', "None", stale_picture),
-    (GUARD, "blind = not frame_age_s <=", "blind = frame_age_s >", stale_picture),
+    (GUARD, "no_frame = not frame_age_s <=", "no_frame = frame_age_s >", stale_picture),
     # heat
     (HEALTH, "self._hot[i] = celsius >= (", "self._hot[i] = celsius >= 99.0 + (", hot),
     (HEALTH, "hot - _COOLER_C if", "hot if", hot),

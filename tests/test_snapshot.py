@@ -59,7 +59,7 @@ def taken() -> tuple[Snapshot, ...]:
     for number, tick in enumerate(visit()[2]):
         snapshots.update(tick)
         if number % TICKS_BETWEEN == TICKS_BETWEEN - 1:
-            shot = snapshots.take(SnapshotTexts("bus ok", "wait", "seeing", "shy", "listen"))
+            shot = snapshots.take(SnapshotTexts("bus ok", "wait", "perception", "shy", "listen"))
             assert shot is not None
             out.append(shot)
     return tuple(out)
@@ -102,10 +102,10 @@ def test_joints_are_shown_a_hundred_times_a_second_as_wished_permitted_and_measu
 def test_the_ghost_is_where_the_wish_is() -> None:
     apart = []
     for shot in taken():
-        assert shot.ghost is not None
-        apart.append(degrees(angle_between(shot.ghost.gaze_world[0], shot.gaze_world[0])))
+        assert shot.commanded_pose is not None
+        apart.append(degrees(angle_between(shot.commanded_pose.gaze_world[0], shot.gaze_world[0])))
         if shot.desired_rad == shot.measured_rad:
-            assert shot.ghost.p_world_eyes_m == shot.p_world_eyes_m
+            assert shot.commanded_pose.p_world_eyes_m == shot.p_world_eyes_m
     assert np.median(apart) < 1.0  # while the eyes rest
     assert max(apart) > 1.0  # while they jump, the servos lag behind
 
@@ -123,7 +123,7 @@ def test_the_camera_sits_on_the_head_and_sees_the_face() -> None:
 
 def test_what_a_tick_does_not_tell_is_said() -> None:
     shot = taken()[-1]
-    assert (shot.health, shot.behaviour, shot.seeing) == ("bus ok", "wait", "seeing")
+    assert (shot.health, shot.behaviour, shot.perception) == ("bus ok", "wait", "perception")
     assert (shot.character, shot.conversation) == ("shy", "listen")
     assert shot.timing is not None
     assert shot.timing.rate_hz == pytest.approx(RATE_HZ)
@@ -178,7 +178,7 @@ def test_a_clock_set_back_begins_anew() -> None:
 
 def test_without_a_rig_a_single_tick_is_shown_as_far_as_it_goes() -> None:
     shot = snapshot(visit()[2][-1], 200.0, "bus ok", "wait")
-    assert shot.ghost is None and shot.camera is None and shot.servos.limits is None
+    assert shot.commanded_pose is None and shot.camera is None and shot.servos.limits is None
     assert len(shot.trail) == 1 and shot.servos.load != ()
 
 
@@ -219,11 +219,15 @@ def test_lower_lids_are_shown_where_there_are_any() -> None:
     ticks, shot = maker_shown()
     pose = ticks[-1].pose
     assert shot.lower_lids == (pose.lower_left, pose.lower_right)
-    assert shot.ghost is not None and shot.ghost.lower_lids is not None
-    assert shot.ghost.lower_lids == pytest.approx(shot.lower_lids, abs=0.2)
+    assert shot.commanded_pose is not None and shot.commanded_pose.lower_lids is not None
+    assert shot.commanded_pose.lower_lids == pytest.approx(shot.lower_lids, abs=0.2)
     assert all(0.0 < opening < 1.0 for opening in shot.lower_lids)
     desk = taken()[-1]
-    assert desk.lower_lids is None and desk.ghost is not None and desk.ghost.lower_lids is None
+    assert (
+        desk.lower_lids is None
+        and desk.commanded_pose is not None
+        and desk.commanded_pose.lower_lids is None
+    )
 
 
 def test_a_snapshot_of_six_joints_survives_the_way() -> None:

@@ -193,7 +193,7 @@ def _sight(kinematics: Kinematics, camera: CameraParams, options: RunOptions, re
     mount = CameraMount(camera)
     turns = PoseBuffer() if real and mount.on_head else None
     history = PoseHistory if options.placed_by == "capture" else NewestPose
-    return _Sight(mount, history(kinematics, tell=_teller(kinematics, mount, turns)), turns)
+    return _Sight(mount, history(kinematics, tell=_turn_sender(kinematics, mount, turns)), turns)
 
 
 def _components(
@@ -314,7 +314,7 @@ def _camera_params(
     return standing_still(rig.camera, kinematics), (note,)
 
 
-def _teller(
+def _turn_sender(
     kinematics: Kinematics, mount: CameraMount, turns: PoseBuffer | None
 ) -> Callable[[float, Angles3], None] | None:
     """Return what tells the camera's process how its camera is turned, None where nobody asks."""

@@ -21,12 +21,12 @@ from gazerig.robot.model.kinematics import Kinematics
 
 def gaze_parts(rig: Rig, seed: int) -> tuple[Kinematics, Oculomotor]:
     """Return a rig's geometry and its oculomotor model, for looking without a camera."""
-    lid_dice, landing_dice = (
+    lid_rng, landing_rng = (
         np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(2)
     )
     kinematics = kinematics_of(rig)
-    lids = Lids(rig.gaze.lids, lid_dice)
-    return kinematics, oculomotor(rig, kinematics, movers(rig), lids, landing_dice)
+    lids = Lids(rig.gaze.lids, lid_rng)
+    return kinematics, oculomotor(rig, kinematics, movers(rig), lids, landing_rng)
 
 
 def kinematics_of(rig: Rig) -> Kinematics:
@@ -43,14 +43,14 @@ class Deciders(NamedTuple):
     idle: Idle
 
 
-def deciders(rig: Rig, idle_dice: np.random.Generator) -> Deciders:
+def deciders(rig: Rig, idle_rng: np.random.Generator) -> Deciders:
     """Return what attention decides between."""
     gaze = rig.gaze
     return Deciders(
         FieldOfView(gaze.field_of_view),
         BottomUp(gaze.bottom_up),
         TopDown(gaze.top_down),
-        Idle(gaze.idle, idle_dice),
+        Idle(gaze.idle, idle_rng),
     )
 
 
@@ -79,7 +79,7 @@ def oculomotor(
     kinematics: Kinematics,
     moves: Movers,
     lids: Lids,
-    landing_dice: np.random.Generator,
+    landing_rng: np.random.Generator,
 ) -> Oculomotor:
     """Compose the models with the narrower of the rig's and the profile's ranges."""
     return Oculomotor(
@@ -91,5 +91,5 @@ def oculomotor(
         moves.head,
         lids,
         moves.breathing,
-        landing_dice,
+        landing_rng,
     )

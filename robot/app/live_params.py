@@ -188,7 +188,7 @@ class LiveParams:
             parts.kinematics.retune(new.geometry, lid_ends(new))
         said = self._put_joints(old, new)
         if bends or new.ranges != old.ranges:
-            parts.guard.go_gently()  # wishes are elsewhere all at once
+            parts.guard.go_gently()  # desired angles jump
         if new.loop.rate_hz != old.loop.rate_hz:
             parts.guard.pace(1.0 / new.loop.rate_hz)
         if new.tracks != old.tracks:

@@ -1,4 +1,4 @@
-"""A recorded run done again: the same percepts, times, commands and dice, the models of now.
+"""A recorded run done again: the same percepts, times, commands and rng, the models of now.
 
 With the configuration and code of then every command comes out the same to the bit; the
 joints are then fed as recorded. With anything changed the recorded joints would belong to

@@ -84,7 +84,7 @@ class RunObservers:
         address = options.page_address
         self._page = self._made_page(address) if address is not None else None
         self._snapshots = SnapshotBuilder(made.loop.rate_hz, made.shown())
-        self._onlooker = self._made_onlooker(status)
+        self._publisher = self._make_publisher(status)
         # In simulated time nobody can watch.
         self._shown = not options.fast and (self._page is not None or status is not None)
         self._looking = False
@@ -105,7 +105,7 @@ class RunObservers:
         )
         return PageProcess(*address, page_requests)
 
-    def _made_onlooker(self, status: Callable[[str], None] | None) -> Publisher:
+    def _make_publisher(self, status: Callable[[str], None] | None) -> Publisher:
         page, made, tuning = self._page, self._made, self._tuning
         return Publisher(
             page,
@@ -124,7 +124,7 @@ class RunObservers:
     def join(self, observers: Observers) -> None:
         """Have all of them told of ticks; each is left out by itself where it fails."""
         if self._shown:
-            observers.add("page and status line", self._onlooker.update)
+            observers.add("page and status line", self._publisher.update)
         if self._page is not None:
             observers.add("picking a point on the page", self._picking.update)
             observers.add("the page's limits", self._keep_shown)
@@ -168,7 +168,7 @@ class RunObservers:
                 self._live.open()
         with self._spared("page and status line"):
             if self._shown:
-                self._onlooker.start()
+                self._publisher.start()
                 self._looking = True
 
     @contextlib.contextmanager
@@ -179,10 +179,10 @@ class RunObservers:
         except Exception as error:
             self._say(left_out(name, error))
 
-    def tell(self, words: str) -> None:
+    def tell(self, text: str) -> None:
         """Show a message to all users of the page."""
         if self._page is not None:
-            self._page.say(words)
+            self._page.say(text)
 
     def give_up(self) -> None:
         """Leave no file behind of a robot that could not start."""
@@ -204,7 +204,7 @@ class RunObservers:
                 self._live.close()
         with self._spared("page and status line"):
             if self._looking:
-                self._onlooker.stop()
+                self._publisher.stop()
         with self._spared("the page"):
             if self._page is not None:
                 self._page.close()
@@ -226,7 +226,7 @@ class RunObservers:
         return InForce(menus["behaviour"][0], menus["conversation"][0], character)
 
     def _show_depth(self, on: bool) -> None:
-        self._onlooker.depth = on
+        self._publisher.depth = on
 
     def _keep_shown(self, tick: Tick) -> None:
         """Show the rig as it is built now: limits and the field of view can be tuned."""

@@ -117,7 +117,7 @@ class _Session:
         options, made = composed.options, composed.made
         self._options, self._made, self._stopped = options, made, stopped
         self._say = say = _never_raising(say)
-        self._audience = RunObservers(
+        self._run_observers = RunObservers(
             made, options, say, status, composed.tuning, composed.recorder
         )
         self._summary, self._faults = Summary(), JointFaults(say)
@@ -134,14 +134,14 @@ class _Session:
         observers = Observers(self._say)
         observers.add("the summary", self._summary.update)
         observers.add("the watch for faults", self._faults.update)
-        self._audience.join(observers)
+        self._run_observers.join(observers)
         _observe_scene(observers, self._made, self._score, self._face_gaze)
         observers.add("the log", self._log)
         return observers
 
     def _log(self, tick: Tick) -> None:
         """Print the events of a tick."""
-        for event in (*drawn_together(tick.events), *self._audience.events()):
+        for event in (*drawn_together(tick.events), *self._run_observers.events()):
             self._say(f"{tick.t_s - self._start_s:.2f} s: {event}")
 
     def _stop(self, seconds: float) -> str | None:
@@ -151,21 +151,21 @@ class _Session:
 
     def whole(self) -> dict[str, object]:
         """Run from torque on to torque off; return the figures."""
-        wall, audience = RealClock(), self._audience
+        wall, run_observers = RealClock(), self._run_observers
         began_s = wall.now_s()
-        audience.open_files()
+        run_observers.open_files()
         count = self._loop()
         wall_s = wall.now_s() - began_s
         self._faults.close()
         figures = _figures(self._made, self._summary, self._score, count, wall_s, self._faults)
-        unwritten = audience.unwritten() or self._unwritten_heatmap()
+        unwritten = run_observers.unwritten() or self._unwritten_heatmap()
         if unwritten is not None:
             figures["not_written"] = str(unwritten)
         return figures
 
     def _loop(self) -> LoopCount:
         """Switch on, tick until the end, leave as every way out does; close what watches."""
-        made, audience, say = self._made, self._audience, self._say
+        made, run_observers, say = self._made, self._run_observers, self._say
         count = LoopCount(0, 0, "fault: unexpected error")
         begun = False
         try:
@@ -175,17 +175,17 @@ class _Session:
                 self._start_s = made.clock.now_s()
                 for note in (*made.notes, *drawn_together(made.robot.body.bus.events())):
                     say(note)
-                audience.open()
+                run_observers.open()
                 count = run_loop(
-                    made.robot, made.clock, lambda: made.loop, audience.timed(self._stop),
+                    made.robot, made.clock, lambda: made.loop, run_observers.timed(self._stop),
                     self._observers.update,
                 )  # fmt: skip
                 leaving.cause = count.stopped_by
         finally:
             if begun:
-                audience.close(count)
+                run_observers.close(count)
             else:
-                audience.give_up()
+                run_observers.give_up()
         return count
 
     def _unwritten_heatmap(self) -> Path | None:

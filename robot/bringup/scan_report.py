@@ -29,7 +29,7 @@ def board_plain(looked: SearchRound) -> dict[str, object]:
     return {**board._asdict(), "channels": looked.channels, "baud": looked.baud, "pulses": pulses}
 
 
-def board_words(looked: SearchRound) -> Iterator[str]:
+def board_text(looked: SearchRound) -> Iterator[str]:
     """Return a description of what a board reported."""
     board = looked.board
     if board is None:
@@ -49,18 +49,18 @@ def board_words(looked: SearchRound) -> Iterator[str]:
 
 
 def remarks(
-    rounds: Sequence[SearchRound], where: str, wished: Sequence[BusKind] = ()
+    rounds: Sequence[SearchRound], where: str, requested: Sequence[BusKind] = ()
 ) -> Iterator[str]:
     """Return remarks on a scan beyond its tables of servos and boards.
 
-    wished: kinds that were to be asked, unless one before them answered
+    requested: kinds that were to be asked, unless one before them answered
     """
     found = found_of(rounds)
     boards = sum(1 for one in rounds if one.board is not None)
     if not boards or found:
         count = f"{len(found)} servo{'s' if len(found) != 1 else ''}"
         yield f"{count} on {where}; {_asked(rounds)}"
-    unasked = [kind for kind in wished if kind not in {one.kind for one in rounds}]
+    unasked = [kind for kind in requested if kind not in {one.kind for one in rounds}]
     if unasked and boards:
         yield "nothing else was sent: packets for servos would move what hangs on the board"
     elif unasked and found:

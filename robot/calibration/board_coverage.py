@@ -58,7 +58,7 @@ class Held(NamedTuple):
 class Coverage(NamedTuple):
     """What the views kept so far show, and what a person should do next.
 
-    views: number kept; missing: one wish each, in plain words, empty when all is there
+    views: number kept; missing: one instruction each, empty when all is there
     """
 
     views: int
@@ -87,7 +87,7 @@ def held(seen: SeenBoard, guess: Intrinsics, width_px: int, height_px: int) -> H
 def coverage(views: Sequence[Held], params: ViewParams) -> Coverage:
     """Return what is missing."""
     edge, tilt = params.edge_share, params.least_tilt_deg
-    wishes = {
+    goals = {
         "bring the board to the left edge of the image": any(v.left <= edge for v in views),
         "bring the board to the right edge": any(v.right >= 1.0 - edge for v in views),
         "bring the board to the upper edge": any(v.top <= edge for v in views),
@@ -100,7 +100,7 @@ def coverage(views: Sequence[Held], params: ViewParams) -> Coverage:
             max(v.right - v.left, v.bottom - v.top) >= params.near_share for v in views
         ),
     }
-    missing = [desired for desired, there in wishes.items() if not there]
+    missing = [desired for desired, there in goals.items() if not there]
     short = params.least_views - len(views)
     if short > 0:
         missing.append(f"show {short} more {'view' if short == 1 else 'views'}, each a new one")

@@ -149,7 +149,7 @@ class Neck(Protocol):
 class NeckStep(NamedTuple):
     """What one neck angle added.
 
-    number, of: which of how many angles; asked_rad: yaw, pitch, roll wished
+    number, of: which of how many angles; asked_rad: yaw, pitch, roll requested
     corners: how many were seen in every frame; view: what counts, or None and why not
     """
 

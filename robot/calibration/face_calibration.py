@@ -23,7 +23,7 @@ Key = Literal["left", "right", "up", "down", "larger", "smaller", "enter", "skip
 ORDER = ("N", "LE", "RE", "M", "DN", "UP", "FL", "FR")
 """The parts as they are asked for: from the middle outwards."""
 
-PART_WORDS = {
+PART_NAMES_TEXT = {
     "N": "the tip of your nose",
     "LE": "your left eye",
     "RE": "your right eye",

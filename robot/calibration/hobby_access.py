@@ -25,7 +25,7 @@ SPEED_US_S = 200.0
 """18 deg/s of the shaft: slow enough to stop before something bends."""
 
 NEAR_STEPS = 4
-PATIENCE_S = 1.0
+TIMEOUT_S = 1.0
 """A goal is given up that was not reached so long after it could have been."""
 
 SILENT_S = 2.0
@@ -128,7 +128,7 @@ class OneHobby:
             BusLost, gazerig.robot.calibration.joint_access.CalibrationStopped: see ``look``.
         """
         way = abs(self._goal - self._read()) / US_STEPS
-        end_s = self._clock.now_s() + way / SPEED_US_S + PATIENCE_S
+        end_s = self._clock.now_s() + way / SPEED_US_S + TIMEOUT_S
         while not self.look():
             if self._clock.now_s() > end_s:
                 self._goal = self._pulse

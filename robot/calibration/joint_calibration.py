@@ -20,7 +20,7 @@ SMALLEST_RANGE_DEG = 5.0
 """A joint that moves less than this was not really moved."""
 
 LONGEST_GAP_S = 0.3
-LARGEST_BLIND_JUMP_STEPS = STEPS_PER_TURN // 8
+MAX_UNSEEN_JUMP_STEPS = STEPS_PER_TURN // 8
 """A joint that turned farther unseen for longer than that may have turned the other way."""
 
 ENDS = {
@@ -105,7 +105,7 @@ class Unwrapped:
             half = STEPS_PER_TURN // 2
             change = (position_steps - self._at + half) % STEPS_PER_TURN - half
             gap_s = t_s - self._seen_s
-            if gap_s > LONGEST_GAP_S and abs(change) > LARGEST_BLIND_JUMP_STEPS:
+            if gap_s > LONGEST_GAP_S and abs(change) > MAX_UNSEEN_JUMP_STEPS:
                 raise CalibrationRefused(
                     f"it turned by {abs(change) * 360 / STEPS_PER_TURN:.0f} deg while the servo "
                     f"did not answer for {gap_s:.1f} s: check its cable, and begin anew"

@@ -197,8 +197,8 @@ def _eye(job: _Job, number: int, mock: bool, seed: int) -> Iterator[_Eye]:
     """Open the camera, or a simulated one."""
     clock = RealClock()
     if mock:
-        dice = np.random.default_rng(seed)
-        simulated = BoardScene(job.rig.camera, job.board, job.kinematics, dice)
+        rng = np.random.default_rng(seed)
+        simulated = BoardScene(job.rig.camera, job.board, job.kinematics, rng)
         yield _Eye(lambda: simulated.look(clock.now_s()), clock.now_s, lambda _: None, simulated)
         return
     thread = CameraThread(Webcam(number), _NoFaces(), clock.now_s)

@@ -19,7 +19,12 @@ from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_observers import RunObservers, SteeringButtons
 from gazerig.robot.app.session import way_out
-from gazerig.robot.calibration.face_calibration import PART_WORDS, FaceCalibration, begun, changes
+from gazerig.robot.calibration.face_calibration import (
+    PART_NAMES_TEXT,
+    FaceCalibration,
+    begun,
+    changes,
+)
 from gazerig.robot.calibration.face_steering import FaceSteering
 from gazerig.robot.calibration.joint_access import CalibrationStopped
 from gazerig.robot.cli.key_input import BUTTONS, HELP, Keys, LineKeys, PageKeys, TerminalKeys
@@ -132,18 +137,18 @@ def _steered(
     scripted = scripted or not sys.stdin.isatty()
     keys = PageKeys(LineKeys(lines) if scripted else TerminalKeys())
     steer = SteeringButtons(BUTTONS, keys.press, lambda: shown(steering))
-    audience = RunObservers(made, options, say, steer=steer)
+    observers = RunObservers(made, options, say, steer=steer)
     door = StopOnlyServer(
         made.robot.command,
         made.clock,
         {"rig": rig.name, "pid": os.getpid(), "does": "calibrate"},
         say,
     )
-    sitting = _Sitting(steering, keys, made.clock.now_s, stopped, scripted, audience, door)
+    sitting = _Sitting(steering, keys, made.clock.now_s, stopped, scripted, observers, door)
     say("the head turns to you now, as it always does: keep your fingers out of it;")
     say(f"{HELP}; Ctrl-C writes nothing")
     try:
-        count = _run(made, sitting, keys, audience, door, Interrupts.of(stopped))
+        count = _run(made, sitting, keys, observers, door, Interrupts.of(stopped))
     finally:
         made.close()
     if stopped() is not None or count.stopped_by.startswith("fault"):
@@ -155,7 +160,7 @@ def _run(
     made: Assembly,
     sitting: "_Sitting",
     keys: Keys,
-    audience: RunObservers,
+    observers: RunObservers,
     door: StopOnlyServer,
     interrupts: Interrupts,
 ) -> LoopCount:
@@ -165,14 +170,14 @@ def _run(
         leaving.switch_on(lambda: made.robot.start(made.clock, interrupts.refuse))
         for note in (*made.notes, *drawn_together(made.robot.body.bus.events())):
             say(note)
-        closed_last.callback(lambda: audience.close(count))
-        audience.open()
+        closed_last.callback(lambda: observers.close(count))
+        observers.open()
         closed_last.callback(door.close)
         door.open()
         with keys:
             count = run_loop(made.robot, made.clock, made.loop, sitting.over, sitting.update)
         leaving.cause = count.stopped_by
-        audience.tell("over: the head parks; whether to write it is asked at the terminal")
+        observers.tell("over: the head parks; whether to write it is asked at the terminal")
     return count
 
 
@@ -186,12 +191,12 @@ class _Sitting:
         now_s: Callable[[], float],
         stopped: Callable[[], str | None],
         scripted: bool,
-        audience: RunObservers,
+        observers: RunObservers,
         door: StopOnlyServer,
     ) -> None:
         self._steering, self._keys, self._now_s = steering, keys, now_s
         self._stopped, self._scripted = stopped, scripted
-        self._audience, self._door = audience, door
+        self._observers, self._door = observers, door
         self._live_line = not scripted and sys.stderr.isatty()
         self._said: tuple[str | None, bool] | None = None
         self._ready_s = self._shown_s = self._seen_s = now_s()
@@ -202,7 +207,7 @@ class _Sitting:
         if (why := self._stopped()) is not None:
             return why
         if steering.state.part is None:
-            return "you" if steering.state.at < len(PART_WORDS) else "the last part"
+            return "you" if steering.state.at < len(PART_NAMES_TEXT) else "the last part"
         self._refuse_hopeless(now_s)
         key = self._keys.next(steering.aimed)
         if key is not None:
@@ -211,7 +216,7 @@ class _Sitting:
 
     def update(self, tick: Tick) -> None:
         """See what the tick did, and say what a person should know."""
-        self._audience.update(tick)
+        self._observers.update(tick)
         self._door.update(tick)
         self._tell(self._steering.update(tick))
         for event in drawn_together(tick.events):
@@ -229,7 +234,7 @@ class _Sitting:
         if part is None or self._said == (part, seen):
             return
         if seen:
-            self._tell(f"{PART_WORDS[part]}: steer until the gaze meets it, then Enter")
+            self._tell(f"{PART_NAMES_TEXT[part]}: steer until the gaze meets it, then Enter")
         elif t_s - self._seen_s < _UNSEEN_S:
             return
         else:
@@ -247,7 +252,7 @@ class _Sitting:
     def _tell(self, what: str | None) -> None:
         if what is not None:
             say(what)
-            self._audience.tell(what)
+            self._observers.tell(what)
 
 
 def shown(steering: FaceSteering) -> str:
@@ -259,7 +264,7 @@ def shown(steering: FaceSteering) -> str:
     across = f"{abs(left):g} mm {'left' if left > 0.0 else 'right'}" if left else "0 mm across"
     upright = f"{abs(up):g} mm {'up' if up > 0.0 else 'down'}" if up else "0 mm up"
     return (
-        f"{state.at + 1}/{len(PART_WORDS)} {PART_WORDS[state.part]}: {across}, {upright}; "
+        f"{state.at + 1}/{len(PART_NAMES_TEXT)} {PART_NAMES_TEXT[state.part]}: {across}, {upright}; "
         f"step {state.step_mm:g} mm"
     )
 

@@ -104,10 +104,10 @@ def refuse_impossible(rig: Rig, names: Sequence[str], how: CalibrationOptions) -
     Raises:
         SetupError: says which, and what can be done.
     """
-    blind = [name for name in names if not rig.joints[name].facts.measured]
-    if how.by is By.motion and len(blind) == len(names):
+    without_feedback = [name for name in names if not rig.joints[name].facts.measured]
+    if how.by is By.motion and len(without_feedback) == len(names):
         raise SetupError(
-            f"--by motion: hobby servos do not tell where they are ({', '.join(blind)}), so no "
+            f"--by motion: hobby servos do not tell where they are ({', '.join(without_feedback)}), so no "
             "stop can be found: leave --by away and steer them yourself"
         )
     able = [kind for kind in KINDS.values() if kind.set_middle is not None]
@@ -122,7 +122,7 @@ def refuse_impossible(rig: Rig, names: Sequence[str], how: CalibrationOptions) -
             f"--set-middle: only {titles} servos can be told so, not that of {', '.join(other)}: "
             "choose joints with --joint"
         )
-    if how.clear_offset and len(blind) == len(names):
+    if how.clear_offset and len(without_feedback) == len(names):
         raise SetupError("--clear-offset: hobby servos have no offset: leave it away")
     low, high = how.pulses_us
     least, most = 500.0, 2500.0

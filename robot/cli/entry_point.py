@@ -41,15 +41,15 @@ def main() -> None:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def as_now(words: Sequence[str]) -> list[str]:
+def as_now(arguments: Sequence[str]) -> list[str]:
     """Return what was typed with a command of before in its group; one line names the new one.
 
-    words: what stands after ``gazerig``
+    arguments: what stands after ``gazerig``
     """
-    if not words or words[0] not in MOVED:
-        return list(words)
-    os.write(2, f"gazerig {words[0]} is now gazerig ctl {words[0]}\n".encode())
-    return ["ctl", *words]
+    if not arguments or arguments[0] not in MOVED:
+        return list(arguments)
+    os.write(2, f"gazerig {arguments[0]} is now gazerig ctl {arguments[0]}\n".encode())
+    return ["ctl", *arguments]
 
 
 def _gone(number: int, frame: FrameType | None) -> None:
@@ -77,10 +77,10 @@ def hold_standard_files() -> None:
             setattr(sys, name, nowhere)
 
 
-def is_quick(words: Sequence[str], environ: Mapping[str, str]) -> bool:
+def is_quick(arguments: Sequence[str], environ: Mapping[str, str]) -> bool:
     """Return whether cli/tune.py alone can do what was typed, or complete it for a shell.
 
-    words: what stands after ``gazerig``
+    arguments: what stands after ``gazerig``
     """
     if environ.get("_GAZERIG_COMPLETE", "").startswith("complete"):
         typed = environ.get("COMP_WORDS") or environ.get("_TYPER_COMPLETE_ARGS", "")
@@ -88,7 +88,7 @@ def is_quick(words: Sequence[str], environ: Mapping[str, str]) -> bool:
         # While the command's own name is typed, the names of all others belong to it.
         named = len(begun) > 1 or typed.endswith(" ")
         return named and begun[:1] != [] and begun[0] in QUICK
-    return bool(words) and words[0] in QUICK and not _ELSEWHERE & set(words)
+    return bool(arguments) and arguments[0] in QUICK and not _ELSEWHERE & set(arguments)
 
 
 def _quick() -> None:

@@ -155,7 +155,7 @@ def panel_of(command: str) -> str:
 
 def epilog(examples: Iterable[tuple[str, str]]) -> str:
     """Write examples as lines that help keeps apart."""
-    return "\n\n".join(f"gazerig {words}   ({what})" for words, what in examples)
+    return "\n\n".join(f"gazerig {text}   ({what})" for text, what in examples)
 
 
 def complete_shipped(kind: str) -> Callable[[str], list[str]]:

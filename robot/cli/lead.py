@@ -118,18 +118,18 @@ def resume(
         say("torque is on; it goes on slowly")
 
 
-def read_point(words: Sequence[str]) -> tuple[float, float, float] | None:
+def read_point(coordinates: Sequence[str]) -> tuple[float, float, float] | None:
     """Read X Y Z in metres, or "free" as None.
 
     Raises:
         SetupError: it is neither.
     """
-    if list(words) == ["free"]:
+    if list(coordinates) == ["free"]:
         return None
     try:
-        x, y, z = map(float, words)
+        x, y, z = map(float, coordinates)
     except ValueError:
         raise SetupError(
-            f"{' '.join(words)}: give X Y Z in metres (ahead, left, up), or free"
+            f"{' '.join(coordinates)}: give X Y Z in metres (ahead, left, up), or free"
         ) from None
     return x, y, z

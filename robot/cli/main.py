@@ -125,11 +125,11 @@ add_examples(app)
 
 def main() -> None:
     """Run the command line: an error is one line, and with --debug also where it comes from."""
-    words = as_now(sys.argv[1:])
-    if "--debug" in words:  # wherever people put it
-        words = [word for word in words if word != "--debug"]
+    arguments = as_now(sys.argv[1:])
+    if "--debug" in arguments:  # wherever people put it
+        arguments = [word for word in arguments if word != "--debug"]
         logging.getLogger(DEBUG_LOGGER).setLevel(logging.DEBUG)
-    run_app(app, words, "say it again with --debug and report what it shows")
+    run_app(app, arguments, "say it again with --debug and report what it shows")
 
 
 def rig_files() -> list[Path]:

@@ -62,10 +62,10 @@ def holding_rig(
 def holding(rig: Rig) -> str:
     """Return what the servos do once the torque is on."""
     told = [name for name in rig.names if rig.joints[name].facts.measured]
-    blind = len(rig.names) - len(told)
-    if not blind:
+    without_feedback = len(rig.names) - len(told)
+    if not without_feedback:
         return f"torque on: {len(told)} servos hold where they are"
-    pulses = f"{blind} hobby servos hold where their pulses are (estimated: they tell nothing)"
+    pulses = f"{without_feedback} hobby servos hold where their pulses are (estimated: they tell nothing)"
     return (
         f"torque on: {len(told)} servos hold where they are, {pulses}"
         if told

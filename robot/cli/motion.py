@@ -160,11 +160,11 @@ def _ask_for_fingers(rig: Rig, yes: bool) -> None:
         SetupError: no user is there to ask.
         typer.Abort: the answer was no.
     """
-    blind = [name for name in rig.names if not rig.joints[name].facts.measured]
-    if not blind:
+    without_feedback = [name for name in rig.names if not rig.joints[name].facts.measured]
+    if not without_feedback:
         return
     why = (
-        f"{', '.join(blind)}: hobby servos without pulses go to their parking place at once, at "
+        f"{', '.join(without_feedback)}: hobby servos without pulses go to their parking place at once, at "
         "their own full speed"
     )
     if not yes and not sys.stdin.isatty():

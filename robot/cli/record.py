@@ -49,7 +49,7 @@ def record_camera(
 
 
 def _source(
-    oak: bool, camera: int | None, video: Path | None, wishes: tuple[int, int | None, float]
+    oak: bool, camera: int | None, video: Path | None, requested: tuple[int, int | None, float]
 ) -> tuple[FrameSource, str]:
     """Return the one source that was chosen, and its name."""
     asked = [n for n, v in (("oak", oak), ("camera", camera is not None), ("video", video)) if v]
@@ -57,7 +57,7 @@ def _source(
         raise SetupError(
             f"record-camera takes one of --oak, --camera N and --video FILE, not {len(asked)}"
         )
-    width, height, rate_hz = wishes
+    width, height, rate_hz = requested
     # OpenCV and depthai are heavy: loaded when it is clear that there is something to do.
     if oak:
         from gazerig.drivers.camera.oak.params import OakParams

@@ -270,12 +270,12 @@ def _rerun(file: Path, rig: str | None, character: str | None, joints: str | Non
 
 def agreement(result: "Resimulation") -> str:
     """Return a text: how far a rerun agrees with the recorded run."""
-    words = f"{result.agreeing} of {result.ticks} ticks are the same to the bit"
+    text = f"{result.agreeing} of {result.ticks} ticks are the same to the bit"
     if result.first_difference_s is not None:
-        words += f"; the first other one at {result.first_difference_s:.3f} s: {result.differs}"
+        text += f"; the first other one at {result.first_difference_s:.3f} s: {result.differs}"
     if result.tx_same is not None:
-        words += f"; the bytes on the bus are {'the same' if result.tx_same else 'others'}"
-    return f"joints {result.joints}: {words}"
+        text += f"; the bytes on the bus are {'the same' if result.tx_same else 'others'}"
+    return f"joints {result.joints}: {text}"
 
 
 def beside(
@@ -315,9 +315,9 @@ def _told(ticks: Iterable[Tick], read: Callable[[float], None]) -> Iterator[Tick
 
 
 @contextmanager
-def _progress(words: str, total_s: float) -> Iterator[Callable[[float], None]]:
+def _progress(text: str, total_s: float) -> Iterator[Callable[[float], None]]:
     """Draw a bar on a terminal; nothing elsewhere."""
     console = Console(stderr=True)
     with Progress(console=console, transient=True, disable=not sys.stderr.isatty()) as bar:
-        task = bar.add_task(words, total=total_s)
+        task = bar.add_task(text, total=total_s)
         yield lambda at_s: bar.update(task, completed=at_s)

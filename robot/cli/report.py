@@ -63,7 +63,7 @@ def report(
     scanpath: Annotated[str | None, typer.Option(help="Face scanpath instead of its own.")] = None,
     saccade: Annotated[str | None, typer.Option(help="Saccades instead of its own.")] = None,
     conversation: Annotated[str | None, typer.Option(help="talk, listen or think.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of all dice.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all rng.")] = 0,
     out: Annotated[
         Path | None, typer.Option(help="The page to write; .html is added where it is missing.")
     ] = None,
@@ -93,8 +93,8 @@ def report(
                 layers = _Layers(rig, character, profile)
                 about, run = _simulated(options, layers, seconds, conversation, tell)
             made = report_of(run, about, target, tell, force)
-        if words := banner(run.joints):
-            say(words)
+        if text := banner(run.joints):
+            say(text)
         _tell_findings(made.findings)
         say(f"{made.page}: the whole report; {len(made.figures)} figures beside it")
 
@@ -185,7 +185,7 @@ def _run(
     from gazerig.robot.app.scripted_behaviour import ScriptedBehaviour
     from gazerig.robot.control.loop import Tick, run
 
-    words, scene = f"simulating {seconds:.0f} s", made.scene
+    text, scene = f"simulating {seconds:.0f} s", made.scene
     planner = ScriptedBehaviour(scene.behaviour, made.robot.ask) if scene is not None else None
 
     def watch(tick: Tick) -> None:
@@ -199,7 +199,7 @@ def _run(
         with signals() as stopped:
 
             def stop(at_s: float) -> str | None:
-                tell(words, min(1.0, at_s / seconds))
+                tell(text, min(1.0, at_s / seconds))
                 return stopped() or ("seconds" if at_s >= seconds else None)
 
             made.robot.start(made.clock)
@@ -327,9 +327,9 @@ def _progress() -> Iterator[_Tell]:
     with Progress(*columns, console=console, disable=not sys.stderr.isatty()) as bar:
         steps: dict[str, TaskID] = {}
 
-        def tell(words: str, share: float) -> None:
-            if words not in steps:
-                steps[words] = bar.add_task(words, total=1.0)
-            bar.update(steps[words], completed=share)
+        def tell(text: str, share: float) -> None:
+            if text not in steps:
+                steps[text] = bar.add_task(text, total=1.0)
+            bar.update(steps[text], completed=share)
 
         yield tell

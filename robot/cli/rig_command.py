@@ -26,9 +26,9 @@ class RigCommand(TyperCommand):
         """Insert the default rig if the arguments name none."""
         args = self._renamed(args)
         args, rig = self._without_rig_option(args)
-        words = [one for one in self.params if not isinstance(one, TyperOption)]
-        if words and words[0].name == "rig" and len(words) > 1:
-            if rig is None and not self._names_rig(ctx, args, words):
+        positional = [one for one in self.params if not isinstance(one, TyperOption)]
+        if positional and positional[0].name == "rig" and len(positional) > 1:
+            if rig is None and not self._names_rig(ctx, args, positional):
                 rig = DEFAULT_RIG
             args = args if rig is None else [rig, *args]
         elif rig is not None:
@@ -53,12 +53,12 @@ class RigCommand(TyperCommand):
                 return [*args[:i], *rest], value if equals else args[i + 1]
         return args, None
 
-    def _names_rig(self, ctx: Any, args: list[str], words: list[Any]) -> bool:
+    def _names_rig(self, ctx: Any, args: list[str], positional: list[Any]) -> bool:
         """Return whether the first word is a rig: there is one more than needed, or it looks so."""
         options = [one for one in self.params if isinstance(one, TyperOption)]
         parser = TyperCommand(self.name, params=list(options)).make_parser(ctx)
         _, given, _ = parser.parse_args(list(args))
-        if all(one.nargs == 1 for one in words):
-            return len(given) >= len(words)
+        if all(one.nargs == 1 for one in positional):
+            return len(given) >= len(positional)
         first = given[0] if given else ""
         return first in shipped_names("rigs") or "/" in first or first.endswith((".yaml", ".yml"))

@@ -29,7 +29,7 @@ Pixels = Annotated[
     bool, typer.Option(help="Draw the scene and find faces and motion in the frames.")
 ]
 Seconds = Annotated[float | None, typer.Option(min=0.0, help="Stop after S seconds.")]
-Seed = Annotated[int, typer.Option(min=0, help="Seed of all dice.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of all rng.")]
 Fast = Annotated[bool, typer.Option(help="Simulated clock: as fast as it goes (needs --mock).")]
 Profile = Annotated[
     str | None,

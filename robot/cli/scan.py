@@ -23,7 +23,7 @@ from gazerig.drivers.servo_families import FAMILY_OF
 from gazerig.drivers.servo_models import BusKind
 from gazerig.robot.bringup.bus_search import RATES, SearchRound, found_of, known_kinds, plan, search
 from gazerig.robot.bringup.doctor.port import name_ports
-from gazerig.robot.bringup.scan_report import board_plain, board_words, remarks, servo_plain
+from gazerig.robot.bringup.scan_report import board_plain, board_text, remarks, servo_plain
 from gazerig.robot.bringup.servo_families import KINDS, kind_of
 from gazerig.robot.cli import progress as bench
 from gazerig.robot.cli.ports import MockOption, rig_ports
@@ -186,8 +186,8 @@ def _one(
             rounds = [*boards, *_search(line, usb, servos, True, named == "all")]
     finally:
         line.closePort()
-    wished = tuple(dict.fromkeys(row[0] for row in asked))
-    _show(rounds, path, wished, as_json)
+    requested = tuple(dict.fromkeys(row[0] for row in asked))
+    _show(rounds, path, requested, as_json)
     return any(one.answered for one in rounds)
 
 
@@ -217,7 +217,7 @@ def _show_ports(ports: Sequence[SerialPort]) -> None:
 
 
 def _show(
-    rounds: Sequence[SearchRound], where: str, wished: Sequence[BusKind], as_json: bool
+    rounds: Sequence[SearchRound], where: str, requested: Sequence[BusKind], as_json: bool
 ) -> None:
     boards = [one for one in rounds if one.board is not None]
     found = found_of(rounds)
@@ -238,7 +238,7 @@ def _show(
             table.add_row(str(servo.id), servo.model, version, str(servo.baud), made.title)
         out.print(table)
     for one in boards:
-        for line in board_words(one):
+        for line in board_text(one):
             out.print(f"{where}: {line}", markup=False)
-    for line in remarks(rounds, where, wished):
+    for line in remarks(rounds, where, requested):
         out.print(completed(line), markup=False)

@@ -62,11 +62,11 @@ def completed(text: str, given: Mapping[str, object] | None = None) -> str:
     return _SUGGESTED.sub(whole, text)
 
 
-def _command(command: str, words: str, given: Mapping[str, object]) -> str:
+def _command(command: str, text: str, given: Mapping[str, object]) -> str:
     rig, port, mock = (given.get(name) for name in ("rig", "port", "mock"))
     named = shlex.quote(str(rig))
     more = f" --port {shlex.quote(str(port))}" if isinstance(port, str) else ""
     more += " --mock" if mock is True else ""
     if command == "scan" and mock is not True:
-        return f"gazerig scan{words}{more}"
-    return f"gazerig {command} {named}{words}{more}"
+        return f"gazerig scan{text}{more}"
+    return f"gazerig {command} {named}{text}{more}"

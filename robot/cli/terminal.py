@@ -98,7 +98,7 @@ def _show_origin() -> None:
         say(traceback.format_exc().rstrip("\n"))
 
 
-def run_app(app: Callable[[list[str]], object], words: list[str], again: str) -> NoReturn:
+def run_app(app: Callable[[list[str]], object], arguments: list[str], again: str) -> NoReturn:
     """Run the command line and exit; whatever goes wrong is one line.
 
     Ctrl-C is "interrupted" and exit code 130, a reader of standard output that has gone one
@@ -112,7 +112,7 @@ def run_app(app: Callable[[list[str]], object], words: list[str], again: str) ->
         try:
             if signal.getsignal(signal.SIGINT) != signal.SIG_IGN:
                 signal.signal(signal.SIGINT, signal.default_int_handler)
-            app(words)
+            app(arguments)
         finally:
             _flush_stdout()
     except SystemExit as end:

@@ -280,7 +280,7 @@ def state_lines(now: Mapping[str, Any]) -> list[str]:
         f"guard: {'; '.join((now['level'], *now['reasons']))}",
         f"joints in deg: {joints}",
         f"not saved: {_count(unsaved)}; gazerig ctl save keeps" if unsaved else "all saved",
-        *(f"said: {words}" for words in now["said"][-_LAST_SAID:]),
+        *(f"said: {text}" for text in now["said"][-_LAST_SAID:]),
     ]
 
 

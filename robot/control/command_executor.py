@@ -108,12 +108,12 @@ class CommandExecutor:
 
     def _let_lead(self, change: Callable[[], None]) -> None:
         """Change who leads; the models begin gently where they take joints over."""
-        held, words = bool(self._lead.pose_rad), self._lead.words
+        held, text = bool(self._lead.pose_rad), self._lead.words
         change()
         if held and not self._lead.pose_rad:
             self._taken_over = True
             self._guard.go_gently()
-        if self._lead.words and not words:
+        if self._lead.words and not text:
             self._told.append(f"led by {self._lead.words}")
 
     def _resume(self, command: Resume, t_s: float) -> CommandReply:

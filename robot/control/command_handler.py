@@ -247,7 +247,7 @@ class CommandHandler:
     def _of_params(self, request: object) -> Outcome:
         match request:
             case {"do": "parameters" | "knobs", "prefix": str(prefix), **rest} if not rest:
-                found = [words for key, words in self._all_described() if key.startswith(prefix)]
+                found = [text for key, text in self._all_described() if key.startswith(prefix)]
                 return Answered(found)
             case {"do": "get", "prefix": str(prefix), **rest} if not rest:
                 return Answered(plain(self._params.get(prefix)) if self._params else {})

@@ -44,7 +44,7 @@ class Interrupts:
         self._more = 0
         self._before: dict[signal.Signals, Any] = {}
         self._depth = 0
-        self.patience = 1
+        self.tolerated = 1
         """So many requests are noted before one raises KeyboardInterrupt."""
         self.spared: Callable[[FrameType | None], bool] = lambda frame: False
         """Tells whether the function at work must not be interrupted whatever comes."""
@@ -92,7 +92,7 @@ class Interrupts:
 
     def never_raise(self) -> None:
         """Only note from now on: whoever works here asks often enough."""
-        self.patience = _NEVER
+        self.tolerated = _NEVER
 
     def refuse(self) -> None:
         """End here what was asked to end before there was anything to park.
@@ -112,5 +112,5 @@ class Interrupts:
             return
         else:
             self._more += 1
-        if self.requests > self.patience and not self.spared(frame):
+        if self.requests > self.tolerated and not self.spared(frame):
             raise KeyboardInterrupt

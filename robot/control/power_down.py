@@ -88,14 +88,14 @@ class PowerDown:
             self._interrupts.never_raise()
             with contextlib.suppress(BaseException):
                 self._torque_off()
-            self._interrupts.patience = max(1, self._interrupts.requests)
+            self._interrupts.tolerated = max(1, self._interrupts.requests)
 
     def leave(self) -> None:
         """Park, torque off, close, and say what of it worked; never raises."""
         interrupts = self._interrupts
         asked = interrupts.requests
         # The next request skips the rest of parking, one more breaks it off should it hang.
-        interrupts.patience = asked + 1
+        interrupts.tolerated = asked + 1
         how = ""
         try:
             if self._park is not None:
@@ -114,7 +114,7 @@ class PowerDown:
         with contextlib.suppress(Exception):
             if failed or not self._quiet:
                 self._say(f"stopped by {self.cause}: {how}" if self.cause else how)
-        interrupts.patience = max(1, interrupts.requests)
+        interrupts.tolerated = max(1, interrupts.requests)
 
 
 def _at_work_here(frame: FrameType | None) -> bool:

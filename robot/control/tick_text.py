@@ -11,7 +11,7 @@ from gazerig.robot.model.types import GuardResult
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
 
-def seeing_words(tick: Tick, residual: ResidualFigures) -> str:
+def perception_text(tick: Tick, residual: ResidualFigures) -> str:
     """Return age of the frame, distance of faces and its source, and the ego-motion residual.
 
     e.g. "frame 63 ms old | face 1 at 0.98 m by camera, +- 1 cm | still things seem to move
@@ -40,22 +40,22 @@ def target_name(target: Target) -> str:
     return name if target.part is None else f"{name}: {PART_NAMES[target.part]}"
 
 
-def lead_words(tick: Tick) -> str:
+def lead_text(tick: Tick) -> str:
     """Return who leads and how far the gaze is from the point, "" if no client leads.
 
     e.g. "gazerig ctl look (process 7): look at -1 0 0.3; 72 deg beside it: head yaw 70 of 180 deg"
     """
     if not tick.led:
         return ""
-    words, limited = tick.led, tick.gaze.limited
+    text, limited = tick.led, tick.gaze.limited
     if tick.target.kind != "puppet" or not limited or ": jog " in tick.led:
-        return words
+        return text
     error = degrees(gaze_error(tick.target.p_world_m, tick.pose).whole)
     ends = (
         f"{one.axis} {degrees(one.done_rad):.0f} of {degrees(one.asked_rad):.0f} deg"
         for one in limited
     )
-    return f"{words}; {error:.0f} deg beside it: {', '.join(ends)}"
+    return f"{text}; {error:.0f} deg beside it: {', '.join(ends)}"
 
 
 def guard_text(guard_result: GuardResult) -> str:
@@ -66,7 +66,7 @@ def guard_text(guard_result: GuardResult) -> str:
     return f"{guard_result.level.replace('_', ' ')} ({guard_result.reasons[0]}{more})"
 
 
-def health_words(health: BusHealth) -> str:
+def health_text(health: BusHealth) -> str:
     """Return the state of the bus, e.g. "bus: 3 lost"."""
     errors = sum(health.errors.values())
     if errors == 0:

@@ -52,8 +52,8 @@ _TABS_PER_S, _TABS_BURST = 2.0, 20.0  # each is told all there is, which takes a
 _READ_S = 5.0
 _BEAT_S = 1.0
 _RENEWED_EVERY_S = 0.25
-_OPEN_PATIENCE_S = 20.0
-_CLOSE_PATIENCE_S = 3.0
+_OPEN_TIMEOUT_S = 20.0
+_CLOSE_TIMEOUT_S = 3.0
 _DAY_S = 86400
 # What a proxy must not hand on: it is about one leg of the way (RFC 9110, 7.6.1).
 _ONE_LEG = {"connection", "transfer-encoding", "content-encoding", "content-length", "keep-alive"}
@@ -111,7 +111,7 @@ class AuthProxy:
             OSError: the address cannot be listened on.
         """
         self._thread.start()
-        if not self._opened.wait(_OPEN_PATIENCE_S):
+        if not self._opened.wait(_OPEN_TIMEOUT_S):
             raise OSError("the page's door did not open in time")
         if self._failed is not None:
             raise self._failed
@@ -130,7 +130,7 @@ class AuthProxy:
         """Send everybody away."""
         if self._thread.is_alive():
             self._loop.call_soon_threadsafe(self._over.set)
-            self._thread.join(_CLOSE_PATIENCE_S)
+            self._thread.join(_CLOSE_TIMEOUT_S)
 
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
@@ -238,8 +238,8 @@ class AuthProxy:
         """Hand what is asked for to the rig, and say whether it was taken."""
         async with asyncio.timeout(_READ_S):
             body = await request.read()
-        status, words = await self._handle(body, self._who(request))
-        return web.Response(status=status, text=f"{words}\n" if words else None, headers=_HEADERS)
+        status, text = await self._handle(body, self._who(request))
+        return web.Response(status=status, text=f"{text}\n" if text else None, headers=_HEADERS)
 
     async def _handle(self, body: bytes | str, who: str) -> tuple[int, str]:
         """Hand on what a browser asks; return an HTTP status, and words of a refusal."""
@@ -248,10 +248,10 @@ class AuthProxy:
             return 400, "not a JSON object that can be asked for"
         if asked.get("do") == "stop":
             try:
-                words = await self._stop.send(f"{asked.get('why', '')!s:.100} ({who})", who)
+                text = await self._stop.send(f"{asked.get('why', '')!s:.100} ({who})", who)
             except OSError as error:
                 return 503, str(error)
-            return (503, words) if words else (204, "")
+            return (503, text) if text else (204, "")
         if not self._asked_rate.take(self._loop.time()):
             return 429, "too many requests; try again"
         if leads(asked):
@@ -296,9 +296,9 @@ class AuthProxy:
         async for message in line:
             if message.type is not aiohttp.WSMsgType.TEXT:
                 continue
-            status, words = await self._handle(message.data, who)
+            status, text = await self._handle(message.data, who)
             async with asyncio.timeout(TAKES_S):
-                await line.send_str(json.dumps({"answer": status, "words": words}))
+                await line.send_str(json.dumps({"answer": status, "words": text}))
 
     def _wake(self) -> None:
         for news in self._news:

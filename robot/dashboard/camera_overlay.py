@@ -85,9 +85,9 @@ def _draw_scale(drawn: ImageArray) -> None:
     ramp = np.linspace(255, 0, width).astype(np.uint8)[None].repeat(_SCALE_PX, axis=0)
     foot = drawn[max(0, height - _SCALE_PX) :]
     foot[:] = cv2.applyColorMap(ramp, cv2.COLORMAP_TURBO)[: len(foot)]
-    for words, x in ((f"{NEAREST_M:g} m", 3), (f"{FARTHEST_M:g} m", width - 26)):
+    for text, x in ((f"{NEAREST_M:g} m", 3), (f"{FARTHEST_M:g} m", width - 26)):
         cv2.putText(
-            drawn, words, (x, height - 3), cv2.FONT_HERSHEY_SIMPLEX, 0.35, (255, 255, 255), 1,
+            drawn, text, (x, height - 3), cv2.FONT_HERSHEY_SIMPLEX, 0.35, (255, 255, 255), 1,
             cv2.LINE_AA,
         )  # fmt: skip
 

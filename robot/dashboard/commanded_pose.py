@@ -1,4 +1,4 @@
-"""Draw where the wish would have head and eyes, as a translucent ghost over the rig itself."""
+"""Draw head and eyes at the desired angles, translucent, over the measured pose."""
 
 from math import radians
 from typing import NamedTuple
@@ -79,8 +79,8 @@ class CommandedPoseView:
         return _CommandedEye(side, ball, upper, lower)
 
     def show(self, snapshot: Snapshot | None) -> None:
-        """Move the ghost to where the wish is; without a snapshot or a wish it is not seen."""
-        ghost = snapshot.ghost if snapshot is not None else None
+        """Move the drawing to the desired pose; hide it if there is no snapshot or no such pose."""
+        ghost = snapshot.commanded_pose if snapshot is not None else None
         self._frame.visible = ghost is not None
         if snapshot is not None and ghost is not None:
             if snapshot.joints != self._joints:
@@ -114,6 +114,6 @@ class CommandedPoseView:
 
 
 def _apart(ghost: CommandedPose, snapshot: Snapshot) -> bool:
-    """Return whether the wished head is so far off the measured one that both can be seen."""
+    """Return whether the desired head is so far off the measured one that both can be seen."""
     turned = np.array(ghost.R_world_head) - np.array(snapshot.R_world_head)
     return float(np.abs(turned).max()) > _APART

@@ -21,16 +21,16 @@ _TARGET_SCALE = 0.12
 class ControlTabs:
     """Three tabs: lead, joints, tuning."""
 
-    def __init__(self, server: viser.ViserServer, teller: Outbox) -> None:
+    def __init__(self, server: viser.ViserServer, outbox: Outbox) -> None:
         # A window of its own: below words that grow and shrink, a button would slip away from
         # under the mouse.
         window = server.gui.add_panel()
         lead, joints, tuning = (window.add_tab(name) for name in ("lead", "joints", "tuning"))
         window.dock_below(server.gui.main_panel)
         self._window = window
-        self._lead = LeadView(server, lead, teller)
-        self._joints = JogPanel(server.gui, joints, teller)
-        self._tuning = ParamState(server, tuning, teller)
+        self._lead = LeadView(server, lead, outbox)
+        self._joints = JogPanel(server.gui, joints, outbox)
+        self._tuning = ParamState(server, tuning, outbox)
 
     def leave(self) -> None:
         """Remove all controls: a recording cannot be controlled."""
@@ -59,19 +59,19 @@ class ControlTabs:
         self._lead.show(snapshot)
         self._joints.show(snapshot)
 
-    def answered(self, who: str, words: str | None) -> None:
+    def answered(self, who: str, text: str | None) -> None:
         """Pass the rig's reply to the panel that waits for it."""
-        self._tuning.answered(who, words)
+        self._tuning.answered(who, text)
 
 
 class LeadView:
     """Menus, and a target that is dragged through the scene."""
 
-    def __init__(self, server: viser.ViserServer, tab: viser.GuiTabHandle, teller: Outbox) -> None:
+    def __init__(self, server: viser.ViserServer, tab: viser.GuiTabHandle, outbox: Outbox) -> None:
         """Fill the tab; menus and characters follow when the rig names them."""
         self._server = server
         self._tab = tab
-        self._teller = teller
+        self._outbox = outbox
         self._menus: dict[str, viser.GuiButtonGroupHandle] = {}
         self._characters: viser.GuiButtonGroupHandle | None = None
         self._target_m = (0.8, 0.0, 0.15)
@@ -111,12 +111,12 @@ class LeadView:
         async def _(event: viser.TransformControlsEvent) -> None:
             x, y, z = map(float, event.target.position)
             if event.client_id is not None and event.phase != "start":
-                self._teller.command(LookAt((x, y, z)), str(event.client_id))
+                self._outbox.command(LookAt((x, y, z)), str(event.client_id))
 
         @free.on_click
         async def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
             put(self._drag, False)
-            self._teller.command(LookAt(None), str(event.client_id))
+            self._outbox.command(LookAt(None), str(event.client_id))
 
     def offer(self, name: str, choices: Sequence[str]) -> None:
         """Add a menu as a row of buttons."""
@@ -129,9 +129,9 @@ class LeadView:
         async def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
             who, choice = str(event.client_id), event.target.value
             if name == STEER:
-                self._teller.ask({"steer": choice}, who)
+                self._outbox.ask({"steer": choice}, who)
             else:
-                self._teller.command(Ask(name, choice), who)
+                self._outbox.command(Ask(name, choice), who)
 
         self._menus[name] = group
 
@@ -146,7 +146,7 @@ class LeadView:
         @group.on_click
         async def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
             asked = {"do": "character", "name": event.target.value}
-            self._teller.ask(asked, str(event.client_id))
+            self._outbox.ask(asked, str(event.client_id))
 
         self._characters = group
 
@@ -169,9 +169,9 @@ class LeadView:
 
 def _leader(led: str) -> str:
     """Show who leads on one line, always present: the buttons below must not move."""
-    words = f"led by <b>{escape(led)}</b>" if led else "led by nobody"
+    text = f"led by <b>{escape(led)}</b>" if led else "led by nobody"
     cut = "height:1.5em;overflow:hidden;text-overflow:ellipsis;white-space:nowrap"
-    return _note(f"<div title='{escape(led)}' style='{cut}'>{words}</div>")
+    return _note(f"<div title='{escape(led)}' style='{cut}'>{text}</div>")
 
 
 def _note(html: str) -> str:

@@ -35,20 +35,20 @@ def frame(inner: str) -> str:
     return f"<div style='padding:4px 12px;font-size:13px;line-height:1.5'>{inner}</div>"
 
 
-def pill(words: str, colour: str) -> str:
+def pill(text: str, colour: str) -> str:
     """Return words on a coloured ground."""
     return (
         f"<span style='background:{colour};color:#fff;border-radius:9px;padding:0 9px;"
-        f"margin:1px 6px 1px 0;font-weight:600;display:inline-block'>{escape(words)}</span>"
+        f"margin:1px 6px 1px 0;font-weight:600;display:inline-block'>{escape(text)}</span>"
     )
 
 
-def heading(words: str, aside: str = "") -> str:
+def heading(text: str, aside: str = "") -> str:
     """Return a line above a frame or table, with something smaller at its right end."""
     return (
         "<div style='font-size:12px;font-weight:600;margin-top:4px'>"
         f"<span style='float:right;font-weight:400;opacity:.7'>{escape(aside)}</span>"
-        f"{escape(words)}</div>"
+        f"{escape(text)}</div>"
     )
 
 
@@ -57,9 +57,9 @@ def counted(n: int, what: str) -> str:
     return f"{n} {what}" if n == 1 else f"{n} {what}s"
 
 
-def note(words: str) -> str:
+def note(text: str) -> str:
     """Return a small line, for sources and explanations."""
-    return f"<div style='font-size:11px;opacity:.75;line-height:1.35'>{escape(words)}</div>"
+    return f"<div style='font-size:11px;opacity:.75;line-height:1.35'>{escape(text)}</div>"
 
 
 def svg(height: float, parts: Iterable[str]) -> str:
@@ -85,9 +85,9 @@ def line(points: Iterable[tuple[float, float]], colour: str, wide: float = 1.0) 
     return f"<polyline points='{path}' fill='none' stroke='{colour}' stroke-width='{wide}'/>"
 
 
-def text(x: float, y: float, words: str, size: float = 10.0, anchor: str = "start") -> str:
+def text(x: float, y: float, text: str, size: float = 10.0, anchor: str = "start") -> str:
     """Return words whose baseline begins, ends or is centred at a point."""
     return (
         f"<text x='{x:.1f}' y='{y:.1f}' font-size='{size}' text-anchor='{anchor}' "
-        f"fill='currentColor'>{escape(words)}</text>"
+        f"fill='currentColor'>{escape(text)}</text>"
     )

@@ -27,7 +27,7 @@ _MOST_WAITING = 100
 """Requests that wait for the slow thread; one more is refused."""
 _CHANGES_EVERY_S = 0.1
 """A change costs a few ms of processor in all, which the control loop has to share."""
-_CLOSE_PATIENCE_S = 2.0
+_CLOSE_TIMEOUT_S = 2.0
 
 
 def request_message(who: str, data: bytes) -> bytes:
@@ -151,4 +151,4 @@ class Inbox:
             return  # the other side was quicker
         for thread in self._threads:
             if thread is not threading.current_thread():
-                thread.join(_CLOSE_PATIENCE_S)
+                thread.join(_CLOSE_TIMEOUT_S)

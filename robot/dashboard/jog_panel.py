@@ -27,13 +27,13 @@ _TABLE_EVERY = 5  # with every fifth frame, some 5 times a second: figures are t
 class JogPanel:
     """One slider a joint."""
 
-    def __init__(self, gui: viser.GuiApi, tab: viser.GuiTabHandle, teller: Outbox) -> None:
+    def __init__(self, gui: viser.GuiApi, tab: viser.GuiTabHandle, outbox: Outbox) -> None:
         """Fill the tab; the sliders come with the joints' limits."""
         self._gui = gui
         self._tab = tab
-        self._teller = teller
+        self._outbox = outbox
         self._sliders: dict[str, viser.GuiSliderHandle[float]] = {}
-        # Joint -> angle asked for and the time of the last frame in which it was wished.
+        # Joint -> angle asked for and the time of the last frame in which it was requested.
         self._held: dict[str, tuple[float, float]] = {}
         self._now_s = 0.0
         self._table, self._shown = "", 0
@@ -49,7 +49,7 @@ class JogPanel:
         @free.on_click
         async def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
             self._held.clear()
-            self._teller.command(LookAt(None), str(event.client_id))
+            self._outbox.command(LookAt(None), str(event.client_id))
 
     def values(self, in_force: Mapping[str, object]) -> None:
         """Create the sliders, and keep their ends at the joints' limits."""
@@ -85,7 +85,7 @@ class JogPanel:
 
     def _jog(self, joint: str, angle_deg: float, who: str) -> None:
         self._held[joint] = (angle_deg, self._now_s)
-        self._teller.command(Jog(((joint, radians(angle_deg)),)), who)
+        self._outbox.command(Jog(((joint, radians(angle_deg)),)), who)
 
     def show(self, snapshot: Snapshot) -> None:
         """Write the measured angles; sliders that nobody holds follow them."""
@@ -126,7 +126,7 @@ def measured_table(snapshot: Snapshot) -> str:
     What nobody measures stands in a column of its own: an estimated angle looks like any other.
     """
     estimated = frozenset(snapshot.estimated)
-    columns = ["wish"]
+    columns = ["desired"]
     if not estimated.issuperset(snapshot.joints):
         columns.append(MEASURED)
     if estimated:
@@ -139,7 +139,7 @@ def measured_table(snapshot: Snapshot) -> str:
         )
         for joint, desired, now in joints
     )
-    head = "".join(f"<td style='{_RIGHT}'>{words}</td>" for words in columns)
+    head = "".join(f"<td style='{_RIGHT}'>{text}</td>" for text in columns)
     return (
         "<table style='margin:4px 12px;font-size:12px;width:calc(100% - 24px);"
         "font-variant-numeric:tabular-nums'><tr style='opacity:.6'><td>degrees</td>"

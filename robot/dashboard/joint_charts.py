@@ -1,4 +1,4 @@
-"""Traces of eyes, head and lids: what was wished, what the guard permitted, what was measured."""
+"""Traces of eyes, head and lids: desired, commanded and measured angles."""
 
 from collections import deque
 from collections.abc import Iterable, Sequence
@@ -116,7 +116,7 @@ class JointSeries:
     def table(self, over_s: float) -> tuple[Floats, Floats]:
         """Return the last seconds, thinned to MOST_POINTS: times and joints.
 
-        Returns seconds before the newest (n,) and degrees (n, 3, joints): wish, permitted and
+        Returns seconds before the newest (n,) and degrees (n, 3, joints): desired, commanded and
         measured.
         """
         if not self._rows:
@@ -129,7 +129,7 @@ class JointSeries:
 
 
 def mean_deg(angles_deg: Floats, group: ChartGroup, joints: tuple[str, ...]) -> Floats:
-    """Return wish, permitted and measured (n, 3) of a group, from those of the joints."""
+    """Return desired, commanded and measured (n, 3) of a group, from those of the joints."""
     mean: Floats = angles_deg[:, :, [joints.index(name) for name in group.joints]].mean(axis=2)
     return mean
 
@@ -212,7 +212,7 @@ class JointCharts:
 
 
 def _result(estimated: bool) -> uplot.Series:
-    """Return the line of what came of the wish: dashed and pale where nobody measured it."""
+    """Return the line of the resulting angle: dashed and pale if it is not measured."""
     name, colour, width = _ESTIMATED if estimated else _MEASURED
     line = uplot.Series(label=name, stroke=colour, width=width, points={"show": False})
     if estimated:
@@ -230,8 +230,8 @@ def _columns(ago_s: Floats, angles_deg: Floats) -> tuple[Floats, ...]:
     return (ago_s, *(np.ascontiguousarray(column) for column in angles_deg.T), room)
 
 
-def _title(words: str, estimated: bool) -> str:
-    said = f"{words}, degrees{'; no feedback' if estimated else ''}"
+def _title(text: str, estimated: bool) -> str:
+    said = f"{text}, degrees{'; no feedback' if estimated else ''}"
     return f"<div style='padding:4px 12px 0;font-size:12px;opacity:.85'>{said}</div>"
 
 

@@ -29,12 +29,12 @@ class OverlayPanel:
     """The layers in the scene."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
-        self._ghost = CommandedPoseView(scene)
+        self._commanded_pose = CommandedPoseView(scene)
         self._camera = CameraField(scene)
         self._eyes = EyeFields(scene)
 
     def show(self, snapshot: Snapshot, layers: OverlayChoices) -> None:
         """Draw what is wanted and take the rest away."""
-        self._ghost.show(snapshot if layers.ghost else None)
+        self._commanded_pose.show(snapshot if layers.ghost else None)
         self._camera.show(snapshot if layers.camera else None)
         self._eyes.show(snapshot if layers.eyes else None)

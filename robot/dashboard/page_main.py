@@ -81,7 +81,7 @@ class Served(NamedTuple):
 
 
 def serve(
-    host: str, port: int, token: str, folder: Path, teller: Outbox, stop: StopSender
+    host: str, port: int, token: str, folder: Path, outbox: Outbox, stop: StopSender
 ) -> Served:
     """Open the page's server, and its door on the first free port.
 
@@ -90,7 +90,7 @@ def serve(
         port: the first to try; a busy one moves on to the next
         token: what browsers must show
         folder: that only this user can enter, for the server's socket
-        teller: hands on what is asked for
+        outbox: hands on what is asked for
         stop: hands on stops
 
     Raises:
@@ -98,16 +98,16 @@ def serve(
     """
     open_port = free_port(host, port)
     server = open_server(folder / "page.sock")
-    door = AuthProxy(host, open_port, folder / "page.sock", teller.hand_on, stop, token)
-    teller.name = lambda client: _browser(server, client)
-    teller.leads = door.browsers.led_by
+    door = AuthProxy(host, open_port, folder / "page.sock", outbox.hand_on, stop, token)
+    outbox.name = lambda client: _browser(server, client)
+    outbox.leads = door.browsers.led_by
     door.open()
-    words = []
+    text = []
     if port not in (0, open_port):  # 0 asks for any port
-        words.append(f"port {port} is busy, using {open_port}")
+        text.append(f"port {port} is busy, using {open_port}")
     name = socket.gethostname() if host in _EVERYWHERE else host
     url = f"http://[{name}]:{open_port}" if ":" in name else f"http://{name}:{open_port}"
-    return Served(server, door, f"{url}/?token={token}", "; ".join(words) or None)
+    return Served(server, door, f"{url}/?token={token}", "; ".join(text) or None)
 
 
 def _browser(server: viser.ViserServer, client: str) -> str:
@@ -158,17 +158,17 @@ def main(arguments: list[str]) -> int:
     # Not closed by hand: its end tells the other side to read this process's last words,
     # and those of an exception are written only after a ``with`` has been left.
     feed = socket.socket(fileno=int(fd))
-    teller, stop = Outbox(feed), StopSender(socket.socket(fileno=int(stop_fd)))
+    outbox, stop = Outbox(feed), StopSender(socket.socket(fileno=int(stop_fd)))
     folder = Path(os.environ.pop(FOLDER_VARIABLE))
     try:
-        return _show(feed, teller, stop, (host, int(port)), token, folder, int(parent))
+        return _show(feed, outbox, stop, (host, int(port)), token, folder, int(parent))
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
 
 def _show(
     feed: socket.socket,
-    teller: Outbox,
+    outbox: Outbox,
     stop: StopSender,
     address: tuple[str, int],
     token: str,
@@ -177,14 +177,14 @@ def _show(
 ) -> int:
     """Serve the page until the rig is gone; give the process's exit code."""
     try:
-        served = serve(*address, token, folder, teller, stop)
+        served = serve(*address, token, folder, outbox, stop)
     except OSError as error:
         host, port = address
         sys.stderr.write(f"cannot open {host} port {port}: {error.strerror or error}\n")
         return CANNOT_OPEN
     if served.words is not None:
         feed.send(NOTICE + served.words.encode())
-    view = PageView(served.server, teller, served.door.tell)
+    view = PageView(served.server, outbox, served.door.tell)
     feed.send(URL + served.url.encode())
     watch(feed, view, parent, served.door)
     served.door.close()

@@ -50,8 +50,8 @@ MARK_KINDS = ("saccade", "blink", "event")
 OnRequest = Callable[[dict[str, object]], str | None]
 """Carries out a request of a user of the page; returns the reply, or None."""
 
-_CLOSE_PATIENCE_S = 2.0
-_LAST_WORDS_BYTES = 4096
+_CLOSE_TIMEOUT_S = 2.0
+_LAST_LINES_BYTES = 4096
 _MOST_WORDS = 20_000  # of one answer, in characters
 _MOST_OWED = 100  # answers to a page that takes none
 _AGAIN_AFTER_S = 0.5
@@ -189,9 +189,9 @@ class PageProcess:
         self._choices = choices
         self.send(CHOICES + json.dumps(choices).encode())
 
-    def say(self, words: str) -> None:
+    def say(self, text: str) -> None:
         """Show a message to all users of the page."""
-        self._answer(ALL_USERS, words)
+        self._answer(ALL_USERS, text)
 
     def send(self, message: bytes) -> bool:
         """Hand over a message as it is; False where the page does not take it now."""
@@ -249,10 +249,10 @@ class PageProcess:
         except Exception as error:  # a stop must still be obeyed after any fault
             return f"the rig could not do that: {type(error).__name__}: {error}"
 
-    def _answer(self, who: str, words: str | None) -> None:
+    def _answer(self, who: str, text: str | None) -> None:
         """Acknowledge a request, with the reply."""
-        words = words[:_MOST_WORDS] if words is not None else None
-        self._owed.append(MESSAGE + json.dumps((who, words)).encode())
+        text = text[:_MOST_WORDS] if text is not None else None
+        self._owed.append(MESSAGE + json.dumps((who, text)).encode())
         self._pay()
 
     def _pay(self) -> None:
@@ -265,13 +265,13 @@ class PageProcess:
         """Report once that the page has died, and restart it if that can help."""
         process = self._process
         self._hang_up()
-        words = self._last_words()
+        text = self._last_lines()
         self.gone = process is None or _code(process) == CANNOT_OPEN
         if self._clock.now_s() - self._began_s > _WELL_AFTER_S:
             self._wait_s, self._mourned, self._welcomed = _AGAIN_AFTER_S, False, False
         if not self._mourned:
             then = "start it again to see the page" if self.gone else "it is started again"
-            self._notices.append(f"the page has stopped ({words}); the rig runs on, {then}")
+            self._notices.append(f"the page has stopped ({text}); the rig runs on, {then}")
         self._mourned = True
         if self.gone:
             return
@@ -289,17 +289,17 @@ class PageProcess:
             except OSError as error:  # no memory, no processes, no files
                 self._notices.append(f"the page cannot be started again: {error.strerror}")
 
-    def _last_words(self) -> str:
+    def _last_lines(self) -> str:
         if self._errors_fd < 0:
             return "it gave no reason"
-        text = os.pread(self._errors_fd, _LAST_WORDS_BYTES, self._errors_from()).decode(
+        text = os.pread(self._errors_fd, _LAST_LINES_BYTES, self._errors_from()).decode(
             errors="replace"
         )
         lines = text.strip().splitlines()
         return lines[-1].strip() if lines else "it gave no reason"
 
     def _errors_from(self) -> int:
-        return max(0, os.fstat(self._errors_fd).st_size - _LAST_WORDS_BYTES)
+        return max(0, os.fstat(self._errors_fd).st_size - _LAST_LINES_BYTES)
 
     def _hang_up(self) -> None:
         link, self._socket = self._socket, None
@@ -324,7 +324,7 @@ class PageProcess:
         if self._process is None:
             return
         try:
-            self._process.wait(_CLOSE_PATIENCE_S)
+            self._process.wait(_CLOSE_TIMEOUT_S)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
@@ -337,6 +337,6 @@ class PageProcess:
 def _code(process: subprocess.Popen[bytes]) -> int | None:
     """Return the exit code of a process that has hung up, None where it hangs."""
     try:
-        return process.wait(_CLOSE_PATIENCE_S)
+        return process.wait(_CLOSE_TIMEOUT_S)
     except subprocess.TimeoutExpired:
         return None

@@ -32,15 +32,15 @@ class PageView:
     def __init__(
         self,
         server: viser.ViserServer,
-        teller: Outbox,
+        outbox: Outbox,
         tell: Callable[[Mapping[str, object]], None],
     ) -> None:
         """Build the empty room.
 
-        teller: takes what people do to the rig; tell: shows what the stop button must know
+        outbox: takes what people do to the rig; tell: shows what the stop button must know
         """
         self._server = server
-        self._teller = teller
+        self._outbox = outbox
         self._tell = tell
         server.initial_camera.position, server.initial_camera.look_at = VIEWS["both"]
         server.on_client_connect(_greet)
@@ -50,7 +50,7 @@ class PageView:
         self._panel = PanelView(server.gui)
         self._layers = OverlayPanel(server.scene)
         self._panel.depth = self._ask_depth
-        self._controls = ControlTabs(server, teller)
+        self._controls = ControlTabs(server, outbox)
         self._replay: ReplayView | None = None
         self._newest: Snapshot | None = None
         self._jpeg: bytes | None = None
@@ -58,7 +58,7 @@ class PageView:
         self._add_views()
 
     def _ask_depth(self, on: bool) -> None:
-        self._teller.ask({"show": {"depth": on}}, ALL_USERS)
+        self._outbox.ask({"show": {"depth": on}}, ALL_USERS)
 
     def _add_views(self) -> None:
         buttons = self._server.gui.add_button_group("view", tuple(VIEWS), order=9)
@@ -89,19 +89,19 @@ class PageView:
     def _stop_state(self) -> dict[str, object]:
         """Return what the stop button must know: a recording can neither be stopped nor resumed.
 
-        blind: joints without feedback, which do not take hold where they are but jump
+        without_feedback: joints without feedback, which do not take hold where they are but jump
         """
         if self._replay is not None:
             return {"recording": True}
         shot = self._newest
-        stopped, blind = (shot.stopped, len(shot.estimated)) if shot else ("", 0)
-        return {"stopped": stopped, "silent": False, "blind": blind}
+        stopped, without_feedback = (shot.stopped, len(shot.estimated)) if shot else ("", 0)
+        return {"stopped": stopped, "silent": False, "without_feedback": without_feedback}
 
     def _take(self, kind: bytes, data: object) -> None:
         """Apply messages of the rig other than snapshots and frames."""
         if kind == MESSAGE and isinstance(data, list):
-            who, words = data
-            self._controls.answered(who, words)
+            who, text = data
+            self._controls.answered(who, text)
         elif kind == PARAMS and isinstance(data, list):
             self._controls.params(data)
         elif isinstance(data, dict):
@@ -126,7 +126,7 @@ class PageView:
         self._replay.show(state)
 
     def _ask_replay(self, client: int, asked: Mapping[str, object]) -> None:
-        self._teller.ask(asked, str(client))
+        self._outbox.ask(asked, str(client))
 
     def _draw(self) -> None:
         if self._newest is not None:

@@ -40,7 +40,7 @@ class PanelView:
         self._status = gui.add_html(frame("<b>waiting for the rig</b>"), order=1)
         self._image: viser.GuiImageHandle | None = None
         self._shown = 0
-        self.depth: Callable[[bool], None] = _nobody
+        self.depth: Callable[[bool], None] = _ignore
         self._begin()
         window = gui.add_panel()
         window.dock_left()
@@ -179,5 +179,5 @@ def _setter(
     return put
 
 
-def _nobody(wanted: bool) -> None:
+def _ignore(wanted: bool) -> None:
     """Do nothing: nobody asked to be told."""

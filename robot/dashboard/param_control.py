@@ -111,44 +111,42 @@ class ParamControl:
         self._refuse = refuse
         self._unsaved = unsaved
         self._form: viser.GuiFormHandle | None = None
-        words = label(param, unsaved)
-        self._handle = self._add(gui, words, value, order)
+        text = label(param, unsaved)
+        self._handle = self._add(gui, text, value, order)
         if self._form is None:
             self._listen()
         else:
             self._listen_to_enter(self._form)
 
     def _add(
-        self, gui: viser.GuiApi, words: str, value: object, order: float
+        self, gui: viser.GuiApi, text: str, value: object, order: float
     ) -> viser.GuiInputHandle[object]:
         param, says = self.param, hint(self.param)
         handle: object
         if param.kind == "bool" and not param.optional:
-            handle = gui.add_checkbox(words, bool(value), hint=says, order=order)
+            handle = gui.add_checkbox(text, bool(value), hint=says, order=order)
         elif param.choices and not param.optional and value in param.choices:
             names = tuple(map(str, param.choices))
-            handle = gui.add_dropdown(
-                words, names, initial_value=str(value), hint=says, order=order
-            )
+            handle = gui.add_dropdown(text, names, initial_value=str(value), hint=says, order=order)
         elif slides(param, value):
-            handle = self._slider(gui, words, value, order)
+            handle = self._slider(gui, text, value, order)
         else:
             # A number on its way to what is meant is another number: only Enter counts.
             self._form = gui.add_form(None, order=order)
             with self._form:
-                handle = gui.add_text(words, written(param, value), hint=f"{says}; Enter sets it")
+                handle = gui.add_text(text, written(param, value), hint=f"{says}; Enter sets it")
         return cast("viser.GuiInputHandle[object]", handle)
 
-    def _slider(self, gui: viser.GuiApi, words: str, value: object, order: float) -> object:
+    def _slider(self, gui: viser.GuiApi, text: str, value: object, order: float) -> object:
         param = self.param
         assert param.low is not None and param.high is not None  # slides() has seen to it
         if param.kind == "whole":
             low, high, now = int(param.low), int(param.high), int(cast(int, value))
             step: float = max(1, round(step_of(low, high))) if high - low > 500 else 1
-            return gui.add_slider(words, low, high, int(step), now, hint=hint(param), order=order)
+            return gui.add_slider(text, low, high, int(step), now, hint=hint(param), order=order)
         low_, high_, now_ = float(param.low), float(param.high), float(cast(float, value))
         step = step_of(low_, high_)
-        return gui.add_slider(words, low_, high_, step, now_, hint=hint(param), order=order)
+        return gui.add_slider(text, low_, high_, step, now_, hint=hint(param), order=order)
 
     def _listen(self) -> None:
         @self._handle.on_update

@@ -28,9 +28,9 @@ _SAID_S = 8.0
 class ParamState:
     """The parameters, and one panel of controls for each browser."""
 
-    def __init__(self, server: viser.ViserServer, tab: viser.GuiTabHandle, teller: Outbox) -> None:
+    def __init__(self, server: viser.ViserServer, tab: viser.GuiTabHandle, outbox: Outbox) -> None:
         self._tab = tab
-        self._teller = teller
+        self._outbox = outbox
         self._params: dict[str, ParamInfo] = {}
         self._panels: dict[str, ParamPanel] = {}
         # A tab takes one builder at a time, and browsers come and go in a thread of their own.
@@ -44,7 +44,7 @@ class ParamState:
 
     async def _greet(self, client: viser.ClientHandle) -> None:
         with self._lock:
-            panel = ParamPanel(client, self._tab, self._teller, self._lock)
+            panel = ParamPanel(client, self._tab, self._outbox, self._lock)
             panel.offer(self._params)
             panel.take(self.in_force, self._unsaved, self._path)
             self._panels[str(client.client_id)] = panel
@@ -71,19 +71,19 @@ class ParamState:
             for panel in self._panels.values():
                 panel.take(self.in_force, self._unsaved, self._path)
 
-    def answered(self, who: str, words: str | None) -> None:
+    def answered(self, who: str, text: str | None) -> None:
         """Pass the rig's answer on to who asked; words for nobody else go to everybody."""
         client, _, of_tuning = who.partition(":")
         with self._lock:
             panel = self._panels.get(client)
             if panel is not None and of_tuning:
                 panel.answered()
-        if not words:
+        if not text:
             return
         clients = self._clients()
         asked = [c for c in clients.values() if str(c.client_id) == client]
         for handle in asked or clients.values():
-            _notify(handle, words)
+            _notify(handle, text)
 
 
 class ParamPanel:
@@ -93,14 +93,14 @@ class ParamPanel:
         self,
         client: viser.ClientHandle,
         tab: viser.GuiTabHandle,
-        teller: Outbox,
+        outbox: Outbox,
         lock: threading.RLock,
     ) -> None:
         """Add search, groups and buttons; parameters come when they are chosen."""
         self._client = client
         self._gui = client.gui
         self._tab = tab
-        self._teller = teller
+        self._outbox = outbox
         self._lock = lock
         self._who = f"{client.client_id}{_OF_TUNING}"
         self._params: Mapping[str, ParamInfo] = {}
@@ -157,9 +157,9 @@ class ParamPanel:
         """Update the values in force; a control that is being moved keeps its value."""
         self._values, self._unsaved = values, unsaved
         some = f"<b>● {len(unsaved)} not saved</b>" if unsaved else "all saved"
-        words = _note(f"{len(self._params)} parameters, {some}<br>{escape(path)}")
-        if self._words.content != words:
-            self._words.content = words
+        text = _note(f"{len(self._params)} parameters, {some}<br>{escape(path)}")
+        if self._words.content != text:
+            self._words.content = text
         if not self._unanswered:
             self._refresh()
 
@@ -180,20 +180,20 @@ class ParamPanel:
                         self._controls[key] = self._control(key, control.order)
 
     def _ask(self, what: Mapping[str, object]) -> None:
-        if not self._teller.ask(what, self._who):
+        if not self._outbox.ask(what, self._who):
             _notify(self._client, "refused: the rig takes nothing now")
             self._refresh()
 
     def _put(self, key: str, value: object) -> None:
         with self._lock:
             self._unanswered += 1
-            if not self._teller.ask({"do": "set", "changes": {key: value}}, self._who):
+            if not self._outbox.ask({"do": "set", "changes": {key: value}}, self._who):
                 self._unanswered -= 1
                 _notify(self._client, "refused: the rig takes nothing now")
                 self._refresh()
 
-    def _refuse(self, words: str) -> None:
-        _notify(self._client, f"refused: {words}")
+    def _refuse(self, text: str) -> None:
+        _notify(self._client, f"refused: {text}")
         self._refresh()
 
     def _show_chosen(self) -> None:
@@ -248,11 +248,11 @@ def found(text: str, params: Iterable[ParamInfo]) -> list[str]:
     ]
 
 
-def _notify(client: viser.ClientHandle, words: str) -> None:
-    refused = words.startswith("refused")
+def _notify(client: viser.ClientHandle, text: str) -> None:
+    refused = text.startswith("refused")
     client.add_notification(
         "refused" if refused else "the rig says",
-        words.removeprefix("refused: "),
+        text.removeprefix("refused: "),
         color="red" if refused else "blue",
         auto_close_seconds=_REFUSED_S if refused else _SAID_S,
     )

@@ -19,9 +19,9 @@ from gazerig.gaze.angles import rotate_back, sub
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.control.tick_text import (
     guard_text,
-    health_words,
-    lead_words,
-    seeing_words,
+    health_text,
+    lead_text,
+    perception_text,
     target_name,
 )
 from gazerig.robot.dashboard.camera_overlay import draw_detections, encode, ground
@@ -45,7 +45,7 @@ class InForce(NamedTuple):
     character: str
 
 
-def _nobody(words: str) -> None:
+def _drop(text: str) -> None:
     """Drop a message: there is no page."""
 
 
@@ -78,7 +78,7 @@ class Publisher:
         poses: PoseHistory,
         horizontal_field_deg: Callable[[], float],
         feed: ParamFeed | None = None,
-        tell: Callable[[str], None] = _nobody,
+        tell: Callable[[str], None] = _drop,
     ) -> None:
         self._page = page
         self._say = say
@@ -154,8 +154,8 @@ class Publisher:
     def _said(self, tick: Tick) -> SnapshotTexts:
         """Gather what the tick itself does not tell."""
         now = self._in_force()
-        words, seeing = health_words(self._health()), seeing_words(tick, self._residual())
-        return SnapshotTexts(words, now.behaviour, seeing, now.character, now.conversation)
+        text, perception = health_text(self._health()), perception_text(tick, self._residual())
+        return SnapshotTexts(text, now.behaviour, perception, now.character, now.conversation)
 
     def _tell_of(self, page: PageProcess) -> None:
         """Send the page its parameters, and print the page's address."""
@@ -198,9 +198,9 @@ class Publisher:
         parts = [
             f"{rate_hz:5.1f} Hz",
             f"{target_name(tick.target)} - {tick.target.why}",
-            *([f"led by {lead_words(tick)}"] if tick.led else []),
+            *([f"led by {lead_text(tick)}"] if tick.led else []),
             guard_text(tick.guard_result),
-            health_words(self._health()),
+            health_text(self._health()),
         ]
         return " | ".join(parts)
 

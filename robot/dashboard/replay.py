@@ -83,7 +83,7 @@ class ReplayView:
         if (marks := state.get("marks")) is not None:
             self._strip.content = strip(marks)
         if (events := state.get("events")) is not None:
-            self._events = [(float(at_s), str(words)) for at_s, words in events]
+            self._events = [(float(at_s), str(text)) for at_s, text in events]
         at_s, sought_s = float(state["at_s"]), state["sought_s"]
         # While a hand moves the slider, what is played is behind it and must not pull it back.
         if self._asked_s is None or sought_s == self._asked_s:
@@ -156,8 +156,8 @@ def event_list(events: Sequence[tuple[float, str]], at_s: float) -> str:
     return _frame("".join(rows) or "no event")
 
 
-def _event(at_s: float, words: str, opacity: float) -> str:
-    shown = words if len(words) <= _WORDS else f"{words[: _WORDS - 1]}…"
+def _event(at_s: float, text: str, opacity: float) -> str:
+    shown = text if len(text) <= _WORDS else f"{text[: _WORDS - 1]}…"
     return (
         f"<div style='opacity:{opacity};font-size:11.5px'>"
         f"<span style='font-variant-numeric:tabular-nums'>{clock(at_s)}</span> "

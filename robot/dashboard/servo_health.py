@@ -39,7 +39,7 @@ def health(snapshot: Snapshot) -> str:
         + _timing(snapshot.timing)
         + _frame(snapshot.frame_age_s)
         + f"<div>{escape(snapshot.health)}</div>"
-        + f"<div style='opacity:.8;font-size:12px'>{escape(snapshot.seeing)}</div>"
+        + f"<div style='opacity:.8;font-size:12px'>{escape(snapshot.perception)}</div>"
     )
 
 
@@ -156,8 +156,8 @@ def _frame(age_s: float | None) -> str:
     return f"<div>frame <b style='color:{colour}'>{1e3 * age_s:.0f} ms</b> old</div>"
 
 
-def _cell(words: str, strain: Strain) -> str:
-    return f"<td style='{_RIGHT};{_GROUNDS[strain]}'>{words}</td>"
+def _cell(text: str, strain: Strain) -> str:
+    return f"<td style='{_RIGHT};{_GROUNDS[strain]}'>{text}</td>"
 
 
 def _at(column: tuple[float | None, ...], i: int) -> float | None:

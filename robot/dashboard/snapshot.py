@@ -11,7 +11,7 @@ from gazerig.gaze.types import GazeState, Vec3
 from gazerig.robot.analysis.blink_finder import BlinkEvent
 from gazerig.robot.analysis.event_detector import Event, EventDetector, FixationEvent, SaccadeEvent
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.control.tick_text import lead_words, target_name
+from gazerig.robot.control.tick_text import lead_text, target_name
 from gazerig.robot.dashboard.loop_timing import LoopTiming
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.guard_params import HealthParams
@@ -60,7 +60,7 @@ class SnapshotTexts(NamedTuple):
 
     health: str = ""
     behaviour: str = ""
-    seeing: str = ""
+    perception: str = ""
     character: str = ""
     conversation: str = ""
 
@@ -113,7 +113,7 @@ class SnapshotBuilder:
         timing = self._timed(self._newest.t_s)
         plain = snapshot(
             self._newest, timing.rate_hz if timing else 0.0, said.health, said.behaviour,
-            said.seeing, self.rig,
+            said.perception, self.rig,
         )  # fmt: skip
         return replace(
             plain,
@@ -145,12 +145,12 @@ def snapshot(
     rate_hz: float,
     health: str,
     behaviour: str,
-    seeing: str = "",
+    perception: str = "",
     rig: ShownRig | None = None,
 ) -> Snapshot:
     """Return what the page is shown of a single tick.
 
-    rig: how it is built, for the wish's ghost, the camera and the servos' limits
+    rig: how it is built, for the commanded pose, the camera and the servos' limits
     """
     pose, percept, target = tick.pose, tick.percept, tick.target
     joints = joint_names(tick, rig)
@@ -175,15 +175,15 @@ def snapshot(
         health=health,
         behaviour=behaviour,
         saliences=target.saliences,
-        seeing=seeing,
+        perception=perception,
         commanded_rad=tick.guard_result.command_rad,
         target_kind=target.kind,
         target_id=target.id,
         target_part=target.part,
         stopped=tick.stopped,
-        led=lead_words(tick),
+        led=lead_text(tick),
         frame_age_s=percept.age_s(tick.t_s) if percept is not None else None,
-        ghost=_ghost(tick, rig) if rig is not None else None,
+        commanded_pose=_commanded_pose(tick, rig) if rig is not None else None,
         camera=_camera(tick, rig) if rig is not None else None,
         field_deg=_field_deg(rig.field) if rig is not None else None,
         servos=_servos(tick, rig),
@@ -235,8 +235,8 @@ def _bodies(tick: Tick) -> tuple[SeenBody, ...]:
     )
 
 
-def _ghost(tick: Tick, rig: ShownRig) -> CommandedPose:
-    """Return where the wish would have head and eyes."""
+def _commanded_pose(tick: Tick, rig: ShownRig) -> CommandedPose:
+    """Return the pose of head and eyes at the desired angles."""
     at_rest = (0.0,) * len(tick.desired_rad)
     pose: GazeState = rig.kinematics.forward(JointState(tick.desired_rad, at_rest, at_rest, ()))
     return CommandedPose(

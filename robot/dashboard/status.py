@@ -34,7 +34,7 @@ def status(snapshot: Snapshot) -> str:
         f"<div style='opacity:.8;min-height:1.5em'>{escape(snapshot.why)}</div>"
         f"<div style='margin:6px 0'>{pills}</div>{_without_feedback(snapshot)}"
         f"<div style='opacity:.8'>{_one_line(snapshot.health)}</div>"
-        f"<div style='opacity:.8'>{_one_line(snapshot.seeing)}</div>"
+        f"<div style='opacity:.8'>{_one_line(snapshot.perception)}</div>"
     )
 
 
@@ -76,17 +76,17 @@ def drawn_together(reasons: tuple[str, ...]) -> str:
     )
 
 
-def _one_line(words: str) -> str:
+def _one_line(text: str) -> str:
     """Cut words at the panel's edge; the mouse shows all of them."""
-    said = escape(words)
+    said = escape(text)
     cut = "overflow:hidden;text-overflow:ellipsis;white-space:nowrap"
     return f"<div title='{said}' style='{cut}'>{said}</div>"
 
 
-def _banner(words: str, reasons: tuple[str, ...], colour: str) -> str:
+def _banner(text: str, reasons: tuple[str, ...], colour: str) -> str:
     return (
         f"<div style='background:{colour};color:#fff;border-radius:6px;padding:6px 10px;"
-        f"margin-bottom:6px'><div style='font-size:16px;font-weight:700'>{escape(words)}</div>"
+        f"margin-bottom:6px'><div style='font-size:16px;font-weight:700'>{escape(text)}</div>"
         f"{_reasons(reasons)}</div>"
     )
 

@@ -116,10 +116,10 @@
 
   // A servo that tells nothing cannot be taken hold of where it is.
   function how() {
-    const blind = state.blind;
-    if (!blind) return "The torque comes on where the joints are.";
-    const who = blind === 1 ? "1 joint without feedback jumps to its place"
-      : `${blind} joints without feedback jump to their places`;
+    const without_feedback = state.without_feedback;
+    if (!without_feedback) return "The torque comes on where the joints are.";
+    const who = without_feedback === 1 ? "1 joint without feedback jumps to its place"
+      : `${without_feedback} joints without feedback jump to their places`;
     return `${who} at full speed.`;
   }
 

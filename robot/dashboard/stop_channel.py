@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 
 _MESSAGE_BYTES = 4096
 _ANSWERED_WITHIN_S = 1.0
-_CLOSE_PATIENCE_S = 2.0
+_CLOSE_TIMEOUT_S = 2.0
 _WORDS = 150  # of who and why, in characters
 
 
@@ -64,9 +64,9 @@ class StopSender:
         if not data:
             asyncio.get_running_loop().remove_reader(self._link.fileno())
             return
-        number, words = json.loads(data)
+        number, text = json.loads(data)
         if number == self._number and self._waiting is not None:
-            self._waiting.set_result(words)
+            self._waiting.set_result(text)
             self._waiting = None
 
 
@@ -103,5 +103,5 @@ class StopListener:
         with contextlib.suppress(OSError):  # the other side was quicker
             self._link.shutdown(socket.SHUT_RDWR)  # wakes the thread that waits on it
         if self._thread is not threading.current_thread():
-            self._thread.join(_CLOSE_PATIENCE_S)
+            self._thread.join(_CLOSE_TIMEOUT_S)
         self._link.close()

@@ -278,13 +278,13 @@ class Snapshot:
     target_name: e.g. "face 3: left eye"; why: why it won
     rate_hz: control rate of the last second; health: bus figures in words
     behaviour: the behaviour in force; saliences: of the winner and the next bodies, highest first
-    seeing: age of the frame, distances and what they rest on, still things that seem to move
+    perception: age of the frame, distances and what they rest on, still things that seem to move
     target_kind, target_id, target_part: the target as in gaze.types.Target
     character, conversation: those in force, "" where nobody says
     stopped: why somebody stopped the robot, "" while it moves
     led: who leads gaze or joints and how well the head can follow, "" while nobody does
     frame_age_s: None before the first frame
-    ghost: where the wish would have head and eyes; camera: where the camera is
+    commanded_pose: head and eyes at the desired angles; camera: where the camera is
     field_deg: what an eye can see, towards temple, nose, above and below
     servos, timing: health of servos and loop
     worst: the guard's gravest level since the last snapshot
@@ -311,7 +311,7 @@ class Snapshot:
     health: str
     behaviour: str = ""
     saliences: tuple[Salience, ...] = ()
-    seeing: str = ""
+    perception: str = ""
     commanded_rad: JointAngles = ()
     target_kind: str = ""
     target_id: int = -1
@@ -321,7 +321,7 @@ class Snapshot:
     stopped: str = ""
     led: str = ""
     frame_age_s: float | None = None
-    ghost: CommandedPose | None = None
+    commanded_pose: CommandedPose | None = None
     camera: SeenCamera | None = None
     field_deg: tuple[float, float, float, float] | None = None
     servos: Servos = Servos()

@@ -259,8 +259,8 @@ def _write_events(
     ]  # fmt: skip
     blank = [_MISSING] * (len(_EVENT_COLUMNS) - 2)
     rows += [
-        (time_s, [f"{time_s:.6f}", *blank, " ".join(words.split())])
-        for time_s, words in trace.messages
+        (time_s, [f"{time_s:.6f}", *blank, " ".join(text.split())])
+        for time_s, text in trace.messages
     ]
     rows.sort(key=lambda row: row[0])
     lines = (row for _, row in rows)

@@ -69,7 +69,7 @@ class GazeAngles(NamedTuple):
     left_deg, right_deg, cyclopean_deg: (n, 2) x and y as the servos have them, NaN where lost
     head_deg: (n, 3) yaw + left, pitch + up, roll + right ear down, NaN without such a joint
     lids, lower_lids: (n, 2) left and right, 0 shut .. 1 open, NaN without such a joint
-    planned_deg: (n, 2) cyclopean x and y that were wished for
+    planned_deg: (n, 2) cyclopean x and y that were desired
     movement: (n,) index in MOVEMENTS, as planned; blink: (n,) whether one was planned
     looked_at: (n,) index in names, as planned
     messages: what happened and was asked for, (time_s, words) in command
@@ -211,11 +211,11 @@ class GazeAnglesBuilder:
             if angle_between(way, sub(target.p_world_m, head)) < _ARRIVED_RAD:
                 fixated = target
         self._fixated, self._saccades = fixated, tick.gaze.saccades
-        name = GazeTarget(target_words(fixated), fixated.part or "")
+        name = GazeTarget(target_text(fixated), fixated.part or "")
         return self._numbers.setdefault(name, len(self._numbers))
 
 
-def target_words(target: Target) -> str:
+def target_text(target: Target) -> str:
     """Return kind and id of a target, e.g. "face 3"."""
     return target.kind if target.id < 0 else f"{target.kind} {target.id}"
 

@@ -36,8 +36,8 @@ class Labels(NamedTuple):
 
     def event(self) -> list[str]:
         """Return one word a sample: "blink" under a blink, else what the eyes do."""
-        words = np.array(MOVEMENTS, dtype=object)[self.movement]
-        return list(np.where(self.blink, "blink", words))
+        labels = np.array(MOVEMENTS, dtype=object)[self.movement]
+        return list(np.where(self.blink, "blink", labels))
 
 
 class LabelledInterval(NamedTuple):

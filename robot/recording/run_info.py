@@ -101,9 +101,9 @@ def info_of(text: Mapping[str, str]) -> RunInfo:
 
 def _refuse_nonsense(info: RunInfo) -> None:
     """Refuse what no run is started with; files are made with these numbers and names."""
-    words = (info.rig, info.profile, info.config_yaml, info.walk_yaml, info.eyes)
+    texts = (info.rig, info.profile, info.config_yaml, info.walk_yaml, info.eyes)
     maybe = (info.character, info.scene)
-    if not all(isinstance(word, str) for word in words + tuple(m for m in maybe if m is not None)):
+    if not all(isinstance(word, str) for word in texts + tuple(m for m in maybe if m is not None)):
         raise ValueError("a name of the run is no text")
     if not (_within(info.rate_hz, 1.0, 10_000.0) and _within(info.pictures_hz, 0.0, 1000.0)):
         raise ValueError(f"a control rate of {info.rate_hz} Hz")

@@ -14,7 +14,7 @@ from dataclasses import replace
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.control.event_text import drawn_together
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.tick_text import guard_text, seeing_words
+from gazerig.robot.control.tick_text import guard_text, perception_text
 from gazerig.robot.dashboard.page_process import pack, unpack
 from gazerig.robot.dashboard.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts
 from gazerig.robot.model.commands import Ask, Renew
@@ -139,9 +139,9 @@ class SnapshotIndex:
             if at_s < due_s - 1e-9:
                 continue
             due_s = max(due_s + SNAPSHOT_EVERY_S, at_s)
-            seeing = seeing_words(tick, _NO_RESIDUAL)
+            perception = perception_text(tick, _NO_RESIDUAL)
             said = SnapshotTexts(
-                "recorded", noticing.behaviour, seeing, character, noticing.conversation
+                "recorded", noticing.behaviour, perception, character, noticing.conversation
             )
             if (shown := snapshots.take(said)) is not None:
                 self._events += shown.events
@@ -177,7 +177,7 @@ class Noticing:
             found.append(Mark(at_s, "event", command_text(command)))
             if isinstance(command, Ask):
                 self._heed(command)
-        found += [Mark(at_s, "event", words) for words in drawn_together(tick.events)]
+        found += [Mark(at_s, "event", text) for text in drawn_together(tick.events)]
         grave = tick.guard_result.level if tick.guard_result.level in _GRAVE else ""
         if grave and grave != self._grave:
             found.append(Mark(at_s, "event", f"guard: {guard_text(tick.guard_result)}"))

@@ -44,10 +44,10 @@ def image(jpeg: bytes, captured_s: float, at_ns: int) -> Json:
     }
 
 
-def line(words: str, at_ns: int) -> Json:
+def line(text: str, at_ns: int) -> Json:
     """Return words as foxglove.Log."""
     return {
-        "timestamp": stamp(at_ns), "level": _INFO, "message": words, "name": "gazerig", "file": "",
+        "timestamp": stamp(at_ns), "level": _INFO, "message": text, "name": "gazerig", "file": "",
         "line": 0,
     }  # fmt: skip
 

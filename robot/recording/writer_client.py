@@ -19,7 +19,7 @@ QUEUE_BYTES = 64_000_000
 """What waits at most: some minutes of a run."""
 
 _TRIES = 8  # messages sent in one go at most, so that a writer that is back costs no tick
-_PATIENCE_S = 15.0
+_TIMEOUT_S = 15.0
 
 
 class WriterClient:
@@ -88,7 +88,7 @@ class WriterClient:
         if self._batch:
             self.flush()
         while self._queue and self._socket is not None:
-            if not select.select([], [self._socket], [], _PATIENCE_S)[1]:
+            if not select.select([], [self._socket], [], _TIMEOUT_S)[1]:
                 self._lose("its writer does not go on")
                 return
             self._send(len(self._queue))
@@ -113,12 +113,12 @@ class WriterClient:
         if self._socket is not None:
             self._socket.shutdown(socket.SHUT_WR)
             while self._socket is not None:
-                if not select.select([self._socket], [], [], _PATIENCE_S)[0]:
+                if not select.select([self._socket], [], [], _TIMEOUT_S)[0]:
                     self._lose("its writer does not end")
                 self.listen()
         if self._process is not None:
             try:
-                self._process.wait(_PATIENCE_S)
+                self._process.wait(_TIMEOUT_S)
             except subprocess.TimeoutExpired:
                 self._process.kill()
                 self._process.wait()

@@ -289,8 +289,8 @@ class RobotClient:
             check(command)
         except ValueError as error:
             raise RequestRejected(str(error)) from None
-        words = as_json(command)
-        said = self._asked(str(words.pop("do")), **words)
+        fields = as_json(command)
+        said = self._asked(str(fields.pop("do")), **fields)
         match said:
             case {"reply": dict(reply)}:
                 return CommandReply.from_json(reply)

@@ -91,8 +91,8 @@ class LiveServer:
         except self._refusals as error:
             self._say(f"{path} changed and is refused; the values from before stay:\n{error}")
             return
-        words = [str(note) for note in notes] if isinstance(notes, tuple | list) else []
-        if words:
-            self._say("\n".join([f"{path} was edited: read again, in force", *words]))
+        lines = [str(note) for note in notes] if isinstance(notes, tuple | list) else []
+        if lines:
+            self._say("\n".join([f"{path} was edited: read again, in force", *lines]))
         else:
             self._say(f"{path} was written again: all it says is in force already")

@@ -25,7 +25,7 @@ from gazerig.robot.control.command_handler import (
 )
 from gazerig.robot.control.feedback_basis import estimated_joints
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.control.tick_text import lead_words, target_name
+from gazerig.robot.control.tick_text import lead_text, target_name
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.commands import Command, Renew, signed
 from gazerig.robot.model.reply import Ticket
@@ -83,7 +83,7 @@ class Pulse:
             "age_s": self._clock.now_s() - tick.t_s,
             "stopped": tick.stopped,
             "led": tick.led,
-            "lead": lead_words(tick),
+            "lead": lead_text(tick),
             "limited": [
                 {
                     "axis": one.axis,

@@ -128,8 +128,8 @@ class RemoteServer:
         with self._lock:
             if wire in self._wires:
                 self._wires[wire] = self._wires.pop(wire)
-        if not is_stop(request) and (words := self._delayed(own)):
-            return self._answer(wire, {"refused": words})
+        if not is_stop(request) and (text := self._delayed(own)):
+            return self._answer(wire, {"refused": text})
         began_s = time.thread_time()
         try:
             answer = self._requests.answer(request, peer)

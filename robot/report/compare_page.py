@@ -129,9 +129,9 @@ def compare_page(
 def banners(abouts: tuple[RunHeader, RunHeader], runs: Sequence[GazeTrace]) -> tuple[str, ...]:
     """Return what a reader must know first: which runs were not measured, or differ in it."""
     told = [
-        f"{about.name}: {words}"
+        f"{about.name}: {text}"
         for about, run in zip(abouts, runs, strict=True)
-        if (words := banner(run.joints))
+        if (text := banner(run.joints))
     ]
     return (*told, *filter(None, (mixed(abouts, runs),)))
 

@@ -159,10 +159,10 @@ def _pupils(figure: Figure, runs: Sequence[Shown]) -> None:
             name = ("left", "right")[side]
             title = f"{name} eye" if len(runs) == 1 else f"{shown.name}: {name} eye"
             label(axes, "mm to the person's left", "mm up" if not side else "", title)
-            for deg, words in ((1.0, "1 deg"), (0.5 * human.CONE_DEG, "cone of direct gaze")):
+            for deg, text in ((1.0, "1 deg"), (0.5 * human.CONE_DEG, "cone of direct gaze")):
                 radius = 1e3 * distance * np.tan(np.radians(deg))
                 axes.add_patch(Circle((0, 0), radius, fill=False, ec=HUMAN, lw=1.0))
-                axes.text(0.0, radius, f"{words}", ha="center", va="bottom", fontsize=8,
+                axes.text(0.0, radius, f"{text}", ha="center", va="bottom", fontsize=8,
                           color=HUMAN)  # fmt: skip
             _spot(axes, rows[:, 2 * side : 2 * side + 2], shown.colour)
             half = 1e3 * distance * np.tan(np.radians(3.2))

@@ -15,7 +15,7 @@ from gazerig.robot.report.plotting import (
     HUMAN_FILL,
     Drawing,
     Shown,
-    basis_words,
+    basis_text,
     label,
     legend,
     nothing,
@@ -51,7 +51,7 @@ def _shape(figure: Figure, runs: Sequence[Shown]) -> None:
                 low10, mid, high90 = np.percentile(seen, (10, 50, 90))
                 phases.plot([low10, high90], [at, at], color=shown.colour, lw=2.0)
                 phases.plot(mid, at, "o", color=shown.colour, ms=5,
-                            label=f"{shown.name}, {basis_words([shown], LIDS)}" if row == 0
+                            label=f"{shown.name}, {basis_text([shown], LIDS)}" if row == 0
                             else None)  # fmt: skip
             if len(asked):
                 phases.plot(np.median(asked), at, "|", color="black", ms=11,
@@ -62,7 +62,7 @@ def _shape(figure: Figure, runs: Sequence[Shown]) -> None:
         trace,
         "time from the blink's beginning, ms",
         "lid opening",
-        f"lids, {basis_words(runs, LIDS)}",
+        f"lids, {basis_text(runs, LIDS)}",
     )
     label(phases, "ms", "", "phases")
     legend(trace, "lower right")
@@ -130,9 +130,9 @@ def _looks(figure: Figure, runs: Sequence[Shown]) -> None:
             lengths.hist(np.clip(mutual, 0.15, 60.0), bins, histtype="step", lw=1.2, ls="--",
                          color=shown.colour, label=f"mutual ({len(mutual)})")  # fmt: skip
     strips[-1].set_xlabel("time in s")
-    for at, words in ((2.2, "2.2 s"), (3.3, "3.3 s"), (7.9, "7.9 s"), (15.0, "15 s")):
+    for at, text in ((2.2, "2.2 s"), (3.3, "3.3 s"), (7.9, "7.9 s"), (15.0, "15 s")):
         lengths.axvline(at, color=HUMAN, lw=1.0)
-        lengths.text(at, 0.99, f" {words}", color=HUMAN, fontsize=8, va="top",
+        lengths.text(at, 0.99, f" {text}", color=HUMAN, fontsize=8, va="top",
                      transform=lengths.get_xaxis_transform())  # fmt: skip
     lengths.set_xscale("log")
     lengths.set_xticks([0.2, 0.5, 1, 2, 5, 10, 20, 50], ["0.2", "0.5", "1", "2", "5", "10", "20",

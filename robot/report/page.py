@@ -133,13 +133,13 @@ def line_of(finding: MeasureResult, styles: frozenset[str]) -> TextLine:
     known = isfinite(finding.low95)
     interval = f"{number(finding.low95)} to {number(finding.high95)}" if known else ""
     asked = finding.measured.asked
-    notes = tuple(words for style, words in band.notes if style in styles)
+    notes = tuple(text for style, text in band.notes if style in styles)
     return TextLine(
         band.title,
         with_unit(value, band.unit) if isfinite(value) else "nothing found",
         interval,
         number(asked) if isfinite(asked) else "",
-        band_words(band),
+        band_text(band),
         f"{finding.measured.events} of {band.least}"
         if finding.verdict == "too few events"
         else f"{finding.measured.events}",
@@ -164,7 +164,7 @@ def gauge(finding: MeasureResult) -> Gauge:
     return Gauge(at(band.low), at(band.high) - at(band.low), at(finding.value), low, high - low)
 
 
-def band_words(band: NormBand) -> str:
+def band_text(band: NormBand) -> str:
     """Return a band as text."""
     return f"{number(band.low)} to {with_unit(band.high, band.unit)}"
 

@@ -57,10 +57,10 @@ class Drawing(NamedTuple):
 
 def caption_of(drawing: Drawing, runs: Sequence[Shown]) -> str:
     """Return the caption of a figure of these runs."""
-    return drawing.caption.replace("{measured}", basis_words(runs, drawing.group))
+    return drawing.caption.replace("{measured}", basis_text(runs, drawing.group))
 
 
-def basis_words(runs: Sequence[Shown], group: str) -> str:
+def basis_text(runs: Sequence[Shown], group: str) -> str:
     """Return what several runs rest on together, e.g. "measured or estimated"."""
     return " or ".join(dict.fromkeys(shown.run.joints.basis(group) for shown in runs))
 

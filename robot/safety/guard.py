@@ -215,13 +215,13 @@ class Guard:
         if self._collisions:
             self._collisions.look(self._motion, desired_rad, joints.position_rad, self._held)
         stale_s = t_s - self._params.joint_timeout_ms / 1e3
-        blind = not frame_age_s <= self._params.frame_timeout_ms / 1e3
+        no_frame = not frame_age_s <= self._params.frame_timeout_ms / 1e3
         usual = self._all_well(joints)
         far, command, watched = self._stuck.far_rad, self._motion.command, self._stuck.watched
         columns = zip(desired_rad, joints.position_rad, joints.measured_s, strict=True)
         short: dict[int, tuple[int, str]] = {}
         for i, (desired, position, at_s) in enumerate(columns):
-            unseen = blind and self._neck[i]
+            unseen = no_frame and self._neck[i]
             near = -far <= command[i] - position <= far and not watched[i]
             well = near and at_s >= stale_s and not unseen and (usual or self._well(i, joints))
             if well and self._motion.follow(i, desired, dt_s):

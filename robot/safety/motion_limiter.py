@@ -87,7 +87,7 @@ class MotionLimiter:
     def follow(self, i: int, desired: float, dt_s: float) -> bool:
         """Go to the desired angle, if that keeps every limit; else do nothing and say no.
 
-        Who is still catching up would run past the wish: that is for ``chase``.
+        Who is still catching up would run past the goal: that is for ``chase``.
         """
         limit = self.limits[i]
         accel = limit.accel_rad_s2
@@ -122,7 +122,7 @@ class MotionLimiter:
         in full flight.
 
         top, soft: the joint's own speed and acceleration hold all the same
-        along: the speed of the wish itself
+        along: the speed of the goal itself
         """
         top = min(top, self.limits[i].speed_rad_s)
         soft = min(soft, self.limits[i].accel_rad_s2)

@@ -43,7 +43,7 @@ def as_plain(finding: Diagnostic, bus: str) -> dict[str, object]:
 def summed_up(findings: Sequence[Diagnostic], rig: str, fixed: bool) -> str:
     """Count findings by level, and offer what --fix may do."""
     counts = [(level, sum(f.level == level for f in findings)) for level in reversed(LEVELS)]
-    words = ", ".join(f"{count} {level}" for level, count in counts if count)
+    text = ", ".join(f"{count} {level}" for level, count in counts if count)
     fixable = sum(bool(finding.fixes) for finding in findings)
     offer = f"; gazerig doctor --fix mends {fixable} of them" if fixable and not fixed else ""
-    return f"{rig}: {words}{offer}"
+    return f"{rig}: {text}{offer}"
