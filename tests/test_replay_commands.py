@@ -71,7 +71,7 @@ def test_a_replay_knows_how_the_recorded_rig_was_built(
     recording = RunRecording(recorded)
     frames = SnapshotIndex(recording.ticks(), recording.frames(), RATE_HZ, "shy", built)
     shown = unpack(frames.message(frames.at(1.5)))
-    assert shown.ghost is not None and shown.character == "shy" and shown.trail
+    assert shown.commanded_pose is not None and shown.character == "shy" and shown.trail
     assert cli_replay._built("name: desk\n") is None
     assert "no longer valid (recorded.yaml" in capsys.readouterr().err
 
