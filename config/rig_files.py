@@ -133,7 +133,7 @@ def _copy(text: bytes, to: Path) -> None:
         with to.open("xb") as new:
             new.write(text)
     except FileExistsError:
-        rule = "is there already and is not overwritten; choose another name"
+        rule = "already exists and is not overwritten; choose another name"
         raise ConfigError([ConfigFault(str(to), None, "", "", rule)]) from None
     except OSError as error:
         rule = f"cannot be written: {error.strerror}; check it and its folder"

@@ -107,7 +107,7 @@ def save(
     with _errors_named(target), _beside(target, text) as fresh:
         _check_new(target, fresh, changes, check)
         if _held(target) != before:
-            raise _fault(target, "was changed by somebody else meanwhile; try again")
+            raise _fault(target, "was changed by another program meanwhile; try again")
         backup = _backup(target, before, now) if before is not None else None
         if before is not None:
             shutil.copymode(target, fresh)
@@ -296,9 +296,7 @@ def _errors_named(target: Path) -> Iterator[None]:
     try:
         yield
     except FileExistsError:
-        raise _fault(
-            target, "is there already and is not overwritten; choose another name"
-        ) from None
+        raise _fault(target, "already exists and is not overwritten; choose another name") from None
     except OSError as error:
         raise _fault(
             target, f"cannot be written: {error.strerror}; check it and its folder"

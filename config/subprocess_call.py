@@ -35,7 +35,7 @@ def in_subprocess(work: Callable[P, T], /, *words: P.args, **named: P.kwargs) ->
     try:
         done = child_process.run(_MODULE, pickle.dumps((work, words, named)), _LONGEST_S)
     except subprocess.TimeoutExpired:
-        raise _failed(work, f"took more than {_LONGEST_S:g} s; is the disk well?") from None
+        raise _failed(work, f"took more than {_LONGEST_S:g} s; check the disk") from None
     except OSError as error:
         raise _failed(work, f"cannot be started: {error.strerror}") from None
     if done.returncode:

@@ -1,7 +1,7 @@
 """Writing files that a user named: nothing that is there is lost, whatever goes wrong.
 
 A file appears whole or not at all: it is written beside its place and then takes it in one
-step. One that is there already is kept unless the user forces it.
+step. One that already exists is kept unless the user forces it.
 """
 
 import contextlib
@@ -50,7 +50,7 @@ def output_file(path: Path, force: bool = False) -> Iterator[BinaryIO]:
         force: Replace a file that is there; else it is refused.
 
     Raises:
-        SetupError: it is there already, or cannot be written; what was there is
+        SetupError: it already exists, or cannot be written; what was there is
             as it was.
     """
     refuse_existing(path, force=force)
@@ -126,7 +126,7 @@ def _put_in_place(fresh: Path, target: Path, path: Path, force: bool) -> None:
 
 
 def _there(path: Path) -> str:
-    return f"{path} is there already: name another file, or say --force"
+    return f"{path} already exists: name another file, or use --force"
 
 
 def _is_stream(path: Path) -> bool:

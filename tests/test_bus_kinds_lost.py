@@ -208,7 +208,7 @@ def test_a_restart_is_found_and_the_servo_held_where_it_is(here, held_here):
     assert sorted(rearmed) == struck
     assert all(here.holding())
     told = held_here.events()
-    assert any("restarted: set up anew" in line for line in told), told
+    assert any("restarted: set up again" in line for line in told), told
     assert held_here.faults() == ()
     # It follows again, with the speed that it was set up with.
     here.until(held_here, lambda r: here.near(here.seen(r), away(here)), away(here))

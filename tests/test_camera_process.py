@@ -94,7 +94,7 @@ def test_what_was_found_comes_over_with_picture_depth_and_lens(recording):
 
 def test_source_that_cannot_be_opened_says_so_at_once(tmp_path):
     camera = process(partial(VideoFile, tmp_path / "nope.avi"))
-    with pytest.raises(CameraError, match=r"no film or picture at .*nope\.avi"):
+    with pytest.raises(CameraError, match=r"no film or image at .*nope\.avi"):
         camera.open()
     camera.close()
 
@@ -122,7 +122,7 @@ def test_a_killed_process_is_started_again_and_the_rest_goes_on(recording):
     assert present(after).number > present(before).number and present(after).image is not None
     assert present(camera._process).pid != first
     lost, back = camera.events()
-    assert lost.startswith("camera lost (the process that looks at pictures has ended)")
+    assert lost.startswith("camera lost (the camera process has ended)")
     assert back.startswith("camera back after")
     os.kill(present(present(camera._process).pid), signal.SIGKILL)  # so soon again
     wait_for(lambda: present(camera.latest(0.0)).number > present(after).number + 50)
@@ -141,7 +141,7 @@ def test_a_process_that_hangs_is_told_of_and_started_again(recording):
     before = camera.latest(0.0)
     wait_for(lambda: present(camera.latest(0.0)).number > present(before).number + 20)
     told = camera.events()
-    assert "camera lost (no new picture): waiting for it" in told
+    assert "camera lost (no new frame): waiting for it" in told
     assert any("starting the camera's process again" in line for line in told)
     assert present(camera._process).pid != first
     camera.close()
@@ -221,7 +221,7 @@ def test_camera_lost_for_good_ends_with_its_reason(tmp_path):
         return False
 
     wait_for(gone)
-    with pytest.raises(CameraError, match="no film or picture at"):
+    with pytest.raises(CameraError, match="no film or image at"):
         camera.latest(0.0)
     told = camera.events()
     assert any(line.startswith("camera lost") for line in told)

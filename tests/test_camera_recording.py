@@ -111,7 +111,7 @@ def test_jpeg_is_smaller_and_nearly_the_same(tmp_path):
 
 def test_existing_file_is_kept_unless_told_otherwise(file):
     before = file.read_bytes()
-    with pytest.raises(CameraError, match="is there already"):
+    with pytest.raises(CameraError, match="already exists"):
         RecordingWriter(file, {})
     assert file.read_bytes() == before
     write(file, [shot(0)], over=True)
@@ -131,7 +131,7 @@ def test_cut_file_gives_its_whole_pictures(file, share):
     count = len(recording.times_s)
     assert count >= int(len(TIMES_S) * share) - 1
     if share < 0.95:
-        assert f"was not closed: its {count} whole pictures" in recording.note
+        assert f"was not closed: its {count} complete frames" in recording.note
     for k in range(count):
         assert_same(recording.shot(k), shot(k))
 
@@ -158,7 +158,7 @@ def test_damage_inside_a_picture_is_named(file):
     data[where : where + 400] = b"!" * 400
     file.write_bytes(bytes(data))
     recording = Recording(file)
-    with pytest.raises(CameraError, match=r"picture 6 of .* is damaged .*copy the file anew"):
+    with pytest.raises(CameraError, match=r"frame 6 of .* is damaged .*copy the file again"):
         recording.shot(5)
     assert_same(recording.shot(4), shot(4))
 
@@ -179,7 +179,7 @@ def test_damaged_lengths_are_named(file):
         (lambda p: p.touch(), "is no recording"),
         (lambda p: p.write_text("short"), "is no recording"),
         (lambda p: p.write_text("hello world, this is text"), "is no recording"),
-        (lambda p: write(p, []), "holds no picture"),
+        (lambda p: write(p, []), "holds no frame"),
     ],
 )
 def test_what_is_no_recording_is_named(tmp_path, make, words):

@@ -38,7 +38,7 @@ def test_existing_file_is_kept(film, tmp_path):
     out.write_text("precious")
     done = run(out, "--video", film, "--seconds", 0)
     assert (done.exit_code, out.read_text()) == (2, "precious")
-    assert "is there already" in done.output
+    assert "already exists" in done.output
     assert run(out, "--video", film, "--seconds", 0, "--force", "--jpeg", 80).exit_code == 0
 
 

@@ -130,7 +130,7 @@ def test_a_silent_servo_costs_only_itself_and_is_taken_back(twin, bus):
     assert registers(twin, 64, 1) == {3: 1, 1: 1, 12: 1, 7: 1}
     assert bus.health().errors["timeout"] >= 1
     assert bus.faults() == ()
-    assert "servo 1 restarted: set up anew" in bus.events()
+    assert "servo 1 restarted: set up again" in bus.events()
 
 
 def test_open_names_every_problem_at_once(twin):

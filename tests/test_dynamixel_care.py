@@ -118,7 +118,7 @@ def test_without_watchdog_nothing_is_armed_and_a_restart_is_still_healed(indirec
     for _ in range(300):
         rig.tick([2500] * 3)
     assert rig.bus.faults() == ()
-    assert "servo 2 restarted: set up anew" in rig.bus.events()
+    assert "servo 2 restarted: set up again" in rig.bus.events()
     assert rig.places() == pytest.approx([2500] * 3, abs=12)
 
 
@@ -129,7 +129,7 @@ def test_a_quick_restart_between_two_reads_is_found_by_asking_in_turn(fast):
     rig.chain[2]._deaf_until_ms = 0
     for _ in range(100):
         rig.tick([2500] * 3)
-    assert rig.bus.events()[-1] == "servo 2 restarted: set up anew"
+    assert rig.bus.events()[-1] == "servo 2 restarted: set up again"
     assert rig.chain[2].torque
 
 

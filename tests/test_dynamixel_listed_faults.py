@@ -2,7 +2,7 @@
 
 What must be true of each: a read takes a bounded time; no value is delivered that was not
 true in its cycle; one bad servo does not blind the others; an alert is data and a named
-fault; a restarted servo is set up anew and holds where it is.
+fault; a restarted servo is set up again and holds where it is.
 
 Faults on the wire and in servos, by number, and their tests, here or in test_servo_faults:
 
@@ -144,7 +144,7 @@ def test_21_brown_out(rig):
     assert cycles * 0.01 <= 1.5
     assert rig.bus.faults() == ()
     lines = rig.bus.events()
-    assert "neck (servo 3) restarted: set up anew" in lines
+    assert "neck (servo 3) restarted: set up again" in lines
     get = rig.chain[3].memory.get
     assert (get("profile_velocity"), get("bus_watchdog"), get("torque_enable")) == (383, 10, 1)
 
@@ -200,7 +200,7 @@ def test_22_to_26_latched_errors(rig, fault, name):
     assert [r.fault for r in readings] == ["", name, "", ""]
     assert rig.bus.events() == (f"jaw (servo 2): {name}",)
     assert not rig.chain[2].torque
-    # Only a restart clears it; then the servo is set up anew.
+    # Only a restart clears it; then the servo is set up again.
     rig.chain[2].restart()
     rig.until_all()
     assert rig.bus.faults() == ()

@@ -2,7 +2,7 @@
 
 What must be true of each: a read takes a bounded time; no value is delivered that was not
 true in its cycle (the rig asserts it in every tick); one bad servo does not blind the
-others; a fault is data and a name; a restarted servo is set up anew and holds where it is.
+others; a fault is data and a name; a restarted servo is set up again and holds where it is.
 """
 
 import random
@@ -130,7 +130,7 @@ def test_a_restarted_servo_is_set_up_anew_where_it_is(rig):
         rig.bus.write([2900] * 4)
     assert len(seen) == 1
     assert rig.bus.faults() == ()
-    assert "neck (servo 3) restarted: set up anew" in rig.bus.events()
+    assert "neck (servo 3) restarted: set up again" in rig.bus.events()
     assert rig.get(3, 40) == 1
 
 

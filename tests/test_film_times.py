@@ -65,7 +65,7 @@ def test_uneven_film_runs_by_the_times_of_its_pictures(folder):
         assert film.number_at(film.due_s(k + 1)) == k + 1
         assert round(float(film.image(k + 1).mean()) / 12.0) == k
     (told,) = film.events()
-    assert told.startswith("uneven.mkv: the film's pictures come unevenly")
+    assert told.startswith("uneven.mkv: the film's frames come unevenly")
     assert film.events() == ()
     # The last picture stays for the usual time; then the film begins anew.
     assert film.due_s(21) == pytest.approx(44 / 30.0, abs=0.003)
@@ -76,7 +76,7 @@ def test_film_that_lies_about_its_rate_is_noticed(folder):
     film = opened(retimed(folder / "plain.mp4", folder / "slow.mkv", range(0, 40, 2)))
     assert film.rate_hz == pytest.approx(15.0, rel=0.01)
     assert film.due_s(11) == pytest.approx(10 / 15.0, rel=0.01)
-    assert "states 30 pictures a second and shows 15" in film.note
+    assert "states 30 frames a second and shows 15" in film.note
 
 
 def test_honest_film_is_left_alone(folder):
@@ -94,7 +94,7 @@ def test_stated_rate_is_judged_by_the_times():
     assert present(at_a_rate(25.0, "", times_s(25.1))).rate_hz == 25.0  # rounding
     lie = at_a_rate(25.0, "", times_s(12.5))
     assert present(lie).rate_hz == pytest.approx(12.5)
-    assert "states 25 pictures a second and shows 12.5" in present(lie).note
+    assert "states 25 frames a second and shows 12.5" in present(lie).note
     assert at_a_rate(25.0, "", [tick / 25.0 for tick in UNEVEN]) is None
     assert present(at_a_rate(25.0, "25 assumed", times_s(10.0))).rate_hz == pytest.approx(10.0)
     assert present(at_a_rate(25.0, "25 assumed", [])).note == "25 assumed"
@@ -152,7 +152,7 @@ def test_picture_beyond_all_memory_is_named(tmp_path):
     header += (54).to_bytes(4, "little") + (40).to_bytes(4, "little")
     header += (60_000).to_bytes(4, "little") * 2 + b"\x01\x00\x18\x00" + bytes(24)
     file.write_bytes(header)
-    with pytest.raises(CameraError, match="too large a picture|damaged picture"):
+    with pytest.raises(CameraError, match="too large an image|damaged image"):
         VideoFile(file).open()
 
 
@@ -169,9 +169,9 @@ def test_small_film_of_grey_is_a_film(tmp_path):
 def test_empty_file_and_file_of_text_are_named(tmp_path):
     for name, content in (("a.avi", b""), ("b.mp4", b"this is no film"), ("c.png", b"")):
         (tmp_path / name).write_bytes(content)
-        with pytest.raises(CameraError, match="no film or picture|damaged picture"):
+        with pytest.raises(CameraError, match="no readable film or image|damaged image"):
             VideoFile(tmp_path / name).open()
     with pytest.raises(CameraError, match="is not a file"):
         VideoFile(tmp_path).open()
-    with pytest.raises(CameraError, match="no film or picture at"):
+    with pytest.raises(CameraError, match="no film or image at"):
         VideoFile(tmp_path / "nope.avi").open()

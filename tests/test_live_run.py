@@ -66,7 +66,7 @@ class Run:
     def words(self) -> str:
         return self.log.read_text(encoding="utf-8")
 
-    def at_baud(self, words: str) -> bool:
+    def hears(self, words: str) -> bool:
         for _ in range(400):
             if words in self.words():
                 return True
@@ -103,7 +103,7 @@ def test_it_is_tuned_stopped_and_goes_on(run: Run) -> None:
         assert rig.status()["stopped"] == ""
         rig.save()
     assert load_rig(str(run.file)).loop.rate_hz == 150.0
-    assert run.at_baud(f"stopped by process {os.getpid()}: finger; torque off")
+    assert run.hears(f"stopped by process {os.getpid()}: finger; torque off")
 
 
 def test_the_file_edited_by_hand_is_taken_or_refused_whole(run: Run) -> None:
@@ -112,11 +112,11 @@ def test_the_file_edited_by_hand_is_taken_or_refused_whole(run: Run) -> None:
         rig.save()
         good = run.file.read_text(encoding="utf-8")
         run.file.write_text(good.replace("rate_hz: 150.0", "rate_hz: 5e5") + "x: 1\n")
-        assert run.at_baud("refused; the values from before stay")
+        assert run.hears("refused; the values from before stay")
         assert "above 1000" in run.words() and "x: unknown" in run.words()
         assert rig.get(RATE)[RATE] == 150.0
         run.file.write_text(good.replace("rate_hz: 150.0", "rate_hz: 160.0"))
-        assert run.at_baud("read again, in force")
+        assert run.hears("read again, in force")
         assert rig.get(RATE)[RATE] == 160.0
         ticks = rig.status()["ticks"]
         time.sleep(0.1)

@@ -40,7 +40,7 @@ def test_a_restart_is_noticed_within_a_tick_and_held_anew_where_it_was(held):
         first = next(r[i] for r, a in zip(seen, anew, strict=True) if a[i])
         assert first.position_steps == pytest.approx(place, abs=1)
     assert held.pulses() == [5500, 5600, 6600]
-    assert any("the board restarted: set up anew" in line for line in held.bus.events())
+    assert any("the board restarted: set up again" in line for line in held.bus.events())
     assert held.bus.health().errors["restarted"] == 1
 
 

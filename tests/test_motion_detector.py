@@ -129,7 +129,7 @@ def test_pictures_too_small_or_narrow_are_silent(shape: tuple[int, int]) -> None
     detector = MotionDetector(MotionParams())
     for k in range(3):
         assert look(detector, np.full(shape, 9 * k, dtype=np.uint8), k * DT_S) == ()
-    assert detector.report.silent == "picture too small"
+    assert detector.report.silent == "frame too small"
 
 
 @pytest.mark.parametrize("preset", ["ultrafast", "fast", "medium"])
@@ -141,7 +141,7 @@ def test_the_smallest_allowed_are_borne(
     detector = MotionDetector(MotionParams(preset=preset, finest_level=finest_level))
     for k in range(3):
         look(detector, GROUND[k : k + shape[0], : shape[1]], k * DT_S)
-    assert detector.report.silent != "picture too small"
+    assert detector.report.silent != "frame too small"
 
 
 def test_a_change_of_size_begins_anew() -> None:
@@ -149,7 +149,7 @@ def test_a_change_of_size_begins_anew() -> None:
     for k in range(3):
         look(detector, scene(k), k * DT_S)
     assert look(detector, scene(3)[:200], 3 * DT_S) == ()
-    assert detector.report.silent == "first picture"
+    assert detector.report.silent == "first frame"
     for k in range(4, 7):
         blobs = look(detector, scene(k)[:200], k * DT_S)
     assert len(blobs) == 1
@@ -177,7 +177,7 @@ def test_times_that_do_not_follow_are_not_compared(times: tuple[float, float]) -
     look(detector, scene(0), times[0])
     assert detector.before_s == times[0]
     assert look(detector, scene(1), times[1]) == ()
-    assert detector.report.silent == "no picture shortly before"
+    assert detector.report.silent == "no frame shortly before"
 
 
 def test_joints_without_a_number_count_as_unknown() -> None:
@@ -191,7 +191,7 @@ def test_joints_without_a_number_count_as_unknown() -> None:
     "picture", [np.zeros((240, 320)), np.zeros((2, 2, 5), np.uint8), np.zeros((0, 4), np.uint8)]
 )
 def test_what_is_no_picture_is_refused_in_words(picture: NDArray[np.uint8]) -> None:
-    with pytest.raises(ValueError, match="a picture is"):
+    with pytest.raises(ValueError, match="an image is"):
         made_small(picture, 320, lens(320, 240), 0.0)
 
 

@@ -213,7 +213,7 @@ def test_camera_without_pictures_counts_as_lost(film):
         return Outputs(pipeline.create(Nothing).out)
 
     source = opened(silent, OakParams(silence_ms=150.0))
-    with pytest.raises(CameraError, match="no picture for 0.15 s"):
+    with pytest.raises(CameraError, match="no frame for 0.15 s"):
         source.take(time.monotonic, GO_ON)
     stop = threading.Event()
     stop.set()

@@ -291,4 +291,4 @@ def test_device_clock_set_anew_is_told():
     now = iter([100.1, 100.1, 200.1, 200.1])
     take(rig, source, lambda: next(now), Message(500.0, 100.0), Message(1.0, 200.0))
     (told,) = source.events()
-    assert "set anew" in told
+    assert "jumped" in told

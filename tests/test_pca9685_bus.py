@@ -181,7 +181,7 @@ def test_a_brown_out_is_seen_and_set_up_anew_one_after_another(world):
         seen.append(sum(r is None for r in readings))
         on.append(sum(width > 0 for width in world.widths()))
     assert on[-1] == 3 and {1, 2} <= set(on) and max(seen) >= 2
-    assert "the board restarted: set up anew" in world.bus.events()
+    assert "the board restarted: set up again" in world.bus.events()
     assert world.chip()._registers[PRESCALE] == 121
     assert world.places() == pytest.approx([5000, 6500, 7000], abs=2 * GRAIN)
 
@@ -214,7 +214,7 @@ def test_what_another_program_changes_is_set_right(world, spoil):
         ("absent on", "no PCA9685 answers at 0x40: has the board its logic supply"),
         ("stuck on", "the I2C bus is stuck"),
         ("foreign on", "what answers at 0x40 is no PCA9685"),
-        ("lose all", "nobody answers as an I2C bus"),
+        ("lose all", "no answer as an I2C bus"),
     ],
 )
 def test_what_cannot_be_used_is_named_and_nothing_moves(world, command, told):

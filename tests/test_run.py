@@ -103,4 +103,4 @@ def test_a_recorded_run_is_run_again_to_the_same_bytes(
     assert "ticks are the same to the bit; the bytes on the bus are the same" in words
     capfd.readouterr()
     assert typed("run", "--mock", "--fast", "--seconds", "1", "--record", str(file)) == 2
-    assert "is there already" in capfd.readouterr().err
+    assert "already exists" in capfd.readouterr().err

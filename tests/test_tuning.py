@@ -188,7 +188,7 @@ def test_a_copy_never_takes_the_place_of_another_file(mine: Path, tmp_path: Path
     other = tmp_path / "other.yaml"
     other.write_text("mine", encoding="utf-8")
     bench.tuning.set({"gaze.lids.close_ms": 90.0})
-    with pytest.raises(ConfigError, match="is there already"):
+    with pytest.raises(ConfigError, match="already exists"):
         bench.tuning.save(other)
     assert other.read_text(encoding="utf-8") == "mine" and bench.tuning.path == mine
 

@@ -157,7 +157,7 @@ def test_a_file_is_read_up_to_its_limit(tmp_path: Path) -> None:
 def test_what_is_there_is_kept_unless_forced(tmp_path: Path) -> None:
     file = tmp_path / "file"
     write_file(file, "old")
-    with pytest.raises(SetupError, match="is there already: name another file, or say --force"):
+    with pytest.raises(SetupError, match="already exists: name another file, or use --force"):
         write_file(file, "new")
     assert file.read_text() == "old"
     file.chmod(0o640)
@@ -168,7 +168,7 @@ def test_what_is_there_is_kept_unless_forced(tmp_path: Path) -> None:
 
 def test_a_file_made_meanwhile_is_kept(tmp_path: Path) -> None:
     file = tmp_path / "file"
-    with pytest.raises(SetupError, match="is there already"), output_file(file) as out:
+    with pytest.raises(SetupError, match="already exists"), output_file(file) as out:
         out.write(b"new")
         file.write_text("theirs")
     assert file.read_text() == "theirs" and os.listdir(tmp_path) == ["file"]
@@ -187,7 +187,7 @@ def test_a_link_is_followed_and_stays_one(tmp_path: Path) -> None:
     file, link = tmp_path / "file", tmp_path / "link"
     file.write_text("old")
     link.symlink_to(file)
-    with pytest.raises(SetupError, match="is there already"):
+    with pytest.raises(SetupError, match="already exists"):
         write_file(link, "new")
     write_file(link, "new", force=True)
     assert link.is_symlink() and file.read_text() == "new"
@@ -247,13 +247,13 @@ def test_a_report_leaves_the_summary_of_the_run_and_is_refused_before_any_work(
     for page in ("a page", "a newer page"):
         paths, data = write_all(tmp_path / "x.html", page, (), [{"key": 1}], page != "a page")
         assert summary.read_bytes() == figures and data.name == "x_measures.json" and not paths
-    with pytest.raises(SetupError, match="is there already"):
+    with pytest.raises(SetupError, match="already exists"):
         write_all(tmp_path / "x.html", "another page", (), [])
     capfd.readouterr()
     for reporting in (["report"], ["compare", str(run), "--out", str(tmp_path / "x.html")]):
         assert typed(*reporting, str(run)) == 2
         said = capfd.readouterr().err
-        assert "x.html is there already" in said and said.count("\n") == 1
+        assert "x.html already exists" in said and said.count("\n") == 1
     assert (tmp_path / "x.html").read_text() == "a newer page"
     assert typed("export", str(run), "--csv") == 0
     assert typed("export", str(run), "--csv") == 2

@@ -89,7 +89,7 @@ def test_same_picture_may_be_asked_for_again_but_none_before(film):
 
 @pytest.mark.parametrize("film_s", [-0.1, -5.0])
 def test_film_time_starts_at_zero(film, film_s):
-    with pytest.raises(ValueError, match="picture -?[0-9]+ wanted"):
+    with pytest.raises(ValueError, match="frame -?[0-9]+ wanted"):
         film.frame_at(film_s)
 
 
@@ -170,7 +170,7 @@ def test_directory(tmp_path):
 @pytest.mark.parametrize("name", ["x.avi", "x.txt", "x1.png"])
 def test_file_that_is_no_film(tmp_path, content, name):
     (tmp_path / name).write_bytes(content)
-    assert "picture that can be read" in refusal(tmp_path / name)
+    assert "readable" in refusal(tmp_path / name)
 
 
 def test_reader_is_silent_beside_the_error(tmp_path, film_file):
@@ -202,7 +202,7 @@ def test_film_cut_short(tmp_path, film_file, part):
 
 def test_film_cut_to_its_header(tmp_path, film_file):
     (tmp_path / "cut.avi").write_bytes(film_file.read_bytes()[:1000])
-    assert "no film or picture" in refusal(tmp_path / "cut.avi")
+    assert "no readable film or image" in refusal(tmp_path / "cut.avi")
 
 
 def test_picture_cut_short(tmp_path):

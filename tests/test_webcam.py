@@ -88,7 +88,7 @@ def test_index_stands_for_the_device_file():
 
 
 def test_file_that_is_no_camera_is_refused_quietly(device, capfd):
-    with pytest.raises(CameraError, match="gives no picture") as caught:
+    with pytest.raises(CameraError, match="delivers no frame") as caught:
         Webcam(device).open()
     assert "\n" not in str(caught.value)
     assert capfd.readouterr().err == ""
@@ -147,7 +147,7 @@ def test_lasting_failure_means_the_camera_is_gone(device):
     capture = Capture()
     camera = opened(device, capture)
     capture.failures = 10**6
-    with pytest.raises(CameraError, match="no more pictures"):
+    with pytest.raises(CameraError, match="no more frames"):
         camera.take(lambda: 1.0, GO_ON)
 
 
@@ -199,7 +199,7 @@ def run(device, stated_hz: float, gives_hz: float, away_s: float, count: int = 6
 
 def test_camera_that_lies_about_its_rate_is_noticed_once(device):
     (told,) = run(device, 30.0, 15.0, away_s=0.008)
-    assert "states 30 pictures a second and gives 15.0" in told
+    assert "states 30 frames a second and gives 15.0" in told
     assert str(device) in told
 
 
@@ -242,5 +242,5 @@ def test_pictures_of_no_known_kind_count_as_failures(device, picture):
     capture = Capture()
     camera = opened(device, capture)
     capture.picture = picture
-    with pytest.raises(CameraError, match="no more pictures"):
+    with pytest.raises(CameraError, match="no more frames"):
         camera.take(lambda: 1.0, GO_ON)

@@ -117,6 +117,6 @@ def failed(failure: Exception) -> CameraError:
     if isinstance(failure, CameraError):
         return CameraError(str(failure))
     return CameraError(
-        f"looking at pictures failed ({type(failure).__name__}: "
-        f"{' '.join(str(failure).split())}): start anew, and report it if it comes back"
+        f"detection in the camera frames failed ({type(failure).__name__}: "
+        f"{' '.join(str(failure).split())}): start it again, and report it if it comes back"
     )

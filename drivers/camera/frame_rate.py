@@ -52,10 +52,10 @@ class FrameRateMonitor:
             return ""
         self._told = lies
         if not lies:
-            return f"{self._name} gives {rate_hz:.1f} pictures a second again, as it states"
+            return f"{self._name} gives {rate_hz:.1f} frames a second again, as it states"
         return (
-            f"{self._name} states {self._stated_hz:g} pictures a second and gives {rate_hz:.1f}: "
-            "the times of its pictures are measured; more light makes many cameras faster"
+            f"{self._name} states {self._stated_hz:g} frames a second and gives {rate_hz:.1f}: "
+            "the times of its frames are measured; more light makes many cameras faster"
         )
 
     def _prompt(self, away_s: float) -> bool:

@@ -94,7 +94,7 @@ class CameraProcess:
             SetupError: the detector cannot be made.
         """
         if self._process is not None:
-            raise CameraError("the camera process runs already: close() it before opening it anew")
+            raise CameraError("the camera process runs already: close() it before opening it again")
         self._newest, self._failure, self._motion = None, "", None
         self._closing.clear()
         self._events.clear()
@@ -260,7 +260,7 @@ class CameraProcess:
                     if self._closing.is_set() and not self._alive():
                         return _End("closed")
                     if not retrying and self._is_hung(silence):
-                        return _End("no new picture, and its process does not go on")
+                        return _End("no new frame, and its process hangs")
                     continue
                 message = pipe.recv()
                 if isinstance(message, Ended):
@@ -276,7 +276,7 @@ class CameraProcess:
                     silence.record_frame(self._now_s())
                     self._publish(message, slots)
         except (EOFError, OSError):
-            return _End("the process that looks at pictures has ended")
+            return _End("the camera process has ended")
         finally:
             for slot in slots:
                 slot.forget()
@@ -288,9 +288,9 @@ class CameraProcess:
         """Report a camera without new frames; return whether to end its process."""
         verdict = silence.verdict(self._now_s())
         if verdict and self._lost_s is None:
-            self._lose("no new picture", "waiting for it")
+            self._lose("no new frame", "waiting for it")
         if verdict == "hung" and self._owes_back:
-            self._events.append("still no picture: starting the camera's process again")
+            self._events.append("still no frame: starting the camera's process again")
         return verdict == "hung"
 
     def _publish(self, message: Found, slots: tuple[SlotReader, SlotReader]) -> None:
@@ -316,4 +316,4 @@ class CameraProcess:
 
 
 def _no_reply() -> SetupError:
-    return CameraError("the process that looks at pictures did not start: start anew")
+    return CameraError("the camera process did not start: start it again")

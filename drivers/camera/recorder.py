@@ -120,7 +120,7 @@ class CameraRecorder:
         if self._waiting.full():
             if self.left_out == 0:
                 self._events.append(
-                    f"{self._path}: this machine is slower than the camera, pictures are left out "
+                    f"{self._path}: this machine is slower than the camera, frames are left out "
                     "of the recording; --jpeg makes them smaller and faster"
                 )
             self.left_out += 1

@@ -122,7 +122,7 @@ def image(data: bytes) -> ImageArray:
     """
     pixels = bgr(_pixels(data))
     if pixels is None:
-        raise BadMessage("no picture in it")
+        raise BadMessage("no image in it")
     return pixels
 
 
@@ -134,7 +134,7 @@ def depth(data: bytes) -> Depth:
     """
     mm = _pixels(data)
     if mm.dtype != np.uint16 or mm.ndim != 2:
-        raise BadMessage("no 16-bit depth picture in it")
+        raise BadMessage("no 16-bit depth image in it")
     return metres(mm)
 
 
@@ -227,7 +227,7 @@ def _pixels(data: bytes) -> NDArray[Any]:
         file = base64.b64decode(_load(data, "data"), validate=True)
         found = cv2.imdecode(np.frombuffer(file, np.uint8), cv2.IMREAD_UNCHANGED)
     except (ValueError, TypeError, cv2.error) as error:
-        raise BadMessage("no picture in it") from error
+        raise BadMessage("no image in it") from error
     if found is None:
-        raise BadMessage("no picture in it")
+        raise BadMessage("no image in it")
     return found

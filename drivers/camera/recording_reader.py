@@ -53,20 +53,22 @@ class Recording:
         self._file = open_mcap(path, CameraError, _CURE)
         try:
             self._channels: dict[int, str] = {}
-            self._pictures: list[_FrameIndex] = []
+            self._frames: list[_FrameIndex] = []
             ended = self._index()
         except BaseException:
             self._file.close()
             raise
-        if not self._pictures:
+        if not self._frames:
             self._file.close()
-            raise CameraError(f"{path} holds no picture: record anew")
-        first = self._pictures[0].stamp_ns
-        self.times_s = tuple((p.stamp_ns - first) / 1e9 for p in self._pictures)
+            raise CameraError(f"{path} holds no frame: record it again")
+        first = self._frames[0].stamp_ns
+        self.times_s = tuple((p.stamp_ns - first) / 1e9 for p in self._frames)
         self.note = (
             ""
             if ended
-            else (f"{path.name} was not closed: its {len(self.times_s)} whole pictures are there")
+            else (
+                f"{path.name} was not closed: its {len(self.times_s)} complete frames can be read"
+            )
         )
 
     def shot(self, index: int) -> Shot:
@@ -75,7 +77,7 @@ class Recording:
         Raises:
             CameraError: the file is damaged there.
         """
-        places = self._pictures[index].places
+        places = self._frames[index].places
         try:
             return Shot(
                 self.times_s[index],
@@ -87,7 +89,7 @@ class Recording:
             )
         except (fmt.BadMessage, McapError, OSError, KeyError, ValueError) as error:
             raise CameraError(
-                f"picture {index + 1} of {self._path} is damaged ({error}): copy the file anew"
+                f"frame {index + 1} of {self._path} is damaged ({error}): copy the file again"
             ) from error
 
     def close(self) -> None:
@@ -111,7 +113,7 @@ class Recording:
         try:
             return self._indexed()
         except (McapError, ValueError, struct.error) as error:
-            raise CameraError(f"{self._path} is damaged: copy the file anew") from error
+            raise CameraError(f"{self._path} is damaged: copy the file again") from error
 
     def _indexed(self) -> bool:
         """Index the frames; return whether the file was closed properly."""
@@ -134,8 +136,8 @@ class Recording:
 
     def _add(self, stamp_ns: int, places: dict[str, _MessagePlace]) -> None:
         """Record a frame if it is later than the last one."""
-        if not self._pictures or stamp_ns > self._pictures[-1].stamp_ns:
-            self._pictures.append(_FrameIndex(stamp_ns, places))
+        if not self._frames or stamp_ns > self._frames[-1].stamp_ns:
+            self._frames.append(_FrameIndex(stamp_ns, places))
 
     def _meet(self, kind: int, place: _MessagePlace) -> None:
         """Read the records that describe the file."""
@@ -163,7 +165,7 @@ class Recording:
             head = self._file.read(_HEAD)
             kind, length = head[0], int.from_bytes(head[1:], "little")
             if length > _LARGEST:
-                raise CameraError(f"{self._path} is damaged after byte {offset}: copy it anew")
+                raise CameraError(f"{self._path} is damaged after byte {offset}: copy it again")
             if offset + _HEAD + length > end:
                 return
             yield kind, _MessagePlace(offset + _HEAD, length)

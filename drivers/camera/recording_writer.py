@@ -34,7 +34,7 @@ class RecordingWriter:
             keeps frames exactly; over: an existing file is written over
 
         Raises:
-            CameraError: the file is there already or cannot be made.
+            CameraError: the file already exists or cannot be made.
         """
         self._path = path
         self._jpeg_quality = jpeg_quality
@@ -98,6 +98,6 @@ def _create(path: Path, over: bool) -> IO[bytes]:
     try:
         return path.open("wb" if over else "xb")
     except FileExistsError as error:
-        raise CameraError(f"{path} is there already: name another file, or say --force") from error
+        raise CameraError(f"{path} already exists: name another file, or use --force") from error
     except OSError as error:
         raise CameraError(f"cannot write {path} ({error.strerror}): name another file") from error

@@ -61,7 +61,7 @@ class CameraThread:
             CameraError: the source cannot be opened, or is open already.
         """
         if self._thread is not None:
-            raise CameraError("the camera thread runs already: close() it before opening it anew")
+            raise CameraError("the camera thread runs already: close() it before opening it again")
         self._events.clear()
         self._camera.open()
         self._stop.clear()

@@ -49,9 +49,9 @@ def open_video(path: Path) -> VideoReader:
         CameraError: it is absent, no film or frame, empty or cut short.
     """
     if not path.exists():
-        raise CameraError(f"no film or picture at {path}: check the path")
+        raise CameraError(f"no film or image at {path}: check the path")
     if not path.is_file():
-        raise CameraError(f"{path} is not a file: name a film or a picture in it")
+        raise CameraError(f"{path} is not a file: name a film or an image in it")
     try:
         path.open("rb").close()
     except OSError as error:
@@ -67,7 +67,7 @@ def usable_rate_hz(stated_hz: float) -> tuple[float, str]:
     if isfinite(stated_hz) and low <= stated_hz <= high:
         return stated_hz, ""
     return _ASSUMED_RATE_HZ, (
-        f"the film states a rate of {stated_hz:g} pictures a second; {_ASSUMED_RATE_HZ:g} assumed"
+        f"the film states a rate of {stated_hz:g} frames a second; {_ASSUMED_RATE_HZ:g} assumed"
     )
 
 
@@ -82,9 +82,9 @@ class _Still:
             with quiet_opencv():
                 image = cv2.imread(str(path), cv2.IMREAD_COLOR)
         except cv2.error as error:
-            raise CameraError(f"{path} is too large a picture: scale it down") from error
+            raise CameraError(f"{path} is too large an image: scale it down") from error
         if image is None:
-            raise CameraError(f"{path} is a damaged picture: copy or save it anew")
+            raise CameraError(f"{path} is a damaged image: copy or save it again")
         self._image = _frozen(image, path)
         self._last = 1
 
@@ -107,7 +107,7 @@ class _Film:
         stated = usable_rate_hz(self._capture.get(cv2.CAP_PROP_FPS))
         first_s = _times_s(self._capture, SAMPLE)
         if not first_s:
-            raise CameraError(f"{path} holds no picture that can be read: use another file")
+            raise CameraError(f"{path} holds no readable frame: use another file")
         times = at_a_rate(*stated, rising(first_s))
         if times is None:
             times = by_table(rising(first_s + _times_s(self._capture, _MOST_TIMES)))
@@ -129,7 +129,7 @@ class _Film:
                 self._advance(number)
             found, image = self._capture.retrieve()
             if not found:
-                raise CameraError(f"picture {self._index} of {self._path} is damaged: copy it anew")
+                raise CameraError(f"frame {self._index} of {self._path} is damaged: copy it again")
             self._seen = number, _frozen(image, self._path)
         return self._seen[1]
 
@@ -143,7 +143,9 @@ class _Film:
             self._length, self._index = self._index, 0
             self._rewind()
             if not self._capture.grab():
-                raise CameraError(f"{self._path} cannot be read any more: is it still there?")
+                raise CameraError(
+                    f"{self._path} cannot be read any more: check that the file still exists"
+                )
         self._number, self._index = self._number + 1, self._index + 1
         if self._length:
             self._number += (goal - self._number) // self._length * self._length
@@ -160,8 +162,8 @@ def _open_film(path: Path) -> cv2.VideoCapture:
         capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
     if not capture.isOpened():
         raise CameraError(
-            f"{path} is no film or picture that can be read (or is cut short): "
-            "play it in another program, convert it to mp4 or copy it anew"
+            f"{path} is no readable film or image (or is cut short): "
+            "play it in another program, convert it to mp4 or copy it again"
         )
     return capture
 
@@ -188,14 +190,14 @@ def _check_complete(path: Path, capture: cv2.VideoCapture, seen: int) -> None:
     reached = stated if capture.grab() else int(capture.get(cv2.CAP_PROP_POS_FRAMES))
     if reached < _LEAST_COMPLETE * stated:
         raise CameraError(
-            f"{path} is cut short after {reached} of {stated} pictures: copy it anew or convert it"
+            f"{path} is cut short after {reached} of {stated} frames: copy it again or convert it"
         )
 
 
 def _check_forward(number: int, least: int) -> None:
     """Refuse to go back."""
     if number < least:
-        raise ValueError(f"films are read forward: picture {number} wanted, {least} is the least")
+        raise ValueError(f"films are read forward: frame {number} wanted, {least} is the least")
 
 
 def _frozen(image: Any, path: Path) -> ImageArray:

@@ -99,8 +99,8 @@ def at_a_rate(stated_hz: float, note: str, times_s: Sequence[float]) -> VideoTim
         return VideoTimestamps(stated_hz)
     return VideoTimestamps(
         rate_hz,
-        note=f"the film states {stated_hz:g} pictures a second and shows {rate_hz:.4g}: "
-        "the times of its pictures count",
+        note=f"the film states {stated_hz:g} frames a second and shows {rate_hz:.4g}: "
+        "the times of its frames count",
     )
 
 
@@ -114,6 +114,6 @@ def by_table(times_s: Sequence[float]) -> VideoTimestamps:
         rate_hz,
         starts,
         length_s,
-        f"the film's pictures come unevenly, {rate_hz:.3g} a second in the mean: "
-        "the times of its pictures count",
+        f"the film's frames come unevenly, {rate_hz:.3g} a second in the mean: "
+        "the times of its frames count",
     )

@@ -83,7 +83,7 @@ class Webcam:
         if not works:
             capture.release()
             raise CameraError(
-                f"{self._file} gives no picture: it is no camera, or another program uses it; "
+                f"{self._file} delivers no frame: it is no camera, or another program uses it; "
                 "close that program or name another camera"
             )
         self._capture, self._number = capture, 0
@@ -114,7 +114,7 @@ class Webcam:
                 self._number += 1
                 return Shot(captured_s - self._latency_s, self._number, pixels)
         raise CameraError(
-            f"camera {self._file} gives no more pictures: check its cable, start anew"
+            f"camera {self._file} delivers no more frames: check its cable, then start again"
         )
 
     def events(self) -> tuple[str, ...]:

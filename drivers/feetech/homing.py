@@ -30,7 +30,7 @@ def set_middle(port: BusPort, family: Family, servo_id: int) -> int:
     if torque is None:
         raise ServoMissing(f"{where} does not answer: check its cable and servo power")
     if torque:
-        raise ServoFault(f"{where} holds its place: let it go before its middle is set")
+        raise ServoFault(f"{where} has its torque on: switch it off before its middle is set")
     if not registers.write(servo_id, "lock", 0):
         raise ServoMissing(f"{where} does not answer: check its cable and servo power")
     registers.write(servo_id, "torque_enable", SET_MIDDLE)
@@ -42,7 +42,7 @@ def set_middle(port: BusPort, family: Family, servo_id: int) -> int:
         offset = registers.read(servo_id, "position_offset")
     if offset is None or not off or not locked:
         raise ServoFault(
-            f"{where} does not take its place for its middle (it reads {place}): switch its power "
+            f"{where} does not accept its present position as its middle (it reads {place}): switch its power "
             "off and on and try again"
         )
     return offset

@@ -218,8 +218,8 @@ class Channel:
 
     def pop_rearmed(self) -> bool:
         """Return once, after it was enabled, whether plans must begin at its pulse."""
-        anew, self.rearmed = self.rearmed, False
-        return anew or self.entering
+        rearmed, self.rearmed = self.rearmed, False
+        return rearmed or self.entering
 
 
 def _rest(setup: ServoConfig) -> float:

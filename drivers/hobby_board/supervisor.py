@@ -220,7 +220,7 @@ class BoardSupervisor:
         if len(self._restarts) > MOST_RESTARTS:
             self._give_up()
         else:
-            self._log.add(f"{who} restarted: set up anew")
+            self._log.add(f"{who} restarted: set up again")
 
     def _recent_noise(self, now_s: float) -> bool:
         """Return whether bytes to or from the board have been damaged recently."""
@@ -243,7 +243,7 @@ class BoardSupervisor:
             return
         self._told_s = now_s
         again = f" again and again: held once the line is quiet; {self._board.texts.noise}"
-        rest = again if often > 0 else ": set up anew"
+        rest = again if often > 0 else ": set up again"
         self._log.add(f"{who} was sent home by an error ({named}){rest}")
 
     def _drop(self, channel: Channel) -> None:

@@ -75,7 +75,7 @@ def _mute(line: I2cLine, address: int) -> str:
         )
     if line.failure != "not acknowledged":
         return (
-            f"nobody answers as an I2C bus ({line.failure}): a PCA9685 is reached over "
+            f"no answer as an I2C bus ({line.failure}): a PCA9685 is reached over "
             "an I2C bus such as /dev/i2c-1: write it under bus.port"
         )
     return (

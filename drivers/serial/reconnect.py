@@ -54,7 +54,7 @@ class ReconnectingPort:
         baud: bit/s to open it with.
         give_up_s: longest absence, seconds.
         log: gets the events of loss and return.
-        anew: called when it is open again: every servo must be checked.
+        on_reconnect: called when it is open again: every servo must be checked.
 
     down: the port is gone
     release_due: torque must be switched off first as soon as the port is open; set
@@ -67,10 +67,10 @@ class ReconnectingPort:
         baud: int,
         give_up_s: float,
         log: EventLog,
-        anew: Callable[[], None],
+        on_reconnect: Callable[[], None],
     ) -> None:
         self._port, self._baud, self._give_up_s = port, baud, give_up_s
-        self._log, self._anew = log, anew
+        self._log, self._on_reconnect = log, on_reconnect
         self._link = Reconnect()
         self.down = self.release_due = False
 
@@ -128,5 +128,5 @@ class ReconnectingPort:
         except (PortError, BusLost):
             self._port.closePort()
             return False
-        self._anew()
+        self._on_reconnect()
         return True

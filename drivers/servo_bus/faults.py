@@ -76,7 +76,7 @@ class ServoHealth:
     def restarted(self, servo_id: int, now_s: float) -> None:
         """Record that a servo had restarted and works again."""
         self._restarts.setdefault(servo_id, []).append(now_s)
-        self._log.add(f"{servo_label(self._setups[servo_id])} restarted: set up anew")
+        self._log.add(f"{servo_label(self._setups[servo_id])} restarted: set up again")
 
     def record_silent(
         self,

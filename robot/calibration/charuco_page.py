@@ -58,7 +58,7 @@ def write_page(board: CharucoBoard, paper: str, out: Path, force: bool = False) 
 
     Raises:
         SetupError: see ``page``, or the ending is another one.
-            Or it is there already and not forced, or cannot be written.
+            Or it already exists and not forced, or cannot be written.
     """
     if out.suffix.lower() not in (".pdf", ".png"):
         raise SetupError(f"{out}: a page is written as .pdf or .png; choose such a name")

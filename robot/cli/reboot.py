@@ -136,7 +136,7 @@ def _pca9685(rig: Rig, bus: str, line: BusPort, yes: bool) -> None:
         )
     say(
         f"{bus_label(rig, bus)}: a PCA9685 latches no errors; pulses of its {len(ids)} channels "
-        "are off, and it is set up anew at the next start"
+        "are off, and it is set up again at the next start"
     )
 
 

@@ -87,7 +87,7 @@ def write_bids(
     for stem in stems:
         there = stem.with_name(f"{stem.name}_physio.tsv.gz")
         if there.exists() and not force:
-            raise SetupError(f"{there} is there already: choose another --subject or --task")
+            raise SetupError(f"{there} already exists: choose another --subject or --task")
     make_folder(folder)
     made = list(_write_frame(root, subject, about))
     for stem, eye in zip(stems, _eyes(trace), strict=True):
@@ -108,7 +108,7 @@ def _refuse_foreign(root: Path, force: bool) -> None:
     except (OSError, ValueError, AttributeError, TypeError):
         pass
     raise SetupError(
-        f"{root} is there and is no data set of gazerig: name another folder, or say --force"
+        f"{root} is there and is no data set of gazerig: name another folder, or use --force"
     )
 
 

@@ -47,7 +47,7 @@ def write_csv(
     force: replace files that are there
 
     Raises:
-        SetupError: one is there already or cannot be written.
+        SetupError: one already exists or cannot be written.
     """
     refuse_existing(*csv_files(stem), force=force)
     made = (

@@ -206,7 +206,7 @@ def _created(path: Path, over: bool) -> int:
     try:
         return os.open(path, flags, 0o644)
     except FileExistsError:
-        raise SetupError(f"{path} is there already: choose another name or --force") from None
+        raise SetupError(f"{path} already exists: choose another name or --force") from None
     except OSError as error:
         raise SetupError(
             f"cannot write {path} ({error.strerror}): choose a folder you may write to"

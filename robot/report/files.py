@@ -25,7 +25,7 @@ def write_all(
     force: replace files that are there
 
     Raises:
-        SetupError: something is there already or cannot be written.
+        SetupError: something already exists or cannot be written.
     """
     folder, data = out.with_name(f"{out.stem}_figures"), numbers_file(out)
     paths = tuple(folder / f"{figure.drawing.key}.png" for figure in figures)

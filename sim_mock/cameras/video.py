@@ -60,7 +60,7 @@ class FilmCamera:
         motion: Motion | None = None,
     ) -> None:
         if not delay_s >= 0.0:
-            raise ValueError(f"detections cannot come before their picture: delay {delay_s} s")
+            raise ValueError(f"detections cannot come before their frame: delay {delay_s} s")
         self._video = video
         self._frames = FrameAnalyzer(detector, motion)
         self._delay_s = delay_s

@@ -16,7 +16,7 @@ _VENDOR = "03e7"  # Movidius, the chip in every OAK with USB
 _RIGHTS = (
     "an OAK camera is plugged in but may not be opened: put this line into "
     f"/etc/udev/rules.d/80-movidius.rules: {UDEV_RULE} - then run "
-    "sudo udevadm control --reload-rules && sudo udevadm trigger, and plug the camera in anew"
+    "sudo udevadm control --reload-rules && sudo udevadm trigger, and plug the camera in again"
 )
 
 

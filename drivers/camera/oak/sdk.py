@@ -24,6 +24,6 @@ def load_depthai() -> Any:
     except ImportError as error:
         raise CameraError(
             f"depthai cannot be loaded ({' '.join(str(error).split())}): "
-            "install it anew with: pip install 'depthai>=3.12,<4'"
+            "reinstall it with: pip install 'depthai>=3.12,<4'"
         ) from error
     return depthai

@@ -94,7 +94,7 @@ class OakSource:
                 return shot
             if arrived_s - began_s > self._params.silence_ms / 1e3:
                 raise CameraError(
-                    f"the OAK camera gave no picture for {self._params.silence_ms / 1e3:g} s: "
+                    f"the OAK camera delivered no frame for {self._params.silence_ms / 1e3:g} s: "
                     "check its cable and power supply"
                 )
         return None
@@ -185,7 +185,7 @@ class OakSource:
             )
         host_s = self._bridge.host_s(device_s, stamped_s if self._in_step else arrived_s)
         if self._bridge.jumps > jumps:
-            self._events.append("the OAK camera's clock was set anew: its times are found again")
+            self._events.append("the OAK camera's clock jumped: its times are measured again")
         return host_s
 
 

@@ -50,7 +50,7 @@ def _as_bgr(image: ImageArray) -> ImageArray:
     shape = image.shape
     if image.dtype != np.uint8 or len(shape) not in (2, 3) or shape[2:] not in _LAYOUTS:
         raise ValueError(
-            f"a picture is (height, width[, 1, 3 or 4]) of uint8, not {shape} of {image.dtype}"
+            f"an image is (height, width[, 1, 3 or 4]) of uint8, not {shape} of {image.dtype}"
         )
     code = _LAYOUTS[shape[2:]]
     if code is None or image.size == 0:

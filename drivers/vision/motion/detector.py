@@ -137,13 +137,13 @@ class MotionDetector:
     ) -> MotionReport:
         """Compare two images; return the motion, or why they cannot be compared."""
         if not searchable(now.grey):
-            return MotionReport(silent="picture too small")
+            return MotionReport(silent="frame too small")
         if before is None or before.grey.shape != now.grey.shape:
             self._tracks.forget()
-            return MotionReport(silent="first picture")
+            return MotionReport(silent="first frame")
         dt_s = now.captured_s - before.captured_s
         if not 0.0 < dt_s <= self._params.max_gap_ms / 1e3:
-            return MotionReport(silent="no picture shortly before")
+            return MotionReport(silent="no frame shortly before")
         H = turn_homography(R_now_before, now, before)
         pair = self._search.compare(now, before, H)
         depth = small_depth(depth_m, now.grey.shape)
@@ -164,7 +164,7 @@ class MotionDetector:
         if not turn_deg_s <= self._params.max_turn_deg_s:
             return "the camera turns too fast"
         if pair.known.mean() < _LEAST_KNOWN:
-            return "too little of the last picture in view"
+            return "too little of the last frame in view"
         if ego.share < self._params.min_background_share:
             return "no common motion of the background"
         return ""

@@ -67,7 +67,7 @@ def _check(image: NDArray[Any]) -> None:
     right = image.ndim in (2, 3) and channels in (1, 3, 4) and image.size > 0
     if not right or image.dtype != np.uint8:
         raise ValueError(
-            "a picture is (height, width), or that with 1, 3 or 4 channels, of uint8, not "
+            "an image is (height, width), or that with 1, 3 or 4 channels, of uint8, not "
             f"{image.shape} of {image.dtype}"
         )
 
