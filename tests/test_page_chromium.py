@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 from desk import GAZE_JOINTS
 from present import present
+from shown_page import free_port, wait_for
 
 from gazerig.config.allowed_folder import AllowedFolder
 from gazerig.config.load import shipped
@@ -49,7 +50,7 @@ def load_browser() -> ModuleType:
 
 
 browser_of_the_page = load_browser()
-wait_for, free_port = browser_of_the_page.wait_for, browser_of_the_page.free_port
+
 
 YAW = GAZE_JOINTS.index("neck_yaw")
 TICK_S = 0.01

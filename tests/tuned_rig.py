@@ -12,9 +12,11 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+from ideal_bus import ideal_buses
 
 from gazerig.config.load import ConfigError
 from gazerig.config.save import copy_shipped
@@ -25,25 +27,38 @@ from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.control.loop import run as run_loop
 from gazerig.robot.model import stop_latch
+from gazerig.robot.remote import socket_server
+from gazerig.robot.remote.budget import RequestRate
 from gazerig.robot.remote.live_server import LiveServer
 
-PACE_S = 0.02  # real seconds a tick
+PACE_S = 0.01  # real seconds a tick
+
+
+def here(work: Callable[..., Any], *words: Any, **named: Any) -> Any:
+    """Call a function in this process, which has no servos that wait."""
+    return work(*words, **named)
 
 
 def serve(path: Path) -> None:
     """Run until SIGTERM; says what the rig says on standard error."""
     stop_latch.MIN_HOLD_S = stop_latch.MIN_RESUME_GAP_S = 0.0  # time is slow here
+    # What takes time for the loop's sake is tested where it is done: shares of the processor,
+    # files that are read in another process, and a file that is looked at twice a second.
+    socket_server.EACH = socket_server.ALL = RequestRate(1.0, 60.0)
     over: list[str] = []
     signal.signal(signal.SIGTERM, lambda *_: over.append("SIGTERM"))
-    made = assemble(load_rig(str(path)), RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
+    with ideal_buses():
+        options = RunOptions(mock=True, fast=True, seed=0, scene="visitor")
+        made = assemble(load_rig(str(path)), options)
     robot = made.robot
 
     def say(line: str) -> None:
         print(line, file=sys.stderr, flush=True)
 
     about = {"rig": str(path), "pid": os.getpid()}
-    tuning = ParamStore(made.live, robot.command, str(path))
+    tuning = ParamStore(made.live, robot.command, str(path), elsewhere=here)
     live = LiveServer(robot, tuning, (ConfigError,), made.clock, about, say)
+    live._watch._every_s = 0.1
 
     def watch(tick: Tick) -> None:
         live.update(tick)
