@@ -242,7 +242,7 @@ def resumed(rig: Rig, person: Person, question: str = "Fingers out?") -> None:
     assert rig.newest is not None
     held_s = rig.newest.t_s + 2.1
     rig.pace_s = 0.001
-    wait_for(lambda: rig.newest.t_s > held_s, "the time that a stop holds at least")
+    wait_for(lambda: present(rig.newest).t_s > held_s, "the time that a stop holds at least")
     rig.pace_s = PACE_S
     person.click(saying("Resume …"))
     assert rig.robot.stopped  # not without being asked again
