@@ -92,7 +92,22 @@ class ReachableGaze(NamedTuple):
 
 
 class Oculomotor:
-    """Composes saccades, following, head and lids."""
+    """Composes saccades, following, head and lids.
+
+    Args:
+        params: thresholds and times.
+        geometry: of head and eyes.
+        eye_limits: for left and right eye, ((yaw low, high), (pitch low, high)), rad.
+        saccade: the model of saccades.
+        pursuit: the model of pursuit.
+        head: the model of head movements.
+        lids: the model of lids and blinks.
+        breathing: sways the head; None: it does not.
+        rng: random generator of the endpoint scatter.
+
+    Raises:
+        ValueError: endpoints are to scatter and there is no rng.
+    """
 
     def __init__(
         self,
@@ -106,13 +121,6 @@ class Oculomotor:
         breathing: Sway | None = None,
         rng: np.random.Generator | None = None,
     ) -> None:
-        """Take the models and, for left and right eye, ((yaw low, high), (pitch low, high)).
-
-        rng: random generator of the endpoint scatter
-
-        Raises:
-            ValueError: endpoints are to scatter and there is no rng.
-        """
         self._rng = rng
         self._trigger = SaccadeTrigger(params, False)
         self.retune(params, eye_limits)

@@ -1,4 +1,4 @@
-"""The fit-scanpath command: a recording of somebody who looks at a face -> a walk for ``run``."""
+"""The fit-scanpath command: a recording of a person who looks at a face -> a walk for ``run``."""
 
 from math import isnan
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Where on a face somebody has looked, as an image (Nakamoto & Tsuruno 4.3, figs 8 and 9).
+"""Where on a face a person has looked, as an image (Nakamoto & Tsuruno 4.3, figs 8 and 9).
 
 Gaze points lie in the face's own frame, y to the owner's left and z up, in metres from the
 tip of the nose. Each is spread by a bell as wide as what is

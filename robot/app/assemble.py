@@ -317,7 +317,7 @@ def _camera_params(
 def _turn_sender(
     kinematics: Kinematics, mount: CameraMount, turns: PoseBuffer | None
 ) -> Callable[[float, Angles3], None] | None:
-    """Return what tells the camera's process how its camera is turned, None where nobody asks."""
+    """Return what tells the camera's process how its camera is turned, None if it is not needed."""
     if turns is None:
         return None
 

@@ -150,7 +150,7 @@ class LiveParams:
     def __call__(self, command: Tune, t_s: float) -> tuple[str, ...]:
         """Apply a change from this tick on; return a description of what was done.
 
-        A change that nobody has prepared is checked here; a wrong one changes nothing.
+        A change that was not prepared is checked here; a wrong one changes nothing.
         """
         ready = self._ready.pop(id(command.changes), None)
         if ready is None or ready.changes is not command.changes or ready.base is not self.rig:

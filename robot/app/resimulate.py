@@ -38,7 +38,7 @@ class Resimulation(NamedTuple):
     joints: where the joints' angles came from
     ticks: compared; agreeing: whose target, gaze and commands are the same to the bit
     first_difference_s: from the first tick, None where all agree; differs: what does there
-    tx_same: the bytes on the emulated bus are the same too, None where nobody can know
+    tx_same: the bytes on the emulated bus are the same too, None if that cannot be known
     recorded, again: the figures of both (gazerig.robot.analysis.summary)
     notes: what else a person should know
     """

@@ -95,8 +95,8 @@ def search(
     """Search with one kind of bus after the other; end after the first kind that replied.
 
     asked: as ``plan`` gives it
-    thorough: wait long for Dynamixel servos, ask each STS id even where nobody answers a ping
-        to everybody
+    thorough: wait long for Dynamixel servos, ask each STS id even if no servo answers a
+        broadcast ping
     to_the_end: servos of a kind do not end it, as a line can carry two kinds; a board does
 
     Raises:

@@ -59,7 +59,7 @@ def _until(seconds: float | None) -> str:
 
 
 def _lead_on(rig: RobotClient, seconds: float) -> None:
-    """Lead for so long, or until Ctrl-C or somebody else leads; then let go."""
+    """Lead for so long, or until Ctrl-C or until another client leads; then end the lead."""
     clock = RealClock()
     end_s = clock.now_s() + seconds
     with contextlib.suppress(KeyboardInterrupt):

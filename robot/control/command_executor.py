@@ -20,6 +20,18 @@ class CommandExecutor:
     """Carries out commands on the components of one robot.
 
     commanded_rad: joint angles last sent to the servos, where joints are held from
+
+    Args:
+        body: the joints on their bus.
+        lead: who leads gaze or joints.
+        stop: switches the torque off and on.
+        menus: the choices of the models.
+        attention: its behaviours can be chosen.
+        oculomotor: computes how far eyes and head can follow.
+        kinematics: gaze to joint angles.
+        guard: starts slowly where joints are taken over.
+        tune: changes parameters and returns what was done, as text.
+        told: called with a line on whatever happens.
     """
 
     def __init__(
@@ -35,20 +47,6 @@ class CommandExecutor:
         tune: Callable[[Tune, float], tuple[str, ...]],
         told: list[str],
     ) -> None:
-        """Take the components.
-
-        Args:
-            body: the joints on their bus.
-            lead: who leads gaze or joints.
-            stop: switches the torque off and on.
-            menus: what can be asked of the models.
-            attention: its behaviours can be asked for.
-            oculomotor: says how far eyes and head can follow.
-            kinematics: gaze to joint angles.
-            guard: begins slowly where joints are taken over.
-            tune: changes parameters and returns what was done, as text.
-            told: takes a line for people of whatever happens.
-        """
         self._body, self._lead, self._stop, self._menus = body, lead, stop, menus
         self._attention, self._oculomotor, self._kinematics = attention, oculomotor, kinematics
         self._guard, self._tune, self._told = guard, tune, told
@@ -61,7 +59,7 @@ class CommandExecutor:
         return taken_over
 
     def end_lapsed_lead(self, t_s: float) -> None:
-        """End a lead that nobody has renewed."""
+        """End a lead that was not renewed."""
         if self._lead.lapsed(t_s):
             self._told.append(f"{self._lead.words}: not renewed, so the gaze leads again")
             self._let_lead(self._lead.end)

@@ -106,7 +106,7 @@ class Robot:
 
     @property
     def stopped(self) -> str:
-        """Return why somebody stopped the robot, "" while it moves."""
+        """Return why the robot was stopped, "" while it moves."""
         return self._stop.why
 
     def command(self, command: Command) -> Ticket:
@@ -238,7 +238,7 @@ class Robot:
     ) -> bool:
         """Move slowly to the parking pose; tell whether it was reached in time.
 
-        Somebody's stop ends it: the torque is off then. Other commands wait for nothing any more.
+        A user's stop ends it: the torque is off then. Other commands wait for nothing any more.
 
         again: asked at every step, tells whether the rest is to be skipped
         """

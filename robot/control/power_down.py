@@ -20,7 +20,7 @@ from gazerig.robot.control.interrupts import Interrupts
 T = TypeVar("T")
 
 Again = Callable[[], bool]
-"""Tells whether somebody asked again for the end: the rest of parking is skipped then."""
+"""Returns whether the end was requested again: the rest of parking is skipped then."""
 
 
 class PowerDown:

@@ -26,7 +26,7 @@ class StopControl:
 
     @property
     def why(self) -> str:
-        """Return why somebody stopped the robot, "" while it moves."""
+        """Return why the robot was stopped, "" while it moves."""
         return self._latch.why
 
     def halt(self, command: Stop, body: Body, t_s: float) -> None:

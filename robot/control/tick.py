@@ -13,8 +13,8 @@ class Tick(NamedTuple):
 
     events: what has happened on the bus and to the camera, in words
     commands: what people asked for, obeyed at the beginning of this tick
-    stopped: why somebody stopped the robot, "" while it moves
-    led: who leads gaze or joints and with what, "" while nobody does
+    stopped: why the robot was stopped, "" while it moves
+    led: who leads gaze or joints and with what, "" while no client leads
     """
 
     t_s: float

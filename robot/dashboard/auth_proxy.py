@@ -121,13 +121,13 @@ class AuthProxy:
         return self._thread.is_alive()
 
     def tell(self, state: Mapping[str, object]) -> None:
-        """Show this to everybody who looks at the stop button; from any thread."""
+        """Show this to all users of the stop button; from any thread."""
         if state != self._state:
             self._state = dict(state)
             self._loop.call_soon_threadsafe(self._wake)
 
     def close(self) -> None:
-        """Send everybody away."""
+        """Close all connections."""
         if self._thread.is_alive():
             self._loop.call_soon_threadsafe(self._over.set)
             self._thread.join(_CLOSE_TIMEOUT_S)

@@ -15,9 +15,9 @@ from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, rays
 
 NEAR_RAD = 0.12
-"""A click within 7 deg of somebody means something as far away as they are."""
+"""A click within 7 deg of a person means something as far away as they are."""
 USUAL_M = 1.5
-"""How far away a thing counts as where nobody knows: across a desk and a step more."""
+"""Assumed distance of a thing without a measured one: across a desk and a step more."""
 
 _PATCH = 0.03  # of the image's width, the square whose depth is read
 

@@ -15,7 +15,7 @@ _STEP_DEG = 0.1
 _FIRST, _LAST = 1, 100
 """Places of the sliders in the tab, and of what stands below them."""
 _FOLLOWS_DEG = 0.15
-"""A slider nobody holds follows its joint in steps of this."""
+"""A slider that is not held follows its joint in steps of this."""
 _FREE_AFTER_S = 0.5
 """A jogged joint whose desired angle is another for this long is no longer jogged."""
 _SAME_DEG = 0.3
@@ -88,7 +88,7 @@ class JogPanel:
         self._outbox.command(Jog(((joint, radians(angle_deg)),)), who)
 
     def show(self, snapshot: Snapshot) -> None:
-        """Write the measured angles; sliders that nobody holds follow them."""
+        """Write the measured angles; sliders that are not held follow them."""
         if snapshot.t_s < self._now_s:  # the rig's clock was started anew
             self._held.clear()
         self._now_s = snapshot.t_s
@@ -123,7 +123,7 @@ class JogPanel:
 def measured_table(snapshot: Snapshot) -> str:
     """List every joint's desired and measured angle in degrees, as HTML.
 
-    What nobody measures stands in a column of its own: an estimated angle looks like any other.
+    What is not measured is in a column of its own: an estimated angle looks like any other.
     """
     estimated = frozenset(snapshot.estimated)
     columns = ["desired"]

@@ -92,7 +92,7 @@ def groups_of(joints: Iterable[str]) -> dict[str, tuple[ChartGroup, ...]]:
 class JointSeries:
     """The joints of the last half minute.
 
-    joints: their names; estimated: those that nobody measures
+    joints: their names; estimated: those that are not measured
     """
 
     def __init__(self) -> None:

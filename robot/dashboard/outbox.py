@@ -59,5 +59,5 @@ class Outbox:
 
 
 def _unnamed(client: str) -> str:
-    """Return no name: nobody has said which browser a client is."""
+    """Return no name: it is unknown which browser a client is."""
     return ""

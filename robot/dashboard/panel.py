@@ -32,7 +32,7 @@ class PanelView:
     """Status, camera image, and a window of tabs: why, traces, statistics, health, view.
 
     layers: what is to be drawn into the scene, as chosen in the tab "view"
-    depth: is told whenever somebody asks for the depth image or for the plain one
+    depth: called whenever a user selects the depth image or the plain one
     """
 
     def __init__(self, gui: viser.GuiApi) -> None:
@@ -180,4 +180,4 @@ def _setter(
 
 
 def _ignore(wanted: bool) -> None:
-    """Do nothing: nobody asked to be told."""
+    """Do nothing: there is no receiver."""

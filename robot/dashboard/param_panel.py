@@ -72,7 +72,7 @@ class ParamState:
                 panel.take(self.in_force, self._unsaved, self._path)
 
     def answered(self, who: str, text: str | None) -> None:
-        """Pass the rig's answer on to who asked; words for nobody else go to everybody."""
+        """Pass the rig's answer on to who asked; other messages go to all users."""
         client, _, of_tuning = who.partition(":")
         with self._lock:
             panel = self._panels.get(client)

@@ -98,7 +98,7 @@ class Publisher:
         self._slot: Tick | None = None
         self._ticks = 0
         self._over = threading.Event()
-        self._thread = threading.Thread(target=self._watch, name="onlooker", daemon=True)
+        self._thread = threading.Thread(target=self._watch, name="publisher", daemon=True)
 
     def start(self) -> None:
         """Begin to look."""

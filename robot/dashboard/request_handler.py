@@ -32,7 +32,19 @@ Point = Callable[[float, float], Vec3 | None]
 
 
 class PageRequestHandler:
-    """Carries out one request of the page and gives what there is to say about it."""
+    """Carries out one request of the page and gives what there is to say about it.
+
+    Args:
+        command: executes commands.
+        params: the parameters; None: there are none to change.
+        point: the point in the world under a position in the image; None: there is no image.
+        steer: handles a steering button; None: there are no buttons.
+        replay: controls a replay; None: there is none.
+        depth: switches the depth image on or off; None: there is none.
+        refusals: what ``params`` raises if a value breaks a rule, besides ValueError.
+        saved: called with each file that was written.
+        paths: which files may be named; None: any.
+    """
 
     def __init__(
         self,
@@ -46,13 +58,6 @@ class PageRequestHandler:
         saved: Callable[[Path], None] | None = None,
         paths: PathGuard | None = None,
     ) -> None:
-        """Take who obeys.
-
-        params, point, steer, replay, depth: None where there is no such thing to ask for
-        refusals: what ``params`` raises where a value breaks a rule, besides ValueError
-        saved: is told each file that was written
-        paths: which files may be named; None: any
-        """
         self._handler = CommandHandler(
             _Taking(command), params, refusals=refusals, saved=saved, paths=paths
         )
@@ -108,7 +113,7 @@ class PageRequestHandler:
         return None  # the page has its own ways to know
 
     def _replied(self, given: CommandGiven) -> str | None:
-        """Return what a command cannot do, None where it does all or nobody waits."""
+        """Return what a command cannot do, None if it does all or no client waits."""
         if given.ticket is None or not isinstance(given.command, LookAt | Jog | Resume):
             return None
         reply = given.ticket.wait(_REPLY_S)
@@ -118,7 +123,7 @@ class PageRequestHandler:
             return f"refused: {reply.refused}"
         if not reply.limited:
             return None
-        # Of somebody who drags a target out of reach one word is enough for a while.
+        # Of a user who drags a target out of reach one word is enough for a while.
         now_s = self._clock.now_s()
         if now_s - self._limited_s < _SAID_EVERY_S:
             return None

@@ -203,7 +203,7 @@ def joint_names(tick: Tick, rig: ShownRig | None = None) -> tuple[str, ...]:
 
 
 def _estimated(joints: JointState, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the joints whose place is told by nobody; where nothing is said of it, none."""
+    """Return the joints whose position is not measured; where nothing is said of it, none."""
     if not joints.measured:
         return ()
     told = zip(names, joints.measured, strict=True)

@@ -95,7 +95,7 @@ class StopListener:
             answer = [asked.pop("number"), self._take(asked)[:_WORDS]]
             try:
                 self._link.send(json.dumps(answer).encode(), socket.MSG_DONTWAIT)
-            except OSError:  # nobody waits any more; the stop is obeyed
+            except OSError:  # no client waits any more; the stop is obeyed
                 continue
 
     def close(self) -> None:

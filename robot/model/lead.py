@@ -17,9 +17,9 @@ HEARTBEAT_S = 1.0
 class Lead:
     """The lead in force.
 
-    point: to look at, world frame; None where nobody chose one
+    point: to look at, world frame; None if none was chosen
     pose_rad: joints held by hand, empty while the models move them
-    words: who leads and what, "" while nobody does
+    words: who leads and what, "" while no client leads
     """
 
     def __init__(self) -> None:
@@ -48,7 +48,7 @@ class Lead:
     def jog(self, command: Jog, names: tuple[str, ...], now_rad: JointAngles, t_s: float) -> None:
         """Hold all joints but those given; without any, return them to the gaze models.
 
-        now_rad: where the joints are held that nobody has jogged yet
+        now_rad: where the joints are held that have not been jogged yet
         """
         if not command.angles_rad:
             self.pose_rad = ()
@@ -90,7 +90,7 @@ class Lead:
         return puppet._replace(shift=target.shift + self._shifts, saliences=target.saliences)
 
     def puppet(self, t_s: float) -> Target | None:
-        """Return the point that a person chose, None where nobody did."""
+        """Return the point that a user chose, None if none was chosen."""
         if self.point is None:
             return None
         return Target(

@@ -144,4 +144,4 @@ class Ticket:
 
 
 CommandTaker = Callable[[Command], Ticket | None]
-"""Takes a command for the next tick, as Robot.command does; None: nobody will reply to it."""
+"""Takes a command for the next tick, as Robot.command does; None: there will be no reply."""

@@ -37,7 +37,7 @@ class StopLatch:
 
     @property
     def by(self) -> str:
-        """Return who stopped, "" where nobody said."""
+        """Return who stopped, "" if unknown."""
         return " and ".join(sorted(filter(None, self._stoppers)))
 
     def refusal(self, command: Resume, t_s: float) -> str:

@@ -208,7 +208,7 @@ class Servos(NamedTuple):
 
     temperature_c, voltage_v: None before the first reading; load: signed, -1..1
     fault: latched errors in words; age_s: since the last answer
-    unanswered: ticks without an answer since the start, empty where nobody counts
+    unanswered: ticks without an answer since the start, empty if they are not counted
     """
 
     temperature_c: tuple[float | None, ...] = ()
@@ -280,9 +280,9 @@ class Snapshot:
     behaviour: the behaviour in force; saliences: of the winner and the next bodies, highest first
     perception: age of the frame, distances and what they rest on, still things that seem to move
     target_kind, target_id, target_part: the target as in gaze.types.Target
-    character, conversation: those in force, "" where nobody says
-    stopped: why somebody stopped the robot, "" while it moves
-    led: who leads gaze or joints and how well the head can follow, "" while nobody does
+    character, conversation: those in force, "" if unknown
+    stopped: why the robot was stopped, "" while it moves
+    led: who leads gaze or joints and how well the head can follow, "" while no client leads
     frame_age_s: None before the first frame
     commanded_pose: head and eyes at the desired angles; camera: where the camera is
     field_deg: what an eye can see, towards temple, nose, above and below

@@ -14,7 +14,14 @@ from gazerig.robot.model.intrinsics import intrinsics_of_lens
 
 
 class MotionSource:
-    """Finds what moves from one frame to the next."""
+    """Finds what moves from one frame to the next.
+
+    Args:
+        params: of the detection.
+        lens: for frames that do not bring their own lens.
+        field_rad: horizontal field of view, likewise.
+        turns: rotation of a camera that turns with the head; None: it stands still.
+    """
 
     def __init__(
         self,
@@ -23,11 +30,6 @@ class MotionSource:
         field_rad: float,
         turns: PoseBuffer | None,
     ) -> None:
-        """Take how to look.
-
-        lens, field_rad: for frames that do not bring their own lens
-        turns: how a camera that turns with the head was turned when; None: it stands still
-        """
         self._enabled, self._lens, self._field_rad = params.enabled, lens, field_rad
         self._turns = turns
         self._detector = MotionDetector(params)

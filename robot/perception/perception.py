@@ -44,7 +44,17 @@ _HALF_TURN_S = 0.015
 
 
 class Perception:
-    """Sees: one percept for each new frame."""
+    """Sees: one percept for each new frame.
+
+    Args:
+        mount: where the camera sits.
+        horizontal_field_deg: its field of view.
+        tracker: tracks people and things.
+        parts_face_m: measured positions of one person's face parts in the face frame, instead of
+            the average ones (Nakamoto & Tsuruno 3.7).
+        lens: as calibrated, used for frames of the aspect ratio at which it was calibrated.
+        depth_at: reads depth images; without it, distances come from the size of faces.
+    """
 
     def __init__(
         self,
@@ -55,13 +65,6 @@ class Perception:
         lens: LensParams | None = None,
         depth_at: DepthAt | None = None,
     ) -> None:
-        """Take where the camera sits, its field of view and the tracker.
-
-        parts_face_m: a person's own places of some parts in the face's frame, instead of
-            the canonical ones (Nakamoto & Tsuruno 3.7)
-        lens: as measured, used for images of the shape it was measured on
-        depth_at: reads depth images; without it, distances come from the size of faces
-        """
         self._mount = mount
         self.retune(horizontal_field_deg, parts_face_m, lens)
         self._tracker = tracker

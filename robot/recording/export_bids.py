@@ -97,7 +97,7 @@ def write_bids(
 
 
 def _refuse_foreign(root: Path, force: bool) -> None:
-    """Refuse to put a run into somebody else's data set, or among files that are none."""
+    """Refuse to put a run into another data set, or among files that are none."""
     if force or not root.is_dir() or not any(root.iterdir()):
         return
     try:

@@ -14,13 +14,14 @@ from gazerig.robot.dashboard.camera_overlay import encode
 
 
 class FrameEncoder:
-    """Encodes the frames of ticks as JPEG, at a given rate."""
+    """Encodes the frames of ticks as JPEG, at a given rate.
+
+    Args:
+        rate_hz: 0 for none.
+        at_once: encode in ``look`` itself, as a run in simulated time needs it.
+    """
 
     def __init__(self, rate_hz: float, at_once: bool = False) -> None:
-        """Take the rate, 0 for none.
-
-        at_once: encode where ``look`` is called, as a run in simulated time needs it
-        """
         self._every_s = 1.0 / rate_hz if rate_hz > 0.0 else inf
         self._at_once = at_once
         self._due_s = -inf

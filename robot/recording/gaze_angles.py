@@ -30,7 +30,7 @@ from gazerig.robot.model.commands import Command, Jog, Renew, Stop
 Ints = NDArray[np.int64]
 
 MOVEMENTS = ("", "fixation", "saccade", "pursuit")
-"""What eyes do; "" where nobody knows, as they were moved by hand or stood without torque."""
+"""What eyes do; "" if unknown, as they were moved by hand or stood without torque."""
 
 _CODE = {"fixate": 1, "saccade": 2, "pursue": 3}
 _ARRIVED_RAD = 0.009  # half a degree: nearer than that a new target needs no saccade

@@ -270,7 +270,7 @@ def used(path: Path) -> Iterator[None]:
     To be put around what is made of it, as a file may be well-formed and still hold nonsense.
 
     Raises:
-        BadRecording: something that follows from damage, or from the hand of somebody.
+        BadRecording: something that follows from damage, or from a manual edit.
     """
     try:
         yield

@@ -161,7 +161,7 @@ class Recorder:
             if self._beside is not None:
                 self._beside.unlink(missing_ok=True)
                 return f"nothing was recorded: {self._path} is as it was"
-            if self._opened:  # else it is somebody else's
+            if self._opened:  # else it is another program's
                 self._path.unlink(missing_ok=True)
             return f"nothing was recorded: {self._path} is not made"
         done = self._link.done

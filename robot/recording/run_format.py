@@ -104,7 +104,7 @@ _TICK = _says(
         verdict=_says(_VERDICT, "what the guard let through; wish_rad null: that of the tick"),
         events=_TEXTS,
         orders=_list(_ORDER),
-        stopped=_says(_TEXT, "why somebody stopped the robot"),
+        stopped=_says(_TEXT, "why the robot was stopped"),
         led=_says(_TEXT, "who leads gaze or joints and with what"),
         before=_list(_object(what=_TEXT), "what the machine said beside the tick's own reading"),
     ),

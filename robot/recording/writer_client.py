@@ -55,7 +55,7 @@ class WriterClient:
 
     @property
     def alive(self) -> bool:
-        """Return whether there is somebody to hand over to."""
+        """Return whether there is a writer to send to."""
         return self._socket is not None
 
     def post(self, kind: str, values: Any) -> bool:

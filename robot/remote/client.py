@@ -68,15 +68,20 @@ class ConnectionLost(DriverError):
 
 
 class RobotClient:
-    """A connection to one running rig; answers come when the rig has done what was asked."""
+    """A connection to one running rig; answers come when the rig has done what was asked.
+
+    To be made by ``connect``.
+
+    Args:
+        wire: the connection.
+        pid: process of the rig.
+        who: the name under which users see this client.
+        dial: opens another connection to the same rig.
+    """
 
     def __init__(
         self, wire: Wire, pid: int, who: str = "", dial: Callable[[], Wire] | None = None
     ) -> None:
-        """Take a connection; ``connect`` makes one.
-
-        who: what people are told of who asks; dial: makes another connection to the same rig
-        """
         self._wire = wire
         self._lock = threading.Lock()
         self._who = who
@@ -148,7 +153,7 @@ class RobotClient:
         """Apply a value; when this returns, the loop uses it. Return what the user should know.
 
         Raises:
-            Refused: the value breaks a rule; all is as before.
+            RequestRejected: the value breaks a rule; all is as before.
         """
         return self.set_many({key: value})
 
@@ -156,7 +161,7 @@ class RobotClient:
         """Apply several values in the same tick, or none of them.
 
         Raises:
-            Refused: with every rule that is broken.
+            RequestRejected: with every rule that is broken.
         """
         return self._notes(self._asked("set", changes=dict(changes)))
 
@@ -211,14 +216,14 @@ class RobotClient:
     def look_at(self, x_m: float, y_m: float, z_m: float, stay: bool = False) -> CommandReply:
         """Look at a point: metres, x ahead, y left, z up of the neck base.
 
-        stay: until somebody lets go; else for as long as this connection is open, this
-            program alive, and nobody else leads
+        stay: until the lead is ended; else for as long as this connection is open, this
+            program alive, and no other client leads
 
         Returns:
             How far beside the point the gaze will rest, and the joints at their ends.
 
         Raises:
-            Refused: it is no point, or the rig is stopped.
+            RequestRejected: it is no point, or the rig is stopped.
         """
         return self._lead(LookAt((x_m, y_m, z_m), self._who, stay), stay)
 
@@ -233,7 +238,7 @@ class RobotClient:
         stay: as in ``look_at``
 
         Raises:
-            Refused: there is no such joint, the angle is outside its range, or the rig is
+            RequestRejected: there is no such joint, the angle is outside its range, or the rig is
                 stopped.
         """
         return self._lead(Jog(((joint, radians(deg)),), self._who, stay), stay)
@@ -268,7 +273,7 @@ class RobotClient:
         """Switch the torque off at once; when this returns, the loop has done it.
 
         Raises:
-            ConnectionLost, Refused: nobody knows whether it stopped: press the emergency stop.
+            ConnectionLost, RequestRejected: it may not have stopped: press the emergency stop.
         """
         self._command(Stop(why, self._who))
 
@@ -279,7 +284,7 @@ class RobotClient:
             somebody else has stopped it
 
         Raises:
-            Refused: a servo does not take it, or a rule of stops forbids it; the torque
+            RequestRejected: a servo refuses it, or a rule of stops forbids it; the torque
                 stays off.
         """
         self._command(Resume(self._who, confirmed))
@@ -355,7 +360,7 @@ def running(pid: int | None = None, who: str = "") -> list[RobotClient]:
 
 
 def _wire(path: Path) -> Wire:
-    """Connect to a rig's socket; raises OSError where nobody answers."""
+    """Connect to a rig's socket; raises OSError if there is no answer."""
     return Wire(dial(path, _CONNECT_S), ANSWER_BYTES)
 
 

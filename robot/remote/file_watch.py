@@ -80,7 +80,14 @@ class Settling:
 
 
 class FileWatch:
-    """A thread that looks at some files again and again."""
+    """A thread that looks at some files again and again.
+
+    Args:
+        files: returns the files in use.
+        changed: called in this thread with a path of ``files`` that should be read again, also if
+            the file stays missing.
+        every_s: period of the checks.
+    """
 
     def __init__(
         self,
@@ -88,11 +95,6 @@ class FileWatch:
         changed: Callable[[Path], None],
         every_s: float = EVERY_S,
     ) -> None:
-        """Take what gives the files in use, and who is told that one should be read again.
-
-        changed: called in this thread with a path as ``files`` gave it, also when that
-        file stays away
-        """
         self._files = files
         self._changed = changed
         self._every_s = every_s

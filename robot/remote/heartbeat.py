@@ -14,7 +14,7 @@ _EVERY_S = 0.25 * HEARTBEAT_S
 
 
 class LeadHeartbeat:
-    """Renews a lead until it is taken by somebody else or let go.
+    """Renews a lead until it is taken by another client or ended.
 
     Args:
         dial: connects to the rig.
@@ -49,7 +49,7 @@ class LeadHeartbeat:
                 match self._wire.read(10.0, 10.0):
                     case {"ok": _}:
                         self._over.wait(_EVERY_S)
-                    case _:  # somebody else leads, or nobody
+                    case _:  # another client leads, or none
                         return
         except (OSError, EOFError, MalformedMessage):
             return  # hung up, by either side

@@ -27,7 +27,16 @@ class FileTuning(ParamAccess, Protocol):
 
 
 class LiveServer:
-    """The remote control and the file watch of one running rig."""
+    """The remote control and the file watch of one running rig.
+
+    Args:
+        robot: executes commands.
+        tuning: the parameters and their files.
+        refusals: what ``tuning`` raises if a value breaks a rule.
+        clock: the clock of the loop.
+        about: what does not change, as {"rig": name, "pid": process}.
+        say: prints a line on the terminal.
+    """
 
     def __init__(
         self,
@@ -38,12 +47,6 @@ class LiveServer:
         about: Mapping[str, object],
         say: Callable[[str], None],
     ) -> None:
-        """Take the rig.
-
-        refusals: what ``tuning`` raises where a value breaks a rule
-        clock: that of the loop; about: what does not change, as {"rig": name, "pid": process}
-        say: writes a line on the terminal
-        """
         self._tuning = tuning
         self._refusals: tuple[type[Exception], ...] = (OSError, ValueError, *refusals)
         self._say = say

@@ -106,7 +106,17 @@ class Pulse:
 
 
 class RequestHandler:
-    """Answers what another program asks of the running rig: {"ok": ...} or {"refused": ...}."""
+    """Answers what another program asks of the running rig: {"ok": ...} or {"refused": ...}.
+
+    Args:
+        robot: executes commands.
+        params: the parameters; None if they cannot be seen or changed.
+        pulse: whether the loop is alive.
+        about: what does not change, as {"rig": name, "pid": process}.
+        refusals: what ``params`` raises if a value breaks a rule, besides ValueError.
+        saved: called with each file that was written.
+        fixed: why parameters cannot be changed, if they cannot.
+    """
 
     def __init__(
         self,
@@ -118,17 +128,6 @@ class RequestHandler:
         saved: Callable[[Path], None] | None = None,
         fixed: str = FIXED,
     ) -> None:
-        """Take the rig.
-
-        Args:
-            robot: takes commands.
-            params: the parameters; None where nobody may see or change them.
-            pulse: whether the loop lives.
-            about: what does not change, as {"rig": name, "pid": process}.
-            refusals: what ``params`` raises where a value breaks a rule, besides ValueError.
-            saved: is told each file that was written.
-            fixed: why parameters cannot be changed, where they cannot.
-        """
         self._params = params
         self._pulse = pulse
         self._about = dict(about)
@@ -140,7 +139,7 @@ class RequestHandler:
 
         Args:
             request: {"do": verb, ...}.
-            peer: who is at the other end, as "process 123", "" where nobody knows.
+            peer: who is at the other end, as "process 123", "" if unknown.
         """
         try:
             return {"ok": self._told(self._handler.do(request, partial(_signed, peer)))}

@@ -83,7 +83,7 @@ def dial(path: Path, within_s: float) -> socket.socket:
     """Connect to a rig's socket.
 
     Raises:
-        OSError: nobody answers there; ConnectionRefusedError where the process is dead.
+        OSError: there is no answer; ConnectionRefusedError where the process is dead.
     """
     caller = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:

@@ -58,7 +58,7 @@ class RemoteServer:
         return self._path
 
     def close(self) -> None:
-        """Hang up on everybody and remove the socket."""
+        """Close all connections and remove the socket."""
         if self._listener is None or self._path is None:
             return
         self._path.unlink(missing_ok=True)
@@ -99,7 +99,7 @@ class RemoteServer:
                     wire.close()
                     return
                 if len(self._wires) >= _MOST:
-                    # Somebody who comes to stop the head must always be let in.
+                    # A client that comes to stop the head must always be accepted.
                     quietest = next(iter(self._wires))
                     del self._wires[quietest]
                     quietest.close()

@@ -1,6 +1,6 @@
-"""Where other programs stop a head that somebody leads by hand; nothing else is to be had.
+"""Where other programs stop a head that a user leads by hand; nothing else is to be had.
 
-While a person calibrates, parameters stay as they are and nobody else leads the head. But
+While a person calibrates, parameters stay as they are and no other client leads the head. But
 ``gazerig stop`` must reach whatever moves.
 """
 

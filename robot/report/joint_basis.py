@@ -13,7 +13,7 @@ from gazerig.robot.report.norm_bands import GROUPS, LIDS, PARALLEL
 class JointBasis:
     """The joints of a run.
 
-    names: in their order; empty where nobody says, and then nothing is left out
+    names: in their order; empty if unknown, and then nothing is left out
     estimated: those whose servos tell nothing
     """
 

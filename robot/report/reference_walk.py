@@ -13,7 +13,16 @@ _DRAWS = 3000
 
 
 class ReferenceWalk:
-    """A chain of steps with a dwell each (Nakamoto & Tsuruno 3.2); staying lengthens a visit."""
+    """A chain of steps with a dwell each (Nakamoto & Tsuruno 3.2); staying lengthens a visit.
+
+    Args:
+        steps: (8, 8) transition probabilities in the order of PARTS, rows from.
+        dwell_mean_s: mean dwell on each part.
+        dwell_sd_s: its standard deviation.
+        law: distribution of the dwells.
+        tempo: dwells are divided by it.
+        floor_s: shortest dwell.
+    """
 
     def __init__(
         self,
@@ -24,10 +33,6 @@ class ReferenceWalk:
         tempo: float = 1.0,
         floor_s: float = 0.0,
     ) -> None:
-        """Take (8, 8) probabilities in the order of PARTS, rows from, and the dwells' statistics.
-
-        tempo: dwells are divided by it; floor_s: and are never shorter
-        """
         self._steps = steps
         statistics = zip(dwell_mean_s, dwell_sd_s, strict=True)
         self._laws = [dwell_distribution(law, mean, sd) for mean, sd in statistics]

@@ -13,7 +13,7 @@ class RunHeader:
     styles: e.g. "saccade min_jerk", "scanpath markov": which notes of the bands apply
     model: the walk over faces that was configured, None where it was another model
     warnings: what a reader must know, e.g. that the recording is not whole
-    duration_s: how long the run lasts, None where nobody knows before it is read
+    duration_s: how long the run lasts, None if unknown before it is read
     """
 
     name: str

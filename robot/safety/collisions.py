@@ -22,6 +22,15 @@ class Collisions:
 
     exits: joints on their way out of a box they began in -> where they go
     still: joints that wait for these
+
+    Args:
+        params: the forbidden pairs of ranges.
+        margin_deg: distance that is kept from them, as servos round and lag.
+        limits: one for each joint.
+        joints: the joints' names.
+
+    Raises:
+        ValueError: a pair leaves no pose inside the limits, or names an unknown joint.
     """
 
     def __init__(
@@ -31,14 +40,6 @@ class Collisions:
         limits: tuple[JointLimit, ...],
         joints: tuple[str, ...],
     ) -> None:
-        """Take the forbidden pairs of ranges, one limit a joint, and the joints' names.
-
-        margin_deg: distance from them that is kept; servos round and lag
-
-        Raises:
-            ValueError: a pair leaves no pose at all inside the limits, or names a joint
-                that is not there.
-        """
         self._pairs = forbidden_pairs(params, margin_deg, limits, joints)
         self._keeper = [0] * len(self._pairs)
         self.exits: dict[int, float] = {}
@@ -98,7 +99,7 @@ class Collisions:
             if eager and not _crosses(other, motion, desired) and _is_out(other, position):
                 keeper = 1 - keeper
             elif not _is_out(pair[keeper], position):
-                # The keeper lags, or somebody has pushed it in: the other waits outside.
+                # The keeper lags, or a hand has pushed it in: the other waits outside.
                 _wall_off(other, motion)
         self._keeper[k] = keeper
         _wall_off(pair[keeper], motion)

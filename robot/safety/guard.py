@@ -39,7 +39,19 @@ class _Hold(NamedTuple):
 
 
 class Guard:
-    """Checks every command, one tick after the other."""
+    """Checks every command, one tick after the other.
+
+    Args:
+        params: thresholds and times.
+        limits: one for each joint.
+        joints: the joints' names.
+        reach: returns the ranges and speeds that the servos themselves keep, which apply beside
+            limits that are changed; None: all.
+        period_s: nominal time between ticks; a late tick is not made up for.
+
+    Raises:
+        ValueError: a collision leaves no pose inside the limits.
+    """
 
     def __init__(
         self,
@@ -49,15 +61,6 @@ class Guard:
         reach: Callable[[], tuple[JointLimit, ...]] | None = None,
         period_s: float = 0.1,
     ) -> None:
-        """Take one limit a joint, and the joints' names.
-
-        reach: gives the ranges and speeds that the servos themselves keep to, which hold
-            beside limits that are changed; None: all
-        period_s: nominal time between ticks; one much later is not made up for
-
-        Raises:
-            ValueError: a collision leaves no pose inside the limits.
-        """
         self._take(params)
         self._wanted, self._reach = limits, reach
         self._late = LateTicks(period_s)
