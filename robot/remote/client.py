@@ -142,7 +142,7 @@ class RobotClient:
         """Return one parameter's rule and default.
 
         Raises:
-            Refused: there is no such key.
+            RequestRejected: there is no such key.
         """
         for found in self.parameters(key):
             if found.key == key:
@@ -177,7 +177,7 @@ class RobotClient:
         """Write what is in force into the rig's own file, or another of this computer.
 
         Raises:
-            Refused: the file cannot be written, or comes with the program.
+            RequestRejected: the file cannot be written, or comes with the program.
         """
         whole = None if path is None else str(Path(path).expanduser().absolute())
         said = cast(dict[str, Any], self._asked("save", path=whole))
@@ -196,7 +196,7 @@ class RobotClient:
         """Lay another character over the rig.
 
         Raises:
-            Refused: there is none of that name.
+            RequestRejected: there is none of that name.
         """
         return self._notes(self._asked("character", name=name))
 
@@ -209,7 +209,7 @@ class RobotClient:
         """Choose a behaviour, a mode of conversation, or what the lids do.
 
         Raises:
-            Refused: there is no such menu or choice.
+            RequestRejected: there is no such menu or choice.
         """
         self._command(Ask(menu, choice))
 
