@@ -25,7 +25,7 @@ class CaptureLoop:
         now_s: the host's monotonic clock, seconds.
         recovery: how a lost source is reopened.
         motion: finds motion, None for none.
-        tell: gets each event as one line, at once.
+        report: called with each event as one line, at once.
     """
 
     def __init__(
