@@ -23,13 +23,14 @@ from gazerig.gaze.breathing import BreathingParams
 from gazerig.gaze.field_of_view import FieldOfViewParams
 from gazerig.gaze.head import HeadParams
 from gazerig.gaze.idle import IdleParams
+from gazerig.gaze.level import LevelParams
 from gazerig.gaze.lids import LidParams
 from gazerig.gaze.oculomotor import OculomotorParams
 from gazerig.gaze.pursuit import PursuitParams
 from gazerig.gaze.saccade import SaccadeParams
 from gazerig.gaze.scanpath import ScanpathParams
 from gazerig.gaze.top_down import TopDownParams
-from gazerig.params import Bounds
+from gazerig.params import Bounds, Unit
 from gazerig.robot.model.frames import CameraParams
 from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint import JointParams
@@ -164,6 +165,11 @@ class Rig:
     loop: Annotated[LoopParams, "control loop"] = field(default_factory=LoopParams)
     guard: Annotated[GuardParams, "safety"] = field(default_factory=GuardParams)
     gaze: Annotated[GazeConfig, "gaze models"] = field(default_factory=GazeConfig)
+    expressions: Annotated[Mapping[str, Mapping[str, float]], Bounds(-180, 180), Unit("deg"),
+        "facial expressions: name -> joint -> angle added to it; of a lid, of the open lid"] = field(default_factory=dict)
+    expression_blend_s: Annotated[float, Bounds(0.05, 10), "time from one expression to another"] = 0.5
+    levels: Annotated[Mapping[str, LevelParams],
+        "values 0..1 that a program sets many times a second, such as a jaw by loudness"] = field(default_factory=dict)
     # fmt: on
 
     @property

@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+from gazerig.config.animation_rules import expressions, levels
 from gazerig.config.rig import BusConfig, Rig
 from gazerig.drivers.hobby_board.params import HobbyBoardParams
 from gazerig.drivers.servo_models import SERVOS
@@ -158,5 +159,7 @@ RULES = (
     _park_ranges,
     _part_names,
     _collisions,
+    expressions,
+    levels,
 )
 """What no single section of a rig can know."""

@@ -4,43 +4,55 @@ Gaze goes on beneath: what is added to the head's angles is compensated by the e
 on their target (the vestibulo-ocular reflex of ``gazerig.gaze.oculomotor``).
 """
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
-from gazerig.gaze.types import Angles2, Angles3
+from gazerig.gaze.expression import Expressions
+from gazerig.gaze.level import LevelRange, Levels
+from gazerig.gaze.pose_offset import NO_OFFSET as NO_OFFSET
+from gazerig.gaze.pose_offset import PoseOffset as PoseOffset
 
 
-class PoseOffset(NamedTuple):
-    """What is added to the pose that gaze asks for.
+class AnimationTables(NamedTuple):
+    """What a rig's tables come to.
 
-    head_rad: added to the head's (yaw, pitch, roll); the eyes compensate it
-    eyes_rad: added to both eyes' (yaw, pitch) in the head
-    lids: factors on the openings of the left and right upper and the left and right lower lid
-    joints_rad: angles of the joints that gaze does not move, in their order
+    expressions: what each adds at full strength; blend_s: time from one to another
     """
 
-    head_rad: Angles3 = (0.0, 0.0, 0.0)
-    eyes_rad: Angles2 = (0.0, 0.0)
-    lids: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
-    joints_rad: tuple[float, ...] = ()
+    expressions: Mapping[str, PoseOffset]
+    blend_s: float
+    levels: Mapping[str, LevelRange]
 
 
-NO_OFFSET = PoseOffset()
+NO_TABLES = AnimationTables({}, 0.5, {})
 
 
 class Animation:
-    """Everything that moves beside gaze, as one offset a tick."""
+    """Everything that moves beside gaze, as one offset a tick.
 
-    def __init__(self, joints: tuple[str, ...] = ()) -> None:
+    expressions, levels: take what is asked for
+    """
+
+    def __init__(self, joints: tuple[str, ...] = (), tables: AnimationTables = NO_TABLES) -> None:
         """Begin at rest.
 
         Args:
             joints: the joints that gaze does not move (``gazerig.robot.model.types.further``).
+            tables: expressions and levels.
         """
-        self._rest = PoseOffset(joints_rad=(0.0,) * len(joints))
+        self.expressions = Expressions(tables.expressions, tables.blend_s, len(joints))
+        self.levels = Levels(tables.levels, len(joints))
 
     def reset(self, t_s: float) -> None:
         """Begin at rest at a time."""
+        self.expressions.reset()
+        self.levels.reset()
+
+    def retune(self, tables: AnimationTables) -> None:
+        """Change the tables; what moves goes on without a jump."""
+        self.expressions.retune(tables.expressions, tables.blend_s)
+        self.levels.retune(tables.levels)
 
     def step(self, t_s: float) -> PoseOffset:
         """Return what is added to the pose in this tick."""
-        return self._rest
+        return self.expressions.step(t_s).plus(self.levels.step(t_s))

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from gazerig.config.schema import load_rig
 from gazerig.gaze.aversion import Aversion, AversionParams
+from gazerig.gaze.expression import Expressions
 from gazerig.gaze.lids import LidParams, Lids
 from gazerig.gaze.top_down import TopDown, TopDownParams
 from gazerig.robot.app.assemble import assemble
@@ -239,7 +240,9 @@ def test_who_is_in_a_conversation_blinks_as_people_do_there(mode: str) -> None:
         expected[name] = blinks_in_two_minutes(lids)
     assert expected["conversation"] > expected["rest"] + 5
     lids = Lids(LidParams(), np.random.default_rng(1))
-    menus = Menus(Aversion(AversionParams(), np.random.default_rng(2)), lids)
+    menus = Menus(
+        Aversion(AversionParams(), np.random.default_rng(2)), lids, Expressions({}, 0.5, 0)
+    )
     for asked in ("none" if mode != "none" else "talk", mode):
         menus.choose(Ask("conversation", asked), TopDown(TopDownParams()), 0.0)
     expected_of = "rest" if mode == "none" else "conversation"

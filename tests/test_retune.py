@@ -127,7 +127,7 @@ OF_GAZE = (
 OF_BODY = ("guard", "body", "kinematics", "head", "oculomotor")
 
 
-OF_SIGHT = ("mount", "perception", "tracker", "kinematics", "head", "oculomotor")
+OF_SIGHT = ("mount", "perception", "tracker", "kinematics", "head", "oculomotor", "animation")
 
 
 def running_parameters(made: Assembly, names: tuple[str, ...]) -> dict[str, Any]:

@@ -20,6 +20,7 @@ from gazerig.gaze.saccade import SaccadeParams
 from gazerig.gaze.scanpath import Scanpath, ScanpathParams, Walk, row_sums_note
 from gazerig.gaze.types import Angles3
 from gazerig.params import choices_of
+from gazerig.robot.app.animation_tables import animation_tables
 from gazerig.robot.app.camera_factory import real_camera, scene_camera
 from gazerig.robot.app.gaze_models import deciders, kinematics_of, movers, oculomotor
 from gazerig.robot.app.live_params import CameraPlacement, Components, LiveParams
@@ -234,7 +235,7 @@ def _components(
         head=moves.head,
         breathing=moves.breathing,
         lids=lids,
-        animation=Animation(further(rig.joints)),
+        animation=Animation(further(rig.joints), animation_tables(rig)),
     )
 
 

@@ -27,6 +27,7 @@ from gazerig.gaze.pursuit import Pursuit
 from gazerig.gaze.saccade import SaccadeModel
 from gazerig.gaze.scanpath import Scanpath, Walk
 from gazerig.gaze.top_down import TopDown
+from gazerig.robot.app.animation_tables import animation_tables
 from gazerig.robot.app.camera_factory import retune_camera
 from gazerig.robot.app.rig_limits import (
     eye_limits,
@@ -180,6 +181,8 @@ class LiveParams:
             parts.oculomotor.retune(now.oculomotor, eye_limits(new))
         if now.head != was.head or (bounds and head_limits(new) != head_limits(old)):
             parts.head.retune(now.head, *head_limits(new))
+        if (tables := animation_tables(new)) != animation_tables(old):
+            parts.animation.retune(tables)
 
     def _put_machine(self, old: Rig, new: Rig) -> tuple[str, ...]:
         parts = self.parts

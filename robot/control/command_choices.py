@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from math import degrees, radians
 
 from gazerig.gaze.aversion import MODES, Aversion
+from gazerig.gaze.expression import Expressions
 from gazerig.gaze.lids import Lids
 from gazerig.gaze.top_down import TopDown
 from gazerig.robot.model.commands import Ask, Jog
@@ -22,19 +23,23 @@ LID_COMMANDS: dict[str, Callable[[Lids, float], None]] = {
 
 
 class Menus:
-    """The models that a person can choose from: behaviours, modes of conversation, lids."""
+    """What a person can choose from: behaviours, modes of conversation, lids, expressions."""
 
-    def __init__(self, aversion: Aversion, lids: Lids) -> None:
+    def __init__(self, aversion: Aversion, lids: Lids, expressions: Expressions) -> None:
         self._aversion = aversion
         self._lids = lids
+        self._expressions = expressions
 
     def offered(self, top_down: TopDown) -> dict[str, tuple[str, ...]]:
         """Return menu -> choices, the present one first."""
-        return {
+        menus = {
             "behaviour": _first(top_down.behaviour, top_down.behaviours),
             "conversation": _first(self._aversion.mode, MODES),
             "lids": tuple(LID_COMMANDS),
         }
+        if names := self._expressions.names:
+            menus["expression"] = _first(self._expressions.name, names)
+        return menus
 
     def choose(self, command: Ask, top_down: TopDown, t_s: float) -> None:
         """Apply a choice that ``refuse_unknown`` accepted."""
@@ -44,6 +49,8 @@ class Menus:
             mode = next(mode for mode in MODES if mode == command.choice)
             self._aversion.converse(mode, t_s)
             self._lids.mode("rest" if mode == "none" else "conversation")
+        elif command.menu == "expression":
+            self._expressions.express(command.choice)
         else:
             LID_COMMANDS[command.choice](self._lids, t_s)
 

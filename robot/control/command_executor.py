@@ -2,13 +2,25 @@
 
 from collections.abc import Callable
 
+from gazerig.gaze.animation import Animation
 from gazerig.gaze.oculomotor import Oculomotor
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import TargetChooser
 from gazerig.robot.control.command_choices import Menus
 from gazerig.robot.control.reachability import jog_reply, look_reply
 from gazerig.robot.control.stop_control import StopControl
-from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Renew, Resume, Stop, Tune
+from gazerig.robot.model.commands import (
+    Ask,
+    Command,
+    Express,
+    Jog,
+    LookAt,
+    Renew,
+    Resume,
+    SetLevel,
+    Stop,
+    Tune,
+)
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.lead import Lead
 from gazerig.robot.model.reply import CommandReply
@@ -28,6 +40,7 @@ class CommandExecutor:
         menus: the choices of the models.
         attention: its behaviours can be chosen.
         oculomotor: computes how far eyes and head can follow.
+        animation: expressions and levels can be asked for.
         kinematics: gaze to joint angles.
         guard: starts slowly where joints are taken over.
         tune: changes parameters and returns what was done, as text.
@@ -42,6 +55,7 @@ class CommandExecutor:
         menus: Menus,
         attention: TargetChooser,
         oculomotor: Oculomotor,
+        animation: Animation,
         kinematics: Kinematics,
         guard: Guard,
         tune: Callable[[Tune, float], tuple[str, ...]],
@@ -49,6 +63,7 @@ class CommandExecutor:
     ) -> None:
         self._body, self._lead, self._stop, self._menus = body, lead, stop, menus
         self._attention, self._oculomotor, self._kinematics = attention, oculomotor, kinematics
+        self._animation = animation
         self._guard, self._tune, self._told = guard, tune, told
         self._taken_over = False
         self.commanded_rad: JointAngles = ()
@@ -64,6 +79,11 @@ class CommandExecutor:
             self._told.append(f"{self._lead.words}: not renewed, so the gaze leads again")
             self._let_lead(self._lead.end)
 
+    def end_lapsed_levels(self, t_s: float) -> None:
+        """Let levels that nobody sets any more fall to 0."""
+        for name in self._animation.levels.lapsed(t_s):
+            self._told.append(f"level {name}: not set any more, so it falls to 0")
+
     def execute(self, command: Command, t_s: float) -> CommandReply:
         """Carry out one command; return its reply."""
         match command:
@@ -75,6 +95,10 @@ class CommandExecutor:
                 return self._look(command, t_s)
             case Jog():
                 return self._jog(command, t_s)
+            case Express(name, strength):
+                return _refused(lambda: self._animation.expressions.express(name, strength))
+            case SetLevel(name, value):
+                return _refused(lambda: self._animation.levels.set(name, value, t_s))
             case Renew():
                 if not self._lead.renew(command, t_s):
                     return CommandReply(f"{command.who or 'you'} lead nothing now")
@@ -124,3 +148,12 @@ class CommandExecutor:
         self._guard.reset(t_s, resumed)
         self._taken_over = True
         return CommandReply()
+
+
+def _refused(act: Callable[[], None]) -> CommandReply:
+    """Return the reply to something that a table retuned meanwhile may no longer hold."""
+    try:
+        act()
+    except ValueError as error:
+        return CommandReply(str(error))
+    return CommandReply()

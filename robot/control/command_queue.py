@@ -4,7 +4,15 @@ from collections import deque
 from contextlib import suppress
 from typing import NamedTuple
 
-from gazerig.robot.model.commands import Command, Jog, LookAt, Resume, Stop, Tune
+from gazerig.robot.model.commands import (
+    Command,
+    Jog,
+    LookAt,
+    Resume,
+    SetLevel,
+    Stop,
+    Tune,
+)
 from gazerig.robot.model.reply import CommandReply, Ticket
 
 MAX_WAITING = 64
@@ -69,7 +77,7 @@ class CommandQueue:
             if tunes > 1:
                 break
             taken.append(self._commands.popleft())
-        return taken
+        return _without_superseded(taken)
 
     def _drop_leads(self) -> None:
         """Refuse what was asked for before a stop and would move the head; keep the rest."""
@@ -79,3 +87,17 @@ class CommandQueue:
                 waiting.ticket.answer(CommandReply("it has been stopped since"))
             else:
                 self._commands.append(waiting)
+
+
+def _without_superseded(taken: list[QueuedCommand]) -> list[QueuedCommand]:
+    """Return the commands without levels that a later one of this tick sets anew."""
+    kept: list[QueuedCommand] = []
+    seen: set[str] = set()
+    for waiting in reversed(taken):
+        if isinstance(waiting.command, SetLevel):
+            if waiting.command.level in seen:
+                waiting.ticket.answer(CommandReply())
+                continue
+            seen.add(waiting.command.level)
+        kept.append(waiting)
+    return kept[::-1]

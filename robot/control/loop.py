@@ -27,7 +27,7 @@ from gazerig.robot.control.stop_control import StopControl
 from gazerig.robot.control.tick import Tick as Tick
 from gazerig.robot.control.tick import at_rest
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.commands import Ask, Command, Jog, Tune, check
+from gazerig.robot.model.commands import Ask, Command, Express, Jog, SetLevel, Tune, check
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.lead import Lead
@@ -91,7 +91,7 @@ class Robot:
         self._scanpath = scanpath
         self._aversion = aversion
         self._oculomotor = oculomotor
-        self._menus = Menus(aversion, lids)
+        self._menus = Menus(aversion, lids, animation.expressions)
         self._animation = animation
         self._guard = guard
         self._settled = True
@@ -100,8 +100,8 @@ class Robot:
         self._told: list[str] = []
         self._stop = StopControl(self._told)
         self._executor = CommandExecutor(
-            body, self._lead, self._stop, self._menus, attention, oculomotor, kinematics, guard,
-            tune, self._told,
+            body, self._lead, self._stop, self._menus, attention, oculomotor, animation, kinematics,
+            guard, tune, self._told,
         )  # fmt: skip
 
     @property
@@ -135,6 +135,10 @@ class Robot:
             refuse_unknown(command, self.menus())
         if isinstance(command, Jog):
             refuse_absent(command, self.body.names)
+        if isinstance(command, Express):
+            self._animation.expressions.require(command.expression)
+        if isinstance(command, SetLevel):
+            self._animation.levels.require(command.level)
         return self._commands.add(command)
 
     def ask(self, menu: str, choice: str) -> None:
@@ -276,6 +280,7 @@ class Robot:
         for command, ticket in taken:
             ticket.answer(self._executor.execute(command, t_s))
         self._executor.end_lapsed_lead(t_s)
+        self._executor.end_lapsed_levels(t_s)
         return tuple([command for command, _ in taken])
 
 

@@ -47,6 +47,23 @@ class Jog(NamedTuple):
     stay: bool = False
 
 
+class Express(NamedTuple):
+    """Move to a facial expression of the rig's table.
+
+    strength: 1 as written, 0 none of it
+    """
+
+    expression: str
+    strength: float = 1.0
+
+
+class SetLevel(NamedTuple):
+    """Set a level of the rig's table, 0..1; without another within half a second it falls to 0."""
+
+    level: str
+    value: float
+
+
 class Renew(NamedTuple):
     """The heartbeat of one who leads the gaze or the joints; of anybody else it does nothing."""
 
@@ -82,7 +99,10 @@ class Tune(NamedTuple):
     changes: tuple[tuple[str, Value], ...]
 
 
-Command = Ask | LookAt | Jog | Renew | Stop | Resume | Tune
+Command = Ask | LookAt | Jog | Express | SetLevel | Renew | Stop | Resume | Tune
+
+REPEATED = (Renew, SetLevel)
+"""Commands that programs send many times a second: no message or mark tells of each."""
 
 MAX_COORDINATE_M = 1000.0
 """No point to look at lies farther away along any axis."""
@@ -94,8 +114,8 @@ MAX_WORDS = 200
 """Longest name or reason that a command may carry, in characters."""
 
 COMMANDS: dict[str, type[Command]] = {
-    "ask": Ask, "look_at": LookAt, "jog": Jog, "renew": Renew, "stop": Stop, "resume": Resume,
-    "tune": Tune,
+    "ask": Ask, "look_at": LookAt, "jog": Jog, "express": Express, "set_level": SetLevel,
+    "renew": Renew, "stop": Stop, "resume": Resume, "tune": Tune,
 }  # fmt: skip
 _NAMES = {kind: name for name, kind in COMMANDS.items()}
 
@@ -172,6 +192,10 @@ def check(command: Command) -> None:
         case Jog(angles, who, stay):
             _check_angles(angles)
             _check_who(who, stay)
+        case Express(expression, strength):
+            _check_share("an expression", "strength", expression, strength)
+        case SetLevel(level, value):
+            _check_share("a level", "value", level, value)
         case Renew(who):
             _check_who(who)
         case Stop(why, who):
@@ -205,6 +229,13 @@ def _check_angles(angles: object) -> None:
             )
         if not (isinstance(pair[0], str) and JOINT_NAME.fullmatch(pair[0])):
             raise ValueError(f"{pair[0]!r:.40} is no name of a joint: such as neck_yaw or jaw")
+
+
+def _check_share(what: str, key: str, name: object, value: object) -> None:
+    if not isinstance(name, str) or len(name) > MAX_WORDS:
+        raise ValueError(f"{what} is given by its name")
+    if not _within(value, 1.0) or value < 0.0:  # type: ignore[operator]
+        raise ValueError(f"the {key} of {what} is a number 0..1")
 
 
 def _near(value: object) -> bool:

@@ -25,7 +25,7 @@ from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Angles2, Floats, GazeState, Target, Vec3
 from gazerig.robot.control.feedback_basis import Basis, basis_of, estimated_joints
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.commands import Command, Jog, Renew, Stop
+from gazerig.robot.model.commands import REPEATED, Command, Jog, Stop
 
 Ints = NDArray[np.int64]
 
@@ -185,7 +185,7 @@ class GazeAnglesBuilder:
         """Record messages and commands, and whether the joints are moved by hand."""
         self._messages += [(time_s, event) for event in tick.events]
         for command in tick.commands:
-            if isinstance(command, Renew):
+            if isinstance(command, REPEATED):
                 continue
             self._messages.append((time_s, command_text(command)))
             if isinstance(command, Jog):

@@ -17,7 +17,7 @@ from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import guard_text, perception_text
 from gazerig.robot.dashboard.page_process import pack, unpack
 from gazerig.robot.dashboard.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts
-from gazerig.robot.model.commands import Ask, Renew
+from gazerig.robot.model.commands import REPEATED, Ask
 from gazerig.robot.model.types import SeenEvent, Trail
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
 from gazerig.robot.recording.gaze_angles import command_text
@@ -172,7 +172,7 @@ class Noticing:
             found.append(Mark(at_s, "blink", "blink"))
         self._saccades, self._blinks = tick.gaze.saccades, tick.gaze.blinks
         for command in tick.commands:
-            if isinstance(command, Renew):
+            if isinstance(command, REPEATED):
                 continue
             found.append(Mark(at_s, "event", command_text(command)))
             if isinstance(command, Ask):

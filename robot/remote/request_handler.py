@@ -27,7 +27,7 @@ from gazerig.robot.control.feedback_basis import estimated_joints
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.control.tick_text import lead_text, target_name
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.commands import Command, Renew, signed
+from gazerig.robot.model.commands import REPEATED, Command, signed
 from gazerig.robot.model.reply import Ticket
 
 _TAKEN_UP_S = 1.0
@@ -177,7 +177,7 @@ class RequestHandler:
             raise ValueError(_HANGS)
         if reply.refused:
             raise ValueError(reply.refused)
-        if not isinstance(command, Renew):
+        if not isinstance(command, REPEATED):
             self._pulse.taken_up(ticks=1)  # so that the status tells of it
         return {"notes": [], "reply": reply.as_json()}
 

@@ -1,0 +1,239 @@
+"""Facial expressions and levels: tables, blending, commands, and what is refused."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from math import degrees, radians
+from random import Random
+
+import pytest
+from expressive_rig import expressive_rig, faults, started
+
+from gazerig.gaze.expression import Expressions
+from gazerig.gaze.level import HOLD_S, LevelParams, LevelRange, Levels
+from gazerig.gaze.minimum_jerk_blend import PEAK_SPEED, MinimumJerkBlend
+from gazerig.gaze.pose_offset import NO_OFFSET, PoseOffset
+from gazerig.robot.app.animation_tables import pose_offset
+from gazerig.robot.app.assemble import Assembly
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.model.commands import (
+    Ask,
+    Command,
+    Express,
+    SetLevel,
+    as_json,
+    as_recorded,
+    check,
+    from_json,
+    from_recording,
+)
+from gazerig.robot.model.reply import CommandReply
+
+DT = 0.005
+
+
+@pytest.fixture
+def made() -> Iterator[Assembly]:
+    made = started()
+    yield made
+    made.close()
+
+
+def ticks(made: Assembly, number: int) -> list[Tick]:
+    """Run ticks at 200 Hz."""
+    done = []
+    for _ in range(number):
+        made.clock.sleep_until(made.clock.now_s() + DT)
+        done.append(made.robot.tick(made.clock.now_s(), DT))
+    return done
+
+
+def desired_deg(made: Assembly, tick: Tick) -> dict[str, float]:
+    return dict(zip(made.robot.body.names, map(degrees, tick.desired_rad), strict=True))
+
+
+def test_an_interrupted_blend_never_jumps_and_never_leaves_the_goals() -> None:
+    """At 1,000 random moments the goal changes; steps stay below those of one full move."""
+    random = Random(4)
+    goals = [(0.0,), (14.0,), (-12.0,), (6.0,)]
+    blend, t, last, largest = MinimumJerkBlend(goals[0], 0.5), 0.0, 0.0, 0.0
+    for _ in range(1000):
+        blend.move_to(random.choice(goals))
+        for _ in range(random.randrange(1, 120)):
+            t += DT
+            (value,) = blend.step(t)
+            largest, last = max(largest, abs(value - last)), value
+            assert -12.0 - 1e-9 <= value <= 14.0 + 1e-9
+    assert 0.2 < largest <= PEAK_SPEED * 26.0 / 0.5 * DT
+
+
+def test_a_blend_ends_exactly_at_its_goal_and_then_costs_nothing() -> None:
+    blend = MinimumJerkBlend((0.1,), 0.5)
+    for k in range(200):
+        if k < 60:
+            blend.move_to((0.1 * k,))
+        value = blend.step(k * DT)
+    assert value == (0.1 * 59,)
+    assert blend.step(2.0) is blend.step(3.0)
+
+
+def test_goals_that_come_every_tick_add_no_more_than_32_moves() -> None:
+    blend = MinimumJerkBlend((0.0,), 10.0)
+    for k in range(2000):
+        blend.move_to((float(k % 7),))
+        blend.step(k * DT)
+    assert len(blend._moves) <= 33
+
+
+def test_an_expression_moves_joints_brows_and_head_and_the_eyes_stay_on_target(
+    made: Assembly,
+) -> None:
+    ticks(made, 400)
+    made.robot.command(Express("happy"))
+    last = ticks(made, 300)[-1]
+    angles = desired_deg(made, last)
+    assert (angles["jaw"], angles["left_brow"]) == pytest.approx((6.0, 8.0))
+    plain = started(replace(expressive_rig(), expressions={}))
+    quiet = desired_deg(plain, ticks(plain, 700)[-1])
+    assert angles["neck_roll"] - quiet["neck_roll"] == pytest.approx(4.0, abs=0.2)
+    assert angles["left_eye_tilt"] != pytest.approx(quiet["left_eye_tilt"], abs=0.01)
+    plain.close()
+
+
+def test_half_an_expression_is_half_of_each_angle(made: Assembly) -> None:
+    made.robot.command(Express("sad", 0.5))
+    angles = desired_deg(made, ticks(made, 300)[-1])
+    assert angles["left_brow"] == pytest.approx(-6.0)
+    assert made.robot.menus()["expression"][0] == "sad"
+
+
+def test_the_menu_of_expressions_does_the_same(made: Assembly) -> None:
+    assert made.robot.menus()["expression"] == ("neutral", "happy", "sad", "surprised")
+    made.robot.command(Ask("expression", "surprised"))
+    assert desired_deg(made, ticks(made, 300)[-1])["jaw"] == pytest.approx(14.0)
+
+
+def test_a_lid_keeps_shutting_in_a_sad_face() -> None:
+    sad = pose_offset(expressive_rig(), {"left_upper_lid": -15.0})
+    assert sad.lids == pytest.approx((1.0 - 15.0 / 45.0, 1.0, 1.0, 1.0))
+
+
+def test_what_no_table_holds_is_refused_with_what_there_is(made: Assembly) -> None:
+    with pytest.raises(ValueError, match="no expression 'glad'; there is neutral, happy, sad"):
+        made.robot.command(Express("glad"))
+    with pytest.raises(ValueError, match="no level 'ear'; there is mouth"):
+        made.robot.command(SetLevel("ear", 0.5))
+
+
+@pytest.mark.parametrize("value", [float("nan"), -0.1, 1.1, True, "much", 10**400])
+def test_a_share_that_is_none_is_refused(value: float) -> None:
+    for command in (Express("happy", value), SetLevel("mouth", value)):
+        with pytest.raises(ValueError, match=r"number 0\.\.1"):
+            check(command)
+
+
+@pytest.mark.parametrize("command", [Express("happy", 0.25), SetLevel("mouth", 0.5)])
+def test_the_commands_survive_json_and_recordings(command: Command) -> None:
+    assert from_json(as_json(command)) == command
+    assert from_recording(as_recorded(command)) == command
+
+
+def test_a_level_moves_the_jaw_and_falls_to_0_within_a_second(made: Assembly) -> None:
+    for _ in range(100):
+        made.robot.command(SetLevel("mouth", 0.7))
+        last = ticks(made, 1)[-1]
+    assert desired_deg(made, last)["jaw"] == pytest.approx(7.0)
+    after = ticks(made, 200)
+    assert desired_deg(made, after[int(HOLD_S / DT) - 5])["jaw"] == pytest.approx(7.0)
+    assert desired_deg(made, after[-1])["jaw"] == 0.0
+    said = [event for tick in after for event in tick.events if "level" in event]
+    assert said == ["level mouth: not set any more, so it falls to 0"]
+
+
+def test_a_level_adds_to_an_expression(made: Assembly) -> None:
+    made.robot.command(Express("happy"))
+    ticks(made, 200)
+    for _ in range(40):
+        made.robot.command(SetLevel("mouth", 1.0))
+        last = ticks(made, 1)[-1]
+    assert desired_deg(made, last)["jaw"] == pytest.approx(16.0)
+
+
+def test_a_retuned_table_moves_the_face_without_a_jump() -> None:
+    high = NO_OFFSET._replace(joints_rad=(0.2,))
+    faces = Expressions({"happy": high}, 0.5, 1)
+    faces.express("happy")
+    t, angles = 0.0, []
+    for k in range(400):
+        if k == 150:
+            faces.retune({"happy": high._replace(joints_rad=(0.1,))}, 0.4)
+        if k == 180:
+            faces.retune({}, 0.4)
+        t += DT
+        angles.append(faces.step(t).joints_rad[0])
+    steps = [abs(b - a) for a, b in zip(angles, angles[1:], strict=False)]
+    assert angles[149] == pytest.approx(0.2) and angles[-1] == 0.0
+    assert max(steps) <= PEAK_SPEED * 0.2 / 0.4 * DT
+    assert faces.names == () and faces.name == "neutral"
+
+
+def test_a_level_taken_out_of_the_table_leaves_its_joint_slowly() -> None:
+    rest = PoseOffset(joints_rad=(0.0,))
+    levels = Levels({"mouth": LevelRange(rest, rest._replace(joints_rad=(0.3,)), 0.1)}, 1)
+    levels.set("mouth", 1.0, 0.0)
+    angles = []
+    for k in range(120):
+        if k == 60:
+            levels.retune({})
+        angles.append(levels.step(k * DT).joints_rad[0])
+    steps = [abs(b - a) for a, b in zip(angles, angles[1:], strict=False)]
+    assert angles[59] == pytest.approx(0.3) and angles[-1] == 0.0
+    assert max(steps) <= PEAK_SPEED * 0.3 / 0.1 * DT
+
+
+def test_a_rig_with_a_face_keeps_all_rules() -> None:
+    assert faults(expressive_rig()) == []
+
+
+@pytest.mark.parametrize(
+    ("face", "blend_s", "said"),
+    [
+        ({"left_eye_pan": 5.0}, 0.5, "gaze alone turns the eyes"),
+        ({"javv": 5.0}, 0.5, "no joint 'javv'; there is"),
+        ({"jaw": 26.0}, 0.5, "26 deg is outside the joint's range -2..25"),
+        ({"left_upper_lid": -60.0}, 0.5, "more than the lid's whole way of 45 deg"),
+        ({"neck_roll": 20.0}, 0.1, "375 deg/s, its limit is max_speed_deg_s 200; expression_blend_s"),
+        ({"neck_roll": 5.0}, 0.1, "2887 deg/s2, its limit is max_accel_deg_s2 2000"),
+    ],
+)  # fmt: skip
+def test_an_expression_that_no_joint_can_do_is_refused(
+    face: dict[str, float], blend_s: float, said: str
+) -> None:
+    rig = replace(expressive_rig(), expressions={"odd": face}, expression_blend_s=blend_s)
+    (fault,) = faults(rig)
+    assert fault.startswith(f"expressions.odd.{next(iter(face))}: ") and said in fault
+
+
+@pytest.mark.parametrize(
+    ("level", "said"),
+    [
+        (LevelParams("left_eye_tilt", 0.0, 5.0), "mouth.joint: gaze alone turns the eyes"),
+        (LevelParams("jaw", 0.0, 40.0), "mouth.high_deg: 40 deg is outside"),
+        (LevelParams("jaw", 0.0, 20.0, 20.0), "mouth.smoothing_ms: jaw would move 20 deg"),
+    ],
+)
+def test_a_level_that_no_joint_can_follow_is_refused(level: LevelParams, said: str) -> None:
+    found = faults(replace(expressive_rig(), levels={"mouth": level}))
+    assert any(said in fault for fault in found)
+
+
+def test_the_range_of_a_neck_at_full_strength_counts() -> None:
+    rig = replace(expressive_rig(), expressions={"shy": {"neck_pitch": -36.0}})
+    assert any("outside the joint's range -35..35" in fault for fault in faults(rig))
+    assert pose_offset(rig, {"neck_pitch": -20.0}).head_rad == (0.0, radians(-20.0), 0.0)
+
+
+def test_of_many_levels_in_one_tick_the_newest_is_taken_and_recorded(made: Assembly) -> None:
+    tickets = [made.robot.command(SetLevel("mouth", 0.1 * k)) for k in range(8)]
+    (tick,) = ticks(made, 1)
+    assert tick.commands == (SetLevel("mouth", 0.1 * 7),)
+    assert [ticket.wait(0.0) for ticket in tickets] == [CommandReply()] * 8
