@@ -43,7 +43,7 @@ def film(tmp_path_factory):
 
 
 def stamped(message, frame):
-    """Give a message the times and the number of a frame."""
+    """Set the times and the number of a message's frame."""
     message.setTimestamp(frame.getTimestamp())
     message.setTimestampDevice(frame.getTimestampDevice())
     message.setSequenceNum(frame.getSequenceNum())
