@@ -12,10 +12,11 @@ from gazerig.drivers.types import Detections
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Bodies, Face, Percept, Vec3
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.dashboard.click_to_look import USUAL_M, ClickToLook, distance_m
+from gazerig.robot.dashboard.click_to_look import ClickToLook
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
+from gazerig.robot.perception.pixel_to_world import USUAL_M, PixelToWorld, seen_distance_m
 
 CAMERA = CameraParams(position_mm=(20.0, 0.0, 45.0), horizontal_field_deg=70.0)
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -36,7 +37,7 @@ def looking(
         poses.remember(t_s, head_rad)
     poses.remember(1.1, (head_rad[0] + 0.3, 0.0, 0.0))
     mount = CameraMount(CAMERA)
-    picking = ClickToLook(mount, poses, lambda: CAMERA)
+    picking = ClickToLook(PixelToWorld(mount, poses, lambda: CAMERA))
     found = Detections(1.0, 1, WIDTH, HEIGHT, (), (), None, depth, None)
     picking.update(cast(Tick, SimpleNamespace(detections=found, percept=percept)))
     return picking, mount, poses
@@ -61,7 +62,9 @@ def test_without_a_picture_there_is_nothing_to_pick() -> None:
         GAZE_JOINTS,
         {"left_upper_lid": (0.0, 0.5), "right_upper_lid": (0.0, 0.5)},
     )
-    picking = ClickToLook(CameraMount(CAMERA), PoseHistory(kinematics), lambda: CAMERA)
+    picking = ClickToLook(
+        PixelToWorld(CameraMount(CAMERA), PoseHistory(kinematics), lambda: CAMERA)
+    )
     assert picking.point(0.5, 0.5) is None
     picking.update(cast(Tick, SimpleNamespace(detections=None, percept=None)))
     assert picking.point(0.5, 0.5) is None
@@ -110,10 +113,10 @@ def test_the_nearest_direction_wins() -> None:
         np.ones(1),
     )
     percept = Percept(0.0, bodies, (face_at((2.0, 0.0, 0.0)),))
-    assert distance_m(percept, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)) == pytest.approx(2.0)
+    assert seen_distance_m(percept, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)) == pytest.approx(2.0)
     towards_hand = (0.5 / np.hypot(0.5, 0.03), 0.03 / np.hypot(0.5, 0.03), 0.0)
-    assert distance_m(percept, (0.0, 0.0, 0.0), towards_hand) == pytest.approx(0.5, abs=0.01)
-    assert distance_m(None, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)) == USUAL_M
+    assert seen_distance_m(percept, (0.0, 0.0, 0.0), towards_hand) == pytest.approx(0.5, abs=0.01)
+    assert seen_distance_m(None, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0)) == USUAL_M
 
 
 def test_clicks_outside_count_as_on_the_edge() -> None:

@@ -46,7 +46,7 @@ def test_every_tick_comes_back_bit_for_bit(recorded: Recorded) -> None:
     # A new field must be recorded too: add it to moment.flat, as_json and from_json.
     assert Tick._fields == (
         "t_s", "joints", "pose", "detections", "percept", "target", "gaze", "desired_rad",
-        "guard_result", "events", "commands", "stopped", "led",
+        "guard_result", "events", "commands", "stopped", "led", "lead",
     )  # fmt: skip
     back = list(RunRecording(recorded.path).ticks())
     assert len(back) == len(recorded.ticks) == 299

@@ -47,6 +47,7 @@ from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.types import JointAngles, further
 from gazerig.robot.perception.perception import Perception
+from gazerig.robot.perception.pixel_to_world import PixelToWorld
 from gazerig.robot.perception.tracker import Tracker
 from gazerig.robot.safety.guard import Guard
 from gazerig.sim_mock.scenes.registry import scenes
@@ -265,6 +266,7 @@ def _robot(
         parts.animation,
         parts.guard,
         live,
+        PixelToWorld(parts.mount, poses, lambda: live.camera),
     )
 
 

@@ -25,6 +25,7 @@ from gazerig.robot.dashboard.request_handler import PageRequestHandler
 from gazerig.robot.dashboard.snapshot import SnapshotBuilder
 from gazerig.robot.model.commands import Command, Resume, Stop, Tune
 from gazerig.robot.model.reply import CommandTaker, Ticket
+from gazerig.robot.perception.pixel_to_world import PixelToWorld
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.remote.live_server import LiveServer
 
@@ -80,7 +81,7 @@ class RunObservers:
             if tuning is not None and not options.fast
             else None
         )
-        self._picking = ClickToLook(made.mount, made.poses, made.camera)
+        self._picking = ClickToLook(PixelToWorld(made.mount, made.poses, made.camera))
         address = options.page_address
         self._page = self._made_page(address) if address is not None else None
         self._snapshots = SnapshotBuilder(made.loop.rate_hz, made.shown())

@@ -7,6 +7,7 @@ from gazerig.gaze.oculomotor import Oculomotor
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import TargetChooser
 from gazerig.robot.control.command_choices import Menus
+from gazerig.robot.control.look_point import LookPoints
 from gazerig.robot.control.reachability import jog_reply, look_reply
 from gazerig.robot.control.stop_control import StopControl
 from gazerig.robot.model.commands import (
@@ -14,7 +15,8 @@ from gazerig.robot.model.commands import (
     Command,
     Express,
     Jog,
-    LookAt,
+    Leading,
+    LookAtPerson,
     Renew,
     Resume,
     SetLevel,
@@ -45,6 +47,7 @@ class CommandExecutor:
         guard: starts slowly where joints are taken over.
         tune: changes parameters and returns what was done, as text.
         told: called with a line on whatever happens.
+        looks: finds what commands say to look at.
     """
 
     def __init__(
@@ -60,11 +63,12 @@ class CommandExecutor:
         guard: Guard,
         tune: Callable[[Tune, float], tuple[str, ...]],
         told: list[str],
+        looks: LookPoints,
     ) -> None:
         self._body, self._lead, self._stop, self._menus = body, lead, stop, menus
         self._attention, self._oculomotor, self._kinematics = attention, oculomotor, kinematics
         self._animation = animation
-        self._guard, self._tune, self._told = guard, tune, told
+        self._guard, self._tune, self._told, self._looks = guard, tune, told, looks
         self._taken_over = False
         self.commanded_rad: JointAngles = ()
 
@@ -74,10 +78,10 @@ class CommandExecutor:
         return taken_over
 
     def end_lapsed_lead(self, t_s: float) -> None:
-        """End a lead that was not renewed."""
-        if self._lead.lapsed(t_s):
-            self._told.append(f"{self._lead.words}: not renewed, so the gaze leads again")
-            self._let_lead(self._lead.end)
+        """End a lead that was not renewed, or whose time is over."""
+        if why := self._lead.over(t_s):
+            self._told.append(f"{self._lead.words}: {why}, so the gaze leads again")
+            self._let_lead(lambda: self._lead.end(why))
 
     def end_lapsed_levels(self, t_s: float) -> None:
         """Let levels that nobody sets any more fall to 0."""
@@ -89,12 +93,11 @@ class CommandExecutor:
         match command:
             case Ask():
                 self._menus.choose(command, self._attention.top_down, t_s)
-            case LookAt() | Jog() if self._stop.why:
-                return CommandReply(f"stopped ({self._stop.why}): resume first")
-            case LookAt():
-                return self._look(command, t_s)
-            case Jog():
-                return self._jog(command, t_s)
+            case _ if isinstance(command, Leading):
+                if self._stop.why:
+                    return CommandReply(f"stopped ({self._stop.why}): resume first")
+                reply = self._lead_by(command, t_s)
+                return reply._replace(lead=self._lead.state.number * self._lead.state.active)
             case Express(name, strength):
                 return _refused(lambda: self._animation.expressions.express(name, strength))
             case SetLevel(name, value):
@@ -103,7 +106,7 @@ class CommandExecutor:
                 if not self._lead.renew(command, t_s):
                     return CommandReply(f"{command.who or 'you'} lead nothing now")
             case Stop():
-                self._lead.end()
+                self._lead.end(f"stopped: {command.why}")
                 self._stop.halt(command, self._body, t_s)
             case Resume():
                 return self._resume(command, t_s)
@@ -111,11 +114,21 @@ class CommandExecutor:
                 self._told += self._tune(command, t_s)
         return CommandReply()
 
-    def _look(self, command: LookAt, t_s: float) -> CommandReply:
-        """Look at a point that a user chose, or freely again."""
-        self._let_lead(lambda: self._lead.look(command, t_s))
-        target = self._lead.puppet(t_s)
-        if target is None:
+    def _lead_by(self, command: Leading, t_s: float) -> CommandReply:
+        """Let a command lead gaze or joints."""
+        if isinstance(command, Jog):
+            return self._jog(command, t_s)
+        try:
+            if isinstance(command, LookAtPerson):
+                face, captured_s = self._looks.face(command)
+                self._let_lead(lambda: self._lead.follow(command, face, captured_s, t_s))
+            else:
+                point = self._looks.point(command)
+                self._let_lead(lambda: self._lead.look(command, point, t_s))
+        except ValueError as error:
+            return CommandReply(str(error))
+        target = self._lead.chosen(None, t_s)
+        if target is None:  # freely again
             return CommandReply()
         return look_reply(target, self._oculomotor, self._kinematics, self._guard.limits)
 

@@ -4,15 +4,7 @@ from collections import deque
 from contextlib import suppress
 from typing import NamedTuple
 
-from gazerig.robot.model.commands import (
-    Command,
-    Jog,
-    LookAt,
-    Resume,
-    SetLevel,
-    Stop,
-    Tune,
-)
+from gazerig.robot.model.commands import Command, Leading, Resume, SetLevel, Stop, Tune
 from gazerig.robot.model.reply import CommandReply, Ticket
 
 MAX_WAITING = 64
@@ -83,7 +75,7 @@ class CommandQueue:
         """Refuse what was asked for before a stop and would move the head; keep the rest."""
         for _ in range(len(self._commands)):
             waiting = self._commands.popleft()
-            if isinstance(waiting.command, LookAt | Jog | Resume):
+            if isinstance(waiting.command, Leading | Resume):
                 waiting.ticket.answer(CommandReply("it has been stopped since"))
             else:
                 self._commands.append(waiting)

@@ -13,6 +13,7 @@ from gazerig.gaze.aversion import Aversion
 from gazerig.gaze.lids import Lids
 from gazerig.gaze.oculomotor import Oculomotor
 from gazerig.gaze.scanpath import Scanpath
+from gazerig.gaze.types import Percept
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import TargetChooser
 from gazerig.robot.control.command_choices import (
@@ -23,6 +24,7 @@ from gazerig.robot.control.command_choices import (
 )
 from gazerig.robot.control.command_executor import CommandExecutor
 from gazerig.robot.control.command_queue import CommandQueue
+from gazerig.robot.control.look_point import Known, LookPoints
 from gazerig.robot.control.stop_control import StopControl
 from gazerig.robot.control.tick import Tick as Tick
 from gazerig.robot.control.tick import at_rest
@@ -35,6 +37,7 @@ from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.reply import Ticket
 from gazerig.robot.model.types import JointAngles
 from gazerig.robot.perception.perception import Perception
+from gazerig.robot.perception.pixel_to_world import PixelToWorld
 from gazerig.robot.safety.guard import Guard
 
 
@@ -64,6 +67,7 @@ class Robot:
         animation: Animation,
         guard: Guard,
         tune: Callable[[Tune, float], tuple[str, ...]],
+        pixels: PixelToWorld,
     ) -> None:
         """Wire the parts.
 
@@ -81,6 +85,7 @@ class Robot:
             animation: gestures and expressions laid over gaze.
             guard: between what is desired and the bus.
             tune: puts changed parameters in force and says what was done.
+            pixels: places pixels of a camera frame in the world.
         """
         self.body = body
         self.camera = camera
@@ -99,9 +104,10 @@ class Robot:
         self._lead = Lead()
         self._told: list[str] = []
         self._stop = StopControl(self._told)
+        self._looks = LookPoints(pixels)
         self._executor = CommandExecutor(
             body, self._lead, self._stop, self._menus, attention, oculomotor, animation, kinematics,
-            guard, tune, self._told,
+            guard, tune, self._told, self._looks,
         )  # fmt: skip
 
     @property
@@ -189,6 +195,7 @@ class Robot:
         joints = self.body.read(t_s)
         pose = self._kinematics.forward(joints)
         self._poses.remember(t_s, pose.head_rad)
+        self._looks.known = Known(pose)
         self.attention.reset(t_s)
         self._scanpath.reset(t_s)
         self._aversion.reset(t_s)
@@ -210,7 +217,8 @@ class Robot:
             self._oculomotor.reset(t_s, pose)
         detections = self.camera.latest(t_s)
         percept = self.perception.see(detections, self._poses)
-        target = self._lead.target(self.attention.choose(percept, pose, t_s), t_s)
+        self._looks.known = Known(pose, detections, percept)
+        target = self._lead.target(self.attention.choose(percept, pose, t_s), percept, t_s)
         target = self._scanpath.wander(target, percept, t_s, self._settled, pose.p_world_head_m)
         target = self._aversion.step(target, pose.p_world_head_m, t_s)
         offset = self._animation.step(t_s)
@@ -221,16 +229,17 @@ class Robot:
             self._stop.keep_released(self.body, joints, t_s)
             guard_result = at_rest(joints, desired, self.stopped, self.body.names)
         else:
-            # What a person chose to look at is there whatever the camera shows.
-            age_s = 0.0 if self._lead.active else percept.age_s(t_s) if percept is not None else inf
+            age_s = self._frame_age_s(percept, t_s)
             guard_result = self._guard.check(desired, joints, age_s, t_s)
             self.body.write(guard_result.command_rad)
         self._executor.commanded_rad = guard_result.command_rad
+        converges = not self._kinematics.one_pan
+        lead = self._lead.measure(target, pose, joints.position_rad, converges, t_s)
         events = (*self._told, *self.body.bus.events(), *self.camera.events())
         self._told.clear()
         return Tick(
             t_s, joints, pose, detections, percept, target, gaze, desired, guard_result, events, commands,
-            self.stopped, self._lead.words,
+            self.stopped, self._lead.words, lead,
         )  # fmt: skip
 
     def park(
@@ -276,12 +285,23 @@ class Robot:
 
     def _obey(self, t_s: float) -> tuple[Command, ...]:
         """Execute the commands that wait, and end a lead that is not renewed."""
-        taken = self._commands.take()
-        for command, ticket in taken:
-            ticket.answer(self._executor.execute(command, t_s))
+        taken = []
+        for waiting in self._commands.take():
+            command = self._looks.resolved(waiting.command)
+            taken.append(command)
+            waiting.ticket.answer(self._executor.execute(command, t_s))
         self._executor.end_lapsed_lead(t_s)
         self._executor.end_lapsed_levels(t_s)
-        return tuple([command for command, _ in taken])
+        return tuple(taken)
+
+    def _frame_age_s(self, percept: Percept | None, t_s: float) -> float:
+        """Return the age of the frame that the gaze rests on.
+
+        What a person chose to look at is there whatever the camera shows.
+        """
+        if not self._lead.needs_camera:
+            return 0.0
+        return percept.age_s(t_s) if percept is not None else inf
 
 
 def run(

@@ -5,6 +5,7 @@ from typing import NamedTuple
 from gazerig.drivers.types import Detections
 from gazerig.gaze.types import GazeCommand, GazeState, Percept, Target
 from gazerig.robot.model.commands import Command
+from gazerig.robot.model.lead import NOBODY_LEADS, LeadState
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 
 
@@ -15,6 +16,7 @@ class Tick(NamedTuple):
     commands: what people asked for, obeyed at the beginning of this tick
     stopped: why the robot was stopped, "" while it moves
     led: who leads gaze or joints and with what, "" while no client leads
+    lead: the newest lead, and whether the head is where it was to be
     """
 
     t_s: float
@@ -30,6 +32,7 @@ class Tick(NamedTuple):
     commands: tuple[Command, ...] = ()
     stopped: str = ""
     led: str = ""
+    lead: LeadState = NOBODY_LEADS
 
 
 def at_rest(

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from gazerig.robot.dashboard.inbox import MESSAGE_BYTES, request_message
 from gazerig.robot.dashboard.token_bucket import TokenBucket
 from gazerig.robot.model.clock import Clock, RealClock
-from gazerig.robot.model.commands import Command, Jog, LookAt, as_json
+from gazerig.robot.model.commands import Command, Leading, as_json
 
 DOOR = "door"
 """Who asks where it is the stop button or a click in the image."""
@@ -35,7 +35,7 @@ class Outbox:
 
     def command(self, command: Command, who: str) -> bool:
         """Return a command; False where the rig does not take it now."""
-        if isinstance(command, LookAt | Jog):
+        if isinstance(command, Leading):
             self.leads(self.name(who))
             command = command._replace(who=self.name(who))
         return self.ask(as_json(command), who)

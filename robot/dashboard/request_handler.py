@@ -15,7 +15,7 @@ from gazerig.robot.control.command_handler import (
     PathGuard,
 )
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.commands import Command, Jog, LookAt, Resume, signed
+from gazerig.robot.model.commands import Command, Leading, LookAt, Resume, signed
 from gazerig.robot.model.reply import CommandTaker, Ticket
 
 _REPLY_S = 1.0
@@ -114,7 +114,7 @@ class PageRequestHandler:
 
     def _replied(self, given: CommandGiven) -> str | None:
         """Return what a command cannot do, None if it does all or no client waits."""
-        if given.ticket is None or not isinstance(given.command, LookAt | Jog | Resume):
+        if given.ticket is None or not isinstance(given.command, Leading | Resume):
             return None
         reply = given.ticket.wait(_REPLY_S)
         if reply is None:

@@ -6,13 +6,17 @@ recording of a run holds it, so that the run can be done again.
 
 from collections.abc import Mapping
 from math import pi
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
-from gazerig.gaze.types import Vec3
+from gazerig.gaze.types import Angles2, Vec3
 from gazerig.robot.model.types import JOINT_NAME
 
 Value = float | int | bool | str | None | tuple["Value", ...] | Mapping[str, "Value"]
 """What a key of a rig's YAML can hold."""
+
+Frame = Literal["world", "head"]
+FAR_M = 100.0
+"""From here on the eyes look straight ahead, to what can be told."""
 
 
 class Ask(NamedTuple):
@@ -28,23 +32,90 @@ class LookAt(NamedTuple):
     p_world_m: metres, x ahead, y left, z up of the neck base
     who: who asks, in words; stay: until told otherwise; else for as long as ``Renew`` comes
         at least every ``gazerig.robot.model.lead.HEARTBEAT_S``
+    for_s: ends after so many seconds; None: without such an end
     """
 
     p_world_m: Vec3 | None
     who: str = ""
     stay: bool = False
+    for_s: float | None = None
+
+
+class LookAtInHead(NamedTuple):
+    """Look at the point of the world that is now at a place in the head's frame.
+
+    p_head_m: metres, x ahead, y left, z up of the point midway between the eyes, along the head's
+        axes at the time of the command
+    who, stay, for_s: as in LookAt
+    """
+
+    p_head_m: Vec3
+    who: str = ""
+    stay: bool = False
+    for_s: float | None = None
+
+
+class LookAtDirection(NamedTuple):
+    """Look in a direction from where the head is now.
+
+    direction_rad: (yaw, pitch), yaw + left, pitch + up
+    frame: whose axes: the neck base's, or the head's at the time of the command
+    distance_m: on what the eyes converge
+    who, stay, for_s: as in LookAt
+    """
+
+    direction_rad: Angles2
+    frame: Frame = "world"
+    distance_m: float = FAR_M
+    who: str = ""
+    stay: bool = False
+    for_s: float | None = None
+
+
+class LookAtPerson(NamedTuple):
+    """Look at a person and follow, until nobody has seen the person for some time.
+
+    id: of the person, as perception counts them
+    who, stay, for_s: as in LookAt
+    """
+
+    id: int
+    who: str = ""
+    stay: bool = False
+    for_s: float | None = None
+
+
+class LookAtPixel(NamedTuple):
+    """Look at what is at a pixel of a camera frame.
+
+    pixel_px: (x, y), from the centre of the upper left pixel, x right, y down
+    distance_m: of it from the camera; None: its depth where the camera measures it, else as far
+        as what is seen there
+    captured_s: the frame's time of exposure; None: the newest frame
+    p_world_m: where it lay; entered when the command is carried out, for the recording
+    who, stay, for_s: as in LookAt
+    """
+
+    pixel_px: tuple[float, float]
+    distance_m: float | None = None
+    captured_s: float | None = None
+    p_world_m: Vec3 | None = None
+    who: str = ""
+    stay: bool = False
+    for_s: float | None = None
 
 
 class Jog(NamedTuple):
     """Hold all joints, with these at the given angles; without any, the gaze is free again.
 
     angles_rad: (joint, angle) pairs
-    who, stay: as in LookAt
+    who, stay, for_s: as in LookAt
     """
 
     angles_rad: tuple[tuple[str, float], ...]
     who: str = ""
     stay: bool = False
+    for_s: float | None = None
 
 
 class Express(NamedTuple):
@@ -99,7 +170,10 @@ class Tune(NamedTuple):
     changes: tuple[tuple[str, Value], ...]
 
 
-Command = Ask | LookAt | Jog | Express | SetLevel | Renew | Stop | Resume | Tune
+Look = LookAt | LookAtInHead | LookAtDirection | LookAtPerson | LookAtPixel
+Leading = Look | Jog
+"""Commands that take the lead of gaze or joints."""
+Command = Ask | Leading | Express | SetLevel | Renew | Stop | Resume | Tune
 
 REPEATED = (Renew, SetLevel)
 """Commands that programs send many times a second: no message or mark tells of each."""
@@ -112,9 +186,16 @@ MAX_JOINTS = 64
 """A command moves no more joints than this."""
 MAX_WORDS = 200
 """Longest name or reason that a command may carry, in characters."""
+MAX_LEAD_S = 86400.0
+"""Longest time that a lead may be given."""
+MAX_PIXEL = 20000.0
+"""No pixel lies farther from the corner of its frame."""
+_MAX_TIME_S = 1e12
 
 COMMANDS: dict[str, type[Command]] = {
-    "ask": Ask, "look_at": LookAt, "jog": Jog, "express": Express, "set_level": SetLevel,
+    "ask": Ask, "look_at": LookAt, "look_at_in_head": LookAtInHead,
+    "look_at_direction": LookAtDirection, "look_at_person": LookAtPerson,
+    "look_at_pixel": LookAtPixel, "jog": Jog, "express": Express, "set_level": SetLevel,
     "renew": Renew, "stop": Stop, "resume": Resume, "tune": Tune,
 }  # fmt: skip
 _NAMES = {kind: name for name, kind in COMMANDS.items()}
@@ -166,9 +247,8 @@ def from_recording(data: dict[str, object]) -> Command:
 
 def signed(command: Command, who: str) -> Command:
     """Return a command with who asks for it; commands that do not tell stay as they are."""
-    match command:
-        case LookAt() | Jog() | Renew() | Stop() | Resume():
-            return command._replace(who=who[:MAX_WORDS])
+    if isinstance(command, Leading | Renew | Stop | Resume):
+        return command._replace(who=who[:MAX_WORDS])
     return command
 
 
@@ -182,16 +262,12 @@ def check(command: Command) -> None:
         case Ask(menu, choice):
             if not isinstance(menu, str) or not isinstance(choice, str):
                 raise ValueError("menu and choice are names")
-        case LookAt(p, who, stay):
-            if p is not None and not (isinstance(p, tuple) and len(p) == 3 and all(map(_near, p))):
-                raise ValueError(
-                    "a point is three finite numbers in metres, x ahead, y left, z up, none "
-                    f"beyond +-{MAX_COORDINATE_M:g} m"
-                )
-            _check_who(who, stay)
-        case Jog(angles, who, stay):
+        case LookAt() | LookAtInHead() | LookAtDirection() | LookAtPerson() | LookAtPixel():
+            _check_look(command)
+            _check_lead(command)
+        case Jog(angles):
             _check_angles(angles)
-            _check_who(who, stay)
+            _check_lead(command)
         case Express(expression, strength):
             _check_share("an expression", "strength", expression, strength)
         case SetLevel(level, value):
@@ -210,6 +286,58 @@ def check(command: Command) -> None:
             )
             if not pairs:
                 raise ValueError("changes are pairs of a dotted key and a value")
+
+
+def _check_look(command: Look) -> None:
+    """See that what is to be looked at can be."""
+    match command:
+        case LookAt(None):
+            pass
+        case LookAt(p) | LookAtInHead(p):
+            _check_point(p)
+        case LookAtDirection(direction, frame, distance):
+            if not (_numbers(direction, 2, pi) and -pi / 2 <= direction[1] <= pi / 2):
+                raise ValueError(
+                    "a direction is a finite yaw within +-180 deg (left above 0) and a pitch "
+                    "within +-90 deg (up above 0)"
+                )
+            if frame not in ("world", "head"):
+                raise ValueError(f"frame {frame!r:.40}: there is world, head")
+            _check_distance(distance)
+        case LookAtPerson(person):
+            if isinstance(person, bool) or not isinstance(person, int) or person < 0:
+                raise ValueError(
+                    f"a person is named by a whole number from 0 on, not {person!r:.40}"
+                )
+        case LookAtPixel(pixel, distance, captured_s, p):
+            if not _numbers(pixel, 2, MAX_PIXEL):
+                raise ValueError("a pixel is two finite numbers, x right and y down")
+            if distance is not None:
+                _check_distance(distance)
+            if captured_s is not None and not _within(captured_s, _MAX_TIME_S):
+                raise ValueError("captured_s is the time of a frame in seconds")
+            if p is not None:
+                _check_point(p)
+
+
+def _check_point(p: object) -> None:
+    if not _numbers(p, 3, MAX_COORDINATE_M):
+        raise ValueError(
+            "a point is three finite numbers in metres, x ahead, y left, z up, none "
+            f"beyond +-{MAX_COORDINATE_M:g} m"
+        )
+
+
+def _check_distance(distance: object) -> None:
+    if not (_within(distance, MAX_COORDINATE_M) and distance > 0.0):  # type: ignore[operator]
+        raise ValueError(f"a distance is above 0 and at most {MAX_COORDINATE_M:g} m")
+
+
+def _check_lead(command: Leading) -> None:
+    _check_who(command.who, command.stay)
+    for_s = command.for_s
+    if for_s is not None and not (_within(for_s, MAX_LEAD_S) and for_s > 0.0):
+        raise ValueError(f"for_s is above 0 and at most {MAX_LEAD_S:g} s")
 
 
 def _check_who(who: object, flag: object = False) -> None:
@@ -238,8 +366,10 @@ def _check_share(what: str, key: str, name: object, value: object) -> None:
         raise ValueError(f"the {key} of {what} is a number 0..1")
 
 
-def _near(value: object) -> bool:
-    return _within(value, MAX_COORDINATE_M)
+def _numbers(values: object, count: int, most: float) -> bool:
+    """Return whether it is a tuple of so many finite numbers within +-most."""
+    of_them = isinstance(values, tuple) and len(values) == count
+    return of_them and all(_within(value, most) for value in values)  # type: ignore[attr-defined]
 
 
 def _within(value: object, most: float) -> bool:

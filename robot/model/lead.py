@@ -1,48 +1,107 @@
-"""Who leads the head in place of what attracts it: a point to look at, or joints held by hand.
+"""Who leads the head in place of what attracts it: something to look at, or joints held by hand.
 
 A lead needs a heartbeat unless it is to stay: without one the gaze leads again. Pure: times
 are those of the ticks and heartbeats are commands, so a recorded run lapses as it did.
 """
 
-from math import degrees
+from math import degrees, radians
+from typing import NamedTuple
 
-from gazerig.gaze.types import Target, Vec3
-from gazerig.robot.model.commands import Jog, LookAt, Renew
+from gazerig.gaze.angles import add, scale
+from gazerig.gaze.types import Face, GazeState, Percept, Target, Vec3
+from gazerig.robot.model.commands import (
+    Jog,
+    Leading,
+    Look,
+    LookAt,
+    LookAtDirection,
+    LookAtPerson,
+    LookAtPixel,
+    Renew,
+)
+from gazerig.robot.model.gaze_error import gaze_error
 from gazerig.robot.model.types import JointAngles
 
 HEARTBEAT_S = 1.0
 """A lead that is not to stay lapses when it was not renewed for so long."""
+ARRIVED_RAD = radians(1.0)
+"""A gaze or joint that is measured nearer than this to what was asked for is there."""
+GONE_S = 2.0
+"""Who looks at a person leads no longer when the person was not seen for so long."""
+
+
+class LeadState(NamedTuple):
+    """The newest lead, as it is after a tick.
+
+    number: counts the leads since the start; 0 before the first
+    active: it is in force
+    arrived: the gaze has been measured on the point, or the joints at their angles, since
+    error_rad: between gaze and point, or of the worst joint, as measured; 0 while not active
+    ended: why it is not in force any more, "" while it is
+    """
+
+    number: int = 0
+    active: bool = False
+    arrived: bool = False
+    error_rad: float = 0.0
+    ended: str = ""
+
+
+NOBODY_LEADS = LeadState()
 
 
 class Lead:
     """The lead in force.
 
     point: to look at, world frame; None if none was chosen
+    person: whom to look at, by id; None if none was chosen
     pose_rad: joints held by hand, empty while the models move them
     words: who leads and what, "" while no client leads
+    state: as of the last tick
     """
 
     def __init__(self) -> None:
         self.point: Vec3 | None = None
+        self.person: int | None = None
         self.pose_rad: JointAngles = ()
         self.words = ""
+        self.state = NOBODY_LEADS
         self._shifts = 0
         self._jogged: dict[str, float] = {}
+        self._jogged_at: tuple[int, ...] = ()
+        self._what = ""
         self._who = ""
         self._stay = False
         self._renewed_s = 0.0
+        self._until_s: float | None = None
+        self._face: Face | None = None
+        self._seen_s = 0.0
 
     @property
     def active(self) -> bool:
         """True while anybody leads."""
         return bool(self.words)
 
-    def look(self, command: LookAt, t_s: float) -> None:
-        """Lead the gaze to a point, or let it be free; joints are no longer held."""
-        self.point = command.p_world_m
+    @property
+    def needs_camera(self) -> bool:
+        """True unless somebody has chosen a point or joints, which are there without a camera."""
+        return not self.words or self.person is not None
+
+    def look(self, command: Look, point: Vec3 | None, t_s: float) -> None:
+        """Lead the gaze to a point, or let it be free; joints are no longer held.
+
+        point: where what the command names is in the world; None: nowhere, the gaze is free
+        """
+        self._leave(f"{command.who or 'somebody'} looks elsewhere")
+        self.point = point
         self._shifts += 1
-        self.pose_rad = ()
-        self._jogged.clear()
+        self._what = _what(command)
+        self._take(command, t_s)
+
+    def follow(self, command: LookAtPerson, face: Face, captured_s: float, t_s: float) -> None:
+        """Lead the gaze to a person who is seen."""
+        self.look(command, None, t_s)
+        self.person, self._face, self._seen_s = command.id, face, captured_s
         self._take(command, t_s)
 
     def jog(self, command: Jog, names: tuple[str, ...], now_rad: JointAngles, t_s: float) -> None:
@@ -53,14 +112,17 @@ class Lead:
         if not command.angles_rad:
             self.pose_rad = ()
             self._jogged.clear()
+            if self.point is None and self.person is None:
+                self._leave(f"{command.who or 'somebody'} has returned the joints")
             self._describe()
             return
         if command.who != self._who:
-            self.point = None
+            self.point = self.person = None
         angles = dict(zip(names, self.pose_rad or now_rad, strict=True))
         angles.update(command.angles_rad)
         self.pose_rad = tuple(angles[name] for name in names)
         self._jogged.update(command.angles_rad)
+        self._jogged_at = tuple([i for i, name in enumerate(names) if name in self._jogged])
         self._take(command, t_s)
 
     def renew(self, command: Renew, t_s: float) -> bool:
@@ -70,27 +132,36 @@ class Lead:
             self._renewed_s = t_s
         return mine
 
-    def lapsed(self, t_s: float) -> bool:
-        """True if the one who leads has been silent for too long."""
-        return self.active and not self._stay and t_s - self._renewed_s > HEARTBEAT_S
+    def over(self, t_s: float) -> str:
+        """Return why the lead is to end now, "" while it goes on or no client leads."""
+        if not self.active:
+            return ""
+        if self._until_s is not None and t_s >= self._until_s:
+            return "its time is over"
+        if not self._stay and t_s - self._renewed_s > HEARTBEAT_S:
+            return "not renewed"
+        if self.person is not None and t_s - self._seen_s > GONE_S:
+            return f"person {self.person} is gone"
+        return ""
 
-    def end(self) -> None:
+    def end(self, why: str) -> None:
         """End the lead: the gaze models move the head again."""
-        if self.point is not None:
+        if self.point is not None or self.person is not None:
             self._shifts += 1
-        self.point, self.pose_rad = None, ()
-        self._jogged.clear()
+        self._leave(why)
         self._describe()
 
-    def target(self, target: Target, t_s: float) -> Target:
-        """Return the point that a person chose in the place of what attention did."""
-        puppet = self.puppet(t_s)
-        if puppet is None:
+    def target(self, target: Target, percept: Percept | None, t_s: float) -> Target:
+        """Return what a user chose to look at in the place of what attention did."""
+        chosen = self.chosen(percept, t_s)
+        if chosen is None:
             return target
-        return puppet._replace(shift=target.shift + self._shifts, saliences=target.saliences)
+        return chosen._replace(shift=target.shift + self._shifts, saliences=target.saliences)
 
-    def puppet(self, t_s: float) -> Target | None:
-        """Return the point that a user chose, None if none was chosen."""
+    def chosen(self, percept: Percept | None, t_s: float) -> Target | None:
+        """Return what a user chose to look at, None if nothing was chosen."""
+        if self.person is not None:
+            return self._person(percept)
         if self.point is None:
             return None
         return Target(
@@ -98,18 +169,87 @@ class Lead:
             self._shifts, "somebody chose this point",
         )  # fmt: skip
 
-    def _take(self, command: LookAt | Jog, t_s: float) -> None:
+    def measure(
+        self, target: Target, pose: GazeState, joints_rad: JointAngles, converges: bool, t_s: float
+    ) -> LeadState:
+        """Return the state of the lead after a tick.
+
+        Args:
+            target: looked at in this tick.
+            pose: head and eyes as measured.
+            joints_rad: joints as measured.
+            converges: each eye turns to the sides by itself.
+            t_s: time of the tick.
+        """
+        if not self.state.active:
+            return self.state
+        if self.pose_rad:
+            error = max([abs(self.pose_rad[i] - joints_rad[i]) for i in self._jogged_at])
+        else:
+            since_s = max(0.0, t_s - target.at_s)
+            point = add(target.p_world_m, scale(target.v_world_m_s, since_s))
+            error = gaze_error(point, pose, converges).whole
+        arrived = self.state.arrived or error <= ARRIVED_RAD
+        self.state = self.state._replace(arrived=arrived, error_rad=error)
+        return self.state
+
+    def _person(self, percept: Percept | None) -> Target | None:
+        """Return the person who is followed, where last seen."""
+        if percept is not None:
+            for face in percept.faces:
+                if face.id == self.person:
+                    self._face, self._seen_s = face, percept.captured_s
+        known = self._face
+        if known is None:
+            return None
+        return Target(
+            known.p_world_m, known.v_world_m_s, self._seen_s, "face", known.id, 1.0, True, None,
+            self._shifts, f"face {known.id}: somebody chose it",
+        )  # fmt: skip
+
+    def _take(self, command: Leading, t_s: float) -> None:
         self._who, self._stay, self._renewed_s = command.who, command.stay, t_s
+        self._until_s = None if command.for_s is None else t_s + command.for_s
         self._describe()
+        if self.words:
+            self.state = LeadState(self.state.number + 1, True)
+
+    def _leave(self, why: str) -> None:
+        """Let go of everything that is led."""
+        self.point = self.person = self._face = None
+        self.pose_rad = ()
+        self._jogged.clear()
+        if self.state.active:
+            self.state = self.state._replace(active=False, error_rad=0.0, ended=why)
 
     def _describe(self) -> None:
-        """Return who leads and what."""
+        """Describe who leads and what."""
         if self.pose_rad:
             angles = (f"{name} {degrees(angle):.1f}" for name, angle in self._jogged.items())
             what = f"jog {', '.join(angles)}"
-        elif self.point is not None:
-            what = "look at {:g} {:g} {:g}".format(*(round(x, 2) for x in self.point))
+        elif self.point is not None or self.person is not None:
+            what = self._what
         else:
             self.words = ""
             return
         self.words = f"{self._who or 'somebody'}: {what}"
+
+
+def _what(command: Look) -> str:
+    """Describe what is to be looked at."""
+    match command:
+        case LookAt(p):
+            return f"look at {_numbers(p)}" if p is not None else ""
+        case LookAtDirection((yaw, pitch)):
+            of = " of the head" if command.frame == "head" else ""
+            return f"look in direction {degrees(yaw):.1f} {degrees(pitch):.1f} deg{of}"
+        case LookAtPerson(person):
+            return f"look at person {person}"
+        case LookAtPixel(pixel):
+            return f"look at pixel {pixel[0]:.0f} {pixel[1]:.0f}"
+        case _:
+            return f"look at {_numbers(command.p_head_m)} of the head"
+
+
+def _numbers(point: Vec3) -> str:
+    return "{:g} {:g} {:g}".format(*(round(x, 2) for x in point))

@@ -47,6 +47,7 @@ class CommandReply(NamedTuple):
     joints: those that cannot do what was asked; of a jog, all that were asked for
     error_rad: angle between the point and the line of sight once head and eyes are there, of
         the worse eye, or of their mean where one linkage turns both
+    lead: number of the lead that it took (``gazerig.robot.model.lead.LeadState``), 0 for none
     """
 
     refused: str = ""
@@ -54,6 +55,7 @@ class CommandReply(NamedTuple):
     done_m: Vec3 | None = None
     joints: tuple[JointReply, ...] = ()
     error_rad: float = 0.0
+    lead: int = 0
 
     @property
     def error_deg(self) -> float:
@@ -83,6 +85,7 @@ class CommandReply(NamedTuple):
             "asked_m": self.asked_m,
             "done_m": self.done_m,
             "error_deg": self.error_deg,
+            "lead": self.lead,
             "joints": [
                 {
                     "joint": one.joint,
@@ -116,7 +119,8 @@ class CommandReply(NamedTuple):
             for one in data["joints"]
         )
         asked, done = (_point(data[key]) for key in ("asked_m", "done_m"))
-        return cls(data["refused"], asked, done, joints, radians(data["error_deg"]))
+        error_rad = radians(data["error_deg"])
+        return cls(data["refused"], asked, done, joints, error_rad, data.get("lead", 0))
 
 
 def _point(data: Any) -> Vec3 | None:

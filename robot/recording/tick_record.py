@@ -25,6 +25,7 @@ from gazerig.gaze.types import (
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import as_recorded
 from gazerig.robot.model.commands import from_recording as command_from_json
+from gazerig.robot.model.lead import NOBODY_LEADS, LeadState
 from gazerig.robot.model.types import GAZE_JOINTS, GuardResult, JointAngles, JointState
 
 Json = dict[str, Any]
@@ -123,6 +124,7 @@ def flat(
         [as_recorded(command) for command in tick.commands],
         tick.stopped,
         tick.led,
+        tuple(tick.lead),
         [(_BODY_RECORD_NAMES[type(one)], _plain(one)) for one in before],
     )
 
@@ -133,7 +135,7 @@ def as_json(values: Flat) -> Json:
     if not finite:
         values = _worded(values)
     (t_s, dt_s, percept, joints, pose, target, gaze, desired, guard_result, events, commands, stopped,
-     led, before) = values  # fmt: skip
+     led, lead, before) = values  # fmt: skip
     data: Json = {
         "t_s": t_s,
         "dt_s": dt_s,
@@ -155,6 +157,8 @@ def as_json(values: Flat) -> Json:
         "stopped": stopped,
         "led": led,
     }
+    if lead != NOBODY_LEADS:
+        data["lead"] = _named(LeadState, lead)
     if before:
         data["before"] = [
             {"what": what, **_named(_BODY_RECORDS[what], one)} for what, one in before
@@ -211,6 +215,7 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> TickRecord:
         tuple([command_from_json(command) for command in data["orders"]]),
         data["stopped"],
         data.get("led", ""),
+        _made(LeadState, data["lead"]) if "lead" in data else NOBODY_LEADS,
     )
     before = tuple([_body_record(one) for one in data.get("before", ())])
     return TickRecord(tick, data["dt_s"], before)

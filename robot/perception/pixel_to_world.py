@@ -1,0 +1,105 @@
+"""A pixel of a camera frame -> the point of the world that is seen there."""
+
+from collections.abc import Callable
+from math import hypot, radians
+
+import numpy as np
+
+from gazerig.drivers.camera.depth_roi import depth_at
+from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.types import Detections
+from gazerig.gaze.angles import add, angle_between, norm, rotate, scale, sub, unit
+from gazerig.gaze.types import Percept, Vec3
+from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
+from gazerig.robot.model.intrinsics import intrinsics_of_lens, rays
+
+NEAR_RAD = 0.12
+"""A pixel within 7 deg of somebody means something as far away as they are."""
+USUAL_M = 1.5
+"""How far away a thing counts as where nobody knows: across a desk and a step more."""
+
+_PATCH = 0.03  # of the frame's width, the square whose depth is read
+
+
+class PixelToWorld:
+    """Places pixels by the lens, the camera's mount and the head's pose at the exposure.
+
+    Args:
+        mount: where the camera sits on the head.
+        poses: where the head was when.
+        camera: returns the lens as it is believed now.
+    """
+
+    def __init__(
+        self, mount: CameraMount, poses: PoseHistory, camera: Callable[[], CameraParams]
+    ) -> None:
+        self._mount, self._poses, self._camera = mount, poses, camera
+
+    def point(
+        self,
+        pixel: tuple[float, float],
+        found: Detections,
+        percept: Percept | None,
+        distance_m: float | None = None,
+        captured_s: float | None = None,
+    ) -> Vec3:
+        """Return the point of the world at a pixel, in metres.
+
+        Args:
+            pixel: (x, y) from the centre of the upper left one, x right, y down.
+            found: the newest frame, whose size and lens count.
+            percept: what it showed, for the distance of a pixel beside somebody.
+            distance_m: from the camera; None: the depth measured there, or that of what is near.
+            captured_s: exposure of the frame with the pixel; None: the newest frame.
+        """
+        newest = captured_s is None or captured_s == found.captured_s
+        at_s = found.captured_s if captured_s is None else captured_s
+        R, p = self._mount.pose(*self._poses.head_pose(at_s))
+        x_ray, y_ray, z_ray = rays(np.array([pixel]), self._lens(found))[0].tolist()
+        through = rotate(R, (x_ray, y_ray, z_ray))  # 1 m deep: depth is along the optical axis
+        depth_m = _depth_m(found, pixel) if newest and distance_m is None else None
+        if depth_m is not None:
+            return add(p, scale(through, depth_m))
+        direction = unit(through)
+        if distance_m is None:
+            distance_m = seen_distance_m(percept, p, direction)
+        return add(p, scale(direction, distance_m))
+
+    def _lens(self, found: Detections) -> Intrinsics:
+        camera = self._camera()
+        field_rad = radians(camera.horizontal_field_deg)
+        size_px = found.width_px, found.height_px
+        return intrinsics_of_lens(camera.lens, field_rad, *size_px, found.lens)
+
+
+def seen_distance_m(percept: Percept | None, p_world_m: Vec3, direction_world: Vec3) -> float:
+    """Return how far away what is at a pixel counts as: as far as what is seen there.
+
+    Args:
+        percept: what was seen.
+        p_world_m: where the camera is.
+        direction_world: unit vector through the pixel.
+    """
+    near, best = USUAL_M, NEAR_RAD
+    if percept is None:
+        return near
+    places = [face.p_world_m for face in percept.faces]
+    places += [(float(x), float(y), float(z)) for x, y, z in percept.bodies.p_world_m]
+    for place in places:
+        there = sub(place, p_world_m)
+        angle = angle_between(unit(there), direction_world)
+        if angle < best:
+            near, best = norm(there), angle
+    return near
+
+
+def _depth_m(found: Detections, pixel: tuple[float, float]) -> float | None:
+    """Read the depth image about a pixel of the camera frame, None where it says nothing."""
+    if found.depth_m is None:
+        return None
+    height, width = found.depth_m.shape[:2]
+    x = pixel[0] * width / found.width_px
+    y = pixel[1] * height / found.height_px
+    side = max(3.0, _PATCH * hypot(width, height))
+    box = (x - side / 2, y - side / 2, side, side)
+    return depth_at(found.depth_m, box, shrink=1.0).distance_m

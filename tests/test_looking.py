@@ -1,0 +1,244 @@
+"""What can be looked at: points of two frames, directions, people, pixels; and how a lead ends."""
+
+import json
+from collections.abc import Iterator
+from math import degrees, nan, pi, radians
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gazerig.config.schema import load_rig
+from gazerig.gaze.angles import angle_between, norm, rotate_back, sub, yaw_pitch
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.resimulate import rerun
+from gazerig.robot.app.session import compose
+from gazerig.robot.app.session import run as run_session
+from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.model.commands import (
+    Command,
+    Jog,
+    LookAt,
+    LookAtDirection,
+    LookAtInHead,
+    LookAtPerson,
+    LookAtPixel,
+    Stop,
+    as_json,
+    check,
+    from_json,
+)
+from gazerig.robot.model.lead import ARRIVED_RAD
+from gazerig.robot.model.reply import CommandReply
+from gazerig.robot.recording.read import RunRecording
+
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
+
+class Simulated:
+    """A rig in simulated time that ticks on when asked."""
+
+    def __init__(self, made: Assembly) -> None:
+        self.made = made
+
+    def go(self, seconds: float) -> list[Tick]:
+        ticks: list[Tick] = []
+        over = lambda s: "seconds" if s >= seconds else None  # noqa: E731
+        run(self.made.robot, self.made.clock, self.made.loop, over, ticks.append)
+        return ticks
+
+    def do(self, command: Command, seconds: float = 0.006) -> tuple[CommandReply, list[Tick]]:
+        ticket = self.made.robot.command(command)
+        ticks = self.go(seconds)
+        reply = ticket.wait(0.0)
+        assert reply is not None
+        return reply, ticks
+
+
+@pytest.fixture
+def rig() -> Iterator[Simulated]:
+    options = RunOptions(mock=True, fast=True, seed=3, scene="face-to-face")
+    made = assemble(load_rig("desk"), options)
+    made.robot.start(made.clock)
+    try:
+        rig = Simulated(made)
+        rig.go(2.0)
+        yield rig
+    finally:
+        made.robot.stop()
+        made.close()
+
+
+LOOKS: list[Command] = [
+    LookAt((1.0, 0.2, 0.3), for_s=2.0),
+    LookAtInHead((1.0, 0.2, 0.0), "a show", True),
+    LookAtDirection((0.3, -0.1)),
+    LookAtDirection((0.3, -0.1), "head", 2.0, for_s=1.0),
+    LookAtPerson(3),
+    LookAtPixel((320.0, 200.0)),
+    LookAtPixel((320.0, 200.0), 1.5, 12.25, (1.0, 2.0, 3.0)),
+]
+
+
+@pytest.mark.parametrize("command", LOOKS, ids=str)
+def test_looks_cross_processes_as_json(command: Command) -> None:
+    assert from_json(json.loads(json.dumps(as_json(command)))) == command
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        ({"do": "look_at", "p_world_m": None, "for_s": 0}, "for_s is above 0"),
+        ({"do": "look_at", "p_world_m": None, "for_s": nan}, "for_s is above 0"),
+        ({"do": "look_at_in_head", "p_head_m": None}, "three finite numbers"),
+        ({"do": "look_at_in_head", "p_head_m": [nan, 0, 0]}, "three finite numbers"),
+        ({"do": "look_at_direction", "direction_rad": [4.0, 0.0]}, "within .-180 deg"),
+        ({"do": "look_at_direction", "direction_rad": [0.0, 1.7]}, "within\n? ?.-90 deg"),
+        ({"do": "look_at_direction", "direction_rad": [0, 0], "frame": "moon"}, "world, head"),
+        ({"do": "look_at_direction", "direction_rad": [0, 0], "distance_m": 0}, "above 0"),
+        ({"do": "look_at_person", "id": -1}, "whole number"),
+        ({"do": "look_at_person", "id": True}, "whole number"),
+        ({"do": "look_at_pixel", "pixel_px": [1.0]}, "two finite numbers"),
+        ({"do": "look_at_pixel", "pixel_px": [1.0, 10**400]}, "two finite numbers"),
+        ({"do": "look_at_pixel", "pixel_px": [1, 2], "distance_m": -1}, "above 0"),
+        ({"do": "look_at_pixel", "pixel_px": [1, 2], "captured_s": 10**400}, "time of a frame"),
+        ({"do": "look_at_pixel", "pixel_px": [1, 2], "p_world_m": [1]}, "three finite"),
+    ],
+)
+def test_what_cannot_be_looked_at_is_refused_with_the_rule(data: Any, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        from_json(data)
+
+
+def test_a_point_of_the_head_is_where_the_head_had_it(rig: Simulated) -> None:
+    before = rig.go(0.006)[-1].pose
+    reply, ticks = rig.do(LookAtInHead((1.2, 0.3, 0.1), stay=True), 1.5)
+    assert reply.asked_m is not None
+    seen = rotate_back(before.R_world_head, sub(reply.asked_m, before.p_world_head_m))
+    assert seen == pytest.approx((1.2, 0.3, 0.1), abs=1e-9)
+    # The point stays in the world while the head turns to it.
+    assert {tick.target.p_world_m for tick in ticks} == {reply.asked_m}
+    assert ticks[-1].lead.arrived and ticks[-1].lead.error_rad <= ARRIVED_RAD
+
+
+@pytest.mark.parametrize("frame", ["world", "head"])
+def test_a_direction_is_looked_in(rig: Simulated, frame: Any) -> None:
+    rig.do(Jog((("neck_yaw", radians(15.0)),), stay=True), 2.0)
+    before = rig.go(0.006)[-1].pose
+    asked = (radians(10.0), radians(-5.0))
+    ticks = rig.do(LookAtDirection(asked, frame, stay=True), 2.0)[1]
+    pose, point = ticks[-1].pose, ticks[-1].gaze.gaze_point_world_m
+    seen = yaw_pitch(sub(point, pose.p_world_head_m))
+    if frame == "head":
+        seen = yaw_pitch(rotate_back(before.R_world_head, sub(point, pose.p_world_head_m)))
+    assert tuple(map(degrees, seen)) == pytest.approx((10.0, -5.0), abs=0.2)
+    assert ticks[-1].lead.arrived
+
+
+def test_a_person_is_followed_with_the_scanpath_on_the_face(rig: Simulated) -> None:
+    percept = rig.go(0.006)[-1].percept
+    assert percept is not None
+    person = percept.faces[0].id
+    reply, ticks = rig.do(LookAtPerson(person, stay=True), 3.0)
+    assert not reply.refused and reply.lead == 1
+    assert {(tick.target.kind, tick.target.id) for tick in ticks} == {("face", person)}
+    assert len({tick.target.part for tick in ticks}) > 1
+    assert ticks[-1].lead.arrived and ticks[-1].led == f"somebody: look at person {person}"
+
+
+def test_nobody_is_followed_who_is_not_seen_and_no_longer_than_that(rig: Simulated) -> None:
+    assert rig.do(LookAtPerson(99))[0].refused.startswith("no person 99 is seen now; there is ")
+    percept = rig.go(0.006)[-1].percept
+    assert percept is not None
+    rig.do(LookAtPerson(percept.faces[0].id, stay=True))
+    blind: Any = lambda found, poses: None  # noqa: E731
+    rig.made.robot.perception.see = blind  # type: ignore[method-assign]
+    ticks = rig.go(2.5)
+    assert ticks[100].led and not ticks[-1].led
+    assert ticks[-1].lead.ended == f"person {percept.faces[0].id} is gone"
+
+
+def test_a_pixel_is_where_it_was_when_the_frame_was_taken(rig: Simulated) -> None:
+    tick = rig.go(0.006)[-1]
+    found = tick.detections
+    assert found is not None and tick.percept is not None
+    x, y, width, height = found.faces[0].box_px
+    pixel = (x + width / 2, y + height / 2)
+    reply, ticks = rig.do(LookAtPixel(pixel, captured_s=found.captured_s, stay=True), 1.5)
+    face = tick.percept.faces[0].p_world_m
+    head = tick.pose.p_world_head_m
+    assert reply.asked_m is not None
+    assert degrees(angle_between(sub(reply.asked_m, head), sub(face, head))) < 2.0
+    assert norm(sub(reply.asked_m, head)) == pytest.approx(norm(sub(face, head)), abs=0.1)
+    (command,) = ticks[0].commands
+    assert isinstance(command, LookAtPixel) and command.p_world_m == reply.asked_m
+    assert ticks[-1].lead.arrived
+    near = rig.do(LookAtPixel(pixel, 0.5))[0]
+    assert near.asked_m is not None
+    assert norm(sub(near.asked_m, head)) == pytest.approx(0.5, abs=0.1)
+
+
+def test_a_pixel_without_a_frame_is_refused(rig: Simulated) -> None:
+    nothing: Any = lambda now_s: None  # noqa: E731
+    rig.made.robot.camera.latest = nothing  # type: ignore[method-assign]
+    rig.go(0.006)
+    assert "no camera frame" in rig.do(LookAtPixel((1.0, 1.0)))[0].refused
+
+
+def test_a_lead_ends_after_its_time_and_says_so(rig: Simulated) -> None:
+    ticks = rig.do(LookAt((1.0, 0.5, 0.3), "a show", True, for_s=0.5), 1.0)[1]
+    led = [tick for tick in ticks if tick.led]
+    assert led[-1].t_s - led[0].t_s == pytest.approx(0.5, abs=0.011)
+    assert ticks[-1].lead.ended == "its time is over" and not ticks[-1].lead.active
+    words = [event for tick in ticks for event in tick.events]
+    assert "a show: look at 1 0.5 0.3: its time is over, so the gaze leads again" in words
+
+
+def test_leads_are_counted_and_their_ends_have_reasons(rig: Simulated) -> None:
+    assert rig.go(0.006)[-1].lead == (0, False, False, 0.0, "")
+    assert rig.do(LookAt((1.0, 0.0, 0.3), stay=True))[0].lead == 1
+    reply, ticks = rig.do(LookAt((1.0, 0.4, 0.3), stay=True), 1.5)
+    assert reply.lead == 2 and ticks[0].lead.number == 2 and not ticks[0].lead.arrived
+    assert ticks[-1].lead.arrived
+    free = rig.do(LookAt(None, "a show"))
+    assert free[0].lead == 0 and free[1][-1].lead.ended == "a show looks elsewhere"
+    reply, ticks = rig.do(Jog((("neck_yaw", radians(20.0)),), stay=True), 0.1)
+    assert reply.lead == 3 and degrees(ticks[0].lead.error_rad) > 5.0
+    assert rig.go(2.0)[-1].lead.arrived
+    assert rig.do(Stop("a hand"))[1][-1].lead.ended == "stopped: a hand"
+
+
+def test_looks_are_recorded_and_done_again_to_the_same_bytes(tmp_path: Path) -> None:
+    file = tmp_path / "looks.mcap"
+    options = RunOptions(
+        mock=True, fast=True, seed=5, scene="face-to-face", seconds=5.0, record=file, pixels=False
+    )
+    composed = compose(options)
+    asked: dict[int, Command] = {
+        300: LookAtPixel((200.0, 150.0), stay=True),
+        450: LookAtDirection((-0.3, 0.1), "head", for_s=0.4, stay=True),
+        600: LookAtInHead((1.0, -0.2, 0.1), stay=True),
+        750: LookAtPerson(1, stay=True),
+    }
+    count = iter(range(10_000))
+    see = composed.made.robot.perception.see
+
+    def see_and_ask(found: Any, poses: Any) -> Any:
+        command = asked.get(next(count))
+        if command is not None:
+            composed.made.robot.command(command)
+        return see(found, poses)
+
+    watched: Any = see_and_ask
+    composed.made.robot.perception.see = watched  # type: ignore[method-assign]
+    run_session(composed, lambda: None, lambda line: None)
+    recording = RunRecording(file)
+    given = [command for one in recording.moments() for command in one.tick.commands]
+    assert [type(one) for one in given] == [type(one) for one in asked.values()]
+    again = rerun(recording)
+    assert again.same and again.tx_same and not again.notes
+
+
+def test_checks_take_what_the_recording_holds() -> None:
+    check(LookAtDirection((pi, pi / 2)))
