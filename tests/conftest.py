@@ -13,6 +13,7 @@ from collections.abc import Iterator
 
 import child_processes
 import pytest
+import running_order
 import starvation
 from _pytest.runner import runtestprotocol
 from hypothesis import settings
@@ -60,8 +61,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker("browser")
         if "simulated_wires" in getattr(item, "fixturenames", ()):
             continue
-        if _PTY & vars(getattr(item, "module", object)).keys():
+        cases = getattr(getattr(item, "callspec", None), "id", "").split("-")
+        if "pty" in cases or _PTY & vars(getattr(item, "module", object)).keys():
             item.add_marker("pty")
+    items[:] = running_order.spread(items)
 
 
 @pytest.hookimpl(optionalhook=True)
