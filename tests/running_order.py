@@ -20,7 +20,8 @@ def spread(items: Sequence[pytest.Item]) -> list[pytest.Item]:
         files.setdefault(item.location[0], []).append(item)
     long = [file for file in files.values() if any(map(_takes_long, file))]
     short = [file for file in files.values() if not any(map(_takes_long, file))]
-    turns = zip_longest(long, short, fillvalue=[])
+    nothing: list[pytest.Item] = []
+    turns = zip_longest(long, short, fillvalue=nothing)
     return [item for turn in turns for file in turn for item in file]
 
 
