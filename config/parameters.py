@@ -43,7 +43,7 @@ _AT_START: dict[str, str] = {
     "camera.mount": "who looks at the frames must know from the first whether they turn",
     "webcam.*": _AT_OPENING,
     "oak.*": _AT_OPENING,
-    "camera_care.*": _AT_OPENING,
+    "camera_recovery.*": _AT_OPENING,
 }
 _UNLISTED = ("park_deg", "face_parts_mm")
 """Mappings whose entries a file may leave out."""

@@ -13,6 +13,8 @@ from gazerig.config.rig import Rig
 from gazerig.gaze.top_down import TopDownParams
 
 RIG: Mapping[str, str] = {
+    "camera_care": "camera_recovery",
+    "motion.confirm_pictures": "confirm_frames",
     "joints.*.strength": "torque_limit",
     "joints.*.servo_deg_s": "servo_speed_deg_s",
     "joints.*.linkage": "transmission_points",

@@ -155,7 +155,7 @@ class Rig:
     camera: Annotated[CameraParams, "where the camera sits"] = field(default_factory=CameraParams)
     webcam: Annotated[WebcamParams, "what is asked of a webcam"] = field(default_factory=WebcamParams)
     oak: Annotated[OakParams, "what is asked of an OAK-D"] = field(default_factory=OakParams)
-    camera_care: Annotated[CameraRecoveryParams, "a camera that went away"] = field(default_factory=CameraRecoveryParams)
+    camera_recovery: Annotated[CameraRecoveryParams, "a camera that went away"] = field(default_factory=CameraRecoveryParams)
     motion: Annotated[MotionParams, "how moving things are found"] = field(default_factory=MotionParams)
     detector: Annotated[FaceDetectorParams, "how faces are found"] = field(default_factory=FaceDetectorParams)
     face_parts_mm: Annotated[Mapping[str, tuple[float, float, float]], Bounds(-300, 300),

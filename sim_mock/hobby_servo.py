@@ -113,6 +113,26 @@ def checked(spec: HobbySpec) -> HobbySpec:
     return spec
 
 
+def build_servos(specs: Sequence[HobbySpec | Sequence[float]], channels: int) -> list[HobbyServo]:
+    """Return one servo per channel of a board; channels without a spec have a default one.
+
+    Raises:
+        ValueError: a spec's channel does not exist or has two of them.
+    """
+    given: dict[int, HobbySpec] = {}
+    for spec in specs:
+        channel = int(spec[0])
+        if channel in given:
+            raise ValueError(
+                f"two servos are on channel {channel}: give each a channel of its own, "
+                f"0 to {channels - 1}"
+            )
+        if not 0 <= channel < channels:
+            raise ValueError(f"servo on channel {channel}: there is 0 to {channels - 1}")
+        given[channel] = HobbySpec(*spec)
+    return [HobbyServo(given.get(channel, HobbySpec(channel))) for channel in range(channels)]
+
+
 _RANGES: dict[str, tuple[float, float]] = {
     "channel": (0, 255),
     "start_steps": (0.0, 16_383.0),

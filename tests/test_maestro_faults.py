@@ -202,7 +202,7 @@ def test_help_explains_every_command_and_case(world):
         (8, {}, "8 channels: a Maestro has 6, 12, 18, 24"),
         (6, {"device": 128}, "0 to 127"),
         (6, {"servos": [HobbySpec(6)]}, "there is 0 to 5"),
-        (6, {"servos": [(1,), (1,)]}, "two servos are on one channel"),
+        (6, {"servos": [(1,), (1,)]}, "channel 1: give each a channel of its own"),
     ],
 )
 def test_boards_that_do_not_exist(channels, options, says):

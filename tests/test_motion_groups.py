@@ -90,7 +90,7 @@ def test_who_keeps_moving_keeps_the_number_and_two_are_not_mixed_up() -> None:
 
 
 def test_first_sight_is_not_told_yet_and_a_flicker_never() -> None:
-    tracks = MotionTracks(MotionParams(confirm_pictures=3))
+    tracks = MotionTracks(MotionParams(confirm_frames=3))
     for k in range(6):
         found = follow(tracks, k, (50, 50), *(((200, 50),) if k % 2 == 0 else ()))
         assert tracks.told(found[0]) == (k >= 2)

@@ -7,13 +7,15 @@ import pytest
 from pca9685_world import GRAIN, QUICK, SPEED_STEPS_S, World, setup
 from smbus2 import i2c_msg
 
-from gazerig.drivers.errors import ServoMissing
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.drivers.errors import PortError, ServoMissing
 from gazerig.drivers.hobby_board.release import stop_pulses
 from gazerig.drivers.i2c.bridge import ASK_STATUS, Part, commands, read, write
 from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
 from gazerig.drivers.pca9685.probe import probe
 from gazerig.drivers.pca9685.registers import AWAKE, MODE1, PRESCALE, counts_of, prescale_of, pulse
+from gazerig.drivers.servo_bus.torque import disable_torque
 from gazerig.sim_mock.pca9685.smbus import EmulatedSMBus
 
 
@@ -283,6 +285,14 @@ def test_a_guardian_stops_pulses_whatever_the_board_was_set_to(world):
     assert world.widths() == [0, 0, 0]
     world.command("absent on")
     assert left() == (0, 1, 5)
+
+
+def test_a_guardian_names_a_rate_that_would_work(world, monkeypatch):
+    monkeypatch.setattr(world.port, "setBaudRate", lambda baud: False)
+    with pytest.raises(PortError, match=r"cannot run at 9 bit/s: choose 115200"):
+        stop_pulses(world.port, 9, Pca9685Board(world.port, QUICK), (0,))
+    with pytest.raises(PortError, match=r"cannot run at 9 bit/s: choose 57600 or 1000000"):
+        disable_torque(world.port, DYNAMIXEL, 9, (1,))
 
 
 def test_a_lost_write_is_seen_and_the_way_goes_on(world):

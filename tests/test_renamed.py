@@ -90,6 +90,10 @@ def test_a_file_with_old_names_is_untouched_where_nothing_changes(tmp_path: Path
 def test_old_keys_are_understood_while_the_rig_runs() -> None:
     rig = load_rig("desk")
     other = changed(rig, {"gaze.head.pull_least": 0.3, "guard.stuck": {"stuck_ms": 200.0}})
+    camera = changed(rig, {"camera_care.give_up_s": 30.0, "motion.confirm_pictures": 4})
+    assert (camera.camera_recovery.give_up_s, camera.motion.confirm_frames) == (30.0, 4)
+    camera = changed(rig, {"camera_care.give_up_s": 30.0, "motion.confirm_pictures": 4})
+    assert (camera.camera_recovery.give_up_s, camera.motion.confirm_frames) == (30.0, 4)
     assert (other.gaze.head.min_salience, other.guard.stall.detection_ms) == (0.3, 200.0)
     assert value_of(other, "guard.stuck.stuck_ms") == 200.0
     assert changed(rig, {"gaze.top_down.rules.wait.pull": 0.6}).gaze.top_down.rules[
@@ -130,7 +134,8 @@ def test_the_table_leads_from_keys_that_are_gone_to_keys_that_are_there() -> Non
 def test_a_recording_of_before_gives_the_same_to_the_bit(caplog: pytest.LogCaptureFixture) -> None:
     """Its configuration, and a change while it ran, have the old names."""
     recording = RunRecording(BEFORE / "names.mcap")
-    assert "stale_picture_ms" in recording.info.config_yaml
+    for old in ("stale_picture_ms:", "camera_care:", "confirm_pictures:"):
+        assert old in recording.info.config_yaml
     found = rerun(recording)
     assert found.same and found.ticks == found.agreeing == 79
     assert found.tx_same is True

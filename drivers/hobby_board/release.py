@@ -59,6 +59,6 @@ def stop_pulses(
         BusLost: the port went away.
     """
     if not port.setBaudRate(baud):
-        raise PortError(f"{port.port_name} cannot run at {baud} bit/s")
+        raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose 115200")
     released = switch_off(board, channels)
     return (*released.holding, *released.mute)

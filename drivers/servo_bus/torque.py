@@ -177,7 +177,7 @@ def disable_torque(port: BusPort, family: Family, baud: int, ids: Sequence[int])
         BusLost: the port went away.
     """
     if not port.setBaudRate(baud):
-        raise PortError(f"{port.port_name} cannot run at {baud} bit/s")
+        raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose {family.usual_bauds}")
     released = switch_off(Transactions(port, family, LEAST_S, MOST_S, baud), ids)
     return (*released.holding, *released.mute)
 

@@ -70,7 +70,7 @@ def real_camera(
     if options.fast:
         return FilmCamera(_film(options), detector(), options.film_delay_s, motion=motion())
     parts = CameraParts(_source(rig, options), detector, motion)
-    return CameraProcess(parts, clock.now_s, rig.camera_care)
+    return CameraProcess(parts, clock.now_s, rig.camera_recovery)
 
 
 def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams) -> str:

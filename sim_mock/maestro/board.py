@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.active import NOBODY
-from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
+from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec, build_servos
 from gazerig.sim_mock.maestro.body import MaestroBody
 from gazerig.sim_mock.maestro.channel import EmulatedChannel
 from gazerig.sim_mock.maestro.commands import (
@@ -279,12 +279,6 @@ def build_board(
         raise ValueError(f"{channels} channels: a Maestro has {', '.join(map(str, SIZES))}")
     if not 0 <= device <= 127:
         raise ValueError(f"device {device}: a Maestro's number is 0 to 127")
-    given = {int(spec[0]): HobbySpec(*spec) for spec in servos}
-    if len(given) < len(servos):
-        raise ValueError("two servos are on one channel")
-    for channel in given:
-        if not 0 <= channel < channels:
-            raise ValueError(f"servo on channel {channel}: there is 0 to {channels - 1}")
-    built = [HobbyServo(given.get(channel, HobbySpec(channel))) for channel in range(channels)]
+    built = build_servos(servos, channels)
     settings = Settings(crc=crc) if baud is None else Settings("uart-fixed", crc, baud=baud)
     return EmulatedMaestro(built, now_s, device, settings, seed)

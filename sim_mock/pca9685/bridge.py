@@ -6,13 +6,13 @@ it. R, a register, P reads a register of the bridge's own: how the last transfer
 NXP, SC18IM700 data sheet, rev. 2 (10 August 2007).
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.active import NOBODY
 from gazerig.sim_mock.faults.hobby import HobbyFaults
-from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec
+from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec, build_servos
 from gazerig.sim_mock.pca9685.body import BusStuck, NotAcknowledged, Pca9685Body
 from gazerig.sim_mock.pca9685.chip import CHANNELS, LED0, NOMINAL_HZ, Chip
 from gazerig.sim_mock.pca9685.faults import CASES, COMMANDS
@@ -232,11 +232,5 @@ def build_bridge(
         if not 0x40 <= address <= 0x7F:
             raise ValueError(f"address {address:#x}: a PCA9685 has one from 0x40 to 0x7f")
     count = CHANNELS * len(addresses)
-    given: Mapping[int, HobbySpec] = {int(spec[0]): HobbySpec(*spec) for spec in servos}
-    if len(given) < len(servos):
-        raise ValueError("two servos are on one channel")
-    for channel in given:
-        if not 0 <= channel < count:
-            raise ValueError(f"servo on channel {channel}: there is 0 to {count - 1}")
-    built = [HobbyServo(given.get(channel, HobbySpec(channel))) for channel in range(count)]
+    built = build_servos(servos, count)
     return Bridge(built, now_s, addresses, oscillator_hz, seed)

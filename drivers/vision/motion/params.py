@@ -32,7 +32,7 @@ class MotionParams:
     min_area_share: Annotated[float, Bounds(0.0001, 0.5), "smallest moving region that is reported, as a share of the image area"] = 0.001
     close_px: Annotated[int, Bounds(1, 51), "moving regions closer to each other than this are merged"] = 7
     max_blobs: Annotated[int, Bounds(1, 100), "most moving regions reported; the largest are chosen"] = 8
-    confirm_pictures: Annotated[int, Bounds(1, 10),
+    confirm_frames: Annotated[int, Bounds(1, 10),
         "a moving region is reported once it has been detected in this many consecutive frames"] = 2
     forget_ms: Annotated[float, Bounds(0, 5000), "a thing that stood still for longer gets a new id when it moves again"] = 500.0
     max_gap_ms: Annotated[float, Bounds(10, 2000), "frames further apart in time than this are not compared"] = 300.0

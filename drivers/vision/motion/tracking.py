@@ -82,7 +82,7 @@ class MotionTracks:
             follow.seen += 1
         seen_now = {follow.id for follow in found.values()}
         for follow in self._follows:
-            if follow.id not in seen_now and follow.seen < self._params.confirm_pictures:
+            if follow.id not in seen_now and follow.seen < self._params.confirm_frames:
                 follow.seen = 0  # a flicker, not a thing: it starts again
         return [found[j] for j in range(len(centres))]
 
@@ -101,7 +101,7 @@ class MotionTracks:
 
     def told(self, follow: PatchTrack) -> bool:
         """Return whether a patch has been seen often enough."""
-        return follow.seen >= self._params.confirm_pictures
+        return follow.seen >= self._params.confirm_frames
 
     def _begun(self, centre: Floats, t_s: float) -> PatchTrack:
         """Begin to follow something new."""
