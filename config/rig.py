@@ -77,10 +77,10 @@ class LidJoints:
     """Lid joint angles at which the lids are shut and fully open."""
 
     # fmt: off
-    left_shut_deg: Annotated[float, Bounds(-180, 180), "angle at which the left upper lid is shut"]
-    left_open_deg: Annotated[float, Bounds(-180, 180), "angle at which the left upper lid is fully open"]
-    right_shut_deg: Annotated[float, Bounds(-180, 180), "angle at which the right upper lid is shut"]
-    right_open_deg: Annotated[float, Bounds(-180, 180), "angle at which the right upper lid is fully open"]
+    left_shut_deg: Annotated[float | None, Bounds(-180, 180), "angle at which the left upper lid is shut; null: no upper lid"] = None
+    left_open_deg: Annotated[float | None, Bounds(-180, 180), "angle at which the left upper lid is fully open"] = None
+    right_shut_deg: Annotated[float | None, Bounds(-180, 180), "angle at which the right upper lid is shut; null: no upper lid"] = None
+    right_open_deg: Annotated[float | None, Bounds(-180, 180), "angle at which the right upper lid is fully open"] = None
     left_lower_shut_deg: Annotated[float | None, Bounds(-180, 180),
         "angle at which the left lower lid meets the upper one; null: there is no lower lid"] = None
     left_lower_open_deg: Annotated[float | None, Bounds(-180, 180), "angle at which the left lower lid is fully open"] = None
@@ -149,9 +149,9 @@ class Rig:
         "further servo buses by name, for joints whose bus is that name"] = field(default_factory=dict, kw_only=True)
     geometry: Annotated[GeometryParams, "measures of the head"]
     joints: Annotated[Mapping[str, JointParams], "one entry a joint"]
-    lid_joints: Annotated[LidJoints, "lid angles"]
+    lid_joints: Annotated[LidJoints, "lid angles, of a rig that has lids"] = field(default_factory=LidJoints)
     park_deg: Annotated[Mapping[str, float], Bounds(-180, 180),
-        "pose to which the joints move before torque is switched off; joints left out go to 0"]
+        "pose to which the joints move before torque is switched off; joints left out go to 0"] = field(default_factory=dict)
     camera: Annotated[CameraParams, "where the camera sits"] = field(default_factory=CameraParams)
     webcam: Annotated[WebcamParams, "what is asked of a webcam"] = field(default_factory=WebcamParams)
     oak: Annotated[OakParams, "what is asked of an OAK-D"] = field(default_factory=OakParams)

@@ -55,6 +55,22 @@ def test_it_looks_at_its_visitor_blinks_and_lets_go(name: str, tmp_path: Path) -
     made.close()
 
 
+def test_two_eyes_need_neither_lids_nor_a_parking_pose(tmp_path: Path) -> None:
+    file, both = tmp_path / "eyes.yaml", "model: xl330-m077, min_deg: -25, max_deg: 25"
+    limits = "max_speed_deg_s: 600, max_accel_deg_s2: 45000"
+    file.write_text(
+        "name: eyes\nprofile: robot\nbus: {port: /dev/ttyUSB0}\n"
+        "geometry: {pitch_axis_height_mm: 0, eyes_ahead_mm: 0, eyes_above_mm: 60}\n"
+        f"joints:\n  eyes_pan: {{id: 1, {both}, {limits}}}\n  eyes_tilt: {{id: 2, {both}, {limits}}}\n",
+        encoding="utf-8",
+    )
+    made, ticks, _ = ran(load_rig(str(file)), 4.0)
+    assert made.park_rad == (0.0, 0.0)
+    assert {t.target.kind for t in ticks[400:]} == {"face"}
+    assert ticks[-1].pose.lid_left == 1.0
+    made.close()
+
+
 @pytest.fixture(scope="module")
 def maker() -> tuple[Assembly, list[Tick], tuple[str, ...]]:
     """Return twelve seconds of the maker's eyes."""
@@ -83,8 +99,9 @@ def test_four_lids_follow_and_meet(maker: Ran) -> None:
     shut = np.flatnonzero([t.gaze.lid_left == 0.0 for t in ticks])
     assert len(shut) > 3  # some blink shuts all the way
     at = shut[len(shut) // 2]
-    ends = rig.lid_joints
-    assert ticks[at].desired_rad[i["left_upper_lid"]] == pytest.approx(radians(ends.left_shut_deg))
+    shut_deg, _ = rig.lid_joints.ends_deg("left_upper_lid")
+    assert shut_deg is not None
+    assert ticks[at].desired_rad[i["left_upper_lid"]] == pytest.approx(radians(shut_deg))
     assert ticks[at].gaze.lower_left == 0.0
     # Between blinks the lids go with the eyes: upper and lower the same way.
     open_ = [k for k, t in enumerate(ticks) if not t.gaze.blink and k > 600]

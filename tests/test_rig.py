@@ -119,6 +119,8 @@ def test_shipped_profiles_characters_and_walks_load() -> None:
         (r"interocular_mm", "interocular", "geometry", "interocular_mm"),
         (r"^    zero_step: 2048", "    zero_step: 20", "joints.left_eye_pan", "0..4095"),
         (r"max_salience: 1.0", "max_salience: 0.1", "gaze.head", "above min_salience"),
+        (r"^lid_joints:(.*\n  .*)*", "", "lid_joints.left_shut_deg", "left_upper_lid needs it"),
+        (r"^  left_open_deg.*\n", "", "lid_joints", "left upper lid one end is missing; give both"),
     ],
 )
 def test_rules_between_sections(old: str, new: str, place: str, rule: str, tmp_path: Path) -> None:
