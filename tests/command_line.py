@@ -13,7 +13,7 @@ import typer
 from typer.core import TyperGroup
 from typer.testing import CliRunner
 
-from gazerig.robot.cli.calibrate_group import DEFAULT, JointsUnlessNamed
+from gazerig.robot.cli.calibrate.group import DEFAULT, JointsUnlessNamed
 from gazerig.robot.cli.main import app, main
 
 _START = "import sys; from gazerig.robot.cli.main import main; sys.argv[0] = 'gazerig'; main()"

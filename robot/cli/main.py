@@ -14,7 +14,7 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.file_input import read_limited
 from gazerig.drivers.file_output import write_file
 from gazerig.drivers.serial.list_ports import serial_ports
-from gazerig.robot.cli import calibrate_group, doctor, monitor, reboot, scan, setup
+from gazerig.robot.cli import doctor, monitor, reboot, scan, setup
 from gazerig.robot.cli import emulate as cli_emulate
 from gazerig.robot.cli import motion as cli_motion
 from gazerig.robot.cli import record as cli_record
@@ -22,6 +22,7 @@ from gazerig.robot.cli import replay as cli_replay
 from gazerig.robot.cli import report as cli_report
 from gazerig.robot.cli import run as cli_run
 from gazerig.robot.cli import tune as cli_tune
+from gazerig.robot.cli.calibrate import group as cli_calibrate
 from gazerig.robot.cli.entry_point import as_now
 from gazerig.robot.cli.examples import PanelGroup, add_examples
 from gazerig.robot.cli.terminal import (
@@ -42,7 +43,7 @@ app = typer.Typer(
 )
 for part in (
     cli_run,
-    *(scan, setup, doctor, calibrate_group, cli_motion, monitor, reboot),
+    *(scan, setup, doctor, cli_calibrate, cli_motion, monitor, reboot),
     cli_tune,
     cli_record,
     cli_replay,

@@ -125,8 +125,7 @@ class Guard:
         """Return the limits in force, once joints have come to rest: those that servos keep."""
         if self._reach is None:
             return self._wanted
-        pairs = zip(self._wanted, self._reach(), strict=True)
-        return tuple(wanted.within(reach) for wanted, reach in pairs)
+        return tuple(map(JointLimit.within, self._wanted, self._reach()))
 
     def _begin(self, i: int, angle_rad: float) -> None:
         """Begin with one joint at a goal that is in force on the bus, at rest."""

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from gazerig.robot.cli.calibrate_joint import By, ZeroBy
+from gazerig.robot.cli.calibrate.joint import By, ZeroBy
 
 Joint = Annotated[
     list[str] | None, typer.Option(metavar="NAME", help="This joint (again: more); else all.")

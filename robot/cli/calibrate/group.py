@@ -5,9 +5,9 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-from gazerig.robot.cli.calibrate import calibrate_joints
-from gazerig.robot.cli.calibrate_camera import calibrate_board, calibrate_camera
-from gazerig.robot.cli.calibrate_face import calibrate_face
+from gazerig.robot.cli.calibrate.camera import calibrate_board, calibrate_camera
+from gazerig.robot.cli.calibrate.face import calibrate_face
+from gazerig.robot.cli.calibrate.joints import calibrate_joints
 
 DEFAULT = "joints"
 _HELP = ("--help", "-h")

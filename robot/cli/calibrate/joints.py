@@ -12,8 +12,8 @@ from gazerig.drivers.errors import SetupError
 from gazerig.robot.calibration.endstop_search import StopSearchParams
 from gazerig.robot.calibration.joint_access import CalibrationStopped
 from gazerig.robot.calibration.joint_calibration import Value, changes
-from gazerig.robot.cli import calibrate_options as options
-from gazerig.robot.cli.calibrate_joint import (
+from gazerig.robot.cli.calibrate import options as options
+from gazerig.robot.cli.calibrate.joint import (
     By,
     CalibrationJob,
     CalibrationOptions,

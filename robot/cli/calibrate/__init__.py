@@ -1,0 +1,1 @@
+"""The commands that calibrate joints, camera and face."""
