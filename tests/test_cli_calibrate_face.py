@@ -19,7 +19,7 @@ from gazerig.config.save import save_rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.run_observers import only_stops
-from gazerig.robot.cli import calibrate_face as cli_face
+from gazerig.robot.cli.calibrate import face as cli_face
 from gazerig.robot.cli.key_input import BUTTONS, PageKeys, key_and_count, keys_of
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
