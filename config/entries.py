@@ -17,6 +17,7 @@ from ruamel.yaml.reader import ReaderError
 from gazerig.config.bounds import Step
 from gazerig.config.export import abbreviated, suggestion
 from gazerig.drivers.file_input import FileTooLarge, NotRegularFile, read_limited
+from gazerig.errors import Error
 
 Scalar = str | int | float | bool | None
 
@@ -49,7 +50,7 @@ class ConfigFault:
         return " ".join(words.splitlines())
 
 
-class ConfigError(Exception):
+class ConfigError(Error):
     """An unusable configuration; the message lists every fault, one a line."""
 
     def __init__(self, faults: Iterable[ConfigFault]) -> None:

@@ -22,7 +22,7 @@ from gazerig.gaze.binocular import (  # noqa: E402
     BinocularParams,
     HeadMotion,
 )
-from gazerig.gaze.head import Head, HeadParams  # noqa: E402
+from gazerig.gaze.head import HeadModel, HeadParams  # noqa: E402
 from gazerig.gaze.lids import LidParams, Lids  # noqa: E402
 from gazerig.gaze.saccade import SaccadeModel, SaccadeParams  # noqa: E402
 from gazerig.gaze.scanpath import ScanpathParams, markov_walk, normalised  # noqa: E402
@@ -97,7 +97,7 @@ def head_goal() -> None:
     pulls = np.linspace(-0.2, 1.2, 200)
     figure, axes = plt.subplots(figsize=(4.8, 3.4))
     for limit, style in ((55.0, "-"), (20.0, "--")):
-        head = Head(params, radians(limit), limits)
+        head = HeadModel(params, radians(limit), limits)
         offsets = [degrees(head.offset_rad(a)) for a in pulls]
         axes.plot(pulls, offsets, INK, ls=style, label=f"eye limit {limit:.0f} deg")
     axes.set(

@@ -1,7 +1,9 @@
 """Errors of the drivers, by what the caller can do about them."""
 
+from gazerig.errors import Error
 
-class DriverError(Exception):
+
+class DriverError(Error):
     """Base; the message is one line that names the thing and the remedy."""
 
 

@@ -57,7 +57,7 @@ class HeadParams:
             raise ValueError("max_salience must be above min_salience")
 
 
-class Head:
+class HeadModel:
     """Start, goal and trajectory of the head's part of a gaze shift."""
 
     def __init__(

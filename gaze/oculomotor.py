@@ -14,7 +14,7 @@ import numpy as np
 from gazerig.gaze.angles import add, angle_between, norm, rotate, scale, sub, unit
 from gazerig.gaze.animation import NO_OFFSET, PoseOffset
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.head import Head
+from gazerig.gaze.head import HeadModel
 from gazerig.gaze.lids import LidOpenings, Lids
 from gazerig.gaze.pursuit import Pursuit
 from gazerig.gaze.saccade import SaccadeModel
@@ -116,7 +116,7 @@ class Oculomotor:
         eye_limits: tuple[tuple[Angles2, Angles2], tuple[Angles2, Angles2]],
         saccade: SaccadeModel,
         pursuit: Pursuit,
-        head: Head,
+        head: HeadModel,
         lids: Lids,
         breathing: Sway | None = None,
         rng: np.random.Generator | None = None,

@@ -17,7 +17,7 @@ from gazerig.gaze.angles import (
 )
 from gazerig.gaze.breathing import Breathing
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.head import Head, HeadParams
+from gazerig.gaze.head import HeadModel, HeadParams
 from gazerig.gaze.lids import LidParams, Lids
 from gazerig.gaze.oculomotor import Oculomotor, OculomotorParams
 from gazerig.gaze.pursuit import Pursuit, PursuitParams
@@ -80,7 +80,7 @@ class Rig:
             ((span, span), (span, span)),
             SaccadeModel(saccade),
             Pursuit(PursuitParams()),
-            Head(head, radians(eye_deg), (neck, neck)),
+            HeadModel(head, radians(eye_deg), (neck, neck)),
             Lids(LidParams(), np.random.default_rng(0)),
             breathing,
             None if dice is None else np.random.default_rng(dice),

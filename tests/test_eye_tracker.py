@@ -14,7 +14,7 @@ from desk import GAZE_JOINTS, LIDS
 
 from gazerig.gaze.angles import add, scale, unit, yaw_pitch
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.head import Head, HeadParams
+from gazerig.gaze.head import HeadModel, HeadParams
 from gazerig.gaze.lids import LidParams, Lids
 from gazerig.gaze.oculomotor import Oculomotor, OculomotorParams
 from gazerig.gaze.pursuit import Pursuit, PursuitParams
@@ -77,7 +77,7 @@ def look_about(seed: int, saccade: SaccadeParams) -> Trace:
         ((span, span), (span, span)),
         SaccadeModel(saccade),
         Pursuit(PursuitParams()),
-        Head(HeadParams(), radians(35.0), (neck, neck)),
+        HeadModel(HeadParams(), radians(35.0), (neck, neck)),
         Lids(LidParams(), np.random.default_rng(0)),
     )
     joints, plan, k = JointState((0.0,) * 9, (0.0,) * 9, (0.0,) * 9, ()), walk(rng), 0

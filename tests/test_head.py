@@ -7,18 +7,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gazerig.gaze.head import Head, HeadParams
+from gazerig.gaze.head import HeadModel, HeadParams
 from gazerig.gaze.quintic import Quintic
 from gazerig.gaze.types import Floats, Target
 
 NECK = ((-2.0, 2.0), (-1.0, 1.0))
 
 
-def head(eye_deg: float = 55.0, params: HeadParams | None = None) -> Head:
-    return Head(params or HeadParams(min_salience=0.0, max_salience=1.0), radians(eye_deg), NECK)
+def head(eye_deg: float = 55.0, params: HeadParams | None = None) -> HeadModel:
+    return HeadModel(
+        params or HeadParams(min_salience=0.0, max_salience=1.0), radians(eye_deg), NECK
+    )
 
 
-def goal_deg(model: Head, yaw: float, salience: float, pitch: float = 0.0) -> tuple[float, float]:
+def goal_deg(
+    model: HeadModel, yaw: float, salience: float, pitch: float = 0.0
+) -> tuple[float, float]:
     goal = model.goal_rad((radians(yaw), radians(pitch)), model.offset_rad(salience))
     return degrees(goal[0]), degrees(goal[1])
 
@@ -53,7 +57,7 @@ def test_offset_and_trigger_stay_inside_a_small_eye_range() -> None:
 
 
 def test_goal_stays_in_the_neck_range() -> None:
-    model = Head(HeadParams(), radians(35.0), ((-0.5, 0.5), (-0.2, 0.3)))
+    model = HeadModel(HeadParams(), radians(35.0), ((-0.5, 0.5), (-0.2, 0.3)))
     assert model.goal_rad((2.0, 1.2), 0.0)[0] == 0.5
     assert model.goal_rad((0.0, 1.2), 0.0)[1] == 0.3
 
@@ -80,7 +84,7 @@ def test_attention_bounds_must_be_in_order() -> None:
 
 
 def test_an_eye_held_aside_is_relieved_slowly() -> None:
-    model = Head(HeadParams(), radians(35.0), NECK)
+    model = HeadModel(HeadParams(), radians(35.0), NECK)
     model.reset(0.0, (0.0, 0.0, 0.0))
     target = Target((1.0, 0.4, 0.0), (0, 0, 0), 0.0, "face", 1, 0.5, True, None, 1, "")
     yaw = radians(21.0)
@@ -98,7 +102,7 @@ def test_an_eye_held_aside_is_relieved_slowly() -> None:
 
 def aimed(params: HeadParams, centre: float, point: float, top_down: bool = False) -> float:
     """Return where the head (eye range 20 deg) ends for a far centre and a point, in degrees."""
-    model = Head(params, radians(20.0), NECK)
+    model = HeadModel(params, radians(20.0), NECK)
     target = Target((1.0, 0, 0), (0, 0, 0), 0.0, "face", 1, 0.5, top_down, None, 1, "")
     facing, gaze, yaw = (radians(centre), 0.0), (radians(point), 0.0), 0.0
     for k in range(800):
@@ -125,7 +129,9 @@ def test_stahl_share_is_lifted_where_the_eyes_cannot_reach(target: float, head_d
 
 
 def test_stahl_share_of_a_wide_eye_range() -> None:
-    model = Head(HeadParams(goal_model="stahl", recentre_after_ms=60_000.0), radians(55.0), NECK)
+    model = HeadModel(
+        HeadParams(goal_model="stahl", recentre_after_ms=60_000.0), radians(55.0), NECK
+    )
     target = Target((1.0, 0, 0), (0, 0, 0), 0.0, "face", 1, 0.5, True, None, 1, "")
     facing = (radians(40.0), 0.0)
     for k in range(800):
@@ -135,7 +141,7 @@ def test_stahl_share_of_a_wide_eye_range() -> None:
 
 def test_literal_reach_keeps_30_degrees_and_so_the_gaze_short() -> None:
     params = HeadParams(min_salience=0.5, max_salience=1.0, literal_reach=True)
-    model = Head(params, radians(20.0), NECK)
+    model = HeadModel(params, radians(20.0), NECK)
     assert degrees(model.trigger_rad) == pytest.approx(30.0)
     assert degrees(model.offset_rad(0.5)) == pytest.approx(29.97, abs=0.01)
     # 60 - 30.03 - 20: the 9.97 deg that no eye of 20 deg covers.
@@ -146,7 +152,7 @@ def test_literal_reach_keeps_30_degrees_and_so_the_gaze_short() -> None:
     ("size", "peak"), [(20.0, 65.0), (30.0, 84.0), (40.0, 103.0), (60.0, 140.0)]
 )
 def test_larger_head_movements_are_faster(size: float, peak: float) -> None:
-    model = Head(HeadParams(), radians(5.0), NECK)
+    model = HeadModel(HeadParams(), radians(5.0), NECK)
     model.reset(0.0, (0.0, 0.0, 0.0))
     target = Target((1.0, 0, 0), (0, 0, 0), 0.0, "face", 1, 2.0, True, None, 1, "")
     facing = (radians(size), 0.0)
@@ -182,7 +188,7 @@ def test_an_eye_left_aside_by_a_shift_is_relieved_all_the_same() -> None:
 
 
 def test_plans_made_in_full_flight_stay_in_the_neck_range() -> None:
-    model = Head(HeadParams(), radians(35.0), ((-0.9, 0.9), (-0.5, 0.5)))
+    model = HeadModel(HeadParams(), radians(35.0), ((-0.9, 0.9), (-0.5, 0.5)))
     places = np.random.default_rng(5).uniform(-1.4, 1.4, 300).tolist()
     yaws = [0.0]
     for k in range(12_000):

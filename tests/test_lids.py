@@ -8,7 +8,7 @@ import pytest
 from desk import GAZE_JOINTS, LIDS
 
 from gazerig.gaze.blink_statistics import blink_pause_s
-from gazerig.gaze.head import Head, HeadParams
+from gazerig.gaze.head import HeadModel, HeadParams
 from gazerig.gaze.lids import LidMode, LidParams, Lids, Side
 from gazerig.gaze.oculomotor import Oculomotor, OculomotorParams
 from gazerig.gaze.pursuit import Pursuit, PursuitParams
@@ -145,7 +145,7 @@ def test_e53_no_blink_storm_with_the_head_held_aside(literal: bool) -> None:
         ((span, span), (span, span)),
         SaccadeModel(SaccadeParams()),
         Pursuit(PursuitParams()),
-        Head(HeadParams(), radians(55.0), (span, span)),
+        HeadModel(HeadParams(), radians(55.0), (span, span)),
         lids(2, gaze_evoked_blink_literal=literal),
     )
     held = JointState((0.0,) * 6 + (radians(40.0), 0.0, 0.0), (0.0,) * 9, (0.0,) * 9, ())

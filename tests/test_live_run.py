@@ -137,8 +137,8 @@ def test_a_killed_rig_is_no_rig_and_the_next_clears_up(place: Path) -> None:
     killed.connected().close()
     killed.end(signal.SIGKILL)
     socket_folder = folder(os.environ, os.getuid())
-    assert list(sockets(socket_folder)) == [killed.process.pid] and running() == []
+    assert list(sockets(socket_folder).values()) == [killed.process.pid] and running() == []
     second = Run(place)
     second.connected().close()
-    assert list(sockets(socket_folder)) == [second.process.pid]
+    assert list(sockets(socket_folder).values()) == [second.process.pid]
     second.end(signal.SIGTERM)

@@ -214,9 +214,9 @@ def test_a_living_neighbour_keeps_its_socket(folder: Path) -> None:
     with listening() as neighbour:
         server = open_server()
         server.open()
-        assert set(remote_socket.sockets(folder)) == {neighbour.pid, os.getpid()}
+        assert set(remote_socket.sockets(folder).values()) == {neighbour.pid, os.getpid()}
         server.close()
-        assert set(remote_socket.sockets(folder)) == {neighbour.pid}
+        assert set(remote_socket.sockets(folder).values()) == {neighbour.pid}
 
 
 def test_a_new_rig_takes_over_the_socket_of_a_dead_one_with_its_number(folder: Path) -> None:

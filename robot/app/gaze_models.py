@@ -8,7 +8,7 @@ from gazerig.config.schema import Rig
 from gazerig.gaze.bottom_up import BottomUp
 from gazerig.gaze.breathing import Breathing
 from gazerig.gaze.field_of_view import FieldOfView
-from gazerig.gaze.head import Head
+from gazerig.gaze.head import HeadModel
 from gazerig.gaze.idle import Idle
 from gazerig.gaze.lids import Lids
 from gazerig.gaze.oculomotor import Oculomotor
@@ -59,7 +59,7 @@ class Movers(NamedTuple):
 
     saccade: SaccadeModel
     pursuit: Pursuit
-    head: Head
+    head: HeadModel
     breathing: Breathing
 
 
@@ -69,7 +69,7 @@ def movers(rig: Rig) -> Movers:
     return Movers(
         SaccadeModel(gaze.saccade),
         Pursuit(gaze.pursuit),
-        Head(gaze.head, *head_limits(rig)),
+        HeadModel(gaze.head, *head_limits(rig)),
         Breathing(gaze.breathing),
     )
 

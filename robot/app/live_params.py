@@ -19,7 +19,7 @@ from gazerig.gaze.aversion import Aversion
 from gazerig.gaze.bottom_up import BottomUp
 from gazerig.gaze.breathing import Breathing
 from gazerig.gaze.field_of_view import FieldOfView
-from gazerig.gaze.head import Head
+from gazerig.gaze.head import HeadModel
 from gazerig.gaze.idle import Idle
 from gazerig.gaze.lids import Lids
 from gazerig.gaze.oculomotor import Oculomotor
@@ -70,7 +70,7 @@ class Components(NamedTuple):
     oculomotor: Oculomotor
     saccade: SaccadeModel
     pursuit: Pursuit
-    head: Head
+    head: HeadModel
     breathing: Breathing
     lids: Lids
     animation: Animation

@@ -1,7 +1,7 @@
 """One run from start to torque off: what the command line asks for, carried out."""
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
@@ -23,8 +23,7 @@ from gazerig.robot.app.scripted_behaviour import ScriptedBehaviour
 from gazerig.robot.control.event_text import drawn_together
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.joint_faults import JointFaults
-from gazerig.robot.control.loop import LoopCount, Robot, Tick
-from gazerig.robot.control.loop import run as run_loop
+from gazerig.robot.control.loop import LoopCount, Robot, Tick, TickLoop
 from gazerig.robot.control.observers import Observers
 from gazerig.robot.control.power_down import Again, PowerDown
 from gazerig.robot.model.clock import RealClock
@@ -86,6 +85,7 @@ def run(
     stopped: Callable[[], str | None],
     say: Callable[[str], None],
     status: Callable[[str], None] | None = None,
+    watch: Callable[[Tick], object] | None = None,
 ) -> dict[str, object]:
     """Run until the time is over, a signal comes or something fails; return the figures.
 
@@ -94,25 +94,30 @@ def run(
         stopped: returns the name of a signal that has come, None before.
         say: writes a line.
         status: rewrites the status line; None: there is none.
+        watch: gets every tick.
 
     Raises:
         SetupError: before anything moved.
     """
     try:
-        return _Session(composed, stopped, say, status).whole()
+        return Session(composed, stopped, say, status, watch).whole()
     finally:
         composed.made.close()
 
 
-class _Session:
-    """One run, with everything that watches it."""
+class Session:
+    """One run, with everything that watches it; arguments as of ``run``.
+
+    stopped_by: why it ended; a fault until ``powered``'s block says otherwise
+    """
 
     def __init__(
         self,
         composed: ComposedRun,
         stopped: Callable[[], str | None],
         say: Callable[[str], None],
-        status: Callable[[str], None] | None,
+        status: Callable[[str], None] | None = None,
+        watch: Callable[[Tick], object] | None = None,
     ) -> None:
         options, made = composed.options, composed.made
         self._options, self._made, self._stopped = options, made, stopped
@@ -125,7 +130,11 @@ class _Session:
         self._score = BehaviourScore(scene.events(), scene.round_s) if scene is not None else None
         self._face_gaze = GazeOnFace() if options.heatmap is not None else None
         self._start_s = 0.0
+        self.stopped_by = "fault: unexpected error"
+        self._count = LoopCount(0, 0, self.stopped_by)
         self._observers = self._all_observers()
+        if watch is not None:
+            self._observers.add("the program", watch)
         _ask_all(made.robot, options)
         self._longest_s = _longest_s(made, options)
         self._interrupts = Interrupts.of(stopped)
@@ -151,22 +160,31 @@ class _Session:
 
     def whole(self) -> dict[str, object]:
         """Run from torque on to torque off; return the figures."""
-        wall, run_observers = RealClock(), self._run_observers
+        wall = RealClock()
         began_s = wall.now_s()
-        run_observers.open_files()
-        count = self._loop()
+        with self.powered() as loop:
+            while (reason := loop.step()) is None:
+                pass
+            self.stopped_by = reason
         wall_s = wall.now_s() - began_s
         self._faults.close()
-        figures = _figures(self._made, self._summary, self._score, count, wall_s, self._faults)
-        unwritten = run_observers.unwritten() or self._unwritten_heatmap()
+        figures = _figures(
+            self._made, self._summary, self._score, self._count, wall_s, self._faults
+        )
+        unwritten = self._run_observers.unwritten() or self._unwritten_heatmap()
         if unwritten is not None:
             figures["not_written"] = str(unwritten)
         return figures
 
-    def _loop(self) -> LoopCount:
-        """Switch on, tick until the end, leave as every way out does; close what watches."""
+    @contextlib.contextmanager
+    def powered(self) -> Iterator[TickLoop]:
+        """Switch on, let the block step the loop, leave as every way out does.
+
+        Raises:
+            SetupError: before anything moved.
+        """
         made, run_observers, say = self._made, self._run_observers, self._say
-        count = LoopCount(0, 0, "fault: unexpected error")
+        run_observers.open_files()
         begun = False
         try:
             with self._interrupts, way_out(made, say, self._interrupts) as leaving:
@@ -176,17 +194,18 @@ class _Session:
                 for note in (*made.notes, *drawn_together(made.robot.body.bus.events())):
                     say(note)
                 run_observers.open()
-                count = run_loop(
+                loop = TickLoop(
                     made.robot, made.clock, lambda: made.loop, run_observers.timed(self._stop),
                     self._observers.update,
                 )  # fmt: skip
-                leaving.cause = count.stopped_by
+                yield loop
+                self._count = loop.count(self.stopped_by)
+                leaving.cause = self.stopped_by
         finally:
             if begun:
-                run_observers.close(count)
+                run_observers.close(self._count)
             else:
                 run_observers.give_up()
-        return count
 
     def _unwritten_heatmap(self) -> Path | None:
         """Write the heat map where one is asked for; return its file where that failed."""

@@ -26,6 +26,7 @@ class Interrupts:
     Args:
         now_s: gives the time; the host's where nothing is said.
         also: gives another reason to end, None while there is none.
+        signals: note signals; else only ``request`` counts, and handlers stay as they are.
 
     The first is only noted: whoever works asks for it by calling this object. A second one
     raises KeyboardInterrupt, because the work may hang, except where ``held_off`` says
@@ -36,8 +37,9 @@ class Interrupts:
         self,
         now_s: Callable[[], float] | None = None,
         also: Callable[[], str | None] | None = None,
+        signals: bool = True,
     ) -> None:
-        self._also = also
+        self._also, self._signals = also, signals
         self._now_s = now_s if now_s is not None else RealClock().now_s
         self._first: str | None = None
         self._last_s = 0.0
@@ -60,7 +62,8 @@ class Interrupts:
         A block inside a block changes nothing.
         """
         self._depth += 1
-        if threading.current_thread() is threading.main_thread() and self._depth == 1:
+        main = threading.current_thread() is threading.main_thread()
+        if main and self._signals and self._depth == 1:
             for number in ENDING:
                 # Who starts a program with nohup wants it to outlive the terminal.
                 if number == signal.SIGHUP and signal.getsignal(number) == signal.SIG_IGN:
@@ -84,6 +87,13 @@ class Interrupts:
         if self._first is None and self._also is not None:
             self._first = self._also()
         return self._first
+
+    def request(self, reason: str) -> None:
+        """Ask for the end from any thread; asked again, it skips what is left of parking."""
+        if self._first is None:
+            self._first = reason
+        else:
+            self._more += 1
 
     @property
     def requests(self) -> int:

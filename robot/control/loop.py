@@ -304,14 +304,8 @@ class Robot:
         return percept.age_s(t_s) if percept is not None else inf
 
 
-def run(
-    robot: Robot,
-    clock: Clock,
-    params: LoopParams | Callable[[], LoopParams],
-    stop: Callable[[float], str | None],
-    watch: Callable[[Tick], None],
-) -> LoopCount:
-    """Tick at absolute slots until ``stop(seconds)`` gives a reason or something fails.
+class TickLoop:
+    """Ticks at absolute slots, one at each call of ``step``.
 
     A tick that takes too long costs the slots it overran: they are counted and
     skipped, never caught up in a burst.
@@ -323,38 +317,64 @@ def run(
             rate begin at the last tick's.
         stop: is given the seconds since the start, and returns why to stop, or None.
         watch: gets every tick.
-
-    Returns:
-        Ticks done, slots missed and why it ended.
     """
-    now = params if callable(params) else lambda: params
-    start_s = slots_s = last_s = clock.now_s()
-    rate_hz = now().rate_hz
-    period = 1.0 / rate_hz
-    slot, ticks, overruns = 0, 0, 0
-    while True:
-        if now().rate_hz != rate_hz:
-            slots_s += slot * period
-            rate_hz, slot = now().rate_hz, 0
-            period = 1.0 / rate_hz
-        slot += 1
-        clock.sleep_until(slots_s + slot * period)
+
+    def __init__(
+        self,
+        robot: Robot,
+        clock: Clock,
+        params: LoopParams | Callable[[], LoopParams],
+        stop: Callable[[float], str | None],
+        watch: Callable[[Tick], None],
+    ) -> None:
+        self._robot, self._clock, self._stop, self._watch = robot, clock, stop, watch
+        self._params = params if callable(params) else lambda: params
+        self._start_s = self._slots_s = self._last_s = clock.now_s()
+        self._rate_hz = self._params().rate_hz
+        self._slot = self._ticks = self._overruns = 0
+
+    def step(self) -> str | None:
+        """Wait for the next slot and tick; return why the loop ends, None while it goes on."""
+        clock, rate_hz = self._clock, self._params().rate_hz
+        if rate_hz != self._rate_hz:
+            self._slots_s += self._slot * (1.0 / self._rate_hz)
+            self._rate_hz, self._slot = rate_hz, 0
+        period = 1.0 / rate_hz
+        self._slot += 1
+        clock.sleep_until(self._slots_s + self._slot * period)
         t_s = clock.now_s()
-        reason = stop(t_s - start_s)
+        reason = self._stop(t_s - self._start_s)
         if reason is not None:
-            return LoopCount(ticks, overruns, reason)
+            return reason
         try:
-            tick = robot.tick(t_s, t_s - last_s)
+            tick = self._robot.tick(t_s, t_s - self._last_s)
         except DriverError as error:
-            return LoopCount(ticks, overruns, f"fault: {error}")
-        watch(tick)
+            return f"fault: {error}"
+        self._watch(tick)
         if tick.guard_result.level == "torque_off" and not tick.stopped:
-            return LoopCount(
-                ticks, overruns, f"fault: {'; '.join(tick.guard_result.critical_reasons)}"
-            )
-        last_s = t_s
-        ticks += 1
-        late = int((clock.now_s() - slots_s) / period) - slot
+            return f"fault: {'; '.join(tick.guard_result.critical_reasons)}"
+        self._last_s = t_s
+        self._ticks += 1
+        late = int((clock.now_s() - self._slots_s) / period) - self._slot
         if late > 0:
-            overruns += late
-            slot += late
+            self._overruns += late
+            self._slot += late
+        return None
+
+    def count(self, stopped_by: str) -> LoopCount:
+        """Return ticks done, slots missed and why it ended."""
+        return LoopCount(self._ticks, self._overruns, stopped_by)
+
+
+def run(
+    robot: Robot,
+    clock: Clock,
+    params: LoopParams | Callable[[], LoopParams],
+    stop: Callable[[float], str | None],
+    watch: Callable[[Tick], None],
+) -> LoopCount:
+    """Tick until ``stop(seconds)`` returns a reason or something fails; as ``TickLoop``."""
+    loop = TickLoop(robot, clock, params, stop, watch)
+    while (reason := loop.step()) is None:
+        pass
+    return loop.count(reason)

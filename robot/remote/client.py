@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from gazerig.drivers.errors import DriverError, SetupError
+from gazerig.errors import HeadEnded, NotFound, Refused
 from gazerig.robot.model.commands import (
     Ask,
     Command,
@@ -55,15 +56,15 @@ _FILES_S = 40.0
 _WITH_FILES = {"save", "character"}
 
 
-class NoRobotError(SetupError):
+class NoRobotError(SetupError, NotFound):
     """No rig runs, or not the one that is meant; the message says which do."""
 
 
-class RequestRejected(SetupError):
+class RequestRejected(SetupError, Refused):
     """The rig runs on as before; the message lists every rule that was broken."""
 
 
-class ConnectionLost(DriverError):
+class ConnectionLost(DriverError, HeadEnded):
     """The rig ended or does not answer; the message says which."""
 
 
@@ -350,7 +351,7 @@ def running(pid: int | None = None, who: str = "") -> list[RobotClient]:
     if not is_private(place, uid):  # whoever put a socket there is not known
         return []
     found: list[RobotClient] = []
-    for number, path in sockets(place).items():
+    for path, number in sockets(place).items():
         if pid is None or number == pid:
             try:
                 found.append(RobotClient(_wire(path), number, who, partial(_wire, path)))

@@ -73,10 +73,20 @@ def is_private(path: Path, uid: int) -> bool:
     return stat.S_ISDIR(found.st_mode) and found.st_uid == uid and not found.st_mode & 0o077
 
 
-def sockets(path: Path) -> dict[int, Path]:
-    """Return the sockets in a folder by the process that made them, dead ones among them."""
+def sockets(path: Path) -> dict[Path, int]:
+    """Return the sockets in a folder, dead ones among them, and the process of each."""
     found = path.glob("*.sock") if path.is_dir() else ()
-    return {int(p.stem): p for p in sorted(found) if p.stem.isdecimal()}
+    pids = {place: place.stem.partition("-")[0] for place in sorted(found)}
+    return {place: int(pid) for place, pid in pids.items() if pid.isdecimal()}
+
+
+def free_name(path: Path, pid: int) -> Path:
+    """Return a name for one more socket of a process: 7.sock, for its second head 7-2.sock."""
+    count, name = 1, path / f"{pid}.sock"
+    while name.exists():
+        count += 1
+        name = path / f"{pid}-{count}.sock"
+    return name
 
 
 def dial(path: Path, within_s: float) -> socket.socket:
@@ -139,7 +149,7 @@ def peer(end: socket.socket) -> Peer:
 def clear_dead(path: Path) -> tuple[int, ...]:
     """Remove the sockets that killed rigs left behind; give their processes' numbers."""
     dead: list[int] = []
-    for pid, place in sockets(path).items():
+    for place, pid in sockets(path).items():
         try:
             dial(place, 0.2).close()
         except ConnectionRefusedError:

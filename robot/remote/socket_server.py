@@ -28,6 +28,10 @@ _MOST = 16
 """Programs at a time; for one more the one that was quiet longest is hung up on."""
 
 
+_NAMING = threading.Lock()
+"""Two heads of one program that start at a time get two names."""
+
+
 class RemoteServer:
     """Listens while a rig runs."""
 
@@ -52,8 +56,9 @@ class RemoteServer:
         folder = remote_socket.folder(os.environ, uid)
         remote_socket.make_private(folder, uid)
         remote_socket.clear_dead(folder)
-        self._path = folder / f"{os.getpid()}.sock"
-        self._listener = remote_socket.listen(self._path)
+        with _NAMING:
+            self._path = remote_socket.free_name(folder, os.getpid())
+            self._listener = remote_socket.listen(self._path)
         self._start(self._accept, self._listener)
         return self._path
 
