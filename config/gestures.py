@@ -1,0 +1,92 @@
+"""Gestures by name: those shipped, and those of a rig's own files; each read and checked."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+
+from gazerig.config.load import ConfigError, ConfigFault, load, shipped, shipped_names
+from gazerig.gaze.gesture import Gesture, faults_of, loop_fault
+from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME
+
+_HEAD_KEYS = {
+    "neck_yaw": "head_yaw_deg",
+    "neck_pitch": "head_pitch_deg",
+    "neck_roll": "head_roll_deg",
+}
+
+
+def load_gesture(path: Path) -> Gesture:
+    """Return the gesture of a file.
+
+    Raises:
+        gazerig.config.load.ConfigError: with every fault.
+    """
+    return load(path, Gesture, checks=CHECKS)
+
+
+def shipped_gestures() -> Mapping[str, Gesture]:
+    """Return the gestures that come with the package, by name."""
+    return _shipped()
+
+
+@cache
+def _shipped() -> Mapping[str, Gesture]:
+    return {name: load_gesture(shipped("gestures", name)) for name in shipped_names("gestures")}
+
+
+def gestures_of(files: Sequence[str]) -> dict[str, Gesture]:
+    """Return the gestures of a rig: the shipped ones, and its own by the names of their files.
+
+    Args:
+        files: paths of its own; one with the name of a shipped gesture takes its place.
+
+    Raises:
+        gazerig.config.load.ConfigError: with every fault of all files.
+    """
+    found, faults = dict(shipped_gestures()), []
+    for file in files:
+        try:
+            found[gesture_name(file)] = load_gesture(Path(file).expanduser())
+        except ConfigError as error:
+            faults += error.faults
+    if faults:
+        raise ConfigError(faults)
+    return found
+
+
+def gesture_name(file: str) -> str:
+    """Return the name of a gesture in a file.
+
+    Raises:
+        gazerig.config.load.ConfigError: it is no name.
+    """
+    name = Path(file).stem
+    if JOINT_NAME.fullmatch(name):
+        return name
+    rule = (
+        "the file's name names the gesture: small letters, digits and _, a letter first, at most 40"
+    )
+    raise ConfigError([ConfigFault(file, None, "", repr(name), rule)])
+
+
+def _frame_times(gesture: Gesture) -> Iterable[tuple[str, str]]:
+    for key in ("frames", "frames_without_neck"):
+        for i, rule in faults_of(getattr(gesture, key)):
+            yield f"{key}.{i}.time_s", rule
+    if rule := loop_fault(gesture):
+        yield "loop_s", rule
+
+
+def _joint_names(gesture: Gesture) -> Iterable[tuple[str, str]]:
+    for key in ("frames", "frames_without_neck"):
+        for i, frame in enumerate(getattr(gesture, key)):
+            for joint in frame.joints_deg:
+                if joint in GAZE_JOINTS:
+                    instead = _HEAD_KEYS.get(joint, "lids" if joint.endswith("lid") else "eyes_yaw_deg and eyes_pitch_deg")  # fmt: skip
+                    yield f"{key}.{i}.joints_deg.{joint}", f"is moved by {instead}; write that"
+                elif not JOINT_NAME.fullmatch(joint):
+                    yield f"{key}.{i}.joints_deg.{joint}", "no name of a joint"
+
+
+CHECKS = (_frame_times, _joint_names)
+"""What no single frame can know."""

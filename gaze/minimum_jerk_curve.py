@@ -1,0 +1,129 @@
+"""Smooth curves through key values: of all that pass them at their times, those of least jerk.
+
+A curve of least integrated squared jerk through given values is a fifth-order spline whose
+jerk and snap are continuous at every value it passes (Flash and Hogan 1985; Todorov and
+Jordan 1998). Where the direction turns back or a value is held, the curve comes to rest (speed
+and acceleration 0), so that it does not swing past the values that somebody has chosen as its
+extremes. Any unit; speed and acceleration are per second.
+"""
+
+from bisect import bisect_right
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.gaze.types import Floats
+
+
+class MinimumJerkCurve:
+    """A curve from rest through key values to rest at the last of them.
+
+    duration_s: time of the last key
+
+    Args:
+        start: the value at time 0.
+        times_s: of the keys, increasing, the first above 0.
+        values: at those times.
+
+    Raises:
+        ValueError: the times do not increase from 0.
+    """
+
+    def __init__(self, start: float, times_s: Sequence[float], values: Sequence[float]) -> None:
+        knots = np.array([0.0, *times_s])
+        span = np.diff(knots)
+        if len(span) != len(values) or not (span > 0.0).all():
+            raise ValueError("the times of the keys must increase from 0, one for each value")
+        position = np.array([start, *values])
+        speed, acceleration = _states(position, span)
+        ends = position[:-1], speed[:-1], acceleration[:-1], position[1:], speed[1:], acceleration[1:]  # fmt: skip
+        self._table = _coefficients(span, *ends)
+        self._rows = [tuple(row) for row in self._table.tolist()]
+        self._knots = knots
+        self._starts: list[float] = knots[:-1].tolist()
+        self.duration_s, self._last = float(knots[-1]), float(position[-1])
+
+    def at(self, t_s: float) -> float:
+        """Return the value at a time since the start."""
+        if t_s >= self.duration_s:
+            return self._last
+        i = max(0, bisect_right(self._starts, t_s) - 1)
+        c0, c1, c2, c3, c4, c5 = self._rows[i]
+        t = max(0.0, t_s - self._starts[i])
+        return float(c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5)))))
+
+    def sampled(self, times_s: Floats) -> tuple[Floats, Floats, Floats]:
+        """Return (n,) values, speeds and accelerations at (n,) times."""
+        times = np.clip(times_s, 0.0, None)
+        i = np.minimum(
+            np.searchsorted(self._knots[:-1], times, side="right") - 1, len(self._rows) - 1
+        )
+        t = times - self._knots[i]
+        c0, c1, c2, c3, c4, c5 = self._table[i].T
+        over = times >= self.duration_s
+        value = c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5))))
+        speed = c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * 5.0 * c5)))
+        acceleration = 2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5))
+        return (
+            np.where(over, self._last, value),
+            np.where(over, 0.0, speed),
+            np.where(over, 0.0, acceleration),
+        )
+
+
+def _states(position: Floats, span: Floats) -> tuple[Floats, Floats]:
+    """Return speed and acceleration at every key: 0 where the curve turns or holds."""
+    speed, acceleration = np.zeros(len(position)), np.zeros(len(position))
+    step = np.diff(position)
+    passed = np.flatnonzero(step[:-1] * step[1:] > 0.0) + 1
+    if len(passed):
+        _pass(passed, position, span, speed, acceleration)
+    return speed, acceleration
+
+
+def _pass(
+    passed: NDArray[np.intp],
+    position: Floats,
+    span: Floats,
+    speed: Floats,
+    acceleration: Floats,
+) -> None:
+    """Set speed and acceleration where keys are passed, so that jerk and snap are continuous."""
+    count = len(passed)
+
+    def gaps(unknown: Floats) -> Floats:
+        """Return by how much jerk and snap jump at the keys passed; linear in the unknowns."""
+        speed[passed], acceleration[passed] = unknown[:count], unknown[count:]
+        ends = position[:-1], speed[:-1], acceleration[:-1], position[1:], speed[1:], acceleration[1:]  # fmt: skip
+        _, _, _, c3, c4, c5 = _coefficients(span, *ends).T
+        jerk = 6.0 * c3 + span * (24.0 * c4 + span * 60.0 * c5)
+        snap = 24.0 * c4 + span * 120.0 * c5
+        return np.concatenate(
+            (jerk[passed - 1] - 6.0 * c3[passed], snap[passed - 1] - 24.0 * c4[passed])
+        )
+
+    at_zero = gaps(np.zeros(2 * count))
+    matrix = np.stack([gaps(one) - at_zero for one in np.eye(2 * count)], axis=1)
+    # Jerk and snap differ in size by a power of the time; each row gets a largest entry of 1.
+    scale = np.abs(matrix).max(axis=1)
+    gaps(np.linalg.solve(matrix / scale[:, None], -at_zero / scale))
+
+
+def _coefficients(
+    span: Floats, p0: Floats, v0: Floats, a0: Floats, p1: Floats, v1: Floats, a1: Floats
+) -> Floats:
+    """Return the (n, 6) coefficients of fifth-order polynomials between two states each."""
+    d, T = p1 - p0, span
+    return np.stack(
+        (
+            p0,
+            v0,
+            0.5 * a0,
+            (20.0 * d - (8.0 * v1 + 12.0 * v0) * T - (3.0 * a0 - a1) * T * T) / (2.0 * T**3),
+            (-30.0 * d + (14.0 * v1 + 16.0 * v0) * T + (3.0 * a0 - 2.0 * a1) * T * T)
+            / (2.0 * T**4),
+            (12.0 * d - 6.0 * (v1 + v0) * T + (a1 - a0) * T * T) / (2.0 * T**5),
+        ),
+        axis=1,
+    )

@@ -1,0 +1,301 @@
+"""What a rig can do of a gesture: which joints it has, how far, how fast; before it moves."""
+
+from collections.abc import Mapping, Sequence
+from math import degrees
+from typing import NamedTuple
+
+import numpy as np
+
+from gazerig.gaze.gesture import (
+    EYE_TRACKS,
+    HEAD_TRACKS,
+    LID_TRACKS,
+    POSE_TRACKS,
+    Gesture,
+    KeyFrame,
+    keys_of,
+)
+from gazerig.gaze.gesture_motion import GestureMotion, MotionSamples
+from gazerig.gaze.gesture_player import OffsetState, PlayedGesture
+from gazerig.gaze.types import Floats
+from gazerig.robot.model.joint_limit import JointLimit
+from gazerig.robot.model.types import further
+
+_SMALLEST = 0.2
+"""A gesture of which a range leaves less than this share is not played: nobody would see it."""
+_ROUNDING = 1e-6
+_FADES_S = tuple(0.25 * 1.25**i for i in range(16))
+_WAITS = (0.0, 0.25, 0.5, 0.75, 1.0)
+
+
+class GestureRefused(ValueError):
+    """A rig cannot do a gesture; the message says which joint, when, and the limit."""
+
+
+class FittedGesture(NamedTuple):
+    """A gesture as this rig can do it.
+
+    slowed_by: factor by which it takes longer than asked; slow_joint: which joint needs that
+    smaller: (joint, share of its motion that is left) where a range ends
+    """
+
+    played: PlayedGesture
+    slowed_by: float = 1.0
+    slow_joint: str = ""
+    smaller: tuple[tuple[str, float], ...] = ()
+
+
+class GestureMotions(NamedTuple):
+    """A gesture's curves on one rig; left_out: joints that it names and the rig lacks."""
+
+    gesture: Gesture
+    motion: GestureMotion
+    left_out: tuple[str, ...]
+
+
+def motions(gesture: Gesture, joints: Sequence[str], count: int = 0) -> GestureMotions:
+    """Return a gesture as curves of the joints that a rig has.
+
+    Args:
+        gesture: as written.
+        joints: the rig's.
+        count: how often; 0: as the gesture says.
+
+    Raises:
+        GestureRefused: it needs a joint that the rig lacks.
+    """
+    frames, left_out = _frames_for(gesture, joints)
+    tracks = keys_of(gesture, frames, count or gesture.count)
+    kept = {name: keys for name, keys in tracks.items() if _is_there(name, joints)}
+    if not kept:
+        raise GestureRefused(f"this rig has none of the joints that it moves: {', '.join(tracks)}")
+    motion = GestureMotion(kept, further(joints), gesture.space == "joint")
+    return GestureMotions(gesture, motion, left_out)
+
+
+def _frames_for(
+    gesture: Gesture, joints: Sequence[str]
+) -> tuple[tuple[KeyFrame, ...], tuple[str, ...]]:
+    """Return the frames that a rig plays, and the joints that it lacks for them."""
+    frames, lacking = gesture.frames, _lacking(gesture.frames, joints)
+    needed = [name for name in lacking if name not in gesture.optional]
+    if gesture.frames_without_neck and any(name.startswith("neck_") for name in needed):
+        frames, neck = gesture.frames_without_neck, lacking
+        lacking = [*neck, *_lacking(frames, joints)]
+        needed = [n for n in lacking if n not in gesture.optional and n not in neck]
+    if needed:
+        raise GestureRefused(
+            f"it moves {', '.join(needed)}, which this rig lacks; list under optional what it "
+            "can do without"
+        )
+    return frames, tuple(lacking)
+
+
+def _lacking(frames: tuple[KeyFrame, ...], joints: Sequence[str]) -> list[str]:
+    """Return the joints that frames name and a rig lacks."""
+    named = [name for frame in frames for name in _named(frame)]
+    return [name for name in dict.fromkeys(named) if name not in joints]
+
+
+def _named(frame: KeyFrame) -> list[str]:
+    """Return the joints that a frame names; a group of lids names those that are there."""
+    heads = [_neck(track) for track in HEAD_TRACKS if getattr(frame, f"{track}_deg") is not None]
+    return [*heads, *(lid for lid in frame.lids if lid in LID_TRACKS), *frame.joints_deg]
+
+
+def _neck(track: str) -> str:
+    """Return the joint of a track of the head."""
+    return track.replace("head", "neck")
+
+
+def _is_there(track: str, joints: Sequence[str]) -> bool:
+    if track in HEAD_TRACKS:
+        return _neck(track) in joints
+    return track in EYE_TRACKS or track in joints
+
+
+class GestureFit:
+    """Compares gestures with the limits of one rig.
+
+    Joint angles are linear in the offset: the eyes turn against the head, and a lid turns by
+    its factor times its whole way.
+
+    Args:
+        joints: the rig's, in the order of all sequences of joints.
+        lid_spans_rad: way of each lid from shut to open, by joint.
+    """
+
+    def __init__(self, joints: tuple[str, ...], lid_spans_rad: Mapping[str, float]) -> None:
+        self.joints = joints
+        channels = (*POSE_TRACKS, *further(joints))
+        self._matrix = np.zeros((len(channels), len(joints)))
+        for j, name in enumerate(joints):
+            if name in channels:
+                self._matrix[channels.index(name), j] = lid_spans_rad.get(name, 1.0)
+            elif name.startswith("neck_"):
+                self._matrix[channels.index(name.replace("neck", "head")), j] = 1.0
+            else:
+                axis = 0 if name.endswith("pan") else 1
+                self._matrix[axis, j] = -1.0
+                self._matrix[channels.index(EYE_TRACKS[axis]), j] = 1.0
+        # A range is checked for what moves a joint by itself; lids are kept within by their
+        # openings, and eyes that compensate the head go as far as they can.
+        self._own = np.where(self._matrix > 0.0, self._matrix, 0.0)
+        self._own[[channels.index(lid) for lid in LID_TRACKS]] = 0.0
+
+    def without(self, commanded_rad: Sequence[float], state: OffsetState) -> Floats:
+        """Return commanded joint angles less what an offset adds to them."""
+        angles: Floats = np.array(commanded_rad) - state.value @ self._matrix
+        return angles
+
+    def fit(
+        self,
+        name: str,
+        made: GestureMotions,
+        speed: float,
+        base_rad: Floats,
+        limits: Sequence[JointLimit],
+        share: float,
+    ) -> FittedGesture:
+        """Return a gesture as the rig can do it from where it is.
+
+        Args:
+            name: of the gesture.
+            made: its curves on this rig.
+            speed: factor on the speed at which it was written.
+            base_rad: joint angles that it is added to.
+            limits: of the joints.
+            share: of speed and acceleration limits that it may use; the rest is for gaze.
+
+        Raises:
+            GestureRefused: it cannot be done, or not as written and is not to be changed.
+        """
+        slow, motion = made.gesture.fit == "slow", made.motion
+        sizes, smaller = self._sizes(motion.samples, base_rad, limits)
+        if smaller and not slow:
+            raise GestureRefused(self._beyond_range(motion.samples, base_rad, limits))
+        if smaller and min(left for _, left in smaller) < _SMALLEST:
+            joint = min(smaller, key=lambda one: one[1])[0]
+            raise GestureRefused(f"{joint} is at the end of its range")
+        samples = motion.samples.scaled(sizes, speed)
+        factor, joint, text = self._too_fast(samples, limits, share)
+        if factor > 1.0 + _ROUNDING and not slow:
+            raise GestureRefused(text)
+        played = PlayedGesture(name, motion, speed / factor, tuple(sizes.tolist()))
+        return FittedGesture(played, factor, joint if factor > 1.0 + _ROUNDING else "", smaller)
+
+    def _sizes(
+        self, samples: MotionSamples, base_rad: Floats, limits: Sequence[JointLimit]
+    ) -> tuple[Floats, tuple[tuple[str, float], ...]]:
+        """Return the factor of every channel that keeps ranges, and the joints that need one."""
+        sizes = np.ones(len(self._matrix))
+        smaller = {}
+        highest, lowest = samples.value.max(axis=0), samples.value.min(axis=0)
+        for c, j in zip(*np.nonzero(self._own), strict=True):
+            low, high = limits[j][:2]
+            room = max(0.0, high - base_rad[j]), max(0.0, base_rad[j] - low)
+            for far, there in zip((highest[c], -lowest[c]), room, strict=True):
+                if far > there + _ROUNDING:
+                    sizes[c] = min(sizes[c], there / far)
+                    smaller[self.joints[j]] = float(sizes[c])
+        return sizes, tuple(smaller.items())
+
+    def _beyond_range(
+        self, samples: MotionSamples, base_rad: Floats, limits: Sequence[JointLimit]
+    ) -> str:
+        """Return at which joint, when and by how much a range is left first."""
+        angles = base_rad + samples.value @ self._own
+        low, high = (np.array([limit[end] for limit in limits]) for end in (0, 1))
+        beyond = (angles > high + _ROUNDING) | (angles < low - _ROUNDING)
+        row, j = np.argwhere(beyond)[0]
+        return (
+            f"{self.joints[j]} at {samples.times_s[row]:.2f} s: leaves its range "
+            f"{degrees(low[j]):g}..{degrees(high[j]):g} deg; it would go to "
+            f"{degrees(angles[:, j].max() if angles[row, j] > high[j] else angles[:, j].min()):.1f}"
+        )
+
+    def _too_fast(
+        self, samples: MotionSamples, limits: Sequence[JointLimit], share: float
+    ) -> tuple[float, str, str]:
+        """Return the factor of time that keeps all limits, the joint that needs it, and why."""
+        found = (1.0, "", "")
+        for column, power, at, unit in (
+            (samples.speed, 1.0, 2, "deg/s"),
+            (samples.acceleration, 0.5, 3, "deg/s2"),
+        ):
+            most = share * np.array([limit[at] for limit in limits])
+            ratio = np.abs(column @ self._matrix) / most
+            row, j = np.unravel_index(int(np.argmax(ratio)), ratio.shape)
+            factor = float(ratio[row, j]) ** power
+            if factor > found[0]:
+                asked = degrees(ratio[row, j] * most[j])
+                found = factor, self.joints[j], (
+                    f"{self.joints[j]} at {samples.times_s[row]:.2f} s: needs {asked:.0f} {unit}, and "
+                    f"gestures may use {degrees(most[j]):.0f} ({share:g} of the joint's limit)"
+                )  # fmt: skip
+        return found
+
+    def fade_s(
+        self, state: OffsetState, limits: Sequence[JointLimit], share: float, least_s: float
+    ) -> float:
+        """Return the time in which a moving offset can return to rest within limits."""
+        begins = (state.speed @ self._matrix, state.acceleration @ self._matrix)
+        most = [
+            np.maximum(share * np.array([limit[at] for limit in limits]), np.abs(now)) + _ROUNDING
+            for at, now in zip((2, 3), begins, strict=True)
+        ]
+        for time_s in _FADES_S:
+            if time_s >= least_s and self._keeps(_fade(state, time_s), most):
+                return time_s
+        return _FADES_S[-1]
+
+    def wait_s(
+        self,
+        state: OffsetState,
+        fade_s: float,
+        played: PlayedGesture,
+        limits: Sequence[JointLimit],
+        share: float,
+    ) -> float:
+        """Return how long a gesture must wait for what is under way to return to rest."""
+        if not any(map(np.any, state)):
+            return 0.0
+        fade = _fade(state, fade_s)
+        begins = (state.speed @ self._matrix, state.acceleration @ self._matrix)
+        most = [
+            np.maximum(share * np.array([limit[at] for limit in limits]), np.abs(now)) + _ROUNDING
+            for at, now in zip((2, 3), begins, strict=True)
+        ]
+        for wait in _WAITS:
+            since = np.maximum(0.0, fade.times_s - wait * fade_s) * played.speed
+            also = played.motion.sampled(since).scaled(np.array(played.sizes), played.speed)
+            both = MotionSamples(
+                fade.times_s, *(a + b for a, b in zip(fade[1:], also[1:], strict=True))
+            )
+            if self._keeps(both, most):
+                return wait * fade_s
+        return fade_s
+
+    def _keeps(self, samples: MotionSamples, most: Sequence[Floats]) -> bool:
+        """Return whether speeds and accelerations stay below the given ones."""
+        return all(
+            bool((np.abs(column @ self._matrix) <= limit).all())
+            for column, limit in zip(samples[2:], most, strict=True)
+        )
+
+
+def _fade(state: OffsetState, time_s: float) -> MotionSamples:
+    """Return samples of the fifth-order polynomials from a state to rest in a time."""
+    s = np.linspace(0.0, 1.0, 101)[:, None]
+    p, v, a = state.value, state.speed * time_s, state.acceleration * time_s**2
+    c3, c4, c5 = (
+        -10.0 * p - 6.0 * v - 1.5 * a,
+        15.0 * p + 8.0 * v + 1.5 * a,
+        -6.0 * p - 3.0 * v - 0.5 * a,
+    )
+    return MotionSamples(
+        s[:, 0] * time_s,
+        p + s * (v + s * (0.5 * a + s * (c3 + s * (c4 + s * c5)))),
+        (v + s * (a + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)))) / time_s,
+        (a + s * (6.0 * c3 + s * (12.0 * c4 + s * 20.0 * c5))) / time_s**2,
+    )
