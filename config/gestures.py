@@ -43,7 +43,8 @@ def gestures_of(files: Sequence[str]) -> dict[str, Gesture]:
     Raises:
         gazerig.config.load.ConfigError: with every fault of all files.
     """
-    found, faults = dict(shipped_gestures()), []
+    found = dict(shipped_gestures())
+    faults: list[ConfigFault] = []
     for file in files:
         try:
             found[gesture_name(file)] = load_gesture(Path(file).expanduser())
