@@ -21,6 +21,7 @@ from gazerig.gaze.aversion import AversionParams
 from gazerig.gaze.bottom_up import BottomUpParams
 from gazerig.gaze.breathing import BreathingParams
 from gazerig.gaze.field_of_view import FieldOfViewParams
+from gazerig.gaze.gesture import GestureParams
 from gazerig.gaze.head import HeadParams
 from gazerig.gaze.idle import IdleParams
 from gazerig.gaze.level import LevelParams
@@ -132,6 +133,7 @@ class GazeConfig:
     head: Annotated[HeadParams, "how the head joins"] = field(default_factory=HeadParams)
     breathing: Annotated[BreathingParams, "the head's slow sway"] = field(default_factory=BreathingParams)
     lids: Annotated[LidParams, "blinks"] = field(default_factory=LidParams)
+    gestures: Annotated[GestureParams, "gestures laid over gaze"] = field(default_factory=GestureParams)
     oculomotor: Annotated[OculomotorParams, "how it all fits together"] = field(default_factory=OculomotorParams)
     # fmt: on
 
@@ -165,6 +167,7 @@ class Rig:
     loop: Annotated[LoopParams, "control loop"] = field(default_factory=LoopParams)
     guard: Annotated[GuardParams, "safety"] = field(default_factory=GuardParams)
     gaze: Annotated[GazeConfig, "gaze models"] = field(default_factory=GazeConfig)
+    gesture_files: Annotated[tuple[str, ...], "paths of YAML files with further gestures; a file's name names its gesture"] = ()
     expressions: Annotated[Mapping[str, Mapping[str, float]], Bounds(-180, 180), Unit("deg"),
         "facial expressions: name -> joint -> angle added to it; of a lid, of the open lid"] = field(default_factory=dict)
     expression_blend_s: Annotated[float, Bounds(0.05, 10), "time from one expression to another"] = 0.5

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 
 from gazerig.config.animation_rules import expressions, levels
+from gazerig.config.gestures import gesture_rules
 from gazerig.config.rig import BusConfig, Rig
 from gazerig.drivers.hobby_board.params import HobbyBoardParams
 from gazerig.drivers.servo_models import SERVOS
@@ -161,5 +162,6 @@ RULES = (
     _collisions,
     expressions,
     levels,
+    gesture_rules,
 )
 """What no single section of a rig can know."""

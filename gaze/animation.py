@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from gazerig.gaze.expression import Expressions
+from gazerig.gaze.gesture_player import GesturePlayer
 from gazerig.gaze.level import LevelRange, Levels
 from gazerig.gaze.pose_offset import NO_OFFSET as NO_OFFSET
 from gazerig.gaze.pose_offset import PoseOffset as PoseOffset
@@ -30,7 +31,7 @@ NO_TABLES = AnimationTables({}, 0.5, {})
 class Animation:
     """Everything that moves beside gaze, as one offset a tick.
 
-    expressions, levels: take what is asked for
+    expressions, levels, gestures: take what is asked for
     """
 
     def __init__(self, joints: tuple[str, ...] = (), tables: AnimationTables = NO_TABLES) -> None:
@@ -42,11 +43,13 @@ class Animation:
         """
         self.expressions = Expressions(tables.expressions, tables.blend_s, len(joints))
         self.levels = Levels(tables.levels, len(joints))
+        self.gestures = GesturePlayer(len(joints))
 
     def reset(self, t_s: float) -> None:
         """Begin at rest at a time."""
         self.expressions.reset()
         self.levels.reset()
+        self.gestures.reset()
 
     def retune(self, tables: AnimationTables) -> None:
         """Change the tables; what moves goes on without a jump."""
@@ -55,4 +58,5 @@ class Animation:
 
     def step(self, t_s: float) -> PoseOffset:
         """Return what is added to the pose in this tick."""
-        return self.expressions.step(t_s).plus(self.levels.step(t_s))
+        face = self.expressions.step(t_s).plus(self.levels.step(t_s))
+        return face.plus(self.gestures.step(t_s))

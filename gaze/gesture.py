@@ -13,6 +13,8 @@ from typing import Annotated, Literal, NamedTuple
 
 from gazerig.params import Bounds
 
+MIN_SPEED, MAX_SPEED = 0.1, 4.0
+"""Factors on the speed of a gesture as written."""
 MAX_COUNT = 20
 """A gesture is not repeated more often by one command."""
 HEAD_TRACKS = ("head_yaw", "head_pitch", "head_roll")
@@ -105,6 +107,18 @@ class Gesture:
         """
         if not self.frames:
             raise ValueError("a gesture needs at least one frame")
+
+
+@dataclass(frozen=True)
+class GestureParams:
+    """How gestures fit in with everything else that moves the joints."""
+
+    # fmt: off
+    limit_share: Annotated[float, Bounds(0.1, 1),
+        "share of the joints' speed and acceleration limits that a gesture may use; the rest is left to gaze"] = 0.8
+    blend_out_ms: Annotated[float, Bounds(100, 5000),
+        "shortest time in which a gesture that is interrupted returns to rest"] = 250.0
+    # fmt: on
 
 
 class TrackKeys(NamedTuple):

@@ -7,6 +7,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+from gazerig.config.gestures import gestures_of
 from gazerig.config.schema import Rig, load_rules, load_walk
 from gazerig.drivers.camera.depth_roi import depth_at
 from gazerig.drivers.camera.pose_buffer import PoseBuffer
@@ -26,6 +27,7 @@ from gazerig.robot.app.gaze_models import deciders, kinematics_of, movers, oculo
 from gazerig.robot.app.live_params import CameraPlacement, Components, LiveParams
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_limits import (
+    lid_spans,
     limits,
     own_parts,
     park_rad,
@@ -33,6 +35,7 @@ from gazerig.robot.app.rig_limits import (
 from gazerig.robot.app.run_bus import RunBus, run_bus, true_head
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import TargetChooser
+from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.control.loop import Robot
 from gazerig.robot.dashboard.snapshot import ShownRig
 from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
@@ -213,6 +216,7 @@ def _components(
     tracker = Tracker(rig.tracks)
     moves = movers(rig)
     decides = deciders(rig, random.idle)
+    animation = Animation(further(rig.joints), animation_tables(rig))
     return Components(
         body=body,
         guard=_guard(rig, body),
@@ -236,7 +240,14 @@ def _components(
         head=moves.head,
         breathing=moves.breathing,
         lids=lids,
-        animation=Animation(further(rig.joints), animation_tables(rig)),
+        animation=animation,
+        gestures=GestureChoices(
+            gestures_of(rig.gesture_files),
+            animation.gestures,
+            rig.gaze.gestures,
+            rig.names,
+            lid_spans(rig),
+        ),
     )
 
 
@@ -264,6 +275,7 @@ def _robot(
         parts.oculomotor,
         parts.lids,
         parts.animation,
+        parts.gestures,
         parts.guard,
         live,
         PixelToWorld(parts.mount, poses, lambda: live.camera),

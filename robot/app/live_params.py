@@ -33,11 +33,13 @@ from gazerig.robot.app.rig_limits import (
     eye_limits,
     head_limits,
     lid_ends,
+    lid_spans,
     limits,
     own_parts,
     park_pose,
 )
 from gazerig.robot.control.body import Body
+from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.model.commands import Tune, Value
 from gazerig.robot.model.frames import CameraMount, CameraParams, MountedOn
 from gazerig.robot.model.joint import JointParams
@@ -74,6 +76,7 @@ class Components(NamedTuple):
     breathing: Breathing
     lids: Lids
     animation: Animation
+    gestures: GestureChoices
 
 
 class CameraPlacement(NamedTuple):
@@ -183,6 +186,8 @@ class LiveParams:
             parts.head.retune(now.head, *head_limits(new))
         if (tables := animation_tables(new)) != animation_tables(old):
             parts.animation.retune(tables)
+        if now.gestures != was.gestures or new.lid_joints != old.lid_joints:
+            parts.gestures.retune(now.gestures, lid_spans(new))
 
     def _put_machine(self, old: Rig, new: Rig) -> tuple[str, ...]:
         parts = self.parts

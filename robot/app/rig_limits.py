@@ -39,6 +39,11 @@ def lid_ends(rig: Rig) -> dict[str, LidEnds]:
     return ends
 
 
+def lid_spans(rig: Rig) -> dict[str, float]:
+    """Return the way of each lid from shut to open, in radians."""
+    return {name: wide - shut for name, (shut, wide) in lid_ends(rig).items()}
+
+
 def eye_limits(rig: Rig) -> EyeLimits:
     """Return the eyes' ranges: the narrower of the joints' and the profile's."""
     return (_eye(rig, "left"), _eye(rig, "right"))

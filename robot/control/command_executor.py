@@ -7,6 +7,7 @@ from gazerig.gaze.oculomotor import Oculomotor
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import TargetChooser
 from gazerig.robot.control.command_choices import Menus
+from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.control.look_point import LookPoints
 from gazerig.robot.control.reachability import jog_reply, look_reply
 from gazerig.robot.control.stop_control import StopControl
@@ -17,6 +18,7 @@ from gazerig.robot.model.commands import (
     Jog,
     Leading,
     LookAtPerson,
+    Play,
     Renew,
     Resume,
     SetLevel,
@@ -43,6 +45,7 @@ class CommandExecutor:
         attention: its behaviours can be chosen.
         oculomotor: computes how far eyes and head can follow.
         animation: expressions and levels can be asked for.
+        gestures: those that can be played.
         kinematics: gaze to joint angles.
         guard: starts slowly where joints are taken over.
         tune: changes parameters and returns what was done, as text.
@@ -59,6 +62,7 @@ class CommandExecutor:
         attention: TargetChooser,
         oculomotor: Oculomotor,
         animation: Animation,
+        gestures: GestureChoices,
         kinematics: Kinematics,
         guard: Guard,
         tune: Callable[[Tune, float], tuple[str, ...]],
@@ -67,7 +71,7 @@ class CommandExecutor:
     ) -> None:
         self._body, self._lead, self._stop, self._menus = body, lead, stop, menus
         self._attention, self._oculomotor, self._kinematics = attention, oculomotor, kinematics
-        self._animation = animation
+        self._animation, self._gestures = animation, gestures
         self._guard, self._tune, self._told, self._looks = guard, tune, told, looks
         self._taken_over = False
         self.commanded_rad: JointAngles = ()
@@ -98,6 +102,10 @@ class CommandExecutor:
                     return CommandReply(f"stopped ({self._stop.why}): resume first")
                 reply = self._lead_by(command, t_s)
                 return reply._replace(lead=self._lead.state.number * self._lead.state.active)
+            case Play():
+                if self._stop.why:
+                    return CommandReply(f"stopped ({self._stop.why}): resume first")
+                return self._play(command, t_s)
             case Express(name, strength):
                 return _refused(lambda: self._animation.expressions.express(name, strength))
             case SetLevel(name, value):
@@ -107,6 +115,7 @@ class CommandExecutor:
                     return CommandReply(f"{command.who or 'you'} lead nothing now")
             case Stop():
                 self._lead.end(f"stopped: {command.why}")
+                self._gestures.drop()
                 self._stop.halt(command, self._body, t_s)
             case Resume():
                 return self._resume(command, t_s)
@@ -135,11 +144,23 @@ class CommandExecutor:
     def _jog(self, command: Jog, t_s: float) -> CommandReply:
         """Hold all joints but those given; without any, return the joints to the gaze models."""
         names = self._body.names
+        if command.angles_rad and (name := self._gestures.drop()):
+            self._told.append(f"gesture {name} ends: the joints are led")
         self._let_lead(lambda: self._lead.jog(command, names, self.commanded_rad, t_s))
         if command.angles_rad:
             # A slider can be torn from end to end in no time.
             self._guard.go_gently()
         return jog_reply(command, names, self._guard.limits)
+
+    def _play(self, command: Play, t_s: float) -> CommandReply:
+        """Play a gesture over gaze; the joints must not be held by hand."""
+        if command.gesture and self._lead.pose_rad:
+            return CommandReply(f"{self._lead.words}: the joints are held where they are")
+        reply = self._gestures.play(command, t_s, self.commanded_rad, self._guard.limits)
+        if command.gesture:
+            by = f" for {command.who}" if command.who else ""
+            self._told.append(f"gesture{by}: {reply.words()}")
+        return reply
 
     def _let_lead(self, change: Callable[[], None]) -> None:
         """Change who leads; the models begin gently where they take joints over."""

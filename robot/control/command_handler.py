@@ -11,12 +11,14 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from gazerig.drivers.errors import DriverError
+from gazerig.robot.control.gesture_choices import GestureInfo
 from gazerig.robot.model.commands import COMMANDS, Command, Tune, Value, from_json
 from gazerig.robot.model.reply import Ticket
 
 QUESTIONS = (
     "status",
     "menus",
+    "gestures",
     'parameters, "prefix"',
     'get, "prefix"',
     "unsaved",
@@ -150,6 +152,10 @@ class Commandable(Protocol):
         """Return what there is to ask for."""
         ...
 
+    def gestures(self) -> Sequence[GestureInfo]:
+        """Return the gestures there are."""
+        ...
+
 
 class Answered(NamedTuple):
     """The answer to a question, as plain JSON values."""
@@ -227,6 +233,8 @@ class CommandHandler:
                 return Answered(self._status())
             case {"do": "menus", **rest} if not rest:
                 return Answered({menu: list(them) for menu, them in self._robot.menus().items()})
+            case {"do": "gestures", **rest} if not rest:
+                return Answered([plain(one._asdict()) for one in self._robot.gestures()])
             case {"do": str(name)} if name in COMMANDS:
                 return self.give(sign(from_json(request)))
             case {"do": "order", "order": dict(command), **rest} if not rest:

@@ -24,12 +24,13 @@ from gazerig.robot.control.command_choices import (
 )
 from gazerig.robot.control.command_executor import CommandExecutor
 from gazerig.robot.control.command_queue import CommandQueue
+from gazerig.robot.control.gesture_choices import GestureChoices, GestureInfo
 from gazerig.robot.control.look_point import Known, LookPoints
 from gazerig.robot.control.stop_control import StopControl
 from gazerig.robot.control.tick import Tick as Tick
 from gazerig.robot.control.tick import at_rest
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.commands import Ask, Command, Express, Jog, SetLevel, Tune, check
+from gazerig.robot.model.commands import Ask, Command, Express, Jog, Play, SetLevel, Tune, check
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.lead import Lead
@@ -65,6 +66,7 @@ class Robot:
         oculomotor: Oculomotor,
         lids: Lids,
         animation: Animation,
+        gestures: GestureChoices,
         guard: Guard,
         tune: Callable[[Tune, float], tuple[str, ...]],
         pixels: PixelToWorld,
@@ -83,6 +85,7 @@ class Robot:
             oculomotor: target to eyes, head and lids.
             lids: their blinks can be asked for.
             animation: gestures and expressions laid over gaze.
+            gestures: those that can be played.
             guard: between what is desired and the bus.
             tune: puts changed parameters in force and says what was done.
             pixels: places pixels of a camera frame in the world.
@@ -98,6 +101,7 @@ class Robot:
         self._oculomotor = oculomotor
         self._menus = Menus(aversion, lids, animation.expressions)
         self._animation = animation
+        self._gestures = gestures
         self._guard = guard
         self._settled = True
         self._commands = CommandQueue()
@@ -106,8 +110,8 @@ class Robot:
         self._stop = StopControl(self._told)
         self._looks = LookPoints(pixels)
         self._executor = CommandExecutor(
-            body, self._lead, self._stop, self._menus, attention, oculomotor, animation, kinematics,
-            guard, tune, self._told, self._looks,
+            body, self._lead, self._stop, self._menus, attention, oculomotor, animation, gestures,
+            kinematics, guard, tune, self._told, self._looks,
         )  # fmt: skip
 
     @property
@@ -145,6 +149,8 @@ class Robot:
             self._animation.expressions.require(command.expression)
         if isinstance(command, SetLevel):
             self._animation.levels.require(command.level)
+        if isinstance(command, Play):
+            self._gestures.require(command)
         return self._commands.add(command)
 
     def ask(self, menu: str, choice: str) -> None:
@@ -160,6 +166,10 @@ class Robot:
     def menus(self) -> dict[str, tuple[str, ...]]:
         """Return what ``ask`` takes: menu -> choices, the present one first."""
         return self._menus.offered(self.attention.top_down)
+
+    def gestures(self) -> tuple[GestureInfo, ...]:
+        """Return the gestures there are, with what this rig can do of them."""
+        return self._gestures.offered(self._guard.limits)
 
     def start(self, clock: Clock, ready: Callable[[], None] | None = None) -> None:
         """Open camera and bus, switch torque on where the joints are, begin from there.

@@ -14,6 +14,7 @@ from gazerig.robot.control.command_handler import (
     ParamsSaved,
     PathGuard,
 )
+from gazerig.robot.control.gesture_choices import GestureInfo
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import Command, Leading, LookAt, Resume, signed
 from gazerig.robot.model.reply import CommandTaker, Ticket
@@ -152,6 +153,10 @@ class _Taking:
     def menus(self) -> dict[str, tuple[str, ...]]:
         """Return none: the page is sent them."""
         return {}
+
+    def gestures(self) -> tuple[GestureInfo, ...]:
+        """Return none: the page is sent their names."""
+        return ()
 
 
 def _signed(command: Command) -> Command:

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from math import pi
 from typing import Literal, NamedTuple
 
+from gazerig.gaze.gesture import MAX_COUNT, MAX_SPEED, MIN_SPEED
 from gazerig.gaze.types import Angles2, Vec3
 from gazerig.robot.model.types import JOINT_NAME
 
@@ -135,6 +136,20 @@ class SetLevel(NamedTuple):
     value: float
 
 
+class Play(NamedTuple):
+    """Play a gesture once; "" ends the one under way.
+
+    speed: factor on the speed at which it was written
+    times: how often it is repeated; 0: as the gesture says
+    who: who asks, in words
+    """
+
+    gesture: str
+    speed: float = 1.0
+    times: int = 0
+    who: str = ""
+
+
 class Renew(NamedTuple):
     """The heartbeat of one who leads the gaze or the joints; of anybody else it does nothing."""
 
@@ -173,7 +188,7 @@ class Tune(NamedTuple):
 Look = LookAt | LookAtInHead | LookAtDirection | LookAtPerson | LookAtPixel
 Leading = Look | Jog
 """Commands that take the lead of gaze or joints."""
-Command = Ask | Leading | Express | SetLevel | Renew | Stop | Resume | Tune
+Command = Ask | Leading | Express | SetLevel | Play | Renew | Stop | Resume | Tune
 
 REPEATED = (Renew, SetLevel)
 """Commands that programs send many times a second: no message or mark tells of each."""
@@ -196,6 +211,7 @@ COMMANDS: dict[str, type[Command]] = {
     "ask": Ask, "look_at": LookAt, "look_at_in_head": LookAtInHead,
     "look_at_direction": LookAtDirection, "look_at_person": LookAtPerson,
     "look_at_pixel": LookAtPixel, "jog": Jog, "express": Express, "set_level": SetLevel,
+    "play": Play,
     "renew": Renew, "stop": Stop, "resume": Resume, "tune": Tune,
 }  # fmt: skip
 _NAMES = {kind: name for name, kind in COMMANDS.items()}
@@ -247,7 +263,7 @@ def from_recording(data: dict[str, object]) -> Command:
 
 def signed(command: Command, who: str) -> Command:
     """Return a command with who asks for it; commands that do not tell stay as they are."""
-    if isinstance(command, Leading | Renew | Stop | Resume):
+    if isinstance(command, Leading | Play | Renew | Stop | Resume):
         return command._replace(who=who[:MAX_WORDS])
     return command
 
@@ -272,6 +288,9 @@ def check(command: Command) -> None:
             _check_share("an expression", "strength", expression, strength)
         case SetLevel(level, value):
             _check_share("a level", "value", level, value)
+        case Play(gesture, speed, times, who):
+            _check_play(gesture, speed, times)
+            _check_who(who)
         case Renew(who):
             _check_who(who)
         case Stop(why, who):
@@ -357,6 +376,15 @@ def _check_angles(angles: object) -> None:
             )
         if not (isinstance(pair[0], str) and JOINT_NAME.fullmatch(pair[0])):
             raise ValueError(f"{pair[0]!r:.40} is no name of a joint: such as neck_yaw or jaw")
+
+
+def _check_play(gesture: object, speed: object, times: object) -> None:
+    if not isinstance(gesture, str) or len(gesture) > MAX_WORDS:
+        raise ValueError("a gesture is given by its name")
+    if not _within(speed, MAX_SPEED) or speed < MIN_SPEED:  # type: ignore[operator]
+        raise ValueError(f"the speed of a gesture is a number {MIN_SPEED:g}..{MAX_SPEED:g}")
+    if type(times) is not int or not 0 <= times <= MAX_COUNT:
+        raise ValueError(f"the times of a gesture are a whole number 0..{MAX_COUNT}")
 
 
 def _check_share(what: str, key: str, name: object, value: object) -> None:

@@ -24,7 +24,7 @@ from gazerig.robot.model.types import further
 _SMALLEST = 0.2
 """A gesture of which a range leaves less than this share is not played: nobody would see it."""
 _ROUNDING = 1e-6
-_FADES_S = tuple(0.25 * 1.25**i for i in range(16))
+_LONGER = tuple(1.25**i for i in range(16))
 _WAITS = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
@@ -244,10 +244,10 @@ class GestureFit:
             np.maximum(share * np.array([limit[at] for limit in limits]), np.abs(now)) + _ROUNDING
             for at, now in zip((2, 3), begins, strict=True)
         ]
-        for time_s in _FADES_S:
-            if time_s >= least_s and self._keeps(_fade(state, time_s), most):
-                return time_s
-        return _FADES_S[-1]
+        for factor in _LONGER:
+            if self._keeps(_fade(state, factor * least_s), most):
+                return factor * least_s
+        return _LONGER[-1] * least_s
 
     def wait_s(
         self,

@@ -38,6 +38,35 @@ class JointReply(NamedTuple):
         )
 
 
+class GestureReply(NamedTuple):
+    """A gesture that was begun; name "": the one under way is ended.
+
+    duration_s: until everything is at rest again
+    slowed_by: factor by which it takes longer than asked; slow_joint: whose limits need that
+    smaller: (joint, share of its motion that its range leaves)
+    left_out: joints that it names and the rig lacks
+    """
+
+    name: str
+    duration_s: float
+    slowed_by: float = 1.0
+    slow_joint: str = ""
+    smaller: tuple[tuple[str, float], ...] = ()
+    left_out: tuple[str, ...] = ()
+
+    def words(self) -> str:
+        """Return one line for people."""
+        if not self.name:
+            return f"gestures end within {self.duration_s:.2f} s"
+        parts = [f"{self.name} takes {self.duration_s:.1f} s"]
+        if self.slow_joint:
+            parts.append(f"slower by {self.slowed_by:.2f} for {self.slow_joint}")
+        parts += [f"{joint} moves {share:.0%} as far" for joint, share in self.smaller]
+        if self.left_out:
+            parts.append(f"without {', '.join(self.left_out)}")
+        return "; ".join(parts)
+
+
 class CommandReply(NamedTuple):
     """What the robot made of one command when it took it up.
 
@@ -48,6 +77,7 @@ class CommandReply(NamedTuple):
     error_rad: angle between the point and the line of sight once head and eyes are there, of
         the worse eye, or of their mean where one linkage turns both
     lead: number of the lead that it took (``gazerig.robot.model.lead.LeadState``), 0 for none
+    gesture: what is played, None for other commands
     """
 
     refused: str = ""
@@ -56,6 +86,7 @@ class CommandReply(NamedTuple):
     joints: tuple[JointReply, ...] = ()
     error_rad: float = 0.0
     lead: int = 0
+    gesture: GestureReply | None = None
 
     @property
     def error_deg(self) -> float:
@@ -71,6 +102,8 @@ class CommandReply(NamedTuple):
         """Return one line for people, "" where there is nothing to say."""
         if self.refused:
             return f"refused: {self.refused}"
+        if self.gesture is not None:
+            return self.gesture.words()
         ends = "; ".join(joint.words() for joint in self.joints)
         if self.asked_m is None:
             return ends
@@ -97,6 +130,7 @@ class CommandReply(NamedTuple):
                 }
                 for one in self.joints
             ],
+            "gesture": None if self.gesture is None else self.gesture._asdict(),
             "words": self.words(),
         }
 
@@ -120,7 +154,17 @@ class CommandReply(NamedTuple):
         )
         asked, done = (_point(data[key]) for key in ("asked_m", "done_m"))
         error_rad = radians(data["error_deg"])
-        return cls(data["refused"], asked, done, joints, error_rad, data.get("lead", 0))
+        return cls(
+            data["refused"], asked, done, joints, error_rad, data.get("lead", 0), _gesture(data)
+        )
+
+
+def _gesture(data: Mapping[str, Any]) -> GestureReply | None:
+    found = data.get("gesture")
+    if found is None:
+        return None
+    smaller = tuple((joint, share) for joint, share in found["smaller"])
+    return GestureReply(**{**found, "smaller": smaller, "left_out": tuple(found["left_out"])})
 
 
 def _point(data: Any) -> Vec3 | None:

@@ -7,6 +7,7 @@ While a person calibrates, parameters stay as they are and no other client leads
 from collections.abc import Callable, Mapping
 
 from gazerig.drivers.errors import SetupError
+from gazerig.robot.control.gesture_choices import GestureInfo
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.commands import Command, Resume, Stop
@@ -74,3 +75,7 @@ class _OnlyStops:
     def menus(self) -> dict[str, tuple[str, ...]]:
         """Offer nothing."""
         return {}
+
+    def gestures(self) -> tuple[GestureInfo, ...]:
+        """Offer none."""
+        return ()

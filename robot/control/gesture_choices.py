@@ -1,0 +1,181 @@
+"""The gestures of a robot: which there are, what this rig can do of them, and playing them."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from gazerig.gaze.gesture import Gesture, GestureParams
+from gazerig.gaze.gesture_player import GesturePlayer
+from gazerig.robot.model.commands import Play
+from gazerig.robot.model.gesture_fit import (
+    FittedGesture,
+    GestureFit,
+    GestureMotions,
+    GestureRefused,
+    motions,
+)
+from gazerig.robot.model.joint_limit import JointLimit
+from gazerig.robot.model.reply import CommandReply, GestureReply
+from gazerig.robot.model.types import JointAngles
+
+_MOST_KEPT = 64
+"""Curves of so many gestures with a count of their own are kept."""
+
+
+class GestureInfo(NamedTuple):
+    """One gesture on this rig, played from the middle of all ranges.
+
+    duration_s: 0 where it is refused; slowed_by: factor by which it takes longer than written
+    refused: why this rig cannot do it, "" where it can
+    """
+
+    name: str
+    description: str
+    duration_s: float = 0.0
+    slowed_by: float = 1.0
+    refused: str = ""
+
+
+class GestureChoices:
+    """Prepares gestures for one rig and starts them.
+
+    Args:
+        gestures: all that are known, by name.
+        player: plays them.
+        params: how much of the joints' limits they may use.
+        joints: the rig's, in the order of all sequences of joints.
+        lid_spans_rad: way of each lid from shut to open, by joint.
+    """
+
+    def __init__(
+        self,
+        gestures: Mapping[str, Gesture],
+        player: GesturePlayer,
+        params: GestureParams,
+        joints: tuple[str, ...],
+        lid_spans_rad: Mapping[str, float],
+    ) -> None:
+        self._gestures, self._player, self._joints = gestures, player, joints
+        self._made: dict[tuple[str, int], GestureMotions | GestureRefused] = {}
+        self.retune(params, lid_spans_rad)
+        for name in gestures:
+            self._motions(name, 0)
+
+    def retune(self, params: GestureParams, lid_spans_rad: Mapping[str, float]) -> None:
+        """Change the share of limits and the lids, for the next gesture."""
+        self._params = params
+        self._fit = GestureFit(self._joints, lid_spans_rad)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the gestures whose joints this rig has."""
+        return tuple(
+            name for name in self._gestures if not isinstance(self._motions(name, 0), Exception)
+        )
+
+    @property
+    def playing(self) -> str:
+        """Return the gesture under way, "" where there is none."""
+        return self._player.playing
+
+    def require(self, command: Play) -> None:
+        """See that there is such a gesture, and compute its curves; for any thread.
+
+        Raises:
+            ValueError: there is none; the message lists those there are.
+        """
+        if not command.gesture:
+            return
+        if command.gesture not in self._gestures:
+            there = ", ".join(self.names)
+            raise ValueError(f"no gesture {command.gesture!r}; there is {there}")
+        made = self._motions(command.gesture, command.times)
+        if isinstance(made, GestureRefused):
+            raise ValueError(f"{command.gesture}: {made}")
+
+    def offered(self, limits: Sequence[JointLimit]) -> tuple[GestureInfo, ...]:
+        """Return all gestures with what this rig can do of them.
+
+        Args:
+            limits: of the joints.
+        """
+        return tuple(self._info(name, gesture, limits) for name, gesture in self._gestures.items())
+
+    def _info(self, name: str, gesture: Gesture, limits: Sequence[JointLimit]) -> GestureInfo:
+        middle = np.clip(0.0, [one.low_rad for one in limits], [one.high_rad for one in limits])
+        try:
+            fitted = self._fitted(name, 0, 1.0, middle, limits)
+        except GestureRefused as refused:
+            return GestureInfo(name, gesture.description, refused=str(refused))
+        return GestureInfo(name, gesture.description, fitted.played.duration_s, fitted.slowed_by)
+
+    def play(
+        self, command: Play, t_s: float, commanded_rad: JointAngles, limits: Sequence[JointLimit]
+    ) -> CommandReply:
+        """Begin a gesture from where the joints are, or end the one under way.
+
+        Args:
+            command: which, how fast, how often.
+            t_s: now.
+            commanded_rad: joint angles last sent.
+            limits: of the joints, in force.
+        """
+        share, state = self._params.limit_share, self._player.state(t_s)
+        fade_s = self._fit.fade_s(state, limits, share, self._params.blend_out_ms / 1e3)
+        if not command.gesture:
+            self._player.play(None, t_s, fade_s, 0.0)
+            return CommandReply(gesture=GestureReply("", fade_s))
+        base = self._fit.without(commanded_rad, state)
+        try:
+            fitted = self._fitted(command.gesture, command.times, command.speed, base, limits)
+        except GestureRefused as refused:
+            return CommandReply(f"{command.gesture}: {refused}")
+        wait_s = self._fit.wait_s(state, fade_s, fitted.played, limits, share)
+        self._player.play(fitted.played, t_s, fade_s, wait_s)
+        left_out = self._made_of(command.gesture, command.times).left_out
+        return CommandReply(
+            gesture=GestureReply(
+                command.gesture,
+                wait_s + fitted.played.duration_s,
+                fitted.slowed_by,
+                fitted.slow_joint,
+                fitted.smaller,
+                left_out,
+            )
+        )
+
+    def drop(self) -> str:
+        """Forget the gesture under way, as its joints are led or switched off; return its name."""
+        name = self._player.playing
+        self._player.reset()
+        return name
+
+    def _fitted(
+        self,
+        name: str,
+        count: int,
+        speed: float,
+        base_rad: np.ndarray[tuple[int, ...], np.dtype[np.float64]],
+        limits: Sequence[JointLimit],
+    ) -> FittedGesture:
+        made = self._made_of(name, count)
+        return self._fit.fit(name, made, speed, base_rad, limits, self._params.limit_share)
+
+    def _made_of(self, name: str, count: int) -> GestureMotions:
+        made = self._motions(name, count)
+        if isinstance(made, GestureRefused):
+            raise made
+        return made
+
+    def _motions(self, name: str, count: int) -> GestureMotions | GestureRefused:
+        """Return the curves of a gesture, or why this rig has none of it."""
+        key = name, count if count != self._gestures[name].count else 0
+        if key not in self._made:
+            if len(self._made) >= len(self._gestures) + _MOST_KEPT:
+                self._made = {kept: made for kept, made in self._made.items() if kept[1] == 0}
+            try:
+                self._made[key] = motions(self._gestures[name], self._joints, count)
+            except GestureRefused as refused:
+                self._made[key] = refused
+        return self._made[key]
