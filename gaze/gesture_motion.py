@@ -61,12 +61,15 @@ class GestureMotion:
             (channels.index(name), MinimumJerkCurve(rest_of(name), keys.times_s, keys.values))
             for name, keys in tracks.items()
         ]
+        self._keys_s = [np.array(keys.times_s) for keys in tracks.values()]
         self.duration_s = max(curve.duration_s for _, curve in self._curves)
         self.samples = self._sampled()
 
     def _sampled(self) -> MotionSamples:
         count = min(_MOST_SAMPLES, int(self.duration_s / _SAMPLE_S) + 2)
-        return self.sampled(np.linspace(0.0, self.duration_s, count))
+        even = np.linspace(0.0, self.duration_s, count)
+        # The farthest points are keys, which an even row of moments may miss.
+        return self.sampled(np.unique(np.concatenate((even, *self._keys_s))))
 
     def sampled(self, times_s: Floats) -> MotionSamples:
         """Return the motion at (n,) times since its start."""

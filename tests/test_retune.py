@@ -121,6 +121,7 @@ def test_every_knob_at_any_time_keeps_every_limit_on_the_bus(seed: int, walk: st
 OF_GAZE = (
     "field_of_view", "bottom_up", "top_down", "attention", "idle", "scanpath", "aversion",
     "oculomotor", "saccade", "pursuit", "head", "breathing", "lids",
+    "gestures",
 )  # fmt: skip
 
 

@@ -1,0 +1,188 @@
+"""Gestures as data: curves of least jerk, what a rig can do of them, and bad input."""
+
+from math import degrees, radians
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import make_interp_spline
+
+from gazerig.config.gestures import gestures_of, load_gesture, shipped_gestures
+from gazerig.config.load import ConfigError, shipped_names
+from gazerig.config.schema import load_rig
+from gazerig.gaze.gesture import POSE_TRACKS, Gesture, KeyFrame, keys_of
+from gazerig.gaze.minimum_jerk_curve import MinimumJerkCurve
+from gazerig.robot.app.rig_limits import lid_spans, limits
+from gazerig.robot.model.gesture_fit import FittedGesture, GestureFit, GestureRefused, motions
+
+RIGS = {name: load_rig(name) for name in shipped_names("rigs")}
+
+
+def fitted(gesture: Gesture, rig: str = "desk", speed: float = 1.0, **at: float) -> FittedGesture:
+    """Return a gesture on a shipped rig, with joints at angles in degrees, else at 0."""
+    joints = RIGS[rig].names
+    base = np.array([radians(at.get(name, 0.0)) for name in joints])
+    fit = GestureFit(joints, lid_spans(RIGS[rig]))
+    return fit.fit("x", motions(gesture, joints), speed, base, limits(RIGS[rig].joints), 0.8)
+
+
+def test_there_are_the_gestures_promised() -> None:
+    assert set(shipped_gestures()) >= {
+        *("nod", "shake", "tilt", "double_take", "eye_roll", "look_around", "sleepy"),
+        *("surprised", "laugh", "brow_shrug"),
+    }
+
+
+@pytest.mark.parametrize("rig", RIGS)
+@pytest.mark.parametrize("name", shipped_gestures())
+def test_every_shipped_gesture_is_done_by_every_shipped_rig_as_written(name: str, rig: str) -> None:
+    gesture = shipped_gestures()[name]
+    brows = {"left_brow", "right_brow"} <= set(RIGS[rig].names)
+    if name == "brow_shrug" and not brows:
+        with pytest.raises(GestureRefused, match="left_brow, right_brow"):
+            fitted(gesture, rig)
+        return
+    found = fitted(gesture, rig)
+    assert found.slowed_by == 1.0 and found.smaller == ()
+    samples = found.played.motion.samples
+    assert np.abs(samples.value).max() > radians(3.0)
+    for end in (0, -1):
+        for column in samples[1:]:
+            assert np.abs(column[end]).max() < 1e-9
+
+
+@given(keys=st.lists(st.tuples(st.floats(0.05, 2.0), st.floats(0.1, 30.0)), min_size=1, max_size=8))
+@settings(max_examples=60, deadline=None)
+def test_a_curve_that_does_not_turn_is_the_spline_of_least_jerk(
+    keys: list[tuple[float, float]],
+) -> None:
+    spans, steps = np.array(keys).T
+    times, values = np.cumsum(spans), np.cumsum(steps)
+    curve = MinimumJerkCurve(0.0, times.tolist(), values.tolist())
+    rest = [(1, 0.0), (2, 0.0)]
+    spline = make_interp_spline([0.0, *times], [0.0, *values], k=5, bc_type=(rest, rest))
+    at = np.linspace(0.0, times[-1], 300)
+    scale = np.abs(spline(at)).max()
+    assert np.abs(curve.sampled(at)[0] - spline(at)).max() < 1e-6 * scale
+    assert [curve.at(t) for t in at[::50]] == pytest.approx(curve.sampled(at[::50])[0], abs=1e-9)
+
+
+def test_a_curve_rests_where_it_turns_and_never_swings_past() -> None:
+    curve = MinimumJerkCurve(0.0, [0.3, 0.6, 0.9, 1.4], [10.0, -4.0, -4.0, 0.0])
+    value, speed, acceleration = curve.sampled(np.linspace(0.0, 1.5, 3001))
+    assert value.max() <= 10.0 + 1e-9 and value.min() >= -4.0 - 1e-9
+    at = curve.sampled(np.array([0.3, 0.6, 0.9, 1.4]))
+    assert np.abs(at[1]).max() < 1e-9 and np.abs(at[2]).max() < 1e-6
+    assert np.abs(np.gradient(value, 5e-4) - speed).max() < 0.2
+    assert np.abs(np.gradient(speed, 5e-4) - acceleration)[5:-5].max() < 20.0
+
+
+def nod(**more: object) -> Gesture:
+    frames = (KeyFrame(0.2, head_pitch_deg=-8.0), KeyFrame(0.5, head_pitch_deg=0.0))
+    return Gesture("a nod", frames, **more)  # type: ignore[arg-type]
+
+
+def test_too_fast_is_refused_with_joint_time_and_limit_or_slowed() -> None:
+    fast = (KeyFrame(0.05, head_pitch_deg=-10.0),)
+    with pytest.raises(
+        GestureRefused, match=r"neck_pitch at 0\.0\d s: needs \d+ deg/s2, and gestures may use 1600"
+    ):
+        fitted(Gesture("a jerk", fast))  # fmt: skip
+    slow = fitted(Gesture("a jerk", fast, fit="slow"))
+    # 10 deg in 50 ms peak at 5.7735 x 10 / .05^2 = 23094 deg/s2; 1600 may be used.
+    assert slow.slowed_by == pytest.approx((23094.0 / 1600.0) ** 0.5, rel=0.01)
+    assert slow.slow_joint == "neck_pitch"
+    most = np.abs(slow.played.motion.samples.scaled(np.array(slow.played.sizes), slow.played.speed).acceleration)  # fmt: skip
+    assert degrees(most.max()) == pytest.approx(1600.0, rel=0.01)
+
+
+def test_at_the_end_of_a_range_it_is_smaller_or_refused() -> None:
+    with pytest.raises(
+        GestureRefused, match=r"neck_pitch at 0\.\d\d s: leaves its range -35\.\.35"
+    ):
+        fitted(nod(), neck_pitch=-31.0)  # fmt: skip
+    found = fitted(nod(fit="slow"), neck_pitch=-31.0)
+    assert found.smaller == (("neck_pitch", pytest.approx(0.5)),)
+    with pytest.raises(GestureRefused, match="neck_pitch is at the end of its range"):
+        fitted(nod(fit="slow"), neck_pitch=-34.5)
+
+
+def test_joints_that_a_rig_lacks_are_left_out_where_optional_else_refused_by_name() -> None:
+    jaw = (KeyFrame(0.3, head_pitch_deg=5.0, joints_deg={"jaw": 10.0}),)
+    with pytest.raises(GestureRefused, match="it moves jaw, which this rig lacks"):
+        fitted(Gesture("a yawn", jaw))
+    made = motions(Gesture("a yawn", jaw, optional=("jaw",)), RIGS["desk"].names)
+    assert made.left_out == ("jaw",)
+    with pytest.raises(GestureRefused, match="this rig has none of the joints"):
+        motions(Gesture("a yawn", (KeyFrame(0.3, joints_deg={"jaw": 9.0}),), optional=("jaw",)), RIGS["desk"].names)  # fmt: skip
+
+
+def test_a_loop_repeats_and_all_ends_at_rest() -> None:
+    laugh = shipped_gestures()["laugh"]
+    once, often = (keys_of(laugh, laugh.frames, count) for count in (1, 5))
+    pitch = once["head_pitch"], often["head_pitch"]
+    assert len(pitch[1].times_s) == len(pitch[0].times_s) + 4 * 2
+    assert pitch[1].times_s[-1] == pytest.approx(pitch[0].times_s[-1] + 4 * 0.3)
+    aside = Gesture("aside", (KeyFrame(0.3, eyes_yaw_deg=5.0),), return_s=0.7)
+    assert keys_of(aside, aside.frames, 1)["eyes_yaw"].times_s == (0.3, 1.0)
+
+
+def test_in_joint_space_the_eyes_go_along_with_the_head() -> None:
+    for space, follows in (("gaze", 0.0), ("joint", 1.0)):
+        motion = motions(nod(space=space), RIGS["desk"].names).motion
+        flat = [0.0] * len(POSE_TRACKS)
+        motion.add_to(flat, 0.2, (1.0,) * len(flat))
+        assert flat[1] == pytest.approx(radians(-8.0))
+        assert flat[POSE_TRACKS.index("eyes_pitch")] == pytest.approx(follows * radians(-8.0))
+        eyes = motion.samples.value[:, POSE_TRACKS.index("eyes_pitch")]
+        assert np.allclose(eyes, follows * motion.samples.value[:, 1])
+
+
+BAD = {
+    "frames:\n  - {time_s: 0.2}\n": ("frames.0", "names nothing that moves"),
+    "frames:\n  - {time_s: 0.2, head_pich_deg: 3}\n": ("frames.0.head_pich_deg", "head_pitch_deg"),
+    "frames:\n  - {time_s: 0.2, head_pitch_deg: 300}\n": ("frames.0.head_pitch_deg", "90"),
+    "frames:\n  - {time_s: 0.2, lids: {top: 0.5}}\n": ("frames.0", "no lids 'top'"),
+    "frames:\n  - {time_s: 0.2, head_yaw_deg: .nan}\n": ("frames.0.head_yaw_deg", ""),
+    "frames: []\n": ("", "at least one frame"),
+    "frames:\n  - {time_s: 0.5, head_yaw_deg: 1}\n  - {time_s: 0.5, head_yaw_deg: 2}\n": (
+        "frames.1.time_s",
+        "later than the frame before",
+    ),
+    "loop_s: [0.1, 0.5]\nframes:\n  - {time_s: 0.5, head_yaw_deg: 1}\n": ("loop_s", "no frame"),
+    "frames:\n  - {time_s: 0.5, joints_deg: {neck_yaw: 1}}\n": (
+        "frames.0.joints_deg.neck_yaw",
+        "head_yaw_deg",
+    ),
+    "fit: maybe\nframes:\n  - {time_s: 0.5, head_yaw_deg: 1}\n": ("fit", "slow"),
+}
+
+
+@pytest.mark.parametrize("text", BAD)
+def test_a_bad_file_is_answered_with_line_key_and_rule(text: str, tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(f"description: mine\n{text}", encoding="utf-8")
+    with pytest.raises(ConfigError) as caught:
+        load_gesture(file)
+    key, rule = BAD[text]
+    (fault,) = caught.value.faults
+    assert fault.key == key and rule in fault.rule
+    assert fault.line is not None and fault.line >= 1
+
+
+def test_a_rig_with_gestures_of_its_own_is_checked_with_them(tmp_path: Path) -> None:
+    good, bad = tmp_path / "wave_back.yaml", tmp_path / "twitch.yaml"
+    good.write_text("description: x\nframes:\n  - {time_s: 0.5, head_yaw_deg: 5}\n")
+    bad.write_text("description: x\nframes:\n  - {time_s: 0.05, head_yaw_deg: 30}\n")
+    assert "wave_back" in gestures_of([str(good)])
+    mine = tmp_path / "rig.yaml"
+    mine.write_text(f"gesture_files: [{good}, {bad}]\n")
+    whole = Path("config/rigs/desk.yaml").read_text(encoding="utf-8")
+    mine.write_text(f"{whole}\ngesture_files: [{good}, {bad}]\n", encoding="utf-8")
+    with pytest.raises(ConfigError) as caught:
+        load_rig(str(mine))
+    (fault,) = caught.value.faults
+    assert fault.key == "gesture_files.1" and "neck_yaw at 0.0" in fault.rule
+    assert fault.line == whole.count("\n") + 2
