@@ -9,6 +9,7 @@ import pytest
 
 from gazerig.config.load import ConfigError, ConfigFault
 from gazerig.drivers.errors import SetupError
+from gazerig.robot.control.gesture_choices import GestureInfo
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.commands import Command
 from gazerig.robot.remote.client import running
@@ -23,6 +24,9 @@ class Robot:
 
     def menus(self) -> dict[str, tuple[str, ...]]:
         return {}
+
+    def gestures(self) -> tuple[GestureInfo, ...]:
+        return ()
 
 
 class FileOnly:
