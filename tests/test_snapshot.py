@@ -21,6 +21,8 @@ from gazerig.robot.dashboard.page_process import MESSAGE_BYTES, pack, unpack
 from gazerig.robot.dashboard.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts, snapshot
 from gazerig.robot.model.types import SeenBlink, SeenFixation, SeenSaccade, Snapshot
 
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
 RATE_HZ = 200.0
 TICKS_BETWEEN = 8
 

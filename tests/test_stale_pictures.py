@@ -18,6 +18,8 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
 GONE_S, BACK_S, END_S = 2.0, 9.0, 12.0
 LOST, FOUND = "camera lost: trying it again", "camera back after 7.0 s"
 NECK = slice(GAZE_JOINTS.index("neck_yaw"), GAZE_JOINTS.index("neck_roll") + 1)
