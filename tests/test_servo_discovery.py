@@ -274,7 +274,7 @@ def test_the_present_place_becomes_the_middle_for_good():
 def test_the_middle_is_not_set_under_torque_nor_of_nobody():
     bench = Bench(FEETECH, 1_000_000, 7).opened()
     bench.chain[7].write(40, b"\x01")
-    with pytest.raises(ServoFault, match="servo 7 holds its place: let it go"):
+    with pytest.raises(ServoFault, match="servo 7 has its torque on: switch it off before"):
         set_middle(bench.port, FEETECH, 7)
     with pytest.raises(ServoMissing, match="servo 8 does not answer"):
         set_middle(bench.port, FEETECH, 8)
