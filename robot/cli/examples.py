@@ -78,6 +78,15 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("ctl ask behaviour guard", "another behaviour of its rules"),
         ("ctl ask conversation listen", "look away as a listener does"),
     ),
+    "express": (
+        ("ctl express", "the expressions of the running rig, the present one first"),
+        ("ctl express happy", "blend to one of them"),
+        ("ctl express happy --strength 0.5", "half of it"),
+    ),
+    "level": (
+        ("ctl level mouth 0.7 --seconds 2", "the jaw 70 % open for two seconds"),
+        ("ctl level mouth -", "values from standard input, one a line"),
+    ),
     "status": (
         ("ctl status", "what the running rig looks at and why, guard, joints"),
         ("ctl status --json", "the same for a program"),

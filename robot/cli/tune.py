@@ -10,6 +10,7 @@ import typer
 
 from gazerig.config.load import ConfigError, read_yaml, shipped_names
 from gazerig.drivers.errors import DriverError, SetupError
+from gazerig.robot.cli import animation as cli_animation
 from gazerig.robot.cli import lead as cli_lead
 from gazerig.robot.cli.lead import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
@@ -22,6 +23,7 @@ ctl = typer.Typer(
     no_args_is_help=True,
 )
 ctl.add_typer(cli_lead.app)
+ctl.add_typer(cli_animation.app)
 app = typer.Typer()
 app.add_typer(ctl)
 app.command()(cli_lead.stop)

@@ -5,6 +5,7 @@ from html import escape
 
 import viser
 
+from gazerig.robot.dashboard.animation_panel import EXPRESSION, AnimationPanel
 from gazerig.robot.dashboard.jog_panel import JogPanel
 from gazerig.robot.dashboard.outbox import Outbox
 from gazerig.robot.dashboard.param_panel import ParamState
@@ -19,7 +20,7 @@ _TARGET_SCALE = 0.12
 
 
 class ControlTabs:
-    """Three tabs: lead, joints, tuning."""
+    """Three tabs: lead, joints, tuning; a fourth, face, where the rig has expressions."""
 
     def __init__(self, server: viser.ViserServer, outbox: Outbox) -> None:
         # A window of its own: below words that grow and shrink, a button would slip away from
@@ -31,6 +32,7 @@ class ControlTabs:
         self._lead = LeadView(server, lead, outbox)
         self._joints = JogPanel(server.gui, joints, outbox)
         self._tuning = ParamState(server, tuning, outbox)
+        self._face = AnimationPanel(server.gui, window, outbox)
 
     def leave(self) -> None:
         """Remove all controls: a recording cannot be controlled."""
@@ -40,7 +42,10 @@ class ControlTabs:
     def offer(self, menus: Mapping[str, Sequence[str]]) -> None:
         """Add menus, each with what can be chosen from it."""
         for name, choices in menus.items():
-            self._lead.offer(name, choices)
+            if name == EXPRESSION:
+                self._face.offer(choices)
+            else:
+                self._lead.offer(name, choices)
 
     def params(self, params: Sequence[Mapping[str, object]]) -> None:
         """Add parameters that can be tuned, as the rig describes them."""

@@ -22,9 +22,11 @@ from gazerig.errors import HeadEnded, NotFound, Refused
 from gazerig.robot.model.commands import (
     Ask,
     Command,
+    Express,
     Jog,
     LookAt,
     Resume,
+    SetLevel,
     Stop,
     Value,
     as_json,
@@ -213,6 +215,22 @@ class RobotClient:
             RequestRejected: there is no such menu or choice.
         """
         self._command(Ask(menu, choice))
+
+    def express(self, expression: str, strength: float = 1.0) -> None:
+        """Move to a facial expression of the rig's table; strength 0..1.
+
+        Raises:
+            RequestRejected: there is no such expression; the message lists those there are.
+        """
+        self._command(Express(expression, strength))
+
+    def set_level(self, level: str, value: float) -> None:
+        """Set a level of the rig's table, 0..1; not set for half a second it falls to 0.
+
+        Raises:
+            RequestRejected: there is no such level; the message lists those there are.
+        """
+        self._command(SetLevel(level, value))
 
     def look_at(self, x_m: float, y_m: float, z_m: float, stay: bool = False) -> CommandReply:
         """Look at a point: metres, x ahead, y left, z up of the neck base.

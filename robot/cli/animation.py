@@ -1,0 +1,83 @@
+"""Commands that move the face of a rig which runs in another terminal: expressions and levels."""
+
+import contextlib
+import sys
+from collections.abc import Iterable, Iterator
+from math import inf
+from typing import Annotated
+
+import typer
+
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.cli.lead import PidOption
+from gazerig.robot.cli.terminal import clear_errors, say
+from gazerig.robot.model.clock import RealClock
+from gazerig.robot.remote.client import RobotClient
+
+app = typer.Typer()
+_SET_EVERY_S = 0.1
+"""A level falls to 0 when it is not set for half a second."""
+
+
+@app.command()
+def express(
+    expression: Annotated[
+        str | None, typer.Argument(help="One of the rig's table; without it, all are listed.")
+    ] = None,
+    strength: Annotated[
+        float, typer.Option("--strength", min=0.0, max=1.0, help="1 as in the table, 0 none of it.")
+    ] = 1.0,
+    pid: PidOption = None,
+) -> None:
+    """Move the running head's face to an expression, or list the expressions."""
+    with clear_errors(), RobotClient.connect(pid, "gazerig ctl express") as rig:
+        if expression is None:
+            there = rig.menus().get("expression", ())
+            say(", ".join(there) or "this rig has no table expressions")
+            return
+        rig.express(expression, strength)
+        say(f"{expression} is in force" + (f", strength {strength:g}" if strength != 1.0 else ""))
+
+
+@app.command()
+def level(
+    name: Annotated[str, typer.Argument(help="A level of the rig's table, such as mouth.")],
+    value: Annotated[str, typer.Argument(metavar="0..1 | -", help="Or - to read values by line.")],
+    seconds: Annotated[
+        float | None, typer.Option(min=0.0, help="Keep it for S seconds; else until Ctrl-C.")
+    ] = None,
+    pid: PidOption = None,
+) -> None:
+    """Set a level, such as a jaw by loudness, while this command runs; then it falls to 0."""
+    with clear_errors():
+        values = _lines(sys.stdin) if value == "-" else _kept(_number(value), seconds)
+        with RobotClient.connect(pid, "gazerig ctl level") as rig:
+            with contextlib.suppress(KeyboardInterrupt):
+                for one in values:
+                    rig.set_level(name, one)
+            rig.set_level(name, 0.0)
+
+
+def _kept(value: float, seconds: float | None) -> Iterator[float]:
+    """Repeat a value for so long, at the pace that keeps it up."""
+    clock = RealClock()
+    end_s = clock.now_s() + (inf if seconds is None else seconds)
+    yield value
+    while (now_s := clock.now_s()) < end_s:
+        clock.sleep_until(min(end_s, now_s + _SET_EVERY_S))
+        yield value
+
+
+def _lines(lines: Iterable[str]) -> Iterator[float]:
+    """Return the number of every line as it comes."""
+    return (_number(line) for line in lines if line.strip())
+
+
+def _number(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = -1.0
+    if not 0.0 <= value <= 1.0:
+        raise SetupError(f"{text.strip()!r:.40} is no level: give a number 0..1")
+    return value

@@ -1,0 +1,119 @@
+"""Expressions and levels asked for from the command line, from Python and on the page."""
+
+import asyncio
+from collections.abc import Iterator
+from math import degrees
+
+import pytest
+import viser
+from expressive_rig import started
+from page_visitor import PATIENCE_S
+from typer.testing import CliRunner
+
+from gazerig.robot.app.assemble import Assembly
+from gazerig.robot.cli.tune import app
+from gazerig.robot.dashboard.animation_panel import AnimationPanel
+from gazerig.robot.model.commands import Command, Express, SetLevel
+from gazerig.robot.model.reply import Ticket
+from gazerig.robot.remote.client import RobotClient
+from gazerig.robot.remote.request_handler import Pulse, RequestHandler
+
+
+class TickedRig:
+    """A rig that ticks once whenever a command comes, and its connection in one object."""
+
+    def __init__(self, made: Assembly) -> None:
+        self.made, self.pulse = made, Pulse(made.clock)
+        self.commands: list[Command] = []
+        self.handler = RequestHandler(self, None, self.pulse, {})
+        self.answer: object = None
+
+    def command(self, command: Command) -> Ticket:
+        ticket = self.made.robot.command(command)
+        self.commands.append(command)
+        self.tick()
+        return ticket
+
+    def tick(self, number: int = 1) -> dict[str, float]:
+        for _ in range(number):
+            self.made.clock.sleep_until(self.made.clock.now_s() + 0.005)
+            tick = self.made.robot.tick(self.made.clock.now_s(), 0.005)
+            self.pulse.update(tick)
+        return dict(zip(self.made.robot.body.names, map(degrees, tick.desired_rad), strict=True))
+
+    def menus(self) -> dict[str, tuple[str, ...]]:
+        return self.made.robot.menus()
+
+    def write(self, request: object, within_s: float) -> None:
+        self.answer = self.handler.answer(request)
+
+    def read(self, first_s: float, within_s: float) -> object:
+        return self.answer
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.fixture
+def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[TickedRig]:
+    made = started()
+    rig = TickedRig(made)
+    monkeypatch.setattr(Pulse, "taken_up", lambda *_, **__: True)
+    monkeypatch.setattr(
+        RobotClient, "connect", lambda pid=None, who="": RobotClient(rig, 1)  # type: ignore[arg-type]
+    )  # fmt: skip
+    yield rig
+    made.close()
+
+
+def gazerig(*words: str, typed: str = "") -> str:
+    done = CliRunner().invoke(app, words, input=typed)
+    return done.stdout + done.stderr
+
+
+def test_an_expression_from_the_command_line(rig: TickedRig) -> None:
+    assert "neutral, happy, sad, surprised" in gazerig("ctl", "express")
+    assert "happy is in force, strength 0.5" in gazerig(
+        "ctl", "express", "happy", "--strength", "0.5"
+    )
+    assert rig.tick(200)["jaw"] == pytest.approx(3.0)
+    assert "expression: happy (in force), neutral, sad" in gazerig("ctl", "ask", "expression")
+    assert "there is neutral, happy, sad, surprised" in gazerig("ctl", "express", "glad")
+
+
+def test_a_level_from_the_command_line_is_kept_up_and_let_go(rig: TickedRig) -> None:
+    assert gazerig("ctl", "level", "mouth", "0.7", "--seconds", "0.25") == ""
+    assert rig.commands == [SetLevel("mouth", 0.7)] * 4 + [SetLevel("mouth", 0.0)]
+    assert "'loud' is no level: give a number 0..1" in gazerig("ctl", "level", "mouth", "loud")
+    assert "no level 'ear'; there is mouth" in gazerig("ctl", "level", "ear", "1")
+
+
+def test_levels_come_from_standard_input(rig: TickedRig) -> None:
+    assert gazerig("ctl", "level", "mouth", "-", typed="0.2\n\n1\n") == ""
+    assert rig.commands == [SetLevel("mouth", v) for v in (0.2, 1.0, 0.0)]
+
+
+def test_buttons_and_strength_on_the_page() -> None:
+    server = viser.ViserServer(port=0, verbose=False)
+    asked: list[tuple[Command, str]] = []
+
+    class Outbox:
+        def command(self, command: Command, who: str) -> bool:
+            asked.append((command, who))
+            return True
+
+    try:
+        panel = AnimationPanel(server.gui, server.gui.add_panel(), Outbox())  # type: ignore[arg-type]
+        panel.offer(["sad", "neutral", "happy"])
+        panel.offer(["happy", "neutral", "sad"])
+        group, strength = panel._expressions, panel._strength
+        assert group is not None and strength is not None
+        assert group.options == ("neutral", "happy", "sad")
+        strength.value = 0.4
+        group._impl.value = "sad"
+        (callback,) = group._impl.update_cb
+        event = viser.GuiEvent(None, 5, group)  # type: ignore[arg-type]
+        asyncio.run_coroutine_threadsafe(callback(event), server._event_loop).result(PATIENCE_S)  # type: ignore[arg-type]
+        assert asked == [(Express("sad", 0.4), "5")]
+    finally:
+        server.stop()
