@@ -109,10 +109,10 @@ def test_buttons_and_strength_on_the_page() -> None:
         group, strength = panel._expressions, panel._strength
         assert group is not None and strength is not None
         assert group.options == ("neutral", "happy", "sad")
-        strength.value = 0.4
+        strength._impl.value = 0.4
         group._impl.value = "sad"
         (callback,) = group._impl.update_cb
-        event = viser.GuiEvent(None, 5, group)  # type: ignore[arg-type]
+        event = viser.GuiEvent(None, 5, group)
         asyncio.run_coroutine_threadsafe(callback(event), server._event_loop).result(PATIENCE_S)  # type: ignore[arg-type]
         assert asked == [(Express("sad", 0.4), "5")]
     finally:
