@@ -15,6 +15,8 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.servo_models import STEPS_PER_TURN
 from gazerig.robot.bringup.servo_families import kind_of
 from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.kinematics import LIDS
+from gazerig.robot.model.types import GAZE_JOINTS
 
 SMALLEST_RANGE_DEG = 5.0
 """A joint that moves less than this was not really moved."""
@@ -117,7 +119,14 @@ class Unwrapped:
 
 def ends_of(joint_name: str) -> tuple[str, str]:
     """Return the names of a joint's positive and negative end."""
+    if joint_name not in GAZE_JOINTS:
+        return "POSITIVE", "NEGATIVE"
     return next(ends for part, ends in ENDS.items() if joint_name.endswith(part))
+
+
+def zero_of(joint_name: str) -> str:
+    """Return what people call the position of a joint at 0 deg."""
+    return "straight ahead" if joint_name in GAZE_JOINTS else "at rest"
 
 
 def _plain(value: Value) -> Value:
@@ -133,7 +142,7 @@ def _short(number: float) -> float:
 
 def is_lid(joint_name: str) -> bool:
     """Return whether a joint moves a lid: its ends matter, and it has no straight ahead."""
-    return joint_name.endswith("_lid")
+    return joint_name in LIDS
 
 
 def lid_keys(joint_name: str) -> tuple[str, str]:
@@ -157,6 +166,9 @@ def calibration(name: str, marks: Marks, joint: JointParams, margin_deg: float) 
     """
     steps_per_deg = joint.ratio * STEPS_PER_TURN / 360.0
     low, high = sorted((marks.positive_end, marks.negative_end))
+    at_end = name not in GAZE_JOINTS  # a jaw rests where it is shut, at one of its ends
+    if at_end and low - steps_per_deg <= marks.zero <= high + steps_per_deg:
+        marks = marks._replace(zero=min(max(marks.zero, low), high))
     travel_deg = (high - low) / steps_per_deg
     if travel_deg <= SMALLEST_RANGE_DEG:
         raise CalibrationRefused(
@@ -165,16 +177,18 @@ def calibration(name: str, marks: Marks, joint: JointParams, margin_deg: float) 
             "and is its horn screwed on?"
         )
     _refuse_seam(name, low, high, steps_per_deg, kind_of(joint.model).set_middle is not None)
-    if not low < marks.zero < high:
+    if not (low < marks.zero < high or (at_end and low <= marks.zero <= high)):
         raise CalibrationRefused(
-            f"{name}: straight ahead (step {marks.zero % STEPS_PER_TURN}) does not lie between "
+            f"{name}: {zero_of(name)} (step {marks.zero % STEPS_PER_TURN}) does not lie between "
             f"the ends (steps {low % STEPS_PER_TURN} and {high % STEPS_PER_TURN}): "
             "mark the three places anew"
         )
     sign = 1 if marks.positive_end > marks.negative_end else -1
     most = abs(marks.positive_end - marks.zero) / steps_per_deg - margin_deg
     least = abs(marks.negative_end - marks.zero) / steps_per_deg - margin_deg
-    made = Calibration(marks.zero % STEPS_PER_TURN, sign, -inwards(least), inwards(most))
+    if at_end:
+        most, least = max(0.0, most), max(0.0, least)
+    made = Calibration(marks.zero % STEPS_PER_TURN, sign, 0.0 - inwards(least), inwards(most))
     _refuse_unfit(name, made, joint, margin_deg)
     return made
 
@@ -217,7 +231,7 @@ def _refuse_seam(name: str, low: int, high: int, steps_per_deg: float, settable:
 
 def _refuse_unfit(name: str, made: Calibration, joint: JointParams, margin_deg: float) -> None:
     """Refuse what the rig file's own rules would."""
-    if not made.min_deg < 0.0 < made.max_deg:
+    if name in GAZE_JOINTS and not made.min_deg < 0.0 < made.max_deg:
         raise CalibrationRefused(
             f"{name}: straight ahead lies within {margin_deg:g} deg of an end (range "
             f"{made.min_deg:g}..{made.max_deg:g} deg): build the horn in anew, or lessen the margin"

@@ -18,6 +18,7 @@ from gazerig.robot.calibration.joint_calibration import (
     ends_of,
     is_lid,
     middle,
+    zero_of,
 )
 
 ZeroBy = Literal["middle", "person"]
@@ -87,7 +88,9 @@ def by_hand(single: SingleJoint, person: Operator, margin_deg: float) -> Calibra
 
     first = mark(f"to its {positive} end")
     marks = Marks(first, mark(f"to its {negative} end"), 0)
-    marks = middle(marks) if is_lid(single.name) else marks._replace(zero=mark("straight ahead"))
+    marks = (
+        middle(marks) if is_lid(single.name) else marks._replace(zero=mark(zero_of(single.name)))
+    )
     return calibration(single.name, marks, single.joint, margin_deg)
 
 
@@ -113,7 +116,7 @@ def by_motion(
     person.tell(f"{single.who}: torque off")
     if zero_by == "person" and not is_lid(single.name):
         watched = Watched(single)
-        person.wait(f"turn {single.name} straight ahead, then press Enter", watched.live)
+        person.wait(f"turn {single.name} {zero_of(single.name)}, then press Enter", watched.live)
         marks = marks._replace(zero=watched.steps())
     else:
         marks = middle(marks)

@@ -14,8 +14,10 @@ from gazerig.robot.calibration.joint_calibration import (
     LinkageFit,
     inwards,
     is_lid,
+    zero_of,
 )
 from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.types import GAZE_JOINTS
 
 Place = tuple[float, float]
 """(angle, position)"""
@@ -58,13 +60,15 @@ def places(name: str, marked: Sequence[Place], joint: JointParams, margin_deg: f
     linkage = tuple(sorted((round(angle, 1) + 0.0, position) for angle, position in marked))
     kept = 0.0 if is_lid(name) else margin_deg
     low, high = -inwards(-(linkage[0][0] + kept)), inwards(linkage[-1][0] - kept)
+    if name not in GAZE_JOINTS and linkage[0][0] <= 0.0 <= linkage[-1][0]:
+        low, high = min(low, 0.0), max(high, 0.0)  # a jaw rests where it is shut, at one end
     if not low <= 0.0 <= high:
         raise CalibrationRefused(
             f"{name}: 0 deg must lie within its range, which is {low:g}..{high:g} deg: "
             + (
                 "call half open 0"
                 if is_lid(name)
-                else "call straight ahead 0, or lessen the margin"
+                else f"call it {zero_of(name)} 0, or lessen the margin"
             )
         )
     if high - low <= SMALLEST_RANGE_DEG:

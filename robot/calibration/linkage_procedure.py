@@ -9,7 +9,7 @@ from typing import Protocol
 
 from gazerig.robot.calibration.hobby_access import OneHobby
 from gazerig.robot.calibration.joint_access import SingleJoint
-from gazerig.robot.calibration.joint_calibration import LinkageFit, ends_of, is_lid
+from gazerig.robot.calibration.joint_calibration import LinkageFit, ends_of, is_lid, zero_of
 from gazerig.robot.calibration.joint_procedure import Operator, Watched
 from gazerig.robot.calibration.linkage_calibration import (
     Place,
@@ -222,7 +222,7 @@ def by_places(placer: Placer, person: Steerer, margin_deg: float, more: int) -> 
 def _turning(placer: Placer, person: Steerer) -> list[Place]:
     """Mark straight ahead, which is 0 deg, and both ends."""
     positive, negative = ends_of(placer.name)
-    marked = [(0.0, placer.mark("straight ahead"))]
+    marked = [(0.0, placer.mark(zero_of(placer.name)))]
     for end, sign in ((positive, 1), (negative, -1)):
         at = placer.mark(f"to its {end} end, as far as it goes freely")
         marked.append((_angle(placer, person, at, sign * abs(angle_now(placer.joint, at))), at))
