@@ -59,6 +59,12 @@ _OPEN_RAD = radians(48.0)
 _LOWER_OPEN_RAD = radians(-46.0)
 
 SIDES = ("left", "right")
+JAW = "jaw"
+"""A joint of this name is drawn as a chin that opens downwards."""
+_JAW_HINGE_M: Vec3 = (-0.05, 0.0, -0.03)
+"""Below the ears."""
+_CHIN_M: Vec3 = (-0.018, 0.0, -0.078)
+_CHIN_HALF_AXES_M: Vec3 = (0.026, 0.032, 0.014)
 
 
 class _EyeModel(NamedTuple):
@@ -113,6 +119,10 @@ class HeadModel:
         self._add("/head/shell", ellipsoid(SHELL_HALF_AXES_M, 0.86, 33), _SHELL, SHELL_MIDDLE_M)
         self._add("/head/nose", ellipsoid((0.013, 0.008, 0.014)), _SHELL, (0.005, 0.0, -0.034))
         self._add("/head/mouth", ellipsoid((0.005, 0.019, 0.002)), _TRIM, (-0.0105, 0.0, -0.064))
+        self._jaw = self._scene.add_frame("/head/jaw", show_axes=False, position=_JAW_HINGE_M)
+        self._jaw.visible = False
+        chin = sub(_CHIN_M, _JAW_HINGE_M)
+        self._add("/head/jaw/chin", ellipsoid(_CHIN_HALF_AXES_M), _SHELL, chin)
         ear = turned([(0.0, 0.0), (0.022, 0.0), (0.022, 0.0), (0.018, 0.009), (0.0, 0.011)])
         x, _, z = SHELL_MIDDLE_M
         for side, y, turn in (("left", 0.070, -pi / 2), ("right", -0.070, pi / 2)):
@@ -156,6 +166,8 @@ class HeadModel:
         R_world_head, p_world_head_m = snapshot.R_world_head, snapshot.p_world_head_m
         put(self._head, p_world_head_m, quaternion(R_world_head))
         self._hold_up(R_world_head, p_world_head_m)
+        if JAW in self._joints:
+            turn_to(self._jaw, jaw_turn(snapshot.measured_rad[self._joints.index(JAW)]))
         colour = _SIGHT.get(snapshot.phase, _SIGHT["fixate"])
         sides = zip(
             self._eyes,
@@ -187,6 +199,7 @@ class HeadModel:
         self._post.visible = not self._necked
         if self._necked:
             put(self._foot, (0.0, 0.0, FLOOR_M))
+        self._jaw.visible = JAW in joints
         for eye in self._eyes:
             eye.upper.visible = f"{eye.side}_upper_lid" in joints
             # An upper lid shuts upon a lower one, moved or not.
@@ -220,6 +233,11 @@ class HeadModel:
             self._neck_m = length
             self._neck.scale = (1.0, 1.0, length)
         turn_to(self._neck, upright_along(top_m))
+
+
+def jaw_turn(angle_rad: float) -> Turn:
+    """Return the turn of a jaw: + is open, the chin down."""
+    return turned_up(-angle_rad)
 
 
 def lid_turn(opening: float) -> Turn:

@@ -1,0 +1,186 @@
+"""The shipped rig with a jaw and brows goes through every part of the program."""
+
+import json
+from dataclasses import replace
+from math import degrees
+from pathlib import Path
+
+import pytest
+import viser
+from command_line import answers_in, invoked
+from expressive_rig import started
+from shown_page import SNAPSHOT
+
+from gazerig.config.parameters import changed, parameters
+from gazerig.config.schema import load_rig
+from gazerig.config.text import rig_text, walk_text
+from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.resimulate import rerun
+from gazerig.robot.calibration.joint_calibration import (
+    CalibrationRefused,
+    Marks,
+    calibration,
+    ends_of,
+)
+from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.dashboard.head_model import HeadModel
+from gazerig.robot.model.commands import Command, Express, SetLevel
+from gazerig.robot.recording.read import RunRecording
+from gazerig.robot.recording.recorder import Recorder
+from gazerig.robot.recording.run_info import RunInfo
+
+NAMES = (
+    "eyes_pan", "eyes_tilt", "left_upper_lid", "right_upper_lid", "neck_yaw", "neck_pitch", "jaw",
+    "left_brow", "right_brow",
+)  # fmt: skip
+ASKED: dict[int, tuple[Command, ...]] = {
+    20: (Express("surprised"),),
+    90: (Express("happy", 0.5), SetLevel("mouth", 0.4)),
+    **{k: (SetLevel("mouth", (k % 7) / 7.0),) for k in range(100, 180, 3)},
+}
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunRecording, list[Tick]]:
+    """Record two seconds with expressions and a level."""
+
+    rig = load_rig("expressive")
+    path = tmp_path_factory.mktemp("face") / "face.mcap"
+    info = RunInfo(
+        rig="expressive", profile=rig.profile, character=None, config_yaml=rig_text(rig),
+        walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix), seed=3, rate_hz=rig.loop.rate_hz,
+        started_utc="2026-01-31T12:00:00+00:00", scene="visitor", mock=True, fast=True,
+    )  # fmt: skip
+    recorder = Recorder(path, info, patient=True)
+    recorder.open()
+    options = RunOptions(mock=True, fast=True, seed=3, scene="visitor")
+    made = assemble(rig, options, Substitutes(body=recorder.recorded))
+    seen: list[Tick] = []
+
+    def watch(tick: Tick) -> None:
+        recorder.record(tick)
+        seen.append(tick)
+        for command in ASKED.get(len(seen), ()):
+            made.robot.command(command)
+
+    made.robot.start(made.clock)
+    stop = recorder.timed(lambda s: "seconds" if s >= 2.0 - 1e-9 else None)
+    run(made.robot, made.clock, lambda: made.loop, stop, watch)
+    made.robot.stop()
+    recorder.close("seconds", made.sent_digest())
+    made.close()
+    return RunRecording(path), seen
+
+
+def test_a_recorded_face_is_rerun_with_the_same_angles(
+    recorded: tuple[RunRecording, list[Tick]],
+) -> None:
+    recording, ticks = recorded
+    again: list[Tick] = []
+    rerun(recording, on_tick=again.append)
+    assert [t.guard_result.command_rad for t in again] == [
+        t.guard_result.command_rad for t in ticks
+    ]
+    jaw = [degrees(t.joints.position_rad[NAMES.index("jaw")]) for t in ticks]
+    assert max(jaw) > 8.0
+    assert len([c for t in ticks for c in t.commands]) == 30
+
+
+def test_it_is_exported_and_reported(
+    recorded: tuple[RunRecording, list[Tick]], tmp_path: Path
+) -> None:
+    path = str(recorded[0].path)
+    assert invoked("export", path, "--csv", "--out", str(tmp_path / "gaze")).code == 0
+    about = json.loads((tmp_path / "gaze_samples.json").read_text())
+    assert about["joints"] == list(NAMES)
+    assert invoked("report", path, "--out", str(tmp_path / "report.html")).code in (0, 1)
+    assert (tmp_path / "report.html").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "said"),
+    [
+        (("check", "expressive"), 0, "good: rig 'expressive', 9 joints"),
+        (("scan", "--mock", "--rig", "expressive", "--kind", "feetech"), 0, "9 servos on"),
+        (("setup", "expressive", "--mock", "--joint", "jaw", "--yes"), 0, "jaw (servo 7): id 1 -> 7"),
+        (("monitor", "expressive", "--mock", "--seconds", "0.3"), 0, "right_brow"),
+        (("jog", "expressive", "jaw", "40", "--mock"), 2, "jaw"),
+    ],
+)  # fmt: skip
+def test_bring_up_knows_all_joints(words: tuple[str, ...], code: int, said: str) -> None:
+    done = invoked(*words)
+    assert done.code == code, done
+    assert said in done.out + done.err
+
+
+def test_doctor_names_the_jaw_and_mends_its_limits() -> None:
+    done = invoked("doctor", "expressive", "--mock")
+    assert "jaw, left_brow, right_brow (servos" in done.out + done.err
+
+
+def test_a_jaw_is_calibrated_by_motion(tmp_path: Path) -> None:
+    rig = tmp_path / "face.yaml"
+    text = Path("config/rigs/expressive.yaml").read_text(encoding="utf-8")
+    rig.write_text(text, encoding="utf-8")
+    done = invoked(
+        "calibrate", "joints", str(rig), "--joint", "jaw", "--by", "motion", "--mock", "--dry-run",
+        "--answers", answers_in(tmp_path, *["yes"] * 6),
+    )  # fmt: skip
+    assert "did jaw just go to its POSITIVE end?" in done.out + done.err
+    assert "joints.jaw.zero_step" in done.out + done.err, done
+
+
+def test_a_jaw_may_rest_at_its_stop_and_an_eye_may_not() -> None:
+    joint = load_rig("expressive").joints["jaw"]
+    assert ends_of("jaw") == ends_of("car_lid") == ("POSITIVE", "NEGATIVE")
+    made = calibration("jaw", Marks(2400, 2047, 2045), joint, 2.0)
+    assert (made.zero_step, made.min_deg, made.sign) == (2047, 0.0, 1)
+    assert made.max_deg == pytest.approx(29.0, abs=0.05)
+    with pytest.raises(CalibrationRefused, match=r"straight ahead .* does not lie between"):
+        calibration("neck_yaw", Marks(2400, 2047, 2045), joint, 2.0)
+
+
+def test_the_chin_on_the_page_opens_with_the_jaw() -> None:
+    server = viser.ViserServer(port=0, verbose=False)
+    try:
+        head = HeadModel(server.scene)
+        head.show(SNAPSHOT)
+        assert not head._jaw.visible
+        rest = (0.0,) * len(NAMES)
+        head.show(replace(SNAPSHOT, joints=NAMES, measured_rad=rest))
+        shut = tuple(head._jaw.wxyz)
+        head.show(replace(SNAPSHOT, joints=NAMES, measured_rad=(*rest[:6], 0.2, 0.0, 0.0)))
+        assert head._jaw.visible and tuple(head._jaw.wxyz) != shut
+    finally:
+        server.stop()
+
+
+def test_every_joint_has_a_key_a_table_and_a_chart() -> None:
+    rig = load_rig("expressive")
+    keys = {one.key for one in parameters(rig, rig)}
+    assert {"joints.jaw.max_deg", "expressions.sad.neck_pitch", "levels.mouth.high_deg"} <= keys
+    tuned = changed(rig, {"expressions.happy.jaw": 5.0, "levels.mouth.smoothing_ms": 120.0})
+    assert tuned.expressions["happy"]["jaw"] == 5.0
+    assert tuned.levels["mouth"].smoothing_ms == 120.0
+
+
+def test_a_jaw_keeps_clear_of_a_neck_that_looks_down() -> None:
+    """A forbidden pair with a jaw in it holds the jaw back while the chin is on the chest."""
+    rig = load_rig("expressive")
+    pair = {
+        "first": "neck_pitch", "first_min_deg": -35.0, "first_max_deg": -5.0,
+        "second": "jaw", "second_min_deg": 4.0, "second_max_deg": 25.0,
+    }  # fmt: skip
+    low = {"expressions.sulky": {"neck_pitch": -20.0, "jaw": 15.0}}
+    made: Assembly = started(changed(rig, {"guard.collisions": (pair,), **low}))
+    made.robot.command(Express("sulky"))
+    worst = -90.0
+    for _ in range(600):
+        made.clock.sleep_until(made.clock.now_s() + 0.005)
+        tick = made.robot.tick(made.clock.now_s(), 0.005)
+        at = dict(zip(NAMES, map(degrees, tick.guard_result.command_rad), strict=True))
+        if at["neck_pitch"] < -5.0:
+            worst = max(worst, at["jaw"])
+    made.close()
+    assert worst <= 4.0
