@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.cli.tune import app
+from gazerig.robot.control.gesture_choices import GestureInfo
 from gazerig.robot.dashboard.animation_panel import AnimationPanel
 from gazerig.robot.model.commands import Command, Express, SetLevel
 from gazerig.robot.model.reply import Ticket
@@ -43,6 +44,9 @@ class TickedRig:
 
     def menus(self) -> dict[str, tuple[str, ...]]:
         return self.made.robot.menus()
+
+    def gestures(self) -> tuple[GestureInfo, ...]:
+        return self.made.robot.gestures()
 
     def write(self, request: object, within_s: float) -> None:
         self.answer = self.handler.answer(request)

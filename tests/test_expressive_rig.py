@@ -25,7 +25,7 @@ from gazerig.robot.calibration.joint_calibration import (
 )
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.dashboard.head_model import HeadModel
-from gazerig.robot.model.commands import Command, Express, SetLevel
+from gazerig.robot.model.commands import Command, Express, SetLevel, Value
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo
@@ -168,11 +168,11 @@ def test_every_joint_has_a_key_a_table_and_a_chart() -> None:
 def test_a_jaw_keeps_clear_of_a_neck_that_looks_down() -> None:
     """A forbidden pair with a jaw in it holds the jaw back while the chin is on the chest."""
     rig = load_rig("expressive")
-    pair = {
+    pair: Value = {
         "first": "neck_pitch", "first_min_deg": -35.0, "first_max_deg": -5.0,
         "second": "jaw", "second_min_deg": 4.0, "second_max_deg": 25.0,
     }  # fmt: skip
-    low = {"expressions.sulky": {"neck_pitch": -20.0, "jaw": 15.0}}
+    low: dict[str, Value] = {"expressions.sulky": {"neck_pitch": -20.0, "jaw": 15.0}}
     made: Assembly = started(changed(rig, {"guard.collisions": (pair,), **low}))
     made.robot.command(Express("sulky"))
     worst = -90.0
