@@ -8,11 +8,11 @@ between two sections, still names the line to change.
 import contextlib
 import importlib.resources
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import MISSING, asdict, dataclass
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from gazerig.config.bounds import Step, shapes_of, validate, with_stand_ins
+from gazerig.config.bounds import Shape, Step, shapes_of, validate, with_stand_ins
 from gazerig.config.entries import ConfigError as ConfigError
 from gazerig.config.entries import ConfigFault as ConfigFault
 from gazerig.config.entries import Entry as Entry
@@ -70,7 +70,7 @@ def load(
         raise ConfigError(faults)
     root = whole[0]
     for layer in whole[1:]:
-        root = _merged(root, layer)
+        root = _merged(root, layer, cast(Any, into))
     outcome = validate_entries(into, root, checks)
     value, found = outcome
     faults += found
@@ -142,13 +142,46 @@ def _steps(key: str) -> tuple[str, ...]:
     return tuple(key.split(".")) if key else ()
 
 
-def _merged(low: Entry, high: Entry) -> Entry:
-    """Return one entry laid over another; a mapping keeps the line of the lowest file."""
+def _merged(low: Entry, high: Entry, into: type | None = None) -> Entry:
+    """Return one entry laid over another; a mapping keeps the line of the lowest file.
+
+    into: the dataclass that they make; a mapping that it has by default lies below ``high`` where
+        ``low`` has none, so that a character can change one rule of those every rig has
+    """
     if not (isinstance(low.value, dict) and isinstance(high.value, dict)):
         return high
-    below = low.value
-    over = {k: _merged(below[k], e) if k in below else e for k, e in high.value.items()}
-    return Entry({**below, **over}, low.file, low.line)
+    over = dict(low.value)
+    shapes = shapes_of(into) if into is not None else {}
+    for key, entry in high.value.items():
+        shape = shapes.get(key)
+        below = low.value.get(key) or _by_default(into, key, shape, entry)
+        over[key] = entry
+        if below is not None:
+            over[key] = _merged(below, entry, shape.params if shape is not None else None)
+    return Entry(over, low.file, low.line)
+
+
+def _by_default(into: type | None, key: str, shape: Shape | None, above: Entry) -> Entry | None:
+    """Return what a dataclass has at a key by default if that is a mapping, else None."""
+    if into is None or shape is None:
+        return None
+    if shape.params is not None:
+        return Entry({}, above.file, above.line)
+    if shape.inner is None or shape.inner.params is None:
+        return None
+    made = cast(Any, into).__dataclass_fields__[key].default_factory
+    values = made() if made is not MISSING else {}
+    entries = {name: _entries(asdict(value), above) for name, value in values.items()}
+    return Entry(entries, above.file, above.line)
+
+
+def _entries(value: Any, at: Entry) -> Entry:
+    """Return plain values as entries of the place of another."""
+    if isinstance(value, dict):
+        value = {key: _entries(one, at) for key, one in value.items()}
+    elif isinstance(value, tuple):
+        value = tuple(_entries(one, at) for one in value)
+    return Entry(value, at.file, at.line)
 
 
 def _placed(root: Entry, violation: Violation) -> ConfigFault:

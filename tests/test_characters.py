@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from math import pi, sin
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -115,3 +116,24 @@ def test_shipped_rule_sets_load() -> None:
     assert talk.rules["recall"].point_world_m == (1.2, 0.35, 0.75)
     for rules in sets.values():
         TopDown(rules).behave(rules.behaviour)
+
+
+@pytest.mark.parametrize("rig", shipped_names("rigs"))
+@pytest.mark.parametrize("character", CHARACTERS)
+def test_a_character_changes_one_rule_of_those_a_rig_has_by_default(
+    rig: str, character: str
+) -> None:
+    rules = load_rig(rig, character).gaze.top_down.rules
+    assert {"wait", "guard", "attack"} <= set(rules)
+    assert rules["wait"].look_at == "face"
+    if character in ("shy", "sleepy"):
+        assert rules["wait"].salience < load_rig(rig).gaze.top_down.rules["wait"].salience
+
+
+def test_a_rig_of_its_own_rules_keeps_them_alone_under_a_character(tmp_path: Path) -> None:
+    own = tmp_path / "own.yaml"
+    text = shipped("rigs", "maker").read_text(encoding="utf-8")
+    rule = "gaze:\n  top_down: {rules: {wait: {look_at: face, salience: 0.9}}}\n"
+    own.write_text(text.replace("gaze:  # what differs", rule + "  # what differs"), "utf-8")
+    rules = load_rig(str(own), "sleepy").gaze.top_down.rules
+    assert list(rules) == ["wait"] and rules["wait"].salience == 0.35
