@@ -18,6 +18,7 @@ from gazerig.config.entries import ConfigFault as ConfigFault
 from gazerig.config.entries import Entry as Entry
 from gazerig.config.entries import read
 from gazerig.config.export import Violation, abbreviated, suggestion, violation
+from gazerig.config.plugin_sections import extended
 from gazerig.config.renamed import renamed
 
 T = TypeVar("T")
@@ -87,6 +88,9 @@ def validate_entries(
 
     What checks find is a fault as well, so a value may come with some.
     """
+    into, problems = extended(into, root.plain())
+    if problems:
+        return None, [_placed(root, _contradiction(root, *one)) for one in problems]
     value, errors = validate(into, root.plain())
     complaints = [violation(into, error) for error in errors]
     if value is not None:

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 from gazerig.config.bounds import Form, Shape, shapes_of, validate
 from gazerig.config.export import abbreviated, suggestion
 from gazerig.config.load import ConfigError, ConfigFault, Entry, validate_entries
+from gazerig.config.plugin_sections import extended
 from gazerig.config.renamed import renamed_changes, renamed_key
 from gazerig.config.schema import RULES, Rig
 from gazerig.gaze.types import PARTS
@@ -83,7 +84,7 @@ def parameters(rig: Rig, defaults: Rig) -> tuple[Parameter, ...]:
     """Return the parameters of a rig in the order of its file."""
     return tuple(
         _knob(key, shape, _at(defaults, key))
-        for key, shape, _ in _leaves(_ROOT, rig, (), _unlisted(rig))
+        for key, shape, _ in _leaves(_root(rig), rig, (), _unlisted(rig))
     )
 
 
@@ -114,7 +115,7 @@ def value_of(rig: Rig, key: str) -> Value:
 
 def values(rig: Rig) -> dict[str, Value]:
     """Return key -> value of every knob."""
-    return {key: value for key, _, value in _leaves(_ROOT, rig, (), _unlisted(rig))}
+    return {key: value for key, _, value in _leaves(_root(rig), rig, (), _unlisted(rig))}
 
 
 def values_after(known: Mapping[str, Value], before: Rig, after: Rig) -> dict[str, Value]:
@@ -149,10 +150,11 @@ def _judged(rig: Rig, changes: Mapping[str, Value]) -> Rig | None:
     Sections in which nothing changes go through the judge as they are, already checked.
     """
     data = _opened(rig, [tuple(key.split(".")) for key in changes])
-    if any([_put(data, key, _frozen(value)) for key, value in changes.items()]):
+    if any([_put(_root(rig), data, key, _frozen(value)) for key, value in changes.items()]):
         return None
-    made, _ = validate(Rig, data)
-    if made is None or any(True for rule in RULES for _ in rule(made)):
+    into, problems = extended(Rig, data)
+    made, _ = validate(into, data)
+    if problems or made is None or any(True for rule in RULES for _ in rule(made)):
         return None
     return made
 
@@ -161,7 +163,7 @@ def _weighed(rig: Rig, changes: Mapping[str, Value]) -> Rig:
     """Return the changed rig with all rules checked, or raise every fault."""
     data, faults = plain(rig), []
     for key, value in changes.items():
-        faults += _put(data, key, _frozen(value))
+        faults += _put(_root(rig), data, key, _frozen(value))
     outcome = validate_entries(Rig, _entries(data), RULES)
     made, found = outcome
     faults += [dataclasses.replace(fault, line=None) for fault in found]
@@ -175,7 +177,7 @@ def differences(before: Rig, after: Rig) -> dict[str, Value]:
 
     Where a mapping lost an entry, that entry's value is None.
     """
-    return dict(_differing(_ROOT, before, after, ()))
+    return dict(_differing(_root(after), before, after, ()))
 
 
 def flattened(rig: Rig, changes: Mapping[str, Value]) -> dict[str, Value]:
@@ -222,7 +224,11 @@ def _opened(value: Any, paths: Sequence[tuple[str, ...]]) -> Any:
     return parts
 
 
-_ROOT = Shape("params", params=Rig)
+def _root(rig: Rig) -> Shape:
+    """Return the shape of a rig, with the sections of plug-ins that it has."""
+    return Shape("params", params=type(rig))
+
+
 _Unlisted = Mapping[str, tuple[str, ...]]
 """Key of a mapping -> the entries that it may have."""
 
@@ -289,7 +295,7 @@ def _at(rig: Rig, key: str) -> Value:
 
 def _is_group(rig: Rig, key: str) -> bool:
     """Return whether a key holds keys of its own in a file."""
-    shape: Shape | None = _ROOT
+    shape: Shape | None = _root(rig)
     for step in key.split("."):
         if shape is None:
             return False
@@ -304,7 +310,11 @@ def _differing(
         return
     if shape.params is not None and before is not None and after is not None:
         for name, field in shapes_of(shape.params).items():
-            yield from _differing(field, getattr(before, name), getattr(after, name), (*path, name))
+            if hasattr(before, name):
+                both = getattr(before, name), getattr(after, name)
+                yield from _differing(field, *both, (*path, name))
+            else:  # the section of a plug-in that was not there before
+                yield ".".join((*path, name)), plain(getattr(after, name))
     elif before == after and type(before) is type(after):
         return
     elif shape.form == "mapping" and shape.inner is not None:
@@ -317,11 +327,11 @@ def _differing(
         yield ".".join(path), plain(after)
 
 
-def _put(data: dict[str, Any], key: str, value: Value) -> list[ConfigFault]:
+def _put(root: Shape, data: dict[str, Any], key: str, value: Value) -> list[ConfigFault]:
     """Set a value in plain data at a dotted key; return the faults."""
     *over, last = key.split(".")
     held: Any = data
-    shape: Shape | None = _ROOT
+    shape: Shape | None = root
     for step in over:
         shape = _below(shape, step)
         if isinstance(held, dict) and held.get(step, {}) is None and shape is not None:

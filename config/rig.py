@@ -5,7 +5,7 @@ Bounds stand with the values, in the rooms; the rules between sections in gazeri
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, Any
 
 from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.params import CameraRecoveryParams, WebcamParams
@@ -13,7 +13,7 @@ from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.pca9685.params import Pca9685Params
-from gazerig.drivers.servo_models import BusKind
+from gazerig.drivers.servo_models import BUS_KINDS, BusKind
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.gaze.attention import AttentionParams
@@ -31,7 +31,7 @@ from gazerig.gaze.pursuit import PursuitParams
 from gazerig.gaze.saccade import SaccadeParams
 from gazerig.gaze.scanpath import ScanpathParams
 from gazerig.gaze.top_down import TopDownParams
-from gazerig.params import Bounds, Unit
+from gazerig.params import Bounds, Choices, Unit
 from gazerig.robot.model.frames import CameraParams
 from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint import JointParams
@@ -60,7 +60,7 @@ class BusConfig:
 
     # fmt: off
     port: Annotated[str, "serial port or I2C bus, e.g. /dev/ttyUSB0"]
-    kind: Annotated[BusKind, "type of the servos or board on this bus"] = "dynamixel"
+    kind: Annotated[BusKind, Choices(*BUS_KINDS), "type of the servos or board on this bus"] = "dynamixel"
     dynamixel: Annotated[DynamixelParams, "Protocol 2.0 settings, for kind dynamixel"] = field(default_factory=DynamixelParams)
     feetech: Annotated[FeetechParams, "Feetech STS settings, for kind feetech"] = field(default_factory=FeetechParams)
     maestro: Annotated[MaestroParams, "Pololu Maestro settings, for kind maestro"] = field(default_factory=MaestroParams)
@@ -68,9 +68,14 @@ class BusConfig:
     # fmt: on
 
     @property
+    def section(self) -> Any:
+        """Return the parameters of its kind."""
+        return getattr(self, self.kind)
+
+    @property
     def baud(self) -> int:
         """Return the speed of its line in bit/s."""
-        return int(getattr(self, self.kind).baud)
+        return int(self.section.baud)
 
 
 @dataclass(frozen=True)
@@ -124,6 +129,7 @@ class GazeConfig:
     field_of_view: Annotated[FieldOfViewParams, "what an eye can see"] = field(default_factory=FieldOfViewParams)
     bottom_up: Annotated[BottomUpParams, "how motion pulls"] = field(default_factory=BottomUpParams)
     top_down: Annotated[TopDownParams, "what a behaviour looks at"] = field(default_factory=TopDownParams)
+    chooser: Annotated[str, Choices("attention"), "what chooses whom to look at: attention, or the rule of a package"] = "attention"
     attention: Annotated[AttentionParams, "who wins"] = field(default_factory=AttentionParams)
     idle: Annotated[IdleParams, "when nothing is there"] = field(default_factory=IdleParams)
     aversion: Annotated[AversionParams, "looking away while talking"] = field(default_factory=AversionParams)

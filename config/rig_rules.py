@@ -85,7 +85,7 @@ def _buses(rig: Rig) -> Iterable[tuple[str, str]]:
 
 def _channel(name: str, joint: JointParams, bus: BusConfig) -> Iterable[tuple[str, str]]:
     """Find what keeps a joint from its channel of a board of hobby servos."""
-    params = getattr(bus, bus.kind)
+    params = bus.section
     if not isinstance(params, HobbyBoardParams):
         return
     try:

@@ -1,7 +1,7 @@
 """Every servo model that a joint can have: on which kind of bus, and in which steps it counts."""
 
 from math import inf
-from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, NamedTuple
 
 from gazerig.drivers.dynamixel.control_table import MODELS as DYNAMIXEL
 from gazerig.drivers.dynamixel.control_table import STEPS_PER_TURN as STEPS_PER_TURN
@@ -10,14 +10,17 @@ from gazerig.drivers.event_log import servo_label as label_with
 from gazerig.drivers.feetech.memory_table import MODELS as FEETECH
 from gazerig.drivers.feetech.memory_table import SCS_MODELS, SCS_STEPS, FeetechModel
 from gazerig.drivers.hobby_board.models import HOBBY, US_STEPS
+from gazerig.drivers.plugins import BUS, SHIPPED, PluginError
 
 if TYPE_CHECKING:
+    from gazerig.drivers.plugins import BusPlugin
     from gazerig.drivers.types import ServoConfig
 
-BusKind = Literal["dynamixel", "feetech", "maestro", "pca9685"]
-BUS_KINDS: tuple[BusKind, ...] = get_args(BusKind)
+BusKind = str
+"""Name of a kind of bus: one of ``BUS_KINDS``, or one that a package brings."""
+BUS_KINDS: tuple[BusKind, ...] = tuple(SHIPPED[BUS])
 HOBBY_KINDS: tuple[BusKind, ...] = ("maestro", "pca9685")
-"""Boards that send pulses to hobby servos: any of them moves any."""
+"""Our boards that send pulses to hobby servos: any of them moves any."""
 
 
 SmartModel = DynamixelModel | FeetechModel
@@ -31,7 +34,7 @@ class ServoModelInfo(NamedTuple):
     unit, unit_steps: unit in which its position is shown, "steps" or "us", and how many
         steps that is
     middle: of its travel, in that unit
-    family: of a smart servo, by its name; "" for a hobby servo
+    family: of a smart servo of ours, by its name; "" for hobby servos and those of packages
     measured: whether it measures its position; without that it has no other feedback either
     hottest_c, lowest_v, highest_v: limits at which it switches itself off, if it does
     """
@@ -51,7 +54,9 @@ class ServoModelInfo(NamedTuple):
 
     def fits(self, kind: str) -> bool:
         """Return whether it can be on a bus of this kind: any board moves a hobby servo."""
-        return kind == self.bus or (self.bus in HOBBY_KINDS and kind in HOBBY_KINDS)
+        if kind == self.bus or self.bus in _ALSO_MOVED.get(kind, ()):
+            return True
+        return self.bus in HOBBY_KINDS and kind in HOBBY_KINDS
 
 
 def _smart(bus: BusKind, family: str, model: SmartModel, steps: int) -> ServoModelInfo:
@@ -87,7 +92,28 @@ SERVOS: dict[str, ServoModelInfo] = {
         for name, model in HOBBY.items()
     },
 }
-"""By the model name in a rig's YAML."""
+"""By the model name in a rig's YAML; those of a package are added as its bus is used."""
+
+_ALSO_MOVED: dict[BusKind, tuple[BusKind, ...]] = {}
+"""Kind of a package -> kinds of which it moves the servos too."""
+
+
+def add_models(kind: BusKind, part: "BusPlugin", label: str) -> None:
+    """Make the servo models of a package's bus known; ``label`` names it in messages.
+
+    Raises:
+        PluginError: a model has a name that is taken, or is no model.
+    """
+    for name, model in part.models.items():
+        if not isinstance(model, ServoModelInfo):
+            raise PluginError(f"{label}: its servo model {name!r} is no ServoModelInfo")
+        if SERVOS.get(name, model._replace(bus=kind)) != model._replace(bus=kind):
+            raise PluginError(f"{label}: there is another servo model {name!r} already")
+    for name in part.moves:
+        if name not in SERVOS:
+            raise PluginError(f"{label}: there is no servo model {name!r} that it could move too")
+    SERVOS.update({name: m._replace(bus=kind) for name, m in part.models.items()})
+    _ALSO_MOVED[kind] = tuple(SERVOS[name].bus for name in part.moves)
 
 
 def servo_label(setup: "ServoConfig") -> str:

@@ -1,5 +1,7 @@
 """Emulated devices as plain data that can be sent to another process, and how they are built."""
 
+import base64
+import pickle
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar
@@ -8,6 +10,7 @@ from gazerig.drivers.dynamixel.control_table import BAUD_RATES as DYNAMIXEL_BAUD
 from gazerig.drivers.feetech.memory_table import BAUD_RATES as FEETECH_BAUDS
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.pca9685.params import BRIDGE_BAUD
+from gazerig.drivers.plugins import BUS, BusPlugin, EmulatedJoint, PluginError, find, load
 from gazerig.drivers.servo_models import HOBBY_KINDS, BusKind
 from gazerig.params import choices_of
 from gazerig.sim_mock.device import Device
@@ -104,8 +107,25 @@ class Pca9685Line:
     listens: ClassVar[str] = "the boards listen"
 
 
-Emulated = DynamixelLine | FeetechLine | MaestroLine | Pca9685Line
-_KINDS: dict[str, type[Emulated]] = {
+@dataclass(frozen=True, slots=True)
+class PluginLine:
+    """The servos of a package's bus.
+
+    kind: of the bus
+    settings: its parameters, pickled and written as text
+    servos: in the order of the joints
+    """
+
+    kind: BusKind
+    settings: str
+    servos: tuple[EmulatedJoint, ...]
+    baud: int | None = None
+    listens: ClassVar[str] = "the servos listen"
+
+
+Emulated = DynamixelLine | FeetechLine | MaestroLine | Pca9685Line | PluginLine
+OurLine = DynamixelLine | FeetechLine | MaestroLine | Pca9685Line
+_KINDS: dict[str, type[OurLine]] = {
     one.kind: one for one in (DynamixelLine, FeetechLine, MaestroLine, Pca9685Line)
 }
 
@@ -116,6 +136,8 @@ def build(what: Emulated, now_s: Callable[[], float], seed: int = 0) -> Device:
     Raises:
         ValueError: it cannot exist; names what is wrong and what would be right.
     """
+    if isinstance(what, PluginLine):
+        return _build_plugin(what, now_s, seed)
     if isinstance(what, MaestroLine):
         return build_board(
             what.channels, now_s, what.device, what.crc, what.baud, seed, what.servos
@@ -125,6 +147,26 @@ def build(what: Emulated, now_s: Callable[[], float], seed: int = 0) -> Device:
     if isinstance(what, FeetechLine):
         return build_feetech(what.servos, now_s, what.baud, seed=seed)
     return build_dynamixel(what.servos, now_s, baud=what.baud, seed=seed)
+
+
+def plugin_line(kind: BusKind, params: object, servos: tuple[EmulatedJoint, ...]) -> PluginLine:
+    """Return the emulated servos of a package's bus.
+
+    Raises:
+        PluginError: the package has none.
+    """
+    if load(BUS, kind, BusPlugin).device is None:
+        raise PluginError(f"{find(BUS, kind).label} has no emulated device: run it without --mock")
+    return PluginLine(kind, base64.b85encode(pickle.dumps(params)).decode(), servos)
+
+
+def _build_plugin(what: PluginLine, now_s: Callable[[], float], seed: int) -> Device:
+    make = load(BUS, what.kind, BusPlugin).device
+    if make is None:
+        raise ValueError(f"{find(BUS, what.kind).label} has no emulated device")
+    params = pickle.loads(base64.b85decode(what.settings))
+    device: Device = make(params, what.servos, now_s, seed)
+    return device
 
 
 def packed(what: Emulated) -> dict[str, object]:
@@ -141,6 +183,9 @@ def unpacked(data: Mapping[str, Any]) -> Emulated:
     """
     settings = dict(data)
     kind = settings.pop("kind", None)
+    if "settings" in settings:
+        servos = tuple(EmulatedJoint(**one) for one in settings.pop("servos"))
+        return PluginLine(str(kind), servos=servos, **settings)
     if kind not in _KINDS:
         raise ValueError(f"no device of kind {kind!r}: there is {', '.join(_KINDS)}")
     read = HobbySpec._make if kind in HOBBY_KINDS else _servo

@@ -65,7 +65,7 @@ class CaptureLoop:
             return None
         self._number = self._counted + shot.number
         found = self._frames.look(shot._replace(number=self._number))
-        for line in self._source.events():
+        for line in (*self._source.events(), *self._frames.events()):
             self._report(line)
         return found
 

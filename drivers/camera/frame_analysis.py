@@ -37,6 +37,11 @@ class FrameAnalyzer:
             shot.lens,
         )
 
+    def events(self) -> tuple[str, ...]:
+        """Return what the detector has to tell since the last call, one line each."""
+        told = getattr(self._detector, "events", None)
+        return told() if told is not None else ()
+
     def retune(
         self,
         detector: Callable[[], FaceDetector] | None,

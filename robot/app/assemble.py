@@ -23,7 +23,13 @@ from gazerig.gaze.types import Angles3
 from gazerig.params import choices_of
 from gazerig.robot.app.animation_tables import animation_tables
 from gazerig.robot.app.camera_factory import real_camera, scene_camera
-from gazerig.robot.app.gaze_models import deciders, kinematics_of, movers, oculomotor
+from gazerig.robot.app.gaze_models import (
+    chooser_of,
+    deciders,
+    kinematics_of,
+    movers,
+    oculomotor,
+)
 from gazerig.robot.app.live_params import CameraPlacement, Components, LiveParams
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_limits import (
@@ -120,7 +126,7 @@ class Substitutes(NamedTuple):
     body: Callable[[Body], Body] = _unchanged
     camera: Callable[[Camera], Camera] = _unchanged
     perception: Callable[[Perception], Perception] = _unchanged
-    chooser: Callable[[Attention], TargetChooser] = _unchanged
+    chooser: Callable[[TargetChooser], TargetChooser] = _unchanged
 
 
 RIGS_OWN = Substitutes()
@@ -165,7 +171,7 @@ def assemble(rig: Rig, options: RunOptions, substitutes: Substitutes = RIGS_OWN)
             lambda rig: _camera_params(rig, options, kinematics)[0], camera.mount
         )
         live = LiveParams(parts, rig, placement)
-        robot = _robot(parts, sight.poses, live, substitutes)
+        robot = _robot(parts, sight.poses, live, substitutes, rig, options.fast)
     except BaseException:
         wires.close()
         raise
@@ -261,15 +267,22 @@ def _guard(rig: Rig, body: Body) -> Guard:
 
 
 def _robot(
-    parts: Components, poses: PoseHistory, live: LiveParams, substitutes: Substitutes
+    parts: Components,
+    poses: PoseHistory,
+    live: LiveParams,
+    substitutes: Substitutes,
+    rig: Rig,
+    simulated: bool,
 ) -> Robot:
+    told: list[str] = []
+    chooser = chooser_of(rig, parts.attention, told.append, simulated)
     return Robot(
         substitutes.body(parts.body),
         parts.kinematics,
         substitutes.camera(parts.camera),
         substitutes.perception(parts.perception),
         poses,
-        substitutes.chooser(parts.attention),
+        substitutes.chooser(chooser),
         parts.scanpath,
         parts.aversion,
         parts.oculomotor,
@@ -279,6 +292,7 @@ def _robot(
         parts.guard,
         live,
         PixelToWorld(parts.mount, poses, lambda: live.camera),
+        told,
     )
 
 

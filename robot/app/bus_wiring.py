@@ -1,39 +1,23 @@
 """The buses of a rig: which joints are on which, and one bus made of them all."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from collections.abc import Mapping, Sequence
 
+from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig
+from gazerig.drivers.checked_bus import CheckedBus
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.i2c.port import port_of
-from gazerig.drivers.maestro.bus import MaestroBus
 from gazerig.drivers.multi_bus import BusShare, MultiBus
-from gazerig.drivers.pca9685.bus import Pca9685Bus
+from gazerig.drivers.plugins import BUS, BusPlugin, PluginError, failure, find, is_ours, load
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_bus.bus import SmartServoBus
-from gazerig.drivers.servo_bus.params import BusParams
-from gazerig.drivers.servo_families import FAMILY_OF
-from gazerig.drivers.servo_models import BUS_KINDS, SERVOS, BusKind
+from gazerig.drivers.servo_models import SERVOS
 from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.robot.app.rig_limits import park_rad
 from gazerig.robot.control.body import setups
 from gazerig.robot.guardian.guarded_bus import GuardedBus
 from gazerig.robot.guardian.guardian import Guardian
-from gazerig.robot.guardian.release_plan import ReleasePlan
-
-
-def _smart(port: BusPort, own: Sequence[ServoConfig], params: BusParams) -> ServoBus:
-    """Return the bus of smart servos of one family."""
-    return SmartServoBus(FAMILY_OF[own[0].model], port, own, params)
-
-
-BUSES: Mapping[BusKind, Callable[[BusPort, Sequence[ServoConfig], Any], ServoBus]] = {
-    "dynamixel": _smart,
-    "feetech": _smart,
-    "maestro": MaestroBus,
-    "pca9685": Pca9685Bus,
-}
-"""What makes the bus of a kind: a port, its servos, and the rig's section of the kind's name."""
+from gazerig.robot.guardian.release_plan import ReleasePlan, pickled
+from gazerig.robot.model.clock import RealClock
 
 
 def bus_names(rig: Rig) -> tuple[str, ...]:
@@ -128,10 +112,10 @@ def release_plan(rig: Rig, name: str, path: str) -> ReleasePlan:
         path: of its serial port.
     """
     config, board = rig.bus_named(name), rig.bus_named(name).maestro
-    (kind,) = (kind for kind in BUS_KINDS if kind == config.kind)
+    ours = is_ours(BUS, config.kind)
     ids = tuple(rig.joints[joint].id for joint in joints_on(rig, name))
     return ReleasePlan(
-        kind,
+        config.kind,
         path,
         config.baud,
         ids,
@@ -141,13 +125,16 @@ def release_plan(rig: Rig, name: str, path: str) -> ReleasePlan:
         board.channels,
         config.pca9685.addresses,
         SERVOS[rig.joints[joints_on(rig, name)[0]].model].family,
+        "" if ours else pickled(config.section),
     )
 
 
 def has_watchdog(rig: Rig, name: str) -> bool:
     """Return whether the servos of one bus stop by themselves when their program dies."""
     config = rig.bus_named(name)
-    return bool(getattr(getattr(config, config.kind), "watchdog_ms", 0))
+    if is_ours(BUS, config.kind):
+        return bool(getattr(config.section, "watchdog_ms", 0))
+    return load(BUS, config.kind, BusPlugin).release is None
 
 
 def _joined(shares: list[BusShare]) -> ServoBus:
@@ -161,4 +148,24 @@ def _share(rig: Rig, name: str, port: BusPort) -> BusShare:
     own = [every[joint] for joint in mine]
     places = tuple(rig.names.index(joint) for joint in mine)
     config = rig.bus_named(name)
-    return BusShare(name, BUSES[config.kind](port, own, getattr(config, config.kind)), places)
+    return BusShare(name, _bus(config, port, own), places)
+
+
+def _bus(config: BusConfig, port: BusPort, own: Sequence[ServoConfig]) -> ServoBus:
+    """Return the bus of a kind.
+
+    Raises:
+        PluginError: it is another package's and cannot be made.
+    """
+    part = load(BUS, config.kind, BusPlugin)
+    if is_ours(BUS, config.kind):
+        ours: ServoBus = part.make(port, tuple(own), config.section)
+        return ours
+    label = find(BUS, config.kind).label
+    try:
+        bus: ServoBus = part.make(port, tuple(own), config.section)
+    except SetupError:
+        raise
+    except Exception as error:
+        raise PluginError(f"{label} cannot be made: {failure(error)}") from error
+    return CheckedBus(bus, label, own, getattr(port, "now_s", None) or RealClock().now_s)

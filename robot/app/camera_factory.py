@@ -3,10 +3,13 @@
 from collections.abc import Callable
 from functools import partial
 from math import radians
+from typing import cast
 
 import numpy as np
 
 from gazerig.config.schema import Rig
+from gazerig.drivers.camera.camera_plugins import camera_part, is_source, plugin_source
+from gazerig.drivers.camera.guarded_camera import GuardedCamera
 from gazerig.drivers.camera.oak.source import OakSource
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay
@@ -17,6 +20,7 @@ from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.camera.webcam import Webcam
 from gazerig.drivers.camera.worker import CameraParts
 from gazerig.drivers.errors import SetupError
+from gazerig.drivers.plugins import CAMERA, CameraPlugin, PluginError, find, is_ours, load
 from gazerig.drivers.types import Camera, MovingBlob
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.motion.detector import MotionDetector, turned_between
@@ -69,8 +73,33 @@ def real_camera(
     motion = partial(motion_finder, rig.motion, placed.lens, field_rad, turns)
     if options.fast:
         return FilmCamera(_film(options), detector(), options.film_delay_s, motion=motion())
-    parts = CameraParts(_source(rig, options), detector, motion)
-    return CameraProcess(parts, clock.now_s, rig.camera_recovery)
+    name = options.camera if isinstance(options.camera, str) else None
+    if name is None or is_ours(CAMERA, name):
+        parts = CameraParts(_source(rig, options), detector, motion)
+        return CameraProcess(parts, clock.now_s, rig.camera_recovery)
+    params, label = _section(rig, name), find(CAMERA, name).label
+    camera = camera_part(name, params)
+    if is_source(camera):
+        parts = CameraParts(partial(plugin_source, name, params), detector, motion)
+        return GuardedCamera(CameraProcess(parts, clock.now_s, rig.camera_recovery), label)
+    return GuardedCamera(cast(Camera, camera), label)
+
+
+def _section(rig: Rig, name: str) -> object:
+    """Return the parameters of a package's camera: the rig's section of its name, or defaults.
+
+    Raises:
+        PluginError: the rig has none, and something in it has no default.
+    """
+    section = getattr(rig, name, None)
+    if section is not None:
+        return section
+    try:
+        return load(CAMERA, name, CameraPlugin).params()
+    except TypeError as error:
+        raise PluginError(
+            f"{find(CAMERA, name).label} needs a section {name} in the rig"
+        ) from error
 
 
 def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams) -> str:
@@ -87,6 +116,8 @@ def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams)
     field_rad = radians(placed.horizontal_field_deg)
     try:
         match camera:
+            case GuardedCamera():
+                return retune_camera(camera.camera, before, after, placed)
             case CameraProcess() | FilmCamera():
                 motion = partial(retuned, after.motion, placed.lens, field_rad)
                 done = camera.retune(detector, motion if moves else None)
@@ -110,9 +141,10 @@ def _source(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
         return partial(CameraReplay, options.replay)
     if options.video is not None:
         return partial(VideoFile, options.video)
-    if options.oak:
+    if options.oak or options.camera == "oak":
         return partial(OakSource, rig.oak)
-    return partial(Webcam.of, options.camera or 0, rig.webcam)
+    number = options.camera if isinstance(options.camera, int) else 0
+    return partial(Webcam.of, number, rig.webcam)
 
 
 def _path(options: RunOptions) -> str:

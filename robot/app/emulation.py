@@ -5,10 +5,18 @@ from math import pi, radians
 
 from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig
+from gazerig.drivers.plugins import EmulatedJoint
 from gazerig.drivers.servo_models import HOBBY_KINDS
 from gazerig.robot.app.bus_wiring import bus_names, joints_on
 from gazerig.robot.model.joint import JointParams
-from gazerig.sim_mock.devices import DynamixelLine, Emulated, FeetechLine, MaestroLine, Pca9685Line
+from gazerig.sim_mock.devices import (
+    DynamixelLine,
+    Emulated,
+    FeetechLine,
+    MaestroLine,
+    Pca9685Line,
+    plugin_line,
+)
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
@@ -48,7 +56,10 @@ def _line(rig: Rig, name: str) -> Emulated:
     if config.kind in CHAINS:
         specs = tuple(emulated_servo(rig, joint) for joint in joints)
         return CHAINS[config.kind](specs, config.baud)
-    return BOARDS[config.kind](config, tuple(_hobby(rig.joints[one], one) for one in joints))
+    if config.kind in BOARDS:
+        return BOARDS[config.kind](config, tuple(_hobby(rig.joints[one], one) for one in joints))
+    servos = tuple(_plain(rig.joints[one], one) for one in joints)
+    return plugin_line(config.kind, config.section, servos)
 
 
 CHAINS: dict[str, type[DynamixelLine] | type[FeetechLine]] = {
@@ -81,6 +92,10 @@ def _hobby(joint: JointParams, name: str) -> HobbySpec:
         min_steps=facts.lowest,
         max_steps=facts.highest,
     )
+
+
+def _plain(joint: JointParams, name: str) -> EmulatedJoint:
+    return EmulatedJoint(joint.id, joint.model, _start(joint, name), *_stops(joint))
 
 
 def _start(joint: JointParams, name: str) -> int:

@@ -1,10 +1,20 @@
 """The models of gaze/ with a rig's parameters."""
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
 from gazerig.config.schema import Rig
+from gazerig.drivers.plugins import (
+    ATTENTION,
+    AttentionPlugin,
+    PluginError,
+    find,
+    is_ours,
+    load,
+    made,
+)
 from gazerig.gaze.bottom_up import BottomUp
 from gazerig.gaze.breathing import Breathing
 from gazerig.gaze.field_of_view import FieldOfView
@@ -16,6 +26,7 @@ from gazerig.gaze.pursuit import Pursuit
 from gazerig.gaze.saccade import SaccadeModel
 from gazerig.gaze.top_down import TopDown
 from gazerig.robot.app.rig_limits import eye_limits, head_limits, lid_ends
+from gazerig.robot.control.chooser import LONGEST_S, GuardedChooser, TargetChooser
 from gazerig.robot.model.kinematics import Kinematics
 
 
@@ -93,3 +104,28 @@ def oculomotor(
         moves.breathing,
         landing_rng,
     )
+
+
+def chooser_of(
+    rig: Rig, own: TargetChooser, say: Callable[[str], None], simulated: bool
+) -> TargetChooser:
+    """Return who chooses what to look at: the rig's attention, or a package's rule before it.
+
+    Args:
+        rig: its ``gaze.chooser`` names the rule.
+        own: the rig's own attention.
+        say: gets one line when the rule is dropped.
+        simulated: time is simulated, so that no answer can be late.
+
+    Raises:
+        SetupError: the rule cannot be made.
+    """
+    name = rig.gaze.chooser
+    if is_ours(ATTENTION, name):
+        return own
+    part = load(ATTENTION, name, AttentionPlugin)
+    rule = made(ATTENTION, name, part, getattr(rig.gaze, name))
+    label = find(ATTENTION, name).label
+    if not callable(getattr(rule, "choose", None)):
+        raise PluginError(f"{label} made a {type(rule).__name__}, which has no method choose")
+    return GuardedChooser(rule, own, label, say, None if simulated else LONGEST_S)

@@ -17,7 +17,8 @@ class RunOptions:
         mock: emulated servos instead of the rig's.
         fast: simulated time.
         seed: of all random generators.
-        scene, video, camera, oak, replay: what to look at; one of them (see ``checked``).
+        scene, video, camera, oak, replay: what to look at; one of them (see ``checked``); a camera
+            is the number of a webcam or the name of another package's.
         pixels: the scene is drawn and looked at by the real detectors.
         scanpath, saccade: models instead of the rig's; rules: a rule set instead of the rig's.
         port: serial port instead of the rig's.
@@ -39,7 +40,7 @@ class RunOptions:
     seed: int = 0
     scene: str | None = None
     video: Path | None = None
-    camera: int | None = None
+    camera: int | str | None = None
     oak: bool = False
     replay: Path | None = None
     pixels: bool = False
@@ -72,7 +73,7 @@ class RunOptions:
         if self.replay is not None:
             return "a recording"
         if self.camera is not None:
-            return "a webcam"
+            return "a webcam" if isinstance(self.camera, int) else f"the camera {self.camera!r}"
         return "an OAK-D" if self.oak else None
 
     @property
@@ -168,3 +169,8 @@ def host_port(text: str) -> tuple[str, int]:
     if not host or not port.isdecimal() or not 0 < int(port) < 65536:
         raise SetupError(f"--page {text}: not HOST:PORT, for example 127.0.0.1:8080")
     return host, int(port)
+
+
+def camera_of(text: str | None) -> int | str | None:
+    """Return what --camera asks for: the number of a webcam, or the name of a camera."""
+    return int(text) if text is not None and text.isdecimal() else text

@@ -17,7 +17,15 @@ from gazerig.robot.cli import emulate_options as options
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import clear_errors
 from gazerig.sim_mock.device_spec import EXAMPLE, line_of
-from gazerig.sim_mock.devices import BAUDS, CASES, CHANNELS, Emulated, MaestroLine, Pca9685Line
+from gazerig.sim_mock.devices import (
+    BAUDS,
+    CASES,
+    CHANNELS,
+    Emulated,
+    MaestroLine,
+    Pca9685Line,
+    PluginLine,
+)
 from gazerig.sim_mock.pty.line import BusSettings
 from gazerig.sim_mock.pty.server import ServerSettings, run
 from gazerig.sim_mock.pty.server import say as say_line
@@ -151,7 +159,7 @@ def _of_rig(name: str, firmware: int | None) -> dict[str, Emulated]:
 
 def _aged(line: Emulated, firmware: int | None) -> Emulated:
     """Return all servos of a line one firmware; None: that which they have."""
-    if firmware is None or isinstance(line, MaestroLine | Pca9685Line):
+    if firmware is None or isinstance(line, MaestroLine | Pca9685Line | PluginLine):
         return line
     return replace(line, servos=tuple(s._replace(firmware=firmware) for s in line.servos))
 
@@ -162,6 +170,8 @@ def _at(device: Emulated, baud: int | None, any_baud: bool) -> Emulated:
     Raises:
         SetupError: it does not know this rate.
     """
+    if isinstance(device, PluginLine):
+        return device
     known = BAUDS[device.kind]
     if baud is not None and baud not in known:
         rates = ", ".join(map(str, known))
@@ -184,7 +194,7 @@ def _chosen(buses: Sequence[BusSettings], given: Sequence[str]) -> tuple[BusSett
     Raises:
         SetupError: one is no choice, or nobody knows its case.
     """
-    known = {case: None for bus in buses for case in CASES[bus.device.kind]}
+    known = {case: None for bus in buses for case in CASES.get(bus.device.kind, {})}
     choices = {}
     for text in given:
         name, _, value = text.partition("=")
@@ -194,7 +204,9 @@ def _chosen(buses: Sequence[BusSettings], given: Sequence[str]) -> tuple[BusSett
             raise SetupError(f"--set {text}: unknown case; there is {', '.join(known)}")
         choices[name.replace("_", "-")] = value
     return tuple(
-        replace(bus, choices={k: v for k, v in choices.items() if k in CASES[bus.device.kind]})
+        replace(
+            bus, choices={k: v for k, v in choices.items() if k in CASES.get(bus.device.kind, {})}
+        )
         for bus in buses
     )
 

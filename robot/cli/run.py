@@ -3,13 +3,14 @@
 import json
 import sys
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import typer
 
 from gazerig.drivers.file_output import refuse_existing, write_file
-from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.options import RunOptions, camera_of
 from gazerig.robot.cli import run_options as options
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
@@ -50,6 +51,7 @@ def run(
 ) -> None:
     """Run the head: gazerig run --mock, then open the page it names."""
     asked = RunOptions(**locals())  # what a person can ask for is a field of the same name
+    asked = replace(asked, camera=camera_of(camera))
     with clear_errors(rig, port, mock):
         asked = asked.checked()
         refuse_existing(*asked.written_at_the_end, force=force)

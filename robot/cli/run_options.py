@@ -17,7 +17,12 @@ Scene = Annotated[
     ),
 ]
 Video = Annotated[Path | None, typer.Option(help="Look at a film or frame, looped.")]
-Camera = Annotated[int | None, typer.Option(help="Look through webcam N.")]
+Camera = Annotated[
+    str | None,
+    typer.Option(
+        metavar="N", help="Look through webcam N, or through the camera NAME of a package."
+    ),
+]
 Oak = Annotated[bool, typer.Option(help="Look through an OAK-D camera.")]
 Replay = Annotated[
     Path | None,

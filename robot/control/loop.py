@@ -70,6 +70,7 @@ class Robot:
         guard: Guard,
         tune: Callable[[Tune, float], tuple[str, ...]],
         pixels: PixelToWorld,
+        told: list[str] | None = None,
     ) -> None:
         """Wire the parts.
 
@@ -89,6 +90,7 @@ class Robot:
             guard: between what is desired and the bus.
             tune: puts changed parameters in force and says what was done.
             pixels: places pixels of a camera frame in the world.
+            told: lines for the events of the next tick, to which other parts add theirs.
         """
         self.body = body
         self.camera = camera
@@ -106,7 +108,7 @@ class Robot:
         self._settled = True
         self._commands = CommandQueue()
         self._lead = Lead()
-        self._told: list[str] = []
+        self._told: list[str] = told if told is not None else []
         self._stop = StopControl(self._told)
         self._looks = LookPoints(pixels)
         self._executor = CommandExecutor(

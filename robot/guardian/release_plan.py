@@ -1,8 +1,10 @@
 """What must be known to release the servos of one port: data that fits on a command line."""
 
+import base64
 import json
+import pickle
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from gazerig.drivers.maestro.params import Form, MaestroParams
 from gazerig.drivers.serial.port import BusPort
@@ -18,6 +20,7 @@ class ReleasePlan(NamedTuple):
     protocol, device, crc, channels: of a Maestro, as in gazerig.drivers.maestro.params
     addresses: of PCA9685 boards
     family: of smart servos, by its name
+    settings: of a package's bus, its parameters as ``pickled`` wrote them
     """
 
     kind: BusKind
@@ -30,6 +33,17 @@ class ReleasePlan(NamedTuple):
     channels: int = 12
     addresses: tuple[int, ...] = ()
     family: str = ""
+    settings: str = ""
+
+
+def pickled(params: object) -> str:
+    """Return the parameters of a package's bus as text."""
+    return base64.b85encode(pickle.dumps(params)).decode()
+
+
+def unpickled(text: str) -> Any:
+    """Return the parameters that ``pickled`` wrote in this program."""
+    return pickle.loads(base64.b85decode(text))
 
 
 def encode(plans: tuple[ReleasePlan, ...]) -> str:
@@ -54,7 +68,7 @@ def releaser(plan: ReleasePlan) -> Releaser:
     It opens the port and returns the ids that did not confirm; it raises PortError where the
     port cannot be opened, BusLost where it went away. All that it needs is imported here.
     """
-    return RELEASERS[plan.kind](plan)
+    return RELEASERS.get(plan.kind, _of_package)(plan)
 
 
 def _smart(plan: ReleasePlan) -> Releaser:
@@ -81,6 +95,16 @@ def _pca9685(plan: ReleasePlan) -> Releaser:
     first, *more = plan.addresses
     params = Pca9685Params(first, tuple(more))
     return lambda port: stop_pulses(port, params.baud, Pca9685Board(port, params), plan.ids)
+
+
+def _of_package(plan: ReleasePlan) -> Releaser:
+    from gazerig.drivers.plugins import BUS, BusPlugin, load
+
+    release, params = load(BUS, plan.kind, BusPlugin).release, unpickled(plan.settings)
+    if release is None:
+        return lambda port: ()
+    wanted = release
+    return lambda port: wanted(port, params, plan.ids)
 
 
 RELEASERS: dict[BusKind, Callable[[ReleasePlan], Releaser]] = {

@@ -152,8 +152,9 @@ class PixelCamera:
         return True
 
     def events(self) -> tuple[str, ...]:
-        """Return no events: nothing can happen to it."""
-        return ()
+        """Return what the detector has to tell since the last call: nothing else can happen."""
+        told = getattr(self._detector, "events", None)
+        return told() if told is not None else ()
 
     def close(self) -> None:
         """Stop; there is nothing to free."""

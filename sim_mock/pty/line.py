@@ -193,4 +193,4 @@ class TerminalLine:
 
 def _patience(device: Emulated) -> dict[str, str]:
     """Return the case that makes a device wait longer for the rest of a packet."""
-    return {PACKET_GAP: str(GAP_MS)} if PACKET_GAP in CASES[device.kind] else {}
+    return {PACKET_GAP: str(GAP_MS)} if PACKET_GAP in CASES.get(device.kind, {}) else {}

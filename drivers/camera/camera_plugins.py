@@ -1,0 +1,115 @@
+"""Our kinds of cameras, registered as a package registers its own, and sources made by name."""
+
+import threading
+from collections.abc import Callable
+from typing import Any, cast
+
+from gazerig.drivers.camera.oak.params import OakParams
+from gazerig.drivers.camera.params import WebcamParams
+from gazerig.drivers.camera.source import FrameSource, Shot, bgr
+from gazerig.drivers.errors import CameraError, SetupError
+from gazerig.drivers.plugins import (
+    CAMERA,
+    CameraPlugin,
+    Evidence,
+    PluginError,
+    failure,
+    find,
+    load,
+    made,
+)
+
+
+def _webcam(params: WebcamParams) -> FrameSource:
+    from gazerig.drivers.camera.webcam import Webcam
+
+    return Webcam.of(0, params)
+
+
+def _oak(params: OakParams) -> FrameSource:
+    from gazerig.drivers.camera.oak.source import OakSource
+
+    return OakSource(params)
+
+
+WEBCAM = CameraPlugin(_webcam, WebcamParams, ("frames",), Evidence(emulated=True))
+OAK = CameraPlugin(_oak, OakParams, ("frames", "depth", "lens"), Evidence(emulated=True))
+
+
+def camera_part(name: str, params: Any) -> object:
+    """Return a frame source or a camera of a package, by its name.
+
+    Raises:
+        SetupError: there is none, or it cannot be made.
+    """
+    return made(CAMERA, name, load(CAMERA, name, CameraPlugin), params)
+
+
+def is_source(part: object) -> bool:
+    """Return whether a camera gives frames, in which the rig's own detectors look."""
+    return hasattr(part, "take")
+
+
+def plugin_source(name: str, params: Any) -> FrameSource:
+    """Return the frame source of a package by its name, checked frame by frame; for any process.
+
+    Raises:
+        SetupError: there is none, or it cannot be made.
+    """
+    return CheckedSource(cast(FrameSource, camera_part(name, params)), find(CAMERA, name).label)
+
+
+class CheckedSource:
+    """A frame source of another package; whatever it raises or returns is one named line.
+
+    Args:
+        source: of the package.
+        label: the camera as messages name it.
+    """
+
+    def __init__(self, source: FrameSource, label: str) -> None:
+        self._source, self._label = source, label
+
+    def open(self) -> None:
+        """Open the device.
+
+        Raises:
+            CameraError: it cannot be opened.
+        """
+        try:
+            self._source.open()
+        except SetupError:
+            raise
+        except Exception as error:
+            raise PluginError(f"{self._label} cannot be opened: {failure(error)}") from error
+
+    def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
+        """Wait for the next frame; None where ``stop`` was set meanwhile.
+
+        Raises:
+            CameraError: the source fails, or what it returns is no frame.
+        """
+        try:
+            shot = self._source.take(now_s, stop)
+        except CameraError:
+            raise
+        except Exception as error:
+            raise CameraError(f"{self._label} failed ({failure(error)})") from error
+        if shot is None:
+            return None
+        if not isinstance(shot, Shot):
+            raise CameraError(f"{self._label} returned a {type(shot).__name__}, wanted a Shot")
+        image = bgr(shot.image)
+        if image is None:
+            raise CameraError(f"{self._label} returned a frame that is no image of 8 or 16 bits")
+        if not shot.captured_s <= now_s() + 1.0:  # nor a NaN
+            raise CameraError(f"{self._label} returned a frame of the time {shot.captured_s!r}")
+        return shot._replace(image=image)
+
+    def events(self) -> tuple[str, ...]:
+        """Return what happened since the last call, one line each."""
+        return tuple(map(str, self._source.events()))
+
+    def close(self) -> None:
+        """Free the device; safe to call twice."""
+        self._source.close()

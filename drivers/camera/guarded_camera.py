@@ -1,0 +1,156 @@
+"""A camera of another package: the control loop neither waits for it nor ends with it."""
+
+from math import isfinite
+from typing import Any
+
+from gazerig.drivers.bounded_call import BoundedCall
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.event_log import EventLog
+from gazerig.drivers.plugins import PluginError, failure
+from gazerig.drivers.types import Camera, DetectedFace, Detections, MovingBlob
+
+LONGEST_S = 0.001
+"""It is waited for so long in a tick; after that the loop goes on with what it had."""
+
+SILENT_S = 1.0
+"""A call that lasts longer is reported."""
+
+
+class GuardedCamera:
+    """A camera whose failures cost the rig its sight alone; implements ``Camera``.
+
+    What it returns is checked: something else than detections, or a number that is not finite,
+    is a failure. After a failure there is no frame, and the rig runs on without.
+
+    Args:
+        camera: of another package, or a process that reads another package's frames.
+        label: the camera as messages name it.
+        longest_s: it is waited for so long in a tick, real seconds; None: to the end of the call,
+            for simulated time.
+    """
+
+    def __init__(self, camera: Camera, label: str, longest_s: float | None = LONGEST_S) -> None:
+        self.camera = camera
+        self._label = label
+        self._call = BoundedCall(f"camera {label}", longest_s)
+        self._log = EventLog()
+        self._newest: Detections | None = None
+        self._checked: object = None
+        self._failed = False
+        self._asked_s: float | None = None
+        self._late = False
+
+    def open(self) -> None:
+        """Open the camera.
+
+        Raises:
+            SetupError: it cannot be opened.
+            PluginError: it fails.
+        """
+        try:
+            self.camera.open()
+        except SetupError:
+            raise
+        except Exception as error:
+            raise PluginError(f"{self._label} cannot be opened: {failure(error)}") from error
+        self._newest, self._failed, self._asked_s, self._late = None, False, None, False
+
+    def latest(self, now_s: float) -> Detections | None:
+        """Return the newest detections, None before the first and after a failure."""
+        if self._failed:
+            return None
+        outcome = self._call(lambda: (self.camera.latest(now_s), tuple(self.camera.events())))
+        if outcome is None:
+            self._wait(now_s)
+            return self._newest
+        if self._late:
+            self._log.add(f"{self._label} answers again")
+        self._asked_s, self._late = None, False
+        if outcome.error is not None:
+            self._fail(f"failed ({failure(outcome.error)})")
+            return None
+        found, events = outcome.value
+        for line in events:
+            self._log.add(str(line))
+        if found is not self._checked:
+            wrong = fault_of(found)
+            if wrong:
+                self._fail(f"returned {wrong}")
+                return None
+            self._newest = self._checked = found
+        return self._newest
+
+    def events(self) -> tuple[str, ...]:
+        """Return what happened since the last call, one line each."""
+        return self._log.drain()
+
+    def close(self) -> None:
+        """Close the camera, whatever it does; safe to call twice."""
+        self._call.close()
+        outcome = BoundedCall(f"close {self._label}", 2.0)(self.camera.close)
+        if outcome is None:
+            self._log.add(f"{self._label} does not end: it is left behind")
+        elif outcome.error is not None:
+            self._log.add(f"{self._label} failed as it was closed ({failure(outcome.error)})")
+
+    def _wait(self, now_s: float) -> None:
+        """Record that it has not answered, and report it once."""
+        if self._asked_s is None:
+            self._asked_s = now_s
+        elif not self._late and now_s - self._asked_s > SILENT_S:
+            self._late = True
+            self._log.add(f"{self._label} has not answered for {SILENT_S:g} s: no new frames")
+
+    def _fail(self, why: str) -> None:
+        self._failed, self._newest = True, None
+        self._call.close()
+        self._log.add(f"{self._label} {why}: the rig runs on without frames")
+
+
+def fault_of(found: Any) -> str:
+    """Return what is wrong with the detections of a camera, "" where nothing is."""
+    try:
+        return "" if found is None else _fault(found)
+    except Exception as error:  # its parts may be anything
+        return f"detections that cannot be read ({failure(error)})"
+
+
+def _fault(found: Any) -> str:
+    if not isinstance(found, Detections):
+        return f"a {type(found).__name__}, wanted Detections or None"
+    if not _finite(found.captured_s) or not isinstance(found.number, int):
+        return f"captured_s {found.captured_s!r} and number {found.number!r}"
+    if not (_whole(found.width_px) and _whole(found.height_px)):
+        return f"a frame of {found.width_px!r} x {found.height_px!r}"
+    for face in found.faces:
+        if wrong := fault_of_face(face):
+            return wrong
+    for blob in found.blobs:
+        if not isinstance(blob, MovingBlob) or not all(
+            map(_finite, (*blob.p_camera_m, blob.radius_m))
+        ):
+            return f"a thing {str(blob)[:60]!r}"
+    return ""
+
+
+def fault_of_face(face: Any) -> str:
+    """Return what is wrong with a face, "" where nothing is."""
+    if not isinstance(face, DetectedFace):
+        return f"a {type(face).__name__} as a face, wanted a DetectedFace"
+    if len(face.box_px) != 4 or not all(map(_finite, face.box_px)) or not _finite(face.confidence):
+        return f"a face with the box {face.box_px!r} and confidence {face.confidence!r}"
+    shape = getattr(face.landmarks_px, "shape", None)
+    if shape != (5, 2) or not all(map(_finite, face.landmarks_px.ravel().tolist())):
+        return "a face whose landmarks are not five finite points"
+    return ""
+
+
+def _finite(value: Any) -> bool:
+    try:
+        return isfinite(value)
+    except TypeError:
+        return False
+
+
+def _whole(value: Any) -> bool:
+    return isinstance(value, int) and value > 0

@@ -1,0 +1,358 @@
+"""Parts that packages bring: found by group and name, loaded when they are used.
+
+A package registers a part by an entry point; ours stand in ``SHIPPED`` in the same form and are
+found by the same code. Ours are found without a look at installed packages, which takes some
+milliseconds; nothing is imported before its name is used or listed with its abilities.
+"""
+
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from gazerig.drivers.errors import SetupError
+
+if TYPE_CHECKING:
+    from gazerig.drivers.serial.port import BusPort
+    from gazerig.drivers.servo_models import ServoModelInfo
+
+BUS, CAMERA, DETECTOR = "gazerig.bus", "gazerig.camera", "gazerig.detector"
+ATTENTION, GESTURES, RIGS = "gazerig.attention", "gazerig.gestures", "gazerig.rigs"
+GROUPS: Mapping[str, str] = {
+    BUS: "bus",
+    CAMERA: "camera",
+    DETECTOR: "detector",
+    ATTENTION: "attention",
+    GESTURES: "gestures",
+    RIGS: "rigs",
+}
+"""Group of entry points -> what people call a part of it."""
+
+SHIPPED: Mapping[str, Mapping[str, str]] = {
+    BUS: {
+        "dynamixel": "gazerig.drivers.bus_plugins:DYNAMIXEL",
+        "feetech": "gazerig.drivers.bus_plugins:FEETECH",
+        "maestro": "gazerig.drivers.bus_plugins:MAESTRO",
+        "pca9685": "gazerig.drivers.bus_plugins:PCA9685",
+    },
+    CAMERA: {
+        "webcam": "gazerig.drivers.camera.camera_plugins:WEBCAM",
+        "oak": "gazerig.drivers.camera.camera_plugins:OAK",
+    },
+    DETECTOR: {
+        "mtcnn": "gazerig.drivers.vision.face.detector:MTCNN",
+        "yunet": "gazerig.drivers.vision.face.detector:YUNET",
+    },
+    ATTENTION: {"attention": "gazerig.gaze.attention:Attention"},
+    GESTURES: {"gazerig": "gazerig.config.gestures"},
+    RIGS: {"gazerig": "gazerig.config.rigs"},
+}
+"""Our own parts, in the form of an entry point: group -> name -> "module:attribute".
+
+Gestures and rigs are folders of YAML files: a module of that folder, or its path.
+"""
+
+OUR_PACKAGE = "gazerig"
+
+
+class PluginError(SetupError):
+    """A part of a package cannot be used; the message names part, package and version."""
+
+
+@dataclass(frozen=True)
+class NoParams:
+    """The section of a part that has no parameters."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """How far a part is proven.
+
+    Attributes:
+        emulated: it was tested with an emulated device.
+        judge: an independent client or program that agreed with the emulated device, "" for none.
+        hardware: on which real device it was run, "" where it was not.
+    """
+
+    emulated: bool = False
+    judge: str = ""
+    hardware: str = ""
+
+
+NOTHING_PROVEN = Evidence()
+
+
+@dataclass(frozen=True)
+class Plugin:
+    """A part that can be made by name.
+
+    Attributes:
+        make: makes it of its parameters.
+        params: dataclass of its section in the rig file, which has the part's name.
+        abilities: what it can do, in words for ``gazerig kinds``.
+        evidence: how far it is proven.
+    """
+
+    make: Callable[..., Any]
+    params: type = NoParams
+    abilities: tuple[str, ...] = ()
+    evidence: Evidence = NOTHING_PROVEN
+
+
+@dataclass(frozen=True)
+class CameraPlugin(Plugin):
+    """A kind of camera; its section is at the top of the rig file.
+
+    ``make`` returns a ``gazerig.drivers.camera.source.FrameSource`` (frames, in which the rig's
+    own detectors look) or a ``gazerig.drivers.types.Camera`` (detections).
+    """
+
+
+@dataclass(frozen=True)
+class DetectorPlugin(Plugin):
+    """A kind of face detector; its section is below ``detector``.
+
+    ``make`` returns a ``gazerig.drivers.types.FaceDetector``.
+    """
+
+
+@dataclass(frozen=True)
+class AttentionPlugin(Plugin):
+    """A rule of who is looked at; its section is below ``gaze``.
+
+    ``make`` returns a ``gazerig.robot.control.chooser.Chooser``.
+    """
+
+
+@dataclass(frozen=True)
+class BusPlugin(Plugin):
+    """A kind of servo bus; its section is below ``bus``, and has a field ``baud``.
+
+    ``make`` returns, of a ``gazerig.drivers.serial.port.BusPort``, the servos' ``ServoConfig`` and
+    the parameters, a ``gazerig.drivers.types.ServoBus``.
+
+    Attributes:
+        models: its servo models by the name that a joint gives them.
+        moves: models of others that it moves too, as a board moves any "hobby" servo.
+        device: of the parameters, the servos, a clock and a seed the emulated device
+            (``gazerig.sim_mock.device.Device``) for --mock; None: it has none.
+        release: switches the torque of servos off through a port, for the guardian that does so
+            when the program dies, and returns the ids that did not confirm; of the port, the
+            parameters and the ids. None: the servos stop by themselves.
+    """
+
+    models: "Mapping[str, ServoModelInfo]" = field(default_factory=dict)
+    moves: tuple[str, ...] = ()
+    device: "Callable[[Any, tuple[EmulatedJoint, ...], Callable[[], float], int], Any] | None" = (
+        None
+    )
+    release: "Callable[[BusPort, Any, tuple[int, ...]], tuple[int, ...]] | None" = None
+
+
+@dataclass(frozen=True)
+class EmulatedJoint:
+    """One servo of an emulated bus.
+
+    Attributes:
+        id: of the servo.
+        model: as in the rig file.
+        start_steps: where its shaft is at first.
+        stop_low_steps, stop_high_steps: ends that its mechanics allow.
+    """
+
+    id: int
+    model: str
+    start_steps: float
+    stop_low_steps: float
+    stop_high_steps: float
+
+
+@dataclass(frozen=True)
+class Registration:
+    """A part as registered, not loaded yet.
+
+    Attributes:
+        group: of ``GROUPS``.
+        name: by which it is used.
+        value: "module:attribute", as of an entry point.
+        package, version: who brings it.
+    """
+
+    group: str
+    name: str
+    value: str
+    package: str
+    version: str = ""
+
+    @property
+    def ours(self) -> bool:
+        """Return whether it comes with gazerig."""
+        return self.package == OUR_PACKAGE
+
+    @property
+    def maker(self) -> str:
+        """Return package and version, as messages name them."""
+        return f"{self.package} {self.version}".rstrip()
+
+    @property
+    def label(self) -> str:
+        """Return the part as messages name it: "camera 'fish' of fishcam 1.2"."""
+        return f"{GROUPS[self.group]} {self.name!r} of {self.maker}"
+
+    def load(self) -> object:
+        """Return what the entry point names.
+
+        Raises:
+            PluginError: it cannot be imported, or is not there.
+        """
+        from importlib.metadata import EntryPoint
+
+        try:
+            return EntryPoint(self.name, self.value, self.group).load()
+        except (Exception, SystemExit) as error:  # a package may do anything while imported
+            raise PluginError(f"{self.label} cannot be loaded: {failure(error)}") from error
+
+
+def failure(error: BaseException) -> str:
+    """Return an exception of a package as part of one line."""
+    text = " ".join(str(error).split())[:200]
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+def registered(group: str) -> tuple[Registration, ...]:
+    """Return all parts of a group: ours, then those of packages by package and name."""
+    return (*_ours(group), *_outside(group, tuple(sys.path)))
+
+
+def taken_names(group: str) -> tuple[str, ...]:
+    """Return one line about every part whose name another one has."""
+    owner: dict[str, Registration] = {}
+    lines = []
+    for one in registered(group):
+        first = owner.setdefault(one.name, one)
+        if first is not one:
+            lines.append(f"{one.label} is left out: {first.maker} has that name")
+    return tuple(lines)
+
+
+def is_ours(group: str, name: str) -> bool:
+    """Return whether gazerig brings a part of this name."""
+    return name in SHIPPED[group]
+
+
+def find(group: str, name: str) -> Registration:
+    """Return the part of a name; ours before others'.
+
+    Raises:
+        PluginError: there is none, or several packages bring one; the message lists them.
+    """
+    if is_ours(group, name):
+        return Registration(group, name, SHIPPED[group][name], OUR_PACKAGE)
+    there = _outside(group, tuple(sys.path))
+    found = [one for one in there if one.name == name]
+    if len(found) == 1:
+        return found[0]
+    what = GROUPS[group]
+    if found:
+        makers = " and ".join(one.maker for one in found)
+        raise PluginError(f"{what} {name!r} comes with {makers}: uninstall one of them")
+    names = [*SHIPPED[group], *dict.fromkeys(one.name for one in there)]
+    near = get_close_matches(name, names, 1)
+    hint = f"did you mean {near[0]!r}? " if near else ""
+    raise PluginError(f"no {what} is called {name!r}: {hint}there is {', '.join(names) or 'none'}")
+
+
+P = TypeVar("P", bound=Plugin)
+
+
+def load(group: str, name: str, kind: type[P]) -> P:
+    """Return the part of a name, imported; a plain class or function is one without parameters.
+
+    Raises:
+        PluginError: there is none, it cannot be imported, or it is something else.
+    """
+    found = find(group, name)
+    part = _loaded(found)
+    if isinstance(part, kind):
+        return part
+    if callable(part) and kind is not BusPlugin:
+        without = part
+        return kind(make=lambda params: without())
+    raise PluginError(f"{found.label} is a {type(part).__name__}, wanted a {kind.__name__}")
+
+
+@cache
+def _loaded(found: Registration) -> object:
+    return found.load()
+
+
+def yaml_files(group: str) -> dict[str, tuple[Path, Registration]]:
+    """Return the YAML files of packages, ours not among them: name -> file and who brings it.
+
+    Of two files with one name the first counts; ``taken_names`` does not know of it.
+
+    Raises:
+        PluginError: a package cannot be imported, or does not name a folder.
+    """
+    files: dict[str, tuple[Path, Registration]] = {}
+    for one in _outside(group, tuple(sys.path)):
+        for file in sorted(_folder(one).glob("*.yaml")):
+            files.setdefault(file.stem, (file, one))
+    return files
+
+
+def _folder(found: Registration) -> Path:
+    part = found.load()
+    places = list(getattr(part, "__path__", ())) or [part]
+    if isinstance(places[0], str | Path) and (folder := Path(places[0])).is_dir():
+        return folder
+    raise PluginError(f"{found.label} is no folder: name a folder of YAML files, or its package")
+
+
+def made(group: str, name: str, part: Plugin, params: Any) -> Any:
+    """Return what a part makes of its parameters.
+
+    Raises:
+        SetupError: it says itself why it cannot.
+        PluginError: it fails.
+    """
+    try:
+        return part.make(params)
+    except SetupError:
+        raise
+    except Exception as error:
+        raise PluginError(f"{find(group, name).label} cannot be made: {failure(error)}") from error
+
+
+def _ours(group: str) -> tuple[Registration, ...]:
+    return tuple(
+        Registration(group, name, value, OUR_PACKAGE, _version())
+        for name, value in SHIPPED[group].items()
+    )
+
+
+@cache
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version(OUR_PACKAGE)
+    except PackageNotFoundError:  # a checkout that is not installed
+        return ""
+
+
+@cache
+def _outside(group: str, path: tuple[str, ...]) -> tuple[Registration, ...]:
+    """Return the parts of installed packages; path: where modules are looked for."""
+    from importlib.metadata import entry_points
+
+    found = []
+    for one in entry_points(group=group):
+        package = one.dist.name if one.dist is not None else one.module.partition(".")[0]
+        if package != OUR_PACKAGE:
+            version = one.dist.version if one.dist is not None else ""
+            found.append(Registration(group, one.name, one.value, package, version))
+    return tuple(sorted(found, key=lambda one: (one.package, one.name)))

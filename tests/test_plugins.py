@@ -1,0 +1,212 @@
+"""Parts of other packages are found by name, loaded when used, and refused in one line."""
+
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from outside_package import install, on_path
+
+from gazerig.config.load import ConfigError
+from gazerig.config.parameters import changed, parameters
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers import plugins
+from gazerig.drivers.plugins import (
+    ATTENTION,
+    CAMERA,
+    DETECTOR,
+    GROUPS,
+    RIGS,
+    SHIPPED,
+    AttentionPlugin,
+    CameraPlugin,
+    Plugin,
+    PluginError,
+)
+
+DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
+
+RULE = """
+    from dataclasses import dataclass
+    from typing import Annotated
+    from gazerig.drivers.plugins import AttentionPlugin
+    from gazerig.params import Bounds
+
+    @dataclass(frozen=True)
+    class Params:
+        height_m: Annotated[float, Bounds(0.0, 3.0), "height that is looked at"] = 1.0
+
+    class Rule:
+        def __init__(self, params):
+            self.params = params
+
+        def choose(self, percept, state, t_s):
+            return (1.0, 0.0, self.params.height_m)
+
+    PLUGIN = AttentionPlugin(Rule, Params)
+"""
+
+
+@pytest.fixture
+def folder(tmp_path):
+    with on_path(tmp_path / "site") as made:
+        made.mkdir()
+        yield made
+
+
+def with_chooser(tmp_path, name, section=""):
+    text = DESK.read_text(encoding="utf-8")
+    head, gaze, rest = text.partition("\ngaze:")
+    _, end, rest = rest.partition("\n")
+    assert gaze and end
+    file = tmp_path / "mine.yaml"
+    file.write_text(f"{head}\ngaze:\n  chooser: {name}\n{section}{rest}", encoding="utf-8")
+    return str(file)
+
+
+def fault(path):
+    with pytest.raises(ConfigError) as caught:
+        load_rig(path)
+    lines = str(caught.value).splitlines()
+    assert len(lines) == 1, lines
+    return lines[0]
+
+
+# --- ours come through the same door
+
+
+@pytest.mark.parametrize(
+    ("group", "name"), [(g, n) for g in GROUPS for n in SHIPPED[g] if g not in (plugins.GESTURES,)]
+)
+def test_ours_are_found_and_loaded_by_the_same_code(group, name):
+    found = plugins.find(group, name)
+    assert found.ours and found in {
+        one.__class__(one.group, one.name, one.value, one.package)
+        for one in plugins.registered(group)
+    }
+    part = found.load()
+    if group == RIGS:
+        assert plugins._folder(found).joinpath("desk.yaml").is_file()
+    elif group != ATTENTION:
+        assert isinstance(part, Plugin)
+
+
+def test_a_rig_of_ours_looks_at_no_package():
+    code = (
+        "import sys; from gazerig.config.schema import load_rig; load_rig('desk');"
+        "from gazerig.robot.app.bus_wiring import rig_bus;"
+        "from gazerig.drivers import plugins; print(plugins._outside.cache_info().misses)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "0"
+
+
+# --- those of others
+
+
+def test_a_package_is_imported_when_its_part_is_used_and_no_sooner(folder):
+    install(folder, "tall-rule", {ATTENTION: {"tallest": "tall_rule:PLUGIN"}}, {"tall_rule": RULE})
+    (found,) = [one for one in plugins.registered(ATTENTION) if not one.ours]
+    assert (found.name, found.maker) == ("tallest", "tall-rule 1.2")
+    assert found.label == "attention 'tallest' of tall-rule 1.2"
+    assert "tall_rule" not in sys.modules
+    assert isinstance(plugins.load(ATTENTION, "tallest", AttentionPlugin), AttentionPlugin)
+    assert "tall_rule" in sys.modules
+
+
+def test_a_plain_class_is_a_part_without_parameters(folder):
+    install(folder, "p", {CAMERA: {"fish": "fish_eye:Fish"}}, {"fish_eye": "class Fish: pass"})
+    part = plugins.load(CAMERA, "fish", CameraPlugin)
+    assert type(plugins.made(CAMERA, "fish", part, part.params())).__name__ == "Fish"
+
+
+def test_a_name_nobody_brings_is_refused_with_those_there_are(folder):
+    install(folder, "p", {CAMERA: {"fish": "fish_eye:Fish"}}, {"fish_eye": "class Fish: pass"})
+    with pytest.raises(
+        PluginError,
+        match="^no camera is called 'fisch': did you mean 'fish'. there is webcam, oak, fish$",
+    ):
+        plugins.find(CAMERA, "fisch")
+
+
+def test_a_name_that_is_taken_is_named_with_both_packages(folder):
+    install(folder, "one", {DETECTOR: {"eyes": "m:x", "mtcnn": "m:x"}}, {"m": "x = 1"})
+    install(folder, "two", {DETECTOR: {"eyes": "m:x"}}, {}, "3.0")
+    with pytest.raises(
+        PluginError, match="^detector 'eyes' comes with one 1.2 and two 3.0: uninstall one of them$"
+    ):
+        plugins.find(DETECTOR, "eyes")
+    assert plugins.find(DETECTOR, "mtcnn").ours
+    assert [line.replace(plugins._version(), "V") for line in plugins.taken_names(DETECTOR)] == [
+        "detector 'mtcnn' of one 1.2 is left out: gazerig V has that name",
+        "detector 'eyes' of two 3.0 is left out: one 1.2 has that name",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("source", "told"),
+    [
+        (
+            "import nowhere_to_be_found",
+            "ModuleNotFoundError: No module named 'nowhere_to_be_found'",
+        ),
+        ("raise RuntimeError('no\\nlicence')", "RuntimeError: no licence"),
+        ("raise SystemExit(3)", "SystemExit: 3"),
+        ("other = 1", "AttributeError: module 'broken' has no attribute 'PLUGIN'"),
+        ("def x(:", "SyntaxError: invalid syntax"),
+    ],
+)
+def test_a_package_that_cannot_be_imported_is_one_line_at_its_key(folder, tmp_path, source, told):
+    install(folder, "bad-rule", {ATTENTION: {"bad": "broken:PLUGIN"}}, {"broken": source})
+    line = fault(with_chooser(tmp_path, "bad"))
+    assert "mine.yaml:" in line and "gaze.chooser" in line
+    assert f"attention 'bad' of bad-rule 1.2 cannot be loaded: {told}" in line
+
+
+def test_something_else_than_a_part_is_refused(folder, tmp_path):
+    install(folder, "odd", {ATTENTION: {"odd": "odd_one:PLUGIN"}}, {"odd_one": "PLUGIN = 7"})
+    assert "attention 'odd' of odd 1.2 is a int, wanted a AttentionPlugin" in fault(
+        with_chooser(tmp_path, "odd")
+    )
+
+
+# --- their sections of the rig file
+
+
+def test_a_section_is_checked_like_ours(folder, tmp_path):
+    install(folder, "tall-rule", {ATTENTION: {"tallest": "tall_rule:PLUGIN"}}, {"tall_rule": RULE})
+    rig = load_rig(with_chooser(tmp_path, "tallest", "  tallest:\n    height_m: 1.8\n"))
+    assert isinstance(rig, Rig) and rig.gaze.tallest.height_m == 1.8
+    assert load_rig(with_chooser(tmp_path, "tallest")).gaze.tallest.height_m == 1.0
+    for section, told in (
+        ("    height_m: 8.0\n", "gaze.tallest.height_m: 8.0 is above 3 (unit m)"),
+        ("    heigth_m: 1.0\n", "unknown key 'heigth_m'; did you mean 'height_m'?"),
+        ("    height_m: tall\n", "'tall' is text, wanted a number, 0 to 3 m"),
+    ):
+        line = fault(with_chooser(tmp_path, "tallest", f"  tallest:\n{section}"))
+        assert told in line, line
+        assert "mine.yaml:" in line
+
+
+def test_a_rule_nobody_brings_is_refused_at_its_key_with_all_there_are(folder, tmp_path):
+    install(folder, "tall-rule", {ATTENTION: {"tallest": "tall_rule:PLUGIN"}}, {"tall_rule": RULE})
+    line = fault(with_chooser(tmp_path, "talest"))
+    assert "gaze.chooser" in line and "did you mean 'tallest'?" in line
+    assert "tall_rule" not in sys.modules
+
+
+def test_a_rig_with_a_section_is_changed_listed_and_sent_to_other_processes(folder, tmp_path):
+    install(folder, "tall-rule", {ATTENTION: {"tallest": "tall_rule:PLUGIN"}}, {"tall_rule": RULE})
+    rig = load_rig(with_chooser(tmp_path, "tallest"))
+    other = changed(rig, {"gaze.tallest.height_m": 2.5})
+    assert other.gaze.tallest.height_m == 2.5 and type(other) is type(rig)
+    with pytest.raises(ConfigError, match="9.0 is above 3"):
+        changed(rig, {"gaze.tallest.height_m": 9.0})
+    (found,) = [one for one in parameters(other, rig) if one.key == "gaze.tallest.height_m"]
+    assert (found.unit, found.low, found.high, found.default) == ("m", 0.0, 3.0, 1.0)
+    assert pickle.loads(pickle.dumps(other)) == other != rig
+    assert type(load_rig("desk")) is Rig
+    # From the plain rig to it and back, as a file that is edited does.
+    chosen = changed(load_rig("desk"), {"gaze.chooser": "tallest"})
+    assert chosen.gaze.tallest.height_m == 1.0
