@@ -19,6 +19,7 @@ from gazerig.config.export import abbreviated, suggestion
 from gazerig.config.load import ConfigError, ConfigFault, Entry, validate_entries
 from gazerig.config.plugin_sections import extended
 from gazerig.config.renamed import renamed_changes, renamed_key
+from gazerig.config.rig import GazeConfig
 from gazerig.config.schema import RULES, Rig
 from gazerig.gaze.types import PARTS
 from gazerig.robot.model.commands import Value
@@ -28,6 +29,7 @@ NEXT_TICK = "next tick"
 NEXT_START = "next start"
 
 _AT_OPENING = "the camera is opened with it"
+_CHOOSER = "what chooses whom to look at is made with it"
 _AT_START: dict[str, str] = {
     "name": "it only names the rig",
     "profile": "its file is laid over the rig's when that is read",
@@ -43,10 +45,13 @@ _AT_START: dict[str, str] = {
     "joints.*.gains": "servos are set up while their torque is off; a stop and a resume will do",
     "joints.*.torque_limit": "servos are set up while their torque is off; a stop and a resume will do",
     "camera.mount": "who looks at the frames must know from the first whether they turn",
+    "gaze.chooser": _CHOOSER,
     "webcam.*": _AT_OPENING,
     "oak.*": _AT_OPENING,
     "camera_recovery.*": _AT_OPENING,
 }
+_SECTIONS = frozenset(field.name for field in dataclasses.fields(Rig))
+_GAZE = frozenset(field.name for field in dataclasses.fields(GazeConfig))
 _UNLISTED = ("park_deg", "face_parts_mm")
 """Mappings whose entries a file may leave out."""
 _LEFT_OUT: dict[str, Value] = {"park_deg": 0.0}
@@ -282,6 +287,11 @@ def live(key: str) -> str:
     for pattern, reason in _AT_START.items():
         if fnmatchcase(key, pattern):
             return f"{NEXT_START}: {reason}"
+    first, _, rest = key.partition(".")
+    if first not in _SECTIONS:  # a package's camera
+        return f"{NEXT_START}: {_AT_OPENING}"
+    if first == "gaze" and rest.partition(".")[0] not in _GAZE:  # a package's rule
+        return f"{NEXT_START}: {_CHOOSER}"
     return NEXT_TICK
 
 
