@@ -20,6 +20,7 @@ from gazerig.config.renamed import RIG as RENAMED
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.feetech.family import FEETECH
+from gazerig.drivers.plugins import BusPlugin
 from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_models import SERVOS
 from gazerig.robot.cli.examples import EXAMPLES
@@ -239,7 +240,10 @@ def test_every_span_names_something_that_is_there(paper: Path) -> None:
         return  # its tables are held against the emulator below
     words = {*keys(), *defined(), *SERVOS, *scenes(), *EXAMPLES, *_modes()}
     words |= {*RENAMED, *RENAMED.values(), "rules.*.pull"}
-    words |= {field.name for field in fields(Family)} | {*DYNAMIXEL.registers, *FEETECH.registers}
+    words |= {field.name for field in (*fields(Family), *fields(BusPlugin))} | {
+        *DYNAMIXEL.registers,
+        *FEETECH.registers,
+    }
     for span in spans(paper):
         if span.startswith(("gazerig ", "--", "make ", "pip install ", "/dev/", "/etc/", "test_")):
             continue
