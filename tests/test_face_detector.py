@@ -10,7 +10,7 @@ from present import present
 from skimage import data
 
 from gazerig.drivers.camera.video_file import VideoFile
-from gazerig.drivers.errors import ModelFileError
+from gazerig.drivers.errors import ModelFileError, SetupError
 from gazerig.drivers.types import DetectedFace, FaceDetector, ImageArray, Pixels
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.mtcnn import package_folder, read_model
@@ -249,8 +249,8 @@ def test_altered_or_missing_model_file_names_the_cure(tmp_path):
 
 
 def test_unknown_detector_is_refused():
-    with pytest.raises(ModelFileError, match="'mtcnn' or 'yunet'"):
-        face_detector(FaceDetectorParams(kind="other"))  # type: ignore[arg-type]
+    with pytest.raises(SetupError, match="'other': there is mtcnn, yunet"):
+        face_detector(FaceDetectorParams(kind="other"))
 
 
 # ---- YuNet ------------------------------------------------------------------------------

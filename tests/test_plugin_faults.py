@@ -4,6 +4,7 @@ import threading
 from dataclasses import replace
 from math import inf, nan
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.chooser import MOST_OVERRUNS, GuardedChooser
 
 LABEL = "attention 'odd' of odd 1.2"
-OWN = Target((2.0, 0.0, 0.5), (0.0, 0.0, 0.0), 0.0, "face", 3, 1.0, True, None, 1, "own")
+OWN: Any = Target((2.0, 0.0, 0.5), (0.0, 0.0, 0.0), 0.0, "face", 3, 1.0, True, None, 1, "own")
 
 
 class Own:
@@ -42,9 +43,10 @@ class Own:
 
 
 def guarded(answer, longest_s=None):
-    said = []
+    said: list[str] = []
     rule = SimpleNamespace(choose=answer)
-    return GuardedChooser(rule, Own(), LABEL, said.append, longest_s), said
+    own: Any = Own()
+    return GuardedChooser(rule, own, LABEL, said.append, longest_s), said
 
 
 def raising(*_):
@@ -153,7 +155,8 @@ def test_a_whole_rig_runs_on_without_a_rule_and_nan_reaches_no_joint(tmp_path, n
         install(tmp_path, "odd", {ATTENTION: {"odd": "odd_rule:Rule"}}, {"odd_rule": source})
         rig = changed(load_rig("desk"), {"gaze.chooser": "odd"})
         made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
-        events, kinds = [], set()
+        events: list[str] = []
+        kinds: set[str] = set()
         made.robot.start(made.clock)
         for k in range(1, 200):
             made.clock.sleep_until(k * 0.005)
@@ -170,6 +173,10 @@ def test_a_whole_rig_runs_on_without_a_rule_and_nan_reaches_no_joint(tmp_path, n
 
 
 # --- a camera
+
+
+SHOT: Any = Shot
+NO_IMAGE: Any = None
 
 
 class Camera:
@@ -194,8 +201,8 @@ class Camera:
         self.closed += 1
 
 
-SEEN = Detections(1.0, 1, 640, 480)
-FACE = DetectedFace((1.0, 2.0, 30.0, 40.0), np.ones((5, 2)), 0.9)
+SEEN: Any = Detections(1.0, 1, 640, 480)
+FACE: Any = DetectedFace((1.0, 2.0, 30.0, 40.0), np.ones((5, 2)), 0.9)
 
 
 @pytest.mark.parametrize(
@@ -231,8 +238,9 @@ def test_a_camera_that_fails_leaves_the_rig_without_frames(answer, told):
 
 def test_a_camera_that_blocks_keeps_its_last_frame_and_is_reported_once():
     gate = threading.Event()
-    camera = GuardedCamera(Camera(SEEN), "camera 'fish' of fish 2", 0.001)
-    camera.camera.latest = lambda now_s: gate.wait(60.0) and SEEN
+    inner: Any = Camera(SEEN)
+    camera = GuardedCamera(inner, "camera 'fish' of fish 2", 0.001)
+    inner.latest = lambda now_s: gate.wait(60.0) and SEEN
     camera.open()
     for k in range(300):
         assert camera.latest(0.01 * k) is None
@@ -244,7 +252,7 @@ def test_a_camera_that_blocks_keeps_its_last_frame_and_is_reported_once():
 
 
 def test_a_camera_that_cannot_be_opened_refuses_the_start():
-    camera = Camera()
+    camera: Any = Camera()
     for error, kind, told in (
         (CameraError("no such camera: plug it in"), CameraError, "^no such camera: plug it in$"),
         (OSError("bus\nerror"), PluginError, "^fish cannot be opened: OSError: bus error$"),
@@ -262,10 +270,10 @@ def test_a_camera_that_cannot_be_opened_refuses_the_start():
     ("answer", "told"),
     [
         (7, "returned a int, wanted a Shot"),
-        (Shot(nan, 1, np.zeros((4, 4, 3), np.uint8)), "a frame of the time nan"),
-        (Shot(1e9, 1, np.zeros((4, 4, 3), np.uint8)), "a frame of the time 1000000000.0"),
-        (Shot(1.0, 1, np.zeros((4, 4, 3))), "no image of 8 or 16 bits"),
-        (Shot(1.0, 1, "picture"), "no image"),
+        (SHOT(nan, 1, np.zeros((4, 4, 3), np.uint8)), "a frame of the time nan"),
+        (SHOT(1e9, 1, np.zeros((4, 4, 3), np.uint8)), "a frame of the time 1000000000.0"),
+        (SHOT(1.0, 1, np.zeros((4, 4, 3))), "no image of 8 or 16 bits"),
+        (SHOT(1.0, 1, "picture"), "no image"),
         (RuntimeError("cable"), "failed (RuntimeError: cable)"),
     ],
 )
@@ -296,8 +304,8 @@ def test_a_source_that_returns_nonsense_is_named(answer, told):
 def test_a_detector_that_fails_is_replaced_by_ours(answer, told):
     ours = SimpleNamespace(find=lambda image: (FACE,))
     detector = CheckedDetector(SimpleNamespace(find=answer), "detector 'd' of d 1", lambda: ours)
-    assert detector.find(None) == (FACE,)
-    assert detector.find(None) == (FACE,)
+    assert detector.find(NO_IMAGE) == (FACE,)
+    assert detector.find(NO_IMAGE) == (FACE,)
     (line,) = detector.events()
     assert line.startswith("detector 'd' of d 1 ") and told in line
     assert line.endswith(": dropped, mtcnn finds the faces")
@@ -306,7 +314,7 @@ def test_a_detector_that_fails_is_replaced_by_ours(answer, told):
 # --- a bus
 
 SERVOS = (ServoConfig(1, "m", 0, 1000, 500.0, "neck"), ServoConfig(2, "m", 0, 1000, 500.0, "jaw"))
-GOOD = Feedback.of_none(2)._replace(
+GOOD: Any = Feedback.of_none(2)._replace(
     position_steps=(500.0, 400.0), velocity_steps_s=(0.0, 0.0), load=(0.0, 0.0), at_s=(1.0, 1.0),
     torque=(True, True), missing=(),
 )  # fmt: skip
@@ -369,7 +377,7 @@ def test_a_read_that_takes_a_tick_is_reported_seldom():
 
 
 def test_goals_are_clipped_and_checked_whatever_the_bus_does():
-    sent = []
+    sent: list[list[int]] = []
     bus = checked(write=sent.append)
     bus.write([-50, 1e9])
     assert sent == [[0, 1000]]

@@ -4,6 +4,7 @@ import pickle
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 from outside_package import install, on_path
@@ -176,9 +177,10 @@ def test_something_else_than_a_part_is_refused(folder, tmp_path):
 
 def test_a_section_is_checked_like_ours(folder, tmp_path):
     install(folder, "tall-rule", {ATTENTION: {"tallest": "tall_rule:PLUGIN"}}, {"tall_rule": RULE})
-    rig = load_rig(with_chooser(tmp_path, "tallest", "  tallest:\n    height_m: 1.8\n"))
-    assert isinstance(rig, Rig) and rig.gaze.tallest.height_m == 1.8
-    assert load_rig(with_chooser(tmp_path, "tallest")).gaze.tallest.height_m == 1.0
+    rig: Any = load_rig(with_chooser(tmp_path, "tallest", "  tallest:\n    height_m: 1.8\n"))
+    assert rig.gaze.tallest.height_m == 1.8 and issubclass(type(rig), Rig)
+    plain: Any = load_rig(with_chooser(tmp_path, "tallest"))
+    assert plain.gaze.tallest.height_m == 1.0
     for section, told in (
         ("    height_m: 8.0\n", "gaze.tallest.height_m: 8.0 is above 3 (unit m)"),
         ("    heigth_m: 1.0\n", "unknown key 'heigth_m'; did you mean 'height_m'?"),
@@ -198,8 +200,8 @@ def test_a_rule_nobody_brings_is_refused_at_its_key_with_all_there_are(folder, t
 
 def test_a_rig_with_a_section_is_changed_listed_and_sent_to_other_processes(folder, tmp_path):
     install(folder, "tall-rule", {ATTENTION: {"tallest": "tall_rule:PLUGIN"}}, {"tall_rule": RULE})
-    rig = load_rig(with_chooser(tmp_path, "tallest"))
-    other = changed(rig, {"gaze.tallest.height_m": 2.5})
+    rig: Any = load_rig(with_chooser(tmp_path, "tallest"))
+    other: Any = changed(rig, {"gaze.tallest.height_m": 2.5})
     assert other.gaze.tallest.height_m == 2.5 and type(other) is type(rig)
     with pytest.raises(ConfigError, match="9.0 is above 3"):
         changed(rig, {"gaze.tallest.height_m": 9.0})
@@ -208,5 +210,5 @@ def test_a_rig_with_a_section_is_changed_listed_and_sent_to_other_processes(fold
     assert pickle.loads(pickle.dumps(other)) == other != rig
     assert type(load_rig("desk")) is Rig
     # From the plain rig to it and back, as a file that is edited does.
-    chosen = changed(load_rig("desk"), {"gaze.chooser": "tallest"})
+    chosen: Any = changed(load_rig("desk"), {"gaze.chooser": "tallest"})
     assert chosen.gaze.tallest.height_m == 1.0
