@@ -69,9 +69,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """Return three workers for two processors: for a third of the time tests wait."""
+    """Return four workers for two processors: for a third of the time tests wait."""
     processors = os.cpu_count() or 1
-    return processors + (processors + 1) // 2
+    return processors + processors // 2 + 1
 
 
 @pytest.hookimpl(tryfirst=True)
