@@ -42,7 +42,8 @@ class Shape:
     inner: shape of the items of a list or mapping
     params: the dataclass, for form "params"
     optional: null may stand here
-    low, high, choices, unit, says: as declared; length: number of items of a list, None if free
+    low, high, choices, unit, description: as declared
+    length: number of items of a list, None if free
     """
 
     form: Form
@@ -54,7 +55,7 @@ class Shape:
     high: float | None = None
     length: int | None = None
     unit: str = ""
-    says: str = ""
+    description: str = ""
 
 
 def validate(into: type[T], data: object) -> tuple[T | None, list[ErrorDetails]]:
@@ -129,7 +130,7 @@ def shapes_of(params: type) -> dict[str, Shape]:
 def _shape(declared: Declaration, kind: Any, place: str) -> Shape:
     """Return what may stand where a type is declared, or in a list or mapping of it."""
     shape = _of_type(declared, kind, place)
-    return dataclasses.replace(shape, unit=declared.unit, says=declared.description)
+    return dataclasses.replace(shape, unit=declared.unit, description=declared.description)
 
 
 def _of_type(declared: Declaration, kind: Any, place: str) -> Shape:
@@ -244,7 +245,7 @@ def _first_line(params: type) -> str:
 
 def _described(shape: Shape) -> str:
     """Return the description of a value with its unit, for an editor's hover text."""
-    return f"{shape.says} [{shape.unit}]".strip() if shape.unit else shape.says
+    return f"{shape.description} [{shape.unit}]".strip() if shape.unit else shape.description
 
 
 def _miscounted(details: ErrorDetails) -> bool:

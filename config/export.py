@@ -48,8 +48,8 @@ def violation(into: type, details: ErrorDetails) -> Violation:
         return Violation(path, abbreviated(details["input"]), _unknown(_at(root, path[:-1]), path))
     shape = _at(root, path)
     if details["type"] == "missing":
-        says = f" ({shape.says})" if shape.says else ""
-        return Violation(path, "", f"missing; wanted {expected(shape)}{says}")
+        described = f" ({shape.description})" if shape.description else ""
+        return Violation(path, "", f"missing; wanted {expected(shape)}{described}")
     return Violation(path, abbreviated(details["input"]), _rule(shape, details))
 
 

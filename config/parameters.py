@@ -62,7 +62,8 @@ class Parameter(NamedTuple):
     """One parameter.
 
     key: dotted path in the YAML; group: the path above it, "" at the top
-    unit, says, low, high, choices: as declared beside the value; of a list they hold for items
+    unit, description, low, high, choices: as declared beside the value; of a list they hold
+        for items
     kind: number, whole, bool, text, choice, list or mapping
     default: its value in the rig of defaults
     live: "next tick", or "next start: " and why a running rig cannot take it
@@ -73,7 +74,7 @@ class Parameter(NamedTuple):
     key: str
     group: str
     unit: str
-    says: str
+    description: str
     low: float | None
     high: float | None
     choices: tuple[Value, ...]
@@ -251,7 +252,7 @@ def _leaves(
         for name, field in shapes_of(shape.params).items():
             yield from _leaves(field, getattr(value, name), (*path, name), unlisted)
     elif shape.form == "mapping" and shape.inner is not None:
-        inner = dataclasses.replace(shape.inner, says=shape.says, unit=shape.unit)
+        inner = dataclasses.replace(shape.inner, description=shape.description, unit=shape.unit)
         for step in (*value, *(s for s in unlisted.get(key, ()) if s not in value)):
             yield from _leaves(inner, value.get(step, _LEFT_OUT.get(key)), (*path, step), unlisted)
     else:
@@ -268,7 +269,7 @@ def _knob(key: str, shape: Shape, default: Value) -> Parameter:
         key,
         entry,
         shape.unit,
-        shape.says,
+        shape.description,
         inner.low,
         inner.high,
         choices,

@@ -43,7 +43,7 @@ class _Edit(NamedTuple):
 def edited(text: str, changes: Mapping[str, Value], into: type) -> str:
     """Return the text with the values at dotted key paths replaced, missing keys added.
 
-    into: the Params dataclass of the file; its fields' ``says`` explain keys that are added
+    into: the Params dataclass of the file; its fields' descriptions explain keys that are added
 
     Raises:
         Unchangeable: a value cannot be written where it should stand.
@@ -229,14 +229,14 @@ def _block(steps: list[str], depth: int, indent: int, value: Value, into: type) 
     return lines
 
 
-def _explained(body: str, says: str, indent: str) -> list[str]:
+def _explained(body: str, description: str, indent: str) -> list[str]:
     """Return a line with a comment behind it, or above it where it is too long."""
     line = f"{indent}{body}"
-    if not says:
+    if not description:
         return [line]
-    if len(line) + len(says) + 4 <= WIDTH:
-        return [f"{line}  # {says}"]
-    above = textwrap.wrap(says, WIDTH - len(indent) - 2)
+    if len(line) + len(description) + 4 <= WIDTH:
+        return [f"{line}  # {description}"]
+    above = textwrap.wrap(description, WIDTH - len(indent) - 2)
     return [*(f"{indent}# {part}" for part in above), line]
 
 
@@ -255,4 +255,6 @@ def _described(shape: Shape) -> str:
     limits = " | ".join(map(str, inner.choices))
     if inner.low is not None and inner.high is not None:
         limits = f"{inner.low:.12g}..{inner.high:.12g}"
-    return "; ".join(filter(None, (", ".join(filter(None, (shape.unit, limits))), shape.says)))
+    return "; ".join(
+        filter(None, (", ".join(filter(None, (shape.unit, limits))), shape.description))
+    )

@@ -45,7 +45,7 @@ def _sections(params: type, above: str) -> Iterator[tuple[str, list[str]]]:
             nested.append((f"{key}.*", inner.params))
         else:
             rows.append(
-                f"| `{name}` | {defaults[name]} | {_limits(shape)} | {_cell(shape.says)} |\n"
+                f"| `{name}` | {defaults[name]} | {_limits(shape)} | {_cell(shape.description)} |\n"
             )
     if rows:
         yield above, rows

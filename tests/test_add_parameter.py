@@ -71,7 +71,7 @@ def test_adding_a_parameter_takes_what_the_paper_says(tmp_path: Path) -> None:
     made = json.loads(found.stdout)
     knob = made["knob"]
     assert (knob["low"], knob["high"], knob["default"], knob["unit"]) == (0.3, 0.5, 0.45, "")
-    assert knob["live"] == "next tick" and "share of the rise" in knob["says"]
+    assert knob["live"] == "next tick" and "share of the rise" in knob["description"]
     assert (made["schema"]["minimum"], made["schema"]["maximum"]) == (0.3, 0.5)
     assert "gaze.saccade.rise_share: 0.6 is above 0.5" in made["refused"]
     assert made["moved"] > 1e-4

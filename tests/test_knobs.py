@@ -46,7 +46,7 @@ def test_a_knob_says_what_its_field_says() -> None:
     (knob,) = (k for k in KNOBS if k.key == "gaze.lids.blinks_per_min")
     assert knob.group == "gaze.lids" and knob.unit == "1/min" and knob.kind == "number"
     assert (knob.low, knob.high, knob.default) == (0.0, 60.0, 17.0)
-    assert knob.says == "spontaneous blinks at rest; 0: never" and knob.live == NEXT_TICK
+    assert knob.description == "spontaneous blinks at rest; 0: never" and knob.live == NEXT_TICK
     (pan,) = (k for k in KNOBS if k.key == "park_deg.left_eye_pan")
     assert (pan.default, pan.low, pan.unit) == (0.0, -180.0, "deg")
     (part,) = (k for k in KNOBS if k.key == "face_parts_mm.N")
@@ -58,7 +58,7 @@ def test_all_have_words_and_structure_waits_for_the_next_start() -> None:
     assert {"bus.port", "joints.neck_yaw.id", "oak.rate_hz", "camera.mount", "name"} <= waiting
     assert not any(key.startswith(("gaze.", "guard.", "tracks.", "loop.")) for key in waiting)
     for knob in KNOBS:
-        assert knob.says, knob.key
+        assert knob.description, knob.key
         assert knob.live == NEXT_TICK or len(knob.live) > len("next start: "), knob.key
         assert knob.kind != "choice" or knob.choices, knob.key
 

@@ -173,6 +173,8 @@ def test_sliders_are_those_of_the_rig(server: viser.ViserServer) -> None:
 def test_a_parameter_is_read_as_the_rig_writes_it() -> None:
     data = {**PARAM._asdict(), "choices": [1, -1], "length": None, "items": None}
     assert ParamInfo.from_json(json.loads(json.dumps(data))) == PARAM._replace(choices=(1, -1))
+    older = {"says" if name == "description" else name: one for name, one in data.items()}
+    assert ParamInfo.from_json(older) == PARAM._replace(choices=(1, -1))
 
 
 def test_a_hint_says_all_there_is_to_know() -> None:
@@ -269,7 +271,7 @@ def ignore(key: str, value: object) -> None:
 
 
 def test_search_takes_every_word() -> None:
-    parameters = (PARAM, PARAM._replace(key="guard.speed", group="guard", says="how fast"))
+    parameters = (PARAM, PARAM._replace(key="guard.speed", group="guard", description="how fast"))
     assert found("how FAR", parameters) == ["a.b"]
     assert found("how", parameters) == ["a.b", "guard.speed"] and found("how not", parameters) == []
     assert group_of(PARAM._replace(group="joints.neck_yaw.more")) == "joints.neck_yaw"

@@ -77,7 +77,7 @@ def test_the_error_told_is_the_error_that_comes(name: str, point: Vec3) -> None:
 def test_a_point_in_reach_is_met_and_nothing_is_said_to_be_limited(name: str) -> None:
     reply, error_deg = foretold_and_true(name, (1.5, 0.1, 0.2))
     assert reply.error_deg < 0.6 and error_deg < 1.0 and not reply.joints
-    assert reply.words() == "it looks there"
+    assert reply.text() == "it looks there"
 
 
 def test_behind_the_head_the_ends_are_named() -> None:
@@ -86,13 +86,14 @@ def test_behind_the_head_the_ends_are_named() -> None:
     assert {"neck_yaw", "left_eye_pan", "right_eye_pan"} <= {one.joint for one in reply.limited}
     (yaw,) = [one for one in reply.joints if one.joint == "neck_yaw"]
     assert abs(yaw.asked_rad) > 3.0 and abs(yaw.done_rad) == pytest.approx(radians(70.0))
-    assert "deg beside it: " in reply.words() and "neck_yaw stays at" in reply.words()
-    assert CommandReply.from_json(reply.as_json()).words() == reply.words()
+    assert "deg beside it: " in reply.text() and "neck_yaw stays at" in reply.text()
+    assert CommandReply.from_json(reply.as_json()).text() == reply.text()
+    assert reply.as_json()["text"] == reply.as_json()["words"] == reply.text()
 
 
 def test_a_rig_without_a_neck_says_so() -> None:
     reply, _ = foretold_and_true("maker", (1.0, 2.0, 0.0), 0.1)
-    assert "neck_yaw: this rig has none" in reply.words() and reply.error_deg > 20.0
+    assert "neck_yaw: this rig has none" in reply.text() and reply.error_deg > 20.0
 
 
 def test_the_running_robot_replies_so_and_keeps_saying_it() -> None:

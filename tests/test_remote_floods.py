@@ -241,7 +241,7 @@ def test_a_program_leads_while_it_lives_and_is_named(
     monkeypatch.setattr(heartbeat, "_EVERY_S", 0.05)
     with RobotClient.connect(who="a show") as show:
         reply = show.look_at(-1.0, 0.0, 0.3)
-        assert 60.0 < reply.error_deg < 90.0 and "neck_yaw stays at" in reply.words()
+        assert 60.0 < reply.error_deg < 90.0 and "neck_yaw stays at" in reply.text()
         assert show.leads
         status = rig.status()
         assert status["led"] == f"a show (process {os.getpid()}): look at -1 0 0.3"

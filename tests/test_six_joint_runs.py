@@ -201,9 +201,9 @@ def test_figures_and_status_say_what_is_estimated(maker: Run, desk: Run) -> None
         pulse.update(ticks[0])
         figures = summary.figures()
         assert figures["estimated"] == figures["reckoned"] == estimated
-        words = pulse.words()
-        assert words["estimated"] == words["reckoned"] == estimated
-        joints_deg = words["joints_deg"]
+        status = pulse.as_json()
+        assert status["estimated"] == status["reckoned"] == estimated
+        joints_deg = status["joints_deg"]
         assert isinstance(joints_deg, dict) and tuple(joints_deg) == ticks[0].guard_result.joints
 
 

@@ -49,7 +49,7 @@ def look(
                 return
             reply = rig.look_at(*point, stay=stay)
             until = "gazerig ctl look free" if stay else _until(seconds)
-            say(f"{reply.words()}, until: {until}")
+            say(f"{reply.text()}, until: {until}")
             if not stay:
                 _lead_on(rig, inf if seconds is None else seconds)
 

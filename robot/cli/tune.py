@@ -321,7 +321,9 @@ def _rule(param: ParamInfo) -> str:
     bounds = "" if param.low is None or param.high is None else f"{param.low:g} .. {param.high:g}"
     choices = ", ".join(map(_written, param.choices))
     allowed = " ".join(part for part in (bounds, param.unit if bounds else "") if part) or choices
-    return "; ".join(part for part in (param.says, allowed, f"changes at the {param.live}") if part)
+    return "; ".join(
+        part for part in (param.description, allowed, f"changes at the {param.live}") if part
+    )
 
 
 def _written(value: object) -> str:

@@ -159,7 +159,7 @@ class CommandExecutor:
         reply = self._gestures.play(command, t_s, self.commanded_rad, self._guard.limits)
         if command.gesture:
             by = f" for {command.who}" if command.who else ""
-            self._told.append(f"gesture{by}: {reply.words()}")
+            self._told.append(f"gesture{by}: {reply.text()}")
         return reply
 
     def _let_lead(self, change: Callable[[], None]) -> None:

@@ -286,7 +286,7 @@ class CommandHandler:
             return []
         found = self._params.parameters()
         if found is not self._described[0]:
-            self._described = found, [(one.key, plain(one._asdict())) for one in found]
+            self._described = found, [(one.key, _param_json(one)) for one in found]
         return self._described[1]
 
     def _set(self, changes: Mapping[str, object]) -> Outcome:
@@ -337,6 +337,12 @@ def as_value(value: object) -> Value:
         return {key: as_value(item) for key, item in value.items()}
     assert value is None or isinstance(value, bool | int | float | str)
     return value
+
+
+def _param_json(param: DescribedParam) -> object:
+    """Return plain values of a parameter; older clients read its description as ``says``."""
+    described = param._asdict()
+    return plain({**described, "says": described.get("description", "")})
 
 
 def _notes(notes: object) -> tuple[str, ...]:

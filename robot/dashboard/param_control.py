@@ -20,7 +20,7 @@ _FAR = 20.0
 
 def hint(param: ParamInfo) -> str:
     """Return the tooltip of a parameter: description, range and default."""
-    parts = [f"{param.key}: {param.says}" if param.says else param.key]
+    parts = [f"{param.key}: {param.description}" if param.description else param.key]
     unit = f" {param.unit}" if param.unit else ""
     if param.low is not None and param.high is not None:
         parts.append(f"from {param.low:g} to {param.high:g}{unit}")
@@ -121,20 +121,22 @@ class ParamControl:
     def _add(
         self, gui: viser.GuiApi, text: str, value: object, order: float
     ) -> viser.GuiInputHandle[object]:
-        param, says = self.param, hint(self.param)
+        param, tooltip = self.param, hint(self.param)
         handle: object
         if param.kind == "bool" and not param.optional:
-            handle = gui.add_checkbox(text, bool(value), hint=says, order=order)
+            handle = gui.add_checkbox(text, bool(value), hint=tooltip, order=order)
         elif param.choices and not param.optional and value in param.choices:
             names = tuple(map(str, param.choices))
-            handle = gui.add_dropdown(text, names, initial_value=str(value), hint=says, order=order)
+            handle = gui.add_dropdown(
+                text, names, initial_value=str(value), hint=tooltip, order=order
+            )
         elif slides(param, value):
             handle = self._slider(gui, text, value, order)
         else:
             # A number on its way to what is meant is another number: only Enter counts.
             self._form = gui.add_form(None, order=order)
             with self._form:
-                handle = gui.add_text(text, written(param, value), hint=f"{says}; Enter sets it")
+                handle = gui.add_text(text, written(param, value), hint=f"{tooltip}; Enter sets it")
         return cast("viser.GuiInputHandle[object]", handle)
 
     def _slider(self, gui: viser.GuiApi, text: str, value: object, order: float) -> object:

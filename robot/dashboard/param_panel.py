@@ -244,7 +244,7 @@ def found(text: str, params: Iterable[ParamInfo]) -> list[str]:
     return [
         param.key
         for param in params
-        if all(word in f"{param.key} {param.says} {param.unit}".lower() for word in words)
+        if all(word in f"{param.key} {param.description} {param.unit}".lower() for word in words)
     ]
 
 

@@ -129,7 +129,7 @@ class PageRequestHandler:
         if now_s - self._limited_s < _SAID_EVERY_S:
             return None
         self._limited_s = now_s
-        return reply.words()
+        return reply.text()
 
     def _pick(self, x: float, y: float, who: str) -> str | None:
         if not (0.0 <= x <= 1.0 and 0.0 <= y <= 1.0):

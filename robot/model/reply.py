@@ -26,7 +26,7 @@ class JointReply(NamedTuple):
     high_rad: float
     reason: str
 
-    def words(self) -> str:
+    def text(self) -> str:
         """Return one phrase for people."""
         if self.low_rad == self.high_rad:
             return f"{self.joint}: {self.reason}"
@@ -54,7 +54,7 @@ class GestureReply(NamedTuple):
     smaller: tuple[tuple[str, float], ...] = ()
     left_out: tuple[str, ...] = ()
 
-    def words(self) -> str:
+    def text(self) -> str:
         """Return one line for people."""
         if not self.name:
             return f"gestures end within {self.duration_s:.2f} s"
@@ -98,13 +98,13 @@ class CommandReply(NamedTuple):
         """Return the joints that cannot do what was asked."""
         return tuple(joint for joint in self.joints if joint.reason)
 
-    def words(self) -> str:
+    def text(self) -> str:
         """Return one line for people, "" where there is nothing to say."""
         if self.refused:
             return f"refused: {self.refused}"
         if self.gesture is not None:
-            return self.gesture.words()
-        ends = "; ".join(joint.words() for joint in self.joints)
+            return self.gesture.text()
+        ends = "; ".join(joint.text() for joint in self.joints)
         if self.asked_m is None:
             return ends
         if self.error_deg < _BESIDE_DEG:
@@ -112,7 +112,8 @@ class CommandReply(NamedTuple):
         return f"it looks {self.error_deg:.0f} deg beside it" + (f": {ends}" if ends else "")
 
     def as_json(self) -> dict[str, object]:
-        """Return plain JSON values: angles in degrees, metres, words."""
+        """Return plain JSON values: angles in degrees, metres, text."""
+        text = self.text()
         return {
             "refused": self.refused,
             "asked_m": self.asked_m,
@@ -131,7 +132,8 @@ class CommandReply(NamedTuple):
                 for one in self.joints
             ],
             "gesture": None if self.gesture is None else self.gesture._asdict(),
-            "words": self.words(),
+            "text": text,
+            "words": text,  # its name before, for older clients
         }
 
     @classmethod

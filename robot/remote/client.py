@@ -4,7 +4,7 @@ from gazerig.robot.remote.client import RobotClient
 
 with RobotClient.connect() as rig:
     rig.set("gaze.lids.blinks_per_min", 12.0)
-    print(rig.look_at(1.0, 0.3, 0.0).words())
+    print(rig.look_at(1.0, 0.3, 0.0).text())
     print(rig.status()["target"])
     rig.save("/home/me/my.yaml")
 """

@@ -11,7 +11,7 @@ JsonValue = float | int | bool | str | None | list["JsonValue"] | dict[str, "Jso
 class ParamInfo(NamedTuple):
     """One parameter of the rig, its rule and its default.
 
-    unit: "" for a bare number; says: what it is; low, high: None where there is no bound
+    unit: "" for a bare number; description: what it is; low, high: None where there is no bound
     choices: empty where any value of its kind may stand
     kind: number, whole, bool, text, choice, list or mapping
     live: when a change takes effect, "next tick", or "next start" with the reason
@@ -21,7 +21,7 @@ class ParamInfo(NamedTuple):
     key: str
     group: str
     unit: str
-    says: str
+    description: str
     low: float | None
     high: float | None
     choices: tuple[Any, ...]
@@ -34,8 +34,9 @@ class ParamInfo(NamedTuple):
 
     @classmethod
     def from_json(cls, said: Mapping[str, Any]) -> "ParamInfo":
-        """Return what a rig says of one parameter; what it says beside that is passed over."""
+        """Return a rig's description of one parameter; keys that are not fields are ignored."""
         named = {name: said[name] for name in cls._fields if name in said}
+        named.setdefault("description", said.get("says", ""))  # the key in answers of older rigs
         return cls(**{**named, "choices": tuple(named["choices"])})
 
 

@@ -71,7 +71,7 @@ class Pulse:
             waits -= 1
         return self._ticks >= wanted
 
-    def words(self) -> dict[str, object]:
+    def as_json(self) -> dict[str, object]:
         """Return the newest tick as plain values: degrees, seconds, words."""
         tick = self._newest
         if tick is None:
@@ -166,7 +166,7 @@ class RequestHandler:
             unsaved = self._params.unsaved() if self._params is not None else ()
             self._unsaved = version, len(tuple(unsaved))
         about = {**self._about, "version": version, "unsaved": self._unsaved[1]}
-        return {**about, **self._pulse.words()}
+        return {**about, **self._pulse.as_json()}
 
     def _replied(self, command: Command, ticket: Ticket | None) -> object:
         """Wait for the tick that takes a command up; return its reply."""
