@@ -12,7 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from servo_rows import rows
 from struck_rigs import rig_of
 
 from gazerig.config.rig import Rig
@@ -20,6 +19,7 @@ from gazerig.drivers.serial.port import BlockingPort
 from gazerig.robot.app.bus_wiring import guarded_rig_bus, ports_of, rig_bus, rig_setups
 from gazerig.robot.app.emulation import emulated_lines
 from gazerig.sim_mock.pty.client import PtyBuses
+from gazerig.testing.rows import rows
 
 SLOW_DEG_S = 4.0
 PATIENCE_S = 30.0

@@ -5,9 +5,8 @@ A bus's own test makes the chain and the driver; here is what is done with them.
 
 from typing import Any
 
-from servo_rows import rows
-
 from gazerig.drivers.types import ServoBus
+from gazerig.testing.rows import rows
 
 IDS = (1, 2, 3, 4)
 NAMES = ("eye", "jaw", "neck", "lid")

@@ -93,6 +93,7 @@ def package(folder: Path) -> Path:
     top.mkdir()
     for file in (ROOT / "api").glob("*.py"):
         (top / file.name).symlink_to(file)
+    (top / "testing").symlink_to(ROOT / "api" / "testing")
     for room in ROOMS:
         (top / room).symlink_to(ROOT / room)
     return top

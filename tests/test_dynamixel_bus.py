@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 import pytest
 from dynamixel_sdk import PacketHandler
 from present import present
-from servo_rows import rows
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
@@ -20,6 +19,7 @@ from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
+from gazerig.testing.rows import rows
 
 TWINS = ("in-process", pytest.param("pty", marks=pytest.mark.own_timeouts))
 """A terminal's driver has time-outs in real time."""

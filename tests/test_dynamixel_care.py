@@ -1,7 +1,6 @@
 """Servos that stop, restart or start outside their limits while the driver looks after them."""
 
 import pytest
-from servo_rows import rows
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
@@ -10,6 +9,7 @@ from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
+from gazerig.testing.rows import rows
 
 IDS = (1, 2, 3)
 STARTS = (2001, 2002, 2003)

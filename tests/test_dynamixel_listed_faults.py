@@ -55,7 +55,6 @@ from moving_bus import (
     LONGEST_S,
 )
 from present import present
-from servo_rows import rows
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
@@ -67,6 +66,7 @@ from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
+from gazerig.testing.rows import rows
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,6 @@ from typing import Any
 import pytest
 from dynamixel_sdk import PacketHandler
 from present import present
-from servo_rows import rows
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
@@ -18,6 +17,7 @@ from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.dynamixel.packets import status
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
+from gazerig.testing.rows import rows
 
 IDS = (1, 2, 3)
 

@@ -9,7 +9,6 @@ import time
 from pathlib import Path
 
 from present import present
-from servo_rows import rows
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
@@ -18,6 +17,7 @@ from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
+from gazerig.testing.rows import rows
 
 IDS = (1, 2, 3)
 SPECS = [ServoSpec(i, "xl330-m077", 1200) for i in IDS]

@@ -8,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from moving_bus import IDS
 from present import present
-from servo_rows import rows
 from sts_rig import Rig
 
 from gazerig.drivers.errors import ServoFault, ServoMissing
@@ -20,6 +19,7 @@ from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.devices import FeetechLine
 from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
+from gazerig.testing.rows import rows
 
 SPECS = (
     ServoSpec(3, "sts3215", 1800),

@@ -15,7 +15,6 @@ from moving_bus import (
     NAMES,
 )
 from present import present
-from servo_rows import rows
 from sts_rig import Rig
 
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
@@ -23,6 +22,7 @@ from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN
 from gazerig.drivers.servo_bus.recovery import FAR_SIDE
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
+from gazerig.testing.rows import rows
 
 
 @pytest.fixture(scope="module")

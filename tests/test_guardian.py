@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from loop_deaths import PATIENCE_S, driven
 from mixed_rig import mixed_text
 from present import present
-from servo_rows import rows
 from sts_rig import Rig as StsRig
 
 from gazerig.config.schema import load_rig
@@ -25,6 +24,7 @@ from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.guardian.hang_detector import HANG_S, HangDetector
 from gazerig.robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, SIZE, Heartbeat, shared_file
 from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe, encode
+from gazerig.testing.rows import rows
 
 PLAN = ReleasePlan("feetech", "/tmp/no such port", 1_000_000, (1, 2))
 

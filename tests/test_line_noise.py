@@ -3,7 +3,8 @@
 import pytest
 from line_noise import Noisy
 from present import present
-from servo_rows import rows
+
+from gazerig.testing.rows import rows
 
 SMART = ("dynamixel", "dynamixel direct", "feetech")
 

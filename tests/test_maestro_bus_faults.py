@@ -5,13 +5,13 @@ import time
 import pytest
 from maestro_bench import CENTRE, HIGH, IDS, SETUPS, TICK_S, Bench, places
 from present import present
-from servo_rows import rows
 
 from gazerig.drivers.errors import BusLost
 from gazerig.drivers.maestro.bus import MaestroBus, MaestroParams
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.sim_mock.devices import MaestroLine
 from gazerig.sim_mock.pty.client import PtyBus
+from gazerig.testing.rows import rows
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from bus_kinds import KINDS, Twin, in_process
+from bus_kinds import KINDS, in_process
 from mixed_rig import mixed_text
 
 import gazerig.robot.app.run_bus as run_bus
@@ -17,17 +17,18 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.commands import Resume, Stop
 from gazerig.sim_mock.device import Device
+from gazerig.testing.bus_bench import BusBench
 
 RIGS = ("desk", "feetech", "maker", "mixed")
 
 
 @pytest.fixture
-def twin(request: pytest.FixtureRequest) -> Twin:
-    return Twin(request.param, in_process(request.param).wires, patient=False)
+def twin(request: pytest.FixtureRequest) -> BusBench:
+    return in_process(request.param).bench
 
 
 @pytest.mark.parametrize("twin", KINDS, indirect=True)
-def test_what_could_not_be_released_is_when_the_port_is_back(twin: Twin) -> None:
+def test_what_could_not_be_released_is_when_the_port_is_back(twin: BusBench) -> None:
     twin.pulses_on()
     bus = twin.bus(give_up_s=1.0)
     bus.open()
@@ -57,7 +58,7 @@ def test_what_could_not_be_released_is_when_the_port_is_back(twin: Twin) -> None
 
 
 @pytest.mark.parametrize("twin", KINDS, indirect=True)
-def test_torque_that_came_on_only_here_and_there_is_taken_off(twin: Twin) -> None:
+def test_torque_that_came_on_only_here_and_there_is_taken_off(twin: BusBench) -> None:
     twin.pulses_on()
     bus = twin.bus()
     bus.open()
@@ -70,7 +71,7 @@ def test_torque_that_came_on_only_here_and_there_is_taken_off(twin: Twin) -> Non
     assert not any(twin.holding())
 
 
-def _read_on(twin: Twin, bus: Any, seconds: float) -> None:
+def _read_on(twin: BusBench, bus: Any, seconds: float) -> None:
     end_s = twin.now_s() + seconds
     while twin.now_s() < end_s:
         twin.wait(0.01)

@@ -1,8 +1,11 @@
-"""Feedback of a bus servo by servo, as tests like to look at it; the product has columns."""
+"""Feedback of a bus servo by servo, as tests look at it; the product has columns."""
 
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple, TypeVar
 
 from gazerig.drivers.types import Feedback
+
+T = TypeVar("T")
 
 
 class Row(NamedTuple):
@@ -34,3 +37,14 @@ def feedback_of(given: list[Row | None]) -> Feedback:
     every: Any = zip(*[blank if row is None else row for row in given], strict=True)
     missing = tuple(i for i, row in enumerate(given) if row is None)
     return Feedback(*(*every, missing))
+
+
+def well(readings: Sequence[Row | None]) -> bool:
+    """Return whether all servos have answered with their torque on."""
+    return all(row is not None and row.torque for row in readings)
+
+
+def present(thing: T | None) -> T:
+    """Return the thing; fail where it is None."""
+    assert thing is not None
+    return thing

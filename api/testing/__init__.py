@@ -1,0 +1,16 @@
+"""Suites that a package runs on its own servo bus or camera, with pytest.
+
+They are those that gazerig's own kinds must pass. They need the extra ``gazerig[testing]``; the
+program itself never imports this package.
+"""
+
+import pytest
+
+pytest.register_assert_rewrite("gazerig.testing.bus_suite", "gazerig.testing.bus_lost_suite")
+
+from gazerig.testing.bus_bench import Absence as Absence  # noqa: E402
+from gazerig.testing.bus_bench import BusBench as BusBench  # noqa: E402
+from gazerig.testing.bus_bench import BusUnderTest as BusUnderTest  # noqa: E402
+from gazerig.testing.bus_bench import Fault as Fault  # noqa: E402
+from gazerig.testing.bus_lost_suite import BusLossSuite as BusLossSuite  # noqa: E402
+from gazerig.testing.bus_suite import BusSuite as BusSuite  # noqa: E402

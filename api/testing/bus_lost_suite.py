@@ -1,0 +1,244 @@
+"""What every kind of servo bus does when a servo, a port or a supply goes away, as a suite."""
+
+import pytest
+
+from gazerig.drivers.errors import BusLost, PortError, ServoMissing
+from gazerig.drivers.servo_models import servo_label
+from gazerig.testing.bus_suite import BusBenches
+from gazerig.testing.rows import rows, well
+
+
+class BusLossSuite(BusBenches):
+    """Servos and ports that are absent, fall silent, restart or fail, and come back."""
+
+    # --- somebody is missing
+
+    def test_open_names_who_is_missing_and_leaves_the_ports_free(self, twin):
+        place = twin.smart()[-1] if twin.smart() else None
+        kind = twin.kinds[twin.on[place or 0]]
+        wanted = list(twin.setups)
+        if place is None:
+            twin.command(kind.absence.begin)
+            told = kind.absence.told
+        else:
+            told = rf"{twin.setups[place].name} \((servo|channel) 99\) does not answer"
+            wanted[place] = twin.setups[place]._replace(id=99)
+        with pytest.raises(ServoMissing, match=told) as caught:
+            twin.bus(wanted).open()
+        message = str(caught.value)
+        assert twin.wires.ports[kind.name].port_name in message
+        assert "\n" not in message
+        if place is None:
+            twin.command(kind.absence.end)
+        bus = twin.bus()
+        bus.open()
+        bus.close()
+
+    def test_a_port_that_cannot_be_opened_is_named(self, here):
+        for name in here.buses:
+            here.command("deny on", name)
+            with pytest.raises(PortError, match=f"emulated {name}"):
+                here.bus().open()
+            here.command("deny off", name)
+        bus = here.bus()
+        bus.open()
+        bus.close()
+
+    def test_one_silent_servo_costs_only_itself(self, here, held_here):
+        """A Maestro answers for all its channels at once: there the board is one."""
+        if not here.smart():
+            return
+        place = here.smart()[0]
+        others = [p for p in range(here.count) if p != place]
+        here.strike("lose", place)
+        readings = here.until(held_here, lambda r: r[place] is None, here.starts())
+        for _ in range(20):
+            readings = here.run(held_here, 0.0, here.starts())
+            assert all(readings[p] is not None for p in others)
+            here.wait(0.01)
+        assert readings[place] is None
+        assert held_here.health().errors["timeout"] >= 1
+        here.until(
+            held_here, lambda r: _says(held_here, here, place, "does not answer"), here.starts()
+        )
+        here.command("clear", here.on[place])
+        here.until(held_here, well, here.starts())
+        assert here.near(here.truth(), here.starts())
+
+    # --- a port goes away
+
+    def test_an_unplugged_port_comes_back_and_holds(self, twin, held):
+        name = next(iter(twin.buses))
+        gone = twin.buses[name]
+        rest = [p for p in range(twin.count) if p not in gone]
+        twin.run(held, 0.1, twin.starts())
+        twin.command("unplug", name)
+        twin.until(held, lambda r: all(r[p] is None for p in gone), twin.starts())
+        for _ in range(20):
+            # Who plans goals goes on for a while as if nothing were.
+            readings = twin.run(held, 0.0, [0.5] * twin.count)
+            assert [readings[p] for p in gone] == [None] * len(gone)
+            assert all(readings[p] is not None for p in rest)
+            twin.wait(0.01)
+        twin.command("plug", name)
+        rearmed = _until_back(twin, held, gone)
+        assert sorted(rearmed) == sorted(gone)
+        assert twin.near([twin.truth()[p] for p in gone], [twin.starts()[p] for p in gone])
+        told = held.events()
+        assert any(line.startswith("port lost: ") for line in told)
+        assert any(line.startswith("port back after ") for line in told)
+
+    def test_a_port_that_stays_away_is_given_up_and_told_at_release(self, another):
+        for name in another().bench.buses:
+            _given_up(another().bench, name)
+
+    def test_no_read_takes_long_while_nobody_answers(self, here):
+        here.pulses_on()
+        bus = here.bus(give_up_s=2.0)
+        bus.open()
+        bus.enable_torque()
+        here.run(bus, 0.5, here.starts())
+        here.command("lose all")
+        spent = []
+        with pytest.raises(BusLost, match="answered for 2"):
+            for _ in range(1000):
+                began_s = here.now_s()
+                bus.read(began_s)
+                spent.append(here.now_s() - began_s)
+                bus.write(here.steps(here.starts()))
+                here.wait(0.01)
+        assert max(spent) < 0.1
+
+    # --- a servo restarts
+
+    def test_a_restart_is_found_and_the_servo_held_where_it_is(self, here, held_here):
+        place = 0
+        # The board of a Maestro is one: all its channels restart.
+        struck = [p for p in range(here.count) if here.is_board(p)]
+        struck = struck if here.is_board(place) else [place]
+        here.run(held_here, 0.2, here.starts())
+        here.strike("brown-out", place)
+        rearmed = _until_back(here, held_here, struck)
+        assert sorted(rearmed) == struck
+        assert all(here.holding())
+        told = held_here.events()
+        assert any("restarted: set up again" in line for line in told), told
+        assert held_here.faults() == ()
+        # It follows again, with the speed that it was set up with.
+        here.until(held_here, lambda r: here.near(here.seen(r), here.away()), here.away())
+
+    @pytest.mark.parametrize("befalls", ["", "brown-out", "power cut", "unplug"])
+    def test_no_servo_is_faster_than_it_was_set_up_whatever_it_went_through(self, here, befalls):
+        """A goal far away at once: only what the servo or its board has armed holds it back."""
+        here.pulses_on()
+        slow = [s._replace(max_speed_steps_s=0.2 * s.max_speed_steps_s) for s in here.setups]
+        bus = here.bus(slow)
+        bus.open()
+        bus.enable_torque()
+        here.run(bus, 0.3, here.starts())
+        _befall(here, bus, befalls)
+        before_s, before = here.now_s(), here.steps(here.truth())
+        for _ in range(30):
+            here.run(bus, 0.0, [0.95] * here.count)
+            here.wait(0.02)
+            now_s, now = here.now_s(), here.steps(here.truth())
+            for setup, was, is_now in zip(slow, before, now, strict=True):
+                most = 1.2 * setup.max_speed_steps_s * (now_s - before_s) + 12.0
+                assert abs(is_now - was) <= most, (setup.name, is_now - was, most)
+            before_s, before = now_s, now
+        here.until(bus, lambda r: here.near(here.seen(r), [0.95] * here.count), [0.95] * here.count)
+
+    def test_a_fault_is_named_with_its_joint_or_board(self, here):
+        here.pulses_on()
+        bus = here.bus()
+        bus.open()
+        bus.enable_torque()
+        here.run(bus, 0.5, here.starts())
+        bus.events()
+        for name, places in here.buses.items():
+            fault = here.kinds[name].fault
+            if fault is None:
+                continue
+            setup = here.setups[places[1]]
+            for _ in range(fault.times):
+                here.command(fault.command.format(id=setup.id), name)
+                readings = here.run(bus, 0.3, here.starts())
+            whose = fault.board or servo_label(setup)
+            assert any(one.startswith(f"{whose}: {fault.cause}") for one in bus.faults()), (
+                bus.faults()
+            )
+            assert fault.times > 1 or any(fault.cause in line for line in bus.events())
+            assert fault.times > 1 or None not in readings
+            if not here.kinds[name].board:
+                assert readings[places[1]].fault == fault.cause
+            elif not fault.board:
+                assert here.run(bus, 0.1)[places[1]].fault.startswith(fault.cause)
+        bus.disable_torque()
+        bus.close()
+
+
+def _says(bus, twin, place, what):
+    """Return whether the bus says something of a servo by its joint's name."""
+    who = servo_label(twin.setups[place])
+    return any(line.startswith(who) and what in line for line in bus.events())
+
+
+def _until_back(twin, bus, gone):
+    """Tick until all hold again, with goals far away until a servo says where it begins."""
+    goals, rearmed = [0.9] * twin.count, []
+    before = twin.truth()
+
+    def note(readings):
+        for place, reading in enumerate(readings):
+            if reading is not None and reading.rearmed:
+                rearmed.append(place)
+                goals[place] = twin.seen(readings)[place]
+        return len(set(rearmed)) == len(gone) and well(readings)
+
+    end_s = twin.now_s() + 8.0
+    while not note(rows(bus.read(twin.now_s()))):
+        assert twin.now_s() < end_s, (rearmed, bus.events())
+        truth = twin.truth()
+        assert twin.near([truth[p] for p in gone], [before[p] for p in gone])
+        bus.write(twin.steps(goals))
+        twin.wait(0.01)
+    twin.run(bus, 0.3, goals)
+    return rearmed
+
+
+def _given_up(here, name):
+    here.pulses_on()
+    bus = here.bus(give_up_s=1.0)
+    bus.open()
+    bus.enable_torque()
+    here.command("unplug", name)
+    began_s = here.now_s()
+    with pytest.raises(BusLost, match=f"emulated {name} has been gone for 1.[012] s"):
+        here.run(bus, 3.0, here.starts())
+    assert here.now_s() - began_s < 1.3
+    with pytest.raises(BusLost, match=f"emulated {name} is gone.*cut the servo power"):
+        bus.disable_torque()
+    # What could be reached was let go of all the same.
+    assert [on for p, on in enumerate(here.holding()) if here.on[p] != name] == [False] * (
+        here.count - len(here.buses[name])
+    )
+    here.command("plug", name)
+    bus.disable_torque()
+    assert not any(here.holding())
+    bus.close()
+
+
+def _befall(here, bus, what):
+    """Let something pass over all servos while they hold, until all hold again."""
+    if what == "unplug":
+        here.command("unplug for 0.2")
+    elif what:
+        if what == "power cut":
+            here.command("lose all for 1")
+        for place in range(here.count):
+            if not here.is_board(place) or place == min(here.buses[here.on[place]]):
+                here.strike("brown-out", place)
+    if what:
+        here.until(bus, lambda r: None in r, here.starts())
+        here.until(bus, well, here.starts())
+        bus.events()
