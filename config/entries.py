@@ -96,7 +96,7 @@ def read(
     """Return a file's text and its top entry, None where nothing of it can be used.
 
     known: keys of such a file's top level. What has none of them is something else, and
-        nothing of it is shown: anybody who may choose a character could read it.
+        nothing of it is shown: any client that may choose a character could read it.
     """
     file, text = str(path), ""
     try:

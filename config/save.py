@@ -207,8 +207,8 @@ def _refuse_side_effects(before: dict[str, Any], text: str, changes: Mapping[str
     after = _document(text.encode()).data
     kept, found = _leaves(before), _leaves(after)
     for key in sorted({*kept, *found}):
-        wished = key in changes or any(c.startswith(f"{key}.") for c in changes)
-        if not wished and kept.get(key, _ABSENT) != found.get(key, _ABSENT):
+        requested = key in changes or any(c.startswith(f"{key}.") for c in changes)
+        if not requested and kept.get(key, _ABSENT) != found.get(key, _ABSENT):
             raise EditRefused(
                 f"{key} would change as well, as an anchor (&) ties it to "
                 f"{', '.join(changes)}; write its value out first"

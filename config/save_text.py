@@ -103,7 +103,7 @@ def written(value: Value) -> str:
 
 @lru_cache(maxsize=2)
 def _composed(text: str) -> MappingNode:
-    """Parse the text as far as nodes, which know where they stand; nobody changes them."""
+    """Parse the text as far as nodes, which know where they stand; they are not changed."""
     node = YAML(typ="safe", pure=True).compose(text)
     if not isinstance(node, MappingNode):
         raise EditRefused("the top level is no mapping; write 'key: value' lines")

@@ -52,7 +52,7 @@ def in_subprocess(work: Callable[P, T], /, *words: P.args, **named: P.kwargs) ->
 
 def serve() -> None:
     """Run as the other process: one call from standard input, its result to standard output."""
-    os.nice(5)  # whoever waits for servos goes first
+    os.nice(5)  # processes that wait for servos go first
     work, words, named = pickle.load(sys.stdin.buffer)
     pickle.dump(_outcome(work, words, named), sys.stdout.buffer)
 

@@ -3,7 +3,7 @@
 A child runs a module of this package with the same interpreter. It finds no module in the
 working folder (``-P``), is in a session of its own, as Ctrl-C in the terminal is for the program,
 which ends its children in order, and does its numerics in one thread beside the control loop's.
-A child ends when its end of a pipe or socket says so; whoever starts it waits for it or kills it.
+A child ends when its end of a pipe or socket says so; its parent waits for it or kills it.
 The camera's process alone is started by ``multiprocessing`` (drivers/camera/process.py), as
 frames go through memory that both share.
 """

@@ -15,7 +15,7 @@ BUSY = 3
 """So many late answers within that time are no accident."""
 
 SILENCE_S = 0.25
-"""Where nobody at all answers, that is worth a line from so long on."""
+"""Where no servo at all answers, that is worth a line from so long on."""
 
 BLAME_S = 1.5
 """Plugs and power are blamed for such a silence only while it lasts longer than this: before,

@@ -13,7 +13,7 @@ IN_A_ROW = 3
 """So many reads may stay without any answer before a bus is asked less often."""
 
 AGAIN_S = 0.2
-"""Time between questions to a bus of which nobody answers. Each costs its whole patience, 20 ms
+"""Time between questions to a bus of which no servo answers. Each costs its whole time-out, 20 ms
 as a rule, and while it lasts the servos of the other buses wait for their goals."""
 
 
@@ -64,7 +64,7 @@ class MultiBus:
 
     def __init__(self, shares: Sequence[BusShare]) -> None:
         self._shares = tuple(shares)
-        self._patience = [_PollTimer() for _ in self._shares]
+        self._timers = [_PollTimer() for _ in self._shares]
         places = sorted(place for share in shares for place in share.places)
         if places != list(range(len(places))):
             raise ValueError(f"buses share out places {places}: each from 0 on must be there once")
@@ -80,7 +80,7 @@ class MultiBus:
             PortError: a port cannot be opened.
             ServoMissing: servos are absent or of another model.
         """
-        self._patience = [_PollTimer() for _ in self._shares]
+        self._timers = [_PollTimer() for _ in self._shares]
         opened: list[BusShare] = []
         try:
             for share in self._shares:
@@ -102,15 +102,15 @@ class MultiBus:
         """
         feedbacks = list(self._nothing)
         lost: list[BusLost] = []
-        for i, (share, patience) in enumerate(zip(self._shares, self._patience, strict=True)):
-            if not patience.due(now_s):
+        for i, (share, timer) in enumerate(zip(self._shares, self._timers, strict=True)):
+            if not timer.due(now_s):
                 continue
             try:
                 feedbacks[i] = share.bus.read(now_s)
             except BusLost as error:  # the others are read all the same, and may come back
                 lost.append(error)
                 continue
-            patience.update(feedbacks[i], now_s)
+            timer.update(feedbacks[i], now_s)
         if lost:
             raise lost[0]
         return self._together(feedbacks)

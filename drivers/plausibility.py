@@ -1,4 +1,4 @@
-"""Positions that a joint can have, told from those that noise has made. Numbers in, masks out.
+"""Positions that a joint can have, and those that noise has made. Numbers in, masks out.
 
 A check over the bytes of an answer lets some damaged ones pass: a sum of one byte one in
 256, a CRC of two bytes one in 65,536. Between two answers a joint moves no farther than its

@@ -44,11 +44,11 @@ class PortBus(ABC):
 
     A bus creates its parts before any of these methods is called, and may replace them.
 
-    holding, mute: texts about a servo whose torque is not off, or that does not confirm it
+    holding, unconfirmed: texts about a servo whose torque is not off, or that does not confirm it
     """
 
     holding: ClassVar[str] = "still reports torque"
-    mute: ClassVar[str] = "does not confirm that its torque is off"
+    unconfirmed: ClassVar[str] = "does not confirm that its torque is off"
 
     _port: BusPort
     _line: Exchange
@@ -158,7 +158,10 @@ class PortBus(ABC):
             raise BusLost(self._cannot_release()) from lost
         self._link.released()
         self._line.errors["refused"] += len(released.holding)
-        for ids, what in ((released.holding, self.holding), (released.mute, self.mute)):
+        for ids, what in (
+            (released.holding, self.holding),
+            (released.unconfirmed, self.unconfirmed),
+        ):
             for servo_id in ids:
                 self._log.add(f"{self._servo_label(servo_id)} {what}: {CUT}")
 

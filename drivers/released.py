@@ -7,4 +7,4 @@ class ReleaseResult(NamedTuple):
     """Ids that still report torque or pulses, and those that did not answer."""
 
     holding: tuple[int, ...]
-    mute: tuple[int, ...]
+    unconfirmed: tuple[int, ...]

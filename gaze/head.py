@@ -142,7 +142,7 @@ class HeadModel:
         """
         self._decide(target, facing_rad, gaze_rad, eccentricity_rad, since_eye_onset_s, t_s)
         now = [plan.at(t_s - self._planned_s)[0] for plan in self._plans]
-        # A plan made anew in full flight may swing past its goal, but not past the neck's range.
+        # A plan made again in full flight may swing past its goal, but not past the neck's range.
         return self.in_range((now[0], now[1], now[2]))
 
     def _decide(

@@ -199,7 +199,7 @@ class Idle:
             side * radians(float(rng.uniform(par.glance_least_deg, par.glance_yaw_deg))),
             radians(float(rng.uniform(-par.glance_pitch_deg, par.glance_pitch_deg))),
         )
-        self._look("glance", place, par.rest_distance_m, t_s, "glancing around, nobody in sight")
+        self._look("glance", place, par.rest_distance_m, t_s, "glancing around, no one in sight")
         self._until_s = t_s + self._time_s(par.glance_ms, rng)
 
     def _look(self, kind: str, place: Angles2, distance_m: float, t_s: float, why: str) -> None:
@@ -212,7 +212,7 @@ class Idle:
     def _resting(self, t_s: float) -> Target:
         salience = self._params.rest_salience
         return Target(
-            self._rest, _STILL, t_s, "rest", -1, salience, True, None, 0, "nobody in sight"
+            self._rest, _STILL, t_s, "rest", -1, salience, True, None, 0, "no one in sight"
         )
 
     def _time_s(self, mean_ms: float, rng: np.random.Generator) -> float:

@@ -143,7 +143,7 @@ class Scanpath:
             self._shift += 1
 
     def reset(self, t_s: float) -> None:
-        """Forget the face; the next one is entered anew."""
+        """Forget the face; the next one is entered again."""
         self._face: Face | None = None
         self._shift = 0
         self.looks.enter()

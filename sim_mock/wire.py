@@ -17,7 +17,7 @@ Dynamixel servos, is 0 unless asked for.
 from collections import deque
 
 from gazerig.sim_mock.device import Device, DeviceReply
-from gazerig.sim_mock.faults.active import NOBODY
+from gazerig.sim_mock.faults.active import NO_DEVICE
 from gazerig.sim_mock.replies import Piece
 
 BITS_PER_BYTE = 10
@@ -94,7 +94,7 @@ class ServoLine:
         ]
         if said and before and wire.take("repeat", None, now_s) is not None:
             first = replies[0]
-            replies[0] = DeviceReply(first.end, [Piece(NOBODY, before), *first.pieces])
+            replies[0] = DeviceReply(first.end, [Piece(NO_DEVICE, before), *first.pieces])
         return replies
 
     def _any_late(self, replies: list[DeviceReply]) -> bool:

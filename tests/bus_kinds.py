@@ -64,14 +64,14 @@ def _smart(model: str) -> Callable[[BusPort, Sequence[ServoConfig], bool, float]
     def make(
         port: BusPort, setups: Sequence[ServoConfig], patient: bool, give_up_s: float
     ) -> ServoBus:
-        patience = _patience(patient, give_up_s)
+        timeouts = _patience(patient, give_up_s)
         if patient:
-            patience["prompt_timeout_ms"] = 200.0
+            timeouts["prompt_timeout_ms"] = 200.0
         family = FAMILY_OF[model]
         params: BusParams = (
-            DynamixelParams(**patience, watchdog_ms=0)
+            DynamixelParams(**timeouts, watchdog_ms=0)
             if family.name == "dynamixel"
-            else FeetechParams(**patience)
+            else FeetechParams(**timeouts)
         )
         return SmartServoBus(family, port, setups, params)
 

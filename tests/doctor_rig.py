@@ -53,7 +53,7 @@ class Rig:
         self.chain = build(specs, lambda: self.now_s, baud=BAUD)
         self.port = InProcessPort(self.chain)
         self.port.setBaudRate(BAUD)
-        self.told = []
+        self.reported = []
         for setup in self.setups:
             if any(spec.id == setup.id for spec in specs):
                 self.set(setup.id, return_delay_time=0, min_position_limit=setup.min_steps,
@@ -92,8 +92,8 @@ class Rig:
         return [bytes(self.chain[i].memory.bytes[:end]) for i in (1, 2, 7)]
 
     def check(self):
-        self.told.clear()
-        return check(self.port, self.kind, self.setups, BAUD, self.told.append)
+        self.reported.clear()
+        return check(self.port, self.kind, self.setups, BAUD, self.reported.append)
 
     def fix(self, findings):
         return list(apply_fixes(lambda fix: apply_fix(self.port, self.kind, fix), findings))

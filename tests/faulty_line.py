@@ -42,10 +42,10 @@ class World:
     def sleep_until(self, t_s):
         self.now_s = max(self.now_s, t_s)
 
-    def ask(self, servo_id, code, params=b"", patience_s=0.1):
+    def ask(self, servo_id, code, params=b"", timeout_s=0.1):
         """Send one instruction and give all that arrives in time."""
         self.port.write(instruction(servo_id, code, params))
-        return self.port.read_until(2000, self.now_s + patience_s)
+        return self.port.read_until(2000, self.now_s + timeout_s)
 
     def one(self, servo_id=2):
         return self.ask(servo_id, *READ_ONE)

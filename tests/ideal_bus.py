@@ -64,7 +64,7 @@ class IdealBus:
         n = len(self._shafts)
         return Feedback(
             tuple([float(round(positions[place])) for positions, place in self._shafts]),
-            tuple(speeds), (0.0,) * n, (now_s,) * n, tuple([30.0 if told else None for told in self._measured]), (None,) * n,
+            tuple(speeds), (0.0,) * n, (now_s,) * n, tuple([30.0 if reported else None for reported in self._measured]), (None,) * n,
             (self._torque,) * n, ("",) * n, self._measured, (False,) * n, (),
         )  # fmt: skip
 

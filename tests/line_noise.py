@@ -189,7 +189,7 @@ class Noisy:
         for _ in range(200):
             self._tick(None)
 
-    def run(self, fault: str, rate: float, cycles: int, patience_s: float = 20.0) -> Outcome:
+    def run(self, fault: str, rate: float, cycles: int, timeout_s: float = 20.0) -> Outcome:
         """Tick with a fault of the line, then without it until all is well again."""
         outcome = Outcome(self.kind, rate)
         self.device.faults.command(fault)
@@ -204,7 +204,7 @@ class Noisy:
         before = dict(self.bus.health().errors)
         outcome.errors = before
         self.device.faults.command("clear")
-        outcome.recover_s = self._recover(patience_s)
+        outcome.recover_s = self._recover(timeout_s)
         return outcome
 
     def _tick(self, outcome: Outcome | None) -> None:
@@ -244,10 +244,10 @@ class Noisy:
             outcome.worst = max(outcome.worst, off)
             outcome.wrong += off > WRONG_STEPS
 
-    def _recover(self, patience_s: float) -> float | None:
+    def _recover(self, timeout_s: float) -> float | None:
         """Tick until every servo is fresh, near where it was sent and powered."""
         began = self.now
-        while self.now - began < patience_s:
+        while self.now - began < timeout_s:
             tick = self.now
             try:
                 readings = rows(self.bus.read(self.now))

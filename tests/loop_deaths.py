@@ -114,27 +114,27 @@ class Driven(NamedTuple):
         servos: list[dict[str, float]] = json.loads(self.buses.command("status", ""))["servos"]
         return [one for one in servos if one["id"] in self.ids]
 
-    def limp_after_s(self, since_s: float, patience_s: float) -> float | None:
+    def limp_after_s(self, since_s: float, timeout_s: float) -> float | None:
         """Return the time from then until no servo is under torque; None where some stay so."""
         while True:
             limp = not any(self.holding())
             took_s = time.monotonic() - since_s
             if limp:
                 return took_s
-            if took_s > patience_s:
+            if took_s > timeout_s:
                 return None
             time.sleep(0.005)
 
-    def still_after_s(self, since_s: float, patience_s: float) -> float | None:
+    def still_after_s(self, since_s: float, timeout_s: float) -> float | None:
         """Return the time from then until the last servo stops moving; None where some go on."""
         before, moved_s = self.places(), since_s
-        while time.monotonic() - since_s < patience_s:
+        while time.monotonic() - since_s < timeout_s:
             time.sleep(0.03)
             places = self.places()
             if any(abs(a - b) > 0.5 for a, b in zip(places, before, strict=True)):
                 moved_s = time.monotonic()
             before = places
-        return moved_s - since_s if patience_s - (moved_s - since_s) > 0.5 else None
+        return moved_s - since_s if timeout_s - (moved_s - since_s) > 0.5 else None
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from gazerig.testing.rows import rows
 IDS = (1, 2, 3, 4)
 NAMES = ("eye", "jaw", "neck", "lid")
 LONGEST_S = 0.1
-"""No read takes longer, but the one that opens a port anew or sets a servo up anew."""
+"""No read takes longer, but the one that opens a port again or sets a servo up again."""
 
 
 class MovingBus:

@@ -44,9 +44,9 @@ def _unknown() -> float:
     return _looks[0]
 
 
-def eventually(check: Callable[[], object], patience_s: float = 20.0) -> bool:
+def eventually(check: Callable[[], object], timeout_s: float = 20.0) -> bool:
     """Wait for something to become true; False where it does not."""
-    deadline_s = time.monotonic() + patience_s
+    deadline_s = time.monotonic() + timeout_s
     while time.monotonic() < deadline_s:
         if check():
             return True

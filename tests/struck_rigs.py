@@ -284,7 +284,7 @@ class Machine:
         )
 
     def _judge_command(self, command: Sequence[float], rearmed: Sequence[bool], t_s: float) -> None:
-        """See that commands keep range, speed and acceleration, but where a joint began anew."""
+        """See that commands keep range, speed and acceleration, but where a joint began again."""
         dt_s = t_s - self._last_s
         # No goal came meanwhile, and servos braked: commands go on from there as the guard may.
         late = dt_s > 1.5 * self.period_s or self._late

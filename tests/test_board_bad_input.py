@@ -26,7 +26,7 @@ def jog(rig: str, *words: str) -> str:
 
 
 @pytest.mark.parametrize(
-    ("was", "written", "told"),
+    ("was", "written", "reported"),
     [
         ("kind: pca9685", "kind: pca6985", "bus.kind: 'pca6985' is not one of 'dynamixel', "
          "'feetech', 'maestro', 'pca9685'; did you mean 'pca9685'?"),
@@ -39,8 +39,8 @@ def jog(rig: str, *words: str) -> str:
         ("i2c-1", "i2c-99", "no I2C bus /dev/i2c-99: switch I2C on"),
     ],
 )  # fmt: skip
-def test_a_file_that_cannot_be_right(tmp_path: Path, was: str, written: str, told: str) -> None:
-    assert told in jog(on_pca9685(tmp_path, SECTION.replace(was, written)))
+def test_a_file_that_cannot_be_right(tmp_path: Path, was: str, written: str, reported: str) -> None:
+    assert reported in jog(on_pca9685(tmp_path, SECTION.replace(was, written)))
 
 
 def test_a_channel_that_no_board_has(tmp_path: Path) -> None:
@@ -51,7 +51,7 @@ def test_a_channel_that_no_board_has(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("device", "rig", "fault", "told"),
+    ("device", "rig", "fault", "reported"),
     [
         (Pca9685Line((0x41,)), "pca9685", "", "no PCA9685 answers at 0x40: has the board its logic "
          "supply (VCC, not V+ alone)? check SDA, SCL and ground; its jumpers make the address"),
@@ -64,13 +64,13 @@ def test_a_channel_that_no_board_has(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_a_board_that_is_not_the_one(
-    tmp_path: Path, device: Emulated, rig: str, fault: str, told: str
+    tmp_path: Path, device: Emulated, rig: str, fault: str, reported: str
 ) -> None:
     with PtyBus() as bus:
         path = bus.start_device(device)
         if fault:
             bus.command(fault)
-        assert told in jog(on_pca9685(tmp_path) if rig == "pca9685" else rig, "--port", path)
+        assert reported in jog(on_pca9685(tmp_path) if rig == "pca9685" else rig, "--port", path)
         assert not any(one["target"] for one in json.loads(bus.command("status"))["servos"])
 
 

@@ -32,7 +32,7 @@ BOARD = CharucoBoard()
 KINEMATICS = Kinematics(GeometryParams(70.0, 38.0, 55.0), GAZE_JOINTS, LIDS)
 CAMERA = CameraParams()
 RANGES = ((-1.2, 1.2), (-0.5, 0.5), (-0.35, 0.35))
-FEW = NeckStepParams(frames=2, patience_s=1.0)
+FEW = NeckStepParams(frames=2, timeout_s=1.0)
 
 
 class MovedNeck:
@@ -153,14 +153,14 @@ def test_a_head_that_trembles_is_not_believed(scene: BoardScene, neck: MovedNeck
         scene.head_rad = (yaw + radians(0.5), pitch, roll)
         return scene.look(now_s())
 
-    short = replace(FEW, patience_s=0.3)
+    short = replace(FEW, timeout_s=0.3)
     (step,) = neck_steps(neck, look, now_s, BOARD, KINEMATICS, [(0.0, 0.0, 0.0)], short)
     assert step.view is None and step.why == "the head does not hold still"
 
 
 def test_a_board_out_of_sight_is_said(scene: BoardScene, neck: MovedNeck) -> None:
     now_s = neck.clock.now_s
-    quick = NeckStepParams(frames=1, patience_s=0.3)
+    quick = NeckStepParams(frames=1, timeout_s=0.3)
     (step,) = neck_steps(
         neck, lambda: scene.look(now_s()), now_s, BOARD, KINEMATICS, [(1.2, 0.0, 0.0)], quick
     )

@@ -87,7 +87,7 @@ def test_what_was_found_comes_over_with_picture_depth_and_lens(recording):
     camera.close()
     camera.close()
     assert not [t for t in threading.enumerate() if t.name == "camera"]
-    camera.open()  # and anew
+    camera.open()  # and again
     wait_for(lambda: camera.latest(0.0) is not None)
     camera.close()
 
@@ -140,9 +140,9 @@ def test_a_process_that_hangs_is_told_of_and_started_again(recording):
     os.kill(present(first), signal.SIGSTOP)
     before = camera.latest(0.0)
     wait_for(lambda: present(camera.latest(0.0)).number > present(before).number + 20)
-    told = camera.events()
-    assert "camera lost (no new frame): waiting for it" in told
-    assert any("starting the camera's process again" in line for line in told)
+    reported = camera.events()
+    assert "camera lost (no new frame): waiting for it" in reported
+    assert any("starting the camera's process again" in line for line in reported)
     assert present(camera._process).pid != first
     camera.close()
 
@@ -172,8 +172,8 @@ def test_an_exception_in_the_process_is_named_and_it_is_started_again(recording)
     camera = CameraProcess(parts, time.monotonic, QUICK)
     camera.open()
     wait_for(lambda: camera._starts > 1 and camera.frames > 11)
-    told = camera.events()
-    assert "ZeroDivisionError" in told[0] and told[0].startswith("camera lost")
+    reported = camera.events()
+    assert "ZeroDivisionError" in reported[0] and reported[0].startswith("camera lost")
     assert camera.latest(0.0) is not None
     camera.close()
 
@@ -223,8 +223,8 @@ def test_camera_lost_for_good_ends_with_its_reason(tmp_path):
     wait_for(gone)
     with pytest.raises(CameraError, match="no film or image at"):
         camera.latest(0.0)
-    told = camera.events()
-    assert any(line.startswith("camera lost") for line in told)
+    reported = camera.events()
+    assert any(line.startswith("camera lost") for line in reported)
     camera.close()
 
 

@@ -339,8 +339,8 @@ def test_slow_disk_leaves_pictures_out_and_says_so(tmp_path, monkeypatch):
     go.set()
     recorder.finish()
     assert 25 <= recorder.left_out <= 30
-    (told,) = [line for line in recorder.events() if "is slower than the camera" in line]
-    assert "--jpeg" in told
+    (reported,) = [line for line in recorder.events() if "is slower than the camera" in line]
+    assert "--jpeg" in reported
 
 
 def test_killed_program_leaves_what_it_wrote(tmp_path):

@@ -52,8 +52,8 @@ class Source:
         return Shot(float(self.number), self.number, np.zeros((24, 32, 3), np.uint8))
 
     def events(self) -> tuple[str, ...]:
-        told, self.news = tuple(self.news), []
-        return told
+        reported, self.news = tuple(self.news), []
+        return reported
 
     def close(self) -> None:
         self.closed += 1

@@ -72,9 +72,9 @@ def test_scan_of_feetech_servos():
 
 def test_scan_of_every_bus_of_a_rig(mixed):
     code, out, _ = invoked("scan", mixed, "--mock", "--bauds", "1000000", "--json")
-    told = [json.loads(line) for line in out.splitlines()]
-    assert code == 0 and [len(one["boards"]) for one in told] == [1, 0, 0]
-    found = [(s["kind"], s["id"]) for one in told for s in one["servos"]]
+    reported = [json.loads(line) for line in out.splitlines()]
+    assert code == 0 and [len(one["boards"]) for one in reported] == [1, 0, 0]
+    found = [(s["kind"], s["id"]) for one in reported for s in one["servos"]]
     assert found == [("dynamixel", 7), ("feetech", 1)]
 
 
@@ -303,7 +303,7 @@ def test_reboot_clears_an_error(rig, before, after):
 
 
 @pytest.mark.pty
-def test_reboot_asks_before_a_joint_goes_limp():
+def test_reboot_asks_before_the_torque_goes_off():
     with PtyBus() as bus:
         path = bus.start(SMALL, baud=1_000_000)
         port = BlockingPort(path)
@@ -311,7 +311,7 @@ def test_reboot_asks_before_a_joint_goes_limp():
         assert Registers(port, DYNAMIXEL).write(7, "torque_enable", 1)
         port.closePort()
         code, _, err = invoked("reboot", "7", "--port", path, answers="n\n")
-        assert code == 0 and "goes limp" in err and "left as it is" in err
+        assert code == 0 and "torque goes off" in err and "left as it is" in err
         code, _, err = invoked("reboot", "7", "--port", path, "--yes")
         assert code == 0 and "torque on" in err and "back after" in err
         code, _, err = invoked("reboot", "9", "--port", path)

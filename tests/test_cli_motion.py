@@ -135,8 +135,8 @@ def test_monitor_shows_every_kind_in_one_table(rigs: dict[str, str]) -> None:
 
 def test_monitor_of_a_mixed_rig_as_json(rigs: dict[str, str]) -> None:
     done = invoked("monitor", rigs["mixed"], "--mock", "--json", "--seconds", "0")
-    told = json.loads(done.out.splitlines()[0])["joints"]
-    assert told["eyes_pan"]["measured"] is False and told["neck_yaw"]["measured"] is True
+    reported = json.loads(done.out.splitlines()[0])["joints"]
+    assert reported["eyes_pan"]["measured"] is False and reported["neck_yaw"]["measured"] is True
 
 
 def test_on_real_wires_hobby_servos_are_asked_for_first(

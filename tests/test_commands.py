@@ -221,7 +221,7 @@ def test_a_jog_beyond_the_end_is_refused_with_the_joints_range(running: Running)
     with pytest.raises(ValueError, match=r"neck_yaw 180.0 deg is outside its range, -70..70 deg"):
         running.order(Jog((("neck_yaw", pi),)))
     running.order(Jog((("neck_yaw", radians(70.04)),)))  # a slider's rounding
-    assert running.go(0.1)[0].led == "somebody: jog neck_yaw 70.0"
+    assert running.go(0.1)[0].led == "a client: jog neck_yaw 70.0"
 
 
 def blinks_in_two_minutes(lids: Lids) -> int:

@@ -152,13 +152,13 @@ def test_a_run_against_itself_differs_in_nothing(
 ) -> None:
     ticks = list(RunRecording(soft).ticks())
     abouts = RunHeader("this", duration_s=SECONDS), RunHeader("again", duration_s=SECONDS)
-    told: list[str] = []
+    reported: list[str] = []
     found = compare(
-        (ticks, ticks), abouts, tmp_path / "same.html", lambda words, share: told.append(words)
+        (ticks, ticks), abouts, tmp_path / "same.html", lambda words, share: reported.append(words)
     )
     assert any(d.word == "may be chance" for d in found.differences)
     assert not any(d.word == "more than chance" for d in found.differences)
     page = found.page.read_text("utf-8")
     assert "Nothing differs by more than chance" in page
     assert page.count("data:image/png;base64,") == few_drawings
-    assert told[0] == "reading the run" and told[-1] == "drawing figures"
+    assert reported[0] == "reading the run" and reported[-1] == "drawing figures"

@@ -99,12 +99,12 @@ def test_what_waits_for_the_next_start_is_told() -> None:
     now = len(every) - len(later)
     assert f"{len(every)} keys {now} work so. The other {len(later)} are" in text
     rows = text.split("| keys | wait")[1].split("\n\n")[0].splitlines()[2:]
-    told = {key for row in rows for key in re.findall(r"`([a-z_.]+)`", row)}
+    reported = {key for row in rows for key in re.findall(r"`([a-z_.]+)`", row)}
     for key in later:
         parts = key.split(".")
         own = parts[2] if parts[0] == "joints" else parts[0]
-        assert {own, key} & told, key
-    for key in told:
+        assert {own, key} & reported, key
+    for key in reported:
         assert any(key in (other, *other.split(".")) for other in [*later, "buses"]), key
 
 

@@ -104,8 +104,8 @@ def test_a_quick_command_works(words: str, folder: Path, capfd: pytest.CaptureFi
 def test_a_paper_shows_what_is_printed(words: str, capfd: pytest.CaptureFixture[str]) -> None:
     [block] = [block for block in blocks("") if f"$ gazerig {words}\n" in block.text]
     typed(*shlex.split(words))  # setup ends where standard input does
-    told = "".join(capfd.readouterr())
-    printed = [" ".join(line.split()) for line in told.splitlines()]
+    reported = "".join(capfd.readouterr())
+    printed = [" ".join(line.split()) for line in reported.splitlines()]
     for line in block.text.split("$ gazerig")[1].splitlines()[1:]:
         if line.strip() != "...":
             assert " ".join(line.split()) in printed, line
@@ -128,10 +128,10 @@ def test_make_and_pip_have_what_the_papers_ask_for() -> None:
 
 def test_the_emulators_commands_are_those_of_its_page() -> None:
     page = EMULATOR.read_text(encoding="utf-8")
-    told = set(re.findall(r"`([a-z-]+)(?: [^`]*)?`", page.split("## Fault commands")[1]))
+    reported = set(re.findall(r"`([a-z-]+)(?: [^`]*)?`", page.split("## Fault commands")[1]))
     for commands in (DYNAMIXEL, FEETECH, MAESTRO):
-        assert not set(commands.verbs) - told
-        assert not set(commands.cases) - told
+        assert not set(commands.verbs) - reported
+        assert not set(commands.cases) - reported
     verbs = {verb for commands in (DYNAMIXEL, FEETECH, MAESTRO) for verb in commands.verbs}
     rows = page.split("| command | what it does |")[1].split("\n\n")[0].splitlines()
     for row in rows[2:]:
@@ -154,9 +154,9 @@ def test_the_emulators_cases_are_those_of_its_page(title: str, device: Any) -> N
     for row in table.splitlines()[2:]:
         cells = row.split("|")
         cases = [device.cases[case] for case in re.findall(r"`([a-z-]+)`", cells[1])]
-        told = set(re.findall(r"`([a-z-]+)`", cells[2].split(":")[0]))
+        reported = set(re.findall(r"`([a-z-]+)`", cells[2].split(":")[0]))
         allowed = {value for case in cases for value in case.split("|") if value.islower()}
-        assert not told or told == allowed, row
+        assert not reported or reported == allowed, row
 
 
 # ---- Python

@@ -255,7 +255,7 @@ def test_that_nobody_guards_servos_without_a_watchdog_is_said():
 
 def test_the_voltage_latch_is_explained_where_it_is_armed():
     findings = Rig(DYNAMIXEL).check()
-    note = one(findings, "note", PAN, "makes it limp until it is restarted")
+    note = one(findings, "note", PAN, "switches its torque off until it is restarted")
     assert "gazerig reboot" in note.remedy and "3.5..7.0 V" in note.what
     assert not any(f.level == "note" and f.where == YAW for f in findings)
 
@@ -270,7 +270,7 @@ def test_a_missing_servo_a_stranger_and_one_at_another_rate(kind):
     assert "gazerig setup" in one(findings, "error", YAW, "does not answer").remedy
     assert one(findings, "warn", "the bus", f"servo 30 ({neck}) answers")
     assert one(findings, "ok", PAN, eye)
-    assert any("115200" in words for words in rig.told)
+    assert any("115200" in words for words in rig.reported)
     # The port is back at the rig's rate, so that the others could be read.
     assert rig.port.baudrate == BAUD
 

@@ -65,8 +65,8 @@ def test_a_good_board_and_what_no_board_tells():
     assert {f.level for f in findings} == {"ok", "note"}
     assert "12 channels" in one(findings, "ok", "the board", "compact and the pololu form").what
     assert one(findings, "note", "the servos", "hobby servos tell nothing")
-    told = one(findings, "note", "the board", "serial timeout cannot be read")
-    assert "Pololu's program" in told.remedy and "gazerig setup" in told.remedy
+    reported = one(findings, "note", "the board", "serial timeout cannot be read")
+    assert "Pololu's program" in reported.remedy and "gazerig setup" in reported.remedy
     wide = one(findings, "note", "left_upper_lid (channel 2)", "goes to 900..1800 us")
     assert "Min to 896" in wide.remedy and "cuts goals silently" in wide.what
     assert not any(f.where == "eyes_pan (channel 0)" for f in findings)

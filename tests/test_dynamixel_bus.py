@@ -43,8 +43,8 @@ class Twin(NamedTuple):
 
     def bus(self, setups=SETUPS, **params) -> SmartServoBus:
         # A shared machine may stall a process for longer than real servos ever wait.
-        patience: dict[str, Any] = {"reply_timeout_ms": 100.0, "prompt_timeout_ms": 100.0}
-        chosen = {**patience, "watchdog_ms": 0, **params}
+        timeouts: dict[str, Any] = {"reply_timeout_ms": 100.0, "prompt_timeout_ms": 100.0}
+        chosen = {**timeouts, "watchdog_ms": 0, **params}
         return SmartServoBus(DYNAMIXEL, self.port, setups, DynamixelParams(**chosen))
 
     def run(self, bus, seconds, goals=None):

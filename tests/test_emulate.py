@@ -91,8 +91,8 @@ class Branch:
     def send_signal(self, number):
         os.kill(self.pid, number)
 
-    def wait(self, patience_s):
-        deadline = time.monotonic() + patience_s
+    def wait(self, timeout_s):
+        deadline = time.monotonic() + timeout_s
         while time.monotonic() < deadline:
             pid, status = os.waitpid(self.pid, os.WNOHANG)
             if pid:
@@ -156,9 +156,9 @@ def test_it_serves_commands_and_clients_that_come_and_go(tmp_path):
         assert ping(port, 2) == (1190, COMM_SUCCESS)
         assert ping(port, 7) == (1240, COMM_SUCCESS)
         port.closePort()
-    told = emulator.type("status")
-    assert [servo["id"] for servo in told["servos"]] == [1, 2, 7]
-    assert told["servos"][2]["position"] == 100
+    reported = emulator.type("status")
+    assert [servo["id"] for servo in reported["servos"]] == [1, 2, 7]
+    assert reported["servos"][2]["position"] == 100
     assert "ok" in emulator.type("lose 1 count 1")
     assert "'x' is not a servo id" in emulator.type("lose x")["error"]
     assert "lose ID" in emulator.type("help")["ok"]
@@ -215,8 +215,8 @@ def test_servos_of_feetech_on_one_line(tmp_path):
     )
     assert emulator.ready == {"path": str(link), "baud": 1_000_000}
     assert asked(link, STS_PING, 6) == STS_PONG
-    told = emulator.type("status")
-    assert [(servo["id"], servo["model"]) for servo in told["servos"]] == [
+    reported = emulator.type("status")
+    assert [(servo["id"], servo["model"]) for servo in reported["servos"]] == [
         (i, "sts3215") for i in range(1, 7)
     ]
     assert "overload-ends" in emulator.type("help")["ok"]
@@ -242,8 +242,8 @@ def test_a_person_is_told_once_of_a_client_at_a_wrong_rate():
         port.closePort()
     assert asked(emulator.path, STS_PING, 6, 500_000) == STS_PONG
     assert emulator.end() == 0
-    with present(emulator.process.stderr) as told:
-        assert told.read() == "a client speaks at 1000000 bit/s; the servos listen at 500000\n"
+    with present(emulator.process.stderr) as reported:
+        assert reported.read() == "a client speaks at 1000000 bit/s; the servos listen at 500000\n"
 
 
 def test_a_rig_of_hobby_servos_is_a_board_that_sends_no_pulses_yet():

@@ -194,17 +194,17 @@ def test_status_tells_everything_as_json(make):
     bench.put("torque_enable", 1)
     bench.put("goal_position", 1100)
     bench.chain.faults.command("lose 1")
-    told = json.loads(bench.chain.faults.command("status"))
-    assert told["faults"] == ["lose 1"]
-    assert told["servos"] == [
+    reported = json.loads(bench.chain.faults.command("status"))
+    assert reported["faults"] == ["lose 1"]
+    assert reported["servos"] == [
         {
             "id": 1, "model": make.model, "position": 1000, "goal": 1100, "torque": 1, "error": 0,
             "temperature_c": 30, "voltage_01v": 74 if make is FeetechBench else 50,
         }
     ]  # fmt: skip
     bench.chain.faults.command("overload 1")
-    told = json.loads(bench.chain.faults.command("status"))
-    assert told["servos"][0]["error"] == 0x20
+    reported = json.loads(bench.chain.faults.command("status"))
+    assert reported["servos"][0]["error"] == 0x20
 
 
 # --- the line and its adapter
@@ -260,11 +260,11 @@ def test_what_cannot_be_asked(make, text, message):
 
 
 def test_help_names_what_can_be_chosen(make):
-    told = bench_of(make).chain.faults.command("help")
+    reported = bench_of(make).chain.faults.command("help")
     cases = ["after-missing silence|skip|timeout", "slot-timeout-ms MS", "brown-out ID"]
     own = "overload-ends" if make is FeetechBench else "stuffing accept|strict"
     for case in (*cases, own):
-        assert case in told
+        assert case in reported
 
 
 # --- two clocks, one result

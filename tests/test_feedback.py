@@ -45,8 +45,12 @@ def columns():
 def test_an_exchange_begins_with_nobody_and_takes_servo_by_servo(columns):
     assert columns.now.missing == (0, 1, 2)
     columns._apply_one(1, 2048, 3.0, 0.5, 7.0)
-    told = columns.now
-    assert told.missing == (0, 2) and told.position_steps[1] == 2048 and told.at_s[1] == 7.0
+    reported = columns.now
+    assert (
+        reported.missing == (0, 2)
+        and reported.position_steps[1] == 2048
+        and reported.at_s[1] == 7.0
+    )
     assert columns.position(1) == 2048 and columns.position(0) is None
     columns.begin()
     assert columns.now.missing == (0, 1, 2)
@@ -59,9 +63,9 @@ def test_what_is_read_in_turn_stays_from_one_exchange_to_the_next(columns):
     columns.begin()
     for slot in range(3):
         columns._apply_one(slot, 1 + slot, 0.0, 0.0, 9.0)
-    told = columns.now
-    assert told.torque == (False, False, True) and told.fault == ("overload", "", "")
-    assert told.missing == () and told.at_s == (9.0,) * 3
+    reported = columns.now
+    assert reported.torque == (False, False, True) and reported.fault == ("overload", "", "")
+    assert reported.missing == () and reported.at_s == (9.0,) * 3
 
 
 def test_a_mark_of_rearming_lasts_for_one_exchange(columns):

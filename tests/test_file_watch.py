@@ -18,18 +18,18 @@ class Rig:
     def __init__(self, folder: Path) -> None:
         self.path = folder / "rig.yaml"
         self.path.write_text(OLD, encoding="utf-8")
-        self.told: list[str] = []
+        self.reported: list[str] = []
         self.watch = FileWatch(lambda: [self.path], self._changed)
         self.watch.look()
 
     def _changed(self, path: Path) -> None:
         assert path == self.path
-        self.told.append(path.read_text(encoding="utf-8") if path.exists() else "(gone)")
+        self.reported.append(path.read_text(encoding="utf-8") if path.exists() else "(gone)")
 
     def looks(self, number: int) -> list[str]:
         for _ in range(number):
             self.watch.look()
-        return self.told
+        return self.reported
 
     def write(self, text: str) -> None:
         self.path.write_text(text, encoding="utf-8")
@@ -161,24 +161,24 @@ def test_files_may_change_while_it_looks(tmp_path: Path) -> None:
     one, two = tmp_path / "one.yaml", tmp_path / "two.yaml"
     for path in (one, two):
         path.write_text(OLD, encoding="utf-8")
-    files, told = [one], list[Path]()
-    watch = FileWatch(lambda: files, told.append)
+    files, reported = [one], list[Path]()
+    watch = FileWatch(lambda: files, reported.append)
     watch.look()
     files[:] = [one, two]
     for _ in range(5):
         watch.look()
-    assert told == []  # what it holds when it comes into use is known
+    assert reported == []  # what it holds when it comes into use is known
     two.write_text(NEW, encoding="utf-8")
     for _ in range(5):
         watch.look()
-    assert told == [two]
+    assert reported == [two]
 
 
 def test_an_edit_right_after_a_file_was_saved_under_a_new_name_is_heard(tmp_path: Path) -> None:
     one, two = tmp_path / "one.yaml", tmp_path / "two.yaml"
     one.write_text(OLD, encoding="utf-8")
-    files, told = [one], list[Path]()
-    watch = FileWatch(lambda: files, told.append)
+    files, reported = [one], list[Path]()
+    watch = FileWatch(lambda: files, reported.append)
     watch.look()
     two.write_text(OLD, encoding="utf-8")
     watch.saved(two)
@@ -186,17 +186,17 @@ def test_an_edit_right_after_a_file_was_saved_under_a_new_name_is_heard(tmp_path
     two.write_text(NEW, encoding="utf-8")  # before anybody has looked
     for _ in range(5):
         watch.look()
-    assert told == [two]
+    assert reported == [two]
 
 
 def test_the_thread_looks_by_itself_and_ends(tmp_path: Path) -> None:
     path = tmp_path / "rig.yaml"
     path.write_text(OLD, encoding="utf-8")
-    told = threading.Event()
-    watch = FileWatch(lambda: [path], lambda _: told.set(), every_s=0.01)
+    reported = threading.Event()
+    watch = FileWatch(lambda: [path], lambda _: reported.set(), every_s=0.01)
     watch.start()
     path.write_text(NEW, encoding="utf-8")
-    assert told.wait(10.0)
+    assert reported.wait(10.0)
     watch.stop()
     assert threads_named("file watch") == []
 

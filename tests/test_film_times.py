@@ -26,7 +26,7 @@ def write_film(path, length=20, rate_hz=30.0, fourcc="mp4v", size=(64, 48)):
 
 
 def retimed(source, path, ticks, rate_hz=30.0):
-    """Pack the pictures of a film anew, picture k at ticks[k] / rate_hz."""
+    """Pack the pictures of a film again, picture k at ticks[k] / rate_hz."""
     packets = cv2.VideoCapture(str(source), cv2.CAP_FFMPEG, [cv2.CAP_PROP_FORMAT, -1])
     writer = cv2.VideoWriter(
         str(path),
@@ -64,10 +64,10 @@ def test_uneven_film_runs_by_the_times_of_its_pictures(folder):
         assert film.due_s(k + 1) == pytest.approx(tick / 30.0, abs=0.002)
         assert film.number_at(film.due_s(k + 1)) == k + 1
         assert round(float(film.image(k + 1).mean()) / 12.0) == k
-    (told,) = film.events()
-    assert told.startswith("uneven.mkv: the film's frames come unevenly")
+    (reported,) = film.events()
+    assert reported.startswith("uneven.mkv: the film's frames come unevenly")
     assert film.events() == ()
-    # The last picture stays for the usual time; then the film begins anew.
+    # The last picture stays for the usual time; then the film starts again.
     assert film.due_s(21) == pytest.approx(44 / 30.0, abs=0.003)
     assert round(float(film.image(21).mean()) / 12.0) == 0
 

@@ -262,8 +262,10 @@ def test_a_port_that_is_gone_is_told_once_and_not_waited_for(capfd):
     pid = guardian.pid
     guardian.leave(0)  # still armed: it could not be switched off
     os.waitpid(present(pid), 0)
-    told = capfd.readouterr().err
-    assert told.count("not released yet") == 1 and "no serial port /tmp/no such port" in told
+    reported = capfd.readouterr().err
+    assert (
+        reported.count("not released yet") == 1 and "no serial port /tmp/no such port" in reported
+    )
 
 
 def test_without_a_guardian_there_is_no_torque(monkeypatch):

@@ -1,4 +1,4 @@
-"""What the gaze does with nobody in sight."""
+"""What the gaze does with no one in sight."""
 
 from itertools import pairwise
 from math import degrees

@@ -19,16 +19,16 @@ class Servo:
     """Keeps what it is told."""
 
     def __init__(self) -> None:
-        self.told: list[tuple[str, float]] = []
+        self.reported: list[tuple[str, float]] = []
 
     def by(self, us: float) -> None:
-        self.told.append(("by", us))
+        self.reported.append(("by", us))
 
     def nudge(self, us: float) -> None:
-        self.told.append(("nudge", us))
+        self.reported.append(("nudge", us))
 
     def to(self, us: float) -> None:
-        self.told.append(("to", us))
+        self.reported.append(("to", us))
 
     def live(self) -> str:
         return "here"
@@ -41,7 +41,7 @@ def person(tmp_path: Path, *lines: str) -> SteeringPerson:
 def test_lines_move_a_servo_until_enter(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     servo = Servo()
     person(tmp_path, "+40", "-12.5", "1480", "left", "nan", "").steer("move it", servo)
-    assert servo.told == [("by", 40.0), ("by", -12.5), ("to", 1480.0)]
+    assert servo.reported == [("by", 40.0), ("by", -12.5), ("to", 1480.0)]
     assert capsys.readouterr().err.count("moves it by so many us") == 2
 
 

@@ -182,13 +182,13 @@ def test_one_mode_may_be_without_blinks_and_a_change_counts_at_once() -> None:
 
 
 def test_the_same_mode_again_changes_nothing() -> None:
-    plain, told = lids(4), lids(4)
+    plain, reported = lids(4), lids(4)
     times = []
     for k in range(12_000):
-        told.mode("rest")
-        count = told.blinks
-        told.step(k * DT, 0.0, None)
-        if told.blinks > count:
+        reported.mode("rest")
+        count = reported.blinks
+        reported.step(k * DT, 0.0, None)
+        if reported.blinks > count:
             times.append(k * DT)
     assert times == onsets(plain, 60.0)
 

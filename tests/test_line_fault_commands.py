@@ -34,10 +34,10 @@ def test_faults_last_for_a_count_a_time_or_until_cleared(world):
 
 def test_status_tells_servos_and_faults(world):
     world.faults.command("delay all 3")
-    told = json.loads(world.faults.command("status"))
-    assert [servo["position"] for servo in told["servos"]] == [2001, 2002, 2003]
-    assert told["servos"][0]["torque"] == 0
-    assert told["faults"] == ["delay all"]
+    reported = json.loads(world.faults.command("status"))
+    assert [servo["position"] for servo in reported["servos"]] == [2001, 2002, 2003]
+    assert reported["servos"][0]["torque"] == 0
+    assert reported["faults"] == ["delay all"]
 
 
 @pytest.mark.parametrize(

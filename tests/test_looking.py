@@ -144,7 +144,7 @@ def test_a_person_is_followed_with_the_scanpath_on_the_face(rig: Simulated) -> N
     assert not reply.refused and reply.lead == 1
     assert {(tick.target.kind, tick.target.id) for tick in ticks} == {("face", person)}
     assert len({tick.target.part for tick in ticks}) > 1
-    assert ticks[-1].lead.arrived and ticks[-1].led == f"somebody: look at person {person}"
+    assert ticks[-1].lead.arrived and ticks[-1].led == f"a client: look at person {person}"
 
 
 def test_nobody_is_followed_who_is_not_seen_and_no_longer_than_that(rig: Simulated) -> None:

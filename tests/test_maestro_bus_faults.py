@@ -34,10 +34,10 @@ def test_a_restart_is_noticed_within_a_tick_and_held_anew_where_it_was(held):
     held.run(1.0, [5500, 5600, 6600])
     held.board.faults.command("brown-out")
     seen = held.run(3.0, [5500, 5600, 6600])
-    anew = [[r is not None and r.rearmed for r in readings] for readings in seen]
-    assert [sum(column) for column in zip(*anew, strict=True)] == [1, 1, 1]
+    again = [[r is not None and r.rearmed for r in readings] for readings in seen]
+    assert [sum(column) for column in zip(*again, strict=True)] == [1, 1, 1]
     for i, place in enumerate((5500, 5600, 6600)):
-        first = next(r[i] for r, a in zip(seen, anew, strict=True) if a[i])
+        first = next(r[i] for r, a in zip(seen, again, strict=True) if a[i])
         assert first.position_steps == pytest.approx(place, abs=1)
     assert held.pulses() == [5500, 5600, 6600]
     assert any("the board restarted: set up again" in line for line in held.bus.events())
@@ -97,8 +97,8 @@ def test_where_home_is_reached_at_once_they_are_held_there():
     bench.run(1.0, [5000, 5000, 5000])
     bench.raw("55")
     seen = bench.run(0.3)
-    anew = [r for readings in seen for r in readings if r is not None and r.rearmed]
-    assert [r.position_steps for r in anew] == [6000, 6000, 6000]
+    again = [r for readings in seen for r in readings if r is not None and r.rearmed]
+    assert [r.position_steps for r in again] == [6000, 6000, 6000]
     assert bench.pulses() == [6000, 6000, 6000]
     assert "sent home by an error" in " ".join(bench.bus.events())
 
@@ -147,8 +147,8 @@ def test_a_channel_that_meets_an_end_of_the_board_is_told_once(held):
         held.run(1.0, [6000, 6000, 7000])
     assert seen[-1][0].position_steps == 7400
     assert not any(r is None or r.rearmed for readings in seen for r in readings)
-    told = [line for line in held.bus.events() if "sent to" in line]
-    assert len(told) == 1 and "gets 1850 us: widen its range" in told[0]
+    reported = [line for line in held.bus.events() if "sent to" in line]
+    assert len(reported) == 1 and "gets 1850 us: widen its range" in reported[0]
 
 
 def test_a_running_script_is_stopped_at_engage(bench):
@@ -217,8 +217,8 @@ def test_unplugged_and_plugged_in_again(held):
     assert all(reading is None for readings in gone for reading in readings)
     held.board.faults.command("plug")
     seen = held.run(2.0, [5500, 5600, 6600])
-    anew = [i for readings in seen for i, r in enumerate(readings) if r is not None and r.rearmed]
-    assert sorted(anew) == [0, 1, 2]
+    again = [i for readings in seen for i, r in enumerate(readings) if r is not None and r.rearmed]
+    assert sorted(again) == [0, 1, 2]
     assert held.pulses() == [5500, 5600, 6600]
     said = " ".join(held.bus.events())
     assert "port lost" in said and "port back after" in said

@@ -161,9 +161,13 @@ def test_status_tells_channels_errors_and_faults(world):
     world.do("set on-error ignore")
     world.do("error crc")
     world.do("lose all")
-    told = json.loads(world.do("status"))
-    assert (told["errors"], told["script"], told["faults"]) == (["crc"], False, ["lose all"])
-    assert [servo["position"] for servo in told["servos"]] == [6000] + [0] * 11
+    reported = json.loads(world.do("status"))
+    assert (reported["errors"], reported["script"], reported["faults"]) == (
+        ["crc"],
+        False,
+        ["lose all"],
+    )
+    assert [servo["position"] for servo in reported["servos"]] == [6000] + [0] * 11
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""The line's patience and the memory of one channel, each by itself."""
+"""The line's time-out and the memory of one channel, each by itself."""
 
 import pytest
 from stand_in import StandIn

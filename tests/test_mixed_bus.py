@@ -84,7 +84,7 @@ class Mixture:
         self.b = Scripted("b", (12, 10), self.log)
         self.bus = MultiBus([BusShare("a", self.a, (1, 3, 4)), BusShare("b", self.b, (2, 0))])
 
-    def told(self):
+    def reported(self):
         log, self.log[:] = list(self.log), []
         return log
 
@@ -107,14 +107,14 @@ def test_every_place_must_be_there_once(places):
 
 def test_every_sequence_is_in_the_order_of_the_whole(mixture):
     assert mixture.bus.enable_torque() == (10, 11, 12, 13, 14)
-    told = mixture.bus.read(1.0)
-    assert rows(told) == tuple(row_at(at, 1.0) for at in (10, 11, 12, 13, 14))
-    assert told.missing == ()
+    reported = mixture.bus.read(1.0)
+    assert rows(reported) == tuple(row_at(at, 1.0) for at in (10, 11, 12, 13, 14))
+    assert reported.missing == ()
     mixture.bus.write([20, 21, 22, 23, 24])
     assert (mixture.a.steps, mixture.b.steps) == ([21, 23, 24], [22, 20])
-    mixture.told()
+    mixture.reported()
     mixture.bus.retune(WANTED)
-    assert mixture.told() == ["a retune 1,3,4", "b retune 2,0"]
+    assert mixture.reported() == ["a retune 1,3,4", "b retune 2,0"]
 
 
 def test_what_is_said_and_counted_is_that_of_all(mixture):
@@ -129,7 +129,7 @@ def test_open_closes_what_is_open_where_the_next_cannot_be(mixture):
     mixture.b.wrong["open"] = PortError("no port")
     with pytest.raises(PortError, match="no port"):
         mixture.bus.open()
-    assert mixture.told() == ["a open", "b open", "a close"]
+    assert mixture.reported() == ["a open", "b open", "a close"]
 
 
 def test_where_one_refuses_its_torque_all_are_let_go(mixture):
@@ -137,7 +137,7 @@ def test_where_one_refuses_its_torque_all_are_let_go(mixture):
     mixture.a.wrong["disable_torque"] = BusLost("port a is gone")
     with pytest.raises(ServoMissing, match="servo 2 refuses"):
         mixture.bus.enable_torque()
-    assert mixture.told() == [
+    assert mixture.reported() == [
         "a enable_torque",
         "b enable_torque",
         "a disable_torque",
@@ -149,7 +149,7 @@ def test_release_reaches_all_and_names_every_port_that_is_gone(mixture):
     mixture.a.wrong["disable_torque"] = BusLost("port a is gone")
     with pytest.raises(BusLost, match="^port a is gone$"):
         mixture.bus.disable_torque()
-    assert mixture.told() == ["a disable_torque", "b disable_torque"]
+    assert mixture.reported() == ["a disable_torque", "b disable_torque"]
     mixture.b.wrong["disable_torque"] = BusLost("port b is gone")
     with pytest.raises(BusLost, match="^port a is gone; port b is gone$"):
         mixture.bus.disable_torque()
@@ -159,13 +159,13 @@ def test_release_reaches_all_and_names_every_port_that_is_gone(mixture):
 def test_goals_that_cannot_be_reach_no_bus_at_all(mixture, goals):
     with pytest.raises(ValueError, match="not a number|goals for 5 servos"):
         mixture.bus.write(goals)
-    assert mixture.told() == []
+    assert mixture.reported() == []
 
 
 def test_other_servos_are_refused_before_any_bus_is_told(mixture):
     with pytest.raises(ValueError, match="other servos need another bus"):
         mixture.bus.retune(WANTED[:4])
-    assert mixture.told() == []
+    assert mixture.reported() == []
 
 
 def test_a_bus_that_gives_up_ends_it_for_all(mixture):
@@ -204,5 +204,5 @@ def test_close_closes_all_and_open_begins_anew(mixture):
     mixture.bus.close()
     mixture.b.silent = False
     mixture.bus.open()
-    assert mixture.told()[-4:] == ["a close", "b close", "a open", "b open"]
+    assert mixture.reported()[-4:] == ["a close", "b close", "a open", "b open"]
     assert None not in rows(mixture.bus.read(0.1))

@@ -21,7 +21,7 @@ def test_what_moves_lies_on_people_who_walk() -> None:
     ground = cv2.createBackgroundSubtractorMOG2(detectShadows=True)
     detector = MotionDetector(MotionParams())
     speck, near = np.ones((3, 3), np.uint8), np.ones((11, 11), np.uint8)
-    on = told = peopled = noticed = 0
+    on = reported = peopled = noticed = 0
     for k in range(BEGIN + LOOK):
         good = film.grab()
         assert good
@@ -41,10 +41,10 @@ def test_what_moves_lies_on_people_who_walk() -> None:
         mask = cv2.dilate(cv2.morphologyEx(moving, cv2.MORPH_OPEN, speck), near)
         centres = [blob.centre_px for blob in blobs if blob.centre_px is not None]
         on += sum(int(mask[round(y), round(x)]) for x, y in centres)
-        told += len(centres)
+        reported += len(centres)
         peopled += int(mask.sum() > 4000)
         noticed += int(mask.sum() > 4000 and bool(centres))
     film.release()
-    assert told > 2 * LOOK
-    assert on >= 0.95 * told
+    assert reported > 2 * LOOK
+    assert on >= 0.95 * reported
     assert noticed >= 0.98 * peopled > 0

@@ -86,15 +86,15 @@ def test_who_keeps_moving_keeps_the_number_and_two_are_not_mixed_up() -> None:
     for k in range(1, 6):
         found = follow(tracks, k, (200 + 10 * k, 50), (50 + 10 * k, 50), v=(100, 0))
         assert [f.id for f in found] == first[::-1]
-        assert all(tracks.told(f) for f in found)
+        assert all(tracks.confirmed(f) for f in found)
 
 
 def test_first_sight_is_not_told_yet_and_a_flicker_never() -> None:
     tracks = MotionTracks(MotionParams(confirm_frames=3))
     for k in range(6):
         found = follow(tracks, k, (50, 50), *(((200, 50),) if k % 2 == 0 else ()))
-        assert tracks.told(found[0]) == (k >= 2)
-        assert not any(tracks.told(f) for f in found[1:])
+        assert tracks.confirmed(found[0]) == (k >= 2)
+        assert not any(tracks.confirmed(f) for f in found[1:])
 
 
 @pytest.mark.parametrize(("gap", "same"), [(4, True), (8, False)])
@@ -111,6 +111,6 @@ def test_the_camera_s_turn_moves_what_is_expected() -> None:
     tracks = MotionTracks(MotionParams())
     (one,) = follow(tracks, 0, (50, 50))
     H = np.array([[1.0, 0.0, 120.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    tracks.pass_over(H, 0.1, 0.1)
+    tracks.predict(H, 0.1, 0.1)
     (other,) = follow(tracks, 2, (170, 50))
     assert one.id == other.id

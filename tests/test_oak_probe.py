@@ -219,8 +219,8 @@ def test_usb_2_is_told():
     rig = Rig("HIGH")
     source = rig.source()
     source.open()
-    (told,) = source.events()
-    assert "USB 2 speed (HIGH)" in told and "USB 3 cable" in told
+    (reported,) = source.events()
+    assert "USB 2 speed (HIGH)" in reported and "USB 3 cable" in reported
     assert source.events() == ()
 
 
@@ -280,8 +280,8 @@ def test_stamps_out_of_step_give_way_to_arrivals(stamp_s):
     source.open()
     (shot,) = take(rig, source, lambda: 100.1, Message(5.0, stamp_s))
     assert shot.captured_s == pytest.approx(100.07)
-    (told,) = source.events()
-    assert "not in step" in told and "30 ms (latency_ms)" in told
+    (reported,) = source.events()
+    assert "not in step" in reported and "30 ms (latency_ms)" in reported
 
 
 def test_device_clock_set_anew_is_told():
@@ -290,5 +290,5 @@ def test_device_clock_set_anew_is_told():
     source.open()
     now = iter([100.1, 100.1, 200.1, 200.1])
     take(rig, source, lambda: next(now), Message(500.0, 100.0), Message(1.0, 200.0))
-    (told,) = source.events()
-    assert "jumped" in told
+    (reported,) = source.events()
+    assert "jumped" in reported

@@ -257,7 +257,7 @@ def test_stop_takes_the_torque_off_until_it_is_asked_back(
 ) -> None:
     rig, person = at_the_rig
     person.click(STOP)
-    wait_for(lambda: "somebody pressed STOP on the page (browser " in rig.robot.stopped, "the stop")
+    wait_for(lambda: "STOP was pressed on the page (browser " in rig.robot.stopped, "the stop")
     wait_for(lambda: present(rig.newest).guard_result.level == "torque_off", "torque off")
     wait_for(lambda: person.reads("Torque is off", "Resume"), "the words")
     resumed(rig, person)
@@ -279,7 +279,7 @@ def test_the_space_bar_stops_but_not_while_somebody_types(
     # On a button in focus a space would press it; here it stops, and nothing else.
     person.run(f"{beside('find', 'input')}.blur(); {saying('joints')}.focus()")
     person.space()
-    wait_for(lambda: "somebody pressed the space bar (" in rig.robot.stopped, "the stop")
+    wait_for(lambda: "the space bar was pressed on the page (" in rig.robot.stopped, "the stop")
     wait_for(lambda: len(rig.orders) > before, "the tick that obeyed")
     assert len(rig.orders) == before + 1
     resumed(rig, person)
@@ -333,7 +333,7 @@ def test_a_target_is_dragged_through_the_scene(at_the_rig: tuple[Rig, Person]) -
     there = (0.7, 0.1, 0.3)
     rig.robot.command(LookAt(there, stay=True))
     wait_for(lambda: present(rig.newest).target.p_world_m == there, "the head being led")
-    wait_for(lambda: person.reads("somebody chose this point"), "the page knowing of it")
+    wait_for(lambda: person.reads("a user chose this point"), "the page knowing of it")
     person.click(beside("drag a target", "input"))
     rect = "(() => { const r = document.querySelector('canvas').getBoundingClientRect();"
     bounds: Any = person.run(rect + "return [r.x, r.y, r.width, r.height]; })()")
@@ -437,7 +437,7 @@ def test_who_did_not_stop_is_asked_about_other_hands(at_the_rig: tuple[Rig, Pers
     rig, person = at_the_rig
     rig.robot.command(Stop("somebody tripped", "ana"))
     wait_for(lambda: person.reads("Torque is off: somebody tripped"), "the words")
-    resumed(rig, person, "Is nobody's hand in the mechanism?")
+    resumed(rig, person, "Is no hand in the mechanism?")
 
 
 def test_on_a_phone_stop_is_at_the_top_and_nothing_covers_it(
@@ -466,7 +466,7 @@ def test_names_are_words_and_never_run(at_the_rig: tuple[Rig, Person]) -> None:
     wait_for(lambda: person.reads("STOPPED: <img src=x"), "the words as they are")
     assert shown and person.run("window.evil === undefined") is True
     assert person.run("document.querySelectorAll('img[src=x]').length") == 0
-    resumed(rig, person, "Is nobody's hand in the mechanism?")
+    resumed(rig, person, "Is no hand in the mechanism?")
 
 
 def test_a_stop_that_gets_lost_is_sent_again(at_the_rig: tuple[Rig, Person]) -> None:

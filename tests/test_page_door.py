@@ -171,8 +171,8 @@ def test_the_stop_button_is_told_of_every_change(near: Rig) -> None:
         first = json.loads(line.recv(timeout=PATIENCE_S))["state"]
         assert (first["stopped"], first["you"]) == ("", "the page")
         near.door.tell({"stopped": "a test"})
-        told = (json.loads(line.recv(timeout=PATIENCE_S)) for _ in range(20))
-        assert any(said["state"]["stopped"] == "a test" for said in told)
+        reported = (json.loads(line.recv(timeout=PATIENCE_S)) for _ in range(20))
+        assert any(said["state"]["stopped"] == "a test" for said in reported)
 
 
 # --- stop -----------------------------------------------------------------------------------

@@ -228,7 +228,7 @@ def test_what_nobody_measured_is_drawn_and_named_otherwise(server: viser.ViserSe
     assert "no measurements" in panel._of_what.content
     before = view._plots
     assert shown(1.1, SIX) == [True, True, True]
-    assert view._plots is before  # what stays as it is is not made anew
+    assert view._plots is before  # what stays as it is is not made again
     assert shown(1.2, ("left_lower_lid",)) == [False, False, True]
     assert "> measured<" in view._key.content and "estimated" in view._key.content
     assert panel._of_what.content == ""
@@ -240,7 +240,7 @@ class Nobody:
     """A stop button and an ear that take whatever they are told."""
 
     def tell(self, state: Mapping[str, object]) -> None:
-        self.told = dict(state)
+        self.reported = dict(state)
 
 
 def test_who_comes_late_sees_all_panels_as_they_are_now(
@@ -255,7 +255,7 @@ def test_who_comes_late_sees_all_panels_as_they_are_now(
         view.show(News((snapshot(1.1 + 0.1 * k),), None, ended=False))
     last = replace(of_six(snapshot(4.0)), target_name="the last", stopped="a test")
     view.show(News((last,), None, ended=False))
-    assert button.told == {"stopped": "a test", "silent": False, "without_feedback": 6}
+    assert button.reported == {"stopped": "a test", "silent": False, "without_feedback": 6}
     assert "the first" in view._panel._status.content
     people[0] = object()
     view.show(News((), None, ended=False))

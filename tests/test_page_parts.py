@@ -292,10 +292,10 @@ def test_depth_is_shown_in_colours_near_red_far_blue_unknown_dark() -> None:
 def test_depth_is_drawn_on_only_where_it_is_wanted_and_there() -> None:
     picture, found = camera_picture()
     assert ground(found, depth=False) is picture
-    told = ground(found, depth=True)
-    assert told is not None and told.shape == (240, IMAGE_WIDTH_PX, 3)
-    assert (np.abs(told.astype(int) - 90).max(axis=2) > 60)[215:].any()  # words at the foot
-    assert not (np.abs(told.astype(int) - 90).max(axis=2) > 60)[:200].any()
+    reported = ground(found, depth=True)
+    assert reported is not None and reported.shape == (240, IMAGE_WIDTH_PX, 3)
+    assert (np.abs(reported.astype(int) - 90).max(axis=2) > 60)[215:].any()  # words at the foot
+    assert not (np.abs(reported.astype(int) - 90).max(axis=2) > 60)[:200].any()
     deep = replace(found, depth_m=np.full((480, 640), 1.0, np.float32))
     shown = ground(deep, depth=True)
     assert shown is not None and len(np.unique(shown[:200].reshape(-1, 3), axis=0)) == 1

@@ -88,7 +88,7 @@ def test_more_than_the_page_can_show_is_passed_over() -> None:
     for tick in range(200):
         page.show(replace(SNAPSHOT, t_s=5.0 + 0.005 * tick))
     assert page.dropped == 100  # every second one was offered, and dropped as nothing is open
-    page.show(replace(SNAPSHOT, t_s=0.0))  # the clock was started anew
+    page.show(replace(SNAPSHOT, t_s=0.0))  # the clock was started again
     assert page.dropped == 101
 
 

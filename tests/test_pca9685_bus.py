@@ -211,7 +211,7 @@ def test_what_another_program_changes_is_set_right(world, spoil):
 
 
 @pytest.mark.parametrize(
-    ("command", "told"),
+    ("command", "reported"),
     [
         ("absent on", "no PCA9685 answers at 0x40: has the board its logic supply"),
         ("stuck on", "the I2C bus is stuck"),
@@ -219,10 +219,10 @@ def test_what_another_program_changes_is_set_right(world, spoil):
         ("lose all", "no answer as an I2C bus"),
     ],
 )
-def test_what_cannot_be_used_is_named_and_nothing_moves(world, command, told):
+def test_what_cannot_be_used_is_named_and_nothing_moves(world, command, reported):
     world.command(command)
     before = bytes(world.chip()._registers)
-    with pytest.raises(ServoMissing, match=told) as caught:
+    with pytest.raises(ServoMissing, match=reported) as caught:
         world.bus.open()
     assert "\n" not in str(caught.value) and str(caught.value).startswith("emulated: ")
     assert bytes(world.chip()._registers) == before
@@ -245,8 +245,8 @@ def test_a_board_that_lost_its_clock_on_the_way_is_named_and_nothing_is_said_to_
     bus = EmulatedSMBus(world.device.body)
     bus.write_byte_data(0x40, MODE1, 0x30)
     bus.write_byte_data(0x40, MODE1, 0x70)
-    told = world.run(0.5, [6000] * 3)
-    assert list(told) == [None] * 3
+    reported = world.run(0.5, [6000] * 3)
+    assert list(reported) == [None] * 3
     assert "board 0x40: it was set to an external clock: switch its logic supply off and on" in (
         world.bus.faults()
     )
@@ -311,7 +311,7 @@ def test_a_lost_write_is_seen_and_the_way_goes_on(world):
 
 
 @pytest.mark.parametrize(
-    ("given", "told"),
+    ("given", "reported"),
     [
         ({"address": 0x70}, "0x70 is reserved"),
         ({"further_addresses": (0x40,)}, "two boards have the same address"),
@@ -319,17 +319,17 @@ def test_a_lost_write_is_seen_and_the_way_goes_on(world):
         ({"frequency_hz": 330.0, "max_pulse_us": 2900.0}, "lower frequency_hz"),
     ],
 )
-def test_params_that_cannot_be_are_refused(given, told):
-    with pytest.raises(ValueError, match=told):
+def test_params_that_cannot_be_are_refused(given, reported):
+    with pytest.raises(ValueError, match=reported):
         Pca9685Params(**given)
 
 
 def test_channels_and_pulses_outside_the_board_are_refused(world):
-    for wrong, told in (
+    for wrong, reported in (
         (setup(16), "the board has channels 0 to 15"),
         (setup(0, min_steps=1000), "within 500..2500 us"),
     ):
-        with pytest.raises(ValueError, match=told):
+        with pytest.raises(ValueError, match=reported):
             Pca9685Bus(world.port, [wrong], QUICK)
     with pytest.raises(ValueError, match="each can move one servo only"):
         Pca9685Bus(world.port, [setup(0), setup(0)], QUICK)

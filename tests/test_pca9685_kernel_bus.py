@@ -80,15 +80,15 @@ def test_an_adapter_that_goes_comes_back_and_holds(world, kernel):
     kernel.refuses = None
     readings = ticks(world, bus, 1.0, [6500] * 3)
     assert all(r is not None and r.torque for r in readings)
-    told = " ".join(bus.events())
-    assert "port lost: /dev/i2c-7 is gone" in told and "port back after" in told
+    reported = " ".join(bus.events())
+    assert "port lost: /dev/i2c-7 is gone" in reported and "port back after" in reported
     kernel.bus.gone, kernel.refuses = True, errno.ENOENT
     with pytest.raises(BusLost, match="has been gone for 2"):
         ticks(world, bus, 3.0)
 
 
 @pytest.mark.parametrize(
-    ("code", "told"),
+    ("code", "reported"),
     [
         (errno.ENOENT, "no I2C bus /dev/i2c-7: switch I2C on"),
         (errno.EACCES, "'sudo usermod -aG i2c [$]USER'"),
@@ -96,9 +96,9 @@ def test_an_adapter_that_goes_comes_back_and_holds(world, kernel):
         (errno.ENOTTY, "is no I2C bus"),
     ],
 )
-def test_a_bus_that_cannot_be_opened_is_named_with_its_cure(kernel, code, told):
+def test_a_bus_that_cannot_be_opened_is_named_with_its_cure(kernel, code, reported):
     kernel.refuses = code
-    with pytest.raises(PortError, match=told) as caught:
+    with pytest.raises(PortError, match=reported) as caught:
         kernel.servos.open()
     assert "\n" not in str(caught.value)
 

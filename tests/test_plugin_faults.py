@@ -72,13 +72,13 @@ NONSENSE = [
 ]
 
 
-@pytest.mark.parametrize(("answer", "told"), NONSENSE)
-def test_a_rule_that_fails_is_dropped_with_one_line_and_the_rig_chooses(answer, told):
+@pytest.mark.parametrize(("answer", "reported"), NONSENSE)
+def test_a_rule_that_fails_is_dropped_with_one_line_and_the_rig_chooses(answer, reported):
     chooser, said = guarded(answer)
     for k in range(3):
         assert chooser.choose(None, None, 0.01 * k).p_world_m == OWN.p_world_m
     (line,) = said
-    assert line.startswith(LABEL) and told in line and "\n" not in line
+    assert line.startswith(LABEL) and reported in line and "\n" not in line
     assert line.endswith(": dropped, the rig's own attention chooses")
 
 
@@ -167,8 +167,8 @@ def test_a_whole_rig_runs_on_without_a_rule_and_nan_reaches_no_joint(tmp_path, n
             assert np.isfinite(tick.desired_rad).all()
         made.robot.stop()
         made.close()
-    told = [line for line in events if "odd 1.2" in line]
-    assert len(told) == (name != "point"), told
+    reported = [line for line in events if "odd 1.2" in line]
+    assert len(reported) == (name != "point"), reported
     assert ("point" in kinds) == (name == "point")
 
 
@@ -206,7 +206,7 @@ FACE: Any = DetectedFace((1.0, 2.0, 30.0, 40.0), np.ones((5, 2)), 0.9)
 
 
 @pytest.mark.parametrize(
-    ("answer", "told"),
+    ("answer", "reported"),
     [
         (7, "returned a int, wanted Detections or None"),
         (RuntimeError("cable"), "failed (RuntimeError: cable)"),
@@ -223,14 +223,14 @@ FACE: Any = DetectedFace((1.0, 2.0, 30.0, 40.0), np.ones((5, 2)), 0.9)
         (replace(SEEN, blobs=("x",)), "a thing 'x'"),
     ],
 )
-def test_a_camera_that_fails_leaves_the_rig_without_frames(answer, told):
+def test_a_camera_that_fails_leaves_the_rig_without_frames(answer, reported):
     camera = GuardedCamera(Camera(SEEN, answer, SEEN), "camera 'fish' of fish 2", None)
     camera.open()
     assert camera.latest(1.0) is SEEN
     assert camera.latest(1.1) is None
     assert camera.latest(1.2) is None
     (line,) = camera.events()
-    assert line.startswith("camera 'fish' of fish 2 ") and told in line
+    assert line.startswith("camera 'fish' of fish 2 ") and reported in line
     assert line.endswith(": the rig runs on without frames")
     camera.close()
     camera.close()
@@ -253,7 +253,7 @@ def test_a_camera_that_blocks_keeps_its_last_frame_and_is_reported_once():
 
 def test_a_camera_that_cannot_be_opened_refuses_the_start():
     camera: Any = Camera()
-    for error, kind, told in (
+    for error, kind, reported in (
         (CameraError("no such camera: plug it in"), CameraError, "^no such camera: plug it in$"),
         (OSError("bus\nerror"), PluginError, "^fish cannot be opened: OSError: bus error$"),
     ):
@@ -262,12 +262,12 @@ def test_a_camera_that_cannot_be_opened_refuses_the_start():
             raise error
 
         camera.open = fails
-        with pytest.raises(kind, match=told):
+        with pytest.raises(kind, match=reported):
             GuardedCamera(camera, "fish", None).open()
 
 
 @pytest.mark.parametrize(
-    ("answer", "told"),
+    ("answer", "reported"),
     [
         (7, "returned a int, wanted a Shot"),
         (SHOT(nan, 1, np.zeros((4, 4, 3), np.uint8)), "a frame of the time nan"),
@@ -277,7 +277,7 @@ def test_a_camera_that_cannot_be_opened_refuses_the_start():
         (RuntimeError("cable"), "failed (RuntimeError: cable)"),
     ],
 )
-def test_a_source_that_returns_nonsense_is_named(answer, told):
+def test_a_source_that_returns_nonsense_is_named(answer, reported):
     def take(now_s, stop):
         if isinstance(answer, Exception):
             raise answer
@@ -286,14 +286,16 @@ def test_a_source_that_returns_nonsense_is_named(answer, told):
     source = CheckedSource(SimpleNamespace(take=take), "camera 'fish' of fish 2")
     with pytest.raises(CameraError) as caught:
         source.take(lambda: 1.0, threading.Event())
-    assert str(caught.value).startswith("camera 'fish' of fish 2 ") and told in str(caught.value)
+    assert str(caught.value).startswith("camera 'fish' of fish 2 ") and reported in str(
+        caught.value
+    )
 
 
 # --- a detector
 
 
 @pytest.mark.parametrize(
-    ("answer", "told"),
+    ("answer", "reported"),
     [
         (lambda image: 7, "failed (TypeError"),
         (lambda image: [1], "returned a int as a face"),
@@ -301,13 +303,13 @@ def test_a_source_that_returns_nonsense_is_named(answer, told):
         (raising, "failed (KeyError"),
     ],
 )
-def test_a_detector_that_fails_is_replaced_by_ours(answer, told):
+def test_a_detector_that_fails_is_replaced_by_ours(answer, reported):
     ours = SimpleNamespace(find=lambda image: (FACE,))
     detector = CheckedDetector(SimpleNamespace(find=answer), "detector 'd' of d 1", lambda: ours)
     assert detector.find(NO_IMAGE) == (FACE,)
     assert detector.find(NO_IMAGE) == (FACE,)
     (line,) = detector.events()
-    assert line.startswith("detector 'd' of d 1 ") and told in line
+    assert line.startswith("detector 'd' of d 1 ") and reported in line
     assert line.endswith(": dropped, mtcnn finds the faces")
 
 
@@ -326,7 +328,7 @@ def checked(**methods):
 
 
 @pytest.mark.parametrize(
-    ("answer", "told"),
+    ("answer", "reported"),
     [
         (lambda now_s: None, "read returned a NoneType, wanted Feedback"),
         (lambda now_s: (1, 2, 3), "read returned a tuple, wanted Feedback"),
@@ -338,10 +340,10 @@ def checked(**methods):
         (raising, "read failed (KeyError"),
     ],
 )
-def test_a_bus_that_reads_nonsense_ends_the_run_with_its_name(answer, told):
+def test_a_bus_that_reads_nonsense_ends_the_run_with_its_name(answer, reported):
     with pytest.raises(BusLost) as caught:
         checked(read=answer).read(1.0)
-    assert str(caught.value).startswith("bus 'b' of b 1: ") and told in str(caught.value)
+    assert str(caught.value).startswith("bus 'b' of b 1: ") and reported in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
@@ -350,11 +352,11 @@ def test_a_bus_that_reads_nonsense_ends_the_run_with_its_name(answer, told):
 def test_a_servo_without_a_finite_reading_counts_as_missing(column, value):
     bus = checked(read=lambda now_s: GOOD._replace(**{column: (1.0, value)}))
     for k in range(5):
-        told = bus.read(1.0 + 0.01 * k)
-        assert told.missing == (1,) and told.position_steps[0] == (
+        reported = bus.read(1.0 + 0.01 * k)
+        assert reported.missing == (1,) and reported.position_steps[0] == (
             1.0 if "pos" in column else 500.0
         )
-        assert not told.torque[1]
+        assert not reported.torque[1]
     assert bus.events() == (
         "bus 'b' of b 1: no finite position, speed, load or time of jaw (servo 2): taken as missing",
     )

@@ -146,7 +146,7 @@ def test_a_name_that_is_taken_is_named_with_both_packages(folder):
 
 
 @pytest.mark.parametrize(
-    ("source", "told"),
+    ("source", "reported"),
     [
         (
             "import nowhere_to_be_found",
@@ -158,11 +158,13 @@ def test_a_name_that_is_taken_is_named_with_both_packages(folder):
         ("def x(:", "SyntaxError: invalid syntax"),
     ],
 )
-def test_a_package_that_cannot_be_imported_is_one_line_at_its_key(folder, tmp_path, source, told):
+def test_a_package_that_cannot_be_imported_is_one_line_at_its_key(
+    folder, tmp_path, source, reported
+):
     install(folder, "bad-rule", {ATTENTION: {"bad": "broken:PLUGIN"}}, {"broken": source})
     line = fault(with_chooser(tmp_path, "bad"))
     assert "mine.yaml:" in line and "gaze.chooser" in line
-    assert f"attention 'bad' of bad-rule 1.2 cannot be loaded: {told}" in line
+    assert f"attention 'bad' of bad-rule 1.2 cannot be loaded: {reported}" in line
 
 
 def test_something_else_than_a_part_is_refused(folder, tmp_path):
@@ -181,13 +183,13 @@ def test_a_section_is_checked_like_ours(folder, tmp_path):
     assert rig.gaze.tallest.height_m == 1.8 and issubclass(type(rig), Rig)
     plain: Any = load_rig(with_chooser(tmp_path, "tallest"))
     assert plain.gaze.tallest.height_m == 1.0
-    for section, told in (
+    for section, reported in (
         ("    height_m: 8.0\n", "gaze.tallest.height_m: 8.0 is above 3 (unit m)"),
         ("    heigth_m: 1.0\n", "unknown key 'heigth_m'; did you mean 'height_m'?"),
         ("    height_m: tall\n", "'tall' is text, wanted a number, 0 to 3 m"),
     ):
         line = fault(with_chooser(tmp_path, "tallest", f"  tallest:\n{section}"))
-        assert told in line, line
+        assert reported in line, line
         assert "mine.yaml:" in line
 
 

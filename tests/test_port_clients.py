@@ -26,8 +26,8 @@ PING = bytes.fromhex("FFFFFD0001030001194E")
 PONG = 14
 
 
-def answers(fd, expected, patience_s=5.0):
-    got, deadline = b"", time.monotonic() + patience_s
+def answers(fd, expected, timeout_s=5.0):
+    got, deadline = b"", time.monotonic() + timeout_s
     while len(got) < expected and time.monotonic() < deadline:
         try:
             got += os.read(fd, 4096)

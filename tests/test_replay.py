@@ -177,9 +177,9 @@ def test_every_eye_movement_is_told_once_as_it_plays(frames: SnapshotIndex) -> N
     replay = Replay(frames, time_)
     replay.ask({"play": True})
     shown(replay, screen, time_, SECONDS + 3.0)
-    told = events_of(screen)
-    assert len(told) > 20 and len(told) == len(set(told))
-    assert told == [e for n in range(len(frames)) for e in unpack(frames.message(n)).events]
+    reported = events_of(screen)
+    assert len(reported) > 20 and len(reported) == len(set(reported))
+    assert reported == [e for n in range(len(frames)) for e in unpack(frames.message(n)).events]
 
 
 def test_after_a_leap_the_page_is_told_what_led_there(
@@ -193,13 +193,13 @@ def test_after_a_leap_the_page_is_told_what_led_there(
         screen.messages.clear()
         replay.ask({"seek_s": place_s})
         shown(replay, screen, time_, 2.0)
-        told = events_of(screen)
-        since_s = before if place_s > before else -1.0  # backwards the page begins anew
+        reported = events_of(screen)
+        since_s = before if place_s > before else -1.0  # backwards the page starts again
         wanted = [
             e for n in range(len(frames)) for e in unpack(frames.message(n)).events
             if frames.at(since_s) * (since_s > 0.0) < n <= frames.at(place_s)
         ]  # fmt: skip
-        assert told == wanted and len(told) > 5
+        assert reported == wanted and len(reported) > 5
         (trail,) = [t for m in screen.messages if m[:1] == SNAPSHOT if (t := unpack(m).trail)]
         at_s = [row.t_s - ticks[0].t_s for row in trail]
         assert at_s == sorted(at_s) and at_s[-1] == pytest.approx(place_s, abs=0.021)

@@ -84,8 +84,8 @@ def test_a_replay_serves_a_page_and_ends(recorded: Path) -> None:
 def test_a_rerun_says_that_all_is_the_same(recorded: Path) -> None:
     code, words = said("replay", recorded, "--rerun")
     assert code == 0 and "joints recorded: " in words and "run again" in words
-    told = re.search(r"(\d+) of (\d+) ticks are the same to the bit", words)
-    assert told is not None and told[1] == told[2] and int(told[1]) > 350
+    reported = re.search(r"(\d+) of (\d+) ticks are the same to the bit", words)
+    assert reported is not None and reported[1] == reported[2] and int(reported[1]) > 350
 
 
 def test_a_rerun_with_another_character_shows_both(recorded: Path) -> None:

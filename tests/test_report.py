@@ -212,12 +212,12 @@ def test_a_walk_drawn_from_the_matrix_passes_and_its_reverse_does_not() -> None:
 
 @pytest.mark.slow
 def test_the_whole_report_is_written(walking: GazeTrace, tmp_path: Path) -> None:
-    told: list[tuple[str, float]] = []
+    reported: list[tuple[str, float]] = []
     about = RunHeader(
         "a <run>", (("rig", "desk"),), frozenset({"saccade min_jerk"}), warnings=("cut & short",)
     )
     out = tmp_path / "deep" / "report.html"
-    made = report_of(walking, about, out, lambda words, share: told.append((words, share)))
+    made = report_of(walking, about, out, lambda words, share: reported.append((words, share)))
     raw = out.read_text(encoding="utf-8")
     page = unescape(raw)
     assert "a &lt;run&gt;" in raw and "cut &amp; short" in raw
@@ -231,8 +231,8 @@ def test_the_whole_report_is_written(walking: GazeTrace, tmp_path: Path) -> None
     assert {row["key"] for row in numbers} == {f.band.key for f in made.findings}
     for finding in made.findings:
         assert finding.band.title in page and band_text(finding.band) in page
-    assert told[-1] == (build.DRAWING, 1.0)
-    assert [share for _, share in told] == sorted(share for _, share in told)
+    assert reported[-1] == (build.DRAWING, 1.0)
+    assert [share for _, share in reported] == sorted(share for _, share in reported)
 
 
 HOSTILE = "<img src=x onerror=alert(1)> $\\frac{$"

@@ -14,7 +14,7 @@ DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
 
 
 def rig_at(file: Path, rate_hz: float, give_up_s: float = 60.0) -> str:
-    """Write the desk rig with another rate and another patience with its bus."""
+    """Write the desk rig with another rate and another time-out of its bus."""
     desk = DESK.read_text(encoding="utf-8")
     # The servo bus comes first in the file; a camera has the same key.
     assert desk.index("give_up_s: 60.0") < desk.index("geometry:")

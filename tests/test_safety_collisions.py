@@ -219,8 +219,8 @@ def test_a_rearmed_joint_inside_a_box_is_led_out() -> None:
         world.tick(left_upper_lid=20.0)
     world.t_s += DT
     at = (*world.path[-1][:PITCH], radians(-24.0), *world.path[-1][PITCH + 1 :])
-    anew = tuple(k == PITCH for k in range(9))
-    joints = JointState(at, (0.0,) * 9, (world.t_s,) * 9, (), rearmed=anew)
+    again = tuple(k == PITCH for k in range(9))
+    joints = JointState(at, (0.0,) * 9, (world.t_s,) * 9, (), rearmed=again)
     verdict = world.guard.check((0.0,) * 9, joints, 0.0, world.t_s)
     assert verdict.applied("neck_pitch").reason == "self-collision"
     world.path.append(verdict.command_rad)

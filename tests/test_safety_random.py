@@ -66,10 +66,10 @@ class Trial:
         self.t_s += dt_s
         verdict = self.guard.check(desired, joints, age_s, self.t_s)
         if True in joints.rearmed:
-            anew = np.array(joints.rearmed) & np.isfinite(joints.position_rad)
+            again = np.array(joints.rearmed) & np.isfinite(joints.position_rad)
             clipped = np.clip(joints.position_rad, self.low, self.high)
-            self.p = tuple(np.where(anew, clipped, self.p).tolist())
-            self.v = tuple(np.where(anew, 0.0, self.v).tolist())
+            self.p = tuple(np.where(again, clipped, self.p).tolist())
+            self.v = tuple(np.where(again, 0.0, self.v).tolist())
         self.begin_p.append(self.p)
         self.begin_v.append(self.v)
         self.dt_s.append(dt_s)
@@ -132,7 +132,7 @@ def sequence(trial: Trial, rng: np.random.Generator) -> None:
     wishes[odd] = rng.choice(ODD, int(odd.sum()))
     ticks = rng.uniform(0.001, 0.1, n) if rng.random() < 0.3 else np.full(n, rng.choice(TICKS))
     rare = rng.choice([0.0, 0.0, 0.0, 0.01, 0.2])
-    off, faulty, anew, old = rng.random((4, n, 9)) < rare
+    off, faulty, again, old = rng.random((4, n, 9)) < rare
     stray = rng.random((n, 9)) < rng.choice([0.0, 0.0, 0.1, 1.0])
     strays = middle + reach * rng.normal(0.0, 0.5, (n, 9))
     strays[rng.random((n, 9)) < 0.02 * rare] = nan
@@ -142,19 +142,19 @@ def sequence(trial: Trial, rng: np.random.Generator) -> None:
     heat = limits[:, 4] + np.where(rng.random(9) < rare, rng.uniform(-20, 2, 9), -30.0)
     volts = np.where(rng.random((n, 9)) < rare, rng.uniform(3, 17, (n, 9)), limits[:, 5] + 1.0)
     unseen = rng.random(n) < rare
-    instead = stray | anew | jam
+    instead = stray | again | jam
     places = np.where(jam, jammed_at, strays)
     words = np.where(faulty, "overload", "")
     ages = np.where(old, 1.0, 0.0)
-    rows = (wishes, instead, places, ages, ~off, words, load, np.tile(heat, (n, 1)), volts, anew)
-    for k, (desired, other, place, age, *told, rearmed) in enumerate(
+    rows = (wishes, instead, places, ages, ~off, words, load, np.tile(heat, (n, 1)), volts, again)
+    for k, (desired, other, place, age, *reported, rearmed) in enumerate(
         zip(*[[tuple(row) for row in column.tolist()] for column in rows], strict=True)
     ):
         tick = float(ticks[k])
         t_s = trial.t_s + tick
         at = tuple([b if o else a for a, b, o in zip(trial.p, place, other, strict=True)])
         since = tuple([t_s - one for one in age])
-        columns: Any = (at, (0.0,) * 9, since, (), *told, rearmed)
+        columns: Any = (at, (0.0,) * 9, since, (), *reported, rearmed)
         joints = JointState(*columns)
         trial.tick(desired, joints, inf if unseen[k] else 0.0, tick)
 

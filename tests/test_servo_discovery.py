@@ -190,12 +190,12 @@ def test_latched_errors_and_stuffed_answers_are_heard():
 
 def test_ids_are_asked_one_by_one_where_a_ping_to_all_tells_nothing():
     bench, asked = Bench(FEETECH, 500_000, 1, 7), []
-    told: dict[str, Any] = {"progress": lambda baud, servo_id: asked.append((baud, servo_id))}
-    list(scan(bench.port, FEETECH, thorough=True, **told))
+    reported: dict[str, Any] = {"progress": lambda baud, servo_id: asked.append((baud, servo_id))}
+    list(scan(bench.port, FEETECH, thorough=True, **reported))
     assert len(asked) == 8 * 254
     asked.clear()
     # Unless thorough only where a servo answers at all.
-    list(scan(bench.port, FEETECH, **told))
+    list(scan(bench.port, FEETECH, **reported))
     assert asked == [(500_000, servo_id) for servo_id in range(254)]
     assert FEETECH.version(353) == "3.53"
 

@@ -39,7 +39,7 @@ class Bench:
         specs = specs or (ServoSpec(1, self.model, 2000),)
         self.chain = build(specs, lambda: self.now, baud=self.baud)
         self.port = InProcessPort(self.chain)
-        self.told = []
+        self.reported = []
 
     def sleep_until(self, t_s):
         self.now = max(self.now, t_s)
@@ -47,11 +47,11 @@ class Bench:
 
     def find(self):
         order = search_order(self.kind, BAUD)
-        return find_alone(self.port, self.kind, order, self.told.append)
+        return find_alone(self.port, self.kind, order, self.reported.append)
 
     def assign(self, setup=None, baud=BAUD):
         found = self.find()
-        return assign(self.port, self.kind, found, setup or self.yaw, baud, self.told.append)
+        return assign(self.port, self.kind, found, setup or self.yaw, baud, self.reported.append)
 
     def restart(self, servo_id=1, sleep_until=None):
         sleep_until = sleep_until or self.sleep_until

@@ -151,13 +151,13 @@ def test_signs_units_and_both_error_bytes():
     assert sample.torque is None
     armed = ARMED.sample(0, bytes((1, 50)) + bytes(6) + struct.pack("<H", 400) + bytes(6) + BLOCK)
     assert (armed.torque, armed.acceleration, armed.torque_limit) == (1, 50, 400)
-    told: dict[str, Any] = {
+    reported: dict[str, Any] = {
         "torque": None,
         "acceleration": None,
         "torque_limit": None,
         "error": 0x01,
     }
-    assert armed._replace(**told) == sample
+    assert armed._replace(**reported) == sample
 
 
 @pytest.mark.parametrize("address", [*range(30, 41), *range(51, 57)])
@@ -253,9 +253,9 @@ def test_the_same_of_servos_that_speak_with_a_crc():
     raw = b"".join(status(i, 0, struct.pack("<hii", -147, -3, 906)) for i in (2, 5))
     columns = [columns_of(DYNAMIXEL, "xl330-m077", 2, 5) for _ in range(2)]
     assert both_ways(group, raw, *columns)
-    told = columns[0].now
-    assert told == columns[1].now
-    assert told.load == pytest.approx((-0.1, -0.1)) and told.velocity_steps_s[0] < 0.0
+    reported = columns[0].now
+    assert reported == columns[1].now
+    assert reported.load == pytest.approx((-0.1, -0.1)) and reported.velocity_steps_s[0] < 0.0
 
 
 @pytest.mark.parametrize(

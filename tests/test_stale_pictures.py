@@ -60,7 +60,7 @@ class Unplugged:
 
     camera: Camera
     newest: Detections | None = None
-    told: list[str] = field(default_factory=list)
+    reported: list[str] = field(default_factory=list)
     now_s: float = 0.0
 
     def open(self) -> None:
@@ -75,8 +75,8 @@ class Unplugged:
 
     def events(self) -> tuple[str, ...]:
         for at_s, line in ((GONE_S, LOST), (BACK_S, FOUND)):
-            if self.now_s >= at_s and line not in self.told:
-                self.told.append(line)
+            if self.now_s >= at_s and line not in self.reported:
+                self.reported.append(line)
                 return (line,)
         return ()
 
@@ -212,10 +212,10 @@ def test_losing_the_camera_and_having_it_back_is_told_once(
     run_of_passer: tuple[Rig, list[Tick]],
 ) -> None:
     _, ticks = run_of_passer
-    told = [(tick.t_s, line) for tick in ticks for line in tick.events if "camera" in line]
-    assert [line for _, line in told] == [LOST, FOUND]
-    assert told[0][0] == pytest.approx(GONE_S, abs=0.02)
-    assert told[1][0] == pytest.approx(BACK_S, abs=0.02)
+    reported = [(tick.t_s, line) for tick in ticks for line in tick.events if "camera" in line]
+    assert [line for _, line in reported] == [LOST, FOUND]
+    assert reported[0][0] == pytest.approx(GONE_S, abs=0.02)
+    assert reported[1][0] == pytest.approx(BACK_S, abs=0.02)
 
 
 def test_it_goes_on_with_the_first_new_pictures(

@@ -37,7 +37,7 @@ def test_what_could_not_be_released_is_when_the_port_is_back(twin: BusBench) -> 
     twin.command("unplug")
     with pytest.raises(BusLost):
         bus.disable_torque()
-    for _ in range(300):  # longer than its patience
+    for _ in range(300):  # longer than its time-out
         twin.wait(0.01)
         try:
             bus.read(twin.now_s())
@@ -152,7 +152,7 @@ def test_a_stop_while_unplugged_is_carried_out_at_once_when_it_is_back(machine: 
     held = machine.holding()
     machine.command("unplug")
     machine.made.robot.command(Stop("a hand", "the space bar"))
-    ticks = machine.go(7.0)  # longer than the bus's patience
+    ticks = machine.go(7.0)  # longer than the bus's time-out
     assert machine.ended == "seconds" and ticks[-1].stopped == "a hand"
     assert machine.said("the stop is remembered, torque is NOT YET off")
     assert any(machine.holding())

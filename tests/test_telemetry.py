@@ -139,9 +139,9 @@ def test_a_silent_servo_is_none_and_counted(kind: str) -> None:
     sample = bench.monitor.sample()
     assert sample.servos["neck_yaw"] is None and sample.servos["left_eye_pan"] is not None
     assert (sample.asked, sample.unanswered) == (2 * len(bench.rig.names), 2)
-    told = json.loads(json.dumps(as_json(sample, 0.0)))
-    assert told["joints"]["neck_yaw"] is None and told["unanswered"] == 2
-    assert told["joints"]["left_eye_pan"]["position_steps"] == 2100
+    reported = json.loads(json.dumps(as_json(sample, 0.0)))
+    assert reported["joints"]["neck_yaw"] is None and reported["unanswered"] == 2
+    assert reported["joints"]["left_eye_pan"]["position_steps"] == 2100
     bench.command("clear")
     assert bench.monitor.sample().servos["neck_yaw"] is not None
 
@@ -215,10 +215,10 @@ def test_a_rig_of_three_kinds_is_one_sample(tmp_path: Path) -> None:
     rig = mixed_rig(tmp_path)
     bench = Bench(rig)
     bench.command("lose 1", "tilt")
-    told = json.loads(json.dumps(as_json(bench.monitor.sample(), 0.0)))
-    assert set(told["joints"]) == set(rig.names)
-    assert told["joints"]["neck_pitch"] is None and told["unanswered"] == 1
-    pan, yaw = told["joints"]["eyes_pan"], told["joints"]["neck_yaw"]
+    reported = json.loads(json.dumps(as_json(bench.monitor.sample(), 0.0)))
+    assert set(reported["joints"]) == set(rig.names)
+    assert reported["joints"]["neck_pitch"] is None and reported["unanswered"] == 1
+    pan, yaw = reported["joints"]["eyes_pan"], reported["joints"]["neck_yaw"]
     assert pan["measured"] is False and pan["pulse_us"] == 0.0 and pan["load"] is None
     assert yaw["measured"] is True and "pulse_us" not in yaw
     start = bench.lines["neck"].servos[0].start_steps

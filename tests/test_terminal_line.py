@@ -89,7 +89,7 @@ def test_a_late_answer_comes_when_it_is_due(bench):
     one = bench()
     one.line.obey("delay 1 30")
     one.send(PING)
-    assert one.line.patience_s() == pytest.approx(0.03, abs=2e-4)
+    assert one.line.wait_s() == pytest.approx(0.03, abs=2e-4)
     one.now_s += 0.02
     one.serve()
     assert one.heard() == b""
@@ -121,9 +121,9 @@ def test_without_a_link_the_new_path_is_told_with_the_name(bench):
     one.line.obey("plug")
     for fd in keep:
         os.close(fd)
-    told = [json.loads(line) for line in one.said]
-    assert told == [{"bus": "eyes", "path": one.line.terminal.path}]
-    assert told[0]["path"] != before["path"]
+    reported = [json.loads(line) for line in one.said]
+    assert reported == [{"bus": "eyes", "path": one.line.terminal.path}]
+    assert reported[0]["path"] != before["path"]
 
 
 def test_answers_to_commands_carry_the_name(bench):

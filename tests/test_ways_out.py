@@ -220,7 +220,7 @@ def test_a_reader_that_is_gone_is_told_apart_from_a_full_disk() -> None:
     os.close(reads)
     writer = LineWriter(writes)
     writer.line("a\n")
-    assert writer.flush(20.0) and "nobody reads" in (writer.unread() or "") and writer.dropped == 1
+    assert writer.flush(20.0) and "closed it" in (writer.unread() or "") and writer.dropped == 1
     quiet_reads, quiet_writes = os.pipe()
     quiet = LineWriter(quiet_writes)
     quiet.line("a\n")

@@ -180,7 +180,7 @@ def run(device, stated_hz: float, gives_hz: float, away_s: float, count: int = 6
     capture = Capture()
     capture.stated_hz = stated_hz
     camera = opened(device, capture)
-    told: list[Any] = []
+    reported: list[Any] = []
     clock, picture = [100.0], [0]
 
     def grab() -> bool:
@@ -192,15 +192,15 @@ def run(device, stated_hz: float, gives_hz: float, away_s: float, count: int = 6
     capture.grab = grab  # type: ignore[method-assign]
     for _ in range(count):
         camera.take(lambda: clock[0], GO_ON)
-        told += camera.events()
+        reported += camera.events()
         clock[0] += away_s
-    return told
+    return reported
 
 
 def test_camera_that_lies_about_its_rate_is_noticed_once(device):
-    (told,) = run(device, 30.0, 15.0, away_s=0.008)
-    assert "states 30 frames a second and gives 15.0" in told
-    assert str(device) in told
+    (reported,) = run(device, 30.0, 15.0, away_s=0.008)
+    assert "states 30 frames a second and gives 15.0" in reported
+    assert str(device) in reported
 
 
 @pytest.mark.parametrize("gives_hz", [30.0, 27.0, 33.0])

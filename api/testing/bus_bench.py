@@ -229,16 +229,16 @@ class BusBench:
         bus: ServoBus,
         done: Callable[[tuple[Row | None, ...]], bool],
         goals: Sequence[float] | None = None,
-        patience_s: float = 8.0,
+        timeout_s: float = 8.0,
     ) -> tuple[Row | None, ...]:
         """Tick until something is so; gives the readings then."""
-        end_s = self.now_s() + patience_s
+        end_s = self.now_s() + timeout_s
         while self.now_s() < end_s:
             readings = self.run(bus, 0.0, goals)
             if done(readings):
                 return readings
             self.wait(TICK_S)
-        raise AssertionError(f"not in {patience_s} s: {readings}, {bus.faults()}, {bus.events()}")
+        raise AssertionError(f"not in {timeout_s} s: {readings}, {bus.faults()}, {bus.events()}")
 
     def near(self, shares: Sequence[float], goals: Sequence[float]) -> bool:
         """Return whether all are where they should be."""

@@ -124,7 +124,7 @@ class BusSuite(BusBenches):
 
     def test_goals_are_followed_and_told(self, twin, held):
         readings = twin.until(
-            held, lambda r: twin.near(twin.seen(r), twin.away()), twin.away(), patience_s=5.0
+            held, lambda r: twin.near(twin.seen(r), twin.away()), twin.away(), timeout_s=5.0
         )
         twin.run(held, 0.3, twin.away())
         assert twin.near(twin.truth(), twin.away())
@@ -133,7 +133,7 @@ class BusSuite(BusBenches):
     def test_goals_are_clipped_to_the_limits(self, here, held_here):
         ends = [(-40.0, 60.0, -1e-3, 1.001)[place % 4] for place in range(here.count)]
         inside = [min(1.0, max(0.0, end)) for end in ends]
-        here.until(held_here, lambda r: here.near(here.seen(r), inside), ends, patience_s=5.0)
+        here.until(held_here, lambda r: here.near(here.seen(r), inside), ends, timeout_s=5.0)
         here.run(held_here, 0.3, ends)
         assert here.near(here.truth(), inside)
         for place, (goal, wanted) in enumerate(zip(here.goals(), here.steps(inside), strict=True)):

@@ -23,7 +23,7 @@ class FrameRateMonitor:
         self._stated_hz = stated_hz if isfinite(stated_hz) and stated_hz > 0.0 else 0.0
         self._intervals_s: deque[float] = deque(maxlen=_WINDOW)
         self._before_s: float | None = None
-        self._told = False
+        self._reported = False
 
     @property
     def measured_hz(self) -> float | None:
@@ -48,9 +48,9 @@ class FrameRateMonitor:
         if rate_hz is None or self._stated_hz == 0.0:
             return ""
         lies = abs(rate_hz / self._stated_hz - 1.0) > _TOLERANCE
-        if lies == self._told:
+        if lies == self._reported:
             return ""
-        self._told = lies
+        self._reported = lies
         if not lies:
             return f"{self._name} gives {rate_hz:.1f} frames a second again, as it states"
         return (

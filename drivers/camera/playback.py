@@ -23,7 +23,7 @@ class CameraReplay:
         self._recording: Recording | None = None
         self._times = VideoTimestamps(1.0)
         self._pace = VideoPacing()
-        self._untold = ""
+        self._unreported = ""
 
     def open(self) -> None:
         """Open the file, or open it again at film time 0.
@@ -37,7 +37,7 @@ class CameraReplay:
         steps = [b - a for a, b in zip(starts, starts[1:], strict=False)]
         length_s = starts[-1] + (median(steps) if steps else _ALONE_S)
         self._times = VideoTimestamps(len(starts) / length_s, starts, length_s)
-        self._pace, self._untold = VideoPacing(), self._recording.note
+        self._pace, self._unreported = VideoPacing(), self._recording.note
 
     @property
     def length_s(self) -> float:
@@ -72,8 +72,8 @@ class CameraReplay:
 
     def events(self) -> tuple[str, ...]:
         """Return what is wrong with the file, one line each, once."""
-        told, self._untold = self._untold, ""
-        return (told,) if told else ()
+        message, self._unreported = self._unreported, ""
+        return (message,) if message else ()
 
     def close(self) -> None:
         """Free the file; safe to call twice."""

@@ -147,10 +147,10 @@ class CameraProcess:
 
     def events(self) -> tuple[str, ...]:
         """Return what has happened since the last call, one line each."""
-        told = []
+        messages = []
         while self._events:
-            told.append(self._events.popleft())
-        return tuple(told)
+            messages.append(self._events.popleft())
+        return tuple(messages)
 
     def close(self) -> None:
         """End the process; safe to call twice."""
@@ -189,12 +189,12 @@ class CameraProcess:
             return _no_reply()
         return message if isinstance(message, SetupError) else None
 
-    def _end(self, patience_s: float) -> None:
+    def _end(self, timeout_s: float) -> None:
         """End the process, by force where it does not end in time; safe to call twice."""
         process, pipe = self._process, self._pipe
         if process is None or pipe is None:
             return
-        process.join(patience_s)
+        process.join(timeout_s)
         if process.is_alive():
             process.kill()
             process.join()

@@ -98,8 +98,8 @@ class CameraRecorder:
 
     def events(self) -> tuple[str, ...]:
         """Return new events of the source and of the recording, one line each."""
-        told, self._events = tuple(self._events), []
-        return (*self._source.events(), *told)
+        reported, self._events = tuple(self._events), []
+        return (*self._source.events(), *reported)
 
     def close(self) -> None:
         """Free the source; the file stays open for when it comes back."""

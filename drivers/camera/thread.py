@@ -82,10 +82,10 @@ class CameraThread:
 
     def events(self) -> tuple[str, ...]:
         """Return what happened since the last call, one line each."""
-        told = []
+        messages = []
         while self._events:
-            told.append(self._events.popleft())
-        return tuple(told)
+            messages.append(self._events.popleft())
+        return tuple(messages)
 
     def close(self) -> None:
         """Stop looking and free the source; safe to call twice."""

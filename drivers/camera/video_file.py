@@ -32,7 +32,7 @@ class VideoFile:
         self._path = Path(path).expanduser()
         self._reel: VideoReader | None = None
         self._pace = VideoPacing()
-        self._untold = ""
+        self._unreported = ""
 
     def open(self) -> None:
         """Open the file, or open it again at film time 0.
@@ -43,7 +43,7 @@ class VideoFile:
         self.close()
         self._reel = open_video(self._path)
         self._pace = VideoPacing()
-        self._untold = self._reel.times.note
+        self._unreported = self._reel.times.note
 
     @property
     def rate_hz(self) -> float:
@@ -102,8 +102,8 @@ class VideoFile:
 
     def events(self) -> tuple[str, ...]:
         """Return what had to be assumed about the file, one line each, once."""
-        told, self._untold = self._untold, ""
-        return (f"{self._path.name}: {told}",) if told else ()
+        message, self._unreported = self._unreported, ""
+        return (f"{self._path.name}: {message}",) if message else ()
 
     def close(self) -> None:
         """Free the file; safe to call twice."""

@@ -19,12 +19,12 @@ _MOST_FAILURES = 5
 # The kernel's stamp is believed if it is this young on the same clock.
 _OLDEST_STAMP_S = 1.0
 # OpenCV waits 10 s for a frame unless told otherwise; it reads this once.
-_PATIENCE = ("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "2")
+_SELECT_TIMEOUT = ("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "2")
 
 
 def open_v4l2(device: str) -> cv2.VideoCapture:
     """Open a device file by Video4Linux alone."""
-    os.environ.setdefault(*_PATIENCE)
+    os.environ.setdefault(*_SELECT_TIMEOUT)
     return cv2.VideoCapture(device, cv2.CAP_V4L2)
 
 
@@ -119,8 +119,8 @@ class Webcam:
 
     def events(self) -> tuple[str, ...]:
         """Return a line when the measured frame rate differs from the stated one."""
-        told, self._events = tuple(self._events), []
-        return told
+        messages, self._events = tuple(self._events), []
+        return messages
 
     def close(self) -> None:
         """Free the camera; safe to call twice."""

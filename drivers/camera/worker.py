@@ -88,7 +88,7 @@ def run(
         while (found := camera.next(stop)) is not None:
             pipe.send(_message(found, slots))
             _retune(camera, requests, pipe)
-    except OSError:  # nobody listens any more
+    except OSError:  # the parent has gone
         pass
     except Exception as failure:
         pipe.send(Ended(str(failed(failure)), isinstance(failure, CameraError)))
@@ -114,7 +114,7 @@ def _receive_requests(pipe: Connection, stop: threading.Event, requests: deque[R
         while isinstance(message := pipe.recv(), Retune):
             requests.append(message)
     stop.set()
-    # Whoever is blocked in a camera's driver would hold that camera for ever.
+    # A thread that is blocked in a camera's driver would hold that camera for ever.
     threading.Event().wait(LONGEST_END_S)
     os._exit(1)
 

@@ -112,7 +112,7 @@ DYNAMIXEL = Family(
     broadcast_ping=True,
     quiet_s=0.1,
     thorough_s=THOROUGH_S,
-    telling=("realtime_tick", "present_position"),
+    duplicate_id_registers=("realtime_tick", "present_position"),
     protocol_1=ask_protocol_1,
     arming=Arming("profile_velocity", speed=True),
     most_goals=253,

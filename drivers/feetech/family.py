@@ -156,7 +156,7 @@ FEETECH = Family(
     broadcast_ping=False,
     quiet_s=0.004,
     thorough_s=0.004,
-    telling=("present_position", "present_current"),
+    duplicate_id_registers=("present_position", "present_current"),
     protocol_1=None,
     arming=Arming("acceleration", speed=False),
     most_goals=MOST_GOALS,

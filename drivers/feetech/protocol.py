@@ -5,7 +5,7 @@ status       FF FF | id | length | error       | params | checksum
 length counts what follows it; checksum is the inverse of the sum from the id to the last
 param. A status looks like an instruction: an adapter that echoes what is sent gives back a
 ping that looks like its own answer, so nothing here trusts a status by its form alone, and
-whoever asks asks for a length that the question does not have.
+a read asks for a length that the question does not have.
 
 The checksum is one byte wide and a sum: a lost byte whose place the next header takes
 passes it now and then. Such a status overlaps the next one, so statuses that overlap are

@@ -77,8 +77,8 @@ def window(address: int) -> ReadWindow:
     pad = (ARMED_AT if armed else SENSED_AT) - address
     layout = f"{pad}x" + ("B15x" if armed else "") + "HHHBBxBx"
     fields = ("position", "velocity", "effort", "voltage", "temperature", "status")
-    told = ("torque", *fields) if armed else fields
-    return ReadWindow(address, _END - address, layout, told, ">", tuple(SIGN_BITS.items()))
+    columns = ("torque", *fields) if armed else fields
+    return ReadWindow(address, _END - address, layout, columns, ">", tuple(SIGN_BITS.items()))
 
 
 def read_plan(
@@ -113,6 +113,6 @@ FEETECH_SCS = replace(
     wanted=scs_settings,
     torque_faults=0x24,
     single_turn=False,
-    telling=("present_position", "moving"),
+    duplicate_id_registers=("present_position", "moving"),
     arming=Arming("acceleration", speed=False),
 )

@@ -44,7 +44,7 @@ class HobbyBoardBus(PortBus):
     """
 
     holding = "still gets pulses"
-    mute = "does not confirm that its pulses have stopped"
+    unconfirmed = "does not confirm that its pulses have stopped"
     _line: BoardLine
     _supervisor: BoardSupervisor
 
@@ -57,7 +57,7 @@ class HobbyBoardBus(PortBus):
             raise ValueError(f"channels {self._ids}: each can move one servo only")
         self._log = EventLog()
         self._nothing = Feedback.of_none(len(self._ids))
-        self._told = False
+        self._reported = False
         self._begin()
 
     def _begin(self) -> None:
@@ -152,8 +152,8 @@ class HobbyBoardBus(PortBus):
         """
         self._apply_wanted()
         try:
-            if not self._told:
-                self._told = True
+            if not self._reported:
+                self._reported = True
                 self._log.add(UNMEASURED)
             enable_channels(self._board, self._channels, self._log)
         except ServoMissing:
@@ -270,7 +270,7 @@ class HobbyBoardBus(PortBus):
     def _switch_off(self) -> ReleaseResult:
         released = switch_off(self._board, self._ids)
         for channel in self._channels:
-            if channel.id not in (*released.holding, *released.mute):
+            if channel.id not in (*released.holding, *released.unconfirmed):
                 channel.stop()
         return released
 

@@ -24,7 +24,7 @@ class Channel:
     entering: it is on its slow way into its limits
     rearmed: it was enabled again, not yet reported
     fault: why it stays without pulses; "" where nothing is wrong
-    told: whether it has been reported that it does not give the pulses it should
+    reported: whether it has been reported that it does not give the pulses it should
     sent_steps: the pulse that it was sent last, where the driver leads it
 
     Args:
@@ -70,7 +70,7 @@ class Channel:
             raise ValueError("a goal is not a number: every goal must be a whole number of steps")
         return low if steps < low else high
 
-    # --- what it is told
+    # --- commands
 
     @property
     def top_speed_steps_s(self) -> float:
@@ -124,7 +124,7 @@ class Channel:
         if self.on and self._at_s > -inf:
             spent_s = now_s - self._at_s
             if spent_s > self._longest_lead_s:
-                # Nobody has led it on: it stood, and begins from rest.
+                # It was not led on: it stood, and begins from rest.
                 self.ramp.move(self.ramp.pulse_steps, spent_s - self._longest_lead_s)
                 spent_s = self._longest_lead_s
             self.ramp.move(self._reached(self.goal_steps), spent_s)

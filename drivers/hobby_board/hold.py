@@ -15,7 +15,7 @@ class Outcome(Enum):
     """The result of enabling a channel: it is held, no answer, or it gives another pulse."""
 
     HELD = "held"
-    MUTE = "mute"
+    NO_ANSWER = "no answer"
     ELSEWHERE = "elsewhere"
 
 
@@ -30,12 +30,12 @@ def take(board: Board, channel: Channel, pulse_steps: int) -> Outcome:
     """
     goal = channel.start(pulse_steps, board.line.port.now_s())
     if not board.send_limits([channel], confirmed=True):
-        return Outcome.MUTE
+        return Outcome.NO_ANSWER
     board.send_goals([channel])
     found = board.pulses((channel.id,))
     channel.advance(board.line.port.now_s())
     if found is None:
-        return Outcome.MUTE
+        return Outcome.NO_ANSWER
     low, high = sorted((pulse_steps or goal, goal))
     # A first pulse is exact; another may have been on its way somewhere when it was asked.
     room = channel.room_steps() if pulse_steps else FINE_STEPS

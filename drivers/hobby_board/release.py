@@ -61,4 +61,4 @@ def stop_pulses(
     if not port.setBaudRate(baud):
         raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose 115200")
     released = switch_off(board, channels)
-    return (*released.holding, *released.mute)
+    return (*released.holding, *released.unconfirmed)

@@ -9,7 +9,7 @@ AGAIN_FIRST_S, AGAIN_LAST_S = 0.0625, 0.5
 """Time between questions to a board that stays silent: doubled from the first to the last."""
 
 IN_A_ROW = 3
-"""So many answers may stay out before it is asked less often: each costs a read its patience."""
+"""So many answers may stay out before it is asked less often: each costs a read its time-out."""
 
 OWED_S = 0.1
 """So long after the first answer, those that were owed have come."""
@@ -24,7 +24,7 @@ class SilenceMonitor:
     def __init__(self, log: EventLog, lateness: HostLateness) -> None:
         self._log, self._lateness = log, lateness
         self.missed = 0
-        self._told = False
+        self._reported = False
         self._spoilt = 0
         self._back_s: float | None = None
         self._since_s, self._due_s, self._wait_s = 0.0, -inf, AGAIN_FIRST_S
@@ -46,8 +46,8 @@ class SilenceMonitor:
             self._wait_s = min(AGAIN_LAST_S, 2.0 * self._wait_s)
         self._spoilt += heard_s >= now_s
         damaged = self._spoilt >= IN_A_ROW
-        if not self._told and now_s - self._since_s >= (SILENCE_S if damaged else BLAME_S):
-            self._told = True
+        if not self._reported and now_s - self._since_s >= (SILENCE_S if damaged else BLAME_S):
+            self._reported = True
             self._log.add(
                 "what the board answers arrives damaged: check cable, ground and baud rate"
                 if damaged
@@ -64,13 +64,13 @@ class SilenceMonitor:
         noise = self._spoilt >= IN_A_ROW
         if silent_s >= SILENCE_S and not noise and self._lateness.any_since(self._since_s):
             self._log.add(STOOD_STILL.format(silent_s))
-        elif self._told:
+        elif self._reported:
             self._log.add(f"the board answers again after {silent_s:.1f} s")
         elif silent_s >= SILENCE_S:
             self._log.add(
                 f"the board did not answer for {silent_s:.1f} s: check its power and the cable"
             )
-        self._told, self._back_s = False, None
+        self._reported, self._back_s = False, None
 
     def seconds(self, now_s: float) -> float:
         """Return how long no answer has come; 0 if the last one came."""

@@ -70,7 +70,7 @@ def _insist(board: Board, channel: Channel, pulse: int) -> None:
         if outcome is Outcome.ELSEWHERE and channel.on:
             break
     where = board.line.port.port_name
-    if outcome is Outcome.MUTE:
+    if outcome is Outcome.NO_ANSWER:
         raise ServoMissing(
             f"{where}: no answer about {channel_label(channel.setup)}: check its cable"
         )

@@ -274,7 +274,7 @@ class BoardSupervisor:
             channel.rearm()
             self._pending.remove(channel)
         elif outcome is Outcome.ELSEWHERE and channel.on:
-            # It does give pulses, only others: that is told once, and it is held so.
+            # It does give pulses, only others: that is reported once, and it is held so.
             self._off_goal(channel, round(channel.ramp.pulse_steps))
             channel.hold()
             channel.rearm()

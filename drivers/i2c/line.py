@@ -29,7 +29,7 @@ class I2cLine:
         self.lateness = HostLateness()
         self.failure = ""
         self._byte_s = BITS_PER_BYTE / baud
-        self._patience_s = reply_timeout_ms / 1000.0
+        self._reply_timeout_s = reply_timeout_ms / 1000.0
         self._late = False
 
     def send(self, packet: bytes) -> None:
@@ -54,7 +54,7 @@ class I2cLine:
         wanted = sum(length + 1 for _, length in transfers)
         self.send(packet)
         wire_s = (len(packet) + wanted) * self._byte_s
-        answer = port.read_until(wanted, port.now_s() + wire_s + self._patience_s)
+        answer = port.read_until(wanted, port.now_s() + wire_s + self._reply_timeout_s)
         self.rx_bytes += len(answer)
         self.failure = self._trouble(answer, [length for _, length in transfers])
         self._late = self.failure in ("timeout", "incomplete", "damaged")
@@ -90,7 +90,7 @@ class I2cLine:
 
     def wait(self, until_s: float) -> None:
         """Let time pass; what arrives meanwhile was not asked for."""
-        # In pieces: each is a sign of life to whoever watches this port.
+        # In pieces: each is a sign of life to the guardian that watches this port.
         while (now_s := self.port.now_s()) < until_s:
             got = self.port.read_until(1, min(until_s, now_s + WAIT_PIECE_S))
             if not got and self.port.now_s() <= now_s:

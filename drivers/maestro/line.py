@@ -42,7 +42,7 @@ class MaestroLink:
         self.errors: Counter[str] = Counter()
         self.lateness = HostLateness()
         self._byte_s = BITS_PER_BYTE / params.baud
-        self._patience_s = params.reply_timeout_ms / 1000.0
+        self._reply_timeout_s = params.reply_timeout_ms / 1000.0
         self._late = False
         self._owed = 0
         self._unhandled = 0
@@ -66,7 +66,7 @@ class MaestroLink:
             port.clearPort()
         self.send(packet)
         wire_s = (len(packet) + length) * self._byte_s
-        answer = port.read_until(length, port.now_s() + wire_s + self._patience_s)
+        answer = port.read_until(length, port.now_s() + wire_s + self._reply_timeout_s)
         self.rx_bytes += len(answer)
         self._late = len(answer) < length
         self._owed += length - len(answer)
@@ -174,7 +174,7 @@ class MaestroLink:
 
     def wait(self, until_s: float) -> None:
         """Let time pass; what arrives meanwhile was not asked for."""
-        # In pieces: each is a sign of life to whoever watches this port.
+        # In pieces: each is a sign of life to the guardian that watches this port.
         while (now_s := self.port.now_s()) < until_s:
             got = self.port.read_until(1, min(until_s, now_s + WAIT_PIECE_S))
             if not got and self.port.now_s() <= now_s:

@@ -202,7 +202,7 @@ class Pca9685Board:
         usual = self._clocks[address].prescale
         prescale = found[2][0] if with_prescale else usual
         if found[0][0] == AWAKE and prescale == usual:
-            return ChannelStatus(self._told(channel.id, counts_of(found[1]), prescale))
+            return ChannelStatus(self._pulse_steps(channel.id, counts_of(found[1]), prescale))
         return self._look_closer(channel)
 
     def _look_closer(self, channel: Channel) -> ChannelStatus | None:
@@ -218,7 +218,7 @@ class Pca9685Board:
         changed = () if well or asleep or not channel.held else ("settings changed",)
         return ChannelStatus(pulses[0], changed)
 
-    def _told(self, servo_id: int, counts: int, prescale: int) -> int:
+    def _pulse_steps(self, servo_id: int, counts: int, prescale: int) -> int:
         """Return the pulse of counts: exactly the one sent if the counts are those sent."""
         sent, clock = self._sent.get(servo_id), self._clock(servo_id)
         if sent is not None and sent[0] == counts and prescale == clock.prescale:
@@ -256,7 +256,7 @@ class Pca9685Board:
                 return None
             for channel, registers in zip(own, outputs, strict=True):
                 servo_id = base + channel
-                pulses[servo_id] = self._told(servo_id, counts_of(registers), prescale)
+                pulses[servo_id] = self._pulse_steps(servo_id, counts_of(registers), prescale)
         return tuple(pulses[servo_id] for servo_id in channels)
 
     def _outputs(self, address: int, channels: Sequence[int], runs_on: bool) -> list[bytes] | None:

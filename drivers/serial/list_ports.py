@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from serial.tools import list_ports
 
-WISHED_LATENCY_MS = 1
+RECOMMENDED_LATENCY_MS = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +156,7 @@ def latency_ms(file: Path) -> int | None:
         return None
 
 
-def set_latency(file: Path, ms: int = WISHED_LATENCY_MS) -> bool:
+def set_latency(file: Path, ms: int = RECOMMENDED_LATENCY_MS) -> bool:
     """Write a latency timer; return whether the adaptor has it. Needs write permission."""
     try:
         file.write_text(f"{ms}\n", encoding="ascii")

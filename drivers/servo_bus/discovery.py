@@ -176,7 +176,7 @@ def corrupt(port: BusPort, family: Family, servo_id: int, tries: int = ANSWERS) 
     Two servos with one id speak at the same time: where their bytes differ they spoil
     each other. Their pings are often equal, their positions hardly ever.
     """
-    first, last = (family.registers[name] for name in family.telling)
+    first, last = (family.registers[name] for name in family.duplicate_id_registers)
     length = last.address + last.size - first.address
     position = family.registers["present_position"]
     at = position.address - first.address
@@ -242,7 +242,7 @@ def find(
     family = line.family
     identified = identities(line) if family.broadcast_ping else {}
     found = {
-        # Two with one id, or a noisy line, spoil an answer to everybody: asked alone as well.
+        # Two with one id, or a noisy line, spoil an answer to a broadcast: asked alone as well.
         setup.id: identified.get(setup.id) or registers.identify(setup.id)
         for setup in setups
     }

@@ -224,7 +224,8 @@ class Family:
         single_turn: beyond its encoder's zero a servo would go the long way round
         broadcast_ping: a ping to all is answered one after the other; else each id is asked
         quiet_s, thorough_s: time-outs of a search: silence after a ping to all, or for each id
-        telling: first and last of registers in which two servos with the same id differ
+        duplicate_id_registers: first and last of registers in which two servos with the same
+            id differ
         protocol_1: ids that answer to Protocol 1.0 only, where they may have been set to it
         arming: what is written before the torque comes on
         most_goals: so many servos' goals fit into one packet
@@ -268,7 +269,7 @@ class Family:
     broadcast_ping: bool
     quiet_s: float
     thorough_s: float
-    telling: tuple[str, str]
+    duplicate_id_registers: tuple[str, str]
     protocol_1: Callable[[BusPort], tuple[int, ...]] | None
     arming: Arming
     most_goals: int

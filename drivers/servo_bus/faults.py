@@ -97,7 +97,7 @@ class ServoHealth:
                 self._all_silent_since_s = now_s
         elif answered and self._all_silent_since_s is not None:
             self.answered_again(now_s, lateness)
-            # While nobody was heard, nobody in particular was silent.
+            # While no servo was heard, none in particular was silent.
             self._silent_since = {i: max(t, now_s) for i, t in self._silent_since.items()}
         for servo_id in [i for i in self._silent_since if i not in out]:
             since_s = self._silent_since.pop(servo_id)

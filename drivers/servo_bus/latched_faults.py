@@ -57,7 +57,7 @@ class LatchedFaultSupervisor(Supervisor):
         elif (
             servo_id in self._health.latches
             or sample.blank
-            or self._is_limp(servo_id, sample.torque)
+            or self._lacks_torque(servo_id, sample.torque)
         ):
             self._suspect(servo_id)
 
@@ -67,7 +67,7 @@ class LatchedFaultSupervisor(Supervisor):
             self._unnamed.add(servo_id)
             self._due_s = -inf
 
-    def _is_limp(self, servo_id: int, torque: int | None) -> bool:
+    def _lacks_torque(self, servo_id: int, torque: int | None) -> bool:
         """Return whether a servo's torque is off without a known reason."""
         return self.engaged and torque == 0 and servo_id not in self._health.faults
 
@@ -157,5 +157,5 @@ class LatchedFaultSupervisor(Supervisor):
         else:
             for torque in self._line.ask((servo_id,), "torque_enable").values():
                 self._feedback.set_torque(slot, bool(torque))
-                if self._is_limp(servo_id, torque):
+                if self._lacks_torque(servo_id, torque):
                     self._suspect(servo_id)

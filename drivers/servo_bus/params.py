@@ -12,11 +12,11 @@ class BusParams(Protocol):
 
     @property
     def reply_timeout_ms(self) -> float:
-        """Longest patience for an answer beyond its time on the wire."""
+        """Longest time-out of an answer beyond its time on the wire."""
 
     @property
     def prompt_timeout_ms(self) -> float:
-        """Shortest patience."""
+        """Shortest time-out of an answer."""
 
     @property
     def give_up_s(self) -> float:

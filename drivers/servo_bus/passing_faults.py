@@ -22,7 +22,7 @@ class PassingFaultSupervisor(Supervisor):
 
     def __init__(self, *args: Any, **more: Any) -> None:
         super().__init__(*args, **more)
-        self._limp: set[int] = set()
+        self._torque_off: set[int] = set()
         self._out_since_s: dict[int, float] = {}
         self._seen_s: dict[int, dict[int, float]] = {}
         self._last_errors: dict[int, int] = {}
@@ -31,13 +31,13 @@ class PassingFaultSupervisor(Supervisor):
     @property
     def at_ease(self) -> bool:
         """Return whether nothing is known of any servo that an answer could change."""
-        doubts = self._limp or self._doubted or self._seen_s or self._health.faults
+        doubts = self._torque_off or self._doubted or self._seen_s or self._health.faults
         return not (doubts or any(self._last_errors.values()))
 
     def torque_enabled(self, entering: Collection[int]) -> None:
         """Begin to look after servos under torque; some of them are outside their limits."""
         super().torque_enabled(entering)
-        self._limp.clear()
+        self._torque_off.clear()
         self._doubted.clear()
         # What was wrong of old is not: all have just taken their goals and their torque.
         for servo_id in [i for i in self._health.faults if i not in self._health.latches]:
@@ -47,7 +47,7 @@ class PassingFaultSupervisor(Supervisor):
     def torque_disabled(self) -> None:
         """Leave servos without torque alone."""
         super().torque_disabled()
-        self._limp.clear()
+        self._torque_off.clear()
         self._doubted.clear()
 
     def look_first(self) -> None:
@@ -56,24 +56,24 @@ class PassingFaultSupervisor(Supervisor):
     def withheld(self, now_s: float) -> frozenset[int]:
         """Return the servos that must get no goals now.
 
-        Some firmware switches the torque on with a goal, so whoever may have restarted, or is
-        limp, is first given its present place.
+        Some firmware switches the torque on with a goal, so a servo that may have restarted, or is
+        without torque, is first given its present place.
         """
         out = self._out_since_s
-        if not out and not self._suspects and not self._limp:
+        if not out and not self._suspects and not self._torque_off:
             return frozenset()
         away = {i for i, since_s in out.items() if now_s - since_s >= RESTART_S}
-        return frozenset(away | self._suspects | self._limp)
+        return frozenset(away | self._suspects | self._torque_off)
 
     # --- one servo's answer
 
     def _recovered(self, servo_id: int) -> None:
-        self._limp.discard(servo_id)
+        self._torque_off.discard(servo_id)
 
     def check_status(self, servo_id: int, sample: Sample, now_s: float) -> None:
         """Check one servo's answer for faults and for lost torque or limits."""
         error = sample.error | (sample.status or 0)
-        # Damaged bytes may pass for a fault, which ends a run: it must be told twice in a row.
+        # Damaged bytes may pass for a fault, which ends a run: it must be reported twice in a row.
         confirmed = error & self._last_errors.get(servo_id, 0)
         self._last_errors[servo_id] = error
         if confirmed or servo_id in self._seen_s:
@@ -135,9 +135,9 @@ class PassingFaultSupervisor(Supervisor):
     def _check_torque(self, servo_id: int, sample: Sample) -> None:
         """Doubt a servo that does not seem armed as it was left: it is asked once more."""
         if sample.torque == 1 and self._is_armed(servo_id, sample):
-            self._limp.discard(servo_id)
+            self._torque_off.discard(servo_id)
             self._doubted.discard(servo_id)
-        elif servo_id not in self._limp or not self._known_reason(servo_id):
+        elif servo_id not in self._torque_off or not self._known_reason(servo_id):
             self._doubted.add(servo_id)
 
     def _is_armed(self, servo_id: int, sample: Sample) -> bool:
@@ -159,7 +159,7 @@ class PassingFaultSupervisor(Supervisor):
             self._doubted.discard(servo_id)
             sample = window.sample(0, data)
             if sample.torque != 1:
-                self._limp.add(servo_id)
+                self._torque_off.add(servo_id)
                 if not self._known_reason(servo_id):
                     self._suspects.add(servo_id)
             elif not self._is_armed(servo_id, sample):

@@ -83,7 +83,7 @@ def silent_servos(ids: Sequence[int], answered: Collection[int]) -> tuple[int, .
     """Name the servos that kept silent of their own accord.
 
     A servo waits for the one before it, so behind the last one heard only the first is
-    to blame; what is missing before the last one heard has nobody else to blame.
+    to blame; what is missing before the last one heard has no other cause.
     """
     missing = [i for i, servo_id in enumerate(ids) if servo_id not in answered]
     last_heard = max((i for i, servo_id in enumerate(ids) if servo_id in answered), default=-1)

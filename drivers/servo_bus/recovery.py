@@ -130,7 +130,7 @@ class Recovery:
         return tuple(i for i in ids if i not in latched)
 
     def _on_this_side(self, ids: tuple[int, ...]) -> tuple[int, ...]:
-        """Leave those limp that would go the wrong way round into their range.
+        """Leave those without torque that would go the wrong way round into their range.
 
         Raises:
             ServoMissing: a servo does not answer.

@@ -160,7 +160,7 @@ def transact(
     family: Family,
     request: bytes,
     length: int,
-    patience_s: float,
+    timeout_s: float,
     servo_id: int | None = None,
 ) -> tuple[bytes, Status | None]:
     """Send a request to one servo and wait for its answer.
@@ -172,7 +172,7 @@ def transact(
         family: the make of the servo.
         request: the packet.
         length: of the answer's params.
-        patience_s: time-out beyond the time on the wire, s.
+        timeout_s: time-out beyond the time on the wire, s.
         servo_id: who must answer; None for any servo.
 
     Returns:
@@ -184,7 +184,7 @@ def transact(
     wire_s = (len(request) + length + codec.STATUS_OVERHEAD) * byte_s
     # A refusal may be shorter than the answer.
     shortest = 0 if codec.REFUSAL else length
-    deadline_s, raw, seen = port.now_s() + wire_s + patience_s, b"", 0
+    deadline_s, raw, seen = port.now_s() + wire_s + timeout_s, b"", 0
     while len(raw) < LONGEST:
         more = port.read_until(codec.bytes_missing(raw, seen + 1, shortest) or 1, deadline_s)
         raw += more

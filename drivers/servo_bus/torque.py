@@ -24,10 +24,10 @@ JUMP_TURN = 0.25
 """No hand moves a joint by so much of a turn while the torque comes on: it has wrapped."""
 
 STILL_STEPS = 16
-"""A limp joint held by a hand moves so far between two questions."""
+"""A joint without torque, held by a hand, moves so far between two questions."""
 
 LEAST_S, MOST_S = 0.005, 0.02
-"""Patience for an answer beyond its time on the wire, where a raw port is released."""
+"""Time-out of an answer beyond its time on the wire, where a raw port is released."""
 
 Value = TypeVar("Value")
 
@@ -179,7 +179,7 @@ def disable_torque(port: BusPort, family: Family, baud: int, ids: Sequence[int])
     if not port.setBaudRate(baud):
         raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose {family.usual_bauds}")
     released = switch_off(Transactions(port, family, LEAST_S, MOST_S, baud), ids)
-    return (*released.holding, *released.mute)
+    return (*released.holding, *released.unconfirmed)
 
 
 def find_faults(line: Transactions, ids: Sequence[int]) -> dict[int, int]:

@@ -236,5 +236,5 @@ class Transactions:
         In the loop others are waiting, and how late answers are has been measured.
         """
         hurried_s = min(self.most_s, HURRIED * self.timeout.seconds)
-        patience_s = self.most_s if self.tries > 1 else hurried_s
-        return self._free_s + answer_bytes * self._byte_s + patience_s
+        timeout_s = self.most_s if self.tries > 1 else hurried_s
+        return self._free_s + answer_bytes * self._byte_s + timeout_s

@@ -139,7 +139,7 @@ class EventDetector:
         return tuple(events)
 
     def _lost(self, tick: Tick) -> None:
-        """Begin anew after the eyes were not measured, or not moved by the models."""
+        """Reset after the eyes were not measured, or not moved by the models."""
         if tick.stopped:
             self._blinks.clear()
         self._saccades.clear()

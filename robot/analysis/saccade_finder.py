@@ -1,7 +1,7 @@
 """Saccades in a trace of gaze directions, found sample by sample by their speed.
 
 The speed is that of Engbert & Kliegl 2003, a central difference over five samples, taken
-relative to the slow motion of the last 50 ms, so that following somebody who walks by is no
+relative to the slow motion of the last 50 ms, so that following a person who walks by is no
 saccade. 30 deg/s beyond that is the usual threshold of velocity-based detection (I-VT).
 """
 

@@ -193,7 +193,7 @@ class _Generators(NamedTuple):
 
 
 class _Sight(NamedTuple):
-    """Where the camera sits, where the head was when, and who else is told of it."""
+    """Where the camera sits, where the head was when, and who else receives it."""
 
     mount: CameraMount
     poses: PoseHistory

@@ -163,7 +163,7 @@ class LiveParams:
             except ConfigError as error:
                 return tuple(f"not tuned: {line}" for line in str(error).splitlines())
         said = self._put(ready.rig, ready.walk or self._walk)
-        return (*(_told(key, value) for key, value in command.changes), *said)
+        return (*(_change_text(key, value) for key, value in command.changes), *said)
 
     def _put(self, rig: Rig, walk: Walk) -> tuple[str, ...]:
         """Hand the parameters that differ to their parts."""
@@ -213,7 +213,7 @@ class LiveParams:
     def _put_joints(self, old: Rig, new: Rig) -> tuple[str, ...]:
         """Apply joint limits to body and guard; the guard gets the present angles of the joints.
 
-        Gives what has to wait for the servos to be set up anew.
+        Gives what has to wait for the servos to be set up again.
         """
         if (new.joints, new.guard) == (old.joints, old.guard):
             return ()
@@ -276,7 +276,7 @@ def _beyond(
     return (f"{', '.join(more)}: all of the range and speed come with a stop and a resume",)
 
 
-def _told(key: str, value: Value) -> str:
+def _change_text(key: str, value: Value) -> str:
     when = live(key)
     note = f" ({when})" if when.startswith(NEXT_START) else ""
     return f"tuned: {key} = {value}{note}"

@@ -90,7 +90,7 @@ class RunOptions:
 
     @property
     def written_at_the_end(self) -> tuple[Path, ...]:
-        """Return the files whose names must be free now, as nobody wants to run again."""
+        """Return the files whose names must be free before the run starts."""
         named = None if self.summary is None or self.summary == "-" else Path(self.summary)
         return tuple(path for path in (self.heatmap, named) if path is not None)
 

@@ -103,7 +103,7 @@ class ParamStore:
         self._options = differences(read, whole)
         self._state = _ParamState(whole, whole, rig, character, files, found, found, 0)
         self._described = described(whole, self._defaults)
-        # A shipped rig's own folder is the package's, where nobody has files.
+        # A shipped rig's own folder is the package's, which holds no file of a user.
         at_home = rig in shipped_names("rigs")
         self.confined = AllowedFolder(Path.cwd() if at_home else self.path.parent)
 
@@ -190,7 +190,7 @@ class ParamStore:
         """
         with self._changing:
             if self._state.files.changed():
-                # An edit that nobody has heard of yet counts; one with faults does not.
+                # An edit that is not in force yet counts; one with faults does not.
                 with contextlib.suppress(ConfigError):
                     self._reload()
             state = self._state
@@ -274,7 +274,7 @@ class ParamStore:
             values=values_after(before.values, before.rig, rig) if found else before.values,
             version=before.version + 1,
         )
-        return tuple(_told(key, value) for key, value in found.items())
+        return tuple(_change_text(key, value) for key, value in found.items())
 
 
 def _defaults(rig: Rig) -> Rig:
@@ -319,7 +319,7 @@ def _overlap(one: str, other: str) -> bool:
     return f"{one}.".startswith(f"{other}.") or f"{other}.".startswith(f"{one}.")
 
 
-def _told(key: str, value: Value) -> str:
+def _change_text(key: str, value: Value) -> str:
     when = live(key)
     note = f" ({when})" if when.startswith(NEXT_START) else ""
     return f"{key} = {_text(value)}{note}"

@@ -1,7 +1,7 @@
 """Everything that watches a run, or reaches into it, beside the control loop.
 
 The page, the status line, other programs, the rig's files and the recording: each is optional,
-has its own thread or process, and is told of a tick in next to no time.
+has its own thread or process, and receives a tick in next to no time.
 """
 
 import contextlib
@@ -86,7 +86,7 @@ class RunObservers:
         self._page = self._made_page(address) if address is not None else None
         self._snapshots = SnapshotBuilder(made.loop.rate_hz, made.shown())
         self._publisher = self._make_publisher(status)
-        # In simulated time nobody can watch.
+        # Simulated time runs faster than a page can show.
         self._shown = not options.fast and (self._page is not None or status is not None)
         self._looking = False
         self._observers = Observers(say)
@@ -123,7 +123,7 @@ class RunObservers:
         )
 
     def join(self, observers: Observers) -> None:
-        """Have all of them told of ticks; each is left out by itself where it fails."""
+        """Give ticks to all of them; each is left out by itself where it fails."""
         if self._shown:
             observers.add("page and status line", self._publisher.update)
         if self._page is not None:

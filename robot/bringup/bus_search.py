@@ -61,7 +61,7 @@ class SearchRound:
 
     @property
     def answered(self) -> bool:
-        """Return whether anyone of this kind has answered."""
+        """Return whether a servo of this kind has answered."""
         return bool(self.found) or self.board is not None
 
 

@@ -93,7 +93,7 @@ def given(board: Board, setup: ServoConfig) -> Iterator[Channel]:
     channel = Channel(setup, board.timing.longest_lead_s)
     try:
         outcomes = (take(board, channel, pulse) for _ in range(MOST_TRIES))
-        if all(outcome is Outcome.MUTE for outcome in outcomes):
+        if all(outcome is Outcome.NO_ANSWER for outcome in outcomes):
             raise ServoMissing(
                 f"{board.line.port.port_name}: no answer about {servo_label(setup)}: check its "
                 "cable"
@@ -148,7 +148,7 @@ def _end(board: Board, setup: ServoConfig) -> None:
     """
     try:
         left = switch_off(board, (setup.id,))
-        sure = not left.holding and not left.mute
+        sure = not left.holding and not left.unconfirmed
     except BusLost:
         sure = False
     if not sure:

@@ -1,7 +1,7 @@
 """What must be set on a Maestro in Pololu's program, as no serial command can set it. Pure.
 
 On an error - one damaged byte is one - a board sends every channel where its setting says.
-Off stops the pulses: servos go limp for the moment until they are held again where they are.
+Off stops the pulses, until the servos are held again where they are.
 Ignore would go on, but also when the program dies; Go to moves all servos home.
 
 Source: Pololu Maestro User's Guide (0J40), sections 4.b (channel settings; Min and Max are
@@ -72,7 +72,7 @@ def instructions(params: MaestroParams, setups: Sequence[ServoConfig], usb: bool
     yield "  tab Serial Settings:"
     yield f"    Serial mode: {mode}    Device Number: {params.device}    Enable CRC: {crc}"
     yield (
-        f"    Timeout: {TIMEOUT_S:.2f} s, so that servos go limp when the program or the cable dies"
+        f"    Timeout: {TIMEOUT_S:.2f} s, so that pulses stop when the program or the cable dies"
     )
     yield "  tab Channel Settings (Rate 50 Hz), of every channel: Mode Servo, 'On startup or"
     yield "    error' Off; its range, which cuts goals silently; limits for after a restart:"

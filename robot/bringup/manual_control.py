@@ -12,8 +12,8 @@ what was really applied:
         control.stop()
 
 Between two calls nothing is sent: Dynamixel servos are held by their own bus watchdog, others
-stay at their last goal, or limp where a guardian watches them (gazerig.robot.guardian, after .4
-s), and the next call goes on from there.
+stay at their last goal, or lose their torque where a guardian watches them
+(gazerig.robot.guardian, after .4 s), and the next call goes on from there.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -48,7 +48,7 @@ class JogParams:
     accel_deg_s2: Annotated[float, Bounds(5, 5000), "top acceleration"] = 100.0
     rate_hz: Annotated[float, Bounds(20, 500), "goals a second"] = 100.0
     near_deg: Annotated[float, Bounds(0.1, 20), "nearer is arrived"] = 2.0
-    patience_s: Annotated[float, Bounds(0.1, 30), "time to come near after the way is over"] = 2.0
+    timeout_s: Annotated[float, Bounds(0.1, 30), "time to come near after the way is over"] = 2.0
     # fmt: on
 
 
@@ -152,7 +152,7 @@ class ManualControl:
                 return None
             return standing(step, desired, moving, radians(self._params.near_deg))
 
-        longest_s = takes_s + self._params.patience_s
+        longest_s = takes_s + self._params.timeout_s
         return self.follow(on_the_way, there, longest_s, desired, gently=True)
 
     def hold(self, seconds: float) -> MoveResult:

@@ -107,13 +107,13 @@ class GuardReasons:
 def outcome(step: Step, desired: JointAngles, notes: GuardReasons) -> tuple[JointResult, ...]:
     """Return every joint's part of how a movement ended."""
     guard_result, joints = step.guard_result, step.joints
-    told = joints.measured or (True,) * len(guard_result.joints)
+    has_feedback = joints.measured or (True,) * len(guard_result.joints)
     rows = zip(
         guard_result.joints,
         desired,
         guard_result.command_rad,
         joints.position_rad,
-        told,
+        has_feedback,
         strict=True,
     )
     return tuple(

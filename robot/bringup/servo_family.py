@@ -12,7 +12,7 @@ from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_models import BusKind
 
 Tell = Callable[[str], None]
-"""Is told in a few words what is being done now."""
+"""Takes a few words on what is being done now."""
 
 
 class Setting(NamedTuple):

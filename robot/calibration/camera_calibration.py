@@ -180,7 +180,7 @@ def _calibrated(views: Sequence[SeenBoard], width: int, height: int, flags: int)
     except (cv2.error, ValueError) as error:
         raise CameraCalibrationRefused(
             "no lens explains these views: see that the board is flat and is the one printed "
-            "(columns, rows), and begin anew"
+            "(columns, rows), and start again"
         ) from error
     return _Fit(lens, float(rms), np.ravel(view_rms), np.ravel(spreads))
 

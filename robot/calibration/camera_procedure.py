@@ -48,7 +48,7 @@ class NeckStepParams:
     roll_deg: Annotated[float, Bounds(0, 60), "farthest roll to each side"] = 12.0
     frames: Annotated[int, Bounds(1, 50), "frames averaged at each angle"] = 3
     still_deg: Annotated[float, Bounds(0.01, 5), "a head that moved more while the frame was taken makes it useless"] = 0.2
-    patience_s: Annotated[float, Bounds(0.1, 60), "time for the frames at each angle"] = 4.0
+    timeout_s: Annotated[float, Bounds(0.1, 60), "time for the frames at each angle"] = 4.0
     # fmt: on
 
 
@@ -91,7 +91,7 @@ class LensSteps:
         if self._size != (width, height):
             raise CameraError(
                 f"the camera changed from {self._size[0]} x {self._size[1]} to {width} x {height} "
-                "pixels: a lens is measured on images of one size; begin anew"
+                "pixels: a lens is measured on images of one size; start again"
             )
         seen = self._board.find(shot.image)
         why = self._collector.offer(seen)
@@ -223,7 +223,7 @@ def _seen_at_rest(
     stood: list[Angles3] = []
     last_s = start_s = now_s()
     why = "no new frame came"
-    while len(sights) < params.frames and now_s() - start_s < params.patience_s:
+    while len(sights) < params.frames and now_s() - start_s < params.timeout_s:
         before = neck.angles()
         neck.rest(0.04)
         shot = look()

@@ -1,6 +1,6 @@
 """Where a person's own face parts are: offsets that keys move until the gaze seems right.
 
-People judge well where somebody looks (Nakamoto & Tsuruno 3.7), so a person whose face
+People judge well where another person looks (Nakamoto & Tsuruno 3.7), so a person whose face
 differs from an adult's average steers the gaze to each part of it and says when it is
 there. Of a gaze only the direction can be judged: a part moves in the face's plane, to its
 owner's left and up, and its place out of the face stays as it was.

@@ -1,6 +1,6 @@
 """A gaze that a person steers over their own face: chooses the target in attention's place.
 
-The target is one part of the nearest face, placed anew with the face's full pose at every
+The target is one part of the nearest face, placed again with the face's full pose at every
 tick, so the person may move while judging. Everything after it is as always: oculomotor
 model, guard, servos.
 """
@@ -58,7 +58,7 @@ class FaceSteering:
         self.reset(0.0)
 
     def reset(self, t_s: float) -> None:
-        """Begin anew."""
+        """Reset."""
         self.state = self._begin
         self.face: Face | None = None
         self.error_deg = inf

@@ -1,4 +1,4 @@
-"""One joint by itself, on a servo that tells its place: limp for a hand, or gently driven."""
+"""One joint by itself, on a servo with feedback: moved by hand without torque, or driven gently."""
 
 from collections.abc import Callable
 
@@ -75,7 +75,7 @@ class SingleJoint:
         if not self.servo.torque_is_on():
             raise ServoFault(
                 f"{self.who} let go on the way: it protected itself or restarted; "
-                "check its supply and begin anew"
+                "check its supply and start again"
             )
         return stop
 

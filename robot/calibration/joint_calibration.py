@@ -2,7 +2,7 @@
 
 A servo counts 4096 steps a turn; where 4095 meets 0 is its seam. After a restart it knows
 only the place within the turn, so a joint whose travel holds the seam would wake up a whole
-turn from where it is: such a joint cannot be used and must be built in anew.
+turn from where it is: such a joint cannot be used and must be built in again.
 Steps as in gazerig.drivers.servo_models, angles in degrees at the joint.
 """
 
@@ -110,7 +110,7 @@ class Unwrapped:
             if gap_s > LONGEST_GAP_S and abs(change) > MAX_UNSEEN_JUMP_STEPS:
                 raise CalibrationRefused(
                     f"it turned by {abs(change) * 360 / STEPS_PER_TURN:.0f} deg while the servo "
-                    f"did not answer for {gap_s:.1f} s: check its cable, and begin anew"
+                    f"did not answer for {gap_s:.1f} s: check its cable, and start again"
                 )
             self._at += change
         self._seen_s = t_s
@@ -181,7 +181,7 @@ def calibration(name: str, marks: Marks, joint: JointParams, margin_deg: float) 
         raise CalibrationRefused(
             f"{name}: {zero_of(name)} (step {marks.zero % STEPS_PER_TURN}) does not lie between "
             f"the ends (steps {low % STEPS_PER_TURN} and {high % STEPS_PER_TURN}): "
-            "mark the three places anew"
+            "mark the three places again"
         )
     sign = 1 if marks.positive_end > marks.negative_end else -1
     most = abs(marks.positive_end - marks.zero) / steps_per_deg - margin_deg
@@ -215,7 +215,7 @@ def _refuse_seam(name: str, low: int, high: int, steps_per_deg: float, settable:
         raise CalibrationRefused(
             f"{name}: its travel (steps {low % STEPS_PER_TURN} to {high % STEPS_PER_TURN}) crosses "
             "the servo's seam from 4095 to 0, where a restarted servo is a whole turn wrong: "
-            "calibrate anew with --set-middle, and the servo calls the middle of the travel 2048"
+            "calibrate again with --set-middle, and the servo calls the middle of the travel 2048"
         )
     centre = (low + high) // 2 % STEPS_PER_TURN
     off = STEPS_PER_TURN // 2 - centre
@@ -224,7 +224,7 @@ def _refuse_seam(name: str, low: int, high: int, steps_per_deg: float, settable:
         "the servo's seam from 4095 to 0, where a restarted servo is a whole turn wrong: take "
         "the horn off, hold the joint in the middle of its travel, turn the servo's shaft by "
         f"{abs(off) * 360 / STEPS_PER_TURN:.0f} deg towards {'more' if off > 0 else 'fewer'} "
-        "steps (about 2048), put the horn on again, and calibrate anew. A Homing Offset is no "
+        "steps (about 2048), put the horn on again, and calibrate again. A Homing Offset is no "
         "cure: in position mode some firmware loses it by a turn as the torque comes on"
     )
 
@@ -234,7 +234,7 @@ def _refuse_unfit(name: str, made: Calibration, joint: JointParams, margin_deg: 
     if name in GAZE_JOINTS and not made.min_deg < 0.0 < made.max_deg:
         raise CalibrationRefused(
             f"{name}: straight ahead lies within {margin_deg:g} deg of an end (range "
-            f"{made.min_deg:g}..{made.max_deg:g} deg): build the horn in anew, or lessen the margin"
+            f"{made.min_deg:g}..{made.max_deg:g} deg): build the horn in again, or lessen the margin"
         )
     if made.max_deg - made.min_deg <= SMALLEST_RANGE_DEG:
         raise CalibrationRefused(
@@ -250,7 +250,7 @@ def _refuse_unfit(name: str, made: Calibration, joint: JointParams, margin_deg: 
     try:
         applied(joint, made)
     except ValueError as error:
-        raise CalibrationRefused(f"{name}: {error}: calibrate anew") from error
+        raise CalibrationRefused(f"{name}: {error}: calibrate again") from error
 
 
 def applied(joint: JointParams, made: Calibration) -> JointParams:

@@ -80,5 +80,5 @@ def places(name: str, marked: Sequence[Place], joint: JointParams, margin_deg: f
     try:
         replace(joint, **made._asdict())
     except ValueError as error:
-        raise CalibrationRefused(f"{name}: {error}: calibrate anew") from error
+        raise CalibrationRefused(f"{name}: {error}: calibrate again") from error
     return made

@@ -165,7 +165,7 @@ class HobbyPlacer:
 
 
 class HandPlacer:
-    """Lets a person turn a limp servo that tells its place; implements Placer."""
+    """Lets a person turn a servo without torque that reports its position; implements Placer."""
 
     def __init__(self, single: SingleJoint, person: Operator) -> None:
         self.name, self.joint = single.name, single.joint
@@ -187,7 +187,7 @@ class HandPlacer:
         return self.mark(f"until it reads about step {place:.0f}")
 
     def leave(self, place: float) -> None:
-        """Leave it where it is: it is limp."""
+        """Leave it where it is: its torque is off."""
 
     def live(self) -> str:
         """Return the position in words."""

@@ -205,7 +205,7 @@ class SingleServo:
         if not 0 <= before < self._family.steps_per_turn:
             raise ServoMissing(
                 f"{self.who} has been turned over the seam of its encoder (it reads {before}): "
-                "turn it back, or switch the servo power off and on, and begin anew"
+                "turn it back, or switch the servo power off and on, and start again"
             )
         put("goal_position", before)
         put("torque_enable", 1)
@@ -248,7 +248,7 @@ class SingleServo:
         if self._guardian is not None and self._guardian.released(0):
             raise ServoFault(
                 f"{self.who}: the program stood still, so its guardian switched the torque off: "
-                "begin anew"
+                "start again"
             )
         self._put("goal_position", goal_steps)
 

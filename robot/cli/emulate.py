@@ -192,7 +192,7 @@ def _chosen(buses: Sequence[BusSettings], given: Sequence[str]) -> tuple[BusSett
     """Return every bus the choices that its kind knows.
 
     Raises:
-        SetupError: one is no choice, or nobody knows its case.
+        SetupError: one is no choice, or no device has its case.
     """
     known = {case: None for bus in buses for case in CASES.get(bus.device.kind, {})}
     choices = {}

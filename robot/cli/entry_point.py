@@ -71,7 +71,7 @@ def hold_standard_files() -> None:
         except OSError:
             os.open(os.devnull, os.O_RDWR)  # gets the lowest number that is free
     nowhere = open(os.devnull, "r+", encoding="utf-8")  # noqa: SIM115 - for all of the program
-    # What was closed when Python began is None there, which nobody expects.
+    # What was closed when Python began is None there, which libraries do not expect.
     for name in ("stdin", "stdout", "stderr"):
         if getattr(sys, name) is None:
             setattr(sys, name, nowhere)

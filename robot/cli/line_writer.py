@@ -1,7 +1,7 @@
-"""Lines for people, written by a thread: a terminal that takes none keeps nobody waiting.
+"""Lines for people, written by a thread: a terminal that takes none delays no caller.
 
-A pipe that nobody reads, a terminal stopped with Ctrl-S, a full disk, a terminal that was
-closed: whoever says something goes on at once. What cannot be written is dropped and counted.
+A pipe without a reader, a terminal stopped with Ctrl-S, a full disk, a terminal that was
+closed: the caller goes on at once. What cannot be written is dropped and counted.
 """
 
 import contextlib
@@ -16,13 +16,13 @@ _MOST = 500
 """So many lines wait; more are dropped."""
 _RETRY_S = 0.2
 _LOOK_S = 0.5
-UNREAD = "standard error, which nobody reads any more"
+UNREAD = "standard error, whose reader has closed it"
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """A disk may have room again."""
 
 
 class LineWriter:
-    """Writes to a file descriptor, in the order in which it is told.
+    """Writes to a file descriptor, in the order of the calls.
 
     dropped: lines that were not written
     """
@@ -61,10 +61,10 @@ class LineWriter:
         """Return that its reader is gone, None while it may be there."""
         return self._unread
 
-    def flush(self, patience_s: float) -> bool:
+    def flush(self, timeout_s: float) -> bool:
         """Wait until everything is written, no longer than this; return whether it is."""
         with self._changed:
-            return self._changed.wait_for(self._idle, patience_s)
+            return self._changed.wait_for(self._idle, timeout_s)
 
     def _idle(self) -> bool:
         return self._gone or not (self._lines or self._status is not None or self._busy)
@@ -113,7 +113,7 @@ class LineWriter:
         while data:
             try:
                 data = data[os.write(self._fd, data) :]
-            except BlockingIOError:  # somebody else made it so
+            except BlockingIOError:  # another process made it so
                 with contextlib.suppress(OSError, ValueError):
                     select.select([], [self._fd], [], _RETRY_S)
             except OSError as error:
@@ -121,7 +121,7 @@ class LineWriter:
                 return
 
     def _lose(self, error: OSError) -> None:
-        """Drop a line; where nobody can read any more, all that follow."""
+        """Drop a line; without a reader, all that follow."""
         with self._changed:
             self.dropped += 1
             if error.errno not in _FULL:

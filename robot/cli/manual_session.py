@@ -61,14 +61,14 @@ def holding_rig(
 
 def holding(rig: Rig) -> str:
     """Return what the servos do once the torque is on."""
-    told = [name for name in rig.names if rig.joints[name].facts.measured]
-    without_feedback = len(rig.names) - len(told)
+    measured_joints = [name for name in rig.names if rig.joints[name].facts.measured]
+    without_feedback = len(rig.names) - len(measured_joints)
     if not without_feedback:
-        return f"torque on: {len(told)} servos hold where they are"
+        return f"torque on: {len(measured_joints)} servos hold where they are"
     pulses = f"{without_feedback} hobby servos hold where their pulses are (estimated: they tell nothing)"
     return (
-        f"torque on: {len(told)} servos hold where they are, {pulses}"
-        if told
+        f"torque on: {len(measured_joints)} servos hold where they are, {pulses}"
+        if measured_joints
         else f"pulses on: {pulses}"
     )
 

@@ -33,7 +33,7 @@ app = typer.Typer()
 
 ESTIMATED = (
     "~ is estimated from the pulse (us); hobby servos tell nothing. The board's errors are not "
-    "asked for: telling clears them"
+    "asked for: reporting clears them"
 )
 _COLUMNS = 7
 _UNTOLD = "-"

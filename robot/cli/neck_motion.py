@@ -41,7 +41,7 @@ class JoggedNeck:
         goal = {name: degrees(a) for name, a in axes if name in there}
         moved = self._control.pose(goal)
         if moved.ended == "torque_off":
-            raise SetupError("the torque went off on the way: see gazerig doctor, then begin anew")
+            raise SetupError("the torque went off on the way: see gazerig doctor, then start again")
         self.rest(_SETTLE_S)
 
     def rest(self, seconds: float) -> None:
@@ -79,7 +79,7 @@ def moving_neck(
     if mock is not None:
         mock.hang()
     elif not agrees(stopped, yes, "does the board hang, and is the head free to move?"):
-        raise CameraCalibrationRefused("left out as you wished: nothing was written")
+        raise CameraCalibrationRefused("left out as you asked: nothing was written")
     params = JogParams(speed_deg_s=_GENTLE_DEG_S)
     with (
         rig_ports(rig, mock is not None, port) as wire,

@@ -94,8 +94,8 @@ def _reboot(line: BusPort, kind: ServoKind, rig: Rig, bus: str, servo_id: int, y
     servo_reboot.present(line, kind, servo_id, baud)
     before = servo_reboot.standing(line, kind, servo_id)
     say(f"{name}: {before}")
-    limp = f"{name} goes limp: hold what it carries. Restart it?"
-    if before.torque and not yes and not typer.confirm(limp, err=True):
+    question = f"{name}: torque goes off: hold what it carries. Restart it?"
+    if before.torque and not yes and not typer.confirm(question, err=True):
         say(f"{name}: left as it is")
         return False
     result = servo_reboot.restart(line, kind, servo_id, baud, RealClock().sleep_until)

@@ -123,7 +123,7 @@ def _export(
     _warn(recording.note)
     with used(file):
         with _progress("reading", recording.duration_s) as read:
-            trace = trace_of(_told(recording.ticks(), read))
+            trace = trace_of(_with_progress(recording.ticks(), read))
         labels = labels_of(trace)
         stretches = stretches_of(trace, labels)
     if bids:
@@ -209,7 +209,7 @@ def _show(
 
 
 def _built(config_yaml: str) -> "ShownRig | None":
-    """Return how the recorded rig was built; None, with a word why, where nobody can tell."""
+    """Return how the recorded rig was built; None, with the reason, where that is unknown."""
     from gazerig.config.load import ConfigError, load
     from gazerig.config.schema import Rig
     from gazerig.robot.app.gaze_models import gaze_parts
@@ -247,13 +247,13 @@ def _rerun(file: Path, rig: str | None, character: str | None, joints: str | Non
 
     recording = RunRecording(file)
     with used(file), _progress("running again", recording.duration_s) as read:
-        told, start_s = 0, 0.0
+        count, start_s = 0, 0.0
 
         def on_tick(tick: Tick) -> None:
-            nonlocal told, start_s
-            start_s = tick.t_s if told == 0 else start_s
-            told += 1
-            if told % 100 == 0:
+            nonlocal count, start_s
+            start_s = tick.t_s if count == 0 else start_s
+            count += 1
+            if count % 100 == 0:
                 read(tick.t_s - start_s)
 
         result = rerun(recording, rig=rig, character=character, joints=joints, on_tick=on_tick)
@@ -304,7 +304,7 @@ def _words(value: object) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def _told(ticks: Iterable[Tick], read: Callable[[float], None]) -> Iterator[Tick]:
+def _with_progress(ticks: Iterable[Tick], read: Callable[[float], None]) -> Iterator[Tick]:
     """Pass ticks on, and tell how far they are."""
     start_s = None
     for number, tick in enumerate(ticks):

@@ -166,7 +166,7 @@ def _one(
     named: str | None,
     as_json: bool,
 ) -> bool:
-    """Search one port and show what was found; return whether anyone answered."""
+    """Search one port and show what was found; return whether a servo answered."""
     usb = bench.usb_id(path)
     asked = plan(usb, kinds, rates)
     if not asked and usb.startswith(POLOLU):
@@ -222,12 +222,12 @@ def _show(
     boards = [one for one in rounds if one.board is not None]
     found = found_of(rounds)
     if as_json:
-        told: dict[str, object] = {
+        answer: dict[str, object] = {
             "port": where,
             "servos": [servo_plain(kind, servo) for kind, servo in found],
             "boards": [board_plain(one) for one in boards],
         }
-        print(json.dumps(told))
+        print(json.dumps(answer))
         return
     out = console()
     if found:

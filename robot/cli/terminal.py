@@ -34,7 +34,7 @@ DEBUG_LOGGER = "gazerig"
 _STDERR = 2
 _FLUSH_S = 1.0
 """The last lines have so long to be written."""
-_UNREAD = "standard output: nobody reads it any more"
+_UNREAD = "standard output: its reader has closed it"
 _writer = LineWriter(_STDERR)
 atexit.register(_writer.flush, _FLUSH_S)
 
@@ -85,7 +85,7 @@ def _errors_said() -> Iterator[None]:
         say(with_doctor(str(error)) if isinstance(error, ServoFault) else str(error))
         raise typer.Exit(FAULT) from None
     except BrokenPipeError:
-        raise  # for run_app: nobody reads what is printed
+        raise  # for run_app: standard output was closed
     except OSError as error:
         _show_origin()
         say(f"{error.filename or 'file'}: {error.strerror or error}")
@@ -104,7 +104,7 @@ def run_app(app: Callable[[list[str]], object], arguments: list[str], again: str
     Ctrl-C is "interrupted" and exit code 130, a reader of standard output that has gone one
     line and exit code 1.
 
-    again: what to do about an error that nobody expected
+    again: what to do about an unexpected error
     """
     threading.excepthook, before = _thread_failed, threading.excepthook
     code: str | int | None = None

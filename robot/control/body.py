@@ -72,7 +72,7 @@ class Body:
     def retune(
         self, joints: Mapping[str, JointParams], gentle_deg_s: float
     ) -> dict[int, tuple[float, float]]:
-        """Count angles otherwise from now on; the servos are set up anew when torque comes on.
+        """Count angles otherwise from now on; the servos are set up again when torque comes on.
 
         Gives, for each joint whose angles are other ones now, (factor, offset in radians):
         what was x is factor x + offset.
@@ -110,7 +110,7 @@ class Body:
         """Read all joints; one that does not answer keeps its last value and its age.
 
         Raises:
-            BusLost: nobody has answered for too long, and torque was not let
+            BusLost: no servo has answered for too long, and torque was not let
                 go of; after that the bus may stay away for as long as it likes.
         """
         try:

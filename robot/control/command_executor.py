@@ -49,7 +49,7 @@ class CommandExecutor:
         kinematics: gaze to joint angles.
         guard: starts slowly where joints are taken over.
         tune: changes parameters and returns what was done, as text.
-        told: called with a line on whatever happens.
+        messages: takes a line on whatever happens.
         looks: finds what commands say to look at.
     """
 
@@ -66,13 +66,13 @@ class CommandExecutor:
         kinematics: Kinematics,
         guard: Guard,
         tune: Callable[[Tune, float], tuple[str, ...]],
-        told: list[str],
+        messages: list[str],
         looks: LookPoints,
     ) -> None:
         self._body, self._lead, self._stop, self._menus = body, lead, stop, menus
         self._attention, self._oculomotor, self._kinematics = attention, oculomotor, kinematics
         self._animation, self._gestures = animation, gestures
-        self._guard, self._tune, self._told, self._looks = guard, tune, told, looks
+        self._guard, self._tune, self._messages, self._looks = guard, tune, messages, looks
         self._taken_over = False
         self.commanded_rad: JointAngles = ()
 
@@ -84,13 +84,13 @@ class CommandExecutor:
     def end_lapsed_lead(self, t_s: float) -> None:
         """End a lead that was not renewed, or whose time is over."""
         if why := self._lead.over(t_s):
-            self._told.append(f"{self._lead.words}: {why}, so the gaze leads again")
+            self._messages.append(f"{self._lead.words}: {why}, so the gaze leads again")
             self._let_lead(lambda: self._lead.end(why))
 
     def end_lapsed_levels(self, t_s: float) -> None:
-        """Let levels that nobody sets any more fall to 0."""
+        """Let levels that no client sets any more fall to 0."""
         for name in self._animation.levels.lapsed(t_s):
-            self._told.append(f"level {name}: not set any more, so it falls to 0")
+            self._messages.append(f"level {name}: not set any more, so it falls to 0")
 
     def execute(self, command: Command, t_s: float) -> CommandReply:
         """Carry out one command; return its reply."""
@@ -120,7 +120,7 @@ class CommandExecutor:
             case Resume():
                 return self._resume(command, t_s)
             case Tune():
-                self._told += self._tune(command, t_s)
+                self._messages += self._tune(command, t_s)
         return CommandReply()
 
     def _lead_by(self, command: Leading, t_s: float) -> CommandReply:
@@ -145,7 +145,7 @@ class CommandExecutor:
         """Hold all joints but those given; without any, return the joints to the gaze models."""
         names = self._body.names
         if command.angles_rad and (name := self._gestures.drop()):
-            self._told.append(f"gesture {name} ends: the joints are led")
+            self._messages.append(f"gesture {name} ends: the joints are led")
         self._let_lead(lambda: self._lead.jog(command, names, self.commanded_rad, t_s))
         if command.angles_rad:
             # A slider can be torn from end to end in no time.
@@ -159,7 +159,7 @@ class CommandExecutor:
         reply = self._gestures.play(command, t_s, self.commanded_rad, self._guard.limits)
         if command.gesture:
             by = f" for {command.who}" if command.who else ""
-            self._told.append(f"gesture{by}: {reply.text()}")
+            self._messages.append(f"gesture{by}: {reply.text()}")
         return reply
 
     def _let_lead(self, change: Callable[[], None]) -> None:
@@ -170,7 +170,7 @@ class CommandExecutor:
             self._taken_over = True
             self._guard.go_gently()
         if self._lead.words and not text:
-            self._told.append(f"led by {self._lead.words}")
+            self._messages.append(f"led by {self._lead.words}")
 
     def _resume(self, command: Resume, t_s: float) -> CommandReply:
         """Switch the torque on where the joints are; a servo that refuses leaves it off."""

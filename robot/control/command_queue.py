@@ -82,7 +82,7 @@ class CommandQueue:
 
 
 def _without_superseded(taken: list[QueuedCommand]) -> list[QueuedCommand]:
-    """Return the commands without levels that a later one of this tick sets anew."""
+    """Return the commands without levels that a later one of this tick sets again."""
     kept: list[QueuedCommand] = []
     seen: set[str] = set()
     for waiting in reversed(taken):

@@ -1,4 +1,4 @@
-"""What a bus has done, told shortly: the same done to several servos is one line."""
+"""What a bus has done, in short: the same done to several servos is one line."""
 
 import re
 from collections.abc import Iterable, Sequence

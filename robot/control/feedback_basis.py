@@ -1,7 +1,7 @@
 """What is measured and what is only estimated: joints whose servos tell nothing.
 
 A hobby servo takes a place and gives none back. What stands for its place is its goal, moved
-by the speed that it is known to have: nobody sees it stick, slip or swing.
+by the speed that it is known to have: no sensor sees it stick, slip or swing.
 """
 
 from collections.abc import Callable, Collection
@@ -17,10 +17,12 @@ PARTLY = "in part estimated from commands and known servo speeds, not measured"
 
 def estimated_joints(tick: Tick) -> tuple[str, ...]:
     """Return the joints whose servos tell nothing."""
-    told = tick.joints.measured
-    if not told:
+    has_feedback = tick.joints.measured
+    if not has_feedback:
         return ()
-    return tuple([n for n, tells in zip(tick.guard_result.joints, told, strict=True) if not tells])
+    return tuple(
+        [n for n, one in zip(tick.guard_result.joints, has_feedback, strict=True) if not one]
+    )
 
 
 def basis_of(

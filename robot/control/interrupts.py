@@ -28,7 +28,7 @@ class Interrupts:
         also: gives another reason to end, None while there is none.
         signals: note signals; else only ``request`` counts, and handlers stay as they are.
 
-    The first is only noted: whoever works asks for it by calling this object. A second one
+    The first is only recorded: the work asks for it by calling this object. A second one
     raises KeyboardInterrupt, because the work may hang, except where ``held_off`` says
     otherwise. SIGHUP is never a second one: it comes several times from one closed terminal.
     """
@@ -101,7 +101,7 @@ class Interrupts:
         return self._more + (self._first is not None)
 
     def never_raise(self) -> None:
-        """Only note from now on: whoever works here asks often enough."""
+        """Only record from now on: the work asks often enough."""
         self.tolerated = _NEVER
 
     def refuse(self) -> None:

@@ -75,7 +75,7 @@ class LookPoints:
         """Return the face of a person and when it was seen.
 
         Raises:
-            ValueError: nobody of that id is seen; the message says who is.
+            ValueError: no person of that id is seen; the message says who is.
         """
         percept = self.known.percept
         faces = percept.faces if percept is not None else ()
@@ -83,5 +83,5 @@ class LookPoints:
             if face.id == command.id and percept is not None:
                 return face, percept.captured_s
         there = ", ".join(str(face.id) for face in faces)
-        seen = f"there is {there}" if there else "nobody is seen"
+        seen = f"there is {there}" if there else "no one is seen"
         raise ValueError(f"no person {command.id} is seen now; {seen}")

@@ -70,7 +70,7 @@ class Robot:
         guard: Guard,
         tune: Callable[[Tune, float], tuple[str, ...]],
         pixels: PixelToWorld,
-        told: list[str] | None = None,
+        messages: list[str] | None = None,
     ) -> None:
         """Wire the parts.
 
@@ -90,7 +90,7 @@ class Robot:
             guard: between what is desired and the bus.
             tune: puts changed parameters in force and says what was done.
             pixels: places pixels of a camera frame in the world.
-            told: lines for the events of the next tick, to which other parts add theirs.
+            messages: lines for the events of the next tick, to which other parts add theirs.
         """
         self.body = body
         self.camera = camera
@@ -108,12 +108,12 @@ class Robot:
         self._settled = True
         self._commands = CommandQueue()
         self._lead = Lead()
-        self._told: list[str] = told if told is not None else []
-        self._stop = StopControl(self._told)
+        self._messages: list[str] = messages if messages is not None else []
+        self._stop = StopControl(self._messages)
         self._looks = LookPoints(pixels)
         self._executor = CommandExecutor(
             body, self._lead, self._stop, self._menus, attention, oculomotor, animation, gestures,
-            kinematics, guard, tune, self._told, self._looks,
+            kinematics, guard, tune, self._messages, self._looks,
         )  # fmt: skip
 
     @property
@@ -247,8 +247,8 @@ class Robot:
         self._executor.commanded_rad = guard_result.command_rad
         converges = not self._kinematics.one_pan
         lead = self._lead.measure(target, pose, joints.position_rad, converges, t_s)
-        events = (*self._told, *self.body.bus.events(), *self.camera.events())
-        self._told.clear()
+        events = (*self._messages, *self.body.bus.events(), *self.camera.events())
+        self._messages.clear()
         return Tick(
             t_s, joints, pose, detections, percept, target, gaze, desired, guard_result, events, commands,
             self.stopped, self._lead.words, lead,

@@ -1,4 +1,4 @@
-"""Those who are told of every tick, none of whom can end the run."""
+"""Observers of every tick, none of which can end the run."""
 
 from collections.abc import Callable
 from typing import NamedTuple

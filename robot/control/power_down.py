@@ -33,7 +33,7 @@ class PowerDown:
         say: gets the line that tells how it went.
         interrupts: requests to end this program.
         off: what to say of torque that is off.
-        left: what to say of servos that could not be told, after the reason.
+        left: what to say of servos that could not be reached, after the reason.
         quiet: says nothing where the torque went off as it should.
 
     cause: why it ended, for the line; "" says nothing of it

@@ -8,18 +8,18 @@ from gazerig.robot.model.stop_latch import StopLatch
 from gazerig.robot.model.types import JointAngles, JointState
 
 _RELEASE_AGAIN_S = 0.5
-"""After a stop, servos that still report torque are told again so often."""
+"""After a stop, servos that still report torque are sent torque off again so often."""
 
 
 class StopControl:
     """Switches the torque off and on again.
 
     Args:
-        told: takes a line for people of whatever happens.
+        messages: takes a line on whatever happens.
     """
 
-    def __init__(self, told: list[str]) -> None:
-        self._told = told
+    def __init__(self, messages: list[str]) -> None:
+        self._messages = messages
         self._latch = StopLatch()
         self._refused = ""
         self._released_s = 0.0
@@ -33,7 +33,7 @@ class StopControl:
         """Switch the torque off at once."""
         if self._latch.stop(command, t_s):
             by = f" by {command.who}" if command.who else ""
-            self._told.append(f"stopped{by}: {command.why}; torque off")
+            self._messages.append(f"stopped{by}: {command.why}; torque off")
         self._release(body, t_s)
 
     def keep_released(self, body: Body, joints: JointState, t_s: float) -> None:
@@ -43,7 +43,7 @@ class StopControl:
         names = zip(body.names, joints.torque, strict=True)
         holding = [name for name, on in names if on and name not in joints.missing]
         if holding:
-            self._told.append(f"stopped, but {', '.join(holding)} still held: torque off again")
+            self._messages.append(f"stopped, but {', '.join(holding)} still held: torque off again")
             self._release(body, t_s)
 
     def resume(self, command: Resume, body: Body, t_s: float) -> JointAngles | CommandReply:
@@ -51,17 +51,17 @@ class StopControl:
         by = f" by {command.who}" if command.who else ""
         if refusal := self._latch.refusal(command, t_s):
             if refusal != self._refused:  # a flood of them is one line
-                self._told.append(f"resume{by} refused: {refusal}")
+                self._messages.append(f"resume{by} refused: {refusal}")
             self._refused = refusal
             return CommandReply(refusal)
         try:
             goals = body.enable_torque()
         except (SetupError, ServoFault, BusLost) as error:
-            self._told.append(f"still stopped: {error}")
-            return CommandReply(self._told[-1])
+            self._messages.append(f"still stopped: {error}")
+            return CommandReply(self._messages[-1])
         self._latch.lift()
         self._refused = ""
-        self._told.append(f"torque on again{by}: going on slowly")
+        self._messages.append(f"torque on again{by}: going on slowly")
         return goals
 
     def _release(self, body: Body, t_s: float) -> None:
@@ -70,4 +70,4 @@ class StopControl:
         try:
             body.disable_torque()
         except DriverError as error:
-            self._told.append(f"the stop is remembered, torque is NOT YET off: {error}")
+            self._messages.append(f"the stop is remembered, torque is NOT YET off: {error}")

@@ -1,7 +1,7 @@
 """The page's door: the only way in, at the asked address, for those who may come in.
 
-A reverse proxy before viser, which itself listens where nobody else can reach it
-(``gazerig.robot.dashboard.viser_server``). Whoever comes in shows a token, once, in the query of
+A reverse proxy before viser, which itself listens where no other program can reach it
+(``gazerig.robot.dashboard.viser_server``). A client shows a token, once, in the query of
 the first address; a cookie takes its place. That holds on this machine as well, which may have
 other users. The Origin of every websocket and of everything that is sent must be the address of
 this page, and on the loopback that address must be a name of the loopback, or a foreign name
@@ -42,13 +42,13 @@ LOOPBACK = ("127.0.0.1", "::1", "localhost")
 MOST_TABS = 16
 """Tabs that show the page at a time."""
 MOST_LINES = 32
-"""Tabs whose stop button is told the state of the rig."""
+"""Tabs whose stop button receives the state of the rig."""
 
 _SCRIPT = Path(__file__).with_name("stop.js")
 _SCRIPT_TAG = b'<script src="/rig/stop.js"></script>'
 _HEAD = b"<head>"
 _ASKED_PER_S, _ASKED_BURST = 20.0, 40.0  # clicks of all people together
-_TABS_PER_S, _TABS_BURST = 2.0, 20.0  # each is told all there is, which takes a moment
+_TABS_PER_S, _TABS_BURST = 2.0, 20.0  # each receives the whole state, which takes a moment
 _READ_S = 5.0
 _BEAT_S = 1.0
 _RENEWED_EVERY_S = 0.25
@@ -58,7 +58,7 @@ _DAY_S = 86400
 # What a proxy must not hand on: it is about one leg of the way (RFC 9110, 7.6.1).
 _ONE_LEG = {"connection", "transfer-encoding", "content-encoding", "content-length", "keep-alive"}
 _HEADERS = {
-    "X-Frame-Options": "DENY",  # nobody may lay a page of theirs over the buttons
+    "X-Frame-Options": "DENY",  # no other page may lie over the buttons
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
@@ -83,7 +83,7 @@ class AuthProxy:
             inside: the Unix socket of the server
             ask: called in the door's thread with what is sent to the rig
             stop: takes stops, beside and before all else
-            token: what whoever comes in must show
+            token: what a client must show
         """
         self._host = host
         self._port = port

@@ -1,6 +1,6 @@
 """Connections to the page: how many there may be, and how long one may be silent.
 
-A browser needs a handful. Whoever opens hundreds and sends nothing, or sends a byte a second,
+A browser needs a handful. A client that opens hundreds and sends nothing, or sends a byte a second,
 must not keep others from pressing STOP, so that the one who has been idle longest goes when
 another comes.
 """

@@ -174,7 +174,7 @@ class LeadView:
 
 def _leader(led: str) -> str:
     """Show who leads on one line, always present: the buttons below must not move."""
-    text = f"led by <b>{escape(led)}</b>" if led else "led by nobody"
+    text = f"led by <b>{escape(led)}</b>" if led else "no client leads"
     cut = "height:1.5em;overflow:hidden;text-overflow:ellipsis;white-space:nowrap"
     return _note(f"<div title='{escape(led)}' style='{cut}'>{text}</div>")
 

@@ -89,7 +89,7 @@ class JogPanel:
 
     def show(self, snapshot: Snapshot) -> None:
         """Write the measured angles; sliders that are not held follow them."""
-        if snapshot.t_s < self._now_s:  # the rig's clock was started anew
+        if snapshot.t_s < self._now_s:  # the rig's clock was started again
             self._held.clear()
         self._now_s = snapshot.t_s
         places = {joint: i for i, joint in enumerate(snapshot.joints)}

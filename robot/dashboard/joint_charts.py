@@ -107,7 +107,7 @@ class JointSeries:
             self.joints = snapshot.joints
         self.estimated = frozenset(snapshot.estimated)
         for row in snapshot.trail:
-            if self._rows and row.t_s < self._rows[-1].t_s:  # the rig's clock was started anew
+            if self._rows and row.t_s < self._rows[-1].t_s:  # the rig's clock was started again
                 self._rows.clear()
             self._rows.append(row)
         while len(self._rows) > 1 and self._rows[-1].t_s - self._rows[1].t_s >= TRACE_S:

@@ -1,4 +1,4 @@
-"""How well the control loop keeps its time, told from the times of its ticks alone."""
+"""How well the control loop keeps its time, measured by the times of its ticks alone."""
 
 from collections import deque
 

@@ -12,7 +12,7 @@ from gazerig.robot.model.types import Snapshot
 
 @dataclass
 class OverlayChoices:
-    """Which of them are wanted; changed by whoever looks at the page."""
+    """Which of them are wanted; changed by the users of the page."""
 
     ghost: bool = True
     camera: bool = True

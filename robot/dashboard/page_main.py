@@ -120,7 +120,7 @@ def watch(feed: socket.socket, view: PageView, parent: int, door: AuthProxy) -> 
     """Draw what comes until the other side is gone.
 
     Raises:
-        RuntimeError: nobody can come in any more; a page that is started anew may help.
+        RuntimeError: no browser can connect any more; a page that is started again may help.
     """
     pause = threading.Event()
     while True:
@@ -145,7 +145,7 @@ def _limit_process() -> None:
     os.nice(_NICENESS)
     least, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (max(least, min(_MOST_FILES, most)), most))
-    # Standard error is kept in memory, and whoever sends rubbish would fill it with complaints.
+    # Standard error is kept in memory, and a client that sends rubbish fills it with complaints.
     logging.disable(logging.CRITICAL)
 
 

@@ -97,7 +97,7 @@ class PageProcess:
     A page process that dies is started again, at the same address, after a while that grows.
 
     dropped: snapshots the page did not take; frames_dropped: the same for frames
-    started: how often the page has come up; who feeds it begins anew when this changes
+    started: how often the page has come up; its feed starts again when this changes
     gone: it has ended and is not started again
     """
 
@@ -142,7 +142,7 @@ class PageProcess:
         """Start a process, and talk to it."""
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         stops, their_stops = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        # The page's own words are of interest only if it dies, and a pipe nobody reads fills.
+        # The page's own words are of interest only if it dies, and a pipe without a reader fills.
         self._errors_fd = os.memfd_create("page_errors")
         self._folder = tempfile.mkdtemp(prefix="gazerig-page-")
         with theirs, their_stops:

@@ -77,7 +77,7 @@ class PanelView:
     def update(self, snapshots: tuple[Snapshot, ...]) -> None:
         """Remember every snapshot for traces and figures, also those that are not drawn.
 
-        One from before the last, of a rig or recording that begins anew, begins all anew.
+        One from before the last, of a rig or recording that starts again, resets all.
         """
         for snapshot in snapshots:
             if snapshot.t_s < self._last_s:
@@ -114,7 +114,7 @@ class PanelView:
         self.draw_all()
 
     def draw_all(self) -> None:
-        """Draw everything at the next frame, whoever's turn it is."""
+        """Draw everything at the next frame, whichever element is due."""
         self._shown = 0
 
     def show_frame(self, jpeg: bytes) -> None:

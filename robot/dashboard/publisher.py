@@ -2,7 +2,7 @@
 
 The loop leaves its newest tick in one slot. A thread turns it into the status line,
 the page's snapshots and the camera image with what was found in it; a slow terminal
-or browser delays nobody but itself.
+or browser delays only itself.
 """
 
 import contextlib

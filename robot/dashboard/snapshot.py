@@ -206,8 +206,8 @@ def _estimated(joints: JointState, names: tuple[str, ...]) -> tuple[str, ...]:
     """Return the joints whose position is not measured; where nothing is said of it, none."""
     if not joints.measured:
         return ()
-    told = zip(names, joints.measured, strict=True)
-    return tuple([name for name, measured in told if not measured])
+    pairs = zip(names, joints.measured, strict=True)
+    return tuple([name for name, measured in pairs if not measured])
 
 
 def _lower_lids(pose: GazeState, names: tuple[str, ...]) -> tuple[float, float] | None:

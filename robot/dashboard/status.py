@@ -105,7 +105,7 @@ def _without_feedback(snapshot: Snapshot) -> str:
     torque = dict(zip(snapshot.joints, snapshot.servos.torque, strict=False))
     without_torque = sum(not torque.get(joint, True) for joint in estimated)
     where = "shown where they should be"
-    if without_torque:  # a finger moves them, and nobody sees it
+    if without_torque:  # a finger moves them, and no sensor sees it
         where += f"; {'all' if without_torque == len(estimated) else without_torque} without torque: may be anywhere"
     return (
         f"<div style='color:{AMBER}'>{len(estimated)} of "

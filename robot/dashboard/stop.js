@@ -2,7 +2,7 @@
 //
 // It stands outside of everything that viser draws, and talks to the rig over the page's
 // door by a connection of its own, which stands before it is needed. The space bar does the
-// same, unless somebody types. A stop is sent again until the rig has taken it. A click into
+// same, unless the user types. A stop is sent again until the rig has taken it. A click into
 // the camera image makes the head look there.
 
 (() => {
@@ -126,7 +126,7 @@
   // Who stopped is asked about as well where it was not here: they may have their hands in it.
   function question() {
     const other = !state.stopped.includes(`(${state.you})`);
-    return other ? `Not stopped here: ${state.stopped}. Is nobody's hand in the mechanism? ${how()}`
+    return other ? `Not stopped here: ${state.stopped}. Is no hand in the mechanism? ${how()}`
       : `Fingers out? ${how()}`;
   }
 
@@ -204,12 +204,12 @@
     return false;
   }
 
-  // Caught before anybody else sees it: a space would also press the button in focus.
+  // Caught before other handlers see it: a space would also press the button in focus.
   function key(event) {
     if (event.code !== "Space" || state.recording || typing(event.target)) return;
     event.preventDefault();
     event.stopImmediatePropagation();
-    if (event.type === "keydown" && !event.repeat) halt("somebody pressed the space bar");
+    if (event.type === "keydown" && !event.repeat) halt("the space bar was pressed on the page");
   }
 
   // The camera image is the one that is called so, in the panel or laid out large.
@@ -241,9 +241,9 @@
     document.head.append(style);
     document.body.append(bar);
     // Pressed, not released: a hand that trembles may leave the button before it lets go.
-    stop.addEventListener("pointerdown", () => halt("somebody pressed STOP on the page"));
+    stop.addEventListener("pointerdown", () => halt("STOP was pressed on the page"));
     stop.addEventListener("click", (event) => { // a screen reader or Enter clicks only
-      if (event.detail === 0) halt("somebody pressed STOP on the page");
+      if (event.detail === 0) halt("STOP was pressed on the page");
     });
     document.addEventListener("click", pick, true);
     document.addEventListener("mouseover", hover, true);

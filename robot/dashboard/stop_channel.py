@@ -38,7 +38,7 @@ class StopSender:
         try:
             return await asyncio.wait_for(asyncio.shield(waiting), _ANSWERED_WITHIN_S)
         except TimeoutError:
-            if self._waiting is waiting:  # the next one sends anew
+            if self._waiting is waiting:  # the next one sends again
                 self._waiting = None
             raise OSError("the rig does not answer") from None
 

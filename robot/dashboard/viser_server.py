@@ -1,6 +1,6 @@
 """The viser server behind the page's door: on a Unix socket that no other user can reach.
 
-Viser asks nobody who they are. On a port of the loopback every user of the machine, and every
+Viser authenticates no client. On a port of the loopback every user of the machine, and every
 page that is open in a browser here, could talk to it past the door.
 """
 

@@ -147,5 +147,5 @@ class GuardedBus:
         """Return feedback in which the first answer of a servo after torque-on says so."""
         here = self._rearmed.difference(feedback.missing)
         self._rearmed -= here
-        rearmed = [anew or i in here for i, anew in enumerate(feedback.rearmed)]
+        rearmed = [reset or i in here for i, reset in enumerate(feedback.rearmed)]
         return feedback._replace(rearmed=tuple(rearmed))

@@ -4,7 +4,7 @@ HANG_S = 0.4
 """Silence of a loop after which its servos are released.
 
 A loop on a busy machine has been seen up to 0.3 s late. Letting go may take 0.1 s more, so
-that servos are limp half a second after the last sign of life."""
+that the torque of the servos is off half a second after the last sign of life."""
 
 MAX_COUNTED_S = 0.1
 """Silence between two looks counts as no more than this.
@@ -39,5 +39,5 @@ class HangDetector:
         return self.silent_s >= HANG_S
 
     def reset(self) -> None:
-        """Begin anew, as where nothing is armed."""
+        """Reset, as where nothing is armed."""
         self.silent_s = 0.0

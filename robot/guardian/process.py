@@ -112,7 +112,7 @@ class ProgramWatch:
         plan = self._plans[i]
         port = port_of(plan.port, exclusive)
         try:
-            mute = self._releasers[i](port)
+            unconfirmed = self._releasers[i](port)
         except DriverError as error:
             if i not in self._complained:
                 say(f"guardian: {why}; not released yet: {error}")
@@ -120,8 +120,8 @@ class ProgramWatch:
             return False
         finally:
             port.closePort()
-        named = ", ".join(map(str, mute))
-        unsure = f"; not confirmed by {named}: cut the servo power" if mute else ""
+        named = ", ".join(map(str, unconfirmed))
+        unsure = f"; not confirmed by {named}: cut the servo power" if unconfirmed else ""
         say(f"guardian: {why}: {describe(plan)}{unsure}")
         return True
 

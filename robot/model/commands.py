@@ -31,7 +31,7 @@ class LookAt(NamedTuple):
     """Look at a point of the world instead of the models' target; None: choose freely again.
 
     p_world_m: metres, x ahead, y left, z up of the neck base
-    who: who asks, in words; stay: until told otherwise; else for as long as ``Renew`` comes
+    who: who asks, in words; stay: until another command; else for as long as ``Renew`` comes
         at least every ``gazerig.robot.model.lead.HEARTBEAT_S``
     for_s: ends after so many seconds; None: without such an end
     """
@@ -74,7 +74,7 @@ class LookAtDirection(NamedTuple):
 
 
 class LookAtPerson(NamedTuple):
-    """Look at a person and follow, until nobody has seen the person for some time.
+    """Look at a person and follow, until the person was out of sight for some time.
 
     id: of the person, as perception counts them
     who, stay, for_s: as in LookAt
@@ -151,7 +151,7 @@ class Play(NamedTuple):
 
 
 class Renew(NamedTuple):
-    """The heartbeat of one who leads the gaze or the joints; of anybody else it does nothing."""
+    """The heartbeat of one who leads the gaze or the joints; from others it does nothing."""
 
     who: str = ""
 
@@ -251,7 +251,7 @@ def from_recording(data: dict[str, object]) -> Command:
     """Read a command of a recorded run.
 
     Those of runs made before leads could lapse and stops be guarded say nothing of it: they
-    stayed, and whoever asked could resume.
+    stayed, and any client could resume.
 
     Raises:
         ValueError: as ``from_json``.

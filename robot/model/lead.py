@@ -79,12 +79,12 @@ class Lead:
 
     @property
     def active(self) -> bool:
-        """True while anybody leads."""
+        """True while a client leads."""
         return bool(self.words)
 
     @property
     def needs_camera(self) -> bool:
-        """True unless somebody has chosen a point or joints, which are there without a camera."""
+        """True unless a client has chosen a point or joints, which are there without a camera."""
         return not self.words or self.person is not None
 
     def look(self, command: Look, point: Vec3 | None, t_s: float) -> None:
@@ -92,7 +92,7 @@ class Lead:
 
         point: where what the command names is in the world; None: nowhere, the gaze is free
         """
-        self._leave(f"{command.who or 'somebody'} looks elsewhere")
+        self._leave(f"{command.who or 'a client'} looks elsewhere")
         self.point = point
         self._shifts += 1
         self._what = _what(command)
@@ -113,7 +113,7 @@ class Lead:
             self.pose_rad = ()
             self._jogged.clear()
             if self.point is None and self.person is None:
-                self._leave(f"{command.who or 'somebody'} has returned the joints")
+                self._leave(f"{command.who or 'a client'} has returned the joints")
             self._describe()
             return
         if command.who != self._who:
@@ -166,7 +166,7 @@ class Lead:
             return None
         return Target(
             self.point, (0.0, 0.0, 0.0), t_s, "puppet", -1, 1.0, True, None,
-            self._shifts, "somebody chose this point",
+            self._shifts, "a user chose this point",
         )  # fmt: skip
 
     def measure(
@@ -204,7 +204,7 @@ class Lead:
             return None
         return Target(
             known.p_world_m, known.v_world_m_s, self._seen_s, "face", known.id, 1.0, True, None,
-            self._shifts, f"face {known.id}: somebody chose it",
+            self._shifts, f"face {known.id}: a user chose it",
         )  # fmt: skip
 
     def _take(self, command: Leading, t_s: float) -> None:
@@ -232,7 +232,7 @@ class Lead:
         else:
             self.words = ""
             return
-        self.words = f"{self._who or 'somebody'}: {what}"
+        self.words = f"{self._who or 'a client'}: {what}"
 
 
 def _what(command: Look) -> str:

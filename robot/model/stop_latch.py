@@ -6,7 +6,7 @@ Pure: times are those of the ticks, so a recorded run is stopped and resumed as 
 from gazerig.robot.model.commands import Resume, Stop
 
 MIN_HOLD_S = 2.0
-"""A stop lasts at least so long, whoever asks for its end."""
+"""A stop lasts at least so long, also for its asker."""
 MIN_RESUME_GAP_S = 1.0
 """A resume within this of the last one of the same asker is refused, and counts as the last."""
 _MAX_ASKERS = 32
@@ -25,7 +25,7 @@ class StopLatch:
         self._asked_s: dict[tuple[str, bool], float] = {}
 
     def stop(self, command: Stop, t_s: float) -> bool:
-        """Stop, or hold a stop anew; True if it is a new one."""
+        """Stop, or renew a stop; True if it is a new one."""
         new = not self.why
         if new:
             self._stoppers.clear()
@@ -53,7 +53,7 @@ class StopLatch:
         if left_s > 0.0:
             return f"a stop holds at least {MIN_HOLD_S:g} s: ask again in {left_s:.1f} s"
         if not command.confirmed and self._stoppers != {command.who}:
-            by = f"stopped by {self.by}" if self.by else "somebody else stopped it"
+            by = f"stopped by {self.by}" if self.by else "another client stopped it"
             return f"{by}: another may only resume who confirms that no hand is in the mechanism"
         return ""
 

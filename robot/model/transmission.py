@@ -78,7 +78,7 @@ class Curve:
             if (steps[i] > steps[i - 1]) != up or steps[i] == steps[i - 1]:
                 raise ValueError(
                     "the positions of a linkage must all rise or all fall; "
-                    f"place {i + 1} goes back: measure it anew"
+                    f"place {i + 1} goes back: measure it again"
                 )
         self.rising = up
         self._angles, self._steps = tuple(angles_rad), tuple(float(s) for s in steps)

@@ -67,7 +67,7 @@ class JointState(NamedTuple):
     fault: latched hardware errors in words, "" where none
     load: share of the servo's stall torque, signed, -1..1
     temperature_c, voltage_v: None before the first reading
-    rearmed: the torque came on anew with the measured position as goal
+    rearmed: the torque came on again with the measured position as goal
     measured: False where the servo tells nothing: position and velocity are its goal moved
         by the speed it is known to have
     """

@@ -103,7 +103,7 @@ class EgomotionResidual:
         )
 
     def _stands(self, t_s: float, views: dict[int, Vec3], seen: list[TrackedPoint]) -> None:
-        """Believe what is where it was before the turn, and begin anew."""
+        """Believe what is where it was before the turn, and start again."""
         for id_ in sorted(views.keys() & self._turns.keys()):
             turn = self._turns[id_]
             same = norm(sub(views[id_], turn.view)) < _STILL_RAD

@@ -14,9 +14,9 @@ from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, rays
 
 NEAR_RAD = 0.12
-"""A pixel within 7 deg of somebody means something as far away as they are."""
+"""A pixel within 7 deg of a person means something as far away as they are."""
 USUAL_M = 1.5
-"""How far away a thing counts as where nobody knows: across a desk and a step more."""
+"""How far away a thing counts as where none is known: across a desk and a step more."""
 
 _PATCH = 0.03  # of the frame's width, the square whose depth is read
 
@@ -48,7 +48,7 @@ class PixelToWorld:
         Args:
             pixel: (x, y) from the centre of the upper left one, x right, y down.
             found: the newest frame, whose size and lens count.
-            percept: what it showed, for the distance of a pixel beside somebody.
+            percept: what it showed, for the distance of a pixel beside a person.
             distance_m: from the camera; None: the depth measured there, or that of what is near.
             captured_s: exposure of the frame with the pixel; None: the newest frame.
         """

@@ -9,7 +9,7 @@ from gazerig.robot.model.types import JointAngles
 
 
 class ForwardingBody(Body):
-    """Hands what it is told on to the body behind it; whoever derives from it says the rest."""
+    """Forwards every call to the body behind it; subclasses add to that."""
 
     def __init__(self, body: Body) -> None:
         # Not set up as a body of its own: it has no joints, only the other's.

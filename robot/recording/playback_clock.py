@@ -58,7 +58,7 @@ class PlaybackClock:
         return PlaybackState(at_s, self._duration_s, self._playing, self._speed, self._sought_s)
 
     def play(self, now_s: float) -> None:
-        """Go on; from the end it begins anew."""
+        """Go on; from the end it starts again."""
         at_s = self.state(now_s).at_s
         self._stand(0.0 if at_s >= self._duration_s - _SAME_S else at_s, now_s)
         self._playing = True

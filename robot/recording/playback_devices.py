@@ -25,7 +25,7 @@ H = TypeVar("H", bound=BodyRecord)
 
 
 class PlaybackBody(ForwardingBody):
-    """A body that does what it is told, and says what the recorded one said.
+    """A body that follows commands, and reports what the recorded one reported.
 
     The body behind it sees every call, so that its bus carries the bytes of the first run.
     """

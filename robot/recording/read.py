@@ -57,7 +57,7 @@ class _ChunkIndex(NamedTuple):
 
 
 class RunRecording:
-    """A recording made by ``gazerig run --record``; reading begins anew with every call.
+    """A recording made by ``gazerig run --record``; reading starts again with every call.
 
     path: the file
     info: the run as it was started; end: how it ended
@@ -215,12 +215,12 @@ class RunRecording:
         while left > 0 and (piece := file.read(min(left, _CRC_PIECE))):
             found, left = zlib.crc32(piece, found), left - len(piece)
         if found != wanted:
-            raise BadRecording(f"{self.path} is damaged (wrong check sum): copy it anew")
+            raise BadRecording(f"{self.path} is damaged (wrong check sum): copy it again")
 
     def _records(self, file: BinaryIO) -> Iterator[tuple[int, int, int]]:
         """Walk over the records that are whole: kind, offset and length of each."""
         end = file.seek(0, 2)
-        # Whoever wrote these bytes had written all that comes before.
+        # The program that wrote these bytes had written all that comes before.
         closed = end > 2 * len(MAGIC) and _bytes(file, end - len(MAGIC), len(MAGIC)) == MAGIC
         offset = len(MAGIC)
         while offset + _HEAD <= end:
@@ -228,7 +228,7 @@ class RunRecording:
             kind, length = head[0], int.from_bytes(head[1:], "little")
             cut = offset + _HEAD + length > end
             if length > _LARGEST or kind not in _KINDS or (cut and closed):
-                raise BadRecording(f"{self.path} is damaged after byte {offset}: copy it anew")
+                raise BadRecording(f"{self.path} is damaged after byte {offset}: copy it again")
             if cut:
                 return
             yield kind, offset + _HEAD, length
@@ -236,7 +236,7 @@ class RunRecording:
                 return
             offset += _HEAD + length
         if closed:
-            raise BadRecording(f"{self.path} is damaged after byte {offset}: copy it anew")
+            raise BadRecording(f"{self.path} is damaged after byte {offset}: copy it again")
 
 
 def _refuse_leap(before_s: float | None, t_s: float) -> None:
@@ -278,7 +278,7 @@ def used(path: Path) -> Iterator[None]:
         raise
     except DAMAGE as error:
         what = f"{type(error).__name__}: {' '.join(str(error).split())[:80]}"
-        raise BadRecording(f"{path} holds what no run gives ({what}): record anew") from error
+        raise BadRecording(f"{path} holds what no run gives ({what}): record again") from error
 
 
 @contextmanager
@@ -290,7 +290,7 @@ def _damage(path: Path) -> Iterator[None]:
         raise
     except DAMAGE as error:
         what = " ".join(str(error).split())[:80]
-        raise BadRecording(f"{path} is damaged ({what}): copy it anew") from None
+        raise BadRecording(f"{path} is damaged ({what}): copy it again") from None
 
 
 def _bytes(file: BinaryIO, offset: int, length: int) -> bytes:

@@ -14,7 +14,7 @@ _VIEWED_EVERY_S = 0.0399  # a little under 40 ms, so that rounding does not turn
 
 
 class RecordRouter:
-    """Writes one run, in the order in which it is told."""
+    """Writes one run, in the order of the calls."""
 
     def __init__(self, writer: RunWriter) -> None:
         self._writer = writer

@@ -42,8 +42,8 @@ class Replay:
         self._number, self._frame = -1, -1
         self._still = 0
         self._missing: int | None = None
-        self._told: PlaybackState | None = None
-        self._told_s, self._introduced = 0.0, False
+        self._sent: PlaybackState | None = None
+        self._sent_s, self._introduced = 0.0, False
 
     def handle_request(self, data: Mapping[str, object]) -> str | None:
         """Do what a person at the page asks for; give the refusal. From any thread."""
@@ -95,7 +95,7 @@ class Replay:
             if screen.send(self._frames.message(number)):
                 self._number, self._still, self._missing = number, 0, None
         elif screen.send(self._frames.bare(number)):
-            # Backwards the page begins anew: it knows of nothing that was before.
+            # Backwards the page starts again: it knows of nothing that was before.
             first = self._number + 1 if passed > 0 else 0
             self._missing = first if self._missing is None else min(first, self._missing)
             self._number, self._still = number, 0
@@ -123,11 +123,11 @@ class Replay:
 
     def _due(self, state: PlaybackState, now_s: float) -> bool:
         """Return whether the page is to know: at once what a person changed, else now and then."""
-        told = self._told
-        if told is None or state._replace(at_s=told.at_s) != told:
+        sent = self._sent
+        if sent is None or state._replace(at_s=sent.at_s) != sent:
             return True
-        leapt = state.at_s != told.at_s and not state.playing
-        return leapt or now_s - self._told_s >= (_SLIDE_S if state.playing else _BEAT_S)
+        leapt = state.at_s != sent.at_s and not state.playing
+        return leapt or now_s - self._sent_s >= (_SLIDE_S if state.playing else _BEAT_S)
 
     def begin_anew(self) -> None:
         """Introduce the recording again: the page that knew it has died, and another is there."""
@@ -137,7 +137,7 @@ class Replay:
         more = {} if self._introduced else introduction(self._frames)
         message = REPLAY + json.dumps({**state._asdict(), **more}).encode()
         if screen.send(message):
-            self._told, self._told_s, self._introduced = state, now_s, True
+            self._sent, self._sent_s, self._introduced = state, now_s, True
 
 
 def introduction(frames: SnapshotIndex) -> dict[str, object]:

@@ -52,7 +52,7 @@ class SnapshotIndex:
         """Read everything.
 
         rate_hz, character: of the run; rig: how it was built, where that is known
-        progress: is told how many seconds are read
+        progress: takes how many seconds are read
 
         Raises:
             SetupError: there is no tick.

@@ -1,7 +1,7 @@
 """The loop's side of the process that writes a recording: hands over and never waits.
 
 What the socket does not take stays in a queue until it does. Beyond the queue's bound
-what is handed over is lost, and the caller is told. Without the process all goes on.
+what is handed over is lost, which is reported. Without the process all goes on.
 """
 
 import pickle

@@ -40,26 +40,26 @@ def main(socket_fd: int, file_fd: int) -> None:
     """Write until the other side is gone or says that the run is over."""
     os.nice(_NICE)
     with socket.socket(fileno=socket_fd) as rig:
-        told = _told(rig, os.getppid())
-        first = next((one for one in told if one is not None), None)
+        messages = _messages(rig, os.getppid())
+        first = next((one for one in messages if one is not None), None)
         if first is None:
             return
         _, (about, started_ns) = first
         writer = RunWriter(file_fd, about, started_ns)
-        end = _write(told, writer, rig, RealClock())
+        end = _write(messages, writer, rig, RealClock())
         writer.close(end)
         _answer(rig, FAILED if writer.failed else DONE, writer.failed or tuple(writer.written))
 
 
 def _write(
-    told: Iterator[tuple[str, Any] | None], writer: RunWriter, rig: socket.socket, clock: Clock
+    messages: Iterator[tuple[str, Any] | None], writer: RunWriter, rig: socket.socket, clock: Clock
 ) -> RunEnd:
-    """Write what is told; give how the run ended."""
+    """Write the messages; return how the run ended."""
     scribe = RecordRouter(writer)
     end = RunEnd()
     flushed_s = synced_s = clock.now_s()
     said = False
-    for one in told:
+    for one in messages:
         if one is not None:
             kind, values = one
             if kind == END:
@@ -92,7 +92,7 @@ def _take(scribe: RecordRouter, kind: str, values: Any) -> None:
         scribe.health(BusHealth(*counts), lost)
 
 
-def _told(rig: socket.socket, parent: int) -> Iterator[tuple[str, Any] | None]:
+def _messages(rig: socket.socket, parent: int) -> Iterator[tuple[str, Any] | None]:
     """Return what is handed over, None where nothing comes for a while, until the end.
 
     parent: the program's process; one that it forked may hold the socket open after its death

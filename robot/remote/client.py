@@ -96,7 +96,7 @@ class RobotClient:
     def connect(cls, pid: int | None = None, who: str = "") -> "RobotClient":
         """Find the one rig that runs, or the one of this process.
 
-        who: what people are told of who asks, e.g. "my show"; the process is added
+        who: the name of this client in messages, e.g. "my show"; the process is added
 
         Raises:
             NoRobotError: none runs, or several and ``pid`` does not say which.
@@ -300,7 +300,7 @@ class RobotClient:
         """Switch the torque on again where the joints are, and go on slowly.
 
         confirmed: a person has said that no hand is in the mechanism; it is needed where
-            somebody else has stopped it
+            another client has stopped it
 
         Raises:
             RequestRejected: a servo refuses it, or a rule of stops forbids it; the torque
@@ -366,7 +366,7 @@ def running(pid: int | None = None, who: str = "") -> list[RobotClient]:
     """
     uid = os.getuid()
     place = folder(os.environ, uid)
-    if not is_private(place, uid):  # whoever put a socket there is not known
+    if not is_private(place, uid):  # who put a socket there is not known
         return []
     found: list[RobotClient] = []
     for path, number in sockets(place).items():

@@ -136,7 +136,7 @@ class FileWatch:
                 path: self._watched.get(path) or Settling(look(path)) for path in files
             }
             new = [path for path, settling in self._watched.items() if settling.update(look(path))]
-        # Not under the lock: who is told may be waiting for a thread that saves.
+        # Not under the lock: the receiver may be waiting for a thread that saves.
         for path in new:
             self._changed(path)
 

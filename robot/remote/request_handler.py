@@ -189,7 +189,7 @@ class RequestHandler:
 
 
 def _signed(peer: str, command: Command) -> Command:
-    """Return a command with the process that asks: nobody can pose as another, or as the page."""
+    """Return a command with the process that asks: none can pose as another, or as the page."""
     who = str(getattr(command, "who", ""))
     return signed(command, f"{who} ({peer})" if who else peer) if peer else command
 

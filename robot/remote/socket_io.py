@@ -1,7 +1,7 @@
 """The socket of a running rig: where it is, and JSON lines through it, one each way.
 
 A Unix socket in a folder of the user's own: who may open files of the user may steer the
-head, nobody else; nothing of it is seen from another machine.
+head, no other user; nothing of it is seen from another machine.
 """
 
 import contextlib
@@ -50,7 +50,7 @@ def make_private(path: Path, uid: int) -> None:
     """Create a folder that only its owner can enter, or check that it is one.
 
     Raises:
-        SetupError: somebody else could put a socket there, or it cannot be made.
+        SetupError: another user could put a socket there, or it cannot be made.
     """
     try:
         with contextlib.suppress(FileExistsError):
@@ -155,7 +155,7 @@ def clear_dead(path: Path) -> tuple[int, ...]:
         except ConnectionRefusedError:
             place.unlink(missing_ok=True)
             dead.append(pid)
-        except OSError:  # busy or gone: nobody's business here
+        except OSError:  # busy or gone: not this program's concern
             continue
     return tuple(dead)
 
@@ -198,7 +198,7 @@ class Wire:
             raise MalformedMessage(f"not a line of JSON: {error}", over=False) from None
 
     def close(self) -> None:
-        """Close this end; whoever waits at either end is told."""
+        """Close this end; a reader at either end sees the end."""
         with contextlib.suppress(OSError):
             self._end.shutdown(socket.SHUT_RDWR)
         self._end.close()

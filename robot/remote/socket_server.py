@@ -100,7 +100,7 @@ class RemoteServer:
                 continue
             wire = Wire(end, REQUEST_BYTES)
             with self._lock:
-                if self._listener is None:  # closed since: nobody would hang up on this one
+                if self._listener is None:  # closed since: nothing would close this one
                     wire.close()
                     return
                 if len(self._wires) >= _MOST:

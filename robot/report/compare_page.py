@@ -128,12 +128,12 @@ def compare_page(
 
 def banners(abouts: tuple[RunHeader, RunHeader], runs: Sequence[GazeTrace]) -> tuple[str, ...]:
     """Return what a reader must know first: which runs were not measured, or differ in it."""
-    told = [
+    messages = [
         f"{about.name}: {text}"
         for about, run in zip(abouts, runs, strict=True)
         if (text := banner(run.joints))
     ]
-    return (*told, *filter(None, (mixed(abouts, runs),)))
+    return (*messages, *filter(None, (mixed(abouts, runs),)))
 
 
 def mixed(abouts: tuple[RunHeader, RunHeader], runs: Sequence[GazeTrace]) -> str:

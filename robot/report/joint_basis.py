@@ -96,7 +96,7 @@ _RULES: tuple[tuple[Sequence[str], Callable[[JointBasis], bool], str], ...] = (
     (
         ("unasked",),
         _eyes_estimated,
-        "Saccades that nobody asked for are left out: an estimated eye does as it is told, whatever "
+        "Saccades that no model asked for are left out: an estimated eye follows its command, whatever "
         "the real one does.",
     ),
 )

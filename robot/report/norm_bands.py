@@ -1,6 +1,6 @@
 """What is measured, between which limits people lie, and who has found that.
 
-The limits are published means with their spread, not wishes. Where a model of this robot is
+The limits are published means with their spread, not targets. Where a model of this robot is
 built to do something else, a note says so; the verdict stays what it is.
 """
 
@@ -95,7 +95,7 @@ BANDS: tuple[NormBand, ...] = (
          "2 to 3 fixations a second, up to 4 (Ruhland et al. 2015)", "", (_NO_WALK, _ONE_POINT)),
     NormBand("too_soon", SACCADES, "saccades less than 100 ms after another", "share", 0.0, 0.1, 30,
          "150 ms between saccades, 50 to 100 at the least (Lee, Badler & Badler 2002)"),
-    NormBand("unasked", SACCADES, "saccades that nobody asked for: servos that swing", "share",
+    NormBand("unasked", SACCADES, "saccades that no model asked for: servos that swing", "share",
          0.0, 0.1, 30, "people land within half a degree, whatever the size (Collewijn et al. "
          "1988)"),
     NormBand("rest_error", SACCADES, "gaze off its target between saccades, median", "deg", 0.0, 1.0,
@@ -175,7 +175,7 @@ BANDS: tuple[NormBand, ...] = (
     NormBand("bout_think", SOCIAL, "mean look away while thinking", "s", 2.3, 4.8, 10,
          "Andrist et al. 2014: 3.54 +- 1.26 s", "think"),
     NormBand("longest_look", SOCIAL, "longest look at a face", "s", 0.0, 15.0, 1,
-         "longer is a stare: nobody does (Lee, Badler & Badler 2002)", "", (_STARES,)),
+         "longer is a stare: people do not (Lee, Badler & Badler 2002)", "", (_STARES,)),
     NormBand("mutual", SOCIAL, "mean time in which both faces are turned to each other", "s",
          1.0, 10.0, 5, "Rogers et al. 2018: 2.2 s; Binetti et al. 2016: 3.3 s is what people like; "
          "the person's own eyes are not seen, only the turn of the face", "", (_STARES,)),

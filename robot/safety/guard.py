@@ -265,9 +265,9 @@ class Guard:
         )
 
     def _rearm(self, joints: JointState) -> None:
-        """Begin where the bus has put the goals of joints whose torque came on anew."""
-        for i, (angle, anew) in enumerate(zip(joints.position_rad, joints.rearmed, strict=True)):
-            if anew and isfinite(angle):
+        """Begin where the bus has put the goals of joints whose torque came on again."""
+        for i, (angle, rearmed) in enumerate(zip(joints.position_rad, joints.rearmed, strict=True)):
+            if rearmed and isfinite(angle):
                 self._begin(i, angle)
                 self._stuck.forget(i)
                 self._retreat[i] = None
@@ -336,7 +336,7 @@ class Guard:
         return _Hold("stale frame") if unseen else None
 
     def _is_stuck(self, i: int, joints: JointState, fresh: bool) -> bool:
-        """Return whether a joint is told to move and does not."""
+        """Return whether a joint is commanded to move and does not."""
         if self._stuck.holds(i, self._t_s):
             return True
         # Where a servo tells nothing, its place is no news of what it met.

@@ -53,7 +53,7 @@ class JointHealth:
         self._take(params)
         self._heated = [min(heat, self._full) for heat in self._heated]
         self._outside_s = [min(s, self._outside_full_s) for s in self._outside_s]
-        self._seen = ((), ())  # what the servos said last is judged anew
+        self._seen = ((), ())  # what the servos said last is judged again
         self._counting = True
 
     def step(self, joints: JointState, dt_s: float) -> None:

@@ -29,7 +29,7 @@ class MotionLimiter:
         self._desired = list(self.command)
 
     def restart(self, i: int, angle_rad: float) -> None:
-        """Begin anew from an angle, at rest."""
+        """Reset to an angle, at rest."""
         self.command[i] = self._desired[i] = angle_rad
         self.speed[i] = 0.0
 

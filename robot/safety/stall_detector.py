@@ -1,4 +1,4 @@
-"""Joints that are told to move and do not: a jam, a blocked lid, a finger.
+"""Joints that are commanded to move and do not: a jam, a blocked lid, a finger.
 
 A servo pushes harder the farther its goal is away, so what does not move must not be
 pushed: the command comes back to where the joint is, waits, and tries again softly.

@@ -10,7 +10,7 @@ from random import Random
 
 from gazerig.sim_mock.replies import Answer, Piece
 
-NOBODY = -1
+NO_DEVICE = -1
 """Id of pieces that no servo sent: noise, echo, babble."""
 
 BABBLE_BYTES_S = 20_000
@@ -157,12 +157,12 @@ class ActiveFaults:
             out += self._late(hurt, now_s)
             again = self.take("duplicate", piece.servo_id, now_s) is not None
             if again and not fast:
-                out.append(Piece(NOBODY, hurt.data))
+                out.append(Piece(NO_DEVICE, hurt.data))
             repeat = repeat or again
             if cut and fast:
                 break
         if fast and repeat:
-            out += [Piece(NOBODY, piece.data) for piece in out]
+            out += [Piece(NO_DEVICE, piece.data) for piece in out]
         return self._amid_noise(out, pieces, now_s)
 
     def _damaged(self, piece: Piece, now_s: float) -> tuple[Piece, bool]:
@@ -198,13 +198,13 @@ class ActiveFaults:
         if not pieces:
             return out
         if self.take("fragment", pieces[0].servo_id, now_s):
-            out.insert(0, Piece(NOBODY, self._header))
+            out.insert(0, Piece(NO_DEVICE, self._header))
         before = self.take("noise_before", None, now_s)
         if before is not None:
-            out.insert(0, Piece(NOBODY, self._noise(before)))
+            out.insert(0, Piece(NO_DEVICE, self._noise(before)))
         after = self.take("noise_after", None, now_s)
         if after is not None:
-            out.append(Piece(NOBODY, self._noise(after)))
+            out.append(Piece(NO_DEVICE, self._noise(after)))
         return out
 
     def _noise(self, fault: LineFault) -> bytes:

@@ -7,7 +7,7 @@ kinds and calls the method of the device's faults that does it.
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-EVERYBODY = ("all", "*")
+ALL_DEVICES = ("all", "*")
 BOTH = ("count", "for")
 TIME = ("for",)
 
@@ -138,7 +138,7 @@ def whole(low: int, high: int, what: str) -> Callable[[str], int]:
 
 def or_all(read: Callable[[str], int]) -> Callable[[str], int | None]:
     """Make a reader of ids that also takes ``all``, which is None."""
-    return lambda text: None if text in EVERYBODY else read(text)
+    return lambda text: None if text in ALL_DEVICES else read(text)
 
 
 def one_of(*values: str) -> Callable[[str], str]:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from gazerig.sim_mock.device import DeviceReply
-from gazerig.sim_mock.faults.active import NOBODY, ActiveFaults, LineFault
+from gazerig.sim_mock.faults.active import NO_DEVICE, ActiveFaults, LineFault
 from gazerig.sim_mock.faults.grammar import CommandTable
 from gazerig.sim_mock.replies import Piece
 
@@ -72,7 +72,7 @@ class LineFaults(ABC):
 
     def label(self, servo_id: int | None) -> str:
         """Return a servo's label for messages."""
-        return "everybody" if servo_id is None else f"{self.noun} {servo_id}"
+        return "all" if servo_id is None else f"{self.noun} {servo_id}"
 
     def begin(
         self,
@@ -144,8 +144,8 @@ class LineFaults(ABC):
         """Add the host's echo and a babbling node to replies, if the line has such faults."""
         now_s = self._chain.now_s()
         if self.wire.on("echo", now_s):
-            replies.insert(0, DeviceReply(len(data), [Piece(NOBODY, data)]))
+            replies.insert(0, DeviceReply(len(data), [Piece(NO_DEVICE, data)]))
         babble = self.wire.babble(now_s)
         if babble:
-            replies.insert(0, DeviceReply(0, [Piece(NOBODY, babble)]))
+            replies.insert(0, DeviceReply(0, [Piece(NO_DEVICE, babble)]))
         return replies

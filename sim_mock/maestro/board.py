@@ -9,7 +9,7 @@ and scripts but for the one that a fault starts. Source: Pololu Maestro User's G
 from collections.abc import Callable, Sequence
 
 from gazerig.sim_mock.device import DeviceReply
-from gazerig.sim_mock.faults.active import NOBODY
+from gazerig.sim_mock.faults.active import NO_DEVICE
 from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec, build_servos
 from gazerig.sim_mock.maestro.body import MaestroBody
 from gazerig.sim_mock.maestro.channel import EmulatedChannel
@@ -207,7 +207,7 @@ class EmulatedMaestro:
         self.body.feed()
         if answer is None:
             return []
-        asked = command.data[0] if command.code == GET_POSITION else NOBODY
+        asked = command.data[0] if command.code == GET_POSITION else NO_DEVICE
         return self._sent(Piece(asked, answer))
 
     def _lost(self) -> bool:

@@ -52,7 +52,7 @@ class MaestroBody:
         """Return whether it does not just restart."""
         return self._period >= self._awake_from
 
-    # --- what it is told
+    # --- commands
 
     def send_all(self, where: OnError) -> None:
         """Send every channel to where it is to be at start or on an error."""

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 from gazerig.sim_mock.device import DeviceReply
-from gazerig.sim_mock.faults.active import NOBODY
+from gazerig.sim_mock.faults.active import NO_DEVICE
 from gazerig.sim_mock.faults.hobby import HobbyFaults
 from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec, build_servos
 from gazerig.sim_mock.pca9685.body import BusStuck, NotAcknowledged, Pca9685Body
@@ -132,7 +132,7 @@ class Bridge:
                 if len(text) < at + 3:
                     break
                 known = text[at + 1] == STATUS_REGISTER and text[at + 2] == STOP
-                said = [Piece(NOBODY, bytes((self._status,)))] if known else []
+                said = [Piece(NO_DEVICE, bytes((self._status,)))] if known else []
                 at += 3
                 yield at - kept, self._sent(said)
             elif text[at] == START:
@@ -184,10 +184,10 @@ class Bridge:
         return said
 
     def _whose(self, part: _Part) -> int:
-        """Return the channel whose registers are read, NOBODY where it is not one's alone."""
+        """Return the channel whose registers are read, NO_DEVICE where it is not one's alone."""
         register = self._pointers.get(part.address, 0) - LED0
         if part.length != 4 or register % 4 or not 0 <= register < 4 * CHANNELS:
-            return NOBODY
+            return NO_DEVICE
         return self._order.get(part.address, 0) * CHANNELS + register // 4
 
 

@@ -66,7 +66,7 @@ class TerminalLine:
         self.settings = settings
         self._now_s, self._say, self._warn = now_s, say, warn
         self.device = build(settings.device, now_s, settings.seed)
-        for case, value in {**_patience(settings.device), **settings.choices}.items():
+        for case, value in {**_packet_gap(settings.device), **settings.choices}.items():
             self.device.choose(case, value)
         self.line = ServoLine(self.device, settings.wire_time, settings.turnaround_us * 1e-6)
         link = None if settings.link is None else Path(os.path.abspath(settings.link))
@@ -94,7 +94,7 @@ class TerminalLine:
         watch = self.terminal.watch
         return [fd for fd in (self.terminal.master, -1 if watch is None else watch.fd) if fd >= 0]
 
-    def patience_s(self) -> float:
+    def wait_s(self) -> float:
         """Return how long to sleep if nothing arrives."""
         due_s = self.line.next_due_s()
         if due_s is not None:
@@ -191,6 +191,6 @@ class TerminalLine:
         return self.labelled({"ok": done})
 
 
-def _patience(device: Emulated) -> dict[str, str]:
+def _packet_gap(device: Emulated) -> dict[str, str]:
     """Return the case that makes a device wait longer for the rest of a packet."""
     return {PACKET_GAP: str(GAP_MS)} if PACKET_GAP in CASES.get(device.kind, {}) else {}

@@ -70,8 +70,8 @@ class Server:
                 watched = [fd for line in self.lines for fd in line.watched()]
                 if commands is not None:
                     watched.append(commands)
-                patience_s = min([line.patience_s() for line in self.lines])
-                ready, _, _ = select.select(watched, (), (), patience_s)
+                wait_s = min([line.wait_s() for line in self.lines])
+                ready, _, _ = select.select(watched, (), (), wait_s)
                 now_s = time.monotonic()
                 if commands in ready and not self._take_commands(commands):
                     if self._settings.until_eof:

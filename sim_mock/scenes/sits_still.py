@@ -1,6 +1,6 @@
 """The scene ``sits-still``: a person who sits before the robot, faces it and does not move.
 
-For everything that a person does with the robot and not before it. Nobody real sits as
+For everything that a person does with the robot and not before it. No real person sits as
 still: no sway, no glance aside, no blink.
 """
 

@@ -1,6 +1,6 @@
 """The scene ``steps-aside``: a person who stands before the robot and steps 40 deg aside.
 
-The case in which a head that turns to where somebody *was* overshoots. One step to the
+The case in which a head that turns to where a person *was* overshoots. One step to the
 left and back in a round, each in 0.7 s: over 0.75 m that takes 0.9 g sideways, about as
 much as shoes on a floor give. Peak speed 2.0 m/s, 105 deg/s as seen by the robot.
 """

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from typing import Any, Generic, TypeVar
 
 from gazerig.sim_mock.device import DeviceReply
-from gazerig.sim_mock.faults.active import NOBODY
+from gazerig.sim_mock.faults.active import NO_DEVICE
 from gazerig.sim_mock.faults.grammar import CommandTable
 from gazerig.sim_mock.replies import BROADCAST, Answer, Piece, merge
 from gazerig.sim_mock.smart_servo.addresses import AddressTable, at_baud
@@ -193,7 +193,9 @@ class ServoChain(Generic[S, Q]):
         """Answer a client at a wrong baud rate: nothing, or garbage made of its own bytes."""
         if self.quirks.wrong_baud == "silence" or not data:
             return []
-        return [DeviceReply(len(data), [Piece(NOBODY, bytes(b & 0x6E | 0x80 for b in data[::2]))])]
+        return [
+            DeviceReply(len(data), [Piece(NO_DEVICE, bytes(b & 0x6E | 0x80 for b in data[::2]))])
+        ]
 
     def _execute(self, instruction: Instruction) -> list[Piece]:
         """Let the addressed servos carry out one instruction; return what they send."""

@@ -150,7 +150,7 @@ class Shaft:
     u, effort: PWM and torque (which is current) as shares
     supply: open-circuit voltage, and
     volts: present voltage, both as shares of the rated one
-    quiet: nothing will change until something is written or someone pushes
+    quiet: nothing will change until something is written or a hand pushes
     """
 
     __slots__ = (
@@ -326,7 +326,7 @@ class Shaft:
     def skip(self, ticks: int) -> None:
         """Skip a long time: the shaft moves as far as its profile, between its stops.
 
-        What is not at rest after seconds of nobody asking is led by a slow profile, turns
+        What is not at rest after seconds without a question is led by a slow profile, turns
         for ever, or hunts around its goal; the last stays as it is.
         """
         if self.quiet or ticks <= 0:

@@ -155,13 +155,15 @@ def unplug(times: int) -> None:
         bus.open()
         bus.enable_torque()
         for _ in range(times):
-            _cycles(bus, lambda told: False, 0.3)
+            _cycles(bus, lambda reported: False, 0.3)
             bus.events()
             server.command("unplug")
-            notices.append(_cycles(bus, lambda told: "lost" in " ".join(bus.events()), 5.0))
-            _cycles(bus, lambda told: False, 0.5)
+            notices.append(_cycles(bus, lambda reported: "lost" in " ".join(bus.events()), 5.0))
+            _cycles(bus, lambda reported: False, 0.5)
             server.command("plug")
-            returns.append(_cycles(bus, lambda told: all(told.torque) and not told.missing, 5.0))
+            returns.append(
+                _cycles(bus, lambda reported: all(reported.torque) and not reported.missing, 5.0)
+            )
         bus.disable_torque()
         bus.close()
     table = Table("", "median ms", "worst ms", title=f"unplugged for 0.5 s, {times} times, 100 Hz")
@@ -220,22 +222,22 @@ def dice(cycles: int) -> None:
         began = now[0]
         truth.clear()
         truth.append(chain.positions_steps())
-        told = bus.read(now[0])
+        reported = bus.read(now[0])
         truth.append(chain.positions_steps())
         longest = max(longest, now[0] - began)
-        missing += len(told.missing)
-        values += len(IDS) - len(told.missing)
-        for at, *places in zip(told.position_steps, *truth, strict=True):
+        missing += len(reported.missing)
+        values += len(IDS) - len(reported.missing)
+        for at, *places in zip(reported.position_steps, *truth, strict=True):
             stale += isfinite(at) and not min(places) - 1 <= at <= max(places) + 1
         bus.write([2048 + round(300 * ((k / 40 + i / 9) % 2 - 1)) for i in IDS])
     chain.faults.clear()
     for _ in range(300):
         now[0] += 0.01
-        told = bus.read(now[0])
+        reported = bus.read(now[0])
     table = Table(title=f"faults by the dice, {cycles} cycles at 100 Hz, simulated time")
     for head in ("injected", "values", "missing", "stale as fresh", "longest read", "well after"):
         table.add_column(head)
-    well = sum(told.torque) - len(told.missing)
+    well = sum(reported.torque) - len(reported.missing)
     row = (injected, values, missing, stale, f"{longest * 1e3:.0f} ms", f"{well} of 9")
     table.add_row(*map(str, row))
     out.print(table)

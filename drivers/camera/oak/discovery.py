@@ -11,7 +11,7 @@ from typing import Any
 from gazerig.drivers.errors import CameraError
 
 UDEV_RULE = 'SUBSYSTEM=="usb", ATTRS{idVendor}=="03e7", MODE="0666"'
-"""What lets everybody use the camera (Luxonis documentation, troubleshooting)."""
+"""What lets all users use the camera (Luxonis documentation, troubleshooting)."""
 _VENDOR = "03e7"  # Movidius, the chip in every OAK with USB
 _RIGHTS = (
     "an OAK camera is plugged in but may not be opened: put this line into "

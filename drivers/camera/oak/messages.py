@@ -51,7 +51,7 @@ def faces_of(
 ) -> tuple[DetectedFace, ...] | None:
     """Return the faces that the camera found, the largest first; None where it did not look.
 
-    Detections without five landmarks are left out: nobody could tell where they look.
+    Detections without five landmarks are left out: their gaze is unknown.
     """
     if FACES not in names(group):
         return None

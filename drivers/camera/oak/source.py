@@ -14,7 +14,7 @@ from gazerig.drivers.camera.oak.sdk import load_depthai
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
 
-_SLICE = timedelta(milliseconds=100)  # so long may a wish to stop be unheard
+_SLICE = timedelta(milliseconds=100)  # so long may a request to stop wait
 # The camera's stamp in host time is believed if it is no older than this, nor of the future.
 _OLDEST_STAMP_S = 1.0
 
@@ -101,8 +101,8 @@ class OakSource:
 
     def events(self) -> tuple[str, ...]:
         """Return new events, one line each: USB 2 instead of 3, a clock that jumped."""
-        told, self._events = tuple(self._events), []
-        return told
+        reported, self._events = tuple(self._events), []
+        return reported
 
     def close(self) -> None:
         """Stop and free the camera; safe to call twice."""

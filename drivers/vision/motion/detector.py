@@ -152,7 +152,7 @@ class MotionDetector:
         turn = float(np.degrees(turn_rad(ego, now.grey, now.K))) / dt_s
         why = self._cannot_tell(pair, ego, turn)
         if why:
-            self._tracks.pass_over(ego.total, now.captured_s, dt_s)
+            self._tracks.predict(ego.total, now.captured_s, dt_s)
             return MotionReport((), why, turn, ego.share, ego.noise_px)
         things = what_moves(pair, ego, self._params)
         groups = gathered(things, self._params)
@@ -192,7 +192,7 @@ class MotionDetector:
         return tuple(
             self._blob(group, motion, follow, now, depth, dt_s)
             for group, (_, motion), follow in zip(groups, motions, follows, strict=True)
-            if self._tracks.told(follow)
+            if self._tracks.confirmed(follow)
         )
 
     def _blob(

@@ -1,7 +1,7 @@
 """Which moving patch is which from image to image, in the image alone.
 
 Each is looked for where its last motion, and the camera's, should have taken it. Nearest
-pairs are joined first; a thing must be seen in a few images in a row before it is told.
+pairs are joined first; a thing must be seen in a few images in a row before it is reported.
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ class PatchTrack:
     """One patch through time, in pixels of the small image.
 
     centre: (2,); velocity_px_s: (2,)
-    offset: (2,) from there to the point of it that was told last
+    offset: (2,) from there to the point of it that was reported last
     size_px: root of the box's area
     seen: images in a row
     """
@@ -64,7 +64,7 @@ class MotionTracks:
 
         total: (3, 3) homography of the camera's own motion, older image to newer
         """
-        self.pass_over(total, t_s, dt_s)
+        self.predict(total, t_s, dt_s)
         found: dict[int, PatchTrack] = {}
         taken: set[int] = set()
         for _, i, j in sorted(self._pairs(centres, sizes_px)):
@@ -86,7 +86,7 @@ class MotionTracks:
                 follow.seen = 0  # a flicker, not a thing: it starts again
         return [found[j] for j in range(len(centres))]
 
-    def pass_over(self, total: Floats, t_s: float, dt_s: float) -> None:
+    def predict(self, total: Floats, t_s: float, dt_s: float) -> None:
         """Predict every track to ``t_s`` and delete those unseen for too long."""
         forget_s = self._params.forget_ms / 1e3
         self._follows = [f for f in self._follows if t_s - f.seen_s <= forget_s]
@@ -99,7 +99,7 @@ class MotionTracks:
         """Forget everything; numbers are not used again."""
         self._follows = []
 
-    def told(self, follow: PatchTrack) -> bool:
+    def confirmed(self, follow: PatchTrack) -> bool:
         """Return whether a patch has been seen often enough."""
         return follow.seen >= self._params.confirm_frames
 

@@ -75,7 +75,7 @@ def _channels(
             what = f"the board has channels 0..{channels - 1} only"
             yield Diagnostic("error", what, where, "correct its id in the YAML")
         elif setup.id not in pulses:
-            remedy = "let all servos go limp and look again"
+            remedy = "stop the pulses of all servos and look again"
             yield Diagnostic("note", UNASKED, where, remedy)
         elif pulse is None:
             what = "the board does not answer about this channel"

@@ -125,7 +125,7 @@ _DYNAMIXEL = ServoChecks(
             "homing_offset", 0, "warn",
             lambda v: f"Homing Offset {v}: position mode heeds only -1024..1024 of it, and some "
             "firmware wraps the position by a whole turn when the torque comes on",
-            f"set it to 0 with {WIZARD}, then calibrate its zero anew: gazerig calibrate",
+            f"set it to 0 with {WIZARD}, then calibrate its zero again: gazerig calibrate",
         ),
     ),
     protection=Protection(

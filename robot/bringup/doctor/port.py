@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from gazerig.drivers.serial.list_ports import (
-    WISHED_LATENCY_MS,
+    RECOMMENDED_LATENCY_MS,
     Access,
     Host,
     SerialPort,
@@ -22,7 +22,7 @@ from gazerig.robot.bringup.doctor.diagnostics import Diagnostic
 UDEV_FILE = "/etc/udev/rules.d/99-servo-bus.rules"
 UDEV_RULE = (
     'ACTION=="add", SUBSYSTEM=="usb-serial", DRIVER=="ftdi_sio", '
-    f'ATTR{{latency_timer}}="{WISHED_LATENCY_MS}"'
+    f'ATTR{{latency_timer}}="{RECOMMENDED_LATENCY_MS}"'
 )
 
 
@@ -98,7 +98,7 @@ def examine_latency(device: str, host: Host) -> list[Diagnostic]:
     ms = latency_ms(file)
     if ms is None:
         return [Diagnostic("note", "its latency timer cannot be read", device, f"look into {file}")]
-    if ms <= WISHED_LATENCY_MS:
+    if ms <= RECOMMENDED_LATENCY_MS:
         return [Diagnostic("ok", f"hands answers over after {ms} ms (latency timer)", device)]
     return [
         Diagnostic(
@@ -106,7 +106,7 @@ def examine_latency(device: str, host: Host) -> list[Diagnostic]:
             f"keeps short answers back for {ms} ms (latency timer): about "
             f"{1000 // (ms or 1)} readings a second at most",
             device,
-            f"now: echo {WISHED_LATENCY_MS} | sudo tee {file}; for good, in {UDEV_FILE}: "
+            f"now: echo {RECOMMENDED_LATENCY_MS} | sudo tee {file}; for good, in {UDEV_FILE}: "
             f"{UDEV_RULE}",
         )
     ]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from gazerig.drivers.errors import DriverError, PortError, SetupError
 from gazerig.drivers.serial.list_ports import (
-    WISHED_LATENCY_MS,
+    RECOMMENDED_LATENCY_MS,
     Host,
     latency_file,
     latency_ms,
@@ -209,11 +209,11 @@ def fix_latency(device: str, host: Host) -> list[AppliedFix]:
     """Set the adaptor's latency timer where it is too long; needs the right to write it."""
     file = latency_file(device, host)
     was = None if file is None else latency_ms(file)
-    if file is None or was is None or was <= WISHED_LATENCY_MS:
+    if file is None or was is None or was <= RECOMMENDED_LATENCY_MS:
         return []
     done = set_latency(file)
     how = "done" if done else f"not done, {file} may not be written"
-    return [AppliedFix(device, f"latency timer {was} -> {WISHED_LATENCY_MS} ms: {how}", done)]
+    return [AppliedFix(device, f"latency timer {was} -> {RECOMMENDED_LATENCY_MS} ms: {how}", done)]
 
 
 def apply_fixes(

@@ -90,7 +90,7 @@ def _voltage_latch(state: ServoState) -> Iterator[RuleResult]:
     limits = f"{(low or 0) / 10.0:.1f}..{(high or 0) / 10.0:.1f} V"
     yield RuleResult(
         "note",
-        f"a moment outside {limits} makes it limp until it is restarted "
+        f"a moment outside {limits} switches its torque off until it is restarted "
         f"({register.capitalize()} {value})",
         "size the supply for all servos at once, and feed long chains at both ends; "
         "gazerig reboot brings a latched servo back",

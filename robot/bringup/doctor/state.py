@@ -94,7 +94,7 @@ def _torque(state: ServoState) -> Iterator[RuleResult]:
         yield RuleResult(
             "warn",
             "its torque is on though no program runs it; its settings cannot be changed so",
-            f"hold the joint, it goes limp: gazerig reboot {state.setup.id}",
+            f"hold the joint, its torque goes off: gazerig reboot {state.setup.id}",
         )
 
 

@@ -81,7 +81,7 @@ class ServoChecks:
     registers: those that rules ask for
     ping_only: Status Return Level 0 means that nothing but pings is answered
     out_of_voltage: what comes of a supply outside the limits
-    error_remedies: by the error; {id} stands for the servo's; errors that are told by their
+    error_remedies: by the error; {id} stands for the servo's; errors that are found by their
         measured value alone have ""
     unlimited_at_zero: both position limits 0 mean none at all
     firmware_notes: of a model, the first that applies is said

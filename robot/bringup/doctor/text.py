@@ -14,8 +14,8 @@ def grouped(findings: Sequence[Diagnostic]) -> list[tuple[Level, str, str, str]]
     groups: dict[tuple[Level, str, str], list[str]] = {}
     for finding in findings:
         groups.setdefault((finding.level, finding.what, finding.remedy), []).append(finding.where)
-    told = [(level, together(at), what, cure) for (level, what, cure), at in groups.items()]
-    return sorted(told, key=lambda row: -LEVELS.index(row[0]))
+    rows = [(level, together(at), what, cure) for (level, what, cure), at in groups.items()]
+    return sorted(rows, key=lambda row: -LEVELS.index(row[0]))
 
 
 def together(places: Sequence[str]) -> str:

@@ -261,7 +261,7 @@ def _mount(job: _Job, eye: _Eye, neck: Neck, camera: CameraParams, good: HandEye
     if (camera.lens.width_px, camera.lens.height_px) != (width, height):
         raise SetupError(
             f"frames are {width} x {height}, the lens was measured on {camera.lens.width_px} x "
-            f"{camera.lens.height_px}: calibrate it anew (--what all)"
+            f"{camera.lens.height_px}: calibrate it again (--what all)"
         )
     lens = intrinsics_of_lens(camera.lens, radians(camera.horizontal_field_deg), width, height)
     yaw, pitch, roll = (neck_span(job.rig, name) for name in NECK)

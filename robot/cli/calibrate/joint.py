@@ -222,11 +222,16 @@ def _off_after(
 ) -> Iterator[None]:
     """Switch the torque off however the block ends; nothing is printed if that works."""
 
-    def told(line: str) -> None:
+    def report_line(line: str) -> None:
         say(f"{who}: {line}")
 
     with PowerDown(
-        None, torque_off, told, Interrupts.of(stopped), left=": cut the servo power", quiet=True
+        None,
+        torque_off,
+        report_line,
+        Interrupts.of(stopped),
+        left=": cut the servo power",
+        quiet=True,
     ) as way_out:
         way_out.switch_on(lambda: None)  # what follows does it, at a time of its own
         yield
@@ -242,4 +247,4 @@ def _warn_of_neck(name: str, person: SteeringPerson) -> None:
         return
     asked = f"{name} will move by itself, and sink when the torque goes off: hold the head. Go on?"
     if not person.agrees(asked):
-        raise CalibrationRefused(f"{name}: left out as you wished")
+        raise CalibrationRefused(f"{name}: left out as you asked")
