@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gazerig.config.export import suggestion
 from gazerig.config.load import ConfigError, ConfigFault, load, shipped, shipped_names
 from gazerig.config.rig import Rig
 from gazerig.gaze.gesture import Gesture, faults_of, loop_fault
@@ -108,6 +109,14 @@ def gesture_rules(rig: Rig) -> Iterable[tuple[str, str]]:
                 yield f"gesture_files.{i}", str(fault)
         except GestureRefused as refused:
             yield f"gesture_files.{i}", f"{file}: {refused}"
+    for behaviour, rule in rig.gaze.top_down.rules.items():
+        if rule.gesture and rule.gesture not in known:
+            near = suggestion(rule.gesture, sorted(known)) or ";"
+            there = ", ".join(sorted(known))
+            yield (
+                f"gaze.top_down.rules.{behaviour}.gesture",
+                f"no gesture {rule.gesture!r}{near} there is {there}",
+            )
 
 
 def _refuse_beyond(rig: Rig, gesture: Gesture) -> None:

@@ -31,6 +31,10 @@ class Rule:
     salience: Annotated[float, Bounds(0, 10), "salience of the rule's target (A_attack, A_guard, A_face)"]
     point_world_m: Annotated[tuple[float, float, float] | None, Bounds(-100, 100),
         "position to look at: ahead, left and above of the neck base"] = None
+    gesture: Annotated[str, "gesture that is played once when the gaze comes to what the rule names; empty: none"] = ""
+    gesture_at: Annotated[str, 
+        "kind of body at which it is played wherever the rule looks, e.g. hand; empty: what look_at names"] = ""
+    gesture_refractory_s: Annotated[float, Bounds(0, 3600), "shortest time between two of its gestures"] = 10.0
     # fmt: on
 
     def __post_init__(self) -> None:
@@ -114,6 +118,11 @@ class TopDown:
         before, self._params = self._params, params
         if params.behaviour != before.behaviour or self.behaviour not in params.rules:
             self.behaviour = params.behaviour
+
+    @property
+    def rule(self) -> Rule:
+        """Return the rule in force."""
+        return self._params.rules[self.behaviour]
 
     @property
     def behaviours(self) -> tuple[str, ...]:

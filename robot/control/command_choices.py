@@ -7,6 +7,7 @@ from gazerig.gaze.aversion import MODES, Aversion
 from gazerig.gaze.expression import Expressions
 from gazerig.gaze.lids import Lids
 from gazerig.gaze.top_down import TopDown
+from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.model.commands import Ask, Jog
 from gazerig.robot.model.joint_limit import JointLimit
 
@@ -22,13 +23,20 @@ LID_COMMANDS: dict[str, Callable[[Lids, float], None]] = {
 """What can be asked of the lids."""
 
 
-class Menus:
-    """What a person can choose from: behaviours, modes of conversation, lids, expressions."""
+NO_GESTURE = "none"
+"""Chosen from the menu of gestures, it ends the one under way."""
 
-    def __init__(self, aversion: Aversion, lids: Lids, expressions: Expressions) -> None:
+
+class Menus:
+    """What a person can choose from: behaviours, conversation, lids, expressions, gestures."""
+
+    def __init__(
+        self, aversion: Aversion, lids: Lids, expressions: Expressions, gestures: GestureChoices
+    ) -> None:
         self._aversion = aversion
         self._lids = lids
         self._expressions = expressions
+        self._gestures = gestures
 
     def offered(self, top_down: TopDown) -> dict[str, tuple[str, ...]]:
         """Return menu -> choices, the present one first."""
@@ -39,6 +47,9 @@ class Menus:
         }
         if names := self._expressions.names:
             menus["expression"] = _first(self._expressions.name, names)
+        menus["gesture"] = _first(
+            self._gestures.playing or NO_GESTURE, (NO_GESTURE, *self._gestures.names)
+        )
         return menus
 
     def choose(self, command: Ask, top_down: TopDown, t_s: float) -> None:

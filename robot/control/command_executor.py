@@ -3,10 +3,12 @@
 from collections.abc import Callable
 
 from gazerig.gaze.animation import Animation
+from gazerig.gaze.gesture_trigger import GestureTrigger
 from gazerig.gaze.oculomotor import Oculomotor
+from gazerig.gaze.types import Target
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import TargetChooser
-from gazerig.robot.control.command_choices import Menus
+from gazerig.robot.control.command_choices import NO_GESTURE, Menus
 from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.control.look_point import LookPoints
 from gazerig.robot.control.reachability import jog_reply, look_reply
@@ -74,7 +76,12 @@ class CommandExecutor:
         self._animation, self._gestures = animation, gestures
         self._guard, self._tune, self._messages, self._looks = guard, tune, messages, looks
         self._taken_over = False
+        self._trigger = GestureTrigger()
         self.commanded_rad: JointAngles = ()
+
+    def reset(self) -> None:
+        """Forget what rules have played."""
+        self._trigger.reset()
 
     def models_take_over(self) -> bool:
         """Return once whether the gaze models lead again, from where head and eyes are."""
@@ -95,6 +102,8 @@ class CommandExecutor:
     def execute(self, command: Command, t_s: float) -> CommandReply:
         """Carry out one command; return its reply."""
         match command:
+            case Ask("gesture", name):
+                return self.execute(Play("" if name == NO_GESTURE else name), t_s)
             case Ask():
                 self._menus.choose(command, self._attention.top_down, t_s)
             case _ if isinstance(command, Leading):
@@ -161,6 +170,20 @@ class CommandExecutor:
             by = f" for {command.who}" if command.who else ""
             self._messages.append(f"gesture{by}: {reply.text()}")
         return reply
+
+    def gesture_by_rule(self, target: Target, t_s: float) -> None:
+        """Play the gesture of the rule in force when the gaze comes to what it names.
+
+        Args:
+            target: what attracts the gaze.
+            t_s: now.
+        """
+        top_down = self._attention.top_down
+        name = self._trigger.step(top_down.behaviour, top_down.rule, target, t_s)
+        if name and not self._stop.why and not self._lead.active:
+            reply = self._play(Play(name, who=f"rule {top_down.behaviour}"), t_s)
+            if reply.refused:
+                self._told.append(f"gesture for rule {top_down.behaviour} {reply.words()}")
 
     def _let_lead(self, change: Callable[[], None]) -> None:
         """Change who leads; the models begin gently where they take joints over."""

@@ -101,7 +101,7 @@ class Robot:
         self._scanpath = scanpath
         self._aversion = aversion
         self._oculomotor = oculomotor
-        self._menus = Menus(aversion, lids, animation.expressions)
+        self._menus = Menus(aversion, lids, animation.expressions, gestures)
         self._animation = animation
         self._gestures = gestures
         self._guard = guard
@@ -213,6 +213,7 @@ class Robot:
         self._aversion.reset(t_s)
         self._oculomotor.reset(t_s, pose)
         self._animation.reset(t_s)
+        self._executor.reset()
         self._executor.commanded_rad = goals
 
     def tick(self, t_s: float, dt_s: float) -> Tick:
@@ -230,7 +231,9 @@ class Robot:
         detections = self.camera.latest(t_s)
         percept = self.perception.see(detections, self._poses)
         self._looks.known = Known(pose, detections, percept)
-        target = self._lead.target(self.attention.choose(percept, pose, t_s), percept, t_s)
+        chosen = self.attention.choose(percept, pose, t_s)
+        self._executor.gesture_by_rule(chosen, t_s)
+        target = self._lead.target(chosen, percept, t_s)
         target = self._scanpath.wander(target, percept, t_s, self._settled, pose.p_world_head_m)
         target = self._aversion.step(target, pose.p_world_head_m, t_s)
         offset = self._animation.step(t_s)

@@ -1,0 +1,49 @@
+"""When the rule in force makes the head gesture: once, as the gaze comes to what it names."""
+
+from math import inf
+
+from gazerig.gaze.top_down import Rule
+from gazerig.gaze.types import Target
+
+
+class GestureTrigger:
+    """Finds the onsets at which rules play their gestures."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what was looked at and when a gesture was played."""
+        self._seen: tuple[str, bool] = ("", False)
+        self._played_s: dict[str, float] = {}
+
+    def step(self, behaviour: str, rule: Rule, target: Target, t_s: float) -> str:
+        """Return the gesture to play now, "" for none.
+
+        Args:
+            behaviour: in force.
+            rule: of this behaviour.
+            target: what the gaze goes to.
+            t_s: now.
+        """
+        if not rule.gesture:
+            return ""
+        before = self._seen == (behaviour, True)
+        named = _is_named(rule, target)
+        self._seen = behaviour, named
+        ready_s = self._played_s.get(behaviour, -inf) + rule.gesture_refractory_s
+        if before or not named or t_s < ready_s:
+            return ""
+        self._played_s[behaviour] = t_s
+        return rule.gesture
+
+
+def _is_named(rule: Rule, target: Target) -> bool:
+    """Return whether a target is what makes the rule's gesture."""
+    if rule.gesture_at:
+        return target.kind == rule.gesture_at
+    if rule.body_id is not None:
+        return target.id == rule.body_id
+    if rule.point_world_m is not None:
+        return target.p_world_m == rule.point_world_m
+    return target.kind == rule.look_at
