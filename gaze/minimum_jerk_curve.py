@@ -4,14 +4,14 @@ A curve of least integrated squared jerk through given values is a fifth-order s
 jerk and snap are continuous at every value it passes (Flash and Hogan 1985; Todorov and
 Jordan 1998). Where the direction turns back or a value is held, the curve comes to rest (speed
 and acceleration 0), so that it does not swing past the values that somebody has chosen as its
-extremes. Any unit; speed and acceleration are per second.
+extremes; where the curve of least jerk would swing back on its way from one to the next, it goes
+slower through the values in between. Any unit; speed and acceleration are per second.
 """
 
 from bisect import bisect_right
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
 
@@ -37,8 +37,7 @@ class MinimumJerkCurve:
             raise ValueError("the times of the keys must increase from 0, one for each value")
         position = np.array([start, *values])
         speed, acceleration = _states(position, span)
-        ends = position[:-1], speed[:-1], acceleration[:-1], position[1:], speed[1:], acceleration[1:]  # fmt: skip
-        self._table = _coefficients(span, *ends)
+        self._table = _coefficients(span, *_ends(position, speed, acceleration))
         self._rows = [tuple(row) for row in self._table.tolist()]
         self._knots = knots
         self._starts: list[float] = knots[:-1].tolist()
@@ -77,37 +76,59 @@ def _states(position: Floats, span: Floats) -> tuple[Floats, Floats]:
     speed, acceleration = np.zeros(len(position)), np.zeros(len(position))
     step = np.diff(position)
     passed = np.flatnonzero(step[:-1] * step[1:] > 0.0) + 1
-    if len(passed):
-        _pass(passed, position, span, speed, acceleration)
+    for run in np.split(passed, np.flatnonzero(np.diff(passed) > 1) + 1):
+        if len(run):
+            # From the stop before the keys that are passed to the stop after them.
+            keys = slice(run[0] - 1, run[-1] + 2)
+            speed[run], acceleration[run] = _passing(position[keys], span[run[0] - 1 : run[-1] + 1])
     return speed, acceleration
 
 
-def _pass(
-    passed: NDArray[np.intp],
-    position: Floats,
-    span: Floats,
-    speed: Floats,
-    acceleration: Floats,
-) -> None:
-    """Set speed and acceleration where keys are passed, so that jerk and snap are continuous."""
-    count = len(passed)
+def _passing(position: Floats, span: Floats) -> tuple[Floats, Floats]:
+    """Return speed and acceleration at the keys between two stops.
+
+    Those of least jerk, unless the curve would swing back on its way: then the slower of the
+    mean speeds before and after each key, at which it cannot.
+    """
+    speed, acceleration = _least_jerk(position, span)
+    table = _coefficients(span, *_ends(position, speed, acceleration))
+    s = np.linspace(0.0, 1.0, 33)[:, None] * span
+    c1, c2, c3, c4, c5 = table.T[1:]
+    rates = c1 + s * (2.0 * c2 + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)))
+    forward = np.sign(position[1] - position[0])
+    if (rates * forward < -1e-6 * np.abs(rates).max()).any():
+        mean = np.diff(position) / span
+        slower = np.minimum(np.abs(mean[:-1]), np.abs(mean[1:])) * forward
+        return slower, np.zeros(len(slower))
+    return speed[1:-1], acceleration[1:-1]
+
+
+def _least_jerk(position: Floats, span: Floats) -> tuple[Floats, Floats]:
+    """Return speed and acceleration at all keys such that jerk and snap are continuous."""
+    count = len(position) - 2
+    inner = slice(1, -1)
+    speed, acceleration = np.zeros(len(position)), np.zeros(len(position))
 
     def gaps(unknown: Floats) -> Floats:
-        """Return by how much jerk and snap jump at the keys passed; linear in the unknowns."""
-        speed[passed], acceleration[passed] = unknown[:count], unknown[count:]
-        ends = position[:-1], speed[:-1], acceleration[:-1], position[1:], speed[1:], acceleration[1:]  # fmt: skip
-        _, _, _, c3, c4, c5 = _coefficients(span, *ends).T
+        """Return by how much jerk and snap jump at the inner keys; linear in the unknowns."""
+        speed[inner], acceleration[inner] = unknown[:count], unknown[count:]
+        _, _, _, c3, c4, c5 = _coefficients(span, *_ends(position, speed, acceleration)).T
         jerk = 6.0 * c3 + span * (24.0 * c4 + span * 60.0 * c5)
         snap = 24.0 * c4 + span * 120.0 * c5
-        return np.concatenate(
-            (jerk[passed - 1] - 6.0 * c3[passed], snap[passed - 1] - 24.0 * c4[passed])
-        )
+        return np.concatenate((jerk[:-1] - 6.0 * c3[1:], snap[:-1] - 24.0 * c4[1:]))
 
     at_zero = gaps(np.zeros(2 * count))
     matrix = np.stack([gaps(one) - at_zero for one in np.eye(2 * count)], axis=1)
     # Jerk and snap differ in size by a power of the time; each row gets a largest entry of 1.
     scale = np.abs(matrix).max(axis=1)
     gaps(np.linalg.solve(matrix / scale[:, None], -at_zero / scale))
+    return speed, acceleration
+
+
+def _ends(position: Floats, speed: Floats, acceleration: Floats) -> tuple[Floats, ...]:
+    """Return the states before and after every segment, as ``_coefficients`` takes them."""
+    before = position[:-1], speed[:-1], acceleration[:-1]
+    return *before, position[1:], speed[1:], acceleration[1:]
 
 
 def _coefficients(

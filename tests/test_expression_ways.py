@@ -2,77 +2,19 @@
 
 import asyncio
 from collections.abc import Iterator
-from math import degrees
 
 import pytest
 import viser
-from expressive_rig import started
 from page_visitor import PATIENCE_S
-from typer.testing import CliRunner
+from ticked_rig import TickedRig, connected, gazerig
 
-from gazerig.robot.app.assemble import Assembly
-from gazerig.robot.cli.tune import app
-from gazerig.robot.control.gesture_choices import GestureInfo
 from gazerig.robot.dashboard.animation_panel import AnimationPanel
 from gazerig.robot.model.commands import Command, Express, SetLevel
-from gazerig.robot.model.reply import Ticket
-from gazerig.robot.remote.client import RobotClient
-from gazerig.robot.remote.request_handler import Pulse, RequestHandler
-
-
-class TickedRig:
-    """A rig that ticks once whenever a command comes, and its connection in one object."""
-
-    def __init__(self, made: Assembly) -> None:
-        self.made, self.pulse = made, Pulse(made.clock)
-        self.commands: list[Command] = []
-        self.handler = RequestHandler(self, None, self.pulse, {})
-        self.answer: object = None
-
-    def command(self, command: Command) -> Ticket:
-        ticket = self.made.robot.command(command)
-        self.commands.append(command)
-        self.tick()
-        return ticket
-
-    def tick(self, number: int = 1) -> dict[str, float]:
-        for _ in range(number):
-            self.made.clock.sleep_until(self.made.clock.now_s() + 0.005)
-            tick = self.made.robot.tick(self.made.clock.now_s(), 0.005)
-            self.pulse.update(tick)
-        return dict(zip(self.made.robot.body.names, map(degrees, tick.desired_rad), strict=True))
-
-    def menus(self) -> dict[str, tuple[str, ...]]:
-        return self.made.robot.menus()
-
-    def gestures(self) -> tuple[GestureInfo, ...]:
-        return self.made.robot.gestures()
-
-    def write(self, request: object, within_s: float) -> None:
-        self.answer = self.handler.answer(request)
-
-    def read(self, first_s: float, within_s: float) -> object:
-        return self.answer
-
-    def close(self) -> None:
-        pass
 
 
 @pytest.fixture
 def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[TickedRig]:
-    made = started()
-    rig = TickedRig(made)
-    monkeypatch.setattr(Pulse, "taken_up", lambda *_, **__: True)
-    monkeypatch.setattr(
-        RobotClient, "connect", lambda pid=None, who="": RobotClient(rig, 1)  # type: ignore[arg-type]
-    )  # fmt: skip
-    yield rig
-    made.close()
-
-
-def gazerig(*words: str, typed: str = "") -> str:
-    done = CliRunner().invoke(app, words, input=typed)
-    return done.stdout + done.stderr
+    yield from connected(monkeypatch)
 
 
 def test_an_expression_from_the_command_line(rig: TickedRig) -> None:

@@ -1,17 +1,19 @@
-"""Commands that move the face of a rig which runs in another terminal: expressions and levels."""
+"""Commands that move the face of a rig in another terminal: expressions, levels, gestures."""
 
 import contextlib
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from math import inf
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from gazerig.drivers.errors import SetupError
+from gazerig.gaze.gesture import MAX_COUNT, MAX_SPEED, MIN_SPEED
 from gazerig.robot.cli.lead import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
 from gazerig.robot.model.clock import RealClock
+from gazerig.robot.model.commands import NO_GESTURE
 from gazerig.robot.remote.client import RobotClient
 
 app = typer.Typer()
@@ -56,6 +58,38 @@ def level(
                 for one in values:
                     rig.set_level(name, one)
             rig.set_level(name, 0.0)
+
+
+@app.command()
+def play(
+    gesture: Annotated[
+        str | None, typer.Argument(help="A gesture, e.g. nod; none ends the one under way.")
+    ] = None,
+    speed: Annotated[
+        float, typer.Option("--speed", min=MIN_SPEED, max=MAX_SPEED, help="1 as it was written.")
+    ] = 1.0,
+    count: Annotated[
+        int, typer.Option("--count", min=0, max=MAX_COUNT, help="How often; 0 as it says.")
+    ] = 0,
+    listed: Annotated[bool, typer.Option("--list", help="List the gestures there are.")] = False,
+    pid: PidOption = None,
+) -> None:
+    """Play a gesture on the running head, or list all with what this rig can do of them."""
+    with clear_errors(), RobotClient.connect(pid, "gazerig ctl play") as rig:
+        if gesture is None or listed:
+            for one in rig.gestures():
+                say(_described(one))
+            return
+        say(rig.play("" if gesture == NO_GESTURE else gesture, speed, count).words())
+
+
+def _described(gesture: Mapping[str, Any]) -> str:
+    """Return one line about a gesture."""
+    head = f"{gesture['name']:<14}{gesture['description']}"
+    if gesture["refused"]:
+        return f"{head}; not on this rig: {gesture['refused']}"
+    slower = f", slower by {gesture['slowed_by']:.2f}" if gesture["slowed_by"] > 1.0 else ""
+    return f"{head} ({gesture['duration_s']:.1f} s{slower})"
 
 
 def _kept(value: float, seconds: float | None) -> Iterator[float]:

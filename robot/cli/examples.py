@@ -87,6 +87,12 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("ctl level mouth 0.7 --seconds 2", "the jaw 70 % open for two seconds"),
         ("ctl level mouth -", "values from standard input, one a line"),
     ),
+    "play": (
+        ("ctl play nod", "two nods, with the eyes on the person all the while"),
+        ("ctl play laugh --count 6 --speed 1.2", "longer and faster"),
+        ("ctl play --list", "the gestures, and what this rig can do of them"),
+        ("ctl play none", "end the one under way"),
+    ),
     "status": (
         ("ctl status", "what the running rig looks at and why, guard, joints"),
         ("ctl status --json", "the same for a program"),

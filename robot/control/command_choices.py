@@ -8,7 +8,7 @@ from gazerig.gaze.expression import Expressions
 from gazerig.gaze.lids import Lids
 from gazerig.gaze.top_down import TopDown
 from gazerig.robot.control.gesture_choices import GestureChoices
-from gazerig.robot.model.commands import Ask, Jog
+from gazerig.robot.model.commands import NO_GESTURE, Ask, Jog
 from gazerig.robot.model.joint_limit import JointLimit
 
 _NEAR_END_RAD = radians(0.05)
@@ -21,10 +21,6 @@ LID_COMMANDS: dict[str, Callable[[Lids, float], None]] = {
     "wink right": lambda lids, t_s: lids.wink("right", t_s),
 }
 """What can be asked of the lids."""
-
-
-NO_GESTURE = "none"
-"""Chosen from the menu of gestures, it ends the one under way."""
 
 
 class Menus:

@@ -8,12 +8,13 @@ from gazerig.gaze.oculomotor import Oculomotor
 from gazerig.gaze.types import Target
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import TargetChooser
-from gazerig.robot.control.command_choices import NO_GESTURE, Menus
+from gazerig.robot.control.command_choices import Menus
 from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.control.look_point import LookPoints
 from gazerig.robot.control.reachability import jog_reply, look_reply
 from gazerig.robot.control.stop_control import StopControl
 from gazerig.robot.model.commands import (
+    NO_GESTURE,
     Ask,
     Command,
     Express,

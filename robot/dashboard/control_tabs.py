@@ -5,7 +5,7 @@ from html import escape
 
 import viser
 
-from gazerig.robot.dashboard.animation_panel import EXPRESSION, AnimationPanel
+from gazerig.robot.dashboard.animation_panel import EXPRESSION, GESTURE, AnimationPanel
 from gazerig.robot.dashboard.jog_panel import JogPanel
 from gazerig.robot.dashboard.outbox import Outbox
 from gazerig.robot.dashboard.param_panel import ParamState
@@ -44,6 +44,8 @@ class ControlTabs:
         for name, choices in menus.items():
             if name == EXPRESSION:
                 self._face.offer(choices)
+            elif name == GESTURE:
+                self._face.offer_gestures(choices)
             else:
                 self._lead.offer(name, choices)
 

@@ -136,6 +136,10 @@ class SetLevel(NamedTuple):
     value: float
 
 
+NO_GESTURE = "none"
+"""Chosen from the menu of gestures, it ends the one under way."""
+
+
 class Play(NamedTuple):
     """Play a gesture once; "" ends the one under way.
 

@@ -25,6 +25,7 @@ from gazerig.robot.model.commands import (
     Express,
     Jog,
     LookAt,
+    Play,
     Resume,
     SetLevel,
     Stop,
@@ -231,6 +232,27 @@ class RobotClient:
             RequestRejected: there is no such level; the message lists those there are.
         """
         self._command(SetLevel(level, value))
+
+    def play(self, gesture: str, speed: float = 1.0, times: int = 0) -> CommandReply:
+        """Play a gesture over gaze; "" ends the one under way.
+
+        Args:
+            gesture: its name.
+            speed: factor on the speed at which it was written.
+            times: how often; 0: as the gesture says.
+
+        Returns:
+            How long it takes, and what the rig's limits leave of it, under ``gesture``.
+
+        Raises:
+            RequestRejected: there is no such gesture, this rig cannot do it, the joints are
+                led by hand or the rig is stopped.
+        """
+        return self._command(Play(gesture, speed, times, self._who))
+
+    def gestures(self) -> tuple[dict[str, Any], ...]:
+        """Return all gestures: name, description, duration_s, slowed_by, and refused if it is."""
+        return tuple(cast(list[dict[str, Any]], self._asked("gestures")))
 
     def look_at(self, x_m: float, y_m: float, z_m: float, stay: bool = False) -> CommandReply:
         """Look at a point: metres, x ahead, y left, z up of the neck base.

@@ -1,0 +1,160 @@
+"""Gestures asked for from the command line, from Python, on the page, from menus and by rules."""
+
+import asyncio
+from collections.abc import Iterator
+
+import pytest
+import viser
+from page_visitor import PATIENCE_S
+from ticked_rig import TickedRig, connected, gazerig
+
+from gazerig.config.load import ConfigError
+from gazerig.config.parameters import changed
+from gazerig.config.schema import RULES, load_rig
+from gazerig.gaze.gesture_trigger import GestureTrigger
+from gazerig.gaze.top_down import Rule
+from gazerig.gaze.types import Target
+from gazerig.robot.app import session
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.dashboard.animation_panel import AnimationPanel
+from gazerig.robot.model.commands import (
+    Ask,
+    Command,
+    Jog,
+    Play,
+    Resume,
+    Stop,
+    as_json,
+    as_recorded,
+    check,
+    from_json,
+    from_recording,
+)
+from gazerig.robot.remote.client import RequestRejected, RobotClient
+
+
+@pytest.fixture
+def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[TickedRig]:
+    yield from connected(monkeypatch)
+
+
+def test_gestures_from_the_command_line(rig: TickedRig) -> None:
+    assert "nod takes 1.0 s" in gazerig("ctl", "play", "nod")
+    assert rig.commands[-1] == Play("nod", 1.0, 0, rig.commands[-1].who)  # type: ignore[union-attr]
+    before = rig.tick(20)["neck_pitch"]
+    assert rig.tick(25)["neck_pitch"] < before - 4.0
+    assert "laugh takes" in gazerig("ctl", "play", "laugh", "--count", "6", "--speed", "1.2")
+    assert "gestures end within" in gazerig("ctl", "play", "none")
+    listed = gazerig("ctl", "play", "--list")
+    assert "brow_shrug    who knows: the brows go up (1.2 s)" in listed and "nod " in listed
+    assert "no gesture 'wink'; there is brow_shrug" in gazerig("ctl", "play", "wink")
+
+
+def test_the_reply_says_what_is_really_done(rig: TickedRig) -> None:
+    client = RobotClient.connect()
+    reply = client.play("nod", speed=4.0)
+    assert reply.gesture is not None and reply.gesture.slow_joint == "neck_pitch"
+    assert reply.gesture.duration_s == pytest.approx(reply.gesture.slowed_by / 4.0)
+    assert f"slower by {reply.gesture.slowed_by:.2f} for neck_pitch" in reply.words()
+    names = {one["name"]: one for one in client.gestures()}
+    assert names["nod"]["duration_s"] == pytest.approx(1.0) and not names["nod"]["refused"]
+
+
+def test_whoever_is_stopped_or_led_by_hand_does_not_gesture(rig: TickedRig) -> None:
+    rig.command(Play("nod"))
+    rig.tick(40)
+    rig.command(Stop("test", "me"))
+    with pytest.raises(RequestRejected, match="stopped"):
+        RobotClient.connect().play("nod")
+    rig.tick(410)
+    reply = rig.command(Resume("me", True)).wait(0.0)
+    assert reply is not None and not reply.refused, reply
+    assert rig.made.robot.menus()["gesture"][0] == "none"  # the stop has ended the nod
+    rig.command(Jog((("jaw", 0.1),), "me", True))
+    with pytest.raises(RequestRejected, match="held where they are"):
+        RobotClient.connect().play("nod")
+
+
+def test_menus_offer_what_this_rig_can_do_and_what_is_under_way(rig: TickedRig) -> None:
+    assert rig.made.robot.menus()["gesture"][:2] == ("none", "brow_shrug")
+    rig.command(Ask("gesture", "tilt"))
+    rig.tick(5)
+    assert rig.made.robot.menus()["gesture"][0] == "tilt"
+    rig.command(Ask("gesture", "none"))
+    rig.tick(200)
+    assert rig.made.robot.menus()["gesture"][0] == "none"
+
+
+def test_the_command_is_data() -> None:
+    command = Play("nod", 1.5, 3, "me")
+    assert from_json(as_json(command)) == command
+    assert from_recording(as_recorded(command)) == command
+    assert from_json({"do": "play", "gesture": "nod"}) == Play("nod")
+    for wrong in (
+        *(Play("nod", speed) for speed in (0.0, -1.0, 9.0, float("nan"), float("inf"))),
+        *(Play("nod", 1.0, times) for times in (-1, 21, True, 1.5)),  # type: ignore[arg-type]
+        Play("n" * 999),
+        Play(3),  # type: ignore[arg-type]
+    ):
+        with pytest.raises(ValueError, match="gesture"):
+            check(wrong)
+
+
+def test_buttons_and_speed_on_the_page() -> None:
+    server = viser.ViserServer(port=0, verbose=False)
+    asked: list[tuple[Command, str]] = []
+
+    class Outbox:
+        def command(self, command: Command, who: str) -> bool:
+            asked.append((command, who))
+            return True
+
+    try:
+        panel = AnimationPanel(server.gui, server.gui.add_panel(), Outbox())  # type: ignore[arg-type]
+        panel.offer_gestures(["tilt", "none", "nod"])
+        group, speed = panel._gestures, panel._speed
+        assert group is not None and speed is not None
+        assert group.options == ("none", "nod", "tilt")
+        speed._impl.value = 1.5
+        for chosen in ("nod", "none"):
+            group._impl.value = chosen
+            (callback,) = group._impl.update_cb
+            event = viser.GuiEvent(None, 5, group)
+            asyncio.run_coroutine_threadsafe(callback(event), server._event_loop).result(PATIENCE_S)  # type: ignore[arg-type]
+        assert asked == [(Play("nod", 1.5), "5"), (Play("", 1.5), "5")]
+    finally:
+        server.stop()
+
+
+def looked_at(kind: str, number: int = 1) -> Target:
+    return Target((1.0, 0.0, 0.2), (0.0, 0.0, 0.0), 0.0, kind, number, 0.5, True, None, 0, "")
+
+
+def test_a_rule_plays_its_gesture_at_its_onset_and_not_again_too_soon() -> None:
+    rule = Rule("face", 0.5, gesture="nod", gesture_at="hand", gesture_refractory_s=2.0)
+    trigger = GestureTrigger()
+    seen = [(0.0, "face"), (0.1, "hand"), (0.2, "hand"), (0.3, "face"), (0.4, "hand"),
+            (1.9, "face"), (2.2, "hand"), (9.0, "hand")]  # fmt: skip
+    played = [t for t, kind in seen if trigger.step("wait", rule, looked_at(kind), t)]
+    assert played == [0.1, 2.2]
+    named = Rule("id:7", 0.5, gesture="nod")
+    assert not trigger.step("one", named, looked_at("face", 6), 20.0)
+    assert trigger.step("one", named, looked_at("face", 7), 20.1) == "nod"
+    assert not trigger.step("none", Rule("face", 0.5), looked_at("face"), 30.0)
+
+
+def test_a_visitor_who_waves_is_nodded_to() -> None:
+    options = RunOptions(
+        rig="desk", mock=True, fast=True, scene="visitor", seconds=20, rules="greeting"
+    )
+    said: list[str] = []
+    session.run(session.compose(options), lambda: None, said.append)
+    (nod,) = [line for line in said if "gesture" in line]
+    at_s = float(nod.split(" s: ")[0])
+    assert 17.5 < at_s < 18.5 and "for rule wait: nod takes 1.0 s" in nod  # the wave begins at 17.5
+
+
+def test_a_rule_that_names_no_gesture_is_refused_with_those_there_are() -> None:
+    with pytest.raises(ConfigError, match=r"rules\.wait\.gesture: no gesture 'nodd'.*nod"):
+        changed(load_rig("desk"), {"gaze.top_down.rules.wait.gesture": "nodd"})
+    assert not [1 for rule in RULES for _ in rule(load_rig("desk"))]
