@@ -55,7 +55,7 @@ def test_the_reply_says_what_is_really_done(rig: TickedRig) -> None:
     reply = client.play("nod", speed=4.0)
     assert reply.gesture is not None and reply.gesture.slow_joint == "neck_pitch"
     assert reply.gesture.duration_s == pytest.approx(reply.gesture.slowed_by / 4.0)
-    assert f"slower by {reply.gesture.slowed_by:.2f} for neck_pitch" in reply.words()
+    assert f"slower by {reply.gesture.slowed_by:.2f} for neck_pitch" in reply.text()
     names = {one["name"]: one for one in client.gestures()}
     assert names["nod"]["duration_s"] == pytest.approx(1.0) and not names["nod"]["refused"]
 

@@ -68,4 +68,6 @@ def connected(monkeypatch: pytest.MonkeyPatch) -> Iterator[TickedRig]:
 
 def gazerig(*words: str, typed: str = "") -> str:
     done = CliRunner().invoke(app, words, input=typed)
+    if done.exception is not None and not isinstance(done.exception, SystemExit):
+        raise done.exception
     return done.stdout + done.stderr

@@ -80,7 +80,7 @@ def play(
             for one in rig.gestures():
                 say(_described(one))
             return
-        say(rig.play("" if gesture == NO_GESTURE else gesture, speed, count).words())
+        say(rig.play("" if gesture == NO_GESTURE else gesture, speed, count).text())
 
 
 def _described(gesture: Mapping[str, Any]) -> str:
