@@ -15,8 +15,10 @@ from gazerig.gaze.top_down import Rule, TopDown, TopDownParams
 from gazerig.gaze.types import Salience, Target
 
 
-def by(look_at: str, salience: float = 0.9, **point: tuple[float, float, float]) -> Attention:
-    rule = Rule(look_at, salience, **point)
+def by(
+    look_at: str, salience: float = 0.9, point_world_m: tuple[float, float, float] | None = None
+) -> Attention:
+    rule = Rule(look_at, salience, point_world_m)
     model = attention()
     model.top_down = TopDown(TopDownParams(behaviour="wait", rules={"wait": rule}))
     return model

@@ -13,12 +13,15 @@ from hypothesis import strategies as st
 from gazerig.config.schema import load_rig
 from gazerig.gaze.aversion import Aversion, AversionParams
 from gazerig.gaze.expression import Expressions
+from gazerig.gaze.gesture import GestureParams
+from gazerig.gaze.gesture_player import GesturePlayer
 from gazerig.gaze.lids import LidParams, Lids
 from gazerig.gaze.top_down import TopDown, TopDownParams
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.session import leave
 from gazerig.robot.control.command_choices import Menus
+from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.model.commands import (
     Ask,
     Command,
@@ -240,9 +243,9 @@ def test_who_is_in_a_conversation_blinks_as_people_do_there(mode: str) -> None:
         expected[name] = blinks_in_two_minutes(lids)
     assert expected["conversation"] > expected["rest"] + 5
     lids = Lids(LidParams(), np.random.default_rng(1))
-    menus = Menus(
-        Aversion(AversionParams(), np.random.default_rng(2)), lids, Expressions({}, 0.5, 0)
-    )
+    none = GestureChoices({}, GesturePlayer(0), GestureParams(), ("eyes_pan",), {})
+    aversion = Aversion(AversionParams(), np.random.default_rng(2))
+    menus = Menus(aversion, lids, Expressions({}, 0.5, 0), none)
     for asked in ("none" if mode != "none" else "talk", mode):
         menus.choose(Ask("conversation", asked), TopDown(TopDownParams()), 0.0)
     expected_of = "rest" if mode == "none" else "conversation"

@@ -82,7 +82,7 @@ def test_a_curve_that_does_not_turn_is_the_spline_of_least_jerk_unless_that_swin
 
 def test_most_even_curves_are_those_of_least_jerk() -> None:
     for steps in ((3.0, 4.0, 5.0, 4.0), (2.0, 2.0, 2.0), (1.0, 3.0, 3.0, 1.0)):
-        times, values = 0.2 * np.arange(1, len(steps) + 1), np.cumsum(steps)
+        times, values = np.cumsum(np.full(len(steps), 0.2)), np.cumsum(np.array(steps))
         at = np.linspace(0.0, times[-1], 100)
         curve = MinimumJerkCurve(0.0, times.tolist(), values.tolist())
         least, rate = spline_of_least_jerk(times, values, at)
