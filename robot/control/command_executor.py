@@ -184,7 +184,7 @@ class CommandExecutor:
         if name and not self._stop.why and not self._lead.active:
             reply = self._play(Play(name, who=f"rule {top_down.behaviour}"), t_s)
             if reply.refused:
-                self._told.append(f"gesture for rule {top_down.behaviour} {reply.text()}")
+                self._messages.append(f"gesture for rule {top_down.behaviour} {reply.text()}")
 
     def _let_lead(self, change: Callable[[], None]) -> None:
         """Change who leads; the models begin gently where they take joints over."""
