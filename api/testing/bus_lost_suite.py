@@ -239,6 +239,6 @@ def _befall(here, bus, what):
             if not here.is_board(place) or place == min(here.buses[here.on[place]]):
                 here.strike("brown-out", place)
     if what:
-        here.until(bus, lambda r: None in r, here.starts())
+        here.until(bus, lambda r: None in r or any(row.rearmed for row in r), here.starts())
         here.until(bus, well, here.starts())
         bus.events()

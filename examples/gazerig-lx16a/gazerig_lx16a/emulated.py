@@ -1,0 +1,135 @@
+"""Emulated LX-16A servos: real frames in, real frames out.
+
+What the documents leave open is taken to be the worse case: a move switches the torque on.
+"""
+
+from collections.abc import Callable, Mapping
+
+from gazerig.drivers.plugins import EmulatedJoint
+from gazerig.sim_mock.device import DeviceReply
+from gazerig.sim_mock.faults.grammar import Argument, CommandTable, Verb, whole
+from gazerig.sim_mock.faults.line import LineFaults
+from gazerig.sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs
+from gazerig.sim_mock.replies import Piece
+from gazerig_lx16a import protocol as p
+from gazerig_lx16a.bus import FASTEST_STEPS_S, Lx16aParams
+
+
+class EmulatedServo:
+    """One servo: it goes to its target in a straight line, within the time it was given."""
+
+    def __init__(self, servo_id: int, steps: float, low: float, high: float) -> None:
+        self.id, self.place, self._low, self._high = servo_id, steps, low, high
+        self.target, self._speed, self.torque, self._at_s = steps, 0.0, False, 0.0
+
+    def advance(self, now_s: float) -> None:
+        """Let time pass until now."""
+        dt_s, self._at_s = now_s - self._at_s, now_s
+        if self.torque:
+            most = min(self._speed, FASTEST_STEPS_S) * max(0.0, dt_s)
+            way = min(max(self.target - self.place, -most), most)
+            self.place = min(max(self.place + way, self._low), self._high)
+
+    def restart(self) -> None:
+        """Lose torque and target, as after a dip of the supply."""
+        self.torque, self.target = False, self.place
+
+    def answer(self, command: int, params: bytes) -> bytes | None:
+        """Carry out a command; return the parameters of the answer, None for silence."""
+        if command == p.MOVE and len(params) == 4:
+            self.target = float(min(1000, int.from_bytes(params[:2], "little")))
+            seconds = int.from_bytes(params[2:], "little") / 1e3
+            way = abs(self.target - self.place)
+            self._speed, self.torque = (way / seconds if seconds else FASTEST_STEPS_S), True
+        elif command == p.LOAD and len(params) == 1:
+            self.torque = bool(params[0])
+        elif command in p.ANSWERS and not params:
+            values = {p.POSITION: (round(self.place),), p.LOADED: (int(self.torque),),
+                      p.TEMPERATURE: (31,), p.VOLTAGE: (7400,), p.MODE: (0, 0, 0)}  # fmt: skip
+            return p.ANSWERS[command].pack(*values[command])
+        return None
+
+
+class Chain:
+    """The device at the end of the line; what can befall a line is gazerig's."""
+
+    heed_baud = False
+
+    def __init__(
+        self, servos: list[EmulatedServo], now_s: Callable[[], float], seed: int = 0
+    ) -> None:
+        self.servos, self.now_s = {servo.id: servo for servo in servos}, now_s
+        self.faults = ChainFaults(self, COMMANDS, seed, p.HEADER)
+        self._rest = b""
+        for servo in servos:
+            servo.advance(now_s())
+
+    def here(self, servo_id: int) -> EmulatedServo:
+        """Return a servo, brought up to now."""
+        servo = self.servos[servo_id]
+        servo.advance(self.now_s())
+        return servo
+
+    def hears(self, client_baud: int) -> bool:
+        return True
+
+    def choose(self, case: str, value: str) -> None:
+        raise ValueError(f"these servos have no case {case!r}")
+
+    def positions_steps(self) -> tuple[float, ...]:
+        return tuple(self.here(servo_id).place for servo_id in self.servos)
+
+    def exchange(self, data: bytes, client_baud: int | None = None) -> list[DeviceReply]:
+        """Carry out the commands in these bytes; return what is answered."""
+        before, whole_data, wire = len(self._rest), self._rest + data, self.faults.wire
+        found, rest = p.frames(whole_data)
+        self._rest, replies = whole_data[rest:], []
+        for servo_id, command, params, end in found:
+            for one in self.servos if servo_id == p.BROADCAST else {servo_id} & set(self.servos):
+                said = self.here(one).answer(command, params)
+                if said is None or servo_id == p.BROADCAST:
+                    continue
+                if wire.take("lose", one, self.now_s()) is None:
+                    pieces = [Piece(one, p.frame(one, command, said))]
+                    spoilt = wire.spoil_pieces(pieces, False, self.now_s())
+                    replies.append(DeviceReply(max(0, end - before), spoilt))
+        return self.faults.around(replies, data) if wire.any else replies
+
+
+class ChainFaults(LineFaults):
+    """What befalls the line, and the servos themselves."""
+
+    def reports(self) -> list[dict[str, object]]:
+        chain: Chain = self._chain  # type: ignore[assignment]
+        servos = [chain.here(servo_id) for servo_id in chain.servos]
+        return [
+            {"id": s.id, "position": s.place, "goal": round(s.target), "torque": s.torque}
+            for s in servos
+        ]
+
+
+def _restart(faults: ChainFaults, servo_id: int) -> str:
+    faults._chain.here(servo_id).restart()  # type: ignore[attr-defined]
+    return f"servo {servo_id} restarts"
+
+
+_ID = Argument("ID", whole(0, 253, "a servo id"))
+COMMANDS = CommandTable(
+    {**line_verbs(_ID), **adapter_verbs(), "brown-out": Verb(_restart, (_ID,), "restart"),
+     **closing_verbs(_ID)}, {}, "a servo's id",
+)  # fmt: skip
+
+
+def chain_of(starts: Mapping[int, float], now_s: Callable[[], float]) -> Chain:
+    """Return servos that stand at these steps, by their ids."""
+    return Chain([EmulatedServo(i, x, 0.0, 1000.0) for i, x in starts.items()], now_s)
+
+
+def device(
+    params: Lx16aParams, joints: tuple[EmulatedJoint, ...], now_s: Callable[[], float], seed: int
+) -> Chain:
+    """Return the servos of a rig, for ``--mock``."""
+    servos = [
+        EmulatedServo(j.id, j.start_steps, j.stop_low_steps, j.stop_high_steps) for j in joints
+    ]
+    return Chain(servos, now_s, seed)

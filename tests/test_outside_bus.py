@@ -1,0 +1,112 @@
+"""A bus of another package passes the shipped suites and moves a rig; no line of ours knows it."""
+
+import os
+import re
+import subprocess
+import sys
+from typing import Any
+
+import pytest
+from outside_bus import EXAMPLE, HEAD, install_example
+from outside_package import on_path
+
+from gazerig.config.load import ConfigError
+from gazerig.config.schema import load_rig
+from gazerig.drivers.plugins import PluginError
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.bus_wiring import has_watchdog, release_plan
+from gazerig.robot.app.emulation import emulated_lines
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.run_bus import run_bus
+from gazerig.robot.guardian.release_plan import decode, encode, releaser
+from gazerig.robot.model.clock import SimulatedClock
+from gazerig.sim_mock.devices import build, packed, unpacked
+from gazerig.sim_mock.in_process_port import InProcessPort
+
+
+@pytest.fixture
+def example(tmp_path):
+    install_example(tmp_path / "site")
+    with on_path(tmp_path / "site") as folder:
+        yield folder
+
+
+def test_it_passes_the_shipped_suites(tmp_path):
+    install_example(tmp_path / "site")
+    path = os.pathsep.join((str(tmp_path / "site"), *filter(None, sys.path)))
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-c", os.devnull,
+         "--rootdir", str(tmp_path), str(EXAMPLE / "tests")],
+        env={**os.environ, "PYTHONPATH": path, "PYTEST_ADDOPTS": ""},
+        cwd=tmp_path, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout[-4000:]
+    found = re.search(r"(\d+) passed in", done.stdout)
+    assert found is not None and int(found[1]) >= 25, done.stdout
+    assert "skipped" not in done.stdout and "deselected" not in done.stdout
+
+
+def test_a_rig_on_it_looks_at_people(example):
+    rig = load_rig(str(HEAD))
+    made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
+    made.robot.start(made.clock)
+    low, high, kinds = [9.0] * 4, [-9.0] * 4, set()
+    for k in range(1, 400):
+        made.clock.sleep_until(k * 0.025)
+        tick = made.robot.tick(made.clock.now_s(), 0.025)
+        kinds.add(tick.target.kind)
+        assert tick.joints.missing == () and all(tick.joints.torque), k
+        low = [min(a, b) for a, b in zip(low, tick.joints.position_rad, strict=True)]
+        high = [max(a, b) for a, b in zip(high, tick.joints.position_rad, strict=True)]
+    made.robot.stop()
+    made.close()
+    assert "face" in kinds
+    assert all(b - a > 0.05 for a, b in zip(low, high, strict=True)), (low, high)
+    assert made.sent_digest()
+
+
+def test_its_section_is_checked(example, tmp_path):
+    text = HEAD.read_text(encoding="utf-8")
+    for old, new, told in (
+        ("reply_timeout_ms: 5.0", "reply_timeout_ms: 900.0", "900.0 is above 500 (unit ms)"),
+        ("reply_timeout_ms: 5.0", "baud: 9600", "wanted one of 115200"),
+        ("kind: lx16a", "kind: lx61a", "did you mean 'lx16a'?"),
+        (
+            "model: lx-16a",
+            "model: sts3215",
+            "a sts3215 speaks feetech, and its bus is of kind lx16a",
+        ),
+    ):
+        file = tmp_path / "head.yaml"
+        file.write_text(text.replace(old, new, 1), encoding="utf-8")
+        with pytest.raises(ConfigError, match=re.escape(told)):
+            load_rig(str(file))
+
+
+def test_the_guardian_switches_its_torque_off(example):
+    rig, clock = load_rig(str(HEAD)), SimulatedClock(1.0)
+    assert not has_watchdog(rig, "")
+    device: Any = build(unpacked(packed(emulated_lines(rig)[""])), clock.now_s)
+    port = InProcessPort(device, sleep_until=clock.sleep_until)
+    for servo in device.servos.values():
+        servo.torque = True
+    (plan,) = decode(encode((release_plan(rig, "", "/dev/ttyUSB0"),)))
+    assert releaser(plan)(port) == ()
+    assert not any(servo.torque for servo in device.servos.values())
+    device.faults.command("lose 3")
+    assert releaser(plan)(port) == (3,)
+
+
+def test_without_an_emulated_device_mock_says_so(example, monkeypatch):
+    import gazerig_lx16a
+
+    from gazerig.drivers import plugins
+
+    bare = gazerig_lx16a.LX16A.__class__(**{**vars(gazerig_lx16a.LX16A), "device": None})
+    monkeypatch.setattr(gazerig_lx16a, "LX16A", bare)
+    plugins._loaded.cache_clear()
+    with pytest.raises(
+        PluginError,
+        match="^bus 'lx16a' of gazerig-lx16a 0.1.0 has no emulated device: run it without --mock$",
+    ):
+        run_bus(load_rig(str(HEAD)), RunOptions(mock=True, fast=True), SimulatedClock())
