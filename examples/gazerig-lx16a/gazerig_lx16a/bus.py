@@ -273,8 +273,8 @@ def release_all(line: Line, ids: Sequence[int]) -> ReleaseResult:
     for _ in range(TRIES):
         line.send(b"".join(p.frame(servo_id, p.LOAD, b"\x00") for servo_id in left))
         left = {i: loaded for i in left if (loaded := line.ask(i, p.LOADED)) != 0}
-    mute = tuple(i for i, loaded in left.items() if loaded is None)
-    return ReleaseResult(tuple(i for i in left if i not in mute), mute)
+    unconfirmed = tuple(i for i, loaded in left.items() if loaded is None)
+    return ReleaseResult(tuple(i for i in left if i not in unconfirmed), unconfirmed)
 
 
 def release(port: BusPort, params: Lx16aParams, ids: tuple[int, ...]) -> tuple[int, ...]:
@@ -282,4 +282,4 @@ def release(port: BusPort, params: Lx16aParams, ids: tuple[int, ...]) -> tuple[i
     if not port.setBaudRate(p.BAUD):
         raise PortError(f"{port.port_name} cannot run at {p.BAUD} bit/s")
     result = release_all(Line(port, params.reply_timeout_ms / 1e3), ids)
-    return (*result.holding, *result.mute)
+    return (*result.holding, *result.unconfirmed)

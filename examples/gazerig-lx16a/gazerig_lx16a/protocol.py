@@ -30,7 +30,8 @@ def frames(data: bytes) -> tuple[list[tuple[int, int, bytes, int]], int]:
 
     A frame is id, command, parameters and the position behind it.
     """
-    found, at = [], 0
+    found: list[tuple[int, int, bytes, int]] = []
+    at = 0
     while (at := data.find(HEADER, at)) >= 0:
         if len(data) < at + 4 or len(data) < (end := at + 3 + data[at + 3]):
             return found, at
