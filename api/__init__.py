@@ -1,10 +1,85 @@
-"""Makes an animatronic head look at people the way people look at each other."""
+"""Makes an animatronic head look at people the way people look at each other.
+
+with gazerig.open("desk", mock=True) as head:
+    head.look_at(1.0, 0.2, 0.3).wait()
+
+What stands in ``__all__`` is promised: it changes only with a word in the changelog.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from gazerig.config.load import ConfigError as ConfigError
+    from gazerig.config.schema import load_rig as load_rig
+    from gazerig.drivers.errors import SetupError as SetupError
+    from gazerig.errors import Error as Error
+    from gazerig.errors import HeadEnded as HeadEnded
+    from gazerig.errors import NotFound as NotFound
+    from gazerig.errors import Refused as Refused
+    from gazerig.geometry import HeadPose as HeadPose
+    from gazerig.geometry import JointSolution as JointSolution
+    from gazerig.geometry import forward as forward
+    from gazerig.geometry import inverse as inverse
+    from gazerig.head import Head as Head
+    from gazerig.local_head import SimulatedHead as SimulatedHead
+    from gazerig.opening import connect as connect
+    from gazerig.opening import open as open
+    from gazerig.order import Order as Order
+    from gazerig.order import Outcome as Outcome
+    from gazerig.robot.control.head_state import GazeReading as GazeReading
+    from gazerig.robot.control.head_state import HeadEvent as HeadEvent
+    from gazerig.robot.control.head_state import HeadState as HeadState
+    from gazerig.robot.control.head_state import JointReading as JointReading
+    from gazerig.robot.control.head_state import Person as Person
+
+    __version__: str
+
+_HOME = {
+    "ConfigError": "gazerig.config.load",
+    "Error": "gazerig.errors",
+    "GazeReading": "gazerig.robot.control.head_state",
+    "Head": "gazerig.head",
+    "HeadEnded": "gazerig.errors",
+    "HeadEvent": "gazerig.robot.control.head_state",
+    "HeadPose": "gazerig.geometry",
+    "HeadState": "gazerig.robot.control.head_state",
+    "JointReading": "gazerig.robot.control.head_state",
+    "JointSolution": "gazerig.geometry",
+    "NotFound": "gazerig.errors",
+    "Order": "gazerig.order",
+    "Outcome": "gazerig.order",
+    "Person": "gazerig.robot.control.head_state",
+    "Refused": "gazerig.errors",
+    "SetupError": "gazerig.drivers.errors",
+    "SimulatedHead": "gazerig.local_head",
+    "connect": "gazerig.opening",
+    "forward": "gazerig.geometry",
+    "inverse": "gazerig.geometry",
+    "load_rig": "gazerig.config.schema",
+    "open": "gazerig.opening",
+}
+"""Name -> the module it is imported from, when it is used: a short command may not wait for all."""
+
+__all__ = [  # noqa: F822
+    "ConfigError", "Error", "GazeReading", "Head", "HeadEnded", "HeadEvent", "HeadPose",
+    "HeadState", "JointReading", "JointSolution", "NotFound", "Order", "Outcome", "Person",
+    "Refused", "SetupError", "SimulatedHead", "connect", "forward", "inverse", "load_rig", "open",
+]  # fmt: skip
 
 
-def __getattr__(name: str) -> str:
-    # Looking the version up takes longer than a short command may.
+def __getattr__(name: str) -> Any:
     if name == "__version__":
         from importlib.metadata import version
 
         return version("gazerig")
+    if name in _HOME:
+        from importlib import import_module
+
+        found = getattr(import_module(_HOME[name]), name)
+        globals()[name] = found
+        return found
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -32,6 +32,7 @@ from gazerig.robot.app.gaze_models import (
 )
 from gazerig.robot.app.live_params import CameraPlacement, Components, LiveParams
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts
 from gazerig.robot.app.rig_limits import (
     lid_spans,
     limits,
@@ -121,12 +122,16 @@ class Assembly(NamedTuple):
 
 
 class Substitutes(NamedTuple):
-    """Parts laid around the rig's own, or put in their place; each gets the rig's own part."""
+    """Parts laid around the rig's own, or put in their place; each gets the rig's own part.
+
+    program: objects that a program brings, which are checked and watched
+    """
 
     body: Callable[[Body], Body] = _unchanged
     camera: Callable[[Camera], Camera] = _unchanged
     perception: Callable[[Perception], Perception] = _unchanged
     chooser: Callable[[TargetChooser], TargetChooser] = _unchanged
+    program: ProgramParts = NO_PARTS
 
 
 RIGS_OWN = Substitutes()
@@ -159,10 +164,10 @@ def assemble(rig: Rig, options: RunOptions, substitutes: Substitutes = RIGS_OWN)
         seen = (
             scene_camera(
                 rig, options, scene, sight.mount, true_head(wires.devices, rig, sight.poses),
-                random.camera,
+                random.camera, substitutes.program,
             )
             if scene is not None
-            else real_camera(rig, options, clock, camera, sight.turns)
+            else real_camera(rig, options, clock, camera, sight.turns, substitutes.program)
         )  # fmt: skip
         parts = _components(
             rig, _body(rig, wires), kinematics, seen, sight.mount, camera, walk, random
@@ -276,6 +281,7 @@ def _robot(
 ) -> Robot:
     told: list[str] = []
     chooser = chooser_of(rig, parts.attention, told.append, simulated)
+    chooser = substitutes.program.choose(chooser, told.append, simulated)
     return Robot(
         substitutes.body(parts.body),
         parts.kinematics,

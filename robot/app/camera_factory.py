@@ -27,6 +27,7 @@ from gazerig.drivers.vision.motion.detector import MotionDetector, turned_betwee
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts, program_camera, watched
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.perception.motion_source import motion_finder, retuned
@@ -46,6 +47,7 @@ def scene_camera(
     mount: CameraMount,
     where: HeadPose,
     rng: np.random.Generator,
+    own: ProgramParts = NO_PARTS,
 ) -> Camera:
     """Return a camera on a simulated scene, which renders frames or returns ideal detections."""
     field_deg = rig.camera.horizontal_field_deg
@@ -54,16 +56,22 @@ def scene_camera(
         return SceneCamera(params, scene, mount, where, rng)
     drawn = PixelCameraParams(horizontal_field_deg=field_deg)
     motion = _MotionOfDrawn(rig.motion)
-    return PixelCamera(drawn, scene, mount, where, face_detector(rig.detector), rng, motion)
+    return PixelCamera(drawn, scene, mount, where, own.find_faces(rig), rng, motion)
 
 
 def real_camera(
-    rig: Rig, options: RunOptions, clock: Clock, placed: CameraParams, turns: PoseBuffer | None
+    rig: Rig,
+    options: RunOptions,
+    clock: Clock,
+    placed: CameraParams,
+    turns: PoseBuffer | None,
+    own: ProgramParts = NO_PARTS,
 ) -> Camera:
-    """Return the camera of a film, a recording, a webcam or an OAK-D.
+    """Return the camera of a program, a film, a recording, a webcam or an OAK-D.
 
     placed: where it sits, which may be standing still though the rig's does not
     turns: how the camera was turned when; None where it stands still
+    own: camera and detector of a program
 
     Raises:
         SetupError: a film, recording or model file cannot be used.
@@ -71,9 +79,15 @@ def real_camera(
     detector = partial(face_detector, rig.detector)
     field_rad = radians(placed.horizontal_field_deg)
     motion = partial(motion_finder, rig.motion, placed.lens, field_rad, turns)
+    if own.camera is not None:
+        return program_camera(rig, own, clock, motion, options.fast)
     if options.fast:
-        return FilmCamera(_film(options), detector(), options.film_delay_s, motion=motion())
+        return FilmCamera(
+            _film(options), own.find_faces(rig), options.film_delay_s, motion=motion()
+        )
     name = options.camera if isinstance(options.camera, str) else None
+    if own.detector is not None and (name is None or is_ours(CAMERA, name)):
+        return watched(rig, own, _source(rig, options)(), clock, motion)
     if name is None or is_ours(CAMERA, name):
         parts = CameraParts(_source(rig, options), detector, motion)
         return CameraProcess(parts, clock.now_s, rig.camera_recovery)

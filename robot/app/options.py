@@ -100,8 +100,11 @@ class RunOptions:
         asked = (("behaviour", self.behaviour), ("conversation", self.conversation))
         return tuple((menu, choice) for menu, choice in asked if choice is not None)
 
-    def checked(self) -> "RunOptions":
+    def checked(self, blind: bool = False) -> "RunOptions":
         """Return the options with the scene that is looked at where nothing was said.
+
+        Args:
+            blind: nothing need be looked at.
 
         Raises:
             SetupError: they do not fit together.
@@ -117,7 +120,7 @@ class RunOptions:
             options = " and ".join(f"--{name}" for name in asked)
             raise SetupError(f"{options} exclude each other: the head looks at one of them")
         scene = self.scene
-        if not asked:
+        if not asked and not blind:
             if not self.mock:
                 raise SetupError(
                     "nothing to look at: give --oak, --camera N, --video FILE or --scene NAME"

@@ -40,8 +40,12 @@ class ComposedRun(NamedTuple):
     recorder: Recorder | None
 
 
-def compose(options: RunOptions) -> ComposedRun:
+def compose(options: RunOptions, substitutes: Substitutes = RIGS_OWN) -> ComposedRun:
     """Assemble one run; nothing moves.
+
+    Args:
+        options: what to run.
+        substitutes: parts of a program's own; a recording goes around the body.
 
     Raises:
         gazerig.config.load.ConfigError: the rig, character, profile or walk is at fault.
@@ -50,11 +54,11 @@ def compose(options: RunOptions) -> ComposedRun:
     loaded = load_rig(options.rig, options.character, options.profile)
     rig = with_options(loaded, options)
     if options.record is None:
-        recorder, substitutes = None, RIGS_OWN
+        recorder = None
     else:
         info = run_info(rig, options)
         recorder = Recorder(options.record, info, options.force, patient=options.fast)
-        substitutes = Substitutes(body=recorder.recorded)
+        substitutes = substitutes._replace(body=recorder.recorded)
     made = assemble(rig, options, substitutes)
     names = (options.rig, options.character, options.profile)
     return ComposedRun(options, made, ParamStore(made.live, made.robot.command, *names), recorder)

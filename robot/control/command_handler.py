@@ -17,6 +17,7 @@ from gazerig.robot.model.reply import Ticket
 
 QUESTIONS = (
     "status",
+    'state, "after": number of the last event that is known',
     "menus",
     "gestures",
     'parameters, "prefix"',
@@ -197,6 +198,7 @@ class CommandHandler:
         saved: called with each file that was written.
         paths: which files may be named; None: any.
         fixed: why parameters cannot be changed, if they cannot.
+        state: returns the newest tick and the events above a number, as plain values.
     """
 
     def __init__(
@@ -208,7 +210,9 @@ class CommandHandler:
         saved: Callable[[Path], None] | None = None,
         paths: PathGuard | None = None,
         fixed: str = FIXED,
+        state: Callable[[int], object] = lambda after: {},
     ) -> None:
+        self._state = state
         self._robot, self._params, self._status = robot, params, status
         self._saved, self._paths, self._fixed = saved, paths, fixed
         self._described: tuple[Iterable[DescribedParam], list[tuple[str, object]]] = (), []
@@ -231,6 +235,8 @@ class CommandHandler:
         match request:
             case {"do": "status", **rest} if not rest:
                 return Answered(self._status())
+            case {"do": "state", "after": int(after), **rest} if not rest:
+                return Answered(self._state(after))
             case {"do": "menus", **rest} if not rest:
                 return Answered({menu: list(them) for menu, them in self._robot.menus().items()})
             case {"do": "gestures", **rest} if not rest:

@@ -5,7 +5,7 @@ from math import pi, radians
 
 from gazerig.gaze.angles import add, norm, scale, sub, unit
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.oculomotor import Oculomotor
+from gazerig.gaze.oculomotor import Oculomotor, ReachableGaze
 from gazerig.gaze.types import Angles2, Angles3, GazeCommand, Target
 from gazerig.robot.model.commands import Jog
 from gazerig.robot.model.gaze_error import gaze_error
@@ -22,6 +22,13 @@ _TOO_NEAR = "the eyes converge on no nearer point"
 _ABSENT = "this rig has none"
 
 
+def reached_joints(
+    reach: ReachableGaze, kinematics: Kinematics, limits: Sequence[JointLimit]
+) -> JointAngles:
+    """Return the joint angles at which head and eyes come to rest, lids open."""
+    return _within(kinematics.inverse(_command(reach.head_rad, *reach.eyes_rad)), limits)
+
+
 def look_reply(
     target: Target, oculomotor: Oculomotor, kinematics: Kinematics, limits: Sequence[JointLimit]
 ) -> CommandReply:
@@ -30,8 +37,7 @@ def look_reply(
     limits: of the joints, in the order of ``kinematics.names``
     """
     reach = oculomotor.reach(target)
-    desired = kinematics.inverse(_command(reach.head_rad, *reach.eyes_rad))
-    done = _within(desired, limits)
+    done = reached_joints(reach, kinematics, limits)
     at_rest = (0.0,) * len(done)
     pose = kinematics.forward(JointState(done, at_rest, at_rest, ()))
     error = gaze_error(target.p_world_m, pose, not kinematics.one_pan)

@@ -19,11 +19,14 @@ from typing import Any, cast
 
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.errors import HeadEnded, NotFound, Refused
+from gazerig.robot.control.head_state import HeadEvent, HeadState
+from gazerig.robot.control.head_state import from_json as state_from_json
 from gazerig.robot.model.commands import (
     Ask,
     Command,
     Express,
     Jog,
+    Leading,
     LookAt,
     Play,
     Resume,
@@ -64,7 +67,14 @@ class NoRobotError(SetupError, NotFound):
 
 
 class RequestRejected(SetupError, Refused):
-    """The rig runs on as before; the message lists every rule that was broken."""
+    """The rig runs on as before; the message lists every rule that was broken.
+
+    reply: what the head made of a command that reached it; None where the request was none
+    """
+
+    def __init__(self, message: str, reply: CommandReply | None = None) -> None:
+        super().__init__(message)
+        self.reply = reply
 
 
 class ConnectionLost(DriverError, HeadEnded):
@@ -88,7 +98,7 @@ class RobotClient:
     ) -> None:
         self._wire = wire
         self._lock = threading.Lock()
-        self._who = who
+        self.who = who
         self._dial = dial
         self._heartbeat: LeadHeartbeat | None = None
         self.pid = pid
@@ -128,6 +138,12 @@ class RobotClient:
         """Hang up; the rig runs on, and leads that were not to stay end."""
         self._end_heartbeat()
         self._wire.close()
+
+    def state(self, after: int = 0) -> tuple[HeadState | None, tuple[HeadEvent, ...]]:
+        """Return the newest tick, None before the first, and events numbered above ``after``."""
+        said = cast(dict[str, Any], self._asked("state", after=after))
+        events = tuple(HeadEvent(*one) for one in said["events"])
+        return (state_from_json(said["state"]) if said["state"] else None), events
 
     def status(self) -> dict[str, Any]:
         """Return what the rig does: its name, target and why, guard level, joints, what it said."""
@@ -248,7 +264,7 @@ class RobotClient:
             RequestRejected: there is no such gesture, this rig cannot do it, the joints are
                 led by hand or the rig is stopped.
         """
-        return self._command(Play(gesture, speed, times, self._who))
+        return self._command(Play(gesture, speed, times, self.who))
 
     def gestures(self) -> tuple[dict[str, Any], ...]:
         """Return all gestures: name, description, duration_s, slowed_by, and refused if it is."""
@@ -266,12 +282,11 @@ class RobotClient:
         Raises:
             RequestRejected: it is no point, or the rig is stopped.
         """
-        return self._lead(LookAt((x_m, y_m, z_m), self._who, stay), stay)
+        return self.give(LookAt((x_m, y_m, z_m), self.who, stay))
 
     def look_freely(self) -> None:
         """Let the head choose its targets again."""
-        self._end_heartbeat()
-        self._command(LookAt(None, self._who))
+        self.give(LookAt(None, self.who))
 
     def jog(self, joint: str, deg: float, stay: bool = False) -> CommandReply:
         """Hold all joints and move one to an angle.
@@ -282,25 +297,34 @@ class RobotClient:
             RequestRejected: there is no such joint, the angle is outside its range, or the rig is
                 stopped.
         """
-        return self._lead(Jog(((joint, radians(deg)),), self._who, stay), stay)
+        return self.give(Jog(((joint, radians(deg)),), self.who, stay))
 
     def jog_free(self) -> None:
         """Return the joints to the gaze models."""
-        self._command(Jog((), self._who))
+        self._command(Jog((), self.who))
 
     @property
     def leads(self) -> bool:
         """True while this connection renews a lead that the rig still obeys."""
         return self._heartbeat is not None and self._heartbeat.leads
 
-    def _lead(self, command: LookAt | Jog, stay: bool) -> CommandReply:
+    def give(self, command: Command) -> CommandReply:
+        """Give any command; one that leads and is not to stay is renewed from now on.
+
+        Raises:
+            RequestRejected: it cannot be meant, or the head does not do it.
+        """
+        if command == LookAt(None, self.who):
+            self._end_heartbeat()
         reply = self._command(command)
-        if stay or self._dial is None:
+        if not isinstance(command, Leading) or not reply.lead:
+            return reply
+        if command.stay or self._dial is None:
             self._end_heartbeat()
         elif not self.leads:
             self._end_heartbeat()
             try:
-                self._heartbeat = LeadHeartbeat(self._dial, self._who)
+                self._heartbeat = LeadHeartbeat(self._dial, self.who)
             except OSError:
                 raise ConnectionLost(f"the rig (process {self.pid}) has ended or hung up") from None
         return reply
@@ -316,7 +340,7 @@ class RobotClient:
         Raises:
             ConnectionLost, RequestRejected: it may not have stopped: press the emergency stop.
         """
-        self._command(Stop(why, self._who))
+        self._command(Stop(why, self.who))
 
     def resume(self, confirmed: bool = False) -> None:
         """Switch the torque on again where the joints are, and go on slowly.
@@ -328,7 +352,7 @@ class RobotClient:
             RequestRejected: a servo refuses it, or a rule of stops forbids it; the torque
                 stays off.
         """
-        self._command(Resume(self._who, confirmed))
+        self._command(Resume(self.who, confirmed))
 
     def _command(self, command: Command) -> CommandReply:
         try:
@@ -352,6 +376,8 @@ class RobotClient:
         match answer:
             case {"ok": said}:
                 return said
+            case {"refused": str(rules), "reply": dict(reply)}:
+                raise RequestRejected(rules, CommandReply.from_json(reply))
             case {"refused": str(rules)}:
                 raise RequestRejected(rules)
             case {"failed": str(what)}:

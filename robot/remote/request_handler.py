@@ -5,7 +5,6 @@
 """
 
 import threading
-from collections import deque
 from collections.abc import Callable, Mapping
 from functools import partial
 from math import degrees
@@ -24,11 +23,14 @@ from gazerig.robot.control.command_handler import (
     as_changes,
 )
 from gazerig.robot.control.feedback_basis import estimated_joints
+from gazerig.robot.control.head_state import as_json as state_as_json
+from gazerig.robot.control.head_state import head_state
 from gazerig.robot.control.loop import Tick
+from gazerig.robot.control.tick_feed import TickFeed
 from gazerig.robot.control.tick_text import lead_text, target_name
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.commands import REPEATED, Command, signed
-from gazerig.robot.model.reply import Ticket
+from gazerig.robot.model.reply import CommandReply, Ticket
 
 _TAKEN_UP_S = 1.0
 """Within this the loop must have obeyed; a servo that answers late costs it some 50 ms."""
@@ -46,17 +48,12 @@ class Pulse:
 
     def __init__(self, clock: Clock) -> None:
         self._clock = clock
-        self._newest: Tick | None = None
-        self._ticks = 0
-        self._said: deque[str] = deque(maxlen=_WORDS)
+        self._feed = TickFeed()
         self._never = threading.Event()
 
     def update(self, tick: Tick) -> None:
         """Leave the newest tick; called by the loop."""
-        self._newest = tick
-        self._ticks += 1
-        if tick.events:
-            self._said.extend(tick.events)
+        self._feed.update(tick)
 
     def taken_up(self, within_s: float = _TAKEN_UP_S, ticks: int = 2) -> bool:
         """Wait until all commands given before are obeyed; tell whether that came to pass.
@@ -64,21 +61,27 @@ class Pulse:
         ticks: to wait for; the one under way may have looked for commands already, the next
             one has not
         """
-        wanted = self._ticks + ticks
+        wanted = self._feed.ticks + ticks
         waits = int(within_s / 0.002)
-        while self._ticks < wanted and waits > 0:
+        while self._feed.ticks < wanted and waits > 0:
             self._never.wait(0.002)
             waits -= 1
-        return self._ticks >= wanted
+        return self._feed.ticks >= wanted
+
+    def state(self, after: int) -> dict[str, object]:
+        """Return the newest tick, None before the first, and events numbered above ``after``."""
+        tick = self._feed.newest
+        events = [(one.number, one.t_s, one.text) for one in self._feed.events(after)]
+        return {"state": state_as_json(head_state(tick)) if tick else None, "events": events}
 
     def as_json(self) -> dict[str, object]:
         """Return the newest tick as plain values: degrees, seconds, words."""
-        tick = self._newest
+        tick = self._feed.newest
         if tick is None:
             return {"ticks": 0, "stopped": "", "said": []}
         measured = zip(tick.guard_result.joints, tick.joints.position_rad, strict=True)
         return {
-            "ticks": self._ticks,
+            "ticks": self._feed.ticks,
             "t_s": tick.t_s,
             "age_s": self._clock.now_s() - tick.t_s,
             "stopped": tick.stopped,
@@ -101,8 +104,16 @@ class Pulse:
             "joints_deg": {name: round(degrees(angle), 2) for name, angle in measured},
             "estimated": list(estimated_joints(tick)),
             "reckoned": list(estimated_joints(tick)),  # the key until this version
-            "said": list(self._said),
+            "said": [event.text for event in self._feed.events()[-_WORDS:]],
         }
+
+
+class _NotDone(ValueError):
+    """The robot has taken a command up and refused it."""
+
+    def __init__(self, reply: CommandReply) -> None:
+        super().__init__(reply.refused)
+        self.reply = reply
 
 
 class RequestHandler:
@@ -131,7 +142,9 @@ class RequestHandler:
         self._params = params
         self._pulse = pulse
         self._about = dict(about)
-        self._handler = CommandHandler(robot, params, self._status, refusals, saved, fixed=fixed)
+        self._handler = CommandHandler(
+            robot, params, self._status, refusals, saved, fixed=fixed, state=pulse.state
+        )
         self._unsaved = -1, 0
 
     def answer(self, request: object, peer: str = "") -> dict[str, object]:
@@ -143,6 +156,8 @@ class RequestHandler:
         """
         try:
             return {"ok": self._told(self._handler.do(request, partial(_signed, peer)))}
+        except _NotDone as error:
+            return {"refused": str(error), "reply": error.reply.as_json()}
         except self._handler.refusals as error:
             return {"refused": str(error)}
 
@@ -176,7 +191,7 @@ class RequestHandler:
         if reply is None:
             raise ValueError(_HANGS)
         if reply.refused:
-            raise ValueError(reply.refused)
+            raise _NotDone(reply)
         if not isinstance(command, REPEATED):
             self._pulse.taken_up(ticks=1)  # so that the status tells of it
         return {"notes": [], "reply": reply.as_json()}

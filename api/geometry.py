@@ -1,0 +1,155 @@
+"""The geometry of a rig as plain functions: a point to joint angles, joint angles to sight."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from math import degrees
+
+from gazerig.config.schema import Rig, load_rig
+from gazerig.errors import Refused
+from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.oculomotor import Oculomotor
+from gazerig.gaze.types import Angles3, Target, Vec3
+from gazerig.robot.app.gaze_models import gaze_parts
+from gazerig.robot.app.rig_limits import limits
+from gazerig.robot.control.reachability import look_reply, reached_joints
+from gazerig.robot.model.commands import LookAt, check
+from gazerig.robot.model.kinematics import Kinematics
+from gazerig.robot.model.reply import JointReply
+from gazerig.robot.model.types import JointState
+
+
+@dataclass(frozen=True, slots=True)
+class JointSolution:
+    """The joint angles with which a head comes to rest on a point.
+
+    Attributes:
+        joints_rad: by name; lids open, joints that gaze does not move at 0.
+        reachable: both eyes meet the point within a degree.
+        error_deg: angle between the line of sight and the point, of the worse eye.
+        seen_m: the point as far away that is really looked at, world.
+        limited: the joints that keep the eyes from the point, with their ranges and the reason.
+    """
+
+    joints_rad: Mapping[str, float]
+    reachable: bool
+    error_deg: float
+    seen_m: Vec3
+    limited: tuple[JointReply, ...]
+
+    @property
+    def joints_deg(self) -> dict[str, float]:
+        """Return the angles in degrees."""
+        return {name: degrees(angle) for name, angle in self.joints_rad.items()}
+
+
+@dataclass(frozen=True, slots=True)
+class HeadPose:
+    """Where head and eyes are at given joint angles, in the world frame.
+
+    Attributes:
+        head_rad: (yaw, pitch, roll).
+        head_m: the point midway between the eyes.
+        left_eye_m: centre of rotation of the left eye.
+        right_eye_m: centre of rotation of the right eye.
+        left_sight: unit vector along the left line of sight.
+        right_sight: unit vector along the right line of sight.
+        lids: opening of the left and right upper lid, 0 shut .. 1 open.
+    """
+
+    head_rad: Angles3
+    head_m: Vec3
+    left_eye_m: Vec3
+    right_eye_m: Vec3
+    left_sight: Vec3
+    right_sight: Vec3
+    lids: tuple[float, float]
+
+
+def inverse(rig: Rig | str, point_m: tuple[float, float, float]) -> JointSolution:
+    """Return the joint angles with which head and eyes look at a point: nothing moves.
+
+    The head takes the share of the turn that the rig's gaze gives it from straight ahead, the eyes
+    the rest. A head that is turned that way already may stay where it is.
+
+    Args:
+        rig: from ``load_rig``, or the name or path of one.
+        point_m: x ahead, y left, z up of the neck base, metres.
+
+    Raises:
+        Refused: it is no point.
+        ConfigError: the rig is at fault.
+    """
+    try:
+        check(LookAt(point_m))
+    except ValueError as error:
+        raise Refused(str(error)) from None
+    found = _loaded(rig)
+    kinematics, oculomotor = _parts(found)
+    target = Target(point_m, (0.0, 0.0, 0.0), 0.0, "point", -1, 1.0, True, None, 1, "asked for")
+    ranges = limits(found.joints)
+    reply = look_reply(target, oculomotor, kinematics, ranges)
+    angles = reached_joints(oculomotor.reach(target), kinematics, ranges)
+    assert reply.done_m is not None
+    return JointSolution(
+        dict(zip(kinematics.names, angles, strict=True)),
+        reply.error_deg <= 1.0,
+        reply.error_deg,
+        reply.done_m,
+        reply.limited,
+    )
+
+
+def forward(rig: Rig | str, joints_rad: Mapping[str, float]) -> HeadPose:
+    """Return where head and eyes are at joint angles.
+
+    Args:
+        rig: from ``load_rig``, or the name or path of one.
+        joints_rad: angles by joint; those left out are at 0.
+
+    Raises:
+        Refused: the rig has no such joint; the message lists those it has.
+        ConfigError: the rig is at fault.
+    """
+    kinematics, _ = _parts(_loaded(rig))
+    if strange := [name for name in joints_rad if name not in kinematics.names]:
+        there = ", ".join(kinematics.names)
+        raise Refused(f"this rig has no joint {strange[0]!r}; there is {there}")
+    angles = tuple([float(joints_rad.get(name, 0.0)) for name in kinematics.names])
+    at_rest = (0.0,) * len(angles)
+    pose = kinematics.forward(JointState(angles, at_rest, at_rest, ()))
+    return HeadPose(
+        pose.head_rad,
+        pose.p_world_head_m,
+        pose.p_world_eye_left_m,
+        pose.p_world_eye_right_m,
+        line_of_sight(pose, left=True),
+        line_of_sight(pose, left=False),
+        (pose.lid_left, pose.lid_right),
+    )
+
+
+def _loaded(rig: Rig | str) -> Rig:
+    return load_rig(rig) if isinstance(rig, str) else rig
+
+
+def _parts(rig: Rig) -> tuple[Kinematics, Oculomotor]:
+    return _made(_Held(rig))
+
+
+class _Held:
+    """A rig as part of a key: equal only to itself, as rigs hold mappings."""
+
+    def __init__(self, rig: Rig) -> None:
+        self.rig = rig
+
+    def __hash__(self) -> int:
+        return id(self.rig)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Held) and other.rig is self.rig
+
+
+@lru_cache(maxsize=8)
+def _made(held: _Held) -> tuple[Kinematics, Oculomotor]:
+    return gaze_parts(held.rig, 0)

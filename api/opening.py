@@ -1,0 +1,131 @@
+"""Heads for a program: its own, or one that another program runs."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Literal, overload
+
+from gazerig.drivers.camera.source import FrameSource
+from gazerig.drivers.types import Camera, FaceDetector
+from gazerig.errors import NotFound
+from gazerig.local_head import LocalHead, RunningHead, SimulatedHead
+from gazerig.remote_head import RemoteHead
+from gazerig.robot.app.assemble import Substitutes
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.program_parts import ProgramParts
+from gazerig.robot.control.chooser import Chooser
+from gazerig.robot.recording.playback_devices import NoCamera
+from gazerig.robot.remote.client import RobotClient, running
+
+
+@overload
+def open(
+    rig: str = "desk", *, fast: Literal[True], mock: bool = True, page: None = None,
+    scene: str | None = None, video: Path | str | None = None,
+    camera: Camera | None = None, detector: FaceDetector | None = None,
+    attention: Chooser | None = None, character: str | None = None, profile: str | None = None,
+    seed: int = 0, record: Path | str | None = None, say: Callable[[str], None] | None = None,
+) -> SimulatedHead: ...  # fmt: skip
+
+
+@overload
+def open(
+    rig: str = "desk", *, fast: Literal[False] = False, mock: bool = False,
+    port: str | None = None, page: str | None = None, scene: str | None = None,
+    video: Path | str | None = None, camera: int | str | Camera | FrameSource | None = None, oak: bool = False,
+    detector: FaceDetector | None = None, attention: Chooser | None = None,
+    character: str | None = None, profile: str | None = None, seed: int = 0,
+    record: Path | str | None = None, say: Callable[[str], None] | None = None,
+) -> RunningHead: ...  # fmt: skip
+
+
+def open(
+    rig: str = "desk", *, fast: bool = False, mock: bool = False, port: str | None = None,
+    page: str | None = None, scene: str | None = None, video: Path | str | None = None,
+    camera: int | str | Camera | FrameSource | None = None, oak: bool = False,
+    detector: FaceDetector | None = None, attention: Chooser | None = None,
+    character: str | None = None, profile: str | None = None, seed: int = 0, record: Path | str | None = None,
+    say: Callable[[str], None] | None = None,
+) -> LocalHead:  # fmt: skip
+    """Return a head; it starts with the ``with`` block, and parks and switches off at its end.
+
+        with gazerig.open("desk", mock=True) as head:
+            head.look_at(1.0, 0.2, 0.3).wait()
+
+    Without anything to look at (``camera``, ``oak``, ``video``, ``scene``) real servos look where
+    the program says, and emulated ones at a simulated visitor.
+
+    Args:
+        rig: a shipped rig by name, or the path of a YAML file.
+        fast: emulated servos in simulated time, stepped by the program (``SimulatedHead.step``).
+        mock: emulated servos; else those of the rig.
+        port: serial port instead of the rig's.
+        page: HOST:PORT of the live page; its address is told to ``say``.
+        scene: simulated people, as of ``gazerig run --scene``.
+        video: a film or image to look at.
+        camera: number of a webcam, name of another package's camera, or an object of one's own
+            that gives frames (``gazerig.drivers.camera.source.FrameSource``) or detections
+            (``gazerig.drivers.types.Camera``).
+        oak: look through an OAK-D.
+        detector: finds faces in frames (``gazerig.drivers.types.FaceDetector``).
+        attention: chooses what to look at (``gazerig.robot.control.chooser.Chooser``).
+        character: laid over the rig, by name or path.
+        profile: style of gaze, by name or path.
+        seed: of all random numbers.
+        record: file to record to.
+        say: gets one line about whatever happens; else ``logging.getLogger("gazerig")`` does.
+
+    Raises:
+        Error: the options do not fit together. What is wrong with the rig or its servos
+            (``ConfigError``, ``SetupError``) is raised where the block begins.
+    """
+    own = camera if not isinstance(camera, int | str) else None
+    seen = camera if isinstance(camera, int | str) else None
+    sees = any(one is not None for one in (scene, video, seen)) or oak
+    mock = mock or fast
+    drawn = scene is not None or (mock and not sees and own is None)
+    options = RunOptions(
+        rig=rig, mock=mock, fast=fast, port=port, page=page, scene=scene, video=_path(video),
+        camera=seen, oak=oak, pixels=detector is not None and drawn,
+        character=character, profile=profile, seed=seed, record=_path(record), seconds=_FOR_EVER_S,
+    )  # fmt: skip
+    blind = own is None and not sees and not mock
+    options = options.checked(blind=blind or own is not None)
+    substitutes = Substitutes(program=ProgramParts(own, detector, attention))
+    if blind:
+        substitutes = substitutes._replace(camera=lambda rigs: NoCamera())
+    kind: type[LocalHead] = SimulatedHead if fast else RunningHead
+    return kind(options, substitutes, say)
+
+
+def connect(
+    pid: int | None = None, *, rig: str | None = None, who: str = "a program"
+) -> RemoteHead:
+    """Connect to a head that runs in another program of the same user.
+
+    Args:
+        pid: of its process, where several run.
+        rig: its rig, where several run.
+        who: what people are told of who asks.
+
+    Raises:
+        NotFound: none runs, or several and nothing says which; the message lists them.
+    """
+    if rig is None:
+        return RemoteHead(RobotClient.connect(pid, who))
+    found = [RemoteHead(client) for client in running(pid, who)]
+    fitting = [head for head in found if head.rig == rig]
+    for head in found:
+        if len(fitting) != 1 or head is not fitting[0]:
+            head.__exit__(None, None, None)
+    if len(fitting) == 1:
+        return fitting[0]
+    there = ", ".join(f"{head.pid} ({head.rig})" for head in found) or "start one: gazerig run ..."
+    raise NotFound(f"{len(fitting) or 'no'} heads with the rig {rig} are running: {there}")
+
+
+_FOR_EVER_S = 1e9
+"""A scene in simulated time would end by itself after a round."""
+
+
+def _path(given: Path | str | None) -> Path | None:
+    return None if given is None else Path(given)

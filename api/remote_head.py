@@ -1,0 +1,107 @@
+"""A head that runs in another program of the same user."""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from gazerig.errors import HeadEnded
+from gazerig.head import Head
+from gazerig.order import Order
+from gazerig.robot.control.command_handler import as_value
+from gazerig.robot.control.head_state import HeadEvent, HeadState
+from gazerig.robot.model.clock import RealClock
+from gazerig.robot.model.commands import Command, Leading, Value
+from gazerig.robot.model.lead import LeadState
+from gazerig.robot.remote.client import RequestRejected, RobotClient
+
+_POLL_S = 0.02
+
+
+class RemoteHead(Head):
+    """A connection to a head that runs; ``gazerig.connect`` makes one.
+
+    The end of the block ends its leads and hangs up; the head runs on.
+
+    Args:
+        client: the connection.
+    """
+
+    _stay = False
+
+    def __init__(self, client: RobotClient) -> None:
+        self._client = client
+        self._who = client.who
+        self._clock = RealClock()
+        self.rig = str(client.status()["rig"])
+        self.pid = client.pid
+
+    def __enter__(self) -> Self:
+        """Return the head itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """End what this program leads, and hang up."""
+        self._client.close()
+
+    @property
+    def state(self) -> HeadState:
+        """Return the newest tick of the control loop."""
+        state = self._client.state()[0]
+        if state is None:
+            raise HeadEnded("the head has just been started: its loop does not tick yet")
+        return state
+
+    def get(self, prefix: str = "") -> Mapping[str, Value]:
+        """Return the values in force of all keys of the rig that begin so."""
+        return {key: as_value(value) for key, value in self._client.get(prefix).items()}
+
+    def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
+        """Put values at dotted keys in force, all of them or none."""
+        return self._client.set_many(changes)
+
+    def save(self, path: Path | str | None = None) -> Path:
+        """Write what is in force into the rig's file, or another one; return the file."""
+        return self._client.save(path).path
+
+    def revert(self) -> tuple[str, ...]:
+        """Put the values of the rig's file in force again; return a line for each."""
+        return self._client.revert()
+
+    def menus(self) -> Mapping[str, tuple[str, ...]]:
+        """Return behaviours, modes of conversation and what the lids do; those in force first."""
+        return self._client.menus()
+
+    def lead(self) -> LeadState:
+        """Return the newest lead of gaze or joints."""
+        return self.state.lead
+
+    def led(self) -> str:
+        """Return who leads gaze or joints and with what, "" while the head chooses."""
+        return self.state.led
+
+    def pause(self, until: Callable[[], bool], seconds: float) -> None:
+        """Wait until something is true, for so long at most."""
+        end_s = self._clock.now_s() + seconds
+        while not until():
+            now_s = self._clock.now_s()
+            if now_s >= end_s:
+                return
+            self._clock.sleep_until(min(now_s + _POLL_S, end_s))
+
+    def _events(self, after: int) -> tuple[HeadEvent, ...]:
+        return self._client.state(after)[1]
+
+    def _give(self, command: Command) -> Order:
+        try:
+            reply = self._client.give(command)
+        except RequestRejected as rejected:
+            if rejected.reply is None or not isinstance(command, Leading):
+                raise
+            reply = rejected.reply
+        return Order(self, lambda: reply)

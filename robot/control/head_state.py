@@ -1,0 +1,285 @@
+"""One moment of a head as programs are shown it: joints, gaze and people, typed and named.
+
+World frame: at the neck base, x ahead, y left, z up. Angles in radians, yaw + left, pitch + up,
+roll + right ear down; metres; seconds of the rig's own clock.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
+from math import degrees
+from typing import Any
+
+from gazerig.gaze.angles import add, unit, yaw_pitch
+from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.types import PART_NAMES, PARTS, Angles2, Angles3, Face, Vec3
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.tick_text import target_name
+from gazerig.robot.model.lead import NOBODY_LEADS, LeadState
+
+
+@dataclass(frozen=True, slots=True)
+class JointReading:
+    """One joint at one moment.
+
+    Attributes:
+        name: as in the rig file.
+        desired_rad: what gaze, a gesture or a program asks for.
+        commanded_rad: what the guard let through to the servo.
+        measured_rad: what the servo says; see ``estimated``.
+        velocity_rad_s: as measured.
+        estimated: the servo tells nothing: ``measured_rad`` is its goal moved by its known speed.
+        limited: why ``commanded_rad`` is another angle than ``desired_rad``, "" where it is not.
+        torque: whether the torque is on; None where nobody knows.
+        fault: latched hardware errors, "" for none.
+        load: share of the stall torque, signed, -1..1; None where nobody knows.
+        temperature_c: None before the first reading.
+        voltage_v: None before the first reading.
+    """
+
+    name: str
+    desired_rad: float
+    commanded_rad: float
+    measured_rad: float
+    velocity_rad_s: float
+    estimated: bool = False
+    limited: str = ""
+    torque: bool | None = None
+    fault: str = ""
+    load: float | None = None
+    temperature_c: float | None = None
+    voltage_v: float | None = None
+
+    @property
+    def desired_deg(self) -> float:
+        """Return ``desired_rad`` in degrees."""
+        return degrees(self.desired_rad)
+
+    @property
+    def commanded_deg(self) -> float:
+        """Return ``commanded_rad`` in degrees."""
+        return degrees(self.commanded_rad)
+
+    @property
+    def measured_deg(self) -> float:
+        """Return ``measured_rad`` in degrees."""
+        return degrees(self.measured_rad)
+
+
+@dataclass(frozen=True, slots=True)
+class GazeReading:
+    """Where head and eyes are, as measured, and where they are going.
+
+    Attributes:
+        target: what is looked at, e.g. "face 3: left eye".
+        reason: why.
+        point_m: where both eyes are meant to point now, world.
+        direction_rad: (yaw, pitch) of the mean line of sight, world, as measured.
+        head_m: the point midway between the eyes, world.
+        head_rad: (yaw, pitch, roll) of the head.
+        left_eye_rad: (yaw, pitch) in the head.
+        right_eye_rad: (yaw, pitch) in the head.
+        lids: opening of the left and the right upper lid, 0 shut .. 1 open.
+        phase: "fixate", "saccade" or "pursue".
+        blink: whether a blink is under way.
+    """
+
+    target: str
+    reason: str
+    point_m: Vec3
+    direction_rad: Angles2
+    head_m: Vec3
+    head_rad: Angles3
+    left_eye_rad: Angles2
+    right_eye_rad: Angles2
+    lids: Angles2
+    phase: str
+    blink: bool
+
+    @property
+    def direction_deg(self) -> Angles2:
+        """Return ``direction_rad`` in degrees."""
+        yaw, pitch = self.direction_rad
+        return degrees(yaw), degrees(pitch)
+
+
+@dataclass(frozen=True, slots=True)
+class Person:
+    """A person who is seen, at the time of the frame.
+
+    Attributes:
+        id: stays the same while the person is seen; for ``look_at_person``.
+        position_m: the middle of the face, the nose, world.
+        velocity_m_s: of it, world.
+        facing: unit vector out of the face, world.
+        parts_m: places of the parts of the face, world: "left eye", "mouth" and so on; left and
+            right are the person's own.
+        confidence: of the detector, 0..1.
+        distance_from: what the distance rests on: "camera", "face size", or "" where unknown.
+        age_s: of the frame.
+    """
+
+    id: int
+    position_m: Vec3
+    velocity_m_s: Vec3
+    facing: Vec3
+    parts_m: Mapping[str, Vec3]
+    confidence: float
+    distance_from: str
+    age_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class HeadEvent:
+    """Something that happened: on the bus, to the camera, or because a program asked for it.
+
+    Attributes:
+        number: counts the events from 1.
+        t_s: the rig's own time.
+        text: one line.
+    """
+
+    number: int
+    t_s: float
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class HeadState:
+    """One tick of the control loop.
+
+    Attributes:
+        t_s: the rig's own time.
+        joints: by name.
+        gaze: where head and eyes are.
+        people: those who are seen.
+        level: of the guard: "ok", "limited", "hold" or "torque_off".
+        reasons: what the guard limited, "joint: reason".
+        stopped: why the head was stopped, "" while it moves.
+        led: who leads gaze or joints and with what, "" while the head chooses.
+        lead: the newest lead.
+        frame_s: time of the newest camera frame; None before the first.
+    """
+
+    t_s: float
+    joints: Mapping[str, JointReading]
+    gaze: GazeReading
+    people: tuple[Person, ...]
+    level: str
+    reasons: tuple[str, ...]
+    stopped: str
+    led: str
+    lead: LeadState = field(default=NOBODY_LEADS)
+    frame_s: float | None = None
+
+
+def head_state(tick: Tick) -> HeadState:
+    """Return a tick as programs are shown it."""
+    percept = tick.percept
+    return HeadState(
+        tick.t_s,
+        _joints(tick),
+        _gaze(tick),
+        tuple(_person(face, percept.age_s(tick.t_s)) for face in percept.faces)
+        if percept is not None
+        else (),
+        tick.guard_result.level,
+        tick.guard_result.reasons,
+        tick.stopped,
+        tick.led,
+        tick.lead,
+        percept.captured_s if percept is not None else None,
+    )
+
+
+def as_json(state: HeadState) -> dict[str, Any]:
+    """Return a state as plain JSON values."""
+    return {**asdict(state), "lead": list(state.lead)}
+
+
+def from_json(data: Mapping[str, Any]) -> HeadState:
+    """Return what ``as_json`` wrote; fields unknown to this version are left out.
+
+    Raises:
+        KeyError, TypeError, ValueError: it is no state.
+    """
+    made = _known(HeadState, data)
+    made["joints"] = {
+        name: JointReading(**_known(JointReading, one)) for name, one in data["joints"].items()
+    }
+    made["gaze"] = GazeReading(**_known(GazeReading, data["gaze"]))
+    made["people"] = tuple(_read_person(one) for one in data["people"])
+    made["lead"] = LeadState(*data["lead"])
+    return HeadState(**made)
+
+
+def _read_person(data: Mapping[str, Any]) -> Person:
+    parts = {name: tuple(point) for name, point in data["parts_m"].items()}
+    return Person(**{**_known(Person, data), "parts_m": parts})
+
+
+def _known(kind: Any, data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a class, JSON's lists as tuples."""
+    names = {one.name for one in fields(kind)}
+    return {
+        name: tuple(value) if isinstance(value, list) else value
+        for name, value in data.items()
+        if name in names
+    }
+
+
+def _joints(tick: Tick) -> dict[str, JointReading]:
+    guard, state = tick.guard_result, tick.joints
+    count = len(guard.joints)
+    columns = zip(
+        guard.joints,
+        guard.desired_rad or tick.desired_rad,
+        guard.command_rad,
+        state.position_rad,
+        state.velocity_rad_s,
+        [not told for told in state.measured] or [False] * count,
+        guard.why or [""] * count,
+        _or_none(state.torque, count),
+        state.fault or [""] * count,
+        _or_none(state.load, count),
+        _or_none(state.temperature_c, count),
+        _or_none(state.voltage_v, count),
+        strict=True,
+    )
+    return {row[0]: JointReading(*row) for row in columns}
+
+
+def _or_none(values: Sequence[Any], count: int) -> Sequence[Any]:
+    return values or [None] * count
+
+
+def _gaze(tick: Tick) -> GazeReading:
+    pose, gaze = tick.pose, tick.gaze
+    sight = add(line_of_sight(pose, left=True), line_of_sight(pose, left=False))
+    return GazeReading(
+        target_name(tick.target),
+        tick.target.why,
+        gaze.gaze_point_world_m,
+        yaw_pitch(unit(sight)),
+        pose.p_world_head_m,
+        pose.head_rad,
+        pose.eye_left_rad,
+        pose.eye_right_rad,
+        (pose.lid_left, pose.lid_right),
+        gaze.phase,
+        gaze.blink,
+    )
+
+
+def _person(face: Face, age_s: float) -> Person:
+    R = face.R_world_face
+    parts = {PART_NAMES[code]: p for code, p in zip(PARTS, face.parts_world_m, strict=True)}
+    return Person(
+        face.id,
+        face.p_world_m,
+        face.v_world_m_s,
+        (R[0][0], R[1][0], R[2][0]),
+        parts,
+        face.confidence,
+        face.distance_from,
+        age_s,
+    )

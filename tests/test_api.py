@@ -1,0 +1,322 @@
+"""What a program asks of a head in simulated time: orders and their ends, values, parameters."""
+
+from collections.abc import Iterator
+from math import degrees, nan
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gazerig
+from gazerig.drivers.types import DetectedFace, Detections, ImageArray
+from gazerig.gaze.types import GazeState, Percept, Vec3
+
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
+
+def quiet(line: str) -> None:
+    """Say nothing."""
+
+
+@pytest.fixture
+def head() -> Iterator[gazerig.SimulatedHead]:
+    with gazerig.open("desk", fast=True, scene="face-to-face", say=quiet) as head:
+        head.step(2.0)
+        yield head
+
+
+def test_an_order_arrives_and_says_what_is_really_done(head: gazerig.SimulatedHead) -> None:
+    began_s = head.time_s
+    order = head.look_at(1.0, 0.5, 0.3)
+    assert order.outcome is None and head.time_s == began_s  # time passes only when stepped
+    assert order.wait() == "arrived" and not order.refused and order.why == ""
+    assert 0.02 < head.time_s - began_s < 1.5
+    assert order.reply.error_deg < 0.1 and order.reply.done_m == pytest.approx((1.0, 0.5, 0.3))
+    assert order.active and head.led() == "the program: look at 1 0.5 0.3"
+    assert degrees(gaze_error(head, (1.0, 0.5, 0.3))) < 1.0
+
+
+def gaze_error(head: gazerig.Head, point: Vec3) -> float:
+    """Return the angle between the measured gaze and a point."""
+    gaze = head.gaze
+    to = np.subtract(point, gaze.head_m)
+    yaw, pitch = gaze.direction_rad
+    sight = (np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch))
+    return float(np.arccos(np.dot(sight, to / np.linalg.norm(to))))
+
+
+def test_a_point_out_of_reach_is_told_and_never_arrived_at(head: gazerig.SimulatedHead) -> None:
+    order = head.look_at(-1.0, 0.1, 0.3)
+    assert order.wait(2.0) == "timed out" and order.active
+    assert order.reply.error_deg > 30.0
+    assert {one.joint for one in order.reply.limited} >= {"neck_yaw"}
+
+
+def test_the_next_order_takes_over_and_the_first_says_by_whom(head: gazerig.SimulatedHead) -> None:
+    first = head.look_at(1.0, 1.0, 0.3)
+    second = head.look_towards(-10.0, 5.0)
+    assert first.wait() == "taken over" and "look in direction -10.0 5.0" in first.why
+    assert second.wait() == "arrived"
+    assert head.gaze.direction_deg == pytest.approx((-10.0, 5.0), abs=1.0)
+    # What has arrived has arrived, whatever comes after.
+    head.look_freely().wait()
+    assert second.outcome == "arrived" and not second.active
+
+
+def test_a_lead_ends_with_its_block_or_after_its_time(head: gazerig.SimulatedHead) -> None:
+    with head.look_at(1.0, 0.4, 0.3) as order:
+        head.step(0.5)
+        assert order.active
+    head.step()
+    assert not order.active and head.state.led == ""
+    timed = head.look_at(1.0, 1.0, 0.3, for_s=0.05)
+    assert timed.wait() == "taken over" and timed.why == "its time is over"
+
+
+def test_a_stopped_head_refuses_orders_until_it_resumes(head: gazerig.SimulatedHead) -> None:
+    head.stop("a hand")
+    assert head.state.stopped == "a hand" and head.state.level == "torque_off"
+    order = head.look_at(1.0, 0.0, 0.3)
+    assert order.wait() == "refused" and "resume first" in order.why and order.refused
+    assert head.resume().refused  # a stop holds two seconds
+    head.step(2.1)
+    assert not head.resume().refused and head.state.stopped == ""
+
+
+@pytest.mark.parametrize(
+    ("ask", "rule"),
+    [
+        (lambda head: head.look_at(nan, 0.0, 0.0), "three finite numbers"),
+        (lambda head: head.look_at(1.0, 0.0, 0.0, frame="moon"), "there is world, head"),
+        (lambda head: head.look_towards(0.0, 99.0), "within"),
+        (lambda head: head.look_at_person(-1), "whole number"),
+        (lambda head: head.look_at_pixel(nan, 0.0), "two finite numbers"),
+        (lambda head: head.jog("nose", 1.0), "no joint 'nose'"),
+        (lambda head: head.jog("neck_yaw", 100.0), "outside its range"),
+        (lambda head: head.behave("dance"), "no behaviour 'dance'"),
+        (lambda head: head.converse("sing"), "no conversation"),
+        (lambda head: head.play("fly"), "fly"),
+        (lambda head: head.express("happy", nan), "0..1"),
+        (lambda head: head.express("smug"), "no expression 'smug'"),
+        (lambda head: head.level("mouth", 2.0), "0..1"),
+        (lambda head: head.set({"gaze.head.comfort_deg": 1e9}), "is above 90"),
+        (lambda head: head.get("gaze.hed"), "unknown key"),
+        (lambda head: head.save(), "comes with"),
+        (lambda head: next(head.states(0.0)), "above 0"),
+    ],
+)
+def test_what_cannot_be_meant_is_refused_at_once(
+    head: gazerig.SimulatedHead, ask: object, rule: str
+) -> None:
+    assert callable(ask)
+    with pytest.raises(gazerig.Refused, match=rule):
+        ask(head)
+
+
+def test_people_pixels_points_of_the_head_and_joints(head: gazerig.SimulatedHead) -> None:
+    (person,) = head.people
+    assert set(person.parts_m) >= {"left eye", "mouth"} and person.age_s < 0.2
+    assert head.look_at_person(person.id).wait() == "arrived"
+    assert head.gaze.target.startswith(f"face {person.id}")
+    assert head.look_at_person(99).wait() == "refused"
+    assert head.look_at_pixel(200.0, 150.0, distance_m=1.0).wait() == "arrived"
+    assert head.look_at(1.0, 0.1, 0.0, frame="head").wait() == "arrived"
+    assert head.jog("neck_yaw", 20.0).wait() == "arrived"
+    neck = head.joints["neck_yaw"]
+    assert neck.measured_deg == pytest.approx(20.0, abs=1.0) and not neck.estimated
+    assert neck.commanded_deg == pytest.approx(20.0, abs=1.0)
+    head.release_joints()
+
+
+def test_face_and_behaviour(head: gazerig.SimulatedHead) -> None:
+    assert head.converse("listen").wait() == "arrived"
+    assert head.menus()["conversation"][0] == "listen"
+    behaviour = head.menus()["behaviour"][-1]
+    head.behave(behaviour)
+    head.wink("left")
+    assert head.play("nod").reply.gesture is not None
+    head.step(0.1)
+    assert head.menus()["behaviour"][0] == behaviour
+
+
+def test_parameters(head: gazerig.SimulatedHead, tmp_path: Path) -> None:
+    key = "gaze.head.comfort_deg"
+    assert head.set({key: 11.0}) == (f"{key} = 11.0",)
+    assert head.get(key) == {key: 11.0}
+    assert head.save(tmp_path / "mine.yaml").read_text().count("comfort_deg: 11") == 1
+    assert head.set({key: 12.0}) and head.revert() == (f"{key} = 11.0",)
+
+
+def test_states_and_events_step_the_head(head: gazerig.SimulatedHead) -> None:
+    began_s, times = head.time_s, []
+    for state in head.states(rate_hz=10.0):
+        times.append(state.t_s)
+        if len(times) == 5:
+            break
+    assert np.diff(times) == pytest.approx([0.1] * 4, abs=0.006)
+    assert head.time_s - began_s == pytest.approx(0.4, abs=0.02)
+    head.look_at(1.0, 0.0, 0.3)
+    texts = [event.text for event in head.events(timeout_s=0.2)]
+    assert "led by the program: look at 1 0 0.3" in texts
+
+
+def test_a_condition_is_waited_for(head: gazerig.SimulatedHead) -> None:
+    assert head.run_until(lambda state: state.gaze.phase == "saccade", 5.0)
+    assert not head.run_until(lambda state: state.t_s < 0.0, 0.1)
+
+
+def bytes_sent(seed: int) -> tuple[str | None, float]:
+    with gazerig.open("desk", fast=True, scene="visitor", seed=seed, say=quiet) as head:
+        head.step(0.5)
+        head.look_at(1.0, 0.5, 0.3).wait()
+        head.play("nod")
+        head.step(0.5)
+        sums = sum(joint.commanded_rad for joint in head.joints.values())
+        return head.state.gaze.target, sums
+
+
+def test_the_same_steps_and_orders_give_the_same(head: gazerig.SimulatedHead) -> None:
+    assert bytes_sent(1) == bytes_sent(1) != bytes_sent(2)
+
+
+def test_a_head_moves_in_its_block_alone() -> None:
+    closed = gazerig.open("desk", fast=True, say=quiet)
+    with pytest.raises(gazerig.Error, match="inside a block"):
+        closed.look_at(1.0, 0.0, 0.0)
+    with closed as head:
+        head.step()
+    with pytest.raises(gazerig.HeadEnded, match="the program"):
+        head.step()
+    with pytest.raises(gazerig.Error, match="open another"), closed:
+        pass
+
+
+def test_the_end_of_the_block_parks_whatever_ends_it() -> None:
+    said: list[str] = []
+    with (
+        pytest.raises(ZeroDivisionError),
+        gazerig.open("desk", fast=True, say=said.append) as head,
+    ):
+        head.step(0.5)
+        raise ZeroDivisionError
+    assert said[-1] == "stopped by the program: parked, torque off"
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "words"),
+    [
+        ({"rig": "dusk"}, gazerig.ConfigError, "did you mean"),
+        ({"scene": "moon"}, gazerig.SetupError, "unknown; scenes"),
+        ({"scene": "visitor", "video": "x.avi"}, gazerig.SetupError, "exclude each other"),
+        ({"video": "/nowhere.avi"}, gazerig.SetupError, "nowhere.avi"),
+        ({"camera": object()}, gazerig.SetupError, "object of the program has no method latest"),
+        ({"detector": object()}, gazerig.SetupError, "has no method find"),
+        ({"attention": object()}, gazerig.SetupError, "has no method choose"),
+    ],
+)
+def test_what_does_not_fit_is_one_line_of_one_family(
+    options: dict[str, object], error: type[Exception], words: str
+) -> None:
+    assert issubclass(error, gazerig.Error)
+    with (
+        pytest.raises(error, match=words),
+        gazerig.open(**{"fast": True, "say": quiet, **options}),  # type: ignore[call-overload]
+    ):
+        pass
+
+
+class OwnCamera:
+    """Sees one face that stands still."""
+
+    def __init__(self) -> None:
+        self.number = 0
+
+    def open(self) -> None: ...
+
+    def close(self) -> None: ...
+
+    def events(self) -> tuple[str, ...]:
+        return ()
+
+    def latest(self, now_s: float) -> Detections | None:
+        self.number = int(now_s * 20) + 1
+        marks = np.array([[300, 200], [340, 200], [320, 220], [305, 240], [335, 240]], float)
+        face = DetectedFace((280.0, 170.0, 80.0, 100.0), marks, 0.9)
+        return Detections(self.number / 20 - 0.05, self.number, 640, 480, (face,))
+
+
+class OwnRule:
+    """Always chooses the same point."""
+
+    def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Vec3:
+        return (1.0, -0.4, 0.2)
+
+
+class BadRule:
+    """Fails."""
+
+    def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Vec3:
+        raise RuntimeError("out of ideas")
+
+
+class OwnDetector:
+    """Finds nobody, and counts the frames."""
+
+    frames = 0
+
+    def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
+        self.frames += 1
+        return ()
+
+
+def test_an_own_camera() -> None:
+    with gazerig.open("desk", fast=True, camera=OwnCamera(), say=quiet) as head:
+        assert head.run_until(lambda state: len(state.people) == 1, 2.0)
+        head.step(2.0)
+        assert head.gaze.target.startswith("face ")
+
+
+def test_an_own_detector() -> None:
+    detector = OwnDetector()
+    with gazerig.open("desk", fast=True, detector=detector, say=quiet) as head:
+        head.step(0.3)
+        assert detector.frames > 0 and head.people == ()
+
+
+def test_an_own_rule_of_attention() -> None:
+    with gazerig.open("desk", fast=True, attention=OwnRule(), say=quiet) as head:
+        head.step(2.0)
+        assert degrees(gaze_error(head, (1.0, -0.4, 0.2))) < 1.0
+
+
+def test_an_own_rule_that_fails_is_dropped_by_name() -> None:
+    with gazerig.open("desk", fast=True, attention=BadRule(), say=quiet) as head:
+        head.step(0.1)
+        (text,) = [event.text for event in head.events(0.0) if "BadRule" in event.text]
+    assert "attention BadRule of the program failed (RuntimeError: out of ideas): dropped" in text
+
+
+# Geometry
+
+
+@pytest.mark.parametrize("rig", ["desk", "feetech", "maker"])
+def test_inverse_and_forward_meet(rig: str) -> None:
+    point = (1.2, 0.15, 0.2)
+    solved = gazerig.inverse(rig, point)
+    assert solved.reachable and solved.error_deg < 1.0 and not solved.limited
+    assert solved.joints_deg.keys() == gazerig.load_rig(rig).joints.keys()
+    pose = gazerig.forward(rig, solved.joints_rad)
+    sight = np.add(pose.left_sight, pose.right_sight)
+    to = np.subtract(point, pose.head_m)
+    cosine = np.dot(sight, to) / np.linalg.norm(sight) / np.linalg.norm(to)
+    assert degrees(np.arccos(min(1.0, cosine))) < 1.0
+
+
+def test_what_is_out_of_reach_names_the_joints() -> None:
+    loaded = gazerig.load_rig("desk")
+    solved = gazerig.inverse(loaded, (-1.0, 0.2, 0.3))
+    assert not solved.reachable and solved.error_deg > 30.0 and solved.limited
+    with pytest.raises(gazerig.Refused, match="finite"):
+        gazerig.inverse(loaded, (nan, 0.0, 0.0))
+    with pytest.raises(gazerig.Refused, match="no joint 'nose'; there is left_eye_pan"):
+        gazerig.forward(loaded, {"nose": 0.1})

@@ -1,0 +1,219 @@
+"""A head beside its program in real time: however its block ends, it parks and lets go."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import gazerig
+from gazerig.robot.control.loop import Robot, Tick
+
+LET_GO = "(not )?parked, torque off"
+"""On a starved machine the time for parking may be over before."""
+
+pytestmark = pytest.mark.usefixtures("ideal_servos", "own_sockets")
+
+
+@pytest.fixture
+def own_sockets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have sockets where no other test's rigs are found."""
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
+
+
+@pytest.fixture
+def said() -> list[str]:
+    return []
+
+
+def opened(said: list[str], rig: str = "desk") -> gazerig.Head:
+    return gazerig.open(rig, mock=True, scene="face-to-face", say=said.append)
+
+
+@pytest.fixture
+def head(said: list[str]) -> Iterator[gazerig.Head]:
+    with opened(said) as head:
+        yield head
+
+
+def assert_let_go(said: list[str], why: str = "the program") -> None:
+    """See that it parked, its torque is off, and no thread of it is left."""
+    assert re.fullmatch(f"stopped by {why}: {LET_GO}", said[-1])
+    assert not [t for t in threading.enumerate() if t.name.startswith("head ")]
+
+
+def test_the_end_of_the_block(said: list[str]) -> None:
+    handlers = [signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)]
+    switching_s = sys.getswitchinterval()
+    with opened(said) as head:
+        assert [
+            signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+        ] == handlers
+        assert head.look_at(1.0, 0.4, 0.3).wait(100.0) == "arrived"
+    assert_let_go(said)
+    assert sys.getswitchinterval() == pytest.approx(switching_s)
+
+
+def test_an_exception_in_the_block(said: list[str]) -> None:
+    with pytest.raises(ZeroDivisionError), opened(said):
+        raise ZeroDivisionError
+    assert_let_go(said)
+
+
+def test_an_interrupt_in_the_block(said: list[str]) -> None:
+    with pytest.raises(KeyboardInterrupt), opened(said):
+        raise KeyboardInterrupt
+    assert_let_go(said)
+
+
+def test_the_death_of_the_thread_that_opened_it(said: list[str]) -> None:
+    kept: list[gazerig.Head] = []
+
+    def forget() -> None:
+        kept.append(opened(said).__enter__())  # and no end of it
+
+    thread = threading.Thread(target=forget)
+    thread.start()
+    thread.join()
+    for running in [t for t in threading.enumerate() if t.name.startswith("head ")]:
+        running.join(30.0)
+    assert_let_go(said, "the end of the thread that opened it")
+    with pytest.raises(gazerig.HeadEnded, match="the end of the thread"):
+        kept[0].look_at(1.0, 0.0, 0.3)
+
+
+def test_an_error_of_the_loop_reaches_the_program(
+    said: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tick, failed = Robot.tick, threading.Event()
+
+    def failing(self: Robot, t_s: float, dt_s: float) -> Tick:
+        if failed.is_set():
+            raise RuntimeError("a bug")
+        return tick(self, t_s, dt_s)
+
+    monkeypatch.setattr(Robot, "tick", failing)
+    with pytest.raises(gazerig.HeadEnded, match="a bug") as caught, opened(said) as head:
+        order = head.look_at(-1.0, 0.0, 0.3)
+        failed.set()
+        order.wait(100.0)
+    assert isinstance(caught.value, gazerig.Error)
+    assert re.fullmatch(f"stopped by fault: unexpected RuntimeError: a bug: {LET_GO}", said[-1])
+
+
+def test_a_fault_that_nobody_asked_about_is_raised_at_the_end(
+    said: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def failing(self: Robot, t_s: float, dt_s: float) -> Tick:
+        raise RuntimeError("a bug")
+
+    with pytest.raises(gazerig.HeadEnded, match="a bug"), opened(said):
+        monkeypatch.setattr(Robot, "tick", failing)
+        for running in [t for t in threading.enumerate() if t.name.startswith("head ")]:
+            running.join(30.0)
+
+
+def test_a_start_that_fails_raises_what_failed(said: list[str]) -> None:
+    with pytest.raises(gazerig.ConfigError, match="did you mean"), opened(said, "dusk"):
+        pass
+    with (
+        pytest.raises(gazerig.SetupError, match="nowhere"),
+        gazerig.open("desk", port="/dev/nowhere", say=said.append),
+    ):
+        pass
+    assert not [t for t in threading.enumerate() if t.name.startswith("head ")]
+
+
+def test_two_heads_in_one_program_are_found_by_their_rigs(said: list[str]) -> None:
+    with opened(said) as desk, opened(said, "feetech") as other:
+        assert desk.look_at(1.0, 0.3, 0.3).wait(100.0) == "arrived"
+        assert other.look_at(1.0, -0.3, 0.3).wait(100.0) == "arrived"
+        assert desk.led() != other.led()
+        with pytest.raises(gazerig.NotFound, match="2 rigs are running"):
+            gazerig.connect()
+        with gazerig.connect(rig="feetech") as far:
+            assert far.rig == "feetech" and far.state.led == other.led()
+        with pytest.raises(gazerig.NotFound, match="no heads with the rig maker"):
+            gazerig.connect(rig="maker")
+    ends = [line for line in said if line.startswith("stopped by")]
+    assert len(ends) == 2 and all(
+        re.fullmatch(f"stopped by the program: {LET_GO}", e) for e in ends
+    )
+
+
+def test_another_program_has_the_same_orders(head: gazerig.Head) -> None:
+    mine = head.look_at(1.0, 0.4, 0.3)
+    mine.wait(100.0)
+    with gazerig.connect(os.getpid(), who="a show") as far:
+        order = far.look_at(1.0, -0.4, 0.3)
+        assert order.wait(100.0) == "arrived" and order.reply.error_deg < 1.0
+        assert mine.outcome == "arrived" and not mine.active
+        assert head.led().startswith("a show (process ")
+        assert far.look_at_person(99).wait(100.0) == "refused"
+        assert far.look_at_person(far.people[0].id).wait(100.0) == "arrived"
+        with pytest.raises(gazerig.Refused, match="three finite numbers"):
+            far.look_at(float("nan"), 0.0, 0.0)
+        with pytest.raises(gazerig.Refused, match="no behaviour"):
+            far.behave("dance")
+        with pytest.raises(gazerig.Refused, match="is above 90"):
+            far.set({"gaze.head.comfort_deg": 1e9})
+        assert far.set({"gaze.head.comfort_deg": 11.0}) and far.get("gaze.head.comfort_deg")
+        assert far.menus() == head.menus()
+        here, there = head.joints, far.joints
+        assert here.keys() == there.keys()
+        texts = [event.text for event in far.events(timeout_s=0.0)]
+        assert any("led by the program" in text for text in texts)
+        led = far.look_towards(10.0, 0.0)
+        assert led.active
+    order = mine  # hung up: the lead of the other program lapses
+    for state in head.states(rate_hz=50.0):
+        if not state.led:
+            break
+
+
+def test_states_are_the_newest_and_cost_the_loop_nothing(head: gazerig.Head) -> None:
+    times = []
+    for state in head.states(rate_hz=100.0):
+        times.append(state.t_s)
+        if len(times) == 20:
+            break
+    assert times == sorted(set(times))
+
+
+FORGETFUL = """
+import signal, sys, threading
+import gazerig
+from ideal_bus import ideal_buses
+with ideal_buses():
+    head = gazerig.open("desk", mock=True, say=lambda line: print(line, flush=True)).__enter__()
+    {end}
+"""
+
+
+@pytest.mark.parametrize(
+    ("end", "status", "why"),
+    [
+        ("head.look_at(1.0, 0.2, 0.3).wait(100.0)", 0, "the end of the program"),
+        ("raise SystemExit(3)", 3, "the end of the program"),
+        ("signal.raise_signal(signal.SIGINT)", 1, "the end of the program"),
+    ],
+)
+def test_the_end_of_the_interpreter(tmp_path: Path, end: str, status: int, why: str) -> None:
+    """Nobody left the block: it parks even so, before the program is gone."""
+    script = tmp_path / "forgetful.py"
+    script.write_text(textwrap.dedent(FORGETFUL).format(end=end), encoding="utf-8")
+    tests = str(Path(__file__).parent)
+    path = os.pathsep.join(filter(None, (os.environ.get("PYTHONPATH"), tests)))
+    done = subprocess.run(
+        [sys.executable, str(script)], env={**os.environ, "PYTHONPATH": path},
+        capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+    last = done.stdout.splitlines()[-1]
+    assert re.fullmatch(f"stopped by {why}: {LET_GO}", last), done.stderr
+    assert done.returncode in (status, -signal.SIGINT if status == 1 else status)
