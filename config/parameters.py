@@ -41,6 +41,7 @@ _AT_START: dict[str, str] = {
     "joints.*.transmission_points": "a push rod's places are taken over while its servo holds nothing",
     "joints.*.servo_speed_deg_s": "the servos' places are estimated from it after the first goal",
     "gesture_files": "gestures are read and checked when the rig is read",
+    "couplings.*": "the servos' places are turned into angles with it from the first reading on",
     "buses.*": "the servo buses are opened with it",
     "joints.*.gains": "servos are set up while their torque is off; a stop and a resume will do",
     "joints.*.torque_limit": "servos are set up while their torque is off; a stop and a resume will do",

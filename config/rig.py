@@ -32,6 +32,7 @@ from gazerig.gaze.saccade import SaccadeParams
 from gazerig.gaze.scanpath import ScanpathParams
 from gazerig.gaze.top_down import TopDownParams
 from gazerig.params import Bounds, Choices, Unit
+from gazerig.robot.model.coupling_params import CouplingParams
 from gazerig.robot.model.frames import CameraParams
 from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint import JointParams
@@ -158,6 +159,8 @@ class Rig:
     geometry: Annotated[GeometryParams, "measures of the head"]
     joints: Annotated[Mapping[str, JointParams], "one entry a joint"]
     lid_joints: Annotated[LidJoints, "lid angles, of a rig that has lids"] = field(default_factory=LidJoints)
+    couplings: Annotated[Mapping[str, CouplingParams],
+        "pairs of joints that two servos move together, each under any name"] = field(default_factory=dict, kw_only=True)
     park_deg: Annotated[Mapping[str, float], Bounds(-180, 180),
         "pose to which the joints move before torque is switched off; joints left out go to 0"] = field(default_factory=dict)
     camera: Annotated[CameraParams, "where the camera sits"] = field(default_factory=CameraParams)

@@ -9,6 +9,7 @@ from gazerig.config.rig import BusConfig, Rig
 from gazerig.drivers.hobby_board.params import HobbyBoardParams
 from gazerig.drivers.servo_models import SERVOS
 from gazerig.gaze.types import PARTS
+from gazerig.robot.model.coupling_params import CoupledPair, unreachable
 from gazerig.robot.model.forbidden_range import forbidden_pairs
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS
@@ -145,6 +146,31 @@ def _park_ranges(rig: Rig) -> Iterable[tuple[str, str]]:
             )
 
 
+def _couplings(rig: Rig) -> Iterable[tuple[str, str]]:
+    """Find couplings whose servos cannot do the whole range of their joints."""
+    owner: dict[str, str] = {}
+    for name, coupling in rig.couplings.items():
+        absent = [
+            (key, joint)
+            for key, joint in (("first", coupling.first), ("second", coupling.second))
+            if joint not in rig.joints
+        ]
+        for key, joint in absent:
+            there = ", ".join(rig.names)
+            yield f"couplings.{name}.{key}", f"no joint {joint!r}; there is {there}"
+        for joint in (coupling.first, coupling.second):
+            if joint in owner:
+                yield f"couplings.{name}", f"{joint} is in {owner[joint]} already"
+            owner.setdefault(joint, name)
+        known = not absent and all(
+            rig.joints[joint].model in SERVOS for joint in (coupling.first, coupling.second)
+        )
+        if known:
+            pair = CoupledPair(coupling.first, coupling.second, coupling.made())
+            if fault := unreachable(pair, rig.joints):
+                yield f"couplings.{name}", fault
+
+
 def _part_names(rig: Rig) -> Iterable[tuple[str, str]]:
     for code in rig.face_parts_mm:
         if code not in PARTS:
@@ -160,6 +186,7 @@ RULES = (
     _park_ranges,
     _part_names,
     _collisions,
+    _couplings,
     expressions,
     levels,
     gesture_rules,

@@ -46,6 +46,7 @@ from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.control.loop import Robot
 from gazerig.robot.dashboard.snapshot import ShownRig
 from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
+from gazerig.robot.model.coupling_params import pairs_of
 from gazerig.robot.model.frames import (
     CameraMount,
     CameraParams,
@@ -264,7 +265,7 @@ def _components(
 
 def _body(rig: Rig, wires: RunBus) -> Body:
     gentle_deg_s = rig.guard.soft_start_speed_deg_s
-    return Body(wires.bus, rig.joints, park_rad(rig), gentle_deg_s)
+    return Body(wires.bus, rig.joints, park_rad(rig), gentle_deg_s, pairs_of(rig.couplings))
 
 
 def _guard(rig: Rig, body: Body) -> Guard:

@@ -18,6 +18,7 @@ from gazerig.robot.guardian.guarded_bus import GuardedBus
 from gazerig.robot.guardian.guardian import Guardian
 from gazerig.robot.guardian.release_plan import ReleasePlan, pickled
 from gazerig.robot.model.clock import RealClock
+from gazerig.robot.model.coupling_params import pairs_of
 
 
 def bus_names(rig: Rig) -> tuple[str, ...]:
@@ -54,7 +55,8 @@ def ports_of(rig: Rig, given: str | None) -> dict[str, str]:
 
 def rig_setups(rig: Rig) -> tuple[ServoConfig, ...]:
     """Return what buses must know of a rig's servos, in the order of its joints."""
-    return setups(rig.joints, park_rad(rig), rig.guard.soft_start_speed_deg_s)
+    gentle_deg_s = rig.guard.soft_start_speed_deg_s
+    return setups(rig.joints, park_rad(rig), gentle_deg_s, pairs_of(rig.couplings))
 
 
 def rig_bus(rig: Rig, ports: Mapping[str, BusPort]) -> ServoBus:

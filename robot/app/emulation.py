@@ -8,6 +8,7 @@ from gazerig.config.schema import Rig
 from gazerig.drivers.plugins import EmulatedJoint
 from gazerig.drivers.servo_models import HOBBY_KINDS
 from gazerig.robot.app.bus_wiring import bus_names, joints_on
+from gazerig.robot.model.coupling_params import pair_setups, pairs_of
 from gazerig.robot.model.joint import JointParams
 from gazerig.sim_mock.devices import (
     DynamixelLine,
@@ -38,7 +39,7 @@ def emulated_lines(rig: Rig) -> dict[str, Emulated]:
 def emulated_servo(rig: Rig, name: str) -> ServoSpec:
     """Return the smart servo of one joint."""
     joint = rig.joints[name]
-    start, (low, high) = _start(joint, name), _stops(joint)
+    start, (low, high) = _start(rig, name), _stops(rig, name)
     load = _LOAD_KG_M2.get(name, 0.0) * (_steps_per_rad(joint) / joint.made().steepest) ** 2
     physics = Physics(load_kg_m2=load, stop_low_steps=low, stop_high_steps=high)
     return ServoSpec(joint.id, joint.model, start, physics=physics)
@@ -57,8 +58,8 @@ def _line(rig: Rig, name: str) -> Emulated:
         specs = tuple(emulated_servo(rig, joint) for joint in joints)
         return CHAINS[config.kind](specs, config.baud)
     if config.kind in BOARDS:
-        return BOARDS[config.kind](config, tuple(_hobby(rig.joints[one], one) for one in joints))
-    servos = tuple(_plain(rig.joints[one], one) for one in joints)
+        return BOARDS[config.kind](config, tuple(_hobby(rig, one) for one in joints))
+    servos = tuple(_plain(rig, one) for one in joints)
     return plugin_line(config.kind, config.section, servos)
 
 
@@ -79,14 +80,15 @@ BOARDS: dict[str, Callable[[BusConfig, tuple[HobbySpec, ...]], Emulated]] = {
 """Emulated boards with their hobby servos by the kind of bus."""
 
 
-def _hobby(joint: JointParams, name: str) -> HobbySpec:
-    low, high = _stops(joint)
+def _hobby(rig: Rig, name: str) -> HobbySpec:
+    joint = rig.joints[name]
+    low, high = _stops(rig, name)
     facts, spec = joint.facts, HobbySpec(joint.id)
     if joint.servo_speed_deg_s is not None:
         spec = spec._replace(speed_steps_s=joint.servo_speed_deg_s * facts.steps_per_turn / 360.0)
     # The board's own range of the channel is set as wide as such servos go.
     return spec._replace(
-        start_steps=_start(joint, name),
+        start_steps=_start(rig, name),
         stop_low_steps=low,
         stop_high_steps=high,
         min_steps=facts.lowest,
@@ -94,16 +96,26 @@ def _hobby(joint: JointParams, name: str) -> HobbySpec:
     )
 
 
-def _plain(joint: JointParams, name: str) -> EmulatedJoint:
-    return EmulatedJoint(joint.id, joint.model, _start(joint, name), *_stops(joint))
+def _plain(rig: Rig, name: str) -> EmulatedJoint:
+    joint = rig.joints[name]
+    return EmulatedJoint(joint.id, joint.model, _start(rig, name), *_stops(rig, name))
 
 
-def _start(joint: JointParams, name: str) -> int:
-    return round(joint.steps(radians(_CROOKED_DEG.get(name, 0.0))))
+def _start(rig: Rig, name: str) -> int:
+    crooked = {name: radians(_CROOKED_DEG.get(name, 0.0)) for name in rig.joints}
+    for first, second, coupling in pairs_of(rig.couplings):
+        crooked[first], crooked[second] = coupling.servo_rad((crooked[first], crooked[second]))
+    return round(rig.joints[name].steps(crooked[name]))
 
 
-def _stops(joint: JointParams) -> tuple[float, float]:
+def _stops(rig: Rig, name: str) -> tuple[float, float]:
     """Return the first and last step of the servo that its mechanics allow."""
+    joint = rig.joints[name]
+    for pair in pairs_of(rig.couplings):
+        if name in pair[:2]:
+            own = pair_setups(pair, rig.joints, {})[name]
+            beyond = joint.made().steepest * radians(_STOP_BEYOND_DEG)
+            return own.min_steps - beyond, own.max_steps + beyond
     ends = (joint.min_deg - _STOP_BEYOND_DEG, joint.max_deg + _STOP_BEYOND_DEG)
     low, high = sorted(joint.steps(radians(end)) for end in ends)
     return low, high

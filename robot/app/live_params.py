@@ -41,6 +41,7 @@ from gazerig.robot.app.rig_limits import (
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.model.commands import Tune, Value
+from gazerig.robot.model.coupling_params import pairs_of, partners
 from gazerig.robot.model.frames import CameraMount, CameraParams, MountedOn
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.joint_limit import JointLimit
@@ -116,6 +117,7 @@ class LiveParams:
         self.parts = parts
         self._placed = placed
         self._started = rig
+        self._coupled = partners(pairs_of(rig.couplings))
         self._walk = load_walk(rig.gaze.scanpath.transition_matrix)
         self._ready: dict[int, _Ready] = {}
 
@@ -232,7 +234,7 @@ class LiveParams:
     def _lasting(self, rig: Rig) -> dict[str, JointParams]:
         """Return the joints with the servos that the bus was opened with."""
         return {
-            name: _with_servo(rig.joints[name], first)
+            name: _with_servo(rig.joints[name], first, name in self._coupled)
             for name, first in self._started.joints.items()
         }
 
@@ -241,9 +243,14 @@ _OF_THE_SERVO = ("id", "model", "firmware_min", "bus", "transmission_points", "s
 """What of a joint stays as it was when the bus was opened."""
 
 
-def _with_servo(joint: JointParams, first: JointParams) -> JointParams:
+_OF_A_PAIR = ("sign", "ratio", "zero_step")
+"""What stays besides where two servos move two joints together."""
+
+
+def _with_servo(joint: JointParams, first: JointParams, coupled: bool) -> JointParams:
     """Return a joint with the servo of another; the same one where it has that already."""
-    kept = {key: getattr(first, key) for key in _OF_THE_SERVO}
+    keys = (*_OF_THE_SERVO, *_OF_A_PAIR) if coupled else _OF_THE_SERVO
+    kept = {key: getattr(first, key) for key in keys}
     if all(getattr(joint, key) == value for key, value in kept.items()):
         return joint
     return replace(joint, **kept)

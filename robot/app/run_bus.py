@@ -15,6 +15,7 @@ from gazerig.robot.app.emulation import emulated_lines, place_of
 from gazerig.robot.app.gaze_models import kinematics_of
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.clock import Clock
+from gazerig.robot.model.coupling_params import pairs_of
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import NECK
 from gazerig.sim_mock.device import Device
@@ -65,16 +66,20 @@ def true_head(devices: Mapping[str, Device], rig: Rig, poses: PoseHistory) -> He
     if not devices:
         return poses.head_pose
     kinematics = kinematics_of(rig)
-    axes = [
-        (i, rig.joints[name].made(), devices[rig.joints[name].bus], place_of(rig, name))
-        for i, name in enumerate(NECK)
-        if name in rig.joints
-    ]
+    pairs = pairs_of(rig.couplings)
+    servos = {
+        name: (rig.joints[name].made(), devices[rig.joints[name].bus], place_of(rig, name))
+        for name in {*NECK, *(other for pair in pairs for other in pair[:2])} & rig.joints.keys()
+    }
 
     def now(_: float) -> tuple[Mat3, Vec3]:
-        angles = [0.0, 0.0, 0.0]
-        for i, linkage, device, place in axes:
-            angles[i] = linkage.angle_rad(device.positions_steps()[place])
-        return kinematics.head_pose((angles[0], angles[1], angles[2]))
+        angles = {
+            name: linkage.angle_rad(device.positions_steps()[place])
+            for name, (linkage, device, place) in servos.items()
+        }
+        for first, second, coupling in pairs:
+            angles[first], angles[second] = coupling.joint_rad((angles[first], angles[second]))
+        yaw, pitch, roll = (angles.get(name, 0.0) for name in NECK)
+        return kinematics.head_pose((yaw, pitch, roll))
 
     return now

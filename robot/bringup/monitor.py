@@ -3,10 +3,13 @@
 A bus that is opened for moving sets its servos up, which is a write; this one only asks.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from math import degrees, radians
 from typing import NamedTuple
 
 from gazerig.robot.bringup.telemetry import Telemetry, TelemetryReader
+from gazerig.robot.model.coupling import joint_rates
+from gazerig.robot.model.coupling_params import CoupledPair
 from gazerig.robot.model.joint import JointParams
 
 _DIGITS = {"goal_deg": 2, "position_deg": 2, "velocity_deg_s": 1, "load": 3}
@@ -34,6 +37,7 @@ class Monitor:
         readers: of the servos of each bus, by the name of the bus.
         joints: in the order of the samples.
         now_s: the ports' clock.
+        pairs: joints that two servos move together.
     """
 
     def __init__(
@@ -41,7 +45,9 @@ class Monitor:
         readers: Mapping[str, TelemetryReader],
         joints: Mapping[str, JointParams],
         now_s: Callable[[], float],
+        pairs: Sequence[CoupledPair] = (),
     ) -> None:
+        self._pairs = tuple(pairs)
         self._readers = dict(readers)
         self._joints = dict(joints)
         self._now_s = now_s
@@ -57,8 +63,40 @@ class Monitor:
         servos = {name: self._readers[one.bus].read(one) for name, one in self._joints.items()}
         self._asked += len(servos)
         self._unanswered += sum(one is None for one in servos.values())
+        for pair in self._pairs:
+            one, other = coupled_angles(pair, servos[pair.first], servos[pair.second])
+            servos[pair.first], servos[pair.second] = one, other
         end_s = self._now_s()
         return TelemetrySample(end_s, end_s - start_s, servos, self._asked, self._unanswered)
+
+
+def coupled_angles(
+    pair: CoupledPair, one: Telemetry | None, other: Telemetry | None
+) -> tuple[Telemetry | None, Telemetry | None]:
+    """Return what two coupled servos say with the angles of their joints.
+
+    Without either of them both joints' angles are unknown.
+    """
+    goals = _joint_deg(pair, one and one.goal_deg, other and other.goal_deg)
+    at = _joint_deg(pair, one and one.position_deg, other and other.position_deg)
+    speeds: tuple[float | None, float | None] = (None, None)
+    if one and other and None not in (*at, one.velocity_deg_s, other.velocity_deg_s):
+        turning = one.velocity_deg_s or 0.0, other.velocity_deg_s or 0.0
+        slopes = pair.coupling.rates((radians(at[0] or 0.0), radians(at[1] or 0.0)))
+        speeds = joint_rates(slopes, turning)
+    return (
+        one and one._replace(goal_deg=goals[0], position_deg=at[0], velocity_deg_s=speeds[0]),
+        other and other._replace(goal_deg=goals[1], position_deg=at[1], velocity_deg_s=speeds[1]),
+    )
+
+
+def _joint_deg(
+    pair: CoupledPair, one: float | None, other: float | None
+) -> tuple[float | None, float | None]:
+    if one is None or other is None:
+        return None, None
+    first, second = pair.coupling.joint_rad((radians(one), radians(other)))
+    return degrees(first), degrees(second)
 
 
 def as_json(sample: TelemetrySample, start_s: float) -> dict[str, object]:

@@ -27,6 +27,7 @@ from gazerig.robot.bringup.telemetry import (
 from gazerig.robot.cli.ports import MockOption, PortOption, RigPorts, opened, rig_ports, setups_on
 from gazerig.robot.cli.terminal import RigArgument, clear_errors, signals
 from gazerig.robot.model.clock import RealClock
+from gazerig.robot.model.coupling_params import pairs_of
 from gazerig.robot.model.joint import JointParams
 
 app = typer.Typer()
@@ -56,7 +57,7 @@ def monitor(
         found, clock = load_rig(rig), RealClock()
         with rig_ports(found, mock, port) as wire, _readers(found, wire) as readers:
             joints = {name: found.joints[name] for name in found.names}
-            watch = Monitor(readers, joints, clock.now_s)
+            watch = Monitor(readers, joints, clock.now_s, pairs_of(found.couplings))
             samples = _samples(watch, clock, rate, 0.0 if once else seconds, stopped)
             if as_lines:
                 start_s = clock.now_s()

@@ -5,6 +5,8 @@ from collections.abc import Mapping, Sequence
 from gazerig.drivers.errors import BusLost, DriverError
 from gazerig.drivers.slow_entry import ENTRY_DEG_S
 from gazerig.drivers.types import Feedback, ServoBus, ServoConfig
+from gazerig.robot.control.coupled_servos import CoupledServos
+from gazerig.robot.model.coupling_params import CoupledPair, pair_setups
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.types import JointAngles, JointState, in_order
@@ -14,15 +16,21 @@ def setups(
     joints: Mapping[str, JointParams],
     park_rad: Mapping[str, float],
     gentle_deg_s: float = ENTRY_DEG_S,
+    pairs: Sequence[CoupledPair] = (),
 ) -> tuple[ServoConfig, ...]:
     """Return what a bus must know of all servos.
 
     park_rad: parking pose of joints, 0 where not given: where servos that do not tell their
         place are taken to be
     gentle_deg_s: joints are led into their ranges no faster
+    pairs: joints that two servos move together
     """
+    coupled: dict[str, ServoConfig] = {}
+    for pair in pairs:
+        coupled |= pair_setups(pair, joints, park_rad, gentle_deg_s)
     return tuple(
-        joints[name].setup(name, park_rad.get(name, 0.0), gentle_deg_s) for name in in_order(joints)
+        coupled.get(name) or joints[name].setup(name, park_rad.get(name, 0.0), gentle_deg_s)
+        for name in in_order(joints)
     )
 
 
@@ -36,6 +44,7 @@ class Body:
         joints: the joints by name.
         park_rad: as in ``setups``.
         gentle_deg_s: as in ``setups``.
+        pairs: as in ``setups``.
     """
 
     def __init__(
@@ -44,9 +53,12 @@ class Body:
         joints: Mapping[str, JointParams],
         park_rad: Mapping[str, float] | None = None,
         gentle_deg_s: float = ENTRY_DEG_S,
+        pairs: Sequence[CoupledPair] = (),
     ) -> None:
         self.bus = bus
         self.names = in_order(joints)
+        self._pairs = tuple(pairs)
+        self._coupled = CoupledServos(pairs, self.names)
         self._park_rad = dict(park_rad or {})
         self._torque_off = False
         self._gentle_deg_s = gentle_deg_s
@@ -55,7 +67,7 @@ class Body:
         # Before the first answer: the centre, of an age that says so.
         self._nothing = Feedback.of_none(len(self.names))
         self._last = self._nothing._replace(
-            position_steps=tuple([round(linkage.steps(0.0)) for linkage in self._linkages]),
+            position_steps=tuple(self._steps((0.0,) * len(self.names))),
             velocity_steps_s=(0.0,) * len(self.names),
             load=(0.0,) * len(self.names),
             torque=(True,) * len(self.names),  # it was switched on, and no servo says otherwise
@@ -79,7 +91,7 @@ class Body:
         """
         before, self._gentle_deg_s = self._joints, gentle_deg_s
         self._take(tuple(joints[name] for name in self.names))
-        self.bus.retune(setups(joints, self._park_rad, self._gentle_deg_s))
+        self.bus.retune(setups(joints, self._park_rad, self._gentle_deg_s, self._pairs))
         return {
             i: (
                 now.angle_rad(old.steps(1.0)) - now.angle_rad(old.steps(0.0)),
@@ -122,11 +134,17 @@ class Body:
         if feedback.missing:
             feedback = feedback.filled(self._last)
         self._last = feedback
+        if self._coupled:
+            feedback = self._coupled.completed(feedback, self._torque_off)
         steps = feedback.position_steps
+        angles = self.angles(steps)
         speeds = zip(feedback.velocity_steps_s, self._to_rate, steps, strict=True)
+        rates = [v * rate(s) for v, rate, s in speeds]
+        if self._coupled:
+            rates = self._coupled.speeds(angles, rates)
         return JointState(
-            self.angles(steps),
-            tuple([v * rate(s) for v, rate, s in speeds]),
+            angles,
+            tuple(rates),
             feedback.at_s,
             tuple([self.names[i] for i in feedback.missing]),
             feedback.torque,
@@ -140,13 +158,19 @@ class Body:
 
     def write(self, command_rad: JointAngles) -> None:
         """Send one goal to every servo."""
-        self.bus.write(
-            [round(steps(angle)) for steps, angle in zip(self._to_steps, command_rad, strict=True)]
-        )
+        self.bus.write(self._steps(command_rad))
+
+    def _steps(self, angles_rad: JointAngles) -> list[int]:
+        """Return the servo positions of joint angles."""
+        angles: Sequence[float] = angles_rad
+        if self._coupled:
+            angles = self._coupled.shafts(angles_rad)
+        return [round(steps(angle)) for steps, angle in zip(self._to_steps, angles, strict=True)]
 
     def angles(self, steps: Sequence[float]) -> JointAngles:
         """Return the joint angles of servo positions."""
-        return tuple([angle(step) for angle, step in zip(self._to_rad, steps, strict=True)])
+        angles = [angle(step) for angle, step in zip(self._to_rad, steps, strict=True)]
+        return tuple(self._coupled.joints(angles) if self._coupled else angles)
 
     def disable_torque(self) -> None:
         """Torque off at once; the bus stays open and readings go on.
@@ -166,6 +190,9 @@ class Body:
         """
         goals = self.bus.enable_torque()
         self._torque_off = False
+        if self._coupled:
+            at = zip(self._to_rad, goals, strict=True)
+            self._coupled.held([angle(step) for angle, step in at])
         self._set_up = self._joints
         return self.angles(goals)
 

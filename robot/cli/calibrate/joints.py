@@ -28,6 +28,7 @@ from gazerig.robot.cli.prompts import Lines
 from gazerig.robot.cli.rig_writer import refuse_unwritable, write_found
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals
 from gazerig.robot.cli.write_options import AllYesOption, DryRunOption, OutOption
+from gazerig.robot.model.coupling_params import pairs_of, partners
 
 
 def calibrate_joints(
@@ -83,12 +84,25 @@ def calibrate_joints(
         raise typer.Exit(FAULT)
 
 
+_BY_LEVEL = (
+    "set zero_step of both by hand, to what gazerig monitor shows while their horns are at 0 deg "
+    "(of a differential: while the head is level)"
+)
+
+
 def _names(rig: Rig, asked: list[str] | None) -> tuple[str, ...]:
     """Return the joints to calibrate, in the order of the rig."""
     for name in asked or ():
         if name not in rig.joints:
             raise SetupError(f"--joint {name}: no such joint; there is {', '.join(rig.names)}")
-    return tuple(name for name in rig.names if not asked or name in asked)
+    coupled = partners(pairs_of(rig.couplings))
+    for name in rig.names:
+        if name in coupled and (not asked or name in asked):
+            text = f"{name} is moved together with {coupled[name]} by two servos: {_BY_LEVEL}"
+            if asked:
+                raise SetupError(text)
+            say(f"left out: {text}")
+    return tuple(name for name in rig.names if name not in coupled and (not asked or name in asked))
 
 
 def _refuse_writes(how: CalibrationOptions) -> None:

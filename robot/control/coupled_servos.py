@@ -1,0 +1,127 @@
+"""Pairs of servos that move two joints together, between a bus and the joints' angles."""
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple, TypeVar
+
+from gazerig.drivers.types import Feedback
+from gazerig.robot.model.coupling import Coupling, Pair, Unreachable, joint_rates
+from gazerig.robot.model.coupling_params import CoupledPair
+
+
+class _Pair(NamedTuple):
+    """A coupling between the joints at two places of every sequence."""
+
+    i: int
+    j: int
+    coupling: Coupling
+
+
+class CoupledServos:
+    """The coupled pairs of one body.
+
+    Args:
+        pairs: by the names of their joints.
+        names: of all joints, in their order.
+    """
+
+    def __init__(self, pairs: Iterable[CoupledPair], names: Sequence[str]) -> None:
+        self._pairs = tuple(
+            _Pair(names.index(one.first), names.index(one.second), one.coupling) for one in pairs
+        )
+        self._goals: dict[int, Pair] = {}
+        self._last: dict[int, Feedback] = {}
+
+    def __bool__(self) -> bool:
+        """Return whether there is any pair."""
+        return bool(self._pairs)
+
+    def joints(self, shafts_rad: Sequence[float]) -> list[float]:
+        """Return the joint angles of servo angles."""
+        angles = list(shafts_rad)
+        for i, j, coupling in self._pairs:
+            angles[i], angles[j] = coupling.joint_rad((shafts_rad[i], shafts_rad[j]))
+        return angles
+
+    def shafts(self, joints_rad: Sequence[float]) -> list[float]:
+        """Return the servo angles of joint angles.
+
+        Beyond what a mechanism can do, where joints can only be before they are led into
+        their range, its servos keep their last goals.
+        """
+        angles = list(joints_rad)
+        for i, j, coupling in self._pairs:
+            at = joints_rad[i], joints_rad[j]
+            try:
+                self._goals[i] = coupling.servo_rad(at)
+            except Unreachable:
+                self._goals.setdefault(i, coupling.servo_rad((0.0, 0.0)))
+            angles[i], angles[j] = self._goals[i]
+        return angles
+
+    def held(self, shafts_rad: Sequence[float]) -> None:
+        """Record the servo angles that were held when the torque came on."""
+        for i, j, _ in self._pairs:
+            self._goals[i] = shafts_rad[i], shafts_rad[j]
+
+    def speeds(self, joints_rad: Sequence[float], shaft_rates: Sequence[float]) -> list[float]:
+        """Return the joints' speeds of the servos' at joint angles."""
+        rates = list(shaft_rates)
+        for i, j, coupling in self._pairs:
+            try:
+                slopes = coupling.rates((joints_rad[i], joints_rad[j]))
+            except Unreachable:
+                rates[i] = rates[j] = 0.0
+                continue
+            rates[i], rates[j] = joint_rates(slopes, (shaft_rates[i], shaft_rates[j]))
+        return rates
+
+    def completed(self, feedback: Feedback, released: bool) -> Feedback:
+        """Return feedback in which both servos of a pair share what concerns both joints.
+
+        Where one did not answer both joints are stale, at their last common position. The
+        higher load, a fault, and torque that came on anew count for both, and torque is on
+        where both have it, once it is ``released`` where one has it.
+        """
+        for i, j, _ in self._pairs:
+            feedback = self._complete(feedback, i, j, released)
+        return feedback
+
+    def _complete(self, now: Feedback, i: int, j: int, released: bool) -> Feedback:
+        absent = {i, j} & set(now.missing)
+        if not absent:
+            self._last[i] = now
+        last = self._last.get(i, now)
+        oldest = min(last.at_s[i], last.at_s[j])
+        load = max((now.load[i], now.load[j]), key=abs)
+        on = now.torque[i], now.torque[j]
+        powered = any(on) if released else all(on)
+        anew = now.rearmed[i] or now.rearmed[j]
+        fault = now.fault[i] or now.fault[j]
+        faults = [
+            now.fault[k] or (f"{fault} (of its coupled servo)" if fault else "") for k in (i, j)
+        ]
+        now = now._replace(
+            at_s=_with(now.at_s, i, oldest, j, oldest),
+            load=_with(now.load, i, load, j, load),
+            torque=_with(now.torque, i, powered, j, powered),
+            rearmed=_with(now.rearmed, i, anew, j, anew),
+            fault=_with(now.fault, i, faults[0], j, faults[1]),
+        )
+        if not absent:
+            return now
+        steps, speeds = last.position_steps, last.velocity_steps_s
+        return now._replace(
+            missing=tuple(sorted({*now.missing, i, j})),
+            position_steps=_with(now.position_steps, i, steps[i], j, steps[j]),
+            velocity_steps_s=_with(now.velocity_steps_s, i, speeds[i], j, speeds[j]),
+        )
+
+
+T = TypeVar("T")
+
+
+def _with(values: tuple[T, ...], i: int, at_i: T, j: int, at_j: T) -> tuple[T, ...]:
+    """Return values with others at two places."""
+    changed = list(values)
+    changed[i], changed[j] = at_i, at_j
+    return tuple(changed)

@@ -1,0 +1,338 @@
+"""Two servos that move two joints together: geometry, servo limits, feedback, and a run."""
+
+from dataclasses import replace
+from math import degrees, inf, radians
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import invoked
+from expressive_rig import faults
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gazerig.config.load import shipped
+from gazerig.config.parameters import changed
+from gazerig.config.rig import Rig
+from gazerig.config.schema import load_rig
+from gazerig.drivers.types import Feedback
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.bus_wiring import rig_setups
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.run_bus import run_bus, true_head
+from gazerig.robot.bringup.monitor import coupled_angles
+from gazerig.robot.bringup.telemetry import Telemetry
+from gazerig.robot.control.coupled_servos import CoupledServos
+from gazerig.robot.model.clock import SimulatedClock
+from gazerig.robot.model.commands import Jog
+from gazerig.robot.model.coupling import (
+    Coupling,
+    Differential,
+    MeasuredGrid,
+    PushRods,
+    Unreachable,
+    joint_rates,
+)
+from gazerig.robot.model.coupling_params import CoupledPair, CouplingParams, pairs_of
+
+PITCH, ROLL = 35.0, 25.0
+RODS = PushRods((-0.035, 0.030, 0.010), (0.005, 0.030, -0.050), -0.040, 0.060)
+
+
+def grid(coupling: Coupling, fields: int) -> tuple[tuple[float, float, float, float], ...]:
+    """Return what a person would measure, in degrees."""
+    points = []
+    for first in np.linspace(-PITCH, PITCH, fields):
+        for second in np.linspace(-ROLL, ROLL, fields):
+            a, b = coupling.servo_rad((radians(first), radians(second)))
+            points.append((float(first), float(second), degrees(a), degrees(b)))
+    return tuple(points)
+
+
+PARALLEL = CouplingParams(
+    "parallel", "neck_pitch", "neck_roll", anchor_mm=(-35.0, 30.0, 10.0),
+    servo_mm=(5.0, 30.0, -50.0), horn_mm=-40.0, rod_mm=60.0,
+)  # fmt: skip
+KINDS = {
+    "differential": CouplingParams("differential", "neck_pitch", "neck_roll", 1.5, 1.2),
+    "parallel": PARALLEL,
+    "measured": CouplingParams("measured", "neck_pitch", "neck_roll", points=grid(RODS, 5)),
+}
+EACH = pytest.mark.parametrize("kind", list(KINDS))
+
+
+def rig_with(coupling: CouplingParams) -> Rig:
+    return replace(load_rig("desk"), couplings={"neck": coupling})
+
+
+@EACH
+@settings(deadline=None, max_examples=300)
+@given(first=st.floats(-PITCH, PITCH), second=st.floats(-ROLL, ROLL))
+def test_servo_angles_come_back_as_joint_angles_to_1e_9(
+    kind: str, first: float, second: float
+) -> None:
+    coupling, at = KINDS[kind].made(), (radians(first), radians(second))
+    back = coupling.joint_rad(coupling.servo_rad(at))
+    assert back == pytest.approx(at, abs=1e-9)
+
+
+@EACH
+def test_rates_are_the_slopes_of_the_angles(kind: str) -> None:
+    coupling, step = KINDS[kind].made(), 1e-6
+    for at in ((0.11, 0.07), (-0.5, 0.33), (0.55, -0.4)):
+        here, rates = coupling.servo_rad(at), coupling.rates(at)
+        for k in range(2):
+            moved = coupling.servo_rad((at[0] + step * (k == 0), at[1] + step * (k == 1)))
+            for servo in range(2):
+                slope = (moved[servo] - here[servo]) / step
+                assert rates[servo][k] == pytest.approx(slope, abs=1e-4)
+        assert joint_rates(rates, (rates[0][0], rates[1][0])) == pytest.approx((1.0, 0.0))
+
+
+def test_push_rods_keep_their_length() -> None:
+    for at in ((0.0, 0.0), (0.5, 0.3), (-0.4, -0.4)):
+        for (error, _, _), servo in (
+            (RODS._rod_error(at, side, angle), angle)
+            for side, angle in zip((1.0, -1.0), RODS.servo_rad(at), strict=True)
+        ):
+            assert abs(error) < 1e-15 and abs(servo) < radians(60)
+
+
+def test_a_differential_is_the_mean_and_half_the_difference() -> None:
+    assert Differential().joint_rad((0.5, 0.1)) == pytest.approx((0.3, 0.2))
+
+
+def test_impossible_servo_angles_give_finite_joint_angles() -> None:
+    for servos in ((3.0, -3.0), (-1.5, -1.5), (50.0, 0.0)):
+        assert all(abs(angle) <= 1.6 for angle in RODS.joint_rad(servos))
+
+
+@EACH
+def test_servos_get_the_limits_that_the_whole_range_needs(kind: str) -> None:
+    rig = rig_with(KINDS[kind])
+    assert faults(rig) == []
+    (pair,) = pairs_of(rig.couplings)
+    found = dict(zip(rig.names, rig_setups(rig), strict=True))
+    plain = dict(zip(rig.names, rig_setups(load_rig("desk")), strict=True))
+    assert {name for name in rig.names if found[name] != plain[name]} == {"neck_pitch", "neck_roll"}
+    needed: dict[str, list[float]] = {"neck_pitch": [], "neck_roll": []}
+    for first in np.linspace(-PITCH, PITCH, 41):
+        for second in np.linspace(-ROLL, ROLL, 41):
+            servos = pair.coupling.servo_rad((radians(first), radians(second)))
+            for name, angle in zip(needed, servos, strict=True):
+                needed[name].append(rig.joints[name].steps(angle))
+    for name, steps in needed.items():
+        assert found[name].min_steps == pytest.approx(min(steps), abs=2.0)
+        assert found[name].max_steps == pytest.approx(max(steps), abs=2.0)
+
+
+@pytest.mark.parametrize(
+    ("coupling", "said"),
+    [
+        (replace(PARALLEL, horn_mm=-25.0, servo_mm=(-10.0, 30.0, -50.0)),
+         "cannot reach neck_pitch -35, neck_roll -25 deg: the rod is"),
+        (replace(KINDS["differential"], first_ratio=5.0),
+         "the servo of neck_pitch would be at -284 steps, outside its 0..4095"),
+        (replace(KINDS["measured"], points=tuple(p for p in grid(RODS, 5) if p[0] > -30.0)),
+         "its points do not go so far"),
+        (replace(PARALLEL, first="nek_pitch"), "no joint 'nek_pitch'; there is"),
+    ],
+)  # fmt: skip
+def test_a_range_that_the_servos_cannot_do_is_refused_with_its_corner(
+    coupling: CouplingParams, said: str
+) -> None:
+    (fault,) = faults(rig_with(coupling))
+    assert fault.startswith("couplings.neck") and said in fault
+
+
+def test_a_coupling_that_cannot_be_is_refused() -> None:
+    with pytest.raises(ValueError, match="needs anchor_mm, servo_mm, horn_mm, rod_mm"):
+        CouplingParams("parallel", "neck_pitch", "neck_roll")
+    with pytest.raises(ValueError, match="with the head level the rod is too long"):
+        replace(PARALLEL, rod_mm=200.0)
+    with pytest.raises(ValueError, match="two angles or more of each joint"):
+        CouplingParams("measured", "neck_pitch", "neck_roll")
+    with pytest.raises(ValueError, match="once; missing is -35, 25 deg"):
+        replace(KINDS["measured"], points=tuple(p for p in grid(RODS, 3) if p[:2] != (-35.0, 25.0)))
+    back = [(f, s, abs(f), s) for f in (-10.0, 0.0, 10.0) for s in (-10.0, 10.0)]
+    with pytest.raises(ValueError, match="turn back beside 0, -10 deg"):
+        CouplingParams("measured", "neck_pitch", "neck_roll", points=tuple(back))
+    with pytest.raises(ValueError, match="name two joints"):
+        CouplingParams("differential", "jaw", "jaw")
+    with pytest.raises(Unreachable, match="too short"):
+        RODS.servo_rad((0.0, 1.4))
+
+
+def answered(**changes: object) -> Feedback:
+    whole = Feedback(
+        (0.0, 1.0, 2.0), (0.0, 0.0, 0.0), (0.0, -0.4, 0.1), (5.0, 5.0, 4.9), (30, 30, 30),
+        (5.0, 5.0, 5.0), (True, True, True), ("", "", ""), (True,) * 3, (False,) * 3, (),
+    )  # fmt: skip
+    return whole._replace(**changes)  # type: ignore[arg-type]
+
+
+def test_one_servo_of_a_pair_speaks_for_both_joints() -> None:
+    pair = CoupledPair("neck_pitch", "neck_roll", Differential())
+    servos = CoupledServos([pair], ("jaw", "neck_pitch", "neck_roll"))
+    servos.completed(answered(), released=False)
+    later = answered(
+        missing=(2,), at_s=(6.0, 6.0, 4.9), position_steps=(0.5, 9.0, 2.0),
+        torque=(True, False, True), rearmed=(False, True, False), fault=("", "", "overheating"),
+    )  # fmt: skip
+    found = servos.completed(later, released=False)
+    assert found.missing == (1, 2) and found.at_s == (6.0, 4.9, 4.9)
+    assert found.position_steps == (0.5, 1.0, 2.0)
+    assert found.load == (0.0, -0.4, -0.4)
+    assert found.torque == (True, False, False) and found.rearmed == (False, True, True)
+    assert found.fault == ("", "overheating (of its coupled servo)", "overheating")
+    assert servos.completed(later, released=True).torque == (True, True, True)
+
+
+def test_beyond_the_mechanism_servos_keep_their_last_goals() -> None:
+    servos = CoupledServos([CoupledPair("a", "b", RODS)], ("a", "b"))
+    servos.held((0.2, 0.1))
+    assert servos.shafts((0.0, 1.4)) == [0.2, 0.1]
+    assert servos.speeds((0.0, 1.4), (1.0, 1.0)) == [0.0, 0.0]
+
+
+@EACH
+def test_a_coupled_neck_goes_where_it_is_sent_and_the_emulator_sees_servos_only(kind: str) -> None:
+    """Joints are measured where they are sent, through two servos that know of no joints."""
+    rig = rig_with(KINDS[kind])
+    made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
+    made.robot.start(made.clock)
+    asked = (("neck_pitch", radians(20.0)), ("neck_roll", radians(-15.0)))
+    made.robot.command(Jog(asked, stay=True))
+    sent: list[list[int]] = []
+    write = made.robot.body.bus.write
+
+    def noted(steps: list[int]) -> None:
+        sent.append(list(steps))
+        write(steps)
+
+    made.robot.body.bus.write = noted  # type: ignore[method-assign,assignment]
+    last: list[float] = []
+    for _ in range(500):
+        made.clock.sleep_until(made.clock.now_s() + 0.005)
+        tick = made.robot.tick(made.clock.now_s(), 0.005)
+        last = [degrees(angle) for angle in tick.joints.position_rad]
+    at = dict(zip(rig.names, last, strict=True))
+    assert at["neck_pitch"] == pytest.approx(20.0, abs=0.4)
+    assert at["neck_roll"] == pytest.approx(-15.0, abs=0.4)
+    servos = KINDS[kind].made().servo_rad((radians(20.0), radians(-15.0)))
+    goals = dict(zip(rig.names, sent[-1], strict=True))
+    for name, angle in zip(("neck_pitch", "neck_roll"), servos, strict=True):
+        assert goals[name] == pytest.approx(rig.joints[name].steps(angle), abs=1.0)
+    setups = dict(zip(rig.names, rig_setups(rig), strict=True))
+    for goal in sent:
+        for name, steps in zip(rig.names, goal, strict=True):
+            assert setups[name].min_steps - 1 <= steps <= setups[name].max_steps + 1
+    made.close()
+
+
+def test_the_emulated_camera_sits_where_coupled_servos_hold_the_head() -> None:
+    rig = rig_with(PARALLEL)
+    clock = SimulatedClock()
+    wires = run_bus(rig, RunOptions(mock=True, fast=True), clock)
+    made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
+    R, _ = true_head(wires.devices, rig, made.poses)(0.0)
+    # As the emulated neck starts: 12 deg to the right, 8 deg down.
+    assert degrees(np.arcsin(R[2][0])) == pytest.approx(-8.0, abs=0.2)
+    assert degrees(np.arctan2(R[1][0], R[0][0])) == pytest.approx(-12.0, abs=0.2)
+    plain = replace(rig, couplings={})
+    other, _ = true_head(wires.devices, plain, made.poses)(0.0)
+    assert abs(degrees(np.arcsin(other[2][0])) + 8.0) > 1.0
+    wires.close()
+    made.close()
+
+
+def test_a_lost_servo_of_a_pair_makes_both_joints_stale() -> None:
+    rig = rig_with(KINDS["differential"])
+    made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
+    made.robot.start(made.clock)
+    read = made.robot.body.bus.read
+    k = rig.names.index("neck_roll")
+
+    def silent(t_s: float) -> Feedback:
+        whole = read(t_s)
+        nothing = Feedback.of_none(len(rig.names))
+        columns = [
+            (*column[:k], none[k], *column[k + 1 :])
+            for column, none in zip(whole[:9], nothing[:9], strict=True)
+        ]
+        return Feedback._make((*columns, whole.rearmed, (k,)))
+
+    made.robot.body.bus.read = silent  # type: ignore[method-assign,assignment]
+    for n in range(60):
+        made.clock.sleep_until(made.clock.now_s() + 0.005)
+        tick = made.robot.tick(made.clock.now_s(), 0.005)
+        if n == 0:
+            assert tick.joints.missing == ("neck_pitch", "neck_roll")
+    held = {reason.partition(":")[0] for reason in tick.guard_result.reasons}
+    assert {"neck_pitch", "neck_roll"} <= held
+    assert inf > min(tick.joints.measured_s) > -inf
+    made.close()
+
+
+def test_a_measured_table_may_be_of_any_two_joints() -> None:
+    table = MeasuredGrid([(f, s, 2 * f + s, f - s) for f in (-1.0, 0.0, 2.0) for s in (-1.0, 1.0)])
+    assert table.joint_rad(table.servo_rad((1.7, -0.3))) == pytest.approx((1.7, -0.3))
+    assert table.joint_rad(table.servo_rad((2.5, 1.4))) == pytest.approx((2.5, 1.4))
+
+
+def telemetry(deg: float | None) -> Telemetry:
+    return Telemetry(deg, 0, deg, 0, deg, 0.1, 30, 5.0, True, ())
+
+
+def test_the_monitor_shows_the_joints_of_coupled_servos() -> None:
+    pair = CoupledPair("neck_pitch", "neck_roll", Differential())
+    one, other = coupled_angles(pair, telemetry(25.0), telemetry(5.0))
+    assert one is not None and other is not None
+    assert (one.goal_deg, other.goal_deg) == pytest.approx((15.0, 10.0))
+    assert (one.position_deg, other.position_deg) == pytest.approx((15.0, 10.0))
+    assert (one.velocity_deg_s, other.velocity_deg_s) == pytest.approx((15.0, 10.0))
+    one, other = coupled_angles(pair, telemetry(25.0), None)
+    assert one is not None and other is None and one.position_deg is None
+    assert coupled_angles(pair, None, telemetry(1.0))[0] is None
+
+
+def coupled_file(tmp_path: Path) -> str:
+    text = shipped("rigs", "feetech").read_text(encoding="utf-8")
+    text += "\ncouplings:\n  neck: {kind: differential, first: neck_pitch, second: neck_roll}\n"
+    path = tmp_path / "coupled.yaml"
+    path.write_text(text, encoding="utf-8")
+    return str(path)
+
+
+def test_bring_up_of_a_coupled_neck(tmp_path: Path) -> None:
+    rig = coupled_file(tmp_path)
+    assert "good: rig 'feetech'" in invoked("check", rig).err
+    jog = invoked("jog", rig, "neck_roll", "6", "--mock")
+    assert jog.code == 0 and "neck_roll: desired 6.0, measured" in jog.out + jog.err
+    refused = invoked("calibrate", "joints", rig, "--joint", "neck_roll", "--mock", "--dry-run")
+    assert refused.code == 2
+    assert "neck_roll is moved together with neck_pitch by two servos" in refused.out + refused.err
+    doctor = invoked("doctor", rig, "--mock", "--fix")
+    # Both at 35 + 25 deg, and both joints' speeds at once on one shaft.
+    assert "neck_pitch (servo 8): min position limit 0 -> 1366: done" in doctor.out + doctor.err
+    assert "the YAML asks its shaft for 360 deg/s" in doctor.out + doctor.err
+    once = invoked("monitor", rig, "--mock", "--once")
+    row = next(line.split() for line in once.out.splitlines() if line.startswith("neck_pitch"))
+    assert float(row[3]) == pytest.approx(-8.0, abs=0.2)
+
+
+def test_coupled_joints_keep_their_gears_until_the_next_start() -> None:
+    """Limits of coupled joints change at once, what turns steps into angles does not."""
+    rig = rig_with(PARALLEL)
+    made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
+    made.robot.start(made.clock)
+    changes = {"joints.neck_pitch.zero_step": 2100, "joints.neck_roll.max_deg": 20.0}
+    made.robot.command(made.live.prepare(rig, changed(rig, changes)))
+    made.clock.sleep_until(made.clock.now_s() + 0.005)
+    before = made.robot.body.angles((2048,) * 9)
+    tick = made.robot.tick(made.clock.now_s(), 0.005)
+    assert any("tuned: joints.neck_roll.max_deg = 20.0" in event for event in tick.events)
+    assert made.robot.body.angles((2048,) * 9) == before
+    limits = made.live.parts.guard.limits
+    assert degrees(limits[rig.names.index("neck_roll")].high_rad) == pytest.approx(20.0)
+    made.close()
