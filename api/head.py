@@ -16,6 +16,7 @@ from gazerig.robot.control.head_state import (
     JointReading,
     Person,
 )
+from gazerig.robot.control.tick_feed import Progress
 from gazerig.robot.model.commands import (
     FAR_M,
     Ask,
@@ -34,7 +35,6 @@ from gazerig.robot.model.commands import (
     Stop,
     Value,
 )
-from gazerig.robot.model.lead import LeadState
 
 
 class Head(ABC):
@@ -329,29 +329,23 @@ class Head(ABC):
                 yield event
             if timeout_s == 0.0:
                 return
-            self.pause(partial(self._happened, number), timeout_s or 3600.0)
+            self._pause(partial(self._happened, number), timeout_s or 3600.0)
             if timeout_s is not None and not self._happened(number):
                 return
 
-    # For orders
+    @abstractmethod
+    def _progress(self) -> Progress:
+        """Return the newest lead and gesture."""
 
     @abstractmethod
-    def lead(self) -> LeadState:
-        """Return the newest lead of gaze or joints."""
-
-    @abstractmethod
-    def led(self) -> str:
-        """Return who leads gaze or joints and with what, "" while the head chooses."""
-
-    @abstractmethod
-    def pause(self, until: Callable[[], bool], seconds: float) -> None:
+    def _pause(self, until: Callable[[], bool], seconds: float) -> None:
         """Let the head's time pass until something is true, for so long at most.
 
         Raises:
             HeadEnded: the head has ended meanwhile.
         """
 
-    def let_go(self) -> None:
+    def _let_go(self) -> None:
         """Let the head choose its targets again, and do not ask what came of it."""
         self._give(LookAt(None, self._who))
 
@@ -362,7 +356,7 @@ class Head(ABC):
             if state.t_s > last_s:
                 last_s = state.t_s
                 yield state
-            self.pause(lambda: False, every_s)
+            self._pause(lambda: False, every_s)
 
     def _happened(self, after: int) -> bool:
         return bool(self._events(after))

@@ -21,10 +21,9 @@ from gazerig.robot.control.head_state import HeadEvent, HeadState, head_state
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.loop import TickLoop
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.tick_feed import TickFeed
+from gazerig.robot.control.tick_feed import Progress, TickFeed
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import Command, Value
-from gazerig.robot.model.lead import NOBODY_LEADS, LeadState
 
 _LOG = logging.getLogger("gazerig")
 _POLL_S = 0.004
@@ -59,7 +58,7 @@ class LocalHead(Head):
         tick = self._feed.newest
         if tick is None:
             self._running()
-            self.pause(lambda: self._feed.newest is not None, 10.0)
+            self._pause(lambda: self._feed.newest is not None, 10.0)
             tick = self._feed.newest
         if tick is None:
             raise HeadEnded("the control loop does not tick")
@@ -90,15 +89,8 @@ class LocalHead(Head):
         """Return behaviours, modes of conversation and what the lids do; those in force first."""
         return self._running().made.robot.menus()
 
-    def lead(self) -> LeadState:
-        """Return the newest lead of gaze or joints."""
-        tick = self._feed.newest
-        return tick.lead if tick is not None else NOBODY_LEADS
-
-    def led(self) -> str:
-        """Return who leads gaze or joints and with what, "" while the head chooses."""
-        tick = self._feed.newest
-        return tick.led if tick is not None else ""
+    def _progress(self) -> Progress:
+        return self._feed.progress()
 
     def _events(self, after: int) -> tuple[HeadEvent, ...]:
         return self._feed.events(after)
@@ -110,7 +102,7 @@ class LocalHead(Head):
         except ValueError as error:
             raise Refused(str(error)) from None
         order = Order(self, lambda: ticket.wait(0.0))
-        self._feed.follow(order.see)
+        self._feed.follow(order._see)
         return order
 
     def _running(self) -> session.ComposedRun:
@@ -201,8 +193,7 @@ class RunningHead(LocalHead):
         if self._ended.startswith("fault"):
             raise HeadEnded(f"the head has ended: {self._ended}")
 
-    def pause(self, until: Callable[[], bool], seconds: float) -> None:
-        """Wait until something is true, for so long at most."""
+    def _pause(self, until: Callable[[], bool], seconds: float) -> None:
         end_s = self._clock.now_s() + seconds
         while not until():
             self._running()
@@ -319,8 +310,7 @@ class SimulatedHead(LocalHead):
                 return True
         return False
 
-    def pause(self, until: Callable[[], bool], seconds: float) -> None:
-        """Step until something is true, for so many simulated seconds at most."""
+    def _pause(self, until: Callable[[], bool], seconds: float) -> None:
         end_s = self.time_s + seconds - 1e-9
         while not until() and self.time_s < end_s:
             self._tick()

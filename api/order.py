@@ -5,13 +5,15 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Literal, Protocol, Self
 
-from gazerig.robot.model.lead import LeadState
+from gazerig.robot.control.tick_feed import Progress
+from gazerig.robot.model.lead import GestureState
 from gazerig.robot.model.reply import CommandReply
 
 Outcome = Literal["arrived", "refused", "taken over", "timed out"]
 """How an order ended.
 
-arrived: the gaze was measured within 1 degree of the point, the joint of its angle
+arrived: the gaze was measured within 1 degree of the point, the joint of its angle; a gesture has
+    come to its end; of other orders, the head has taken them up
 refused: nothing was done; ``Order.why`` says why
 taken over: something else moves the head now, or the lead ended; ``Order.why`` says what
 timed out: none of these within the time given
@@ -21,23 +23,19 @@ timed out: none of these within the time given
 class OrderHost(Protocol):
     """The head that an order was given to."""
 
-    def lead(self) -> LeadState:
-        """Return the newest lead."""
+    def _progress(self) -> Progress:
+        """Return the newest lead and gesture."""
         ...
 
-    def led(self) -> str:
-        """Return who leads and with what."""
-        ...
-
-    def pause(self, until: Callable[[], bool], seconds: float) -> None:
-        """Let time pass until something is true, for so long at most.
+    def _pause(self, until: Callable[[], bool], seconds: float) -> None:
+        """Let the head's time pass until something is true, for so long at most.
 
         Raises:
             HeadEnded: the head has ended meanwhile.
         """
         ...
 
-    def let_go(self) -> None:
+    def _let_go(self) -> None:
         """Let the head choose its targets again."""
         ...
 
@@ -78,7 +76,7 @@ class Order:
         """
         reply = self._taken_up()
         if reply is None:
-            self._host.pause(lambda: self._taken_up() is not None, self._within_s)
+            self._host._pause(lambda: self._taken_up() is not None, self._within_s)
             reply = self._taken_up()
         if reply is None:
             from gazerig.errors import HeadEnded
@@ -95,13 +93,13 @@ class Order:
     def outcome(self) -> Outcome | None:
         """Return how the order ended, None while it is under way."""
         if self._outcome is None:
-            self.see(self._host.lead())
+            self._see(self._host._progress())
         return self._outcome
 
     @property
     def active(self) -> bool:
         """Return whether the lead that the order took is still in force."""
-        reply, lead = self._taken_up(), self._host.lead()
+        reply, lead = self._taken_up(), self._host._progress().lead
         return reply is not None and 0 < reply.lead == lead.number and lead.active
 
     @property
@@ -119,31 +117,13 @@ class Order:
             HeadEnded: the head has ended meanwhile.
         """
         longest_s = timeout_s if timeout_s is not None else threading.TIMEOUT_MAX
-        self._host.pause(lambda: self.outcome is not None, longest_s)
+        self._host._pause(lambda: self.outcome is not None, longest_s)
         return self._outcome or "timed out"
 
     def end(self) -> None:
         """End the lead that the order took, if it is still in force."""
         if self.active:
-            self._host.let_go()
-
-    def see(self, lead: LeadState) -> bool:
-        """Take note of the newest lead; return whether the order has ended."""
-        reply = self._taken_up()
-        if reply is None or self._outcome is not None:
-            return self._outcome is not None
-        if reply.refused:
-            self._end("refused", reply.refused)
-        elif reply.lead == 0:  # it takes no lead: done as soon as taken up
-            self._end("arrived", "")
-        elif lead.number == reply.lead:
-            if lead.arrived:
-                self._end("arrived", "")
-            elif not lead.active:
-                self._end("taken over", lead.ended)
-        elif lead.number > reply.lead:
-            self._end("taken over", self._host.led() or lead.ended)
-        return self._outcome is not None
+            self._host._let_go()
 
     def __enter__(self) -> Self:
         """Return the order itself."""
@@ -157,6 +137,35 @@ class Order:
     ) -> None:
         """End the lead."""
         self.end()
+
+    def _see(self, now: Progress) -> bool:
+        """Take note of the newest lead and gesture; return whether the order has ended."""
+        reply = self._taken_up()
+        if reply is None or self._outcome is not None:
+            return self._outcome is not None
+        played = reply.gesture.number if reply.gesture is not None else 0
+        if reply.refused:
+            self._end("refused", reply.refused)
+        elif played:
+            self._see_gesture(played, now.gesture)
+        elif reply.lead == 0:  # it takes no lead: done as soon as taken up
+            self._end("arrived", "")
+        elif now.lead.number == reply.lead:
+            if now.lead.arrived:
+                self._end("arrived", "")
+            elif not now.lead.active:
+                self._end("taken over", now.lead.ended)
+        elif now.lead.number > reply.lead:
+            self._end("taken over", now.led or now.lead.ended)
+        return self._outcome is not None
+
+    def _see_gesture(self, number: int, newest: GestureState) -> None:
+        if newest.number > number:
+            self._end("taken over", f"another gesture: {newest.name or newest.ended}")
+        elif newest.number == number and newest.ended:
+            self._end("taken over", newest.ended)
+        elif newest.number == number and not newest.name:
+            self._end("arrived", "")
 
     def _end(self, outcome: Outcome, why: str) -> None:
         self._why = why

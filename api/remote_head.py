@@ -10,9 +10,9 @@ from gazerig.head import Head
 from gazerig.order import Order
 from gazerig.robot.control.command_handler import as_value
 from gazerig.robot.control.head_state import HeadEvent, HeadState
+from gazerig.robot.control.tick_feed import Progress
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.commands import Command, Leading, Value
-from gazerig.robot.model.lead import LeadState
 from gazerig.robot.remote.client import RequestRejected, RobotClient
 
 _POLL_S = 0.02
@@ -77,16 +77,11 @@ class RemoteHead(Head):
         """Return behaviours, modes of conversation and what the lids do; those in force first."""
         return self._client.menus()
 
-    def lead(self) -> LeadState:
-        """Return the newest lead of gaze or joints."""
-        return self.state.lead
+    def _progress(self) -> Progress:
+        state = self.state
+        return Progress(state.lead, state.gesture, state.led)
 
-    def led(self) -> str:
-        """Return who leads gaze or joints and with what, "" while the head chooses."""
-        return self.state.led
-
-    def pause(self, until: Callable[[], bool], seconds: float) -> None:
-        """Wait until something is true, for so long at most."""
+    def _pause(self, until: Callable[[], bool], seconds: float) -> None:
         end_s = self._clock.now_s() + seconds
         while not until():
             now_s = self._clock.now_s()

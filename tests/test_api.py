@@ -32,7 +32,7 @@ def test_an_order_arrives_and_says_what_is_really_done(head: gazerig.SimulatedHe
     assert order.wait() == "arrived" and not order.refused and order.why == ""
     assert 0.02 < head.time_s - began_s < 1.5
     assert order.reply.error_deg < 0.1 and order.reply.done_m == pytest.approx((1.0, 0.5, 0.3))
-    assert order.active and head.led() == "the program: look at 1 0.5 0.3"
+    assert order.active and head.state.led == "the program: look at 1 0.5 0.3"
     assert degrees(gaze_error(head, (1.0, 0.5, 0.3))) < 1.0
 
 
@@ -134,7 +134,16 @@ def test_face_and_behaviour(head: gazerig.SimulatedHead) -> None:
     behaviour = head.menus()["behaviour"][-1]
     head.behave(behaviour)
     head.wink("left")
-    assert head.play("nod").reply.gesture is not None
+    nod = head.play("nod")
+    assert nod.reply.gesture is not None and nod.outcome is None
+    began_s = head.time_s
+    assert nod.wait() == "arrived"
+    assert head.time_s - began_s == pytest.approx(nod.reply.gesture.duration_s, abs=0.02)
+    first = head.play("shake")
+    second = head.play("nod")
+    assert first.wait() == "taken over" and "another gesture: nod" in first.why
+    head.stop("a hand")
+    assert second.wait() == "taken over" and second.why == "its joints are led or switched off"
     head.step(0.1)
     assert head.menus()["behaviour"][0] == behaviour
 

@@ -134,11 +134,11 @@ def test_two_heads_in_one_program_are_found_by_their_rigs(said: list[str]) -> No
     with opened(said) as desk, opened(said, "feetech") as other:
         assert desk.look_at(1.0, 0.3, 0.3).wait(100.0) == "arrived"
         assert other.look_at(1.0, -0.3, 0.3).wait(100.0) == "arrived"
-        assert desk.led() != other.led()
+        assert desk.state.led != other.state.led
         with pytest.raises(gazerig.NotFound, match="2 rigs are running"):
             gazerig.connect()
         with gazerig.connect(rig="feetech") as far:
-            assert far.rig == "feetech" and far.state.led == other.led()
+            assert far.rig == "feetech" and far.state.led == other.state.led
         with pytest.raises(gazerig.NotFound, match="no heads with the rig maker"):
             gazerig.connect(rig="maker")
     ends = [line for line in said if line.startswith("stopped by")]
@@ -154,7 +154,7 @@ def test_another_program_has_the_same_orders(head: gazerig.Head) -> None:
         order = far.look_at(1.0, -0.4, 0.3)
         assert order.wait(100.0) == "arrived" and order.reply.error_deg < 1.0
         assert mine.outcome == "arrived" and not mine.active
-        assert head.led().startswith("a show (process ")
+        assert head.state.led.startswith("a show (process ")
         assert far.look_at_person(99).wait(100.0) == "refused"
         assert far.look_at_person(far.people[0].id).wait(100.0) == "arrived"
         with pytest.raises(gazerig.Refused, match="three finite numbers"):

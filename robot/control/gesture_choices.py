@@ -16,6 +16,7 @@ from gazerig.robot.model.gesture_fit import (
     motions,
 )
 from gazerig.robot.model.joint_limit import JointLimit
+from gazerig.robot.model.lead import NO_GESTURE, GestureState
 from gazerig.robot.model.reply import CommandReply, GestureReply
 from gazerig.robot.model.types import JointAngles
 
@@ -57,6 +58,7 @@ class GestureChoices:
         lid_spans_rad: Mapping[str, float],
     ) -> None:
         self._gestures, self._player, self._joints = gestures, player, joints
+        self._state = NO_GESTURE
         self._made: dict[tuple[str, int], GestureMotions | GestureRefused] = {}
         self.retune(params, lid_spans_rad)
         for name in gestures:
@@ -78,6 +80,13 @@ class GestureChoices:
     def playing(self) -> str:
         """Return the gesture under way, "" where there is none."""
         return self._player.playing
+
+    @property
+    def state(self) -> GestureState:
+        """Return the newest gesture, and whether it is under way."""
+        if self._state.name and not self._player.playing:
+            self._state = self._state._replace(name="")
+        return self._state
 
     def require(self, command: Play) -> None:
         """See that there is such a gesture, and compute its curves; for any thread.
@@ -123,8 +132,11 @@ class GestureChoices:
         """
         share, state = self._params.limit_share, self._player.state(t_s)
         fade_s = self._fit.fade_s(state, limits, share, self._params.blend_out_ms / 1e3)
+        by = command.who or "a user"
         if not command.gesture:
             self._player.play(None, t_s, fade_s, 0.0)
+            if self.state.name:
+                self._state = self._state._replace(name="", ended=f"{by} has ended it")
             return CommandReply(gesture=GestureReply("", fade_s))
         base = self._fit.without(commanded_rad, state)
         try:
@@ -133,6 +145,7 @@ class GestureChoices:
             return CommandReply(f"{command.gesture}: {refused}")
         wait_s = self._fit.wait_s(state, fade_s, fitted.played, limits, share)
         self._player.play(fitted.played, t_s, fade_s, wait_s)
+        self._state = GestureState(self._state.number + 1, command.gesture)
         left_out = self._made_of(command.gesture, command.times).left_out
         return CommandReply(
             gesture=GestureReply(
@@ -142,6 +155,7 @@ class GestureChoices:
                 fitted.slow_joint,
                 fitted.smaller,
                 left_out,
+                self._state.number,
             )
         )
 
@@ -149,6 +163,8 @@ class GestureChoices:
         """Forget the gesture under way, as its joints are led or switched off; return its name."""
         name = self._player.playing
         self._player.reset()
+        if name:
+            self._state = self._state._replace(name="", ended="its joints are led or switched off")
         return name
 
     def _fitted(

@@ -14,7 +14,7 @@ from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import PART_NAMES, PARTS, Angles2, Angles3, Face, Vec3
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import target_name
-from gazerig.robot.model.lead import NOBODY_LEADS, LeadState
+from gazerig.robot.model.lead import NO_GESTURE, NOBODY_LEADS, GestureState, LeadState
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,6 +157,7 @@ class HeadState:
         stopped: why the head was stopped, "" while it moves.
         led: who leads gaze or joints and with what, "" while the head chooses.
         lead: the newest lead.
+        gesture: the newest gesture.
         frame_s: time of the newest camera frame; None before the first.
     """
 
@@ -169,6 +170,7 @@ class HeadState:
     stopped: str
     led: str
     lead: LeadState = field(default=NOBODY_LEADS)
+    gesture: GestureState = field(default=NO_GESTURE)
     frame_s: float | None = None
 
 
@@ -187,13 +189,14 @@ def head_state(tick: Tick) -> HeadState:
         tick.stopped,
         tick.led,
         tick.lead,
+        tick.gesture,
         percept.captured_s if percept is not None else None,
     )
 
 
 def as_json(state: HeadState) -> dict[str, Any]:
     """Return a state as plain JSON values."""
-    return {**asdict(state), "lead": list(state.lead)}
+    return {**asdict(state), "lead": list(state.lead), "gesture": list(state.gesture)}
 
 
 def from_json(data: Mapping[str, Any]) -> HeadState:
@@ -209,6 +212,7 @@ def from_json(data: Mapping[str, Any]) -> HeadState:
     made["gaze"] = GazeReading(**_known(GazeReading, data["gaze"]))
     made["people"] = tuple(_read_person(one) for one in data["people"])
     made["lead"] = LeadState(*data["lead"])
+    made["gesture"] = GestureState(*data["gesture"])
     return HeadState(**made)
 
 

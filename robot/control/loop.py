@@ -255,6 +255,7 @@ class Robot:
         return Tick(
             t_s, joints, pose, detections, percept, target, gaze, desired, guard_result, events, commands,
             self.stopped, self._lead.words, lead,
+            self._gestures.state,
         )  # fmt: skip
 
     def park(

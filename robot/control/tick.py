@@ -5,7 +5,7 @@ from typing import NamedTuple
 from gazerig.drivers.types import Detections
 from gazerig.gaze.types import GazeCommand, GazeState, Percept, Target
 from gazerig.robot.model.commands import Command
-from gazerig.robot.model.lead import NOBODY_LEADS, LeadState
+from gazerig.robot.model.lead import NO_GESTURE, NOBODY_LEADS, GestureState, LeadState
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 
 
@@ -17,6 +17,7 @@ class Tick(NamedTuple):
     stopped: why the robot was stopped, "" while it moves
     led: who leads gaze or joints and with what, "" while no client leads
     lead: the newest lead, and whether the head is where it was to be
+    gesture: the newest gesture, and whether it is under way
     """
 
     t_s: float
@@ -33,6 +34,7 @@ class Tick(NamedTuple):
     stopped: str = ""
     led: str = ""
     lead: LeadState = NOBODY_LEADS
+    gesture: GestureState = NO_GESTURE
 
 
 def at_rest(

@@ -2,12 +2,25 @@
 
 from collections import deque
 from collections.abc import Callable
+from typing import NamedTuple
 
 from gazerig.robot.control.head_state import HeadEvent
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.lead import LeadState
+from gazerig.robot.model.lead import NO_GESTURE, NOBODY_LEADS, GestureState, LeadState
 
 _MOST_EVENTS = 1000
+
+
+class Progress(NamedTuple):
+    """How far what was asked for is.
+
+    lead, gesture: the newest ones
+    led: who leads gaze or joints and with what, "" while no client leads
+    """
+
+    lead: LeadState = NOBODY_LEADS
+    gesture: GestureState = NO_GESTURE
+    led: str = ""
 
 
 class TickFeed:
@@ -22,8 +35,8 @@ class TickFeed:
         self.ticks = 0
         self._events: deque[HeadEvent] = deque(maxlen=_MOST_EVENTS)
         self._number = 0
-        self._joining: deque[Callable[[LeadState], bool]] = deque()
-        self._followers: list[Callable[[LeadState], bool]] = []
+        self._joining: deque[Callable[[Progress], bool]] = deque()
+        self._followers: list[Callable[[Progress], bool]] = []
 
     def update(self, tick: Tick) -> None:
         """Leave the newest tick; called by the loop."""
@@ -35,11 +48,17 @@ class TickFeed:
         while self._joining:
             self._followers.append(self._joining.popleft())
         if self._followers:
-            self._followers = [one for one in self._followers if not one(tick.lead)]
+            now = self.progress()
+            self._followers = [one for one in self._followers if not one(now)]
 
-    def follow(self, follower: Callable[[LeadState], bool]) -> None:
-        """Call a function with the lead of every tick until it returns True."""
+    def follow(self, follower: Callable[[Progress], bool]) -> None:
+        """Call a function with the progress of every tick until it returns True."""
         self._joining.append(follower)
+
+    def progress(self) -> Progress:
+        """Return the lead and the gesture of the newest tick."""
+        tick = self.newest
+        return Progress(tick.lead, tick.gesture, tick.led) if tick is not None else Progress()
 
     def events(self, after: int = 0) -> tuple[HeadEvent, ...]:
         """Return the events kept whose numbers are above ``after``, oldest first."""

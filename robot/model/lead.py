@@ -47,7 +47,21 @@ class LeadState(NamedTuple):
     ended: str = ""
 
 
+class GestureState(NamedTuple):
+    """The newest gesture, as it is after a tick.
+
+    number: counts the gestures since the start; 0 before the first
+    name: of the one under way, "" where there is none
+    ended: why it is over, "" where it has come to its own end or is under way
+    """
+
+    number: int = 0
+    name: str = ""
+    ended: str = ""
+
+
 NOBODY_LEADS = LeadState()
+NO_GESTURE = GestureState()
 
 
 class Lead:

@@ -45,6 +45,7 @@ class GestureReply(NamedTuple):
     slowed_by: factor by which it takes longer than asked; slow_joint: whose limits need that
     smaller: (joint, share of its motion that its range leaves)
     left_out: joints that it names and the rig lacks
+    number: of the gesture (``gazerig.robot.model.lead.GestureState``)
     """
 
     name: str
@@ -53,6 +54,7 @@ class GestureReply(NamedTuple):
     slow_joint: str = ""
     smaller: tuple[tuple[str, float], ...] = ()
     left_out: tuple[str, ...] = ()
+    number: int = 0
 
     def text(self) -> str:
         """Return one line for people."""

@@ -85,6 +85,7 @@ _VERDICT = _object(
     wish_rad={"type": ["array", "null"], "items": _NUMBER}, why=_TEXTS, gravest=_TEXTS,
     joints=_says(_TEXTS, "names, in the order of every list of joints"),
 )  # fmt: skip
+_GESTURE = _object(number=_WHOLE, name=_TEXT, ended=_TEXT)
 _LEAD = _object(number=_WHOLE, active=_YES, arrived=_YES, error_rad=_NUMBER, ended=_TEXT)
 _ORDER: Schema = {"type": "object", "properties": {"order": _TEXT}}
 
@@ -108,6 +109,7 @@ _TICK = _says(
         stopped=_says(_TEXT, "why the robot was stopped"),
         led=_says(_TEXT, "who leads gaze or joints and with what"),
         lead=_says(_LEAD, "the newest lead; left out before the first"),
+        gesture=_says(_GESTURE, "the newest gesture; left out before the first"),
         before=_list(_object(what=_TEXT), "what the machine said beside the tick's own reading"),
     ),
     "one tick of the control loop; frames: world at the neck base, x forward, y left, z up",

@@ -25,7 +25,7 @@ from gazerig.gaze.types import (
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import as_recorded
 from gazerig.robot.model.commands import from_recording as command_from_json
-from gazerig.robot.model.lead import NOBODY_LEADS, LeadState
+from gazerig.robot.model.lead import NO_GESTURE, NOBODY_LEADS, GestureState, LeadState
 from gazerig.robot.model.types import GAZE_JOINTS, GuardResult, JointAngles, JointState
 
 Json = dict[str, Any]
@@ -125,6 +125,7 @@ def flat(
         tick.stopped,
         tick.led,
         tuple(tick.lead),
+        tuple(tick.gesture),
         [(_BODY_RECORD_NAMES[type(one)], _plain(one)) for one in before],
     )
 
@@ -135,7 +136,7 @@ def as_json(values: Flat) -> Json:
     if not finite:
         values = _worded(values)
     (t_s, dt_s, percept, joints, pose, target, gaze, desired, guard_result, events, commands, stopped,
-     led, lead, before) = values  # fmt: skip
+     led, lead, gesture, before) = values  # fmt: skip
     data: Json = {
         "t_s": t_s,
         "dt_s": dt_s,
@@ -159,6 +160,8 @@ def as_json(values: Flat) -> Json:
     }
     if lead != NOBODY_LEADS:
         data["lead"] = _named(LeadState, lead)
+    if gesture != NO_GESTURE:
+        data["gesture"] = _named(GestureState, gesture)
     if before:
         data["before"] = [
             {"what": what, **_named(_BODY_RECORDS[what], one)} for what, one in before
@@ -216,6 +219,7 @@ def from_json(data: Json, percepts: Mapping[int, Percept]) -> TickRecord:
         data["stopped"],
         data.get("led", ""),
         _made(LeadState, data["lead"]) if "lead" in data else NOBODY_LEADS,
+        _made(GestureState, data["gesture"]) if "gesture" in data else NO_GESTURE,
     )
     before = tuple([_body_record(one) for one in data.get("before", ())])
     return TickRecord(tick, data["dt_s"], before)
