@@ -8,7 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from gazerig.config.export import suggestion
-from gazerig.config.load import ConfigError, ConfigFault, load, shipped, shipped_names
+from gazerig.config.load import (
+    ConfigError,
+    ConfigFault,
+    from_packages,
+    load,
+    shipped,
+    shipped_names,
+)
 from gazerig.config.rig import Rig
 from gazerig.gaze.gesture import Gesture, faults_of, loop_fault
 from gazerig.robot.model.gesture_fit import GestureFit, GestureRefused, motions
@@ -54,12 +61,23 @@ def gestures_of(files: Sequence[str]) -> dict[str, Gesture]:
     faults: list[ConfigFault] = []
     for file in files:
         try:
-            found[gesture_name(file)] = load_gesture(Path(file).expanduser())
+            found[gesture_name(file)] = load_gesture(gesture_path(file))
         except ConfigError as error:
             faults += error.faults
     if faults:
         raise ConfigError(faults)
     return found
+
+
+def gesture_path(file: str) -> Path:
+    """Return the path of a gesture file; a bare name is that of a package's gesture.
+
+    Raises:
+        gazerig.config.load.ConfigError: no package brings one of this name.
+    """
+    if "/" in file or file.endswith((".yaml", ".yml")):
+        return Path(file).expanduser()
+    return from_packages("gestures", file)
 
 
 def gesture_name(file: str) -> str:
@@ -101,7 +119,7 @@ def gesture_rules(rig: Rig) -> Iterable[tuple[str, str]]:
     known = set(shipped_gestures())
     for i, file in enumerate(rig.gesture_files):
         try:
-            gesture = load_gesture(Path(file).expanduser())
+            gesture = load_gesture(gesture_path(file))
             known.add(gesture_name(file))
             _refuse_beyond(rig, gesture)
         except ConfigError as error:

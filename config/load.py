@@ -20,8 +20,15 @@ from gazerig.config.entries import read
 from gazerig.config.export import Violation, abbreviated, suggestion, violation
 from gazerig.config.plugin_sections import extended
 from gazerig.config.renamed import renamed
+from gazerig.drivers.plugins import GESTURES, RIGS, PluginError, yaml_files
 
 T = TypeVar("T")
+_GROUPS = {"rigs": RIGS, "gestures": GESTURES}
+"""Kinds of files that packages bring too."""
+
+_SHIPPED = Path(str(importlib.resources.files("gazerig.config")))
+RIGS_FOLDER, GESTURES_FOLDER = _SHIPPED / "rigs", _SHIPPED / "gestures"
+
 Check = Callable[[T], Iterable[tuple[str, str]]]
 """Returns (dotted key path, broken rule) for rules between several fields."""
 
@@ -126,10 +133,33 @@ def shipped(kind: str, name: str) -> Path:
     """
     names = shipped_names(kind)
     if name in names:
-        return Path(str(importlib.resources.files("gazerig.config"))) / kind / f"{name}.yaml"
+        return _SHIPPED / kind / f"{name}.yaml"
+    if kind in _GROUPS:
+        return from_packages(kind, name)
+    raise _unknown(kind, name, names)
+
+
+def from_packages(kind: str, name: str) -> Path:
+    """Return the path of a file that another package brings, of rigs or gestures.
+
+    Raises:
+        ConfigError: no package brings one of this name, or one cannot be imported.
+    """
+    try:
+        files = yaml_files(_GROUPS[kind])
+    except PluginError as error:
+        raise ConfigError(
+            [ConfigFault(f"config/{kind}", None, "", repr(name), str(error))]
+        ) from error
+    if name in files:
+        return files[name][0]
+    raise _unknown(kind, name, (*shipped_names(kind), *files))
+
+
+def _unknown(kind: str, name: str, names: Sequence[str]) -> ConfigError:
     known = f"there are {', '.join(names)}" if names else "there are none of this kind"
     rule = f"nothing named {name!r} is shipped{suggestion(name, names) or ';'} {known}"
-    raise ConfigError([ConfigFault(f"config/{kind}", None, "", repr(name), rule)])
+    return ConfigError([ConfigFault(f"config/{kind}", None, "", repr(name), rule)])
 
 
 def shipped_names(kind: str) -> tuple[str, ...]:

@@ -34,12 +34,12 @@ _BRINGUP = ("scan", "setup", "doctor", "reboot", "monitor", "calibrate")
 DYNAMIXEL = _plugin(
     "dynamixel", make=_smart, params=DynamixelParams,
     abilities=(*_BRINGUP, "feedback", "torque off", "watchdog", "emulated"),
-    evidence=Evidence(emulated=True, judge="ROBOTIS' SDK (two versions), rustypot"),
+    evidence=Evidence(emulated=True, judge="rustypot, ROBOTIS' SDK in two versions"),
 )
 FEETECH = _plugin(
     "feetech", make=_smart, params=FeetechParams,
     abilities=(*_BRINGUP, "feedback", "torque off", "guardian", "emulated"),
-    evidence=Evidence(emulated=True, judge="Feetech's SDK, rustypot"),
+    evidence=Evidence(emulated=True, judge="rustypot (STS)"),
 )
 MAESTRO = _plugin(
     "maestro", make=MaestroBus, params=MaestroParams,

@@ -47,8 +47,8 @@ SHIPPED: Mapping[str, Mapping[str, str]] = {
         "yunet": "gazerig.drivers.vision.face.detector:YUNET",
     },
     ATTENTION: {"attention": "gazerig.gaze.attention:Attention"},
-    GESTURES: {"gazerig": "gazerig.config.gestures"},
-    RIGS: {"gazerig": "gazerig.config.rigs"},
+    GESTURES: {"gazerig": "gazerig.config.load:GESTURES_FOLDER"},
+    RIGS: {"gazerig": "gazerig.config.load:RIGS_FOLDER"},
 }
 """Our own parts, in the form of an entry point: group -> name -> "module:attribute".
 
@@ -73,13 +73,27 @@ class Evidence:
 
     Attributes:
         emulated: it was tested with an emulated device.
+        tested: with what else it was tested, e.g. "photographs".
         judge: an independent client or program that agreed with the emulated device, "" for none.
         hardware: on which real device it was run, "" where it was not.
     """
 
     emulated: bool = False
+    tested: str = ""
     judge: str = ""
     hardware: str = ""
+
+    def describe(self) -> str:
+        """Return it as text: "emulated; judged by rustypot; not run on hardware"."""
+        parts = [
+            *(["emulated"] if self.emulated else []),
+            *([f"tested with {self.tested}"] if self.tested else []),
+            *([f"judged by {self.judge}"] if self.judge else []),
+            *([f"run on {self.hardware}"] if self.hardware else []),
+        ]
+        if self.emulated and not self.hardware:
+            parts.append("not run on hardware")
+        return "; ".join(parts)
 
 
 NOTHING_PROVEN = Evidence()
@@ -299,12 +313,17 @@ def yaml_files(group: str) -> dict[str, tuple[Path, Registration]]:
     """
     files: dict[str, tuple[Path, Registration]] = {}
     for one in _outside(group, tuple(sys.path)):
-        for file in sorted(_folder(one).glob("*.yaml")):
+        for file in sorted(folder_of(one).glob("*.yaml")):
             files.setdefault(file.stem, (file, one))
     return files
 
 
-def _folder(found: Registration) -> Path:
+def folder_of(found: Registration) -> Path:
+    """Return the folder of YAML files that a part of gestures or rigs names.
+
+    Raises:
+        PluginError: it cannot be imported, or is none.
+    """
     part = found.load()
     places = list(getattr(part, "__path__", ())) or [part]
     if isinstance(places[0], str | Path) and (folder := Path(places[0])).is_dir():

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from outside_bus import EXAMPLE, HEAD, install_example
 from outside_package import on_path
+from typer.testing import CliRunner
 
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
@@ -18,6 +19,7 @@ from gazerig.robot.app.bus_wiring import has_watchdog, release_plan
 from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_bus import run_bus
+from gazerig.robot.cli.main import app
 from gazerig.robot.guardian.release_plan import decode, encode, releaser
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.sim_mock.devices import build, packed, unpacked
@@ -110,3 +112,15 @@ def test_without_an_emulated_device_mock_says_so(example, monkeypatch):
         match="^bus 'lx16a' of gazerig-lx16a 0.1.0 has no emulated device: run it without --mock$",
     ):
         run_bus(load_rig(str(HEAD)), RunOptions(mock=True, fast=True), SimulatedClock())
+
+
+@pytest.mark.parametrize(
+    "words", ["doctor", "setup", "monitor --once", "reboot", "calibrate joints", "scan"]
+)
+def test_what_speaks_to_our_kinds_alone_says_so_in_one_line(example, words):
+    command, *rest = words.split(" --")
+    joint = ["neck_yaw"] if command == "reboot" else []
+    options = [f"--{one}" for one in rest]
+    done = CliRunner().invoke(app, [*command.split(), str(HEAD), *joint, "--mock", *options])
+    told = f"{command} cannot ask the bus 'lx16a' of gazerig-lx16a 0.1.0: run, jog, home"
+    assert told in done.output and done.exit_code != 0, done.output

@@ -1,22 +1,27 @@
 """Parts of other packages are found by name, loaded when used, and refused in one line."""
 
+import json
 import pickle
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from outside_package import install, on_path
 
+from gazerig.config.gestures import gestures_of
 from gazerig.config.load import ConfigError
 from gazerig.config.parameters import changed, parameters
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers import plugins
 from gazerig.drivers.plugins import (
     ATTENTION,
+    BUS,
     CAMERA,
     DETECTOR,
+    GESTURES,
     GROUPS,
     RIGS,
     SHIPPED,
@@ -25,6 +30,7 @@ from gazerig.drivers.plugins import (
     Plugin,
     PluginError,
 )
+from gazerig.robot.cli import kinds
 
 DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
 
@@ -77,19 +83,17 @@ def fault(path):
 # --- ours come through the same door
 
 
-@pytest.mark.parametrize(
-    ("group", "name"), [(g, n) for g in GROUPS for n in SHIPPED[g] if g not in (plugins.GESTURES,)]
-)
+@pytest.mark.parametrize(("group", "name"), [(g, n) for g in GROUPS for n in SHIPPED[g]])
 def test_ours_are_found_and_loaded_by_the_same_code(group, name):
     found = plugins.find(group, name)
-    assert found.ours and found in {
-        one.__class__(one.group, one.name, one.value, one.package)
-        for one in plugins.registered(group)
-    }
+    assert found.ours
+    assert replace(found, version=plugins._version()) in plugins.registered(group)
     part = found.load()
+    if group in (RIGS, GESTURES):
+        assert any(plugins.folder_of(found).glob("*.yaml"))
     if group == RIGS:
-        assert plugins._folder(found).joinpath("desk.yaml").is_file()
-    elif group != ATTENTION:
+        assert plugins.folder_of(found).joinpath("desk.yaml").is_file()
+    elif group not in (ATTENTION, GESTURES):
         assert isinstance(part, Plugin)
 
 
@@ -214,3 +218,58 @@ def test_a_rig_with_a_section_is_changed_listed_and_sent_to_other_processes(fold
     # From the plain rig to it and back, as a file that is edited does.
     chosen: Any = changed(load_rig("desk"), {"gaze.chooser": "tallest"})
     assert chosen.gaze.tallest.height_m == 1.0
+
+
+# --- gestures and rigs
+
+
+def test_rigs_and_gestures_of_a_package_are_found_by_their_names(folder, tmp_path):
+    parts = {RIGS: {"heads": "my_heads.rigs"}, GESTURES: {"moves": "my_heads.moves"}}
+    install(folder, "my-heads", parts, {"my_heads.__init__": "", "my_heads.moves.__init__": ""})
+    (folder / "my_heads/rigs").mkdir()
+    text = DESK.read_text(encoding="utf-8").replace("name: desk", "name: other", 1)
+    (folder / "my_heads/rigs/other.yaml").write_text(text, encoding="utf-8")
+    nod = DESK.parents[1] / "gestures" / "nod.yaml"
+    (folder / "my_heads/moves/bow.yaml").write_text(nod.read_text(encoding="utf-8"))
+    assert load_rig("other").name == "other"
+    assert "bow" in gestures_of(("bow",))
+    with pytest.raises(ConfigError, match="did you mean 'other'"):
+        load_rig("othr")
+    with pytest.raises(ConfigError, match="did you mean 'bow'"):
+        gestures_of(("bov",))
+
+
+def test_a_package_that_names_no_folder_is_refused(folder):
+    install(folder, "odd", {RIGS: {"odd": "odd_one:x"}}, {"odd_one": "x = 7"})
+    with pytest.raises(ConfigError, match="rigs 'odd' of odd 1.2 is no folder"):
+        load_rig("nowhere")
+
+
+# --- the list
+
+
+def test_kinds_lists_all_with_package_abilities_and_proof(folder, capsys):
+    install(folder, "tall-rule", {ATTENTION: {"tallest": "tall_rule:PLUGIN"}}, {"tall_rule": RULE})
+    install(
+        folder, "bad", {CAMERA: {"fish": "nowhere:x"}, BUS: {"dynamixel": "nowhere:x"}}, {}, "7"
+    )
+    kinds.kinds(as_json=True)
+    listed = json.loads(capsys.readouterr().out)
+    by_name = {
+        (row["group"], row["name"]): row for row in listed["kinds"] if row["package"] != "bad"
+    }
+    assert {name for group, name in by_name if group == "bus"} == set(SHIPPED[BUS])
+    dynamixel = by_name["bus", "dynamixel"]
+    assert {"scan", "watchdog", "torque off", "feedback"} <= set(dynamixel["abilities"])
+    assert dynamixel["proven"].startswith("emulated; judged by rustypot")
+    assert "not run on hardware" in dynamixel["proven"]
+    assert by_name["attention", "tallest"]["version"] == "1.2"
+    assert "desk" in by_name["rigs", "gazerig"]["abilities"]
+    assert "nod" in by_name["gestures", "gazerig"]["abilities"]
+    (fish,) = [row for row in listed["kinds"] if row["name"] == "fish"]
+    assert "camera 'fish' of bad 7 cannot be loaded: ModuleNotFoundError" in fish["fault"]
+    (taken,) = listed["left_out"]
+    assert taken.startswith("bus 'dynamixel' of bad 7 is left out: gazerig")
+    kinds.kinds(as_json=False)
+    shown = capsys.readouterr().out
+    assert "tallest" in shown and taken in shown

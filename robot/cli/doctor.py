@@ -20,7 +20,14 @@ from gazerig.robot.bringup.doctor.run import AppliedFix
 from gazerig.robot.bringup.doctor.text import as_plain, grouped, summed_up
 from gazerig.robot.bringup.servo_families import kind_of
 from gazerig.robot.cli import progress as bench
-from gazerig.robot.cli.ports import MockOption, PortOption, bus_label, rig_ports, setups_on
+from gazerig.robot.cli.ports import (
+    MockOption,
+    PortOption,
+    bus_label,
+    refuse_packages,
+    rig_ports,
+    setups_on,
+)
 from gazerig.robot.cli.progress import JsonOption, console, progress, wipe
 from gazerig.robot.cli.suggestions import completed
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors
@@ -45,6 +52,7 @@ def doctor(
     """Examine every port and servo against the rig's YAML; every finding has its cure."""
     with clear_errors(rig, port, mock):
         model = load_rig(rig)
+        refuse_packages(model, "doctor")
         tell: Tell = (lambda _: None) if as_json else _tell
         with rig_ports(model, mock, port) as wired:
             lines = wired.opened_by()

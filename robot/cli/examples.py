@@ -20,6 +20,10 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     ),
     "check": (("check my.yaml", "all faults of a file at once; no servo is touched"),),
     "schema": (("schema rig.schema.json", "let an editor complete and check rig files"),),
+    "kinds": (
+        ("kinds", "what buses, cameras, detectors and rules there are, and from which package"),
+        ("kinds --json", "the same for a program"),
+    ),
     "scan": (
         ("scan", "ports, and the servos on the only one"),
         ("scan --port /dev/ttyUSB0", "who answers on this port, of any kind, at every baud rate"),
@@ -123,7 +127,7 @@ PANELS: dict[str, tuple[str, ...]] = {
     "Bring-up": (
         *("scan", "setup", "doctor", "calibrate", "jog", "home", "look-at", "monitor", "reboot"),
     ),
-    "Tools": ("check", "schema", "emulate", "record-camera", "fit-scanpath"),
+    "Tools": ("check", "kinds", "schema", "emulate", "record-camera", "fit-scanpath"),
 }
 """What help shows together."""
 

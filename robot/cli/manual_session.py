@@ -86,7 +86,7 @@ def _left_alone(rig: Rig, bus: str) -> str:
     until = "until the servo power is cut, or the guardian, which tries for 10 s, reaches the port"
     if kind in BOARDS:
         return f"{BOARDS[kind]} goes on with its last pulses {until}"
-    title = KINDS[kind].title
+    title = KINDS[kind].title if kind in KINDS else kind
     if has_watchdog(rig, bus):
         return f"the {title} servos' own watchdog stops them"
     return f"{title} servos hold their last goal {until}"

@@ -24,7 +24,15 @@ from gazerig.robot.bringup.telemetry import (
     Telemetry,
     TelemetryReader,
 )
-from gazerig.robot.cli.ports import MockOption, PortOption, RigPorts, opened, rig_ports, setups_on
+from gazerig.robot.cli.ports import (
+    MockOption,
+    PortOption,
+    RigPorts,
+    opened,
+    refuse_packages,
+    rig_ports,
+    setups_on,
+)
 from gazerig.robot.cli.terminal import RigArgument, clear_errors, signals
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.coupling_params import pairs_of
@@ -55,6 +63,7 @@ def monitor(
     """Watch all servos; reads alone: nothing is written, torque stays as it is."""
     with clear_errors(rig, port, mock), signals() as stopped:
         found, clock = load_rig(rig), RealClock()
+        refuse_packages(found, "monitor")
         with rig_ports(found, mock, port) as wire, _readers(found, wire) as readers:
             joints = {name: found.joints[name] for name in found.names}
             watch = Monitor(readers, joints, clock.now_s, pairs_of(found.couplings))

@@ -9,6 +9,7 @@ import typer
 from gazerig.config.schema import Rig
 from gazerig.drivers.errors import PortError, SetupError
 from gazerig.drivers.i2c.port import port_of
+from gazerig.drivers.plugins import BUS, find, is_ours
 from gazerig.drivers.serial.list_ports import serial_ports
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.port_owner import refuse_owner
@@ -49,6 +50,19 @@ class RigPorts(NamedTuple):
         """
         if self.buses is not None:
             self.buses.command(text, bus)
+
+
+def refuse_packages(rig: Rig, command: str) -> None:
+    """Refuse a command that speaks to servos of our kinds alone.
+
+    Raises:
+        SetupError: a bus of the rig is another package's.
+    """
+    for name in bus_names(rig):
+        kind = rig.bus_named(name).kind
+        if not is_ours(BUS, kind):
+            label = find(BUS, kind).label
+            raise SetupError(f"{command} cannot ask the {label}: run, jog, home and look-at can")
 
 
 @contextlib.contextmanager

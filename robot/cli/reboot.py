@@ -16,7 +16,14 @@ from gazerig.robot.bringup import servo_reboot
 from gazerig.robot.bringup.channel_test import sent_home
 from gazerig.robot.bringup.servo_families import KINDS, kind_of
 from gazerig.robot.bringup.servo_family import ServoKind
-from gazerig.robot.cli.ports import MockOption, PortOption, bus_label, rig_ports, setups_on
+from gazerig.robot.cli.ports import (
+    MockOption,
+    PortOption,
+    bus_label,
+    refuse_packages,
+    rig_ports,
+    setups_on,
+)
 from gazerig.robot.cli.progress import YesOption, to_open
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say
@@ -43,6 +50,7 @@ def reboot(
     """Restart servos, which clears latched errors; their torque is off afterwards."""
     with clear_errors(rig, port, mock):
         model = load_rig(rig)
+        refuse_packages(model, "reboot")
         wanted: dict[str, list[int]] = {}
         for text in servos:
             bus, servo_id = _servo(model, text)

@@ -26,7 +26,7 @@ from gazerig.robot.bringup.doctor.port import name_ports
 from gazerig.robot.bringup.scan_report import board_plain, board_text, remarks, servo_plain
 from gazerig.robot.bringup.servo_families import KINDS, kind_of
 from gazerig.robot.cli import progress as bench
-from gazerig.robot.cli.ports import MockOption, rig_ports
+from gazerig.robot.cli.ports import MockOption, refuse_packages, rig_ports
 from gazerig.robot.cli.progress import JsonOption, console
 from gazerig.robot.cli.rig_command import DEFAULT_RIG, RigCommand
 from gazerig.robot.cli.suggestions import completed
@@ -90,6 +90,7 @@ def _paths(
         yield [(path, is_i2c(path))]
         return
     model = load_rig(rig or DEFAULT_RIG)
+    refuse_packages(model, "scan")
     with rig_ports(model, mock, port) as wired:
         yield [
             (path, model.bus_named(name).kind == "pca9685") for name, path in wired.paths.items()

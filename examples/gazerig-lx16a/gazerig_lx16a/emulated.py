@@ -53,7 +53,7 @@ class EmulatedServo:
 class Chain:
     """The device at the end of the line; what can befall a line is gazerig's."""
 
-    heed_baud = False
+    check_baud = False
 
     def __init__(
         self, servos: list[EmulatedServo], now_s: Callable[[], float], seed: int = 0
@@ -70,7 +70,7 @@ class Chain:
         servo.advance(self.now_s())
         return servo
 
-    def hears(self, client_baud: int) -> bool:
+    def at_baud(self, client_baud: int) -> bool:
         return True
 
     def choose(self, case: str, value: str) -> None:

@@ -23,7 +23,7 @@ from gazerig.robot.cli.calibrate.joint import (
     refuse_impossible,
 )
 from gazerig.robot.cli.jog_prompt import SteeringPerson
-from gazerig.robot.cli.ports import MockOption, PortOption, rig_ports
+from gazerig.robot.cli.ports import MockOption, PortOption, refuse_packages, rig_ports
 from gazerig.robot.cli.prompts import Lines
 from gazerig.robot.cli.rig_writer import refuse_unwritable, write_found
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals
@@ -55,6 +55,7 @@ def calibrate_joints(
     """
     with clear_errors(rig, port, mock), signals() as stopped:
         loaded = load_rig(rig)
+        refuse_packages(loaded, "calibrate joints")
         names = _names(loaded, joint)
         search = StopSearchParams(strength=strength)
         span_us = _span(pulses)
