@@ -5,13 +5,13 @@ from difflib import get_close_matches
 
 from gazerig.config.animation_rules import expressions, levels
 from gazerig.config.gestures import gesture_rules
-from gazerig.config.rig import BusConfig, Rig
+from gazerig.config.rig import Rig
 from gazerig.drivers.hobby_board.params import HobbyBoardParams
 from gazerig.drivers.servo_models import SERVOS
+from gazerig.drivers.types import ServoConfig
 from gazerig.gaze.types import PARTS
-from gazerig.robot.model.coupling_params import CoupledPair, unreachable
+from gazerig.robot.model.coupling_params import CoupledPair, pair_setups, unreachable
 from gazerig.robot.model.forbidden_range import forbidden_pairs
-from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS
 from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME
 
@@ -76,7 +76,7 @@ def _buses(rig: Rig) -> Iterable[tuple[str, str]]:
                 f"a {joint.model} speaks {SERVOS[joint.model].bus}, and its bus is of kind {kind}",
             )
         elif joint.model in SERVOS:
-            yield from _channel(name, joint, rig.bus_of(name))
+            yield from _channel(name, rig)
     yield from _series(rig)
     used = {joint.bus for joint in rig.joints.values()}
     for name in rig.buses:
@@ -84,16 +84,28 @@ def _buses(rig: Rig) -> Iterable[tuple[str, str]]:
             yield f"buses.{name}", "no joint is on it: take it out, or give joints this bus"
 
 
-def _channel(name: str, joint: JointParams, bus: BusConfig) -> Iterable[tuple[str, str]]:
+def _channel(name: str, rig: Rig) -> Iterable[tuple[str, str]]:
     """Find what keeps a joint from its channel of a board of hobby servos."""
-    params = bus.section
+    joint, params = rig.joints[name], rig.bus_of(name).section
     if not isinstance(params, HobbyBoardParams):
         return
     try:
-        params.check(joint.setup(name))
+        params.check(_setup(name, rig))
     except ValueError as error:
         what = str(error).removeprefix(f"channel {joint.id}: ")
         yield f"joints.{name}{'' if what.startswith('its range') else '.id'}", what
+
+
+def _setup(name: str, rig: Rig) -> ServoConfig:
+    """Return what the bus must know of a joint's servo, as far as the rig is right so far."""
+    for one in rig.couplings.values():
+        known = {one.first, one.second} <= rig.joints.keys() and all(
+            rig.joints[joint].model in SERVOS for joint in (one.first, one.second)
+        )
+        pair = CoupledPair(one.first, one.second, one.made())
+        if known and name in pair[:2] and not unreachable(pair, rig.joints):
+            return pair_setups(pair, rig.joints, {})[name]
+    return rig.joints[name].setup(name)
 
 
 def _series(rig: Rig) -> Iterable[tuple[str, str]]:

@@ -336,3 +336,34 @@ def test_coupled_joints_keep_their_gears_until_the_next_start() -> None:
     limits = made.live.parts.guard.limits
     assert degrees(limits[rig.names.index("neck_roll")].high_rad) == pytest.approx(20.0)
     made.close()
+
+
+def test_hobby_servos_of_a_coupled_neck_get_the_range_of_both_joints() -> None:
+    """Channels of a board are checked and armed for pitch and roll at once."""
+    rig = load_rig("maker")
+    joint = replace(
+        rig.joints["left_upper_lid"], transmission_points=(), min_deg=-30.0, max_deg=30.0
+    )
+    rig = replace(
+        rig,
+        joints={
+            **rig.joints,
+            "neck_pitch": replace(joint, id=10, sign=1),
+            "neck_roll": replace(joint, id=11, sign=1),
+        },
+        couplings={"neck": CouplingParams("differential", "neck_pitch", "neck_roll")},
+    )
+    assert faults(rig) == []
+    found = dict(zip(rig.names, rig_setups(rig), strict=True))
+    own = joint.setup("neck_pitch")
+    wide = found["neck_pitch"].max_steps - found["neck_pitch"].min_steps
+    assert wide == pytest.approx(2 * (own.max_steps - own.min_steps), abs=4)
+    made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
+    made.robot.start(made.clock)
+    made.robot.command(Jog((("neck_pitch", radians(10.0)), ("neck_roll", radians(8.0))), stay=True))
+    for _ in range(400):
+        made.clock.sleep_until(made.clock.now_s() + 0.005)
+        tick = made.robot.tick(made.clock.now_s(), 0.005)
+    at = dict(zip(rig.names, map(degrees, tick.joints.position_rad), strict=True))
+    assert (at["neck_pitch"], at["neck_roll"]) == pytest.approx((10.0, 8.0), abs=0.3)
+    made.close()

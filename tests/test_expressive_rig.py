@@ -11,6 +11,7 @@ from command_line import answers_in, invoked
 from expressive_rig import started
 from shown_page import SNAPSHOT
 
+from gazerig.config.load import shipped
 from gazerig.config.parameters import changed, parameters
 from gazerig.config.schema import load_rig
 from gazerig.config.text import rig_text, walk_text
@@ -121,7 +122,7 @@ def test_doctor_names_the_jaw_and_mends_its_limits() -> None:
 
 def test_a_jaw_is_calibrated_by_motion(tmp_path: Path) -> None:
     rig = tmp_path / "face.yaml"
-    text = Path("config/rigs/expressive.yaml").read_text(encoding="utf-8")
+    text = shipped("rigs", "expressive").read_text(encoding="utf-8")
     rig.write_text(text, encoding="utf-8")
     done = invoked(
         "calibrate", "joints", str(rig), "--joint", "jaw", "--by", "motion", "--mock", "--dry-run",
@@ -184,3 +185,59 @@ def test_a_jaw_keeps_clear_of_a_neck_that_looks_down() -> None:
             worst = max(worst, at["jaw"])
     made.close()
     assert worst <= 4.0
+
+
+def test_a_blink_shuts_the_lids_of_a_sad_face(recorded: tuple[RunRecording, list[Tick]]) -> None:
+    made = started(load_rig("expressive"))
+    made.robot.command(Express("sad"))
+    lid, widest, narrowest = NAMES.index("left_upper_lid"), -90.0, 90.0
+    for k in range(3000):
+        made.clock.sleep_until(made.clock.now_s() + 0.005)
+        tick = made.robot.tick(made.clock.now_s(), 0.005)
+        if k > 200:
+            angle = degrees(tick.desired_rad[lid])
+            widest, narrowest = max(widest, angle), min(narrowest, angle)
+    made.close()
+    assert narrowest == pytest.approx(-25.0, abs=0.5)  # shut
+    assert widest < 20.0 - 13.0  # open, less nearly all of the 14 deg
+
+
+def test_the_jaw_moves_on_while_a_stale_frame_holds_the_neck() -> None:
+    made = started(load_rig("expressive"))
+    made.live.parts.camera.latest = lambda t_s: None  # type: ignore[assignment,method-assign]
+    made.robot.command(Express("surprised"))
+    for _ in range(600):
+        made.clock.sleep_until(made.clock.now_s() + 0.005)
+        tick = made.robot.tick(made.clock.now_s(), 0.005)
+    made.close()
+    held = [reason for reason in tick.guard_result.reasons if "stale frame" in reason]
+    assert {reason.partition(":")[0] for reason in held} <= {"neck_yaw", "neck_pitch"} and held
+    assert degrees(tick.joints.position_rad[NAMES.index("jaw")]) == pytest.approx(12.0, abs=0.5)
+
+
+def test_an_expression_tuned_while_it_is_in_force_moves_without_a_jump() -> None:
+    rig = load_rig("expressive")
+    made = started(rig)
+    made.robot.command(Express("happy"))
+    jaw, last, largest = NAMES.index("jaw"), 0.0, 0.0
+    for k in range(600):
+        if k == 300:
+            made.robot.command(
+                made.live.prepare(rig, changed(rig, {"expressions.happy.jaw": 10.0}))
+            )
+        made.clock.sleep_until(made.clock.now_s() + 0.005)
+        now = degrees(made.robot.tick(made.clock.now_s(), 0.005).desired_rad[jaw])
+        largest, last = max(largest, abs(now - last)), now
+    made.close()
+    assert last == pytest.approx(10.0)
+    assert largest <= 1.875 * 6.0 / 0.6 * 0.005 + 1e-9
+
+
+def test_a_wrong_expression_is_named_with_its_file_and_line(tmp_path: Path) -> None:
+    text = shipped("rigs", "expressive").read_text(encoding="utf-8")
+    path = tmp_path / "face.yaml"
+    path.write_text(text.replace("happy: {jaw: 4.0", "happy: {jaw: 44.0"), encoding="utf-8")
+    done = invoked("check", str(path))
+    line = 1 + text[: text.index("happy: {")].count("\n")
+    assert done.code == 2 and f"face.yaml:{line}" in done.err
+    assert "expressions.happy.jaw" in done.err and "outside the joint's range -2..25" in done.err

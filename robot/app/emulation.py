@@ -104,7 +104,15 @@ def _plain(rig: Rig, name: str) -> EmulatedJoint:
 def _start(rig: Rig, name: str) -> int:
     crooked = {name: radians(_CROOKED_DEG.get(name, 0.0)) for name in rig.joints}
     for first, second, coupling in pairs_of(rig.couplings):
-        crooked[first], crooked[second] = coupling.servo_rad((crooked[first], crooked[second]))
+        # Push rods know no angles far outside the range.
+        one, other = (
+            min(
+                max(crooked[joint], rig.joints[joint].limit().low_rad),
+                rig.joints[joint].limit().high_rad,
+            )
+            for joint in (first, second)
+        )
+        crooked[first], crooked[second] = coupling.servo_rad((one, other))
     return round(rig.joints[name].steps(crooked[name]))
 
 

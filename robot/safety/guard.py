@@ -66,7 +66,7 @@ class Guard:
         self._late = LateTicks(period_s)
         self._soft = False
         self._names = joints
-        self._neck = tuple(name.startswith("neck") for name in joints)
+        self._neck = tuple("neck" in name.split("_") for name in joints)
         self._motion = MotionLimiter(self._within_reach())
         self._limits = self._motion.limits
         self._waiting: set[int] = set()
