@@ -15,6 +15,7 @@ import pytest
 from command_line import options, parse, typed
 from papers import COMMANDS, EMULATOR, PAPERS, ROOT, Block, blocks, each_of_papers, spans
 
+import gazerig
 from gazerig.robot.control.loop import Robot
 from gazerig.robot.remote.client import RobotClient
 from gazerig.sim_mock.dynamixel.chain import DynamixelChain
@@ -181,6 +182,11 @@ def test_python_of_a_paper_imports_what_there_is(block: Block) -> None:
             case ast.Call(ast.Attribute(ast.Name("rig"), method), args, keywords):
                 call = inspect.signature(getattr(RobotClient, method))
                 call.bind(None, *args, **{str(k.arg): k.value for k in keywords})
+            case ast.Call(ast.Attribute(ast.Name("head"), method), args, keywords):
+                call = inspect.signature(getattr(gazerig.SimulatedHead, method))
+                call.bind(None, *args, **{str(k.arg): k.value for k in keywords})
+            case ast.Attribute(ast.Name("gazerig"), name):
+                assert name in gazerig.__all__
 
 
 def _part(module: ModuleType, path: str, name: str) -> Any:
@@ -189,11 +195,19 @@ def _part(module: ModuleType, path: str, name: str) -> Any:
     return importlib.import_module(f"{path}.{name}")
 
 
+HEADS = [block for block in blocks("python") if "gazerig.open(" in block.text]
+
+
+@pytest.mark.usefixtures("ideal_servos")
+@pytest.mark.parametrize("block", HEADS, ids=lambda block: block.paper.name)
+def test_python_that_opens_a_head_runs(block: Block) -> None:
+    """In simulated time, whatever time the paper has."""
+    code = block.text.replace("mock=True", 'fast=True, scene="face-to-face"')
+    exec(compile(code.replace("10.0)", "1.0)"), str(block.paper), "exec"), {})
+
+
 def test_python_that_needs_no_rig_runs(capfd: pytest.CaptureFixture[str]) -> None:
-    [code] = [b.text for b in blocks("python") if "session.compose" in b.text]
     names: dict[str, Any] = {}
-    exec(compile(code.replace("seconds=10", "seconds=0.05"), "README.md", "exec"), names)
-    assert names["figures"]["stopped_by"] == "seconds"
     [code] = [b.text for b in blocks("python") if "with PtyBus" in b.text]
     names = {}
     exec(compile(code, "emulator.md", "exec"), names)

@@ -2,7 +2,7 @@
 
 import contextlib
 from collections.abc import Sequence
-from math import inf
+from math import inf, radians
 from typing import Annotated
 
 import typer
@@ -10,6 +10,15 @@ import typer
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.robot.cli.terminal import FAULT, clear_errors, say
 from gazerig.robot.model.clock import RealClock
+from gazerig.robot.model.commands import (
+    FAR_M,
+    Look,
+    LookAt,
+    LookAtDirection,
+    LookAtInHead,
+    LookAtPerson,
+    LookAtPixel,
+)
 from gazerig.robot.remote.client import RobotClient, running
 
 app = typer.Typer()
@@ -28,9 +37,17 @@ def look(
     where: Annotated[
         list[str],
         typer.Argument(
-            metavar="X Y Z | free", help="Metres ahead, left and up of the neck; or free."
+            metavar="X Y Z | person N | pixel X Y | direction YAW PITCH | free",
+            help="Metres ahead, left and up of the neck; a person's number; a pixel of the frame; "
+            "degrees to the left and up; or free.",
         ),
     ],
+    head: Annotated[
+        bool, typer.Option("--head", help="X Y Z or YAW PITCH are from the head as it is now.")
+    ] = False,
+    distance: Annotated[
+        float | None, typer.Option(metavar="M", help="Of a pixel or direction, metres away.")
+    ] = None,
     stay: Annotated[
         bool, typer.Option("--stay", help="Return at once; it looks there until: look free.")
     ] = False,
@@ -39,15 +56,15 @@ def look(
     ] = None,
     pid: PidOption = None,
 ) -> None:
-    """Make the running head look at a point while this command runs, or freely again."""
+    """Make the running head look at something while this command runs, or freely again."""
     with clear_errors():
-        point = read_point(where)
+        command = read_look(where, head, distance)
         with RobotClient.connect(pid, "gazerig ctl look") as rig:
-            if point is None:
+            if command == LookAt(None):
                 rig.look_freely()
                 say("it looks freely")
                 return
-            reply = rig.look_at(*point, stay=stay)
+            reply = rig.give(command._replace(who=rig.who, stay=stay))
             until = "gazerig ctl look free" if stay else _until(seconds)
             say(f"{reply.text()}, until: {until}")
             if not stay:
@@ -118,18 +135,40 @@ def resume(
         say("torque is on; it goes on slowly")
 
 
-def read_point(coordinates: Sequence[str]) -> tuple[float, float, float] | None:
-    """Read X Y Z in metres, or "free" as None.
+def read_look(words: Sequence[str], head: bool = False, distance_m: float | None = None) -> Look:
+    """Read what is to be looked at.
+
+    Args:
+        words: X Y Z in metres, "person" N, "pixel" X Y, "direction" YAW PITCH in degrees, "free".
+        head: a point or direction is from the head as it is now.
+        distance_m: of a pixel or direction.
 
     Raises:
-        SetupError: it is neither.
+        SetupError: it is none of these.
     """
-    if list(coordinates) == ["free"]:
-        return None
+    kind, numbers = (words[0], words[1:]) if words[0] in _NUMBERS else ("point", words)
     try:
-        x, y, z = map(float, coordinates)
+        found = tuple(map(float, numbers))
+        if len(found) != _NUMBERS[kind] or (kind == "person" and found[0] % 1.0):
+            raise ValueError
     except ValueError:
         raise SetupError(
-            f"{' '.join(coordinates)}: give X Y Z in metres (ahead, left, up), or free"
+            f"{' '.join(words)}: give X Y Z in metres (ahead, left, up), person N, pixel X Y, "
+            "direction YAW PITCH in degrees (left, up), or free"
         ) from None
-    return x, y, z
+    if kind == "free":
+        return LookAt(None)
+    if kind == "person":
+        return LookAtPerson(int(found[0]))
+    if kind == "pixel":
+        return LookAtPixel((found[0], found[1]), distance_m)
+    if kind == "direction":
+        angles = (radians(found[0]), radians(found[1]))
+        far_m = FAR_M if distance_m is None else distance_m
+        return LookAtDirection(angles, "head" if head else "world", far_m)
+    point = (found[0], found[1], found[2])
+    return LookAtInHead(point) if head else LookAt(point)
+
+
+_NUMBERS = {"point": 3, "person": 1, "pixel": 2, "direction": 2, "free": 0}
+"""What can be looked at, and how many numbers say it."""
