@@ -1,77 +1,14 @@
-"""Whole machines that something befalls while they move: rig, buses, guard and true servos.
+"""What befalls the buses of our kinds, and the shipped rigs that it befalls."""
 
-Everything runs in this process in simulated time, with the bytes' time on the wire. Whatever
-happens, every tick is judged by where the servos truly are.
-"""
-
-from collections.abc import Sequence
 from dataclasses import replace
-from math import pi, radians, sin
-from typing import Any, NamedTuple
+from typing import Any
 
 from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig, load_rig
-from gazerig.drivers.servo_models import HOBBY_KINDS, servo_label
-from gazerig.robot.app.bus_wiring import rig_bus, rig_setups
-from gazerig.robot.app.emulation import emulated_lines, place_of
-from gazerig.robot.app.rig_limits import limits, park_rad
-from gazerig.robot.control.body import Body
-from gazerig.robot.model.clock import SimulatedClock
-from gazerig.robot.safety.guard import Guard
-from gazerig.sim_mock.device import Device
-from gazerig.sim_mock.devices import build
-from gazerig.sim_mock.in_process_port import InProcessPort
-from gazerig.sim_mock.maestro.board import EmulatedMaestro
-from gazerig.sim_mock.pca9685.bridge import Bridge
-
-STRUCK_S, PATIENCE_S = 1.0, 3.0
-FAST = 1.3
-"""Servos catch up after a fault so much faster than their limit."""
-ROOM_RAD = 0.03
-"""And the end of their range by their inertia so much."""
-NEAR_RAD = 0.06
-
-Commands = tuple[str, ...]
-
-
-class Case(NamedTuple):
-    """A fault: what begins it and what ends it. ``{i}`` and ``{j}`` are servos of one bus.
-
-    own_speed: the servo itself catches up at its own speed, as nothing can hold it back
-    """
-
-    begins: Commands
-    ends: Commands = ("clear",)
-    own_speed: bool = False
-
-    @property
-    def name(self) -> str:
-        """Return what it is called."""
-        return "; ".join(self.begins)
-
-
-def _lasting(*texts: str) -> list[Case]:
-    return [Case((text,)) for text in texts]
-
-
-LINE = [
-    *_lasting(
-        "lose {i}", "lose all", "delay {i} 5", "delay {i} 60", "delay all 3",
-        "delay all 30 count 12", "delay all 300 count 3", "truncate {i} 0", "truncate {i} 1",
-        "truncate all 1", "duplicate {i}", "duplicate all", "corrupt {i}", "corrupt {i} 20",
-        "corrupt all", "drop {i} 0", "drop {i} 1", "drop {i} -1", "drop all 0", "stall {i} 5",
-        "stall {i} 30", "stall all 5", "stall all 60 count 9",
-        "noise before random", "noise after random", "noise before FF", "noise after AA",
-        "echo on", "babble on", "block on", "lose-writes 1000 for 1",
-    ),
-    Case(("unplug",), ("plug",)),
-    Case(("unplug", "deny on"), ("plug", "deny off")),
-    Case(("unplug for 0.02",), ("plug",)),
-]  # fmt: skip
-"""What befalls any line."""
+from gazerig.testing.struck_machine import LINE, Case, lasting
 
 PACKETS = [
-    *_lasting(
+    *lasting(
         "truncate {i} 5", "truncate all 11", "drop {i} 3", "drop {i} 8", "fragment {i}", "fragment",
         "reorder", "wrong-id {i} {j}", "wrong-id {i} 77", "short {i} 2", "short all 1",
         "long {i} 2", "long all 1", "refuse {i} 7", "refuse {i} 32", "refuse all 7",
@@ -102,8 +39,8 @@ ERRORS = (
     "script-call-stack", "script-counter",
 )  # fmt: skip
 BOARD = [
-    *_lasting(*(f"error {name}" for name in ERRORS)),
-    *_lasting("lose-bytes 1", "lose-bytes 7", "lose-bytes 1000 for 1"),
+    *lasting(*(f"error {name}" for name in ERRORS)),
+    *lasting("lose-bytes 1", "lose-bytes 7", "lose-bytes 1000 for 1"),
     Case(("set on-error home", "error protocol")),
     Case(("set on-error ignore", "error protocol")),
     Case(("brown-out",)),
@@ -118,7 +55,7 @@ BOARD = [
 """What befalls a Maestro and its servos beside."""
 
 I2C = [
-    *_lasting(
+    *lasting(
         "lose-bytes 1", "lose-bytes 7", "lose-bytes 1000 for 1", "nack 1", "nack 40", "nack",
         "nack for 0.5",
     ),
@@ -141,237 +78,8 @@ CASES = {
     "maestro": [*LINE, *BOARD],
     "pca9685": [*LINE, *I2C],
 }
+
 VOLTS = {"dynamixel": 5.0, "feetech": 7.4, "maestro": 5.0, "pca9685": 5.0}
-
-
-class Outcome(NamedTuple):
-    """How a fault ended.
-
-    end: "came back": all joints move as before; "left, named": some are limp, stand still or
-        move slowly only, and each is named with its cause; else what is wrong
-    after_s: from the end of the fault until so
-    longest_s: the longest read
-    said: what was told of it
-    """
-
-    end: str
-    after_s: float
-    longest_s: float
-    said: tuple[str, ...]
-
-    @property
-    def survived(self) -> bool:
-        """Return whether it ended well."""
-        return self.end in ("came back", "left, named")
-
-
-class Broken(AssertionError):
-    """A servo did what none may do."""
-
-
-class Machine:
-    """A rig's joints on emulated buses, led by the guard on their way to and fro.
-
-    said: what has been told; longest_s: the longest read; heard: joints that have answered
-    under torque in the last tick
-    own_speed: servos may catch up at their own speed
-    """
-
-    def __init__(self, rig: Rig, rate_hz: float = 100.0, seed: int = 0) -> None:
-        self.rig, self.period_s = rig, 1.0 / rate_hz
-        self.clock = SimulatedClock(50.0)
-        lines = emulated_lines(rig)
-        self.devices: dict[str, Device] = {
-            name: build(line, self.clock.now_s, seed) for name, line in lines.items()
-        }
-        ports = {
-            name: InProcessPort(
-                device, None, f"port of {name or 'the rig'}", self.clock.sleep_until, True
-            )
-            for name, device in self.devices.items()
-        }
-        self.body = Body(rig_bus(rig, ports), rig.joints, park_rad(rig))
-        self.names = self.body.names
-        self.limits = limits(rig.joints)
-        self.guard = Guard(rig.guard, self.limits, self.names, self.body.reach, self.period_s)
-        self.setups = rig_setups(rig)
-        self._linkages = [rig.joints[name].made() for name in self.names]
-        self._at = [(rig.joints[name].bus, place_of(rig, name)) for name in self.names]
-        self._kinds = [rig.bus_of(name).kind for name in self.names]
-        self.heard: tuple[bool, ...] = ()
-        self.said: list[str] = []
-        self.longest_s = 0.0
-        self.own_speed = False
-        self._fast_s = [0.0] * len(self.names)
-        self._gentle_rad_s = 1.2 * radians(rig.guard.soft_start_speed_deg_s)
-
-    def start(self) -> None:
-        """Torque on, and on the way until slow motion is over."""
-        goals = self.body.start()
-        self._begin_s = self._last_s = self.clock.now_s()
-        self._slot = 0
-        self.guard.reset(self._last_s, goals)
-        self._command, self._speed = list(goals), [0.0] * len(goals)
-        self._true, self._true_s = self.true_rad(), self._last_s
-        for _ in range(round(2.0 / self.period_s)):
-            if all(self.tick()) and not self.guard.gentle:
-                break
-        self.said.clear()
-        self.longest_s = 0.0
-
-    # --- what is true
-
-    def true_rad(self) -> list[float]:
-        """Return where the joints truly are."""
-        steps = {name: device.positions_steps() for name, device in self.devices.items()}
-        return [
-            linkage.angle_rad(steps[bus][place])
-            for linkage, (bus, place) in zip(self._linkages, self._at, strict=True)
-        ]
-
-    def true_goal(self, i: int) -> int | None:
-        """Return the goal that joint's servo follows; None where it is limp."""
-        bus, place = self._at[i]
-        device = self.devices[bus]
-        if isinstance(device, EmulatedMaestro):
-            return device.body.channels[place].target or None
-        if isinstance(device, Bridge):
-            return device.body.width_steps(place, self.clock.now_s()) or None
-        servo = device.servos[place]  # type: ignore[attr-defined]
-        return int(servo.memory.get("goal_position")) if servo.torque else None
-
-    # --- ticks
-
-    def desired(self, t_s: float) -> list[float]:
-        """Return a wave through the middle of every range, well below its limits."""
-        wave = []
-        for i, limit in enumerate(self.limits):
-            middle = 0.5 * (limit.low_rad + limit.high_rad)
-            size = 0.3 * (limit.high_rad - limit.low_rad)
-            most = (0.2 * limit.accel_rad_s2 / size) ** 0.5
-            rate = min(2.0, 0.35 * limit.speed_rad_s / size, most)
-            wave.append(middle + size * sin(rate * (t_s - self._begin_s) + i * pi / 5.0))
-        return wave
-
-    def tick(self) -> tuple[bool, ...]:
-        """Run one tick at its slot; tells which joints are well.
-
-        Raises:
-            Broken: a servo is or moves where none may.
-            DriverError: as in a run.
-        """
-        # Slots that were overrun are left out, as in the loop.
-        slots = int((self.clock.now_s() - self._begin_s) / self.period_s + 1e-6) + 1
-        self._slot = slots
-        self.clock.sleep_until(self._begin_s + slots * self.period_s)
-        t_s = self.clock.now_s()
-        joints = self.body.read(t_s)
-        self.longest_s = max(self.longest_s, self.clock.now_s() - t_s)
-        desired = tuple(self.desired(t_s))
-        verdict = self.guard.check(desired, joints, 0.0, t_s)
-        self._judge_command(verdict.command_rad, joints.rearmed, t_s)
-        self.body.write(verdict.command_rad)
-        self.said += self.body.bus.events()
-        true = self._judge_servos()
-        self.heard = tuple(
-            name not in joints.missing and joints.torque[i] for i, name in enumerate(self.names)
-        )
-        return tuple(
-            self.heard[i]
-            and abs(true[i] - desired[i]) <= NEAR_RAD
-            and abs(joints.position_rad[i] - true[i]) <= NEAR_RAD
-            for i in range(len(self.names))
-        )
-
-    def _judge_command(self, command: Sequence[float], rearmed: Sequence[bool], t_s: float) -> None:
-        """See that commands keep range, speed and acceleration, but where a joint began again."""
-        dt_s = t_s - self._last_s
-        # No goal came meanwhile, and servos braked: commands go on from there as the guard may.
-        late = dt_s > 1.5 * self.period_s or self._late
-        self._late = dt_s > 1.5 * self.period_s
-        for i, limit in enumerate(self.limits):
-            low, high, top, hard = limit[:4]
-            if not low - 1e-6 <= command[i] <= high + 1e-6:
-                raise Broken(f"{self.names[i]} was sent to {command[i]:.4f} rad")
-            speed = (command[i] - self._command[i]) / dt_s
-            if rearmed[i]:
-                speed = 0.0
-            elif abs(speed) > top + 1e-6:
-                raise Broken(f"{self.names[i]} was sent at {speed:.3f} rad/s")
-            elif (
-                not late
-                and abs(speed - self._speed[i]) > hard * max(dt_s, self._dt_s) * 1.001 + 1e-6
-            ):
-                raise Broken(f"{self.names[i]} was sent with {speed - self._speed[i]:.3f} rad/s")
-            self._command[i], self._speed[i] = command[i], speed
-        self._last_s, self._dt_s = t_s, dt_s
-
-    _dt_s = 0.0
-    _late = False
-
-    def _judge_servos(self) -> list[float]:
-        """See that servos are in their range and no faster than they may."""
-        now_s, true = self.clock.now_s(), self.true_rad()
-        dt_s = now_s - self._true_s
-        for i, (name, limit) in enumerate(zip(self.names, self.limits, strict=True)):
-            goal, setup = self.true_goal(i), self.setups[i]
-            moved, took_s = abs(true[i] - self._true[i]), dt_s
-            if self._kinds[i] in HOBBY_KINDS:
-                took_s = max(dt_s, 0.01)  # a board moves its channels so often
-            if goal is not None and not setup.min_steps <= goal <= setup.max_steps:
-                raise Broken(f"{name}'s servo has goal {goal}")
-            if not limit.low_rad - ROOM_RAD <= true[i] <= limit.high_rad + ROOM_RAD:
-                raise Broken(f"{name} is at {true[i]:.4f} rad")
-            if moved > self._gentle_rad_s * took_s + 1e-4:
-                self._fast_s[i] = now_s
-            if not self.own_speed and moved > FAST * limit.speed_rad_s * took_s + 0.01:
-                raise Broken(f"{name} moved {moved:.4f} rad in {dt_s * 1e3:.1f} ms")
-        self._true, self._true_s = true, now_s
-        return true
-
-    # --- faults
-
-    def strike(self, bus: str, i: int, j: int, case: Case) -> Outcome:
-        """Let something befall a bus for a while; tells how it ends.
-
-        i, j: places of two joints of that bus
-
-        Raises:
-            Broken: a servo is or moves where none may.
-        """
-        words = {
-            "i": self.setups[i].id, "j": self.setups[j].id, "volts": VOLTS[self._kinds[i]],
-        }  # fmt: skip
-        faults = self.devices[bus].faults
-        self.own_speed = case.own_speed
-        for text in case.begins:
-            faults.command(text.format(**words))
-        for _ in range(round(STRUCK_S / self.period_s)):
-            self.tick()
-        for text in (*case.ends, "clear"):
-            faults.command(text.format(**words))
-        end_s = self.clock.now_s()
-        in_a_row = 0
-        while self.clock.now_s() - end_s < PATIENCE_S:
-            well = self.tick()
-            in_a_row = in_a_row + 1 if all(well) else 0
-            if in_a_row >= 10:
-                break
-        after_s = self.clock.now_s() - end_s
-        said = (*self.said, *self.body.bus.faults())
-        return Outcome(self._ended(well, said), after_s, self.longest_s, said)
-
-    def _ended(self, well: Sequence[bool], said: Sequence[str]) -> str:
-        if all(well):
-            return "came back"
-        for i, name in enumerate(self.names):
-            if well[i]:
-                continue
-            if not any(servo_label(self.setups[i]) in line for line in said):
-                return f"{name} is not well and nobody says why"
-            if self.clock.now_s() - self._fast_s[i] < 0.5:
-                return f"{name} is not well and moves fast"
-        return "left, named"
 
 
 RIGS = {"dynamixel": "desk", "feetech": "feetech", "maestro": "maker", "pca9685": "maker"}
@@ -392,9 +100,3 @@ def quick(rig: Rig) -> Rig:
     few = {name: joint for name, joint in rig.joints.items() if name in FEW}
     guard = replace(rig.guard, soft_start_ms=200.0)
     return replace(rig, guard=guard, joints=few if len(few) == len(FEW) else rig.joints)
-
-
-def pair_of(rig: Rig, kind: str) -> tuple[str, int, int]:
-    """Return the bus of a kind, and the places of two of its joints."""
-    places = [i for i, name in enumerate(rig.names) if rig.bus_of(name).kind == kind]
-    return rig.joints[rig.names[places[0]]].bus, places[1 % len(places)], places[-1]

@@ -1,26 +1,27 @@
 """What befalls every kind of bus while a head moves on it, and how each of it ends.
 
 A fault lasts for 0.6 s in a running loop of bus and guard at 100 Hz. In every tick the
-true servos are judged (struck_rigs): goals inside the limits, places inside the range,
+true servos are judged (gazerig.testing): goals inside the limits, places inside the range,
 speeds below the top. After it all joints move as before, or some are left limp or still,
 each named with its cause. tests/bench/bench_faults.py runs the same on the shipped rigs with
 all their joints, for a second and at 200 Hz.
 """
 
-import random
 from dataclasses import replace
+from functools import cache
 
 import pytest
-import struck_rigs
 from copied import copied
 from mixed_rig import mixed_text
-from struck_rigs import CASES, RIGS, Case, Machine, pair_of, quick, rig_of
+from struck_rigs import CASES, RIGS, VOLTS, quick, rig_of
 
 import gazerig.robot.app.run_bus as run_bus
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_limits import limits
+from gazerig.testing.fault_suite import FaultSuite
+from gazerig.testing.struck_machine import Case, Machine, pair_of
 
 LEFT = {
     "dynamixel": {
@@ -34,19 +35,12 @@ LEFT = {
 }  # fmt: skip
 """After these a servo is left, as only a person can help; everything else passes."""
 
-EVERY = [(kind, case) for kind in CASES for case in CASES[kind]]
-LONGEST_S = 0.1
 
-
-@pytest.fixture
-def shorter(monkeypatch):
-    """Long enough for every fault to do what it does."""
-    monkeypatch.setattr(struck_rigs, "STRUCK_S", 0.6)
-
-
-@pytest.fixture(scope="module")
-def rigs():
-    return {kind: quick(rig_of(kind)) for kind in RIGS}
+@cache
+def of_kind(kind):
+    """Return the quick rig of a kind, and its joints in motion: to be copied."""
+    rig = quick(rig_of(kind))
+    return rig, started(rig)
 
 
 def started(rig):
@@ -55,41 +49,34 @@ def started(rig):
     return machine
 
 
-@pytest.fixture(scope="module")
-def machines(rigs):
-    return {kind: started(rig) for kind, rig in rigs.items()}
+class _OfKind(FaultSuite):
+    kind = ""
+
+    @pytest.fixture
+    def rig(self):
+        return of_kind(self.kind)[0]
+
+    @pytest.fixture
+    def machine(self):
+        machine = copied(of_kind(self.kind)[1])
+        machine.volts = VOLTS[self.kind]
+        return machine
 
 
-@pytest.mark.usefixtures("shorter")
-@pytest.mark.parametrize(("kind", "case"), EVERY, ids=[f"{k}: {c.name}" for k, c in EVERY])
-def test_whatever_befalls_a_bus_ends_well(rigs, machines, kind, case):
-    machine = copied(machines[kind])
-    outcome = machine.strike(*pair_of(rigs[kind], kind), case)
-    assert outcome.survived, outcome
-    assert (outcome.end == "left, named") == (case.name in LEFT[kind]), outcome
-    # An adapter that takes nothing gives up after 0.25 s.
-    assert outcome.longest_s < (0.3 if "block" in case.name else LONGEST_S)
-    machine.body.stop()
-    assert all(machine.true_goal(i) is None for i in range(len(machine.names)))
+class TestDynamixel(_OfKind):
+    kind, cases, left = "dynamixel", CASES["dynamixel"], frozenset(LEFT["dynamixel"])
 
 
-@pytest.mark.parametrize("kind", RIGS)
-def test_many_at_once_and_nothing_leaves_its_limits(rigs, machines, kind):
-    """Faults by the dice, three at a time; what is left of the head ends well all the same."""
-    dice = random.Random(kind)
-    gentle = [case for case in CASES[kind] if case.name not in LEFT[kind]]
-    machine = copied(machines[kind])
-    # Servos that catch up by their own strength have no limit but that.
-    machine.own_speed = True
-    for _ in range(6):
-        three = dice.sample(gentle, 3)
-        both = Case(
-            tuple(text for case in three for text in case.begins),
-            tuple(text for case in three for text in case.ends),
-            own_speed=True,
-        )
-        outcome = machine.strike(*pair_of(rigs[kind], kind), both)
-        assert outcome.survived, (both.name, outcome)
+class TestFeetech(_OfKind):
+    kind, cases, left = "feetech", CASES["feetech"], frozenset(LEFT["feetech"])
+
+
+class TestMaestro(_OfKind):
+    kind, cases, left = "maestro", CASES["maestro"], frozenset(LEFT["maestro"])
+
+
+class TestPca9685(_OfKind):
+    kind, cases, left = "pca9685", CASES["pca9685"], frozenset(LEFT["pca9685"])
 
 
 # --- several kinds in one head

@@ -27,7 +27,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 import struck_rigs
 from board_rig import on_pca9685
 from mixed_rig import mixed_text
-from struck_rigs import CASES, Machine, pair_of, quick
+from struck_rigs import CASES, quick
 from true_shafts import Judge, Late, looked_at, on_time, run, sometimes_late
 
 from gazerig.config.schema import Rig, load_rig
@@ -36,6 +36,8 @@ from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.commands import LookAt
 from gazerig.sim_mock.scenes.registry import scenes
+from gazerig.testing import struck_machine
+from gazerig.testing.struck_machine import Machine, pair_of
 
 RIGS = ("desk", "feetech", "maker", "pca9685", "mixed")
 LATES: dict[str, Callable[[], Late]] = {
@@ -113,7 +115,7 @@ def soak(args: argparse.Namespace) -> None:
     """Strike rigs with random faults for simulated hours and print what was found."""
     dice, ends, seen_s, struck, stale = random.Random(args.seed), Counter[str](), 0.0, 0, 0
     first_mb, first_files = resources()
-    struck_rigs.PATIENCE_S = 8.0  # a bus that was late long is slow for a while
+    struck_machine.PATIENCE_S = 8.0  # a bus that was late long is slow for a while
     for k in count():
         if seen_s >= 3600.0 * args.hours:
             break

@@ -18,6 +18,7 @@ from rich.table import Table
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import DriverError
+from gazerig.testing.struck_machine import Machine, pair_of
 
 TESTS = Path(__file__).parents[1]
 HEADS = (
@@ -58,10 +59,11 @@ def of_kind(kind: str, rates: list[float]) -> list[dict[str, object]]:
         ends: Counter[str] = Counter()
         longest_s, after_s = 0.0, []
         for case in struck.CASES[kind]:
-            machine = struck.Machine(rig, rate_hz)
+            machine = Machine(rig, rate_hz)
+            machine.volts = struck.VOLTS[kind]
             try:
                 machine.start()
-                outcome = machine.strike(*struck.pair_of(rig, kind), case)
+                outcome = machine.strike(*pair_of(rig, kind), case)
             except (AssertionError, DriverError) as error:
                 ends["broken"] += 1
                 out.print(f"{kind}, {rate_hz:g} Hz, {case.name}: {error}")

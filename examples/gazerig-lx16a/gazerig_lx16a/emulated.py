@@ -9,7 +9,7 @@ from gazerig.drivers.plugins import EmulatedJoint
 from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.grammar import Argument, CommandTable, Verb, whole
 from gazerig.sim_mock.faults.line import LineFaults
-from gazerig.sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs
+from gazerig.sim_mock.faults.verbs import adapter_verbs, closing_verbs, line_verbs, lost
 from gazerig.sim_mock.replies import Piece
 from gazerig_lx16a import protocol as p
 from gazerig_lx16a.bus import FASTEST_STEPS_S, Lx16aParams
@@ -85,6 +85,8 @@ class Chain:
         found, rest = p.frames(whole_data)
         self._rest, replies = whole_data[rest:], []
         for servo_id, command, params, end in found:
+            if command == p.MOVE and wire.take("lose_writes", None, self.now_s()):
+                continue
             for one in self.servos if servo_id == p.BROADCAST else {servo_id} & set(self.servos):
                 said = self.here(one).answer(command, params)
                 if said is None or servo_id == p.BROADCAST:
@@ -116,6 +118,7 @@ def _restart(faults: ChainFaults, servo_id: int) -> str:
 _ID = Argument("ID", whole(0, 253, "a servo id"))
 COMMANDS = CommandTable(
     {**line_verbs(_ID), **adapter_verbs(), "brown-out": Verb(_restart, (_ID,), "restart"),
+     "lose-writes": lost("lose_writes", "moves"),
      **closing_verbs(_ID)}, {}, "a servo's id",
 )  # fmt: skip
 

@@ -1,13 +1,14 @@
 """gazerig's own suites on this bus."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 from gazerig_lx16a.bus import Lx16aBus, Lx16aParams
 from gazerig_lx16a.emulated import chain_of
 
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoConfig
-from gazerig.testing import BusLossSuite, BusSuite, BusUnderTest
+from gazerig.testing import BusLossSuite, BusSuite, BusUnderTest, FaultSuite
 
 
 def make(port: BusPort, setups: Sequence[ServoConfig], patient: bool, give_up_s: float) -> Lx16aBus:
@@ -24,3 +25,8 @@ class TestBehaviour(BusSuite):
 
 class TestLoss(BusLossSuite):
     under_test = LX16A
+
+
+class TestFaults(FaultSuite):
+    rig_file = str(Path(__file__).parents[1] / "head.yaml")
+    rate_hz = 40.0

@@ -1,0 +1,73 @@
+"""What befalls a bus while a head moves on it, and how each of it ends, as a suite.
+
+A fault lasts for 0.6 s in a running loop of bus and guard. In every tick the true servos are
+judged: goals inside the limits, places inside the range, speeds below the top. After it all
+joints move as before, or some are left limp or still, each named with its cause.
+"""
+
+import random
+from collections.abc import Sequence
+
+import pytest
+
+from gazerig.config.schema import Rig, load_rig
+from gazerig.testing.struck_machine import LINE, RESTARTS, Case, Machine, pair_of
+
+STRUCK_S = 0.6
+
+
+class FaultSuite:
+    """Faults of line and servos, one at a time and three at a time.
+
+    rig_file: a rig whose servos are all on the bus; rate_hz: of its loop
+    cases: what befalls it; left: the names of those after which a servo is left
+    longest_s: no read may take longer
+    """
+
+    rig_file = ""
+    rate_hz = 100.0
+    cases: Sequence[Case] = (*LINE, *RESTARTS)
+    left: frozenset[str] = frozenset()
+    longest_s = 0.1
+
+    def pytest_generate_tests(self, metafunc: pytest.Metafunc) -> None:
+        """Make a test of every case."""
+        if "case" in metafunc.fixturenames:
+            metafunc.parametrize("case", self.cases, ids=[case.name for case in self.cases])
+
+    @pytest.fixture
+    def rig(self) -> Rig:
+        """Return the rig."""
+        return load_rig(self.rig_file)
+
+    @pytest.fixture
+    def machine(self, rig: Rig) -> Machine:
+        """Return the rig's joints, moving."""
+        machine = Machine(rig, self.rate_hz)
+        machine.start()
+        return machine
+
+    def test_whatever_befalls_a_bus_ends_well(self, rig, machine, case):
+        outcome = machine.strike(*pair_of(rig, rig.bus.kind), case, STRUCK_S)
+        assert outcome.survived, outcome
+        assert (outcome.end == "left, named") == (case.name in self.left), outcome
+        # An adapter that takes nothing gives up after 0.25 s.
+        assert outcome.longest_s < (0.3 if "block" in case.name else self.longest_s)
+        machine.body.stop()
+        assert all(machine.true_goal(i) is None for i in range(len(machine.names)))
+
+    def test_many_at_once_and_nothing_leaves_its_limits(self, rig, machine):
+        """Faults by the dice, three at a time; what is left of the head ends well all the same."""
+        dice = random.Random(rig.bus.kind)
+        gentle = [case for case in self.cases if case.name not in self.left]
+        # Servos that catch up by their own strength have no limit but that.
+        machine.own_speed = True
+        for _ in range(6):
+            three = dice.sample(gentle, 3)
+            both = Case(
+                tuple(text for case in three for text in case.begins),
+                tuple(text for case in three for text in case.ends),
+                own_speed=True,
+            )
+            outcome = machine.strike(*pair_of(rig, rig.bus.kind), both)
+            assert outcome.survived, (both.name, outcome)
