@@ -265,7 +265,7 @@ def test_options_of_the_command_line_stay_and_are_never_saved(mine: Path) -> Non
     assert load_rig(str(mine)).gaze.aversion.min_dwell_s == 0.3
 
 
-def test_knobs_follow_what_entries_there_are() -> None:
+def test_parameters_follow_what_entries_there_are() -> None:
     bench = Bench("desk")
     before = len(bench.tuning.parameters())
     rule: dict[str, Any] = {"look_at": "hand", "salience": 1.0}
