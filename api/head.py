@@ -333,6 +333,14 @@ class Head(ABC):
             if timeout_s is not None and not self._happened(number):
                 return
 
+    def sleep(self, seconds: float) -> None:
+        """Wait so long by the head's own clock; in simulated time it is stepped.
+
+        Raises:
+            HeadEnded: the head has ended meanwhile.
+        """
+        self._pause(lambda: False, seconds)
+
     @abstractmethod
     def _progress(self) -> Progress:
         """Return the newest lead and gesture."""

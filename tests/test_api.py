@@ -169,6 +169,12 @@ def test_states_and_events_step_the_head(head: gazerig.SimulatedHead) -> None:
     assert "led by the program: look at 1 0 0.3" in texts
 
 
+def test_a_program_sleeps_by_the_head_s_clock(head: gazerig.SimulatedHead) -> None:
+    before_s = head.state.t_s
+    head.sleep(0.25)
+    assert head.state.t_s - before_s == pytest.approx(0.25, abs=0.006)
+
+
 def test_a_condition_is_waited_for(head: gazerig.SimulatedHead) -> None:
     assert head.run_until(lambda state: state.gaze.phase == "saccade", 5.0)
     assert not head.run_until(lambda state: state.t_s < 0.0, 0.1)
