@@ -8,7 +8,7 @@ between two sections, still names the line to change.
 import contextlib
 import importlib.resources
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from dataclasses import MISSING, asdict, dataclass
+from dataclasses import MISSING, asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
@@ -29,6 +29,8 @@ _GROUPS = {"rigs": RIGS, "gestures": GESTURES}
 _SHIPPED = Path(str(importlib.resources.files("gazerig.config")))
 RIGS_FOLDER, GESTURES_FOLDER = _SHIPPED / "rigs", _SHIPPED / "gestures"
 
+_FILES_BESIDE = "gesture_files"
+"""Key of a rig with paths of files, relative to the folder of the file that names them."""
 Check = Callable[[T], Iterable[tuple[str, str]]]
 """Returns (dotted key path, broken rule) for rules between several fields."""
 
@@ -73,7 +75,8 @@ def load(
     faults: list[ConfigFault] = []
     known = tuple(shapes_of(cast(Any, into)))
     layers = [read(file, faults, known)[1] for file in files]
-    whole = [renamed(layer, into, faults, report) for layer in layers if layer is not None]
+    here = [_from_its_folder(layer) for layer in layers if layer is not None]
+    whole = [renamed(layer, into, faults, report) for layer in here]
     if len(whole) < len(files):  # what a missing layer would have said is unknown
         raise ConfigError(faults)
     root = whole[0]
@@ -174,6 +177,22 @@ def shipped_names(kind: str) -> tuple[str, ...]:
 def _steps(key: str) -> tuple[str, ...]:
     """Return the steps of a dotted key path."""
     return tuple(key.split(".")) if key else ()
+
+
+def _from_its_folder(layer: Entry) -> Entry:
+    """Return a file's entries with the paths of files beside it as seen from the working folder."""
+    found = layer.value.get(_FILES_BESIDE) if isinstance(layer.value, dict) else None
+    if found is None or not isinstance(found.value, tuple):
+        return layer
+    folder = Path(layer.file).parent
+    paths = tuple(
+        replace(one, value=str(folder / one.value))
+        if isinstance(one.value, str) and not one.value.startswith("~")
+        else one
+        for one in found.value
+    )
+    assert isinstance(layer.value, dict)
+    return replace(layer, value={**layer.value, _FILES_BESIDE: replace(found, value=paths)})
 
 
 def _merged(low: Entry, high: Entry, into: type | None = None) -> Entry:

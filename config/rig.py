@@ -176,7 +176,7 @@ class Rig:
     loop: Annotated[LoopParams, "control loop"] = field(default_factory=LoopParams)
     guard: Annotated[GuardParams, "safety"] = field(default_factory=GuardParams)
     gaze: Annotated[GazeConfig, "gaze models"] = field(default_factory=GazeConfig)
-    gesture_files: Annotated[tuple[str, ...], "paths of YAML files with further gestures; a file's name names its gesture"] = ()
+    gesture_files: Annotated[tuple[str, ...], "YAML files with further gestures, relative to this file; named as the gestures"] = ()
     expressions: Annotated[Mapping[str, Mapping[str, float]], Bounds(-180, 180), Unit("deg"),
         "facial expressions: name -> joint -> angle added to it; of a lid, of the open lid"] = field(default_factory=dict)
     expression_blend_s: Annotated[float, Bounds(0.05, 10), "time from one expression to another"] = 0.5
