@@ -20,6 +20,7 @@ check: $(VENV)/.installed-dev links
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/mypy --config-file tests/mypy.ini
+	$(BIN)/mypy --config-file pyproject.toml examples/*.py
 	PYTHONPATH=.links $(BIN)/lint-imports --no-logo
 
 # How much of the source the tests reach, line by line and branch by branch; too little fails it.

@@ -1,6 +1,6 @@
 """Pages of the documentation site that are made while it is built.
 
-README, CHANGELOG and the page about attacks stay where readers of the repository look for them, and
+README, CHANGELOG and the pages about attacks and examples stay where readers of the repository look for them, and
 every package gets a page of its reference. Links between them are turned to where the pages are on
 the site; a link to any other file of the repository becomes the file's name. A link to nothing is
 left as it is, and the build fails on it.
@@ -21,6 +21,7 @@ FROM_ELSEWHERE = {
     "README.md": "index.md",
     "CHANGELOG.md": "changelog.md",
     "tests/attack/README.md": "attacks.md",
+    "examples/README.md": "examples.md",
 }
 """Pages whose source is not in docs/, and their names on the site."""
 
@@ -28,7 +29,7 @@ _LINK = re.compile(r"(!?\[([^\]]*)\])\(([^)#\s]*)(#[^)\s]*)?\)")
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add README, CHANGELOG, and one page for each package."""
+    """Add README, CHANGELOG and their like, and one page for each package."""
     for source, page in FROM_ELSEWHERE.items():
         text = (ROOT / source).read_text(encoding="utf-8")
         files.append(File.generated(config, page, content=_moved(text, source, page)))

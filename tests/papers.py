@@ -12,6 +12,7 @@ PAPERS = [
     ROOT / "README.md",
     *sorted((ROOT / "docs").rglob("*.md")),
     ROOT / "tests/attack/README.md",
+    ROOT / "examples/README.md",
 ]
 EMULATOR = ROOT / "docs/emulator.md"
 

@@ -1,0 +1,35 @@
+"""Gestures: two that come with gazerig, and one of one's own in bow.yaml.
+
+Shows: ``play``, what a gesture does to the joints, and how a rig gets further gestures.
+Run:   python examples/gesture.py          emulated servos
+       python examples/gesture.py my.yaml  your own head
+"""
+
+import sys
+from pathlib import Path
+
+import gazerig
+
+POLITE = Path(__file__).with_name("polite.yaml")  # names bow.yaml
+
+
+def perform(head: gazerig.Head) -> None:
+    """Play some gestures; the eyes stay on a point meanwhile."""
+    head.look_at(1.0, 0.1, 0.25)
+    head.sleep(3.0)
+    for gesture in ("nod", "shake", "bow"):
+        played = head.play(gesture).reply.gesture
+        assert played is not None  # what is refused raises gazerig.Refused
+        lowest_deg, end_s = 90.0, head.state.t_s + played.duration_s
+        for state in head.states():
+            lowest_deg = min(lowest_deg, state.joints["neck_pitch"].measured_deg)
+            if state.t_s > end_s:
+                break
+        print(f"{played.text()}; the head went down to {lowest_deg:.0f} deg")
+
+
+if __name__ == "__main__":
+    mine = sys.argv[1:]
+    rig = mine[0] if mine else "desk"
+    with gazerig.open(rig, mock=not mine, character=str(POLITE)) as head:
+        perform(head)

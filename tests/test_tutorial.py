@@ -1,0 +1,117 @@
+"""Every command and every piece of YAML of the tutorial is tried, step by step."""
+
+import runpy
+import shlex
+from pathlib import Path
+from typing import Any
+
+import pytest
+from command_line import figures, invoked, parse
+from tutorial import blocks, commands, steps, write_files
+
+import gazerig
+from gazerig.config.schema import load_rig
+
+pytestmark = pytest.mark.usefixtures("simulated_wires")
+STEPS = range(1, len(steps()) + 1)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_there_are_ten_steps_and_each_is_tried() -> None:
+    assert len(STEPS) == 10
+    assert all(commands(step) for step in STEPS)
+    assert {block.language for block in blocks()} <= {"sh", "yaml", "python", "text"}
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_every_command_of_a_step_works(step: int, folder: Path) -> None:
+    write_files(folder, step)
+    for line in commands(step):
+        words = shlex.split(line)
+        if words[0] == "gazerig" and words[1] != "ctl":
+            tried(line, *words[1:])
+
+
+def tried(line: str, *words: str) -> str:
+    """Type a command, a run of it in simulated time; give what it wrote."""
+    if words[0] == "run":
+        words = (*_without(words, "--seconds", "--summary"), "--fast", "--seconds", "6")
+    done = invoked(*words)
+    assert done.code == 0, f"{line}: {done.err}"
+    return done.out + done.err
+
+
+def _without(words: tuple[str, ...], *options: str) -> list[str]:
+    return [
+        word
+        for before, word in zip(("", *words), words, strict=False)
+        if word not in options and before not in options
+    ]
+
+
+@pytest.mark.parametrize("step", [6, 7])
+def test_every_command_to_a_running_head_works(
+    step: int, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(folder))
+    write_files(folder, step)
+    with gazerig.open("myhead.yaml", mock=True, say=lambda line: None) as running:
+        for line in commands(step):
+            words = shlex.split(line)[1:]
+            if words[0] == "ctl":
+                tried(line, *words)
+        told = [event.text for event in running.events(timeout_s=0.0)]
+        face = running.menus()["expression"][0]
+    assert face == "surprised" if step == 6 else any("agree" in text for text in told)
+
+
+def test_the_program_greets_the_visitor(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    opened = gazerig.open
+    monkeypatch.setattr(gazerig, "open", lambda rig, mock: opened(rig, fast=mock))
+    write_files(folder, 8)
+    assert commands(8) == ["python greet.py"]
+    runpy.run_path("greet.py", run_name="__main__")
+    assert capsys.readouterr().out == "hello, 1\n"
+
+
+def head(folder: Path, step: int) -> str:
+    """Return the path of the head as it is after a step."""
+    write_files(folder, step)
+    return str(folder / "myhead.yaml")
+
+
+def test_the_head_grows(folder: Path) -> None:
+    counts = [len(load_rig(head(folder / str(_made(folder, n)), n)).joints) for n in range(2, 6)]
+    assert counts == [2, 4, 6, 7]
+
+
+def _made(folder: Path, step: int) -> int:
+    (folder / str(step)).mkdir()
+    return step
+
+
+def test_eyes_alone_look_at_the_visitor(folder: Path) -> None:
+    found: dict[str, Any] = figures(head(folder, 2), "--seconds", "6")
+    assert found["target_share"]["face"] > 0.9 and found["saccades"] > 8
+    assert found["blinks"] >= 0 and not found["joint_faults"]
+
+
+def test_a_mouth_too_slow_for_its_jaw_is_refused_with_the_time_that_would_do(folder: Path) -> None:
+    path = Path(head(folder, 6))
+    path.write_text(path.read_text("utf-8").replace("smoothing_ms: 100", "smoothing_ms: 20"))
+    done = invoked("check", "myhead.yaml")
+    assert done.code != 0 and "levels.mouth.smoothing_ms" in done.err and "or more" in done.err
+
+
+def test_what_the_tutorial_types_is_a_command() -> None:
+    for step in STEPS:
+        for line in commands(step):
+            if line.startswith("gazerig "):
+                parse(shlex.split(line)[1:])
