@@ -1,9 +1,9 @@
 """Pages of the documentation site that are made while it is built.
 
-README, CHANGELOG and the pages about attacks and examples stay where readers of the repository look for them, and
-every package gets a page of its reference. Links between them are turned to where the pages are on
-the site; a link to any other file of the repository becomes the file's name. A link to nothing is
-left as it is, and the build fails on it.
+README, CHANGELOG and the pages about attacks and examples stay where readers of the repository
+look for them, and every package gets a page of its reference. Links between them are turned to
+where the pages are on the site; a link to any other file of the repository becomes the file's
+name. A link to nothing is left as it is, and the build fails on it.
 """
 
 import os

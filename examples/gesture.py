@@ -18,14 +18,11 @@ def perform(head: gazerig.Head) -> None:
     head.look_at(1.0, 0.1, 0.25)
     head.sleep(3.0)
     for gesture in ("nod", "shake", "bow"):
-        played = head.play(gesture).reply.gesture
-        assert played is not None  # what is refused raises gazerig.Refused
-        lowest_deg, end_s = 90.0, head.state.t_s + played.duration_s
-        for state in head.states():
-            lowest_deg = min(lowest_deg, state.joints["neck_pitch"].measured_deg)
-            if state.t_s > end_s:
-                break
-        print(f"{played.text()}; the head went down to {lowest_deg:.0f} deg")
+        order, lowest_deg = head.play(gesture), 90.0
+        while order.outcome is None:
+            head.sleep(0.02)
+            lowest_deg = min(lowest_deg, head.joints["neck_pitch"].measured_deg)
+        print(f"{order.reply.text()}: {order.outcome}; the head went to {lowest_deg:.0f} deg")
 
 
 if __name__ == "__main__":
