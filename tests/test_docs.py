@@ -239,7 +239,14 @@ SAID = {
     *("sudo raspi-config", "sudo usermod -aG i2c $USER", "/dev/i2c-*"),
     *("sudo systemctl stop ModemManager", "robot", "./face", "myrig.yaml.bak-20260131-235958"),
     *("with", "pre-commit install", "_deg", "_rad", "_ms", "_m", "p_world_m"),
-    *("fast=True", "mock=True", "gazerig.open", "gazerig.connect()"),
+    *(
+        'page="127.0.0.1:8080"',
+        "say=print",
+        "fast=True",
+        "mock=True",
+        "gazerig.open",
+        "gazerig.connect()",
+    ),
     *(
         "[tool.importlinter]",
         "sleep_until",
