@@ -11,9 +11,13 @@ frames go through memory that both share.
 import os
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from subprocess import DEVNULL
+from types import ModuleType
 
+_HIDING = threading.Lock()
 _NO_VARIABLES: Mapping[str, str] = {}
 
 
@@ -83,3 +87,20 @@ def _command(module: str, arguments: Sequence[str]) -> list[str]:
 
 def _environment(variables: Mapping[str, str]) -> dict[str, str]:
     return {**os.environ, "OPENBLAS_NUM_THREADS": "1", **variables}
+
+
+@contextmanager
+def hidden_script() -> Iterator[None]:
+    """Have processes that multiprocessing starts meanwhile not run the program's script again.
+
+    Such a process imports the script it was started from, in case something of it is needed; a
+    script that opens a head, and not below ``if __name__ == "__main__"``, would open another one
+    there.
+    """
+    with _HIDING:
+        script = sys.modules["__main__"]
+        sys.modules["__main__"] = ModuleType("__main__")
+        try:
+            yield
+        finally:
+            sys.modules["__main__"] = script

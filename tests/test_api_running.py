@@ -186,6 +186,16 @@ def test_states_are_the_newest_and_cost_the_loop_nothing(head: gazerig.Head) -> 
     assert times == sorted(set(times))
 
 
+def run_script(script: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run a program of its own, which finds the helpers of the tests."""
+    tests = str(Path(__file__).parent)
+    path = os.pathsep.join(filter(None, (os.environ.get("PYTHONPATH"), tests)))
+    return subprocess.run(
+        [sys.executable, str(script), *arguments], env={**os.environ, "PYTHONPATH": path},
+        capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
+
+
 FORGETFUL = """
 import signal, sys, threading
 import gazerig
@@ -208,12 +218,30 @@ def test_the_end_of_the_interpreter(tmp_path: Path, end: str, status: int, why: 
     """Nobody left the block: it parks even so, before the program is gone."""
     script = tmp_path / "forgetful.py"
     script.write_text(textwrap.dedent(FORGETFUL).format(end=end), encoding="utf-8")
-    tests = str(Path(__file__).parent)
-    path = os.pathsep.join(filter(None, (os.environ.get("PYTHONPATH"), tests)))
-    done = subprocess.run(
-        [sys.executable, str(script)], env={**os.environ, "PYTHONPATH": path},
-        capture_output=True, text=True, timeout=120, check=False,
-    )  # fmt: skip
+    done = run_script(script)
     last = done.stdout.splitlines()[-1]
     assert re.fullmatch(f"stopped by {why}: {LET_GO}", last), done.stderr
     assert done.returncode in (status, -signal.SIGINT if status == 1 else status)
+
+
+FILM = """
+import cv2, numpy, sys
+import gazerig
+from ideal_bus import ideal_buses
+print("the script runs", flush=True)
+cv2.imwrite(sys.argv[1], numpy.zeros((120, 160, 3), numpy.uint8))
+with ideal_buses(), gazerig.open("desk", mock=True, video=sys.argv[1]) as head:
+    for state in head.states(rate_hz=20.0):
+        if state.frame_s is not None:
+            break
+    print("it sees", flush=True)
+"""
+
+
+@pytest.mark.slow
+def test_a_plain_script_may_have_a_camera(tmp_path: Path) -> None:
+    """The camera's process does not run the script again, though nothing in it is guarded."""
+    script = tmp_path / "plain.py"
+    script.write_text(FILM, encoding="utf-8")
+    done = run_script(script, str(tmp_path / "image.png"))
+    assert done.stdout.splitlines() == ["the script runs", "it sees"], done.stderr

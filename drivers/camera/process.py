@@ -25,6 +25,7 @@ from gazerig.drivers.camera.frame_watchdog import FrameWatchdog
 from gazerig.drivers.camera.params import CameraRecoveryParams
 from gazerig.drivers.camera.shared_frames import SlotReader
 from gazerig.drivers.camera.worker import LONGEST_END_S, CameraParts, Ended, Found, Retune, run
+from gazerig.drivers.child_process import hidden_script
 from gazerig.drivers.errors import CameraError, SetupError
 from gazerig.drivers.types import Detections, FaceDetector
 
@@ -175,7 +176,8 @@ class CameraProcess:
             name="camera",
             daemon=True,
         )
-        process.start()
+        with hidden_script():
+            process.start()
         theirs.close()
         self._process, self._pipe = process, pipe
         self._starts += 1
