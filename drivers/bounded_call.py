@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 
-class Outcome(NamedTuple):
+class CallResult(NamedTuple):
     """What came of a call; ``error`` is what it raised."""
 
     value: Any = None
@@ -29,10 +29,10 @@ class BoundedCall:
         self._thread: threading.Thread | None = None
         self._begin, self._done = threading.Semaphore(0), threading.Semaphore(0)
         self._work: Callable[[], Any] | None = None
-        self._outcome = Outcome()
+        self._outcome = CallResult()
         self._under_way = False
 
-    def __call__(self, work: Callable[[], Any]) -> Outcome | None:
+    def __call__(self, work: Callable[[], Any]) -> CallResult | None:
         """Make a call; return its outcome or that of the late one before, None while it lasts."""
         if self._longest_s is None:
             return _outcome(work)
@@ -65,8 +65,8 @@ class BoundedCall:
             self._done.release()
 
 
-def _outcome(work: Callable[[], Any]) -> Outcome:
+def _outcome(work: Callable[[], Any]) -> CallResult:
     try:
-        return Outcome(work())
+        return CallResult(work())
     except (Exception, SystemExit) as error:  # a package may do anything
-        return Outcome(None, error)
+        return CallResult(None, error)

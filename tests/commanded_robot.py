@@ -6,9 +6,7 @@ from desk import GAZE_JOINTS
 
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.control.loop import Tick, run
-from gazerig.robot.model.commands import (
-    Command,
-)
+from gazerig.robot.model.commands import Command
 
 YAW = GAZE_JOINTS.index("neck_yaw")
 

@@ -22,19 +22,9 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.session import leave
 from gazerig.robot.control.command_choices import Menus
 from gazerig.robot.control.gesture_choices import GestureChoices
-from gazerig.robot.model.commands import (
-    Ask,
-    Command,
-    Jog,
-    LookAt,
-    Renew,
-    Resume,
-    Stop,
-    Tune,
-    as_json,
-    check,
-    from_json,
-)
+from gazerig.robot.model.command_checks import check
+from gazerig.robot.model.command_json import as_json, from_json
+from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Renew, Resume, Stop, Tune
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 

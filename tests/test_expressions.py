@@ -15,17 +15,9 @@ from gazerig.gaze.pose_offset import NO_OFFSET, PoseOffset
 from gazerig.robot.app.animation_tables import pose_offset
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.commands import (
-    Ask,
-    Command,
-    Express,
-    SetLevel,
-    as_json,
-    as_recorded,
-    check,
-    from_json,
-    from_recording,
-)
+from gazerig.robot.model.command_checks import check
+from gazerig.robot.model.command_json import as_json, as_recorded, from_json, from_recording
+from gazerig.robot.model.commands import Ask, Command, Express, SetLevel
 from gazerig.robot.model.reply import CommandReply
 
 DT = 0.005

@@ -25,7 +25,7 @@ from gazerig.robot.calibration.joint_calibration import (
     ends_of,
 )
 from gazerig.robot.control.loop import Tick, run
-from gazerig.robot.dashboard.head_model import HeadModel
+from gazerig.robot.dashboard.head_view import HeadView
 from gazerig.robot.model.commands import Command, Express, SetLevel, Value
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
@@ -145,7 +145,7 @@ def test_a_jaw_may_rest_at_its_stop_and_an_eye_may_not() -> None:
 def test_the_chin_on_the_page_opens_with_the_jaw() -> None:
     server = viser.ViserServer(port=0, verbose=False)
     try:
-        head = HeadModel(server.scene)
+        head = HeadView(server.scene)
         head.show(SNAPSHOT)
         assert not head._jaw.visible
         rest = (0.0,) * len(NAMES)

@@ -36,7 +36,8 @@ from gazerig.robot.dashboard.page_process import (
 )
 from gazerig.robot.dashboard.param_feed import ParamFeed
 from gazerig.robot.dashboard.request_handler import PAGE, PageRequestHandler
-from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Stop, Value, as_json
+from gazerig.robot.model.command_json import as_json
+from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Stop, Value
 from gazerig.robot.remote.param_info import ParamInfo
 
 

@@ -19,7 +19,8 @@ from websockets.sync.client import ClientConnection
 
 from gazerig.robot.dashboard.camera_overlay import encode
 from gazerig.robot.dashboard.page_process import PageProcess
-from gazerig.robot.model.commands import Stop, as_json
+from gazerig.robot.model.command_json import as_json
+from gazerig.robot.model.commands import Stop
 
 # Noise does not compress: what the deaf browser is owed soon fills all buffers.
 NOISE = np.random.default_rng(0).integers(0, 255, (8, 360, 480, 3)).astype(np.uint8)

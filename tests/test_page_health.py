@@ -13,7 +13,7 @@ from six_joints import SIX, TELLS_NOTHING, of_six
 from gazerig.gaze.types import Salience
 from gazerig.robot.dashboard.attention_panel import saliences, winner
 from gazerig.robot.dashboard.commanded_pose import CommandedPoseView
-from gazerig.robot.dashboard.head_model import HeadModel
+from gazerig.robot.dashboard.head_view import HeadView
 from gazerig.robot.dashboard.html import AMBER, RED
 from gazerig.robot.dashboard.joint_charts import JointCharts, JointSeries
 from gazerig.robot.dashboard.outbox import Outbox
@@ -285,7 +285,7 @@ def test_the_menu_of_traces_is_that_of_the_rig(server: viser.ViserServer) -> Non
 
 
 def test_the_head_has_the_lids_and_the_neck_that_the_rig_has(server: viser.ViserServer) -> None:
-    view, ghost = HeadModel(server.scene), CommandedPoseView(server.scene)
+    view, ghost = HeadView(server.scene), CommandedPoseView(server.scene)
     handles = server.scene._handle_from_node_name
 
     def drawn(shot: Snapshot) -> set[str]:
@@ -319,7 +319,7 @@ def test_the_head_has_the_lids_and_the_neck_that_the_rig_has(server: viser.Viser
 
 
 def test_a_head_without_a_neck_stands_on_a_post(server: viser.ViserServer) -> None:
-    view = HeadModel(server.scene)
+    view = HeadView(server.scene)
     view.show(replace(of_six(snapshot()), p_world_head_m=(0.1, 0.05, 0.12)))
     (x, y, _), (fx, fy, _) = view._post.position, view._foot.position
     assert (x, y) == (fx, fy) and y == pytest.approx(0.05)

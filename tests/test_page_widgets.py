@@ -33,7 +33,8 @@ from gazerig.robot.dashboard.param_control import (
     written,
 )
 from gazerig.robot.dashboard.param_panel import found, group_of
-from gazerig.robot.model.commands import Ask, Command, Jog, as_json, from_json
+from gazerig.robot.model.command_json import as_json, from_json
+from gazerig.robot.model.commands import Ask, Command, Jog
 from gazerig.robot.remote.param_info import JsonValue, ParamInfo
 
 # --- controls -----------------------------------------------------------------------------------

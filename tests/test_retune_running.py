@@ -10,7 +10,8 @@ from gazerig.config.parameters import changed, value_of
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
-from gazerig.robot.model.commands import Jog, Resume, Stop, Tune, Value, as_json, from_json
+from gazerig.robot.model.command_json import as_json, from_json
+from gazerig.robot.model.commands import Jog, Resume, Stop, Tune, Value
 
 
 def test_a_tune_of_nothing_different_touches_nothing() -> None:

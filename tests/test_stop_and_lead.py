@@ -9,15 +9,7 @@ from commanded_robot import YAW, Running
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.model.commands import (
-    Ask,
-    Command,
-    Jog,
-    LookAt,
-    Renew,
-    Resume,
-    Stop,
-)
+from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Renew, Resume, Stop
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 

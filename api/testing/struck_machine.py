@@ -80,7 +80,7 @@ RESTARTS = [
 """What befalls servos that restart alone."""
 
 
-class Outcome(NamedTuple):
+class FaultOutcome(NamedTuple):
     """How a fault ended.
 
     end: "came back": all joints move as before; "left, named": some are limp, stand still or
@@ -283,7 +283,9 @@ class Machine:
 
     # --- faults
 
-    def strike(self, bus: str, i: int, j: int, case: Case, struck_s: float = STRUCK_S) -> Outcome:
+    def strike(
+        self, bus: str, i: int, j: int, case: Case, struck_s: float = STRUCK_S
+    ) -> FaultOutcome:
         """Let something befall a bus for a while; tells how it ends.
 
         i, j: places of two joints of that bus; struck_s: how long it lasts
@@ -311,7 +313,7 @@ class Machine:
                 break
         after_s = self.clock.now_s() - end_s
         said = (*self.said, *self.body.bus.faults())
-        return Outcome(self._ended(well, said), after_s, self.longest_s, said)
+        return FaultOutcome(self._ended(well, said), after_s, self.longest_s, said)
 
     def _ended(self, well: Sequence[bool], said: Sequence[str]) -> str:
         if all(well):

@@ -11,7 +11,7 @@ from gazerig.drivers.hobby_board.channel import FINE_STEPS, Channel
 from gazerig.drivers.hobby_board.models import US_STEPS, channel_label
 
 
-class Outcome(Enum):
+class HoldResult(Enum):
     """The result of enabling a channel: it is held, no answer, or it gives another pulse."""
 
     HELD = "held"
@@ -19,7 +19,7 @@ class Outcome(Enum):
     ELSEWHERE = "elsewhere"
 
 
-def take(board: Board, channel: Channel, pulse_steps: int) -> Outcome:
+def take(board: Board, channel: Channel, pulse_steps: int) -> HoldResult:
     """Hold a channel at the pulse that it gives, or at its last position if it gives none.
 
     Speed and acceleration are armed before the goal is sent, and the pulse is asked for
@@ -30,21 +30,21 @@ def take(board: Board, channel: Channel, pulse_steps: int) -> Outcome:
     """
     goal = channel.start(pulse_steps, board.line.port.now_s())
     if not board.send_limits([channel], confirmed=True):
-        return Outcome.NO_ANSWER
+        return HoldResult.NO_ANSWER
     board.send_goals([channel])
     found = board.pulses((channel.id,))
     channel.advance(board.line.port.now_s())
     if found is None:
-        return Outcome.NO_ANSWER
+        return HoldResult.NO_ANSWER
     low, high = sorted((pulse_steps or goal, goal))
     # A first pulse is exact; another may have been on its way somewhere when it was asked.
     room = channel.room_steps() if pulse_steps else FINE_STEPS
     if not found[0] or not low - room <= found[0] <= high + room:
         channel.gives(found[0])
-        return Outcome.ELSEWHERE
+        return HoldResult.ELSEWHERE
     channel.ramp.found(found[0])
     channel.hold()
-    return Outcome.HELD
+    return HoldResult.HELD
 
 
 def refusal(board: Board, channel: Channel) -> str:

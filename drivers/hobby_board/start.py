@@ -7,7 +7,7 @@ from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.channel import Channel
-from gazerig.drivers.hobby_board.hold import Outcome, refusal, take
+from gazerig.drivers.hobby_board.hold import HoldResult, refusal, take
 from gazerig.drivers.hobby_board.models import channel_label
 from gazerig.drivers.hobby_board.release import TRIES
 from gazerig.drivers.types import ServoConfig
@@ -65,12 +65,12 @@ def _insist(board: Board, channel: Channel, pulse: int) -> None:
     """
     for _ in range(TRIES):
         outcome = take(board, channel, pulse)
-        if outcome is Outcome.HELD:
+        if outcome is HoldResult.HELD:
             return
-        if outcome is Outcome.ELSEWHERE and channel.on:
+        if outcome is HoldResult.ELSEWHERE and channel.on:
             break
     where = board.line.port.port_name
-    if outcome is Outcome.NO_ANSWER:
+    if outcome is HoldResult.NO_ANSWER:
         raise ServoMissing(
             f"{where}: no answer about {channel_label(channel.setup)}: check its cable"
         )

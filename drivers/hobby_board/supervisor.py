@@ -11,7 +11,7 @@ from math import inf
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.channel import Channel
-from gazerig.drivers.hobby_board.hold import Outcome, refusal, take
+from gazerig.drivers.hobby_board.hold import HoldResult, refusal, take
 from gazerig.drivers.hobby_board.models import channel_label
 
 MOST_RESTARTS, WITHIN_S = 3, 10.0
@@ -270,10 +270,10 @@ class BoardSupervisor:
             return
         channel.found(found[0])
         outcome = take(self._board, channel, found[0])
-        if outcome is Outcome.HELD:
+        if outcome is HoldResult.HELD:
             channel.rearm()
             self._pending.remove(channel)
-        elif outcome is Outcome.ELSEWHERE and channel.on:
+        elif outcome is HoldResult.ELSEWHERE and channel.on:
             # It does give pulses, only others: that is reported once, and it is held so.
             self._off_goal(channel, round(channel.ramp.pulse_steps))
             channel.hold()

@@ -12,7 +12,7 @@ from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.channel import Channel
-from gazerig.drivers.hobby_board.hold import Outcome, take
+from gazerig.drivers.hobby_board.hold import HoldResult, take
 from gazerig.drivers.hobby_board.release import switch_off
 from gazerig.drivers.hobby_board.start import every_pulse
 from gazerig.drivers.maestro.commands import name_errors
@@ -93,7 +93,7 @@ def given(board: Board, setup: ServoConfig) -> Iterator[Channel]:
     channel = Channel(setup, board.timing.longest_lead_s)
     try:
         outcomes = (take(board, channel, pulse) for _ in range(MOST_TRIES))
-        if all(outcome is Outcome.NO_ANSWER for outcome in outcomes):
+        if all(outcome is HoldResult.NO_ANSWER for outcome in outcomes):
             raise ServoMissing(
                 f"{board.line.port.port_name}: no answer about {servo_label(setup)}: check its "
                 "cable"

@@ -12,7 +12,8 @@ from typing import NamedTuple, Protocol
 
 from gazerig.drivers.errors import DriverError
 from gazerig.robot.control.gesture_choices import GestureInfo
-from gazerig.robot.model.commands import COMMANDS, Command, Tune, Value, from_json
+from gazerig.robot.model.command_json import from_json
+from gazerig.robot.model.commands import COMMANDS, Command, Tune, Value
 from gazerig.robot.model.reply import Ticket
 
 QUESTIONS = (
@@ -183,7 +184,7 @@ class CommandGiven(NamedTuple):
     ticket: Ticket | None
 
 
-Outcome = Answered | ParamsChanged | ParamsSaved | CommandGiven
+RequestResult = Answered | ParamsChanged | ParamsSaved | CommandGiven
 
 
 class CommandHandler:
@@ -222,7 +223,7 @@ class CommandHandler:
 
     def do(
         self, request: object, sign: Callable[[Command], Command] = lambda command: command
-    ) -> Outcome:
+    ) -> RequestResult:
         """Carry out one request; the patterns are the vocabulary.
 
         Args:
@@ -258,7 +259,7 @@ class CommandHandler:
             raise ValueError("parameters are changed by the request set, which checks them")
         return CommandGiven(command, self._robot.command(command))
 
-    def _of_params(self, request: object) -> Outcome:
+    def _of_params(self, request: object) -> RequestResult:
         match request:
             case {"do": "parameters" | "knobs", "prefix": str(prefix), **rest} if not rest:
                 found = [text for key, text in self._all_described() if key.startswith(prefix)]
@@ -295,14 +296,14 @@ class CommandHandler:
             self._described = found, [(one.key, _param_json(one)) for one in found]
         return self._described[1]
 
-    def _set(self, changes: Mapping[str, object]) -> Outcome:
+    def _set(self, changes: Mapping[str, object]) -> RequestResult:
         params = self._changeable()
         if self._paths is not None:
             self._paths.changes(changes)
         notes = params.set({key: as_value(value) for key, value in changes.items()})
         return ParamsChanged(_notes(notes))
 
-    def _save(self, path: str | None) -> Outcome:
+    def _save(self, path: str | None) -> RequestResult:
         params = self._changeable()
         if path and self._paths is not None:
             path = self._paths.file(path)
@@ -314,7 +315,7 @@ class CommandHandler:
             self._saved(saved.path)
         return ParamsSaved(saved)
 
-    def _character(self, name: str) -> Outcome:
+    def _character(self, name: str) -> RequestResult:
         params = self._changeable()
         if self._paths is not None and name not in params.characters():
             name = self._paths.file(name, "characters")

@@ -30,7 +30,8 @@ from gazerig.robot.control.stop_control import StopControl
 from gazerig.robot.control.tick import Tick as Tick
 from gazerig.robot.control.tick import at_rest
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.commands import Ask, Command, Express, Jog, Play, SetLevel, Tune, check
+from gazerig.robot.model.command_checks import check
+from gazerig.robot.model.commands import Ask, Command, Express, Jog, Play, SetLevel, Tune
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.lead import Lead

@@ -7,7 +7,7 @@ import numpy as np
 import viser
 
 from gazerig.gaze.angles import rotate_back, sub
-from gazerig.robot.dashboard.head_model import (
+from gazerig.robot.dashboard.head_view import (
     EYE_RADIUS_M,
     SHELL_HALF_AXES_M,
     SHELL_MIDDLE_M,

@@ -8,7 +8,8 @@ from collections.abc import Callable, Mapping
 from gazerig.robot.dashboard.inbox import MESSAGE_BYTES, request_message
 from gazerig.robot.dashboard.token_bucket import TokenBucket
 from gazerig.robot.model.clock import Clock, RealClock
-from gazerig.robot.model.commands import Command, Leading, as_json
+from gazerig.robot.model.command_json import as_json
+from gazerig.robot.model.commands import Command, Leading
 
 DOOR = "door"
 """Who asks where it is the stop button or a click in the image."""

@@ -6,7 +6,7 @@ from math import atan
 import viser
 
 from gazerig.robot.dashboard.control_tabs import ControlTabs
-from gazerig.robot.dashboard.head_model import FLOOR_M, HeadModel
+from gazerig.robot.dashboard.head_view import FLOOR_M, HeadView
 from gazerig.robot.dashboard.outbox import Outbox
 from gazerig.robot.dashboard.overlays import OverlayPanel
 from gazerig.robot.dashboard.page_feed import News
@@ -45,7 +45,7 @@ class PageView:
         server.initial_camera.position, server.initial_camera.look_at = VIEWS["both"]
         server.on_client_connect(_greet)
         _furnish(server)
-        self._head = HeadModel(server.scene)
+        self._head = HeadView(server.scene)
         self._people = PeopleView(server.scene)
         self._panel = PanelView(server.gui)
         self._layers = OverlayPanel(server.scene)

@@ -4,7 +4,7 @@ import numpy as np
 import viser
 
 from gazerig.gaze.types import PARTS, Floats, Vec3
-from gazerig.robot.dashboard.head_model import FLOOR_M, Colour
+from gazerig.robot.dashboard.head_view import FLOOR_M, Colour
 from gazerig.robot.dashboard.mesh import Mesh, cap, disc, ellipsoid, ring
 from gazerig.robot.dashboard.scene_node import put, quaternion
 from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot

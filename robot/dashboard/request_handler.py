@@ -8,15 +8,16 @@ from gazerig.robot.control.command_handler import (
     Answered,
     CommandGiven,
     CommandHandler,
-    Outcome,
     ParamAccess,
     ParamsChanged,
     ParamsSaved,
     PathGuard,
+    RequestResult,
 )
 from gazerig.robot.control.gesture_choices import GestureInfo
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.commands import Command, Leading, LookAt, Resume, signed
+from gazerig.robot.model.command_json import signed
+from gazerig.robot.model.commands import Command, Leading, LookAt, Resume
 from gazerig.robot.model.reply import CommandTaker, Ticket
 
 _REPLY_S = 1.0
@@ -91,7 +92,7 @@ class PageRequestHandler:
                 return self._replay(asked)
         raise ValueError(f"{', '.join(map(str, data)) or 'nothing'} cannot be asked for here")
 
-    def _told(self, verb: str, outcome: Outcome, data: Mapping[str, object]) -> str | None:
+    def _told(self, verb: str, outcome: RequestResult, data: Mapping[str, object]) -> str | None:
         """Return an outcome in words, None where nothing needs to be said."""
         match outcome:
             case CommandGiven():

@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from gazerig.gaze.types import Floats, Vec3
-from gazerig.robot.dashboard.head_model import Colour
+from gazerig.robot.dashboard.head_view import Colour
 from gazerig.robot.dashboard.scene_node import along, put, quaternion
 from gazerig.robot.model.types import Snapshot
 

@@ -23,8 +23,8 @@ from gazerig.gaze.types import (
     Target,
 )
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.commands import as_recorded
-from gazerig.robot.model.commands import from_recording as command_from_json
+from gazerig.robot.model.command_json import as_recorded
+from gazerig.robot.model.command_json import from_recording as command_from_json
 from gazerig.robot.model.lead import NO_GESTURE, NOBODY_LEADS, GestureState, LeadState
 from gazerig.robot.model.types import GAZE_JOINTS, GuardResult, JointAngles, JointState
 

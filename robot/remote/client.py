@@ -21,6 +21,8 @@ from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.errors import HeadEnded, NotFound, Refused
 from gazerig.robot.control.head_state import HeadEvent, HeadState
 from gazerig.robot.control.head_state import from_json as state_from_json
+from gazerig.robot.model.command_checks import check
+from gazerig.robot.model.command_json import as_json
 from gazerig.robot.model.commands import (
     Ask,
     Command,
@@ -33,8 +35,6 @@ from gazerig.robot.model.commands import (
     SetLevel,
     Stop,
     Value,
-    as_json,
-    check,
 )
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.remote.heartbeat import LeadHeartbeat

@@ -6,7 +6,8 @@ A program that dies, hangs as a whole or is stopped sends none, and the gaze lea
 import threading
 from collections.abc import Callable
 
-from gazerig.robot.model.commands import Renew, as_json
+from gazerig.robot.model.command_json import as_json
+from gazerig.robot.model.commands import Renew
 from gazerig.robot.model.lead import HEARTBEAT_S
 from gazerig.robot.remote.socket_io import MalformedMessage, Wire
 

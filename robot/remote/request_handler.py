@@ -16,10 +16,10 @@ from gazerig.robot.control.command_handler import (
     Commandable,
     CommandGiven,
     CommandHandler,
-    Outcome,
     ParamAccess,
     ParamsChanged,
     ParamsSaved,
+    RequestResult,
     as_changes,
 )
 from gazerig.robot.control.feedback_basis import estimated_joints
@@ -29,7 +29,8 @@ from gazerig.robot.control.loop import Tick
 from gazerig.robot.control.tick_feed import TickFeed
 from gazerig.robot.control.tick_text import lead_text, target_name
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.commands import REPEATED, Command, signed
+from gazerig.robot.model.command_json import signed
+from gazerig.robot.model.commands import REPEATED, Command
 from gazerig.robot.model.reply import CommandReply, Ticket
 
 _TAKEN_UP_S = 1.0
@@ -161,7 +162,7 @@ class RequestHandler:
         except self._handler.refusals as error:
             return {"refused": str(error)}
 
-    def _told(self, outcome: Outcome) -> object:
+    def _told(self, outcome: RequestResult) -> object:
         """Return an outcome as JSON, once the loop has it."""
         match outcome:
             case Answered(value):

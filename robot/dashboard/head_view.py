@@ -76,7 +76,7 @@ class _EyeModel(NamedTuple):
     lower: viser.MeshHandle
 
 
-class HeadModel:
+class HeadView:
     """The rig in the scene, with those parts that its joints move."""
 
     def __init__(self, scene: viser.SceneApi) -> None:
