@@ -19,4 +19,6 @@ from gazerig.testing.bus_bench import BusUnderTest as BusUnderTest  # noqa: E402
 from gazerig.testing.bus_bench import Fault as Fault  # noqa: E402
 from gazerig.testing.bus_lost_suite import BusLossSuite as BusLossSuite  # noqa: E402
 from gazerig.testing.bus_suite import BusSuite as BusSuite  # noqa: E402
+from gazerig.testing.camera_suite import CameraBench as CameraBench  # noqa: E402
+from gazerig.testing.camera_suite import CameraSuite as CameraSuite  # noqa: E402
 from gazerig.testing.fault_suite import FaultSuite as FaultSuite  # noqa: E402

@@ -95,7 +95,7 @@ class CheckedSource:
             raise
         except Exception as error:
             raise CameraError(f"{self._label} failed ({failure(error)})") from error
-        if shot is None:
+        if shot is None or stop.is_set():
             return None
         if not isinstance(shot, Shot):
             raise CameraError(f"{self._label} returned a {type(shot).__name__}, wanted a Shot")

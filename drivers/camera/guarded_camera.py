@@ -32,6 +32,7 @@ class GuardedCamera:
     def __init__(self, camera: Camera, label: str, longest_s: float | None = LONGEST_S) -> None:
         self.camera = camera
         self._label = label
+        self._longest_s = longest_s
         self._call = BoundedCall(f"camera {label}", longest_s)
         self._log = EventLog()
         self._newest: Detections | None = None
@@ -53,6 +54,7 @@ class GuardedCamera:
             raise
         except Exception as error:
             raise PluginError(f"{self._label} cannot be opened: {failure(error)}") from error
+        self._call = BoundedCall(f"camera {self._label}", self._longest_s)
         self._newest, self._failed, self._asked_s, self._late = None, False, None, False
 
     def latest(self, now_s: float) -> Detections | None:

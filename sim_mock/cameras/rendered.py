@@ -181,6 +181,7 @@ class PixelCamera:
         canvas = Canvas(par.width_px, par.height_px, self.lens, R, p)
         draw_scene(canvas, self._scene, t_s - self._start_s, par.room_seed)
         image = self._noisy(smeared(canvas.image, self._smear_px(t_s, R)))
+        image.setflags(write=False)  # as those of real cameras
         depth = self._stereo(canvas.depth_m) if par.depth else None
         return Exposure(t_s, self._number, image, depth, R, p)
 

@@ -1,0 +1,141 @@
+"""What every camera promises to the loop, on ours: the suite that packages run on theirs."""
+
+import threading
+import time
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from gazerig.config.schema import load_rig
+from gazerig.drivers.camera.camera_plugins import CheckedSource
+from gazerig.drivers.camera.guarded_camera import GuardedCamera
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.camera.video_file import VideoFile
+from gazerig.drivers.camera.webcam import Webcam
+from gazerig.drivers.errors import CameraError
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.testing import CameraBench, CameraSuite
+from gazerig.testing.camera_suite import of_source
+
+
+class Video4Linux:
+    """A capture device that can be pulled out, or hold up who reads it."""
+
+    def __init__(self, file):
+        self.file, self.grabs, self.held = file, 0, threading.Event()
+        self.restore()
+        self.held.set()
+
+    def lose(self):
+        self.file.unlink()
+
+    def restore(self):
+        self.file.touch()
+
+    def isOpened(self):  # noqa: N802
+        return self.file.exists()
+
+    def grab(self):
+        self.held.wait(60.0)
+        time.sleep(0.001)
+        self.grabs += 1
+        return self.file.exists()
+
+    def retrieve(self):
+        return True, np.full((4, 6, 3), self.grabs % 256, np.uint8)
+
+    def get(self, what):
+        return 30.0 if what == cv2.CAP_PROP_FPS else 0.0
+
+    def set(self, what, value):
+        return True
+
+    def release(self):
+        pass
+
+
+class TestWebcam(CameraSuite):
+    @pytest.fixture
+    def bench(self, tmp_path):
+        device: Any = Video4Linux(tmp_path / "video0")
+        return of_source(
+            lambda: Webcam(device.file, capture=lambda name: device),
+            device.lose, device.restore, device.held.clear, device.held.set,
+        )  # fmt: skip
+
+
+class TestFilm(CameraSuite):
+    @pytest.fixture
+    def bench(self, tmp_path):
+        file = str(tmp_path / "film.avi")
+        out = cv2.VideoWriter(file, cv2.VideoWriter.fourcc(*"MJPG"), 100.0, (32, 24))
+        for k in range(20):
+            out.write(np.full((24, 32, 3), 10 * k, np.uint8))
+        out.release()
+        return of_source(lambda: VideoFile(file))
+
+
+@pytest.mark.parametrize("pixels", [False, True], ids=["ideal", "drawn"])
+class TestScene(CameraSuite):
+    @pytest.fixture
+    def bench(self, pixels):
+        made = assemble(
+            load_rig("desk"), RunOptions(mock=True, fast=True, scene="visitor", pixels=pixels)
+        )
+        clock = made.clock
+
+        def wait():
+            clock.sleep_until(clock.now_s() + 0.01)
+            made.poses.remember(clock.now_s(), (0.0, 0.0, 0.0))
+
+        wait()
+        yield CameraBench(lambda: made.robot.camera, clock.now_s, wait)
+        made.close()
+
+
+class Outside:
+    """A camera of another package that finds faces itself."""
+
+    def __init__(self, device):
+        self.device, self.number = device, 0
+
+    def open(self):
+        if not self.device.file.exists():
+            raise CameraError("no fish camera: plug it in")
+        self.number = 0
+
+    def take(self, now_s, stop):
+        self.device.held.wait(60.0)
+        if not self.device.file.exists():
+            raise CameraError("the fish camera is gone")
+        time.sleep(0.001)
+        self.number += 1
+        return Shot(now_s(), self.number, np.zeros((4, 6, 3), np.uint8))
+
+    def events(self):
+        return ()
+
+    def close(self):
+        pass
+
+
+class TestGuarded(CameraSuite):
+    """A package's camera behind the guard that keeps it from the loop."""
+
+    @pytest.fixture
+    def bench(self, tmp_path):
+        device = Video4Linux(tmp_path / "video0")
+        inner = of_source(
+            lambda: CheckedSource(Outside(device), "camera 'fish' of fish 2"),
+            device.lose,
+            device.restore,
+            device.held.clear,
+            device.held.set,
+        )
+        return CameraBench(
+            lambda: GuardedCamera(inner.make(), "camera 'fish' of fish 2"), inner.now_s, inner.wait,
+            inner.lose, inner.restore, inner.block, inner.release,
+        )  # fmt: skip
