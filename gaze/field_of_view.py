@@ -13,8 +13,8 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.gaze.angles import compose, direction, rotate, rotation
-from gazerig.gaze.types import Angles2, Bodies, Floats, GazeState, Mat3, Vec3
+from gazerig.gaze.angles import angles_of, compose, direction, rotate, rotation
+from gazerig.gaze.types import Angles2, Angles3, Bodies, Floats, GazeState, Mat3, Vec3
 from gazerig.params import Bounds
 
 BLOCK = 8192
@@ -137,6 +137,11 @@ def eye_axes(state: GazeState, left: bool) -> Mat3:
     """Return R_world_eye of one eye: x along its line of sight, y left, z up."""
     angles: Angles2 = state.eye_left_rad if left else state.eye_right_rad
     return compose(state.R_world_head, rotation((angles[0], angles[1], 0.0)))
+
+
+def head_in_space(state: GazeState) -> Angles3:
+    """Return the head's (yaw, pitch, roll) in the world: the neck's where no lower neck bends."""
+    return state.head_rad if state.base_rad == (0.0, 0.0) else angles_of(state.R_world_head)
 
 
 def line_of_sight(state: GazeState, left: bool) -> Vec3:

@@ -82,6 +82,7 @@ class ReachableGaze(NamedTuple):
     facing_rad, head_rad: (yaw, pitch, roll) that face it, and where the head stops
     asked_eyes_rad, eyes_rad: left and right (yaw, pitch) from there, and as far as they go
     too_near: the point is nearer than the eyes converge on
+    base_rad: (yaw, pitch) of a lower neck meanwhile
     """
 
     facing_rad: Angles3
@@ -89,6 +90,7 @@ class ReachableGaze(NamedTuple):
     asked_eyes_rad: tuple[Angles2, Angles2]
     eyes_rad: tuple[Angles2, Angles2]
     too_near: bool
+    base_rad: Angles2 = (0.0, 0.0)
 
 
 class Oculomotor:
@@ -131,6 +133,7 @@ class Oculomotor:
         self._lids = lids
         self._breathing = breathing
         self._started = False
+        self._base_rad: Angles2 = (0.0, 0.0)
 
     def retune(
         self,
@@ -180,14 +183,19 @@ class Oculomotor:
             self.reset(t_s, state)
         R_world_head, p_head = self._foreseen_head(state)
         seen = self._now(target, p_head, t_s)
-        facing = self._geometry.facing(seen.point)
+        self._base_rad = state.base_rad
+        facing = self._geometry.facing(seen.point, state.base_rad)
         ahead = rotate(R_world_head, (1.0, 0.0, 0.0))
         aside_rad = angle_between(ahead, sub(seen.point, p_head))
         free_s = self._trajectory.ends_s if self._trajectory else t_s
         self._trigger.record_shift(target.shift, self._head.leads_s(target, aside_rad), free_s, t_s)
         shift_rad = self._maybe_jump(seen, p_head, t_s)
         self._move_gaze(seen, p_head, t_s, dt_s)
-        centre = facing if seen.centre is seen.point else self._geometry.facing(seen.centre)
+        centre = (
+            facing
+            if seen.centre is seen.point
+            else self._geometry.facing(seen.centre, state.base_rad)
+        )
         head = self._head.step(target, centre, facing, aside_rad, t_s - self._trigger.onset_s, t_s)
         wanted = self._geometry.eyes_on(self._gaze, R_world_head, p_head)
         if offset.eyes_rad != (0.0, 0.0):
@@ -202,13 +210,15 @@ class Oculomotor:
 
     def reach(self, target: Target) -> ReachableGaze:
         """Return where head and eyes come to rest for a point that stands still."""
-        facing = self._geometry.facing(target.p_world_m)
+        facing = self._geometry.facing(target.p_world_m, self._base_rad)
         head = (*self._head.destination_rad(target, facing), 0.0)
-        R_world_head, p_head = self._geometry.head_pose(head)
+        R_world_head, p_head = self._geometry.head_pose(head, self._base_rad)
         exact = self._geometry.eyes_on(target.p_world_m, R_world_head, p_head)
         point = self._clear(target.p_world_m, p_head)
         left, right = self._in_range(self._geometry.eyes_on(point, R_world_head, p_head))
-        return ReachableGaze((*facing, 0.0), head, exact, (left, right), point != target.p_world_m)
+        return ReachableGaze(
+            (*facing, 0.0), head, exact, (left, right), point != target.p_world_m, self._base_rad
+        )
 
     @property
     def ranges_rad(self) -> tuple[tuple[Angles2, Angles2], ...]:
@@ -277,8 +287,11 @@ class Oculomotor:
         """Return the head's pose at the time when an eye command of now takes effect."""
         lag = self._params.eye_lag_ms / 1e3
         (yaw, pitch, roll), rates = state.head_rad, state.head_rate_rad_s
+        base, turning = state.base_rad, state.base_rate_rad_s
+        if turning != (0.0, 0.0):
+            base = base[0] + turning[0] * lag, base[1] + turning[1] * lag
         return self._geometry.head_pose(
-            (yaw + rates[0] * lag, pitch + rates[1] * lag, roll + rates[2] * lag)
+            (yaw + rates[0] * lag, pitch + rates[1] * lag, roll + rates[2] * lag), base
         )
 
     def _now(self, target: Target, p_head: Vec3, t_s: float) -> _Seen:

@@ -157,12 +157,13 @@ class Target(NamedTuple):
 class GazeState(NamedTuple):
     """Where head and eyes are, as measured.
 
-    head_rad, head_rate_rad_s: (yaw, pitch, roll) in space and their rates
+    head_rad, head_rate_rad_s: (yaw, pitch, roll) of the neck and their rates
     eye_left_rad, eye_right_rad: (yaw, pitch) in the head
     R_world_head, p_world_head_m: pose of the head frame
     p_world_eye_left_m, p_world_eye_right_m: centres of rotation of the eyes
     lid_left, lid_right: opening of the upper lids, 0 shut .. 1 open
     lower_left, lower_right: the same of the lower lids
+    base_rad, base_rate_rad_s: (yaw, pitch) of a lower neck, which carries the neck, and their rates
     """
 
     head_rad: Angles3
@@ -177,6 +178,8 @@ class GazeState(NamedTuple):
     lid_right: float
     lower_left: float = 1.0
     lower_right: float = 1.0
+    base_rad: Angles2 = (0.0, 0.0)
+    base_rate_rad_s: Angles2 = (0.0, 0.0)
 
 
 class Limited(NamedTuple):
@@ -222,11 +225,11 @@ class GazeCommand(NamedTuple):
 class HeadGeometry(Protocol):
     """The kinematics that the oculomotor models need (gazerig.robot.model.kinematics)."""
 
-    def head_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
-        """Return R_world_head and p_world_head_m for neck angles."""
+    def head_pose(self, head_rad: Angles3, base_rad: Angles2 = (0.0, 0.0)) -> tuple[Mat3, Vec3]:
+        """Return R_world_head and p_world_head_m for angles of the neck and a lower neck."""
         ...
 
-    def facing(self, p_world_m: Vec3) -> Angles2:
+    def facing(self, p_world_m: Vec3, base_rad: Angles2 = (0.0, 0.0)) -> Angles2:
         """Return the neck yaw and pitch that point the head's x axis through a point."""
         ...
 

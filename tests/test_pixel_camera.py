@@ -13,7 +13,7 @@ from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.gaze.angles import angle_between, rotation, sub
-from gazerig.gaze.types import Angles3, Mat3, Vec3
+from gazerig.gaze.types import Angles2, Angles3, Mat3, Vec3
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
@@ -286,7 +286,7 @@ def test_what_finds_motion_gets_the_picture_with_its_pose_and_depth() -> None:
 class Neck(StandIn):
     """A head that turns about the origin."""
 
-    def head_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
+    def head_pose(self, head_rad: Angles3, base_rad: Angles2 = (0.0, 0.0)) -> tuple[Mat3, Vec3]:
         return rotation(head_rad), (0.0, 0.0, 0.0)
 
 

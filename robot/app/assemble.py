@@ -19,7 +19,7 @@ from gazerig.gaze.aversion import Aversion
 from gazerig.gaze.lids import Lids
 from gazerig.gaze.saccade import SaccadeParams
 from gazerig.gaze.scanpath import Scanpath, ScanpathParams, Walk, row_sums_note
-from gazerig.gaze.types import Angles3
+from gazerig.gaze.types import Angles2, Angles3
 from gazerig.params import choices_of
 from gazerig.robot.app.animation_tables import animation_tables
 from gazerig.robot.app.camera_factory import real_camera, scene_camera
@@ -352,13 +352,13 @@ def _camera_params(
 
 def _turn_sender(
     kinematics: Kinematics, mount: CameraMount, turns: PoseBuffer | None
-) -> Callable[[float, Angles3], None] | None:
+) -> Callable[[float, Angles3, Angles2], None] | None:
     """Return what tells the camera's process how its camera is turned, None if it is not needed."""
     if turns is None:
         return None
 
-    def tell(t_s: float, head_rad: Angles3) -> None:
-        turns.record(t_s, np.array(mount.pose(*kinematics.head_pose(head_rad))[0]))
+    def tell(t_s: float, head_rad: Angles3, base_rad: Angles2) -> None:
+        turns.record(t_s, np.array(mount.pose(*kinematics.head_pose(head_rad, base_rad))[0]))
 
     return tell
 

@@ -17,7 +17,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.coupling_params import pairs_of
 from gazerig.robot.model.frames import PoseHistory
-from gazerig.robot.model.kinematics import NECK
+from gazerig.robot.model.kinematics import LOWER_NECK, NECK
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import build
 from gazerig.sim_mock.in_process_port import InProcessPort
@@ -69,7 +69,8 @@ def true_head(devices: Mapping[str, Device], rig: Rig, poses: PoseHistory) -> He
     pairs = pairs_of(rig.couplings)
     servos = {
         name: (rig.joints[name].made(), devices[rig.joints[name].bus], place_of(rig, name))
-        for name in {*NECK, *(other for pair in pairs for other in pair[:2])} & rig.joints.keys()
+        for name in {*NECK, *LOWER_NECK, *(other for pair in pairs for other in pair[:2])}
+        & rig.joints.keys()
     }
 
     def now(_: float) -> tuple[Mat3, Vec3]:
@@ -80,6 +81,7 @@ def true_head(devices: Mapping[str, Device], rig: Rig, poses: PoseHistory) -> He
         for first, second, coupling in pairs:
             angles[first], angles[second] = coupling.joint_rad((angles[first], angles[second]))
         yaw, pitch, roll = (angles.get(name, 0.0) for name in NECK)
-        return kinematics.head_pose((yaw, pitch, roll))
+        lower_yaw, lower_pitch = (angles.get(name, 0.0) for name in LOWER_NECK)
+        return kinematics.head_pose((yaw, pitch, roll), (lower_yaw, lower_pitch))
 
     return now

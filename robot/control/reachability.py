@@ -26,7 +26,10 @@ def reached_joints(
     reach: ReachableGaze, kinematics: Kinematics, limits: Sequence[JointLimit]
 ) -> JointAngles:
     """Return the joint angles at which head and eyes come to rest, lids open."""
-    return _within(kinematics.inverse(_command(reach.head_rad, *reach.eyes_rad)), limits)
+    further_rad = kinematics.further_rad(reach.base_rad)
+    return _within(
+        kinematics.inverse(_command(reach.head_rad, *reach.eyes_rad), further_rad), limits
+    )
 
 
 def look_reply(
@@ -43,7 +46,8 @@ def look_reply(
     error = gaze_error(target.p_world_m, pose, not kinematics.one_pan)
     # A head that stops short because the eyes do the rest is not kept from anything.
     head = reach.facing_rad if error.whole > _BESIDE_RAD else reach.head_rad
-    asked = kinematics.inverse(_command(head, *reach.asked_eyes_rad))
+    further_rad = kinematics.further_rad(reach.base_rad)
+    asked = kinematics.inverse(_command(head, *reach.asked_eyes_rad), further_rad)
     left, right = line_of_sight(pose, left=True), line_of_sight(pose, left=False)
     far_m = norm(sub(target.p_world_m, pose.p_world_head_m))
     met = add(pose.p_world_head_m, scale(unit(add(left, right)), far_m))

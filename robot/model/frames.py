@@ -12,7 +12,7 @@ from math import degrees, inf, radians
 from typing import Annotated, Literal
 
 from gazerig.gaze.angles import add, angles_of, compose, rotate, rotation
-from gazerig.gaze.types import Angles3, HeadGeometry, Mat3, Vec3
+from gazerig.gaze.types import Angles2, Angles3, HeadGeometry, Mat3, Vec3
 from gazerig.params import Bounds
 
 _OPTICAL: Mat3 = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
@@ -62,20 +62,20 @@ class PoseHistory:
         self,
         geometry: HeadGeometry,
         ticks: int = 600,
-        tell: Callable[[float, Angles3], None] | None = None,
+        tell: Callable[[float, Angles3, Angles2], None] | None = None,
     ) -> None:
         """Keep ``ticks`` entries; ``tell`` gets every one of them as well."""
         self._geometry = geometry
         self._tell = tell
         self._times: deque[float] = deque(maxlen=ticks)
-        self._angles: deque[Angles3] = deque(maxlen=ticks)
+        self._angles: deque[tuple[Angles3, Angles2]] = deque(maxlen=ticks)
 
-    def remember(self, t_s: float, head_rad: Angles3) -> None:
-        """Record the head's measured angles; times must increase."""
+    def remember(self, t_s: float, head_rad: Angles3, base_rad: Angles2 = (0.0, 0.0)) -> None:
+        """Record the measured angles of neck and lower neck; times must increase."""
         self._times.append(t_s)
-        self._angles.append(head_rad)
+        self._angles.append((head_rad, base_rad))
         if self._tell is not None:
-            self._tell(t_s, head_rad)
+            self._tell(t_s, head_rad, base_rad)
 
     def head_pose(self, t_s: float) -> tuple[Mat3, Vec3]:
         """Return R_world_head and p_world_head_m at an instant, interpolated between ticks.
@@ -89,19 +89,23 @@ class PoseHistory:
             raise LookupError("no pose has been remembered yet")
         after = bisect_left(self._times, t_s)
         if after == 0:
-            return self._geometry.head_pose(self._angles[0])
+            return self._geometry.head_pose(*self._angles[0])
         if after == len(self._times):
-            return self._geometry.head_pose(self._angles[-1])
+            return self._geometry.head_pose(*self._angles[-1])
         t0, t1 = self._times[after - 1], self._times[after]
         share = (t_s - t0) / (t1 - t0)
-        a, b = self._angles[after - 1], self._angles[after]
-        return self._geometry.head_pose(
-            (
-                a[0] + share * (b[0] - a[0]),
-                a[1] + share * (b[1] - a[1]),
-                a[2] + share * (b[2] - a[2]),
-            )
+        (a, base), (b, base_next) = self._angles[after - 1], self._angles[after]
+        head = (
+            a[0] + share * (b[0] - a[0]),
+            a[1] + share * (b[1] - a[1]),
+            a[2] + share * (b[2] - a[2]),
         )
+        if base != base_next:
+            base = (
+                base[0] + share * (base_next[0] - base[0]),
+                base[1] + share * (base_next[1] - base[1]),
+            )
+        return self._geometry.head_pose(head, base)
 
 
 class NewestPose(PoseHistory):

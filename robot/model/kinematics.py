@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from math import asin, atan2, hypot, pi
 from typing import Annotated
 
-from gazerig.gaze.angles import add, rotate, rotate_back, rotation, sub, yaw_pitch
+from gazerig.gaze.angles import add, compose, rotate, rotate_back, rotation, sub, yaw_pitch
 from gazerig.gaze.types import Angles2, Angles3, GazeCommand, GazeState, Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.model.types import GAZE_JOINTS, JointAngles, JointState, in_order
@@ -27,13 +27,18 @@ class GeometryParams:
     eyes_ahead_mm: Annotated[float, Bounds(-500, 500), "distance of the eye centres in front of the pitch axis"]
     eyes_above_mm: Annotated[float, Bounds(-500, 1000), "height of the eye centres above the pitch axis"]
     interocular_mm: Annotated[float, Bounds(10, 500), "distance between the eye centres (Mitake et al., table 1: 61.9)"] = 61.9
+    lower_pitch_axis_height_mm: Annotated[float, Bounds(0, 2000),
+        "height of the pitch axis of a lower neck (lower_neck_yaw, lower_neck_pitch) above the neck base"] = 0.0
     # fmt: on
 
 
+_UPRIGHT = (0.0, 0.0)
 LidEnds = tuple[float, float]
 """Joint angles at which a lid is shut and fully open, radians."""
 
 NECK = ("neck_yaw", "neck_pitch", "neck_roll")
+LOWER_NECK = ("lower_neck_yaw", "lower_neck_pitch")
+"""A second pair below the neck: expressions and gestures move it, and gaze allows for it."""
 LIDS = ("left_upper_lid", "right_upper_lid", "left_lower_lid", "right_lower_lid")
 
 
@@ -59,6 +64,7 @@ class Kinematics:
             for way in ("pan", "tilt")
         )
         self._neck = tuple(place.get(name, absent) for name in NECK)
+        self._lower = tuple(place.get(name, absent) for name in LOWER_NECK)
         self._lid_places = tuple(place.get(name, absent) for name in LIDS)
         self._wanted = tuple(GAZE_JOINTS.index(name) for name in self.names if name in GAZE_JOINTS)
         self._further = (0.0,) * (len(self.names) - len(self._wanted))
@@ -67,6 +73,7 @@ class Kinematics:
     def retune(self, params: GeometryParams, lids: Mapping[str, LidEnds]) -> None:
         """Change the geometry and lid angles."""
         self._pivot: Vec3 = (0.0, 0.0, params.pitch_axis_height_mm / 1e3)
+        self._base: Vec3 = (0.0, 0.0, params.lower_pitch_axis_height_mm / 1e3)
         self._arm: Vec3 = (params.eyes_ahead_mm / 1e3, 0.0, params.eyes_above_mm / 1e3)
         self._half = params.interocular_mm / 2e3
         # Of an absent lid, whose angle is 0, the opening comes out as 1.
@@ -74,18 +81,34 @@ class Kinematics:
         self._shut = tuple(shut for shut, _ in ends)
         self._span = tuple(wide - shut for shut, wide in ends)
 
-    def head_pose(self, head_rad: Angles3) -> tuple[Mat3, Vec3]:
-        """Return R_world_head and p_world_head_m (midway between the eyes)."""
-        R = rotation(head_rad)
-        return R, add(self._pivot, rotate(R, self._arm))
+    def head_pose(self, head_rad: Angles3, base_rad: Angles2 = _UPRIGHT) -> tuple[Mat3, Vec3]:
+        """Return R_world_head and p_world_head_m (midway between the eyes).
 
-    def facing(self, p_world_m: Vec3) -> Angles2:
+        Args:
+            head_rad: (yaw, pitch, roll) of the neck.
+            base_rad: (yaw, pitch) of a lower neck that carries it.
+        """
+        R = rotation(head_rad)
+        p = add(self._pivot, rotate(R, self._arm))
+        if base_rad == _UPRIGHT:
+            return R, p
+        R_world_base = rotation((*base_rad, 0.0))
+        return compose(R_world_base, R), self._carried(R_world_base, p)
+
+    def _carried(self, R_world_base: Mat3, p_m: Vec3) -> Vec3:
+        """Return where a lower neck carries a point, which is given for it upright."""
+        return add(self._base, rotate(R_world_base, sub(p_m, self._base)))
+
+    def facing(self, p_world_m: Vec3, base_rad: Angles2 = _UPRIGHT) -> Angles2:
         """Return the neck yaw and pitch that lead the head's x axis through a point.
 
         The axis passes above the pivot by the arm's height, so the pitch is that of the
         point less the angle which that height takes up. A point nearer to the pivot than
         the height cannot be faced; it gets the pitch of its own direction.
         """
+        if base_rad != _UPRIGHT:
+            back = rotate_back(rotation((*base_rad, 0.0)), sub(p_world_m, self._base))
+            p_world_m = add(self._base, back)
         x, y, z = sub(p_world_m, self._pivot)
         level = hypot(x, y)
         distance = hypot(level, z)
@@ -117,13 +140,15 @@ class Kinematics:
         q, rate = (*joints.position_rad, 0.0), (*joints.velocity_rad_s, 0.0)
         yaw, pitch, roll = self._neck
         head = (q[yaw], q[pitch], q[roll])
-        R, p_head = self.head_pose(head)
+        lower_yaw, lower_pitch = self._lower
+        base = (q[lower_yaw], q[lower_pitch])
+        R, p_head = self.head_pose(head, base)
         side = rotate(R, (0.0, self._half, 0.0))
         pan_left, tilt_left, pan_right, tilt_right = self._eyes
-        openings = [
+        upper_left, upper_right, lower_left, lower_right = (
             min(1.0, max(0.0, (q[i] - shut) / span))
             for i, shut, span in zip(self._lid_places, self._shut, self._span, strict=True)
-        ]
+        )
         return GazeState(
             head,
             (rate[yaw], rate[pitch], rate[roll]),
@@ -133,7 +158,12 @@ class Kinematics:
             p_head,
             add(p_head, side),
             sub(p_head, side),
-            *openings,
+            upper_left,
+            upper_right,
+            lower_left,
+            lower_right,
+            base,
+            (rate[lower_yaw], rate[lower_pitch]),
         )
 
     def inverse(self, command: GazeCommand, further_rad: JointAngles = ()) -> JointAngles:
@@ -161,6 +191,11 @@ class Kinematics:
             *command.head_rad,
         )
         return (*[every[i] for i in self._wanted], *(further_rad or self._further))
+
+    def further_rad(self, base_rad: Angles2) -> JointAngles:
+        """Return the joints that gaze does not move at 0, but a lower neck at its angles."""
+        lower = dict(zip(LOWER_NECK, base_rad, strict=True))
+        return tuple(lower.get(name, 0.0) for name in self.names[len(self._wanted) :])
 
 
 def _between(one: float, other: float) -> float:

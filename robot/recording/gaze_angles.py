@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.angles import add, angle_between, sub, yaw_pitch
-from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.field_of_view import head_in_space, line_of_sight
 from gazerig.gaze.types import Angles2, Floats, GazeState, Target, Vec3
 from gazerig.robot.control.feedback_basis import Basis, basis_of, estimated_joints
 from gazerig.robot.control.tick import Tick
@@ -145,7 +145,7 @@ class GazeAnglesBuilder:
         left, right, cyclopean = in_space(pose)
         planned = _degrees(sub(tick.gaze.gaze_point_world_m, pose.p_world_head_m))
         lids = (pose.lid_left, pose.lid_right, pose.lower_left, pose.lower_right)
-        head = tuple(map(degrees, pose.head_rad))
+        head = tuple(map(degrees, head_in_space(pose)))
         self._joints = tick.guard_result.joints
         self._estimated.update(dict.fromkeys(estimated_joints(tick)))
         if missing:

@@ -72,7 +72,7 @@ _GAZE_STATE = _object(
     head_rad=_NUMBERS, head_rate_rad_s=_NUMBERS, eye_left_rad=_NUMBERS, eye_right_rad=_NUMBERS,
     R_world_head=_MATRIX, p_world_head_m=_NUMBERS, p_world_eye_left_m=_NUMBERS,
     p_world_eye_right_m=_NUMBERS, lid_left=_NUMBER, lid_right=_NUMBER, lower_left=_NUMBER,
-    lower_right=_NUMBER,
+    lower_right=_NUMBER, base_rad=_NUMBERS, base_rate_rad_s=_NUMBERS,
 )  # fmt: skip
 _GAZE_COMMAND = _object(
     head_rad=_NUMBERS, eye_left_rad=_NUMBERS, eye_right_rad=_NUMBERS, lid_left=_NUMBER,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.angles import add, angle_between, dot, norm, rotate_back, scale, sub, yaw_pitch
-from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.field_of_view import head_in_space, line_of_sight
 from gazerig.gaze.types import Face, Floats, Vec3
 from gazerig.robot.analysis.blink_finder import BlinkEvent, BlinkFinder
 from gazerig.robot.analysis.event_detector import (
@@ -217,9 +217,10 @@ def row_of(tick: Tick, mode: int) -> TraceRow:
             on_left = on_face(left, sight_left, point, R) or on_left
             on_right = on_face(right, sight_right, point, R) or on_right
     eye_left, eye_right = pose.eye_left_rad, pose.eye_right_rad
+    turned = head_in_space(pose)
     return TraceRow(
         tick.t_s, degrees(yaw), degrees(pitch),
-        degrees(pose.head_rad[0]), degrees(pose.head_rad[1]),
+        degrees(turned[0]), degrees(turned[1]),
         degrees(0.5 * (eye_left[0] + eye_right[0])), degrees(0.5 * (eye_left[1] + eye_right[1])),
         degrees(at_yaw), degrees(at_pitch), degrees(yaw_rate), degrees(pitch_rate), norm(rel),
         degrees(eye_right[0] - eye_left[0]), degrees(atan2(y + half, x) - atan2(y - half, x)),

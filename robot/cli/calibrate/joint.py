@@ -243,7 +243,7 @@ def _warn_of_neck(name: str, person: SteeringPerson) -> None:
     Raises:
         gazerig.robot.calibration.joint_calibration.CalibrationRefused: the answer was no.
     """
-    if not name.startswith("neck"):
+    if "neck" not in name.split("_"):
         return
     asked = f"{name} will move by itself, and sink when the torque goes off: hold the head. Go on?"
     if not person.agrees(asked):
