@@ -299,7 +299,7 @@ class Head(ABC):
         """Return the people who are seen."""
         return self.state.people
 
-    def states(self, rate_hz: float = 50.0) -> Iterator[HeadState]:
+    def states(self, rate_hz: float = 50.0, *, seconds: float | None = None) -> Iterator[HeadState]:
         """Return an iterator over the newest states; older ones that nobody took are dropped.
 
         The loop never waits for it. Of a head in simulated time each step of the iterator steps
@@ -307,12 +307,13 @@ class Head(ABC):
 
         Args:
             rate_hz: states a second at most.
+            seconds: ends after so many, by the head's own clock; None: never.
         """
         if not rate_hz > 0.0:
             from gazerig.errors import Refused
 
             raise Refused(f"rate_hz {rate_hz:g}: above 0")
-        return self._states(1.0 / rate_hz)
+        return self._states(1.0 / rate_hz, seconds)
 
     def events(self, timeout_s: float | None = None) -> Iterator[HeadEvent]:
         """Return an iterator over what happens, from the start; it waits for the next event.
@@ -357,10 +358,14 @@ class Head(ABC):
         """Let the head choose its targets again, and do not ask what came of it."""
         self._give(LookAt(None, self._who))
 
-    def _states(self, every_s: float) -> Iterator[HeadState]:
-        last_s = float("-inf")
+    def _states(self, every_s: float, seconds: float | None) -> Iterator[HeadState]:
+        last_s, end_s = float("-inf"), float("inf")
         while True:
             state = self.state
+            if seconds is not None and end_s == float("inf"):
+                end_s = state.t_s + seconds
+            if state.t_s >= end_s:
+                return
             if state.t_s > last_s:
                 last_s = state.t_s
                 yield state

@@ -29,8 +29,6 @@ if __name__ == "__main__":
         mine, mock=camera is None, scene=scene, camera=camera, attention=LeftMost()
     )
     with opened as head:
-        for state in head.states(rate_hz=2.0):
+        for state in head.states(rate_hz=2.0, seconds=8.0):
             yaw, pitch = state.gaze.direction_deg
-            print(f"{state.t_s:.1f} s: {state.gaze.target}, gaze {yaw:+.0f} {pitch:+.0f} deg")
-            if state.t_s > 8.0:
-                break
+            print(f"looks at {state.gaze.target}, gaze {yaw:+.0f} {pitch:+.0f} deg")

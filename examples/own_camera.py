@@ -42,8 +42,6 @@ class Lamp:
 if __name__ == "__main__":
     mine = sys.argv[1:]
     with gazerig.open(mine[0] if mine else "maker", mock=not mine, camera=Lamp()) as head:
-        for state in head.states(rate_hz=4.0):
+        for state in head.states(rate_hz=4.0, seconds=8.0):
             yaw, pitch = state.gaze.direction_deg
-            print(f"{state.t_s:.1f} s: {state.gaze.target}, gaze {yaw:+.0f} {pitch:+.0f} deg")
-            if state.t_s > 8.0:
-                break
+            print(f"looks at {state.gaze.target}, gaze {yaw:+.0f} {pitch:+.0f} deg")

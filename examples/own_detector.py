@@ -36,7 +36,5 @@ def _face(x: float, y: float, width: float, height: float) -> DetectedFace:
 if __name__ == "__main__":
     mine, camera = (sys.argv[1], int(sys.argv[2])) if sys.argv[2:] else ("desk", None)
     with gazerig.open(mine, mock=camera is None, camera=camera, detector=Skin()) as head:
-        for state in head.states(rate_hz=4.0):
-            print(f"{state.t_s:.1f} s: {len(state.people)} seen, looks at {state.gaze.target}")
-            if state.t_s > 4.0:
-                break
+        for state in head.states(rate_hz=4.0, seconds=4.0):
+            print(f"{len(state.people)} seen, looks at {state.gaze.target}")

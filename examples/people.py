@@ -12,11 +12,8 @@ import gazerig
 
 def print_people(head: gazerig.Head, seconds: float) -> None:
     """Print the people who are seen, once a second."""
-    start_s = head.state.t_s
-    for state in head.states(rate_hz=1.0):
-        if state.t_s - start_s > seconds:
-            return
-        print(f"{state.t_s:5.1f} s, the head looks at {state.gaze.target}")
+    for state in head.states(rate_hz=1.0, seconds=seconds):
+        print(f"the head looks at {state.gaze.target}")
         for person in state.people:
             x, y, z = person.position_m
             print(f"  person {person.id}: {x:.2f} m ahead, {y:+.2f} left, {z:+.2f} up")
@@ -28,4 +25,4 @@ if __name__ == "__main__":
     else:
         opened = gazerig.open("desk", mock=True, scene="visitor")
     with opened as head:
-        print_people(head, 15.0)
+        print_people(head, seconds=15.0)

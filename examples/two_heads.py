@@ -15,19 +15,16 @@ BETWEEN_M = 0.5
 
 def follow(first: gazerig.Head, second: gazerig.Head, seconds: float) -> None:
     """Let the second head look at what the first one looks at."""
-    start_s = first.state.t_s
-    for state in first.states(rate_hz=5.0):
-        if state.t_s - start_s > seconds:
-            return
+    for state in first.states(rate_hz=5.0, seconds=seconds):
         x, y, z = state.gaze.point_m
         second.look_at(x, y - BETWEEN_M, z)
         second.sleep(0.2)
         yaws = [round(head.gaze.direction_deg[0]) for head in (first, second)]
-        print(f"{state.t_s:4.1f} s: {state.gaze.target}: yaw {yaws} deg")
+        print(f"{state.gaze.target}: yaw {yaws} deg")
 
 
 if __name__ == "__main__":
     names = sys.argv[1:] or ["desk", "feetech"]
     one, other = (gazerig.open(name, mock=not sys.argv[1:]) for name in names)
     with one as first, other as second:
-        follow(first, second, 8.0)
+        follow(first, second, seconds=8.0)

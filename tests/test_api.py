@@ -169,6 +169,12 @@ def test_states_and_events_step_the_head(head: gazerig.SimulatedHead) -> None:
     assert "led by the program: look at 1 0 0.3" in texts
 
 
+def test_states_end_after_their_seconds(head: gazerig.SimulatedHead) -> None:
+    began_s = head.state.t_s
+    times = [state.t_s - began_s for state in head.states(rate_hz=10.0, seconds=0.5)]
+    assert times == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4], abs=0.006)
+
+
 def test_a_program_sleeps_by_the_head_s_clock(head: gazerig.SimulatedHead) -> None:
     before_s = head.state.t_s
     head.sleep(0.25)

@@ -61,12 +61,12 @@ def test_the_visitor_is_printed_where_the_visitor_is(shown: Shown) -> None:
 @pytest.mark.slow
 def test_the_own_detector_leads_the_gaze_to_the_drawn_visitor(shown: Shown) -> None:
     lines = shown("own_detector.py")
-    assert sum(": 1 seen, looks at face 1" in line for line in lines[4:]) > 0.9 * len(lines[4:])
+    assert sum("1 seen, looks at face 1" in line for line in lines[4:]) > 0.9 * len(lines[4:])
 
 
 def test_the_own_camera_s_lamp_is_followed(shown: Shown) -> None:
     lines = shown("own_camera.py")
-    assert sum(": lamp 1" in line for line in lines) > 25
+    assert sum("at lamp 1," in line for line in lines) > 25
     yaws = [numbers(line.split("gaze")[1])[0] for line in lines[4:]]
     assert max(yaws) > 12.0 and min(yaws) < -12.0
     assert max(abs(numbers(line.split("gaze")[1])[1]) for line in lines[4:]) < 6.0
@@ -74,7 +74,7 @@ def test_the_own_camera_s_lamp_is_followed(shown: Shown) -> None:
 
 def test_the_own_rule_decides_what_is_looked_at(shown: Shown) -> None:
     lines = shown("own_attention.py")
-    assert sum(": point" in line for line in lines[1:]) == len(lines) - 1
+    assert sum("at point," in line for line in lines[1:]) == len(lines) - 1
     assert all(numbers(line.split("gaze")[1])[0] > 3.0 for line in lines[2:])  # to the left
 
 

@@ -148,7 +148,7 @@ class HeadState:
     """One tick of the control loop.
 
     Attributes:
-        t_s: the rig's own time.
+        t_s: seconds of the head's own clock: from 0 in simulated time, else as time.monotonic().
         joints: by name.
         gaze: where head and eyes are.
         people: those who are seen.
