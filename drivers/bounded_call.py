@@ -2,14 +2,20 @@
 
 import threading
 from collections.abc import Callable
+from time import perf_counter
 from typing import Any, NamedTuple
 
 
 class CallResult(NamedTuple):
-    """What came of a call; ``error`` is what it raised."""
+    """What came of a call.
+
+    error: what it raised; took_s: how long it ran, without the time until it was begun, which is
+    the machine's
+    """
 
     value: Any = None
     error: BaseException | None = None
+    took_s: float = 0.0
 
 
 class BoundedCall:
@@ -31,6 +37,12 @@ class BoundedCall:
         self._work: Callable[[], Any] | None = None
         self._outcome = CallResult()
         self._under_way = False
+        self._begun_s: float | None = None
+
+    def running_s(self) -> float:
+        """Return for how long the present call has been running, 0 where none is."""
+        begun_s = self._begun_s
+        return 0.0 if begun_s is None else perf_counter() - begun_s
 
     def __call__(self, work: Callable[[], Any]) -> CallResult | None:
         """Make a call; return its outcome or that of the late one before, None while it lasts."""
@@ -61,7 +73,10 @@ class BoundedCall:
             work = self._work
             if work is None:
                 return
-            self._outcome = _outcome(work)
+            begun_s = self._begun_s = perf_counter()
+            outcome = _outcome(work)
+            self._begun_s = None
+            self._outcome = outcome._replace(took_s=perf_counter() - begun_s)
             self._done.release()
 
 

@@ -12,7 +12,7 @@ from outside_package import install, on_path
 
 from gazerig.config.parameters import changed
 from gazerig.config.schema import load_rig
-from gazerig.drivers.bounded_call import BoundedCall
+from gazerig.drivers.bounded_call import BoundedCall, CallResult
 from gazerig.drivers.camera.camera_plugins import CheckedSource
 from gazerig.drivers.camera.guarded_camera import GuardedCamera
 from gazerig.drivers.camera.source import Shot
@@ -98,19 +98,38 @@ def test_a_rule_chooses_points_targets_or_nothing_and_shifts_are_counted():
 def test_a_rule_that_blocks_costs_the_loop_its_patience_only_and_is_dropped():
     gate = threading.Event()
     chooser, said = guarded(lambda *_: gate.wait(60.0), longest_s=0.001)
-    for k in range(MOST_OVERRUNS + 3):
-        assert chooser.choose(None, None, 0.005 * k).id == OWN.id
+    while not said:
+        assert chooser.choose(None, None, 0.0).id == OWN.id
     gate.set()
+    assert chooser.choose(None, None, 0.0).id == OWN.id
+    (line,) = said
+    assert line.startswith(f"{LABEL} has not answered for 0.25 s: dropped")
+
+
+def answering(took_s):
+    """Return a chooser whose rule answers a point after these times."""
+    chooser, said = guarded(lambda *_: None)
+    outcomes = iter(CallResult((1.0, 0.0, 0.5), None, one) for one in took_s)
+    chooser._call = type("Call", (), {
+        "__call__": lambda self, work: next(outcomes), "running_s": lambda self: 0.0,
+        "close": lambda self: None,
+    })()  # fmt: skip
+    return chooser, said
+
+
+def test_a_rule_that_is_slow_again_and_again_is_dropped():
+    chooser, said = answering([0.01] * 20)
+    kinds = [chooser.choose(None, None, 0.1 * k).kind for k in range(10)]
+    assert kinds == ["point"] * (MOST_OVERRUNS - 1) + ["face"] * (11 - MOST_OVERRUNS)
     (line,) = said
     assert line.startswith(f"{LABEL} took longer than 1 ms {MOST_OVERRUNS} times in a second")
 
 
-def test_overruns_far_apart_are_forgiven():
-    late = iter(range(100))
-    chooser, said = guarded(lambda *_: None, longest_s=0.001)
-    chooser._call = lambda work: None if next(late) % 2 else work() and None
+@pytest.mark.parametrize(("took_s", "apart_s"), [(0.01, 0.3), (0.0005, 0.001)])
+def test_overruns_far_apart_and_time_that_is_the_machines_are_forgiven(took_s, apart_s):
+    chooser, said = answering([took_s] * 50)
     for k in range(40):
-        chooser.choose(None, None, 1.1 * k)
+        assert chooser.choose(None, None, apart_s * k).kind == "point"
     assert said == []
 
 

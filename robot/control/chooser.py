@@ -17,7 +17,10 @@ LONGEST_S = 0.001
 """A rule may take so long in a tick; after that the loop goes on without its answer."""
 
 MOST_OVERRUNS = 5
-"""A rule that took longer so often within ``FORGIVEN_S`` is dropped."""
+"""A rule that ran for longer so often within ``FORGIVEN_S`` is dropped."""
+
+BLOCKED_S = 0.25
+"""A rule that has been running for so long is dropped."""
 
 FORGIVEN_S = 1.0
 """Overruns farther apart than this are forgotten."""
@@ -118,11 +121,15 @@ class GuardedChooser:
     def _ask(self, rule: Chooser, percept: Percept | None, state: GazeState, t_s: float) -> None:
         """Ask the rule, and keep what it chose until it answers again."""
         outcome = self._call(lambda: rule.choose(percept, state, t_s))
-        if outcome is None:
+        if outcome is None:  # the machine may have been busy: only the rule's own time is blamed
+            if self._call.running_s() > BLOCKED_S:
+                self._drop(f"has not answered for {BLOCKED_S:g} s")
+            return
+        if outcome.took_s > LONGEST_S:
             self._overrun(t_s)
-        elif outcome.error is not None:
+        if outcome.error is not None:
             self._drop(f"failed ({failure(outcome.error)})")
-        else:
+        elif self._rule is not None:
             try:
                 chosen = target_of(outcome.value, t_s)
             except ValueError as error:
