@@ -22,10 +22,10 @@ if TYPE_CHECKING:
     from gazerig.geometry import inverse as inverse
     from gazerig.head import Head as Head
     from gazerig.local_head import SimulatedHead as SimulatedHead
-    from gazerig.opening import connect as connect
     from gazerig.opening import open as open
     from gazerig.order import Order as Order
     from gazerig.order import Outcome as Outcome
+    from gazerig.remote_head import connect as connect
     from gazerig.robot.control.head_state import GazeReading as GazeReading
     from gazerig.robot.control.head_state import HeadEvent as HeadEvent
     from gazerig.robot.control.head_state import HeadState as HeadState
@@ -52,7 +52,7 @@ _HOME = {
     "Refused": "gazerig.errors",
     "SetupError": "gazerig.drivers.errors",
     "SimulatedHead": "gazerig.local_head",
-    "connect": "gazerig.opening",
+    "connect": "gazerig.remote_head",
     "forward": "gazerig.geometry",
     "inverse": "gazerig.geometry",
     "load_rig": "gazerig.config.schema",

@@ -1,4 +1,4 @@
-"""Heads for a program: its own, or one that another program runs."""
+"""Heads for a program of its own."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -6,15 +6,12 @@ from typing import Literal, overload
 
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.types import Camera, FaceDetector
-from gazerig.errors import NotFound
 from gazerig.local_head import LocalHead, RunningHead, SimulatedHead
-from gazerig.remote_head import RemoteHead
 from gazerig.robot.app.assemble import Substitutes
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import ProgramParts
 from gazerig.robot.control.chooser import Chooser
 from gazerig.robot.recording.playback_devices import NoCamera
-from gazerig.robot.remote.client import RobotClient, running
 
 
 @overload
@@ -95,32 +92,6 @@ def open(
         substitutes = substitutes._replace(camera=lambda rigs: NoCamera())
     kind: type[LocalHead] = SimulatedHead if fast else RunningHead
     return kind(options, substitutes, say)
-
-
-def connect(
-    pid: int | None = None, *, rig: str | None = None, who: str = "a program"
-) -> RemoteHead:
-    """Connect to a head that runs in another program of the same user.
-
-    Args:
-        pid: of its process, where several run.
-        rig: its rig, where several run.
-        who: what people are told of who asks.
-
-    Raises:
-        NotFound: none runs, or several and nothing says which; the message lists them.
-    """
-    if rig is None:
-        return RemoteHead(RobotClient.connect(pid, who))
-    found = [RemoteHead(client) for client in running(pid, who)]
-    fitting = [head for head in found if head.rig == rig]
-    for head in found:
-        if len(fitting) != 1 or head is not fitting[0]:
-            head.__exit__(None, None, None)
-    if len(fitting) == 1:
-        return fitting[0]
-    there = ", ".join(f"{head.pid} ({head.rig})" for head in found) or "start one: gazerig run ..."
-    raise NotFound(f"{len(fitting) or 'no'} heads with the rig {rig} are running: {there}")
 
 
 _FOR_EVER_S = 1e9

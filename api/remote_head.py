@@ -5,15 +5,15 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from gazerig.errors import HeadEnded
+from gazerig.errors import HeadEnded, NotFound
 from gazerig.head import Head
 from gazerig.order import Order
 from gazerig.robot.control.command_handler import as_value
 from gazerig.robot.control.head_state import HeadEvent, HeadState
 from gazerig.robot.control.tick_feed import Progress
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.model.commands import Command, Leading, Value
-from gazerig.robot.remote.client import RequestRejected, RobotClient
+from gazerig.robot.model.commands import Command, Value
+from gazerig.robot.remote.client import RequestRejected, RobotClient, running
 
 _POLL_S = 0.02
 
@@ -96,7 +96,33 @@ class RemoteHead(Head):
         try:
             reply = self._client.give(command)
         except RequestRejected as rejected:
-            if rejected.reply is None or not isinstance(command, Leading):
+            if rejected.reply is None:
                 raise
             reply = rejected.reply
         return Order(self, lambda: reply)
+
+
+def connect(
+    pid: int | None = None, *, rig: str | None = None, who: str = "a program"
+) -> RemoteHead:
+    """Connect to a head that runs in another program of the same user.
+
+    Args:
+        pid: of its process, where several run.
+        rig: its rig, where several run.
+        who: what people are told of who asks.
+
+    Raises:
+        NotFound: none runs, or several and nothing says which; the message lists them.
+    """
+    if rig is None:
+        return RemoteHead(RobotClient.connect(pid, who))
+    found = [RemoteHead(client) for client in running(pid, who)]
+    fitting = [head for head in found if head.rig == rig]
+    for head in found:
+        if len(fitting) != 1 or head is not fitting[0]:
+            head.__exit__(None, None, None)
+    if len(fitting) == 1:
+        return fitting[0]
+    there = ", ".join(f"{head.pid} ({head.rig})" for head in found) or "start one: gazerig run ..."
+    raise NotFound(f"{len(fitting) or 'no'} heads with the rig {rig} are running: {there}")

@@ -9,6 +9,7 @@ import textwrap
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -70,6 +71,32 @@ def test_an_interrupt_in_the_block(said: list[str]) -> None:
     with pytest.raises(KeyboardInterrupt), opened(said):
         raise KeyboardInterrupt
     assert_let_go(said)
+
+
+def test_a_second_interrupt_skips_what_is_left_of_parking(
+    said: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    join, park, parking = threading.Thread.join, Robot.park, threading.Event()
+    waits = iter(range(1000))
+
+    def interrupted(self: threading.Thread, timeout: float | None = None) -> None:
+        if self.name.startswith("head ") and next(waits) == 0:
+            parking.wait()
+            raise KeyboardInterrupt
+        join(self, timeout)
+
+    def parked(self: Robot, *given: Any) -> bool:
+        again = given[-1]
+        parking.set()
+        while not again():  # as far from the parking pose as can be
+            parking.wait(0.01)
+        return park(self, *given)
+
+    monkeypatch.setattr(Robot, "park", parked)
+
+    with pytest.raises(KeyboardInterrupt), opened(said):
+        monkeypatch.setattr(threading.Thread, "join", interrupted)
+    assert said[-1] == "stopped by the program: not parked (interrupted), torque off"
 
 
 def test_the_death_of_the_thread_that_opened_it(said: list[str]) -> None:
@@ -169,6 +196,11 @@ def test_another_program_has_the_same_orders(head: gazerig.Head) -> None:
         assert here.keys() == there.keys()
         texts = [event.text for event in far.events(timeout_s=0.0)]
         assert any("led by the program" in text for text in texts)
+        far.stop("a hand")
+        assert head.state.stopped == "a hand"
+        assert far.play("nod").wait(100.0) == "refused" and far.resume().refused
+        head.sleep(2.1)
+        assert not far.resume().refused
         led = far.look_towards(10.0, 0.0)
         assert led.active
     order = mine  # hung up: the lead of the other program lapses
