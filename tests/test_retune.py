@@ -55,7 +55,11 @@ def some_changes(
             size = {"width_px": 640, "height_px": 480, "cx_px": 320.0, "cy_px": 240.0}
             yield {key: {**size, "fx_px": 500.0, "fy_px": 500.0}}
         case "text":
-            yield {key: {"behaviour": "attack", "look_at": "hand"}.get(key.split(".")[-1], walk)}
+            yield {
+                key: {"behaviour": "attack", "look_at": "hand", "gesture": "nod"}.get(
+                    key.split(".")[-1], walk
+                )
+            }
 
 
 COLLISION: dict[str, Value] = {
