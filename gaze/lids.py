@@ -7,7 +7,7 @@ describes. Opening 0 is shut, where upper and lower lid meet; 1 is fully open. A
 both lids from wherever the gaze has them to 0, so they meet whatever the gaze direction.
 """
 
-from math import degrees, inf
+from math import degrees, inf, tanh
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -36,18 +36,29 @@ class LidOpenings(NamedTuple):
     lower_right: float
 
     def scaled(self, factors: tuple[float, float, float, float]) -> "LidOpenings":
-        """Return the openings times factors, none wider than open.
+        """Return the openings times factors, slowing down towards fully open.
 
         factors: of the left and right upper, then of the left and right lower lid
         """
         left, right, lower_left, lower_right = factors
         return LidOpenings(
-            min(1.0, self.left * left),
-            min(1.0, self.right * right),
+            _times(self.left, left),
+            _times(self.right, right),
             self.blink,
-            min(1.0, self.lower_left * lower_left),
-            min(1.0, self.lower_right * lower_right),
+            _times(self.lower_left, lower_left),
+            _times(self.lower_right, lower_right),
         )
+
+
+def _times(opening: float, factor: float) -> float:
+    """Return an opening times a factor; a lid that opens does not stop at once when it is open.
+
+    Beyond factor 1 it approaches 1 as tanh does, with the same slope and no bend at 1.
+    """
+    room = 1.0 - opening
+    if factor <= 1.0 or room <= 0.0:
+        return min(1.0, opening * factor)
+    return opening + room * tanh(opening * (factor - 1.0) / room)
 
 
 class Lids:

@@ -1,0 +1,127 @@
+"""Gestures begin, end and are interrupted at random moments: no joint jumps or breaks a limit."""
+
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from gazerig.config.gestures import shipped_gestures
+from gazerig.config.schema import load_rig
+from gazerig.gaze.gesture import GestureParams
+from gazerig.gaze.gesture_player import GesturePlayer
+from gazerig.gaze.lids import LidOpenings
+from gazerig.gaze.pose_offset import PoseOffset
+from gazerig.gaze.types import Floats
+from gazerig.robot.app.gaze_models import kinematics_of
+from gazerig.robot.app.rig_limits import lid_ends, lid_spans, limits
+from gazerig.robot.control.gesture_choices import GestureChoices
+from gazerig.robot.model.commands import Play
+from gazerig.robot.model.kinematics import LIDS, NECK
+from gazerig.robot.model.types import further
+
+DT = 0.005
+TARGET = (1.0, 0.0, 0.25)
+
+
+class Moments(NamedTuple):
+    """What a chain of interrupted gestures asked of the joints.
+
+    step_deg, speed_share, accel_share: (joints,) largest step in a tick, and largest speed and
+        acceleration over the joint's limit
+    began: gestures that were begun
+    """
+
+    joints: tuple[str, ...]
+    step_deg: Floats
+    speed_share: Floats
+    accel_share: Floats
+    began: int
+
+
+def joint_angles(rig_name: str, offsets: list[PoseOffset]) -> Floats:
+    """Return (n, joints) angles of a head that looks at a point straight ahead all the while."""
+    rig = load_rig(rig_name)
+    kinematics, ends = kinematics_of(rig), lid_ends(rig)
+    columns: dict[str, list[float]] = {name: [] for name in rig.names}
+    for offset in offsets:
+        left, right = kinematics.eyes_on(TARGET, *kinematics.head_pose(offset.head_rad))
+        yaw, pitch = offset.eyes_rad
+        lids = LidOpenings(0.9, 0.9, False, 0.9, 0.9).scaled(offset.lids)
+        openings = lids.left, lids.right, lids.lower_left, lids.lower_right
+        angles = {
+            "left_eye_pan": left[0] + yaw, "left_eye_tilt": left[1] + pitch,
+            "right_eye_pan": right[0] + yaw, "right_eye_tilt": right[1] + pitch,
+            "eyes_pan": 0.5 * (left[0] + right[0]) + yaw, "eyes_tilt": left[1] + pitch,
+            **dict(zip(NECK, offset.head_rad, strict=True)),
+            **dict(zip(further(rig.joints), offset.joints_rad, strict=True)),
+            **{lid: ends[lid][0] + opening * (ends[lid][1] - ends[lid][0])
+               for lid, opening in zip(LIDS, openings, strict=True) if lid in ends},
+        }  # fmt: skip
+        for name, column in columns.items():
+            column.append(angles[name])
+    return np.array(list(columns.values())).T
+
+
+def interrupted(gesture: str, rig_name: str, moments: int, seed: int) -> Moments:
+    """Play a gesture and, at random moments, another one, the same again, or nothing."""
+    rig, random = load_rig(rig_name), np.random.default_rng(seed)
+    player = GesturePlayer(len(further(rig.joints)))
+    choices = GestureChoices(shipped_gestures(), player, GestureParams(), rig.names, lid_spans(rig))
+    bounds, others = limits(rig.joints), (*choices.names, gesture, gesture, "")
+    at_rest = tuple([0.0] * len(rig.names))
+    offsets, t, began = [player.step(0.0)] * 3, 0.0, 0
+    for _ in range(moments):
+        name = gesture if not player.playing else str(random.choice(others))
+        speed = float(random.uniform(0.5, 2.0))
+        reply = choices.play(Play(name, speed), t, at_rest, bounds)
+        began += bool(name) and not reply.refused
+        for _ in range(int(random.integers(1, 50))):
+            t += DT
+            offsets.append(player.step(t))
+    angles = joint_angles(rig_name, offsets)
+    step = np.abs(np.diff(angles, axis=0)).max(axis=0)
+    accel = np.abs(np.diff(angles, 2, axis=0)).max(axis=0) / DT**2
+    return Moments(
+        rig.names,
+        np.degrees(step),
+        step / DT / [one.speed_rad_s for one in bounds],
+        accel / [one.accel_rad_s2 for one in bounds],
+        began,
+    )
+
+
+RIG_OF = dict(
+    zip(shipped_gestures(), ("expressive", "desk", "maker", "expressive", "feetech") * 9, strict=False)
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("gesture", shipped_gestures())
+def test_no_joint_jumps_or_breaks_a_limit_at_1000_random_moments(gesture: str) -> None:
+    found = interrupted(gesture, RIG_OF[gesture], 1000, seed=len(gesture))
+    assert found.began > 700
+    assert found.step_deg.max() > 0.1  # something has moved
+    assert found.speed_share.max() < 1.0
+    assert found.accel_share.max() < 1.0
+
+
+def test_a_player_that_jumps_would_be_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    def at_once(self: GesturePlayer, played: object, t: float, fade: float, wait: float) -> None:
+        self._played, self._begins_s, self._fades = played, t, []  # type: ignore[assignment]
+
+    monkeypatch.setattr(GesturePlayer, "play", at_once)
+    found = interrupted("nod", "desk", 50, seed=1)
+    assert found.accel_share.max() > 10.0
+
+
+if __name__ == "__main__":
+    for rig_name in ("desk", "feetech", "maker", "expressive"):
+        for name in shipped_gestures():
+            if name == "brow_shrug" and rig_name != "expressive":
+                continue
+            one = interrupted(name, rig_name, 1000, seed=7)
+            k, a = int(one.step_deg.argmax()), int(one.accel_share.argmax())
+            print(
+                f"{rig_name:10} {name:12} largest step {one.step_deg[k]:.2f} deg ({one.joints[k]}), "
+                f"speed {one.speed_share.max():.2f}, acceleration {one.accel_share[a]:.2f} of the "
+                f"limit ({one.joints[a]})"
+            )

@@ -1,0 +1,87 @@
+"""Gestures on whole robots over emulated servos in simulated time: followed, within every limit."""
+
+from math import degrees
+
+import numpy as np
+import pytest
+
+from gazerig.config.load import shipped_names
+from gazerig.config.schema import load_rig
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.rig_limits import limits
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.model.commands import LookAt, Play
+from gazerig.robot.model.gaze_error import gaze_error
+from gazerig.robot.model.reply import CommandReply
+
+DT = 0.005
+POINT = (1.0, 0.0, 0.25)
+
+
+def ticks(made: Assembly, number: int) -> list[Tick]:
+    done = []
+    for _ in range(number):
+        made.clock.sleep_until(made.clock.now_s() + DT)
+        done.append(made.robot.tick(made.clock.now_s(), DT))
+    return done
+
+
+def played(made: Assembly, gesture: str) -> tuple[CommandReply, list[Tick]]:
+    """Play a gesture and go on until shortly after its end."""
+    ticket = made.robot.command(Play(gesture))
+    first = ticks(made, 1)
+    reply = ticket.wait(0.0)
+    assert reply is not None and reply.gesture is not None, reply
+    return reply, first + ticks(made, int(reply.gesture.duration_s / DT) + 60)
+
+
+@pytest.mark.parametrize("name", shipped_names("rigs"))
+def test_joints_follow_gestures_within_limits_and_the_eyes_stay_on_the_point(name: str) -> None:
+    rig = load_rig(name)
+    made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
+    bounds = limits(rig.joints)
+    lids = np.array([joint.endswith("lid") for joint in rig.names])
+    try:
+        made.robot.start(made.clock)
+        made.robot.command(LookAt(POINT, "test", stay=True))
+        before = ticks(made, 500)[-1]
+        for gesture in ("nod", "shake", "laugh", "look_around"):
+            _, done = played(made, gesture)
+            desired = np.array([tick.desired_rad for tick in done])
+            commanded = np.array([tick.guard_result.command_rad for tick in done])
+            measured = np.array([tick.joints.position_rad for tick in done])
+            for j, limit in enumerate(bounds):
+                one = commanded[:, j]
+                assert limit.low_rad - 1e-9 <= one.min() and one.max() <= limit.high_rad + 1e-9
+                assert np.abs(np.diff(one)).max() / DT <= limit.speed_rad_s * (1.0 + 1e-6)
+                assert np.abs(np.diff(one, 2)).max() / DT**2 <= limit.accel_rad_s2 * (1.0 + 1e-6)
+            # A blink may come in between and ask for more than a lid can do; nothing else may.
+            assert np.array_equal(desired[:, ~lids], commanded[:, ~lids])
+            moved = np.ptp(commanded[:, ~lids], axis=0)
+            if gesture != "laugh" or "neck_pitch" in rig.names:
+                assert degrees(moved.max()) > 4.0
+            behind = np.abs(commanded - measured)[:, ~lids].max(axis=0)
+            assert degrees(behind.max()) < 7.0 and (behind < 0.75 * moved + 0.02).all()
+            assert np.abs(desired[-1] - before.desired_rad)[~lids].max() < np.radians(0.8)
+            if gesture in ("nod", "shake", "laugh") and "neck_pitch" in rig.names:
+                errors = [
+                    gaze_error(POINT, tick.pose, "eyes_pan" not in rig.names) for tick in done
+                ]
+                assert max(degrees(error.whole) for error in errors) < 1.0
+    finally:
+        made.close()
+
+
+def test_eyes_that_did_not_compensate_would_be_found() -> None:
+    """The nod moves the head by more than the eyes may be off."""
+    made = assemble(load_rig("desk"), RunOptions(mock=True, fast=True, scene="visitor"))
+    try:
+        made.robot.start(made.clock)
+        made.robot.command(LookAt(POINT, "test", stay=True))
+        ticks(made, 500)
+        _, done = played(made, "nod")
+        pitch = [tick.pose.head_rad[1] for tick in done]
+        assert degrees(max(pitch) - min(pitch)) > 7.0
+    finally:
+        made.close()
