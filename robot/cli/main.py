@@ -14,7 +14,7 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.file_input import read_limited
 from gazerig.drivers.file_output import write_file
 from gazerig.drivers.serial.list_ports import serial_ports
-from gazerig.robot.cli import doctor, kinds, monitor, reboot, scan, setup
+from gazerig.robot.cli import doctor, gestures, kinds, monitor, reboot, scan, setup
 from gazerig.robot.cli import emulate as cli_emulate
 from gazerig.robot.cli import motion as cli_motion
 from gazerig.robot.cli import record as cli_record
@@ -43,7 +43,7 @@ app = typer.Typer(
 )
 for part in (
     cli_run,
-    *(kinds, scan, setup, doctor, cli_calibrate, cli_motion, monitor, reboot),
+    *(kinds, scan, setup, doctor, cli_calibrate, cli_motion, gestures, monitor, reboot),
     cli_tune,
     cli_record,
     cli_replay,

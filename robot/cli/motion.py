@@ -143,7 +143,7 @@ def _commanded(
         signals() as stopped,
         rig_ports(rig, way.mock, way.port) as wire,
     ):
-        enter = _enter if hold and sys.stdin.isatty() else _never
+        enter = enter_pressed if hold and sys.stdin.isatty() else _never
         params = JogParams(speed_deg_s=_gentle(rig, speed))
         watch = _StatusLine().show if sys.stderr.isatty() else None
         end = lambda: stopped() or enter()  # noqa: E731
@@ -200,7 +200,7 @@ def _never() -> str | None:
     return None
 
 
-def _enter() -> str | None:
+def enter_pressed() -> str | None:
     """Return whether Enter was pressed, without waiting."""
     if not select.select([sys.stdin], [], [], 0.0)[0]:
         return None
