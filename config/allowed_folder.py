@@ -15,6 +15,7 @@ from gazerig.config.renamed import renamed_changes
 _KIND_OF_KEY = {
     "gaze.scanpath.transition_matrix": "scanpaths",
     "profile": "profiles",
+    "gesture_files": "",
     "detector.model_file": "",
     "oak.face_model": "",
 }
@@ -65,9 +66,13 @@ class AllowedFolder:
         """
         faults: list[ConfigFault] = []
         for key, value in _leaves("", renamed_changes(changes)):
-            if isinstance(value, str) and value and key in _KIND_OF_KEY:
+            files = (value,) if isinstance(value, str) else value
+            if key not in _KIND_OF_KEY or not isinstance(files, list | tuple):
+                continue
+            for file in files:
                 try:
-                    self.file(value, _KIND_OF_KEY[key], key, Path.cwd())
+                    if isinstance(file, str) and file:
+                        self.file(file, _KIND_OF_KEY[key], key, Path.cwd())
                 except ConfigError as error:
                     faults += error.faults
         if faults:

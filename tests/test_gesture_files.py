@@ -10,9 +10,12 @@ import pytest
 from emulated_rig import EmulatedRig
 from typer.testing import CliRunner
 
+from gazerig.config.allowed_folder import AllowedFolder
 from gazerig.config.gestures import load_gesture
+from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import ServoFault, SetupError
+from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.gaze.key_frames import fitted_keys, smoothed
 from gazerig.gaze.minimum_jerk_curve import MinimumJerkCurve
 from gazerig.robot.app.gesture_file import TOLERANCE_DEG, gesture_text, write_gesture
@@ -166,31 +169,28 @@ def test_a_head_moved_by_hand_becomes_a_gesture_that_moves_it_so(tmp_path: Path)
 def test_torque_that_comes_on_ends_the_recording() -> None:
     bench = Bench()
     switch_off(DESK.joints, bench.port)
-    bench.rig.clock.sleep_until(bench.rig.clock.now_s() + 0.1)
-    neck = bench.servo("neck_yaw")
-    with pytest.raises(SetupError, match="the torque of neck_yaw came on: another program"):
-        record(_switched_on(bench, neck), bench.rig.clock, lambda: None, 2.0)
-
-
-def _switched_on(bench: Bench, neck: Any) -> Callable[[], TelemetrySample]:
     left = iter(range(5))
 
     def sample() -> TelemetrySample:
-        if next(left, None) is None:
-            neck.memory.bytes[64] = 1
-            neck.memory.set("torque_enable", 1) if hasattr(neck.memory, "set") else None
+        if next(left, None) is None:  # as another program does
+            Registers(bench.port, KINDS["dynamixel"].family).write(7, "torque_enable", 1)
         return bench.monitor.sample()
 
-    return sample
+    with pytest.raises(SetupError, match="the torque of neck_yaw came on: another program"):
+        record(sample, bench.rig.clock, lambda: None, 2.0)
 
 
 def test_a_servo_that_does_not_let_go_is_named_and_all_others_are_off() -> None:
     bench = Bench()
-    ids = [joint.id for joint in DESK.joints.values()]
-    bench.servo("neck_yaw").silent = True
-    with pytest.raises(ServoFault, match=r"neck_yaw \(servo 7\): not known to have let go"):
+    registers = Registers(bench.port, KINDS["dynamixel"].family)
+    for joint in DESK.joints.values():
+        assert registers.write(joint.id, "torque_enable", 1)
+    bench.rig.command("lose 1")
+    with pytest.raises(ServoFault, match=r"left_eye_pan \(servo 1\): not known to have let go"):
         switch_off(DESK.joints, bench.port)
-    assert len(ids) == 9
+    bench.rig.command("clear")
+    held = [joint.id for joint in DESK.joints.values() if registers.read(joint.id, "torque_enable")]
+    assert not held
 
 
 def test_hobby_servos_and_a_closed_input_are_refused_before_anything_moves(tmp_path: Path) -> None:
@@ -202,3 +202,10 @@ def test_hobby_servos_and_a_closed_input_are_refused_before_anything_moves(tmp_p
     )
     assert unsaid.exit_code != 0 and "goes off and stays off" in unsaid.stderr
     assert "hold it and say --yes" in unsaid.stderr
+
+
+def test_a_page_names_gesture_files_in_its_folder_alone(tmp_path: Path) -> None:
+    folder = AllowedFolder(tmp_path)
+    folder.changes({"gesture_files": [str(tmp_path / "mine.yaml")]})
+    with pytest.raises(ConfigError, match="gesture_files"):
+        folder.changes({"gesture_files": [str(tmp_path / "mine.yaml"), "/etc/passwd.yaml"]})

@@ -23,6 +23,7 @@ TOLERANCE_DEG = 0.7
 _DENSE_S = 0.09
 """Rows closer than this are samples of a motion, not keys that somebody has set."""
 _LARGEST_S = 60.0
+_STILL_DEG = 0.01
 
 Series = tuple[Floats, Floats]
 Keys = dict[str, list[tuple[float, float]]]
@@ -57,7 +58,7 @@ def gesture_text(rig: Rig, series: Mapping[str, Series], description: str) -> st
             keys.setdefault(_track(name), []).append((time_s, value))
     keys = {track: _mean(found) for track, found in keys.items() if found}
     if not keys:
-        raise SetupError(f"nothing moves by more than {TOLERANCE_DEG:g} deg")
+        raise SetupError(f"nothing moves; movements below {TOLERANCE_DEG:g} deg count as jitter")
     return _text(keys, description)
 
 
@@ -114,6 +115,8 @@ def _keys(
     """Return the keys of one joint; of a lid, factors of its first opening."""
     dense = len(times_s) > 4 and float(np.median(np.diff(times_s))) < _DENSE_S
     values = angles_deg - angles_deg[0]
+    if np.abs(values).max() <= _STILL_DEG:
+        return []
     if dense:
         times, values = fitted_keys(*smoothed(times_s, values), TOLERANCE_DEG)
         times = times + float(times_s[0]) - start_s

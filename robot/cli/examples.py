@@ -48,6 +48,12 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("calibrate camera my.yaml", "the lens, and where the camera sits"),
         ("calibrate face my.yaml --oak", "steer the gaze onto your own eyes and mouth"),
     ),
+    "record-gesture": (
+        ("record-gesture my.yaml greeting", "torque off; move the head by hand, Enter ends it"),
+    ),
+    "import-gesture": (
+        ("import-gesture my.yaml wave.csv wave --fps 24", "key frames of an animation program"),
+    ),
     "monitor": (("monitor my.yaml", "watch temperatures, loads and positions"),),
     "record-camera": (
         ("record-camera seen.mcap --oak", "keep frames, depth and times of a camera"),
@@ -127,7 +133,10 @@ PANELS: dict[str, tuple[str, ...]] = {
     "Bring-up": (
         *("scan", "setup", "doctor", "calibrate", "jog", "home", "look-at", "monitor", "reboot"),
     ),
-    "Tools": ("check", "kinds", "schema", "emulate", "record-camera", "fit-scanpath"),
+    "Tools": (
+        *("check", "kinds", "schema", "emulate", "record-camera", "record-gesture"),
+        *("import-gesture", "fit-scanpath"),
+    ),
 }
 """What help shows together."""
 
