@@ -24,7 +24,7 @@ from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.plugins import BusPlugin
 from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_models import SERVOS
-from gazerig.gaze.gesture import Gesture
+from gazerig.gaze.gesture import LID_GROUPS, Gesture, KeyFrame
 from gazerig.robot.cli.examples import EXAMPLES
 from gazerig.robot.model.joint import JointParams
 from gazerig.sim_mock.scenes.registry import scenes
@@ -233,6 +233,7 @@ SAID = {
     *("ok", "bus ok", "null", "None", "path", '"baud": null', '{"ok": ...}', '{"error": ...}'),
     *("q", "n", "y", "+", "-", "@", "left 3", "enter", "skip", "back", "end", "turn 300"),
     # formats, bytes, and what is typed elsewhere
+    *("{all: 0.5}", "{jaw: 8, left_brow: 10}", "refuse", "slow", "joint", "time", "angle", "frame"),
     *("time,x,y", "start,duration,part", "N: [x0, y0, x1, y1]", "start + k * period"),
     *("84 00 70 2E", "2B", "83 01", "17", "FF FF 01 02 01 FB", "pytest -k e17"),
     *("sudo udevadm control --reload", "sudo usermod -aG dialout $USER", "ls /dev/serial/by-id"),
@@ -270,6 +271,7 @@ def test_every_span_names_something_that_is_there(paper: Path) -> None:
         *DYNAMIXEL.registers,
         *FEETECH.registers,
     }
+    words |= {field.name for field in (*fields(KeyFrame), *fields(Gesture))} | {*LID_GROUPS}
     for span in spans(paper):
         if span.startswith(("gazerig ", "--", "make ", "pip install ", "/dev/", "/etc/", "test_")):
             continue
