@@ -16,11 +16,11 @@ from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.drivers.servo_bus.registers import Registers
-from gazerig.gaze.key_frames import fitted_keys, smoothed
 from gazerig.gaze.minimum_jerk_curve import MinimumJerkCurve
 from gazerig.robot.app.gesture_file import TOLERANCE_DEG, gesture_text, write_gesture
 from gazerig.robot.bringup.hand_recording import record, switch_off
 from gazerig.robot.bringup.key_frame_table import read_table
+from gazerig.robot.bringup.key_frames import fitted_keys, smoothed
 from gazerig.robot.bringup.monitor import Monitor, TelemetrySample
 from gazerig.robot.bringup.servo_families import KINDS
 from gazerig.robot.bringup.telemetry import SmartServoTelemetry
