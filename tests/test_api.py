@@ -10,6 +10,8 @@ import pytest
 import gazerig
 from gazerig.drivers.types import DetectedFace, Detections, ImageArray
 from gazerig.gaze.types import GazeState, Percept, Vec3
+from gazerig.robot.app.resimulate import rerun
+from gazerig.robot.recording.read import RunRecording
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -198,6 +200,21 @@ def bytes_sent(seed: int) -> tuple[str | None, float]:
 
 def test_the_same_steps_and_orders_give_the_same(head: gazerig.SimulatedHead) -> None:
     assert bytes_sent(1) == bytes_sent(1) != bytes_sent(2)
+
+
+def test_a_program_is_recorded_and_done_again_to_the_same_bytes(tmp_path: Path) -> None:
+    file = tmp_path / "program.mcap"
+    with gazerig.open("desk", fast=True, scene="face-to-face", record=file, say=quiet) as head:
+        head.step(1.0)
+        head.look_at_pixel(200.0, 150.0).wait()
+        head.play("nod")
+        head.look_towards(20.0, 0.0, frame="head", for_s=0.3)
+        head.step(0.5)
+        head.look_at_person(head.people[0].id).wait()
+        head.jog("neck_yaw", 10.0)
+        head.step(0.5)
+    again = rerun(RunRecording(file))
+    assert again.same and again.tx_same and not again.notes
 
 
 def test_a_head_moves_in_its_block_alone() -> None:
