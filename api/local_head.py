@@ -30,6 +30,30 @@ _POLL_S = 0.004
 _ENDED = "the program"
 
 
+class _SwitchInterval:
+    """Restores how often threads take turns, which control loops shorten, after the last loop."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._running = 0
+        self._before_s = 0.0
+
+    def __enter__(self) -> None:
+        with self._lock:
+            if not self._running:
+                self._before_s = sys.getswitchinterval()
+            self._running += 1
+
+    def __exit__(self, *raised: object) -> None:
+        with self._lock:
+            self._running -= 1
+            if not self._running:
+                sys.setswitchinterval(self._before_s)
+
+
+_SWITCHING = _SwitchInterval()
+
+
 class LocalHead(Head):
     """A head whose control loop is in this program; ``gazerig.open`` makes one.
 
@@ -155,11 +179,8 @@ class RunningHead(LocalHead):
         """Switch the torque on where the joints are, and run; return when the loop ticks."""
         self._owner = threading.current_thread()
         composed = self._compose()
-        switching_s = sys.getswitchinterval()
         # Not a daemon: at the end of the interpreter it parks before it ends.
-        self._thread = threading.Thread(
-            target=self._run, args=(composed, switching_s), name=f"head {self.rig}"
-        )
+        self._thread = threading.Thread(target=self._run, args=(composed,), name=f"head {self.rig}")
         self._thread.start()
         try:
             while not self._begun.wait(0.05) and not self._over.is_set():
@@ -202,17 +223,17 @@ class RunningHead(LocalHead):
                 return
             self._clock.sleep_until(min(now_s + _POLL_S, end_s))
 
-    def _run(self, composed: session.ComposedRun, switching_s: float) -> None:
+    def _run(self, composed: session.ComposedRun) -> None:
         """Run from torque on to torque off; the thread of the loop."""
         ended = "fault: unexpected error"
         try:
-            figures = session.run(composed, self._interrupts, self._say, watch=self._update)
+            with _SWITCHING:
+                figures = session.run(composed, self._interrupts, self._say, watch=self._update)
             ended = str(figures["stopped_by"])
         except BaseException as error:
             self._failure = error
             ended = f"fault: {error}"
         finally:
-            sys.setswitchinterval(switching_s)
             self._ended = ended
             self._over.set()
 

@@ -174,6 +174,20 @@ def test_two_heads_in_one_program_are_found_by_their_rigs(said: list[str]) -> No
     )
 
 
+def test_the_first_of_two_heads_may_end_first(said: list[str]) -> None:
+    switching_s = sys.getswitchinterval()
+    first, second = opened(said), opened(said, "feetech")
+    with first:
+        second.__enter__()
+        shortened_s = sys.getswitchinterval()
+    try:
+        assert sys.getswitchinterval() == shortened_s < switching_s
+        assert second.look_at(1.0, -0.3, 0.3).wait(100.0) == "arrived"
+    finally:
+        second.__exit__(None, None, None)
+    assert sys.getswitchinterval() == switching_s
+
+
 def test_another_program_has_the_same_orders(head: gazerig.Head) -> None:
     mine = head.look_at(1.0, 0.4, 0.3)
     mine.wait(100.0)
