@@ -30,7 +30,10 @@ from gazerig.drivers.plugins import (
     Plugin,
     PluginError,
 )
+from gazerig.robot.app.camera_factory import real_camera
+from gazerig.robot.app.options import RunOptions, camera_of
 from gazerig.robot.cli import kinds
+from gazerig.robot.model.clock import RealClock
 
 DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
 
@@ -273,3 +276,79 @@ def test_kinds_lists_all_with_package_abilities_and_proof(folder, capsys):
     kinds.kinds(as_json=False)
     shown = capsys.readouterr().out
     assert "tallest" in shown and taken in shown
+
+
+# --- cameras
+
+
+FISH = """
+    import numpy as np
+    from dataclasses import dataclass
+    from typing import Annotated
+    from gazerig.drivers.camera.source import Shot
+    from gazerig.drivers.plugins import CameraPlugin
+    from gazerig.drivers.types import Detections
+    from gazerig.params import Bounds
+
+    @dataclass(frozen=True)
+    class Params:
+        grey: Annotated[int, Bounds(0, 255), "of its frames"] = 7
+
+    class Frames:
+        def __init__(self, params):
+            self.grey, self.number = params.grey, 0
+        def open(self): pass
+        def take(self, now_s, stop):
+            stop.wait(0.01)
+            self.number += 1
+            return Shot(now_s(), self.number, np.full((24, 32, 3), self.grey, np.uint8))
+        def events(self): return ()
+        def close(self): pass
+
+    class Finds(Frames):
+        def latest(self, now_s):
+            self.number += 1
+            return Detections(now_s, self.number, 32, 24)
+        take = property()
+
+    FRAMES, FINDS = CameraPlugin(Frames, Params), CameraPlugin(Finds, Params)
+"""
+
+
+def fish_rig(tmp_path, section="frames:\n  grey: 9\n"):
+    file = tmp_path / "mine.yaml"
+    file.write_text(DESK.read_text(encoding="utf-8") + "\n" + section, encoding="utf-8")
+    return load_rig(str(file))
+
+
+@pytest.fixture
+def fish(folder):
+    parts = {CAMERA: {"frames": "fish_camera:FRAMES", "finds": "fish_camera:FINDS"}}
+    install(folder, "fish", parts, {"fish_camera": FISH})
+
+
+@pytest.mark.parametrize("name", [pytest.param("frames", marks=pytest.mark.slow), "finds"])
+def test_a_camera_of_a_package_is_looked_through_by_its_name(fish, tmp_path, name):
+    rig, clock = fish_rig(tmp_path), RealClock()
+    options = RunOptions(mock=True, camera=camera_of(name))
+    camera = real_camera(rig, options, clock, rig.camera, None)
+    camera.open()
+    try:
+        until_s = clock.now_s() + 60.0
+        while (found := camera.latest(clock.now_s())) is None:
+            assert clock.now_s() < until_s, camera.events()
+        assert (found.width_px, found.height_px) == (32, 24)
+        assert found.image is None if name == "finds" else (found.image == 9).all()
+    finally:
+        camera.close()
+    assert camera.events() == ()
+
+
+def test_the_section_of_a_camera_is_checked_and_waits_for_the_next_start(fish, tmp_path):
+    with pytest.raises(ConfigError, match=r"frames\.grey: 999 is above 255"):
+        fish_rig(tmp_path, "frames:\n  grey: 999\n")
+    with pytest.raises(ConfigError, match="unknown key 'framse'; did you mean"):
+        fish_rig(tmp_path, "framse:\n  grey: 9\n")
+    rig = fish_rig(tmp_path)
+    (grey,) = [one for one in parameters(rig, rig) if one.key == "frames.grey"]
+    assert grey.live.startswith("next start")

@@ -12,6 +12,9 @@ from gazerig.drivers.types import Camera, DetectedFace, Detections, MovingBlob
 LONGEST_S = 0.001
 """It is waited for so long in a tick; after that the loop goes on with what it had."""
 
+CLOSE_S, CLOSE_PROCESS_S = 2.0, 15.0
+"""A camera, and a process that reads one and ends itself, are waited for so long as they close."""
+
 SILENT_S = 1.0
 """A call that lasts longer is reported."""
 
@@ -27,12 +30,19 @@ class GuardedCamera:
         label: the camera as messages name it.
         longest_s: it is waited for so long in a tick, real seconds; None: to the end of the call,
             for simulated time.
+        close_s: it is waited for so long as it is closed, real seconds.
     """
 
-    def __init__(self, camera: Camera, label: str, longest_s: float | None = LONGEST_S) -> None:
+    def __init__(
+        self,
+        camera: Camera,
+        label: str,
+        longest_s: float | None = LONGEST_S,
+        close_s: float = CLOSE_S,
+    ) -> None:
         self.camera = camera
         self._label = label
-        self._longest_s = longest_s
+        self._longest_s, self._close_s = longest_s, close_s
         self._call = BoundedCall(f"camera {label}", longest_s)
         self._log = EventLog()
         self._newest: Detections | None = None
@@ -89,7 +99,7 @@ class GuardedCamera:
     def close(self) -> None:
         """Close the camera, whatever it does; safe to call twice."""
         self._call.close()
-        outcome = BoundedCall(f"close {self._label}", 2.0)(self.camera.close)
+        outcome = BoundedCall(f"close {self._label}", self._close_s)(self.camera.close)
         if outcome is None:
             self._log.add(f"{self._label} does not end: it is left behind")
         elif outcome.error is not None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from gazerig.config.schema import Rig
 from gazerig.drivers.camera.camera_plugins import camera_part, is_source, plugin_source
-from gazerig.drivers.camera.guarded_camera import GuardedCamera
+from gazerig.drivers.camera.guarded_camera import CLOSE_PROCESS_S, GuardedCamera
 from gazerig.drivers.camera.oak.source import OakSource
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay
@@ -95,7 +95,8 @@ def real_camera(
     camera = camera_part(name, params)
     if is_source(camera):
         parts = CameraParts(partial(plugin_source, name, params), detector, motion)
-        return GuardedCamera(CameraProcess(parts, clock.now_s, rig.camera_recovery), label)
+        process = CameraProcess(parts, clock.now_s, rig.camera_recovery)
+        return GuardedCamera(process, label, close_s=CLOSE_PROCESS_S)
     return GuardedCamera(cast(Camera, camera), label)
 
 
