@@ -1,9 +1,11 @@
 """Gestures by name: those shipped, and those of a rig's own files; each read and checked."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache
 from math import radians
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -67,6 +69,13 @@ def gestures_of(files: Sequence[str]) -> dict[str, Gesture]:
     if faults:
         raise ConfigError(faults)
     return found
+
+
+@dataclass(frozen=True)
+class GestureSet:
+    """Gestures as a recording keeps them."""
+
+    gestures: Annotated[Mapping[str, Gesture], "a rig's own gestures, by name"]
 
 
 def gesture_path(file: str) -> Path:

@@ -3,9 +3,12 @@
 It is read back with ``gazerig.config.load.load``; values come back exactly.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
+from gazerig.config.gestures import GestureSet, gesture_name, gesture_path, load_gesture
+from gazerig.config.load import load
 from gazerig.config.parameters import plain
 from gazerig.config.save_text import written
 from gazerig.config.schema import Rig, load_walk
@@ -23,6 +26,30 @@ def walk_text(name_or_path: str) -> str:
         gazerig.config.load.ConfigError: the walk is at fault.
     """
     return "".join(_lines(plain(load_walk(name_or_path))))
+
+
+def gestures_text(files: Sequence[str]) -> str:
+    """Return the gestures that a rig names itself as one YAML text, "" where it names none.
+
+    Raises:
+        gazerig.config.load.ConfigError: one is at fault.
+    """
+    found = {gesture_name(file): load_gesture(gesture_path(file)) for file in files}
+    return "".join(_lines(plain(GestureSet(found)))) if found else ""
+
+
+def gesture_files(text: Path, folder: Path) -> tuple[str, ...]:
+    """Write each gesture of a text of ``gestures_text`` to a file of its own; return the files.
+
+    Raises:
+        gazerig.config.load.ConfigError: the text is at fault.
+    """
+    files = []
+    for name, gesture in load(text, GestureSet).gestures.items():
+        file = folder / f"{name}.yaml"
+        file.write_text("".join(_lines(plain(gesture))), encoding="utf-8")
+        files.append(str(file))
+    return tuple(files)
 
 
 def _lines(values: dict[str, Any], depth: int = 0) -> Iterator[str]:

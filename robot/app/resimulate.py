@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 
 from gazerig.config.load import ConfigError, load, shipped
 from gazerig.config.schema import Rig, load_rig
-from gazerig.config.text import rig_text
+from gazerig.config.text import gesture_files, rig_text
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app.assemble import Substitutes, assemble
@@ -320,6 +320,11 @@ def _rig(
     found = base
     if character is not None:
         found = load(_character(character), Rig, defaults=(whole,))
+    if rig is None and recording.info.gestures_yaml:
+        # The files of gestures may have changed since, too.
+        kept = _kept(recording.info.gestures_yaml, folder / "gestures.yaml")
+        (folder / "gestures").mkdir()
+        found = replace(found, gesture_files=gesture_files(kept, folder / "gestures"))
     scanpath = found.gaze.scanpath
     same_walk = rig is None and scanpath.transition_matrix == base.gaze.scanpath.transition_matrix
     if not same_walk or not recording.info.walk_yaml:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.config.schema import Rig, load_rig
-from gazerig.config.text import rig_text, walk_text
+from gazerig.config.text import gestures_text, rig_text, walk_text
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.analysis.behaviour_score import BehaviourScore
 from gazerig.robot.analysis.gaze_on_face import GazeOnFace
@@ -72,6 +72,7 @@ def run_info(rig: Rig, options: RunOptions) -> RunInfo:
         character=options.character,
         config_yaml=rig_text(rig),
         walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix),
+        gestures_yaml=gestures_text(rig.gesture_files),
         seed=options.seed,
         rate_hz=rig.loop.rate_hz,
         started_utc=datetime.now(UTC).isoformat(),

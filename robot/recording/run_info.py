@@ -20,6 +20,7 @@ class RunInfo:
 
     rig, profile, character: names as given on the command line, or paths
     config_yaml: everything in force at the start, of one piece; walk_yaml: the face walk's file
+    gestures_yaml: the gestures that the rig names itself, "" where it names none
     scene: what was simulated, None where a camera looked; eyes: what looked, in words
     mock: emulated servos; fast: simulated time
     rate_hz: control rate at the start; pictures_hz: rate of the recorded frames
@@ -35,6 +36,7 @@ class RunInfo:
     started_utc: str
     character: str | None = None
     walk_yaml: str = ""
+    gestures_yaml: str = ""
     scene: str | None = None
     eyes: str = ""
     mock: bool = False
@@ -101,7 +103,14 @@ def info_of(text: Mapping[str, str]) -> RunInfo:
 
 def _refuse_nonsense(info: RunInfo) -> None:
     """Refuse what no run is started with; files are made with these numbers and names."""
-    texts = (info.rig, info.profile, info.config_yaml, info.walk_yaml, info.eyes)
+    texts = (
+        info.rig,
+        info.profile,
+        info.config_yaml,
+        info.walk_yaml,
+        info.gestures_yaml,
+        info.eyes,
+    )
     maybe = (info.character, info.scene)
     if not all(isinstance(word, str) for word in texts + tuple(m for m in maybe if m is not None)):
         raise ValueError("a name of the run is no text")
