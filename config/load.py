@@ -186,13 +186,17 @@ def _from_its_folder(layer: Entry) -> Entry:
         return layer
     folder = Path(layer.file).parent
     paths = tuple(
-        replace(one, value=str(folder / one.value))
-        if isinstance(one.value, str) and not one.value.startswith("~")
-        else one
+        replace(one, value=str(folder / str(one.value))) if _is_relative(one.value) else one
         for one in found.value
     )
     assert isinstance(layer.value, dict)
     return replace(layer, value={**layer.value, _FILES_BESIDE: replace(found, value=paths)})
+
+
+def _is_relative(value: object) -> bool:
+    """Return whether it is a path below a folder; a bare name is that of a package's file."""
+    path = isinstance(value, str) and ("/" in value or value.endswith((".yaml", ".yml")))
+    return path and not str(value).startswith("~")
 
 
 def _merged(low: Entry, high: Entry, into: type | None = None) -> Entry:

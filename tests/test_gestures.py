@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.interpolate import make_interp_spline
 
 from gazerig.config.gestures import gestures_of, load_gesture, shipped_gestures
-from gazerig.config.load import ConfigError, shipped_names
+from gazerig.config.load import ConfigError, shipped, shipped_names
 from gazerig.config.schema import load_rig
 from gazerig.gaze.gesture import POSE_TRACKS, Gesture, KeyFrame, keys_of
 from gazerig.gaze.minimum_jerk_curve import MinimumJerkCurve
@@ -206,3 +206,22 @@ def test_a_rig_with_gestures_of_its_own_is_checked_with_them(tmp_path: Path) -> 
     (fault,) = caught.value.faults
     assert fault.key == "gesture_files.1" and "neck_yaw at 0.0" in fault.rule
     assert fault.line == whole.count("\n") + 2
+
+
+def test_paths_of_gestures_begin_at_the_rig_s_file_and_bare_names_stay(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "rigs").mkdir()
+    (tmp_path / "rigs" / "hello.yaml").write_text(
+        "description: x\nframes:\n  - {time_s: 0.5, head_yaw_deg: 5}\n", encoding="utf-8"
+    )
+    mine = tmp_path / "rigs" / "mine.yaml"
+    whole = shipped("rigs", "desk").read_text(encoding="utf-8")
+    mine.write_text(f"{whole}\ngesture_files: [hello.yaml]\n", encoding="utf-8")
+    monkeypatch.chdir(tmp_path)  # not where the rig is
+    rig = load_rig("rigs/mine.yaml")
+    assert "hello" in gestures_of(rig.gesture_files)
+    mine.write_text(f"{whole}\ngesture_files: [hello]\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match="hello") as caught:
+        load_rig("rigs/mine.yaml")
+    assert "rigs/hello" not in str(caught.value)  # looked for among packages, not in the folder
