@@ -26,8 +26,14 @@ T = TypeVar("T")
 _GROUPS = {"rigs": RIGS, "gestures": GESTURES}
 """Kinds of files that packages bring too."""
 
-_SHIPPED = Path(str(importlib.resources.files("gazerig.config")))
-RIGS_FOLDER, GESTURES_FOLDER = _SHIPPED / "rigs", _SHIPPED / "gestures"
+
+def _shipped() -> Path:
+    return Path(str(importlib.resources.files("gazerig.config")))
+
+
+RIGS_FOLDER, GESTURES_FOLDER = _shipped() / "rigs", _shipped() / "gestures"
+"""What this package registers in the groups of rigs and gestures."""
+
 
 _FILES_BESIDE = "gesture_files"
 """Key of a rig with paths of files, relative to the folder of the file that names them."""
@@ -136,7 +142,7 @@ def shipped(kind: str, name: str) -> Path:
     """
     names = shipped_names(kind)
     if name in names:
-        return _SHIPPED / kind / f"{name}.yaml"
+        return _shipped() / kind / f"{name}.yaml"
     if kind in _GROUPS:
         return from_packages(kind, name)
     raise _unknown(kind, name, names)
