@@ -12,6 +12,7 @@ from pathlib import Path, PurePosixPath
 
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
+from mkdocs.structure.nav import Navigation
 from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -25,6 +26,9 @@ FROM_ELSEWHERE = {
 }
 """Pages whose source is not in docs/, and their names on the site."""
 
+FIRST = ("index", "tutorial", "examples", "api", "hardware", "tuning", "gestures", "plugins")
+"""Pages at the head of the navigation, in this order; all others follow by name."""
+
 _LINK = re.compile(r"(!?\[([^\]]*)\])\(([^)#\s]*)(#[^)\s]*)?\)")
 
 
@@ -36,6 +40,17 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     for package, text in _reference().items():
         files.append(File.generated(config, f"reference/{package}.md", content=text))
     return files
+
+
+def on_nav(nav: Navigation, config: MkDocsConfig, files: Files) -> Navigation:
+    """Put what a newcomer reads before what is looked up."""
+    nav.items.sort(key=_place)
+    return nav
+
+
+def _place(item: object) -> int:
+    name = PurePosixPath(item.file.src_uri).stem if isinstance(item, Page) else ""
+    return FIRST.index(name) if name in FIRST else len(FIRST)
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
