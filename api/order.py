@@ -139,7 +139,7 @@ class Order:
         self.end()
 
     def _see(self, now: Progress) -> bool:
-        """Take note of the newest lead and gesture; return whether the order has ended."""
+        """See the newest lead and gesture; return whether the order has ended."""
         reply = self._taken_up()
         if reply is None or self._outcome is not None:
             return self._outcome is not None

@@ -18,7 +18,7 @@ LANDMARKS = np.array([(0.3, 0.3), (0.7, 0.3), (0.5, 0.52), (0.35, 0.68), (0.65, 
 
 
 class Skin:
-    """Takes every upright patch of skin for a face above a neck."""
+    """Finds a face in every upright patch of skin above a neck."""
 
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
         """Return the faces in a BGR image, the largest first."""

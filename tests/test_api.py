@@ -17,7 +17,7 @@ pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 
 def quiet(line: str) -> None:
-    """Say nothing."""
+    """Stay silent."""
 
 
 @pytest.fixture

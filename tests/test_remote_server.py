@@ -67,8 +67,12 @@ def test_values_rules_and_changes(rig: RobotClient) -> None:
     assert rig.get() == {RATE: 200.0, BLINKS: 17.0}
     assert rig.get("gaze.") == {BLINKS: 17.0}
     assert rig.parameter(RATE).high == 1000.0 and rig.parameter(RATE).group == "loop"
-    assert rig._asked("knobs", prefix=RATE) == rig._asked("parameters", prefix=RATE) != []
-    assert isinstance(described := rig._asked("parameters", prefix=RATE), list)
+    assert (
+        rig._connection.ask("knobs", prefix=RATE)
+        == rig._connection.ask("parameters", prefix=RATE)
+        != []
+    )
+    assert isinstance(described := rig._connection.ask("parameters", prefix=RATE), list)
     assert described[0]["description"] == described[0]["says"] == "a rate"
     assert rig.set(RATE, 100.0) == ("taken",)
     assert rig.get(RATE) == {RATE: 100.0}

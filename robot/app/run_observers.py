@@ -123,7 +123,7 @@ class RunObservers:
         )
 
     def join(self, observers: Observers) -> None:
-        """Give ticks to all of them; each is left out by itself where it fails."""
+        """Let all of them observe the ticks; each is left out by itself where it fails."""
         if self._shown:
             observers.add("page and status line", self._publisher.update)
         if self._page is not None:

@@ -52,7 +52,26 @@ class LoopCount(NamedTuple):
 
 
 class Robot:
-    """All rooms of one head, wired."""
+    """One head: what it reads, decides and writes in a tick.
+
+    Args:
+        body: the joints on their bus.
+        kinematics: joint angles to head pose and gaze, and back.
+        camera: what is looked through.
+        perception: detections to people and things in the world.
+        poses: where the head was when.
+        attention: chooses the target.
+        scanpath: which part of a face.
+        aversion: looking away in a conversation.
+        oculomotor: target to eyes, head and lids.
+        lids: their blinks can be asked for.
+        animation: gestures and expressions laid over gaze.
+        gestures: those that can be played.
+        guard: between what is desired and the bus.
+        tune: puts changed parameters in force and says what was done.
+        pixels: places pixels of a camera frame in the world.
+        messages: lines for the events of the next tick, to which other parts add theirs.
+    """
 
     def __init__(
         self,
@@ -73,26 +92,6 @@ class Robot:
         pixels: PixelToWorld,
         messages: list[str] | None = None,
     ) -> None:
-        """Wire the parts.
-
-        Args:
-            body: the joints on their bus.
-            kinematics: joint angles to head pose and gaze, and back.
-            camera: what is looked through.
-            perception: detections to people and things in the world.
-            poses: where the head was when.
-            attention: chooses the target.
-            scanpath: which part of a face.
-            aversion: looking away in a conversation.
-            oculomotor: target to eyes, head and lids.
-            lids: their blinks can be asked for.
-            animation: gestures and expressions laid over gaze.
-            gestures: those that can be played.
-            guard: between what is desired and the bus.
-            tune: puts changed parameters in force and says what was done.
-            pixels: places pixels of a camera frame in the world.
-            messages: lines for the events of the next tick, to which other parts add theirs.
-        """
         self.body = body
         self.camera = camera
         self.perception = perception

@@ -60,7 +60,7 @@ class TabLimits:
 
     @contextmanager
     def take(self, name: str) -> Iterator[asyncio.Event]:
-        """Take a slot; the event is set when it has to be freed."""
+        """Occupy a slot; the event is set when it has to be freed."""
         leave = asyncio.Event()
         self._taken[leave] = name
         if len(self._taken) > self._most:

@@ -141,7 +141,7 @@ def watch(feed: socket.socket, view: PageView, parent: int, door: AuthProxy) -> 
 
 
 def _limit_process() -> None:
-    """Give this process a lower priority than the control loop, and limit the cost of bad input."""
+    """Lower the priority of this process below the loop, and limit the cost of bad input."""
     os.nice(_NICENESS)
     least, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (max(least, min(_MOST_FILES, most)), most))

@@ -10,15 +10,13 @@ with RobotClient.connect() as rig:
 """
 
 import os
-import threading
 from collections.abc import Callable, Mapping
 from functools import partial
 from math import radians
 from pathlib import Path
 from typing import Any, cast
 
-from gazerig.drivers.errors import DriverError, SetupError
-from gazerig.errors import HeadEnded, NotFound, Refused
+from gazerig.drivers.errors import DriverError
 from gazerig.robot.control.head_state import HeadEvent, HeadState
 from gazerig.robot.control.head_state import from_json as state_from_json
 from gazerig.robot.model.command_checks import check
@@ -37,6 +35,10 @@ from gazerig.robot.model.commands import (
     Value,
 )
 from gazerig.robot.model.reply import CommandReply
+from gazerig.robot.remote.client_connection import CONNECT_S, ClientConnection
+from gazerig.robot.remote.client_connection import ConnectionLost as ConnectionLost
+from gazerig.robot.remote.client_connection import NoRobotError as NoRobotError
+from gazerig.robot.remote.client_connection import RequestRejected as RequestRejected
 from gazerig.robot.remote.heartbeat import LeadHeartbeat
 from gazerig.robot.remote.param_info import (
     JsonValue,
@@ -47,38 +49,12 @@ from gazerig.robot.remote.param_info import (
 )
 from gazerig.robot.remote.socket_io import (
     ANSWER_BYTES,
-    MalformedMessage,
     Wire,
     dial,
     folder,
     is_private,
     sockets,
 )
-
-_CONNECT_S = 1.0
-_ANSWER_S = 10.0
-_FILES_S = 40.0
-"""For what reads or writes files, which the rig leaves to another process."""
-_WITH_FILES = {"save", "character"}
-
-
-class NoRobotError(SetupError, NotFound):
-    """No rig runs, or not the one that is meant; the message says which do."""
-
-
-class RequestRejected(SetupError, Refused):
-    """The rig runs on as before; the message lists every rule that was broken.
-
-    reply: what the head made of a command that reached it; None where the request was none
-    """
-
-    def __init__(self, message: str, reply: CommandReply | None = None) -> None:
-        super().__init__(message)
-        self.reply = reply
-
-
-class ConnectionLost(DriverError, HeadEnded):
-    """The rig ended or does not answer; the message says which."""
 
 
 class RobotClient:
@@ -96,8 +72,7 @@ class RobotClient:
     def __init__(
         self, wire: Wire, pid: int, who: str = "", dial: Callable[[], Wire] | None = None
     ) -> None:
-        self._wire = wire
-        self._lock = threading.Lock()
+        self._connection = ClientConnection(wire, pid, self._end_heartbeat)
         self.who = who
         self._dial = dial
         self._heartbeat: LeadHeartbeat | None = None
@@ -136,26 +111,25 @@ class RobotClient:
 
     def close(self) -> None:
         """Hang up; the rig runs on, and leads that were not to stay end."""
-        self._end_heartbeat()
-        self._wire.close()
+        self._connection.close()
 
     def state(self, after: int = 0) -> tuple[HeadState | None, tuple[HeadEvent, ...]]:
         """Return the newest tick, None before the first, and events numbered above ``after``."""
-        said = cast(dict[str, Any], self._asked("state", after=after))
+        said = cast(dict[str, Any], self._connection.ask("state", after=after))
         events = tuple(HeadEvent(*one) for one in said["events"])
         return (state_from_json(said["state"]) if said["state"] else None), events
 
     def status(self) -> dict[str, Any]:
         """Return what the rig does: its name, target and why, guard level, joints, what it said."""
-        return cast(dict[str, Any], self._asked("status"))
+        return cast(dict[str, Any], self._connection.ask("status"))
 
     def get(self, prefix: str = "") -> dict[str, JsonValue]:
         """Return the values in force of all keys that begin with ``prefix``."""
-        return cast(dict[str, JsonValue], self._asked("get", prefix=prefix))
+        return cast(dict[str, JsonValue], self._connection.ask("get", prefix=prefix))
 
     def parameters(self, prefix: str = "") -> tuple[ParamInfo, ...]:
         """Return the rules and defaults of all keys that begin with ``prefix``."""
-        found = cast(list[dict[str, Any]], self._asked("parameters", prefix=prefix))
+        found = cast(list[dict[str, Any]], self._connection.ask("parameters", prefix=prefix))
         return tuple(ParamInfo.from_json(one) for one in found)
 
     def parameter(self, key: str) -> ParamInfo:
@@ -183,15 +157,15 @@ class RobotClient:
         Raises:
             RequestRejected: with every rule that is broken.
         """
-        return self._notes(self._asked("set", changes=dict(changes)))
+        return self._notes(self._connection.ask("set", changes=dict(changes)))
 
     def unsaved(self) -> tuple[ParamDifference, ...]:
         """Return what is in force and not in the rig's file."""
-        return differences(self._asked("unsaved"))
+        return differences(self._connection.ask("unsaved"))
 
     def differs(self) -> tuple[ParamDifference, ...]:
         """Return what differs from the defaults."""
-        return differences(self._asked("differs"))
+        return differences(self._connection.ask("differs"))
 
     def save(self, path: Path | str | None = None) -> SavedFile:
         """Write what is in force into the rig's own file, or another of this computer.
@@ -200,17 +174,17 @@ class RobotClient:
             RequestRejected: the file cannot be written, or comes with the program.
         """
         whole = None if path is None else str(Path(path).expanduser().absolute())
-        said = cast(dict[str, Any], self._asked("save", path=whole))
+        said = cast(dict[str, Any], self._connection.ask("save", path=whole))
         backup = None if said["backup"] is None else Path(said["backup"])
         return SavedFile(Path(said["path"]), backup, differences(said["changes"]))
 
     def revert(self) -> tuple[str, ...]:
         """Apply the values of the rig's file again."""
-        return self._notes(self._asked("revert"))
+        return self._notes(self._connection.ask("revert"))
 
     def characters(self) -> tuple[str, ...]:
         """Return the characters that can be laid over the rig."""
-        return tuple(cast(list[str], self._asked("characters")))
+        return tuple(cast(list[str], self._connection.ask("characters")))
 
     def character(self, name: str) -> tuple[str, ...]:
         """Lay another character over the rig.
@@ -218,11 +192,11 @@ class RobotClient:
         Raises:
             RequestRejected: there is none of that name.
         """
-        return self._notes(self._asked("character", name=name))
+        return self._notes(self._connection.ask("character", name=name))
 
     def menus(self) -> dict[str, tuple[str, ...]]:
         """Return what ``ask`` takes: menu -> choices, the present one first."""
-        said = cast(dict[str, list[str]], self._asked("menus"))
+        said = cast(dict[str, list[str]], self._connection.ask("menus"))
         return {menu: tuple(choices) for menu, choices in said.items()}
 
     def ask(self, menu: str, choice: str) -> None:
@@ -268,7 +242,7 @@ class RobotClient:
 
     def gestures(self) -> tuple[dict[str, Any], ...]:
         """Return all gestures: name, description, duration_s, slowed_by, and refused if it is."""
-        return tuple(cast(list[dict[str, Any]], self._asked("gestures")))
+        return tuple(cast(list[dict[str, Any]], self._connection.ask("gestures")))
 
     def look_at(self, x_m: float, y_m: float, z_m: float, stay: bool = False) -> CommandReply:
         """Look at a point: metres, x ahead, y left, z up of the neck base.
@@ -309,7 +283,7 @@ class RobotClient:
         return self._heartbeat is not None and self._heartbeat.leads
 
     def give(self, command: Command) -> CommandReply:
-        """Give any command; one that leads and is not to stay is renewed from now on.
+        """Send any command; one that leads and is not to stay is renewed from now on.
 
         Raises:
             RequestRejected: it cannot be meant, or the head does not do it.
@@ -360,7 +334,7 @@ class RobotClient:
         except ValueError as error:
             raise RequestRejected(str(error)) from None
         fields = as_json(command)
-        said = self._asked(str(fields.pop("do")), **fields)
+        said = self._connection.ask(str(fields.pop("do")), **fields)
         match said:
             case {"reply": dict(reply)}:
                 return CommandReply.from_json(reply)
@@ -368,43 +342,6 @@ class RobotClient:
 
     def _notes(self, said: object) -> tuple[str, ...]:
         return tuple(cast(dict[str, list[str]], said)["notes"])
-
-    def _asked(self, do: str, **words: object) -> object:
-        """Send a request and give what came of it."""
-        with self._lock:
-            answer = self._answer({"do": do, **words}, _FILES_S if do in _WITH_FILES else _ANSWER_S)
-        match answer:
-            case {"ok": said}:
-                return said
-            case {"refused": str(rules), "reply": dict(reply)}:
-                raise RequestRejected(rules, CommandReply.from_json(reply))
-            case {"refused": str(rules)}:
-                raise RequestRejected(rules)
-            case {"failed": str(what)}:
-                raise ConnectionLost(
-                    f"the rig (process {self.pid}) met an error of its own: {what}"
-                )
-        raise ConnectionLost(f"process {self.pid} gave no answer of a rig: {answer!r:.80}")
-
-    def _answer(self, request: dict[str, object], within_s: float) -> object:
-        try:
-            self._wire.write(request, _CONNECT_S)
-        except (TypeError, ValueError) as error:
-            raise RequestRejected(
-                f"only finite numbers, text, lists and mappings go: {error}"
-            ) from None
-        except OSError:
-            raise ConnectionLost(f"the rig (process {self.pid}) has ended or hung up") from None
-        try:
-            return self._wire.read(within_s, within_s)
-        except TimeoutError:
-            self.close()  # an answer that comes late would be taken for that of the next request
-            raise ConnectionLost(f"the rig (process {self.pid}) does not answer") from None
-        except (EOFError, OSError):
-            raise ConnectionLost(f"the rig (process {self.pid}) has ended or hung up") from None
-        except MalformedMessage as error:
-            self.close()
-            raise ConnectionLost(f"process {self.pid} gave no answer of a rig: {error}") from None
 
 
 def running(pid: int | None = None, who: str = "") -> list[RobotClient]:
@@ -428,7 +365,7 @@ def running(pid: int | None = None, who: str = "") -> list[RobotClient]:
 
 def _wire(path: Path) -> Wire:
     """Connect to a rig's socket; raises OSError if there is no answer."""
-    return Wire(dial(path, _CONNECT_S), ANSWER_BYTES)
+    return Wire(dial(path, CONNECT_S), ANSWER_BYTES)
 
 
 def _names(rigs: list[RobotClient]) -> str:
