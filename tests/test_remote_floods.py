@@ -97,7 +97,7 @@ def line_of(end: socket.socket) -> dict[str, Any]:
         (b"\xff\xfe\n", "not a line of JSON"),
         (b"[" * 20_000 + b"\n", "nested too deep|not a line of JSON"),
         (b"[]\n", "not understood"),
-        (b'{"do": "dance"}\n', "there is status; menus"),
+        (b'{"do": "dance"}\n', "there is status; "),
         (b'{"do": "get"}\n', "not understood"),
         (b'{"do": "get", "prefix": 1}\n', "not understood"),
         (b'{"do": "get", "prefix": "", "more": 1}\n', "not understood"),
