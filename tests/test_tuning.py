@@ -270,7 +270,7 @@ def test_parameters_follow_what_entries_there_are() -> None:
     before = len(bench.tuning.parameters())
     rule: dict[str, Any] = {"look_at": "hand", "salience": 1.0}
     bench.tuning.set({"gaze.top_down.rules.fetch": rule})
-    assert len(bench.tuning.parameters()) == before + 3
+    assert len(bench.tuning.parameters()) == before + 6
     assert "fetch" in bench.made.robot.menus()["behaviour"]
 
 
