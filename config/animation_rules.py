@@ -11,7 +11,7 @@ from gazerig.robot.model.types import GAZE_JOINTS
 EYES = tuple(name for name in GAZE_JOINTS if name not in (*NECK, *LIDS))
 
 
-class _Move(NamedTuple):
+class _KeyedMove(NamedTuple):
     """The widest move of a joint that a table can ask for, in degrees."""
 
     key: str
@@ -34,7 +34,7 @@ def expressions(rig: Rig) -> Iterable[tuple[str, str]]:
             if not low <= angle <= high:
                 ends[joint], widest[joint] = (min(low, angle), max(high, angle)), key
     for joint, (low, high) in ends.items():
-        move = _Move(widest[joint], joint, high - low, rig.expression_blend_s)
+        move = _KeyedMove(widest[joint], joint, high - low, rig.expression_blend_s)
         yield from _too_fast(rig, move, "expression_blend_s")
 
 
@@ -49,7 +49,7 @@ def levels(rig: Rig) -> Iterable[tuple[str, str]]:
         yield from ((f"levels.{name}.{end}", fault) for end, fault in faults.items() if fault)
         span = abs(level.high_deg - level.low_deg)
         key = f"levels.{name}.smoothing_ms"
-        yield from _too_fast(rig, _Move(key, level.joint, span, level.smoothing_ms / 1e3), key)
+        yield from _too_fast(rig, _KeyedMove(key, level.joint, span, level.smoothing_ms / 1e3), key)
 
 
 def _joint_fault(rig: Rig, joint: str) -> str:
@@ -80,7 +80,7 @@ def _range_fault(rig: Rig, joint: str, angle: float) -> str:
     return f"{angle:g} deg is outside the joint's range {params.min_deg:g}..{params.max_deg:g}"
 
 
-def _too_fast(rig: Rig, move: _Move, key: str) -> Iterable[tuple[str, str]]:
+def _too_fast(rig: Rig, move: _KeyedMove, key: str) -> Iterable[tuple[str, str]]:
     """Find a minimum-jerk move that is faster or more abrupt than the joint can be."""
     joint = rig.joints[move.joint]
     speed = PEAK_SPEED * move.span_deg / move.time_s

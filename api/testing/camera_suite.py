@@ -54,7 +54,7 @@ class CameraBench:
     release: Callable[[], None] | None = None
 
 
-class _NoFaces:
+class _NoDetections:
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
         return ()
 
@@ -69,7 +69,7 @@ def of_source(
     """Return the bench of a source of frames, which is read by a thread as in a run."""
     now_s = time.monotonic  # noqa: TID251 - that of real cameras
     return CameraBench(
-        lambda: CameraThread(make(), _NoFaces(), now_s, QUICKLY),
+        lambda: CameraThread(make(), _NoDetections(), now_s, QUICKLY),
         lose=lose, restore=restore, block=block, release=release,
     )  # fmt: skip
 

@@ -65,7 +65,7 @@ class FixationTable(NamedTuple):
     note: str
 
 
-class _Table(NamedTuple):
+class _TrackerTable(NamedTuple):
     """A CSV file: column names as written, and (line number, cells) of every row."""
 
     path: Path
@@ -94,7 +94,7 @@ def read_recording(path: Path) -> Samples | FixationTable:
     return _samples(table)
 
 
-def _samples(table: _Table) -> Samples:
+def _samples(table: _TrackerTable) -> Samples:
     time = _needed(table, "time")
     x, y = _needed(table, "x"), _needed(table, "y")
     raw = _numbers(table, time, _finite)
@@ -120,7 +120,7 @@ def _samples(table: _Table) -> Samples:
     return Samples(raw * unit_s, np.where(lost, nan, xs), np.where(lost, nan, ys), note)
 
 
-def _fixations(table: _Table) -> FixationTable:
+def _fixations(table: _TrackerTable) -> FixationTable:
     start, duration = _needed(table, "start"), _needed(table, "duration")
     part = _find(table, "part")
     starts, durations = _numbers(table, start, _finite), _numbers(table, duration, _above_0)
@@ -152,7 +152,7 @@ def _fixations(table: _Table) -> FixationTable:
 _LARGEST = 200_000_000  # bytes; an hour at 1000 Hz has about 100 MB
 
 
-def _read(path: Path) -> _Table:
+def _read(path: Path) -> _TrackerTable:
     try:
         text = read_limited(path, _LARGEST).decode("utf-8-sig")
     except OSError as error:
@@ -176,10 +176,10 @@ def _read(path: Path) -> _Table:
             raise SetupError(f"{path}:{line}: {len(row)} cells under {len(names)} column names")
     if not body:
         raise SetupError(f"{path}: no line after the column names")
-    return _Table(path, names, header_line, tuple(body))
+    return _TrackerTable(path, names, header_line, tuple(body))
 
 
-def _find(table: _Table, wanted: str) -> _Column | None:
+def _find(table: _TrackerTable, wanted: str) -> _Column | None:
     """Find a column by one of its names, with or without a unit."""
     for at, name in enumerate(table.names):
         plain = name.lower()
@@ -191,14 +191,14 @@ def _find(table: _Table, wanted: str) -> _Column | None:
     return None
 
 
-def _needed(table: _Table, wanted: str) -> _Column:
+def _needed(table: _TrackerTable, wanted: str) -> _Column:
     column = _find(table, wanted)
     if column is None:
         raise _missing(table, wanted)
     return column
 
 
-def _missing(table: _Table, wanted: str) -> SetupError:
+def _missing(table: _TrackerTable, wanted: str) -> SetupError:
     found = ", ".join(name or "(no name)" for name in table.names[:8])
     return SetupError(
         f"{table.path}:{table.header_line}: no column {wanted}; found: {found}; wanted: time, x, y"
@@ -206,7 +206,7 @@ def _missing(table: _Table, wanted: str) -> SetupError:
     )
 
 
-def _numbers(table: _Table, column: _Column, read: Callable[[str], float]) -> Floats:
+def _numbers(table: _TrackerTable, column: _Column, read: Callable[[str], float]) -> Floats:
     """Read a column as numbers."""
     out = np.empty(len(table.rows))
     for i, (line, row) in enumerate(table.rows):
@@ -238,7 +238,7 @@ def _or_lost(cell: str) -> float:
     return nan if cell.lower() in _LOST else _finite(cell)
 
 
-def _part(table: _Table, column: _Column, line: int, cell: str) -> str | None:
+def _part(table: _TrackerTable, column: _Column, line: int, cell: str) -> str | None:
     """Read a part's code or name; None for a look outside."""
     word = cell.strip().lower()
     if word in _OUTSIDE:
@@ -252,7 +252,9 @@ def _part(table: _Table, column: _Column, line: int, cell: str) -> str | None:
     )
 
 
-def _refuse_unsorted(table: _Table, column: _Column, times: Sequence[float] | Floats) -> None:
+def _refuse_unsorted(
+    table: _TrackerTable, column: _Column, times: Sequence[float] | Floats
+) -> None:
     before = -inf
     for (line, _), now in zip(table.rows, times, strict=True):
         if now <= before:
@@ -263,5 +265,5 @@ def _refuse_unsorted(table: _Table, column: _Column, times: Sequence[float] | Fl
         before = now
 
 
-def _place(table: _Table, line: int, column: _Column) -> str:
+def _place(table: _TrackerTable, line: int, column: _Column) -> str:
     return f"{table.path}:{line}: column {column.name}"

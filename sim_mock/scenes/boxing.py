@@ -63,17 +63,22 @@ _REACH_IN_S, _REACH_STAY_S, _REACH_OUT_S = 0.7, 1.6, 0.5
 _REACH_S = _REACH_IN_S + _REACH_STAY_S + _REACH_OUT_S
 
 
-class _Move(NamedTuple):
+class _ArmMotion(NamedTuple):
     """Something that begins at ``start_s`` on one side."""
 
     start_s: float
     side: float
 
 
-_PUNCHES = (_Move(2.0, _RIGHT), _Move(4.2, _LEFT), _Move(20.9, _RIGHT), _Move(40.0, _LEFT))
-_WAVES = (_Move(16.5, _RIGHT), _Move(31.2, _LEFT))
-_FEINTS = (_Move(27.6, _RIGHT), _Move(41.8, _LEFT))
-_REACHES = (_Move(22.9, _LEFT), _Move(35.4, _RIGHT))
+_PUNCHES = (
+    _ArmMotion(2.0, _RIGHT),
+    _ArmMotion(4.2, _LEFT),
+    _ArmMotion(20.9, _RIGHT),
+    _ArmMotion(40.0, _LEFT),
+)
+_WAVES = (_ArmMotion(16.5, _RIGHT), _ArmMotion(31.2, _LEFT))
+_FEINTS = (_ArmMotion(27.6, _RIGHT), _ArmMotion(41.8, _LEFT))
+_REACHES = (_ArmMotion(22.9, _LEFT), _ArmMotion(35.4, _RIGHT))
 # Blows at the chest and at the side of the face, as offsets from the opponent's face.
 _ATTACKS: tuple[tuple[float, Vec3], ...] = (
     (6.2, (-0.10, 0.0, -0.30)),
@@ -178,12 +183,12 @@ def _punch_end(side: float) -> Vec3:
     return _plus(HEAD_M, (_PUNCH_ENDS_M, side * 0.03, -0.02))
 
 
-def _guards(punch: _Move, phase_s: float) -> bool:
+def _guards(punch: _ArmMotion, phase_s: float) -> bool:
     begin_s = punch.start_s + _REACTION_S
     return begin_s <= phase_s < begin_s + _GUARD_S
 
 
-def _reaching(reach: _Move, phase_s: float) -> Vec3:
+def _reaching(reach: _ArmMotion, phase_s: float) -> Vec3:
     """Return the hand that comes in from aside, beckons and goes."""
     since_s = phase_s - reach.start_s
     into = there_and_back(since_s, _REACH_IN_S, _REACH_STAY_S, _REACH_OUT_S)
@@ -195,14 +200,14 @@ def _reaching(reach: _Move, phase_s: float) -> Vec3:
     )
 
 
-def _punch_event(punch: _Move) -> Event:
+def _punch_event(punch: _ArmMotion) -> Event:
     """Ask for the hand from the punch's beginning until it is back."""
     end_s = punch.start_s + _PUNCH_OUT_S + _PUNCH_HOLD_S + _PUNCH_BACK_S
     middle = _towards(_plus(_CORNER, (0.0, 0.0, -0.1)), _punch_end(punch.side), 0.5)
     return Event("punch", "look", "hand", punch.start_s, end_s, middle, 0.5)
 
 
-def _reach_event(reach: _Move) -> Event:
+def _reach_event(reach: _ArmMotion) -> Event:
     """Ask for the hand while it is nearer to straight ahead than half the field."""
     inside = [
         ms / 1e3

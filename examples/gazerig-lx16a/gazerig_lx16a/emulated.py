@@ -15,7 +15,7 @@ from gazerig_lx16a import protocol as p
 from gazerig_lx16a.bus import FASTEST_STEPS_S, Lx16aParams
 
 
-class EmulatedServo:
+class EmulatedLx16a:
     """One servo: it goes to its target in a straight line, within the time it was given."""
 
     def __init__(self, servo_id: int, steps: float, low: float, high: float) -> None:
@@ -50,13 +50,13 @@ class EmulatedServo:
         return None
 
 
-class Chain:
+class Lx16aChain:
     """The device at the end of the line; what can befall a line is gazerig's."""
 
     check_baud = False
 
     def __init__(
-        self, servos: list[EmulatedServo], now_s: Callable[[], float], seed: int = 0
+        self, servos: list[EmulatedLx16a], now_s: Callable[[], float], seed: int = 0
     ) -> None:
         self.servos, self.now_s = {servo.id: servo for servo in servos}, now_s
         self.faults = ChainFaults(self, COMMANDS, seed, p.HEADER)
@@ -64,7 +64,7 @@ class Chain:
         for servo in servos:
             servo.advance(now_s())
 
-    def here(self, servo_id: int) -> EmulatedServo:
+    def here(self, servo_id: int) -> EmulatedLx16a:
         """Return a servo, brought up to now."""
         servo = self.servos[servo_id]
         servo.advance(self.now_s())
@@ -102,7 +102,7 @@ class ChainFaults(LineFaults):
     """What befalls the line, and the servos themselves."""
 
     def reports(self) -> list[dict[str, object]]:
-        chain: Chain = self._chain  # type: ignore[assignment]
+        chain: Lx16aChain = self._chain  # type: ignore[assignment]
         servos = [chain.here(servo_id) for servo_id in chain.servos]
         return [
             {"id": s.id, "position": s.place, "goal": round(s.target), "torque": s.torque}
@@ -123,16 +123,16 @@ COMMANDS = CommandTable(
 )  # fmt: skip
 
 
-def chain_of(starts: Mapping[int, float], now_s: Callable[[], float]) -> Chain:
+def chain_of(starts: Mapping[int, float], now_s: Callable[[], float]) -> Lx16aChain:
     """Return servos that stand at these steps, by their ids."""
-    return Chain([EmulatedServo(i, x, 0.0, 1000.0) for i, x in starts.items()], now_s)
+    return Lx16aChain([EmulatedLx16a(i, x, 0.0, 1000.0) for i, x in starts.items()], now_s)
 
 
 def device(
     params: Lx16aParams, joints: tuple[EmulatedJoint, ...], now_s: Callable[[], float], seed: int
-) -> Chain:
+) -> Lx16aChain:
     """Return the servos of a rig, for ``--mock``."""
     servos = [
-        EmulatedServo(j.id, j.start_steps, j.stop_low_steps, j.stop_high_steps) for j in joints
+        EmulatedLx16a(j.id, j.start_steps, j.stop_low_steps, j.stop_high_steps) for j in joints
     ]
-    return Chain(servos, now_s, seed)
+    return Lx16aChain(servos, now_s, seed)
