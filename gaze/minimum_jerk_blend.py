@@ -9,6 +9,8 @@ single move over this range: 1.875 x range / duration.
 
 from typing import NamedTuple
 
+from gazerig.gaze.saccade import min_jerk
+
 PEAK_SPEED = 1.875
 """Highest speed of a minimum-jerk move of length 1 in time 1."""
 PEAK_ACCELERATION = 5.7735
@@ -44,8 +46,7 @@ class MinimumJerkBlend:
 
     def move_to(self, goal: Values) -> None:
         """Move to another goal, from the next step on; as many values as at the start."""
-        if goal != self._goal:
-            self._goal = goal
+        self._goal = goal
 
     def step(self, t_s: float) -> Values:
         """Return the values at a time; times never go back. At rest it is the same tuple."""
@@ -73,13 +74,8 @@ class MinimumJerkBlend:
             self._base = _added(self._base, move.delta, 1.0)
         values = self._base
         for move in self._moves:
-            values = _added(values, move.delta, share((t_s - move.start_s) / move.duration_s))
+            values = _added(values, move.delta, min_jerk((t_s - move.start_s) / move.duration_s))
         return values
-
-
-def share(s: float) -> float:
-    """Return how far a minimum-jerk move is at a share of its duration, 0..1."""
-    return s * s * s * (10.0 + s * (6.0 * s - 15.0))
 
 
 def _added(values: Values, delta: Values, factor: float) -> Values:
