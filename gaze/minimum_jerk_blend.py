@@ -46,7 +46,8 @@ class MinimumJerkBlend:
 
     def move_to(self, goal: Values) -> None:
         """Move to another goal, from the next step on; as many values as at the start."""
-        self._goal = goal
+        if goal != self._goal:  # an equal goal stays the tuple that is planned: cheap to compare
+            self._goal = goal
 
     def step(self, t_s: float) -> Values:
         """Return the values at a time; times never go back. At rest it is the same tuple."""
