@@ -16,7 +16,8 @@ from gazerig.robot.recording.playback_devices import NoCamera
 
 @overload
 def open(
-    rig: str = "desk", *, fast: Literal[True], mock: bool = True, page: None = None,
+    rig: str = "desk", *, fast: Literal[True], mock: bool = True,
+    bus: Literal["emulated", "ideal"] | None = None, page: None = None,
     scene: str | None = None, video: Path | str | None = None,
     camera: Camera | None = None, detector: FaceDetector | None = None,
     attention: Chooser | None = None, character: str | None = None, profile: str | None = None,
@@ -27,6 +28,7 @@ def open(
 @overload
 def open(
     rig: str = "desk", *, fast: Literal[False] = False, mock: bool = False,
+    bus: Literal["emulated", "ideal"] | None = None,
     port: str | None = None, page: str | None = None, scene: str | None = None,
     video: Path | str | None = None, camera: int | str | Camera | FrameSource | None = None, oak: bool = False,
     detector: FaceDetector | None = None, attention: Chooser | None = None,
@@ -36,7 +38,8 @@ def open(
 
 
 def open(
-    rig: str = "desk", *, fast: bool = False, mock: bool = False, port: str | None = None,
+    rig: str = "desk", *, fast: bool = False, mock: bool = False, bus: str | None = None,
+    port: str | None = None,
     page: str | None = None, scene: str | None = None, video: Path | str | None = None,
     camera: int | str | Camera | FrameSource | None = None, oak: bool = False,
     detector: FaceDetector | None = None, attention: Chooser | None = None,
@@ -55,6 +58,8 @@ def open(
         rig: a shipped rig by name, or the path of a YAML file.
         fast: emulated servos in simulated time, stepped by the program (``SimulatedHead.step``).
         mock: emulated servos; else those of the rig.
+        bus: what replaces the servos, with ``mock`` or ``fast``: "emulated" (byte for byte, the
+            default) or "ideal" (goals in, a lag out, no bytes: faster).
         port: serial port instead of the rig's.
         page: HOST:PORT of the live page; its address is told to ``say``.
         scene: simulated people, as of ``gazerig run --scene``.
@@ -81,7 +86,7 @@ def open(
     mock = mock or fast
     drawn = scene is not None or (mock and not sees and own is None)
     options = RunOptions(
-        rig=rig, mock=mock, fast=fast, port=port, page=page, scene=scene, video=_path(video),
+        rig=rig, mock=mock, fast=fast, bus=bus, port=port, page=page, scene=scene, video=_path(video),
         camera=seen, oak=oak, pixels=detector is not None and drawn,
         character=character, profile=profile, seed=seed, record=_path(record), seconds=_FOR_EVER_S,
     )  # fmt: skip

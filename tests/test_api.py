@@ -204,7 +204,9 @@ def test_the_same_steps_and_orders_give_the_same(head: gazerig.SimulatedHead) ->
 
 def test_a_program_is_recorded_and_done_again_to_the_same_bytes(tmp_path: Path) -> None:
     file = tmp_path / "program.mcap"
-    with gazerig.open("desk", fast=True, scene="face-to-face", record=file, say=quiet) as head:
+    with gazerig.open(
+        "desk", fast=True, bus="emulated", scene="face-to-face", record=file, say=quiet
+    ) as head:
         head.step(1.0)
         head.look_at_pixel(200.0, 150.0).wait()
         head.play("nod")

@@ -235,12 +235,12 @@ def test_the_emulated_camera_sits_where_coupled_servos_hold_the_head() -> None:
     clock = SimulatedClock()
     wires = run_bus(rig, RunOptions(mock=True, fast=True), clock)
     made = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
-    R, _ = true_head(wires.devices, rig, made.poses)(0.0)
+    R, _ = true_head(wires.true_steps, rig, made.poses)(0.0)
     # As the emulated neck starts: 12 deg to the right, 8 deg down.
     assert degrees(np.arcsin(R[2][0])) == pytest.approx(-8.0, abs=0.2)
     assert degrees(np.arctan2(R[1][0], R[0][0])) == pytest.approx(-12.0, abs=0.2)
     plain = replace(rig, couplings={})
-    other, _ = true_head(wires.devices, plain, made.poses)(0.0)
+    other, _ = true_head(wires.true_steps, plain, made.poses)(0.0)
     assert abs(degrees(np.arcsin(other[2][0])) + 8.0) > 1.0
     wires.close()
     made.close()

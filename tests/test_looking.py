@@ -211,7 +211,7 @@ def test_leads_are_counted_and_their_ends_have_reasons(rig: Simulated) -> None:
 def test_looks_are_recorded_and_done_again_to_the_same_bytes(tmp_path: Path) -> None:
     file = tmp_path / "looks.mcap"
     options = RunOptions(
-        mock=True, fast=True, seed=5, scene="face-to-face", seconds=5.0, record=file, pixels=False
+        mock=True, fast=True, seed=5, scene="face-to-face", seconds=5.0, record=file, bus="emulated"
     )
     composed = compose(options)
     asked: dict[int, Command] = {

@@ -62,7 +62,7 @@ class Run(NamedTuple):
 
 def recorded(path: Path, rig: Rig, seconds: float) -> Run:
     """Record a simulated run; give its ticks too."""
-    options = RunOptions(mock=True, fast=True, seed=5, scene="visitor")
+    options = RunOptions(mock=True, fast=True, seed=5, scene="visitor", bus="emulated")
     info = RunInfo(
         "a rig", rig.profile, rig_text(rig), 5, rig.loop.rate_hz, STARTED,
         walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix), scene="visitor", mock=True, fast=True,

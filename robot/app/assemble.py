@@ -164,7 +164,7 @@ def assemble(rig: Rig, options: RunOptions, substitutes: Substitutes = RIGS_OWN)
     try:
         seen = (
             scene_camera(
-                rig, options, scene, sight.mount, true_head(wires.devices, rig, sight.poses),
+                rig, options, scene, sight.mount, true_head(wires.true_steps, rig, sight.poses),
                 random.camera, substitutes.program,
             )
             if scene is not None

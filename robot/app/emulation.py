@@ -1,4 +1,4 @@
-"""The emulated servos of a rig: built into joints as the rig's YAML says."""
+"""The emulated servos of a rig, byte-true or ideal: built into joints as the rig's YAML says."""
 
 from collections.abc import Callable
 from math import pi, radians
@@ -7,7 +7,7 @@ from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig
 from gazerig.drivers.plugins import EmulatedJoint
 from gazerig.drivers.servo_models import HOBBY_KINDS
-from gazerig.robot.app.bus_wiring import bus_names, joints_on
+from gazerig.robot.app.bus_wiring import bus_names, joints_on, rig_setups
 from gazerig.robot.model.coupling_params import pair_setups, pairs_of
 from gazerig.robot.model.joint import JointParams
 from gazerig.sim_mock.devices import (
@@ -19,6 +19,7 @@ from gazerig.sim_mock.devices import (
     plugin_line,
 )
 from gazerig.sim_mock.hobby_servo import HobbySpec
+from gazerig.sim_mock.ideal.bus import IdealBus
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
 _CROOKED_DEG = {"left_eye_pan": 6.0, "right_eye_pan": -4.0, "neck_yaw": -12.0, "neck_pitch": -8.0}
@@ -34,6 +35,12 @@ _LOAD_KG_M2 = {"neck_yaw": 2.0e-3, "neck_pitch": 3.0e-3, "neck_roll": 3.0e-3}
 def emulated_lines(rig: Rig) -> dict[str, Emulated]:
     """Return what is on each bus of a rig, by the bus's name; servos in the order of joints."""
     return {name: _line(rig, name) for name in bus_names(rig)}
+
+
+def ideal_bus(rig: Rig, now_s: Callable[[], float]) -> IdealBus:
+    """Return all servos of a rig without bytes, starting where the emulated ones do."""
+    measured = [rig.joints[name].facts.measured for name in rig.names]
+    return IdealBus(rig_setups(rig), [_start(rig, name) for name in rig.names], measured, now_s)
 
 
 def emulated_servo(rig: Rig, name: str) -> ServoSpec:

@@ -7,6 +7,8 @@ from typing import Literal
 from gazerig.drivers.errors import SetupError
 
 DEFAULT_SCENE = "visitor"
+BUSES = ("emulated", "ideal")
+"""What replaces the servos: byte-true emulators, or servos without bytes."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,7 @@ class RunOptions:
         record: file to record to; record_pictures: camera frames a second in it.
         force: write over older files.
         summary: file of the figures, "-" for standard output.
+        bus: what replaces the servos, "emulated" (byte-true, the default) or "ideal" (a lag).
     """
 
     mock: bool = False
@@ -64,6 +67,7 @@ class RunOptions:
     record_pictures: float = 2.0
     force: bool = False
     summary: str | None = None
+    bus: str | None = None
 
     @property
     def looks_through(self) -> str | None:
@@ -110,6 +114,7 @@ class RunOptions:
             SetupError: they do not fit together.
         """
         _ = self.page_address
+        self._refuse_bus()
         asked = [
             name
             for name in ("scene", "video", "camera", "oak", "replay")
@@ -128,6 +133,25 @@ class RunOptions:
             scene = DEFAULT_SCENE
         self._refuse_clashes(scene)
         return replace(self, scene=scene)
+
+    def _refuse_bus(self) -> None:
+        """Refuse a bus that is unknown, or that replaces no servos.
+
+        Raises:
+            SetupError: with what it needs.
+        """
+        if self.bus is None:
+            return
+        if self.bus not in BUSES:
+            raise SetupError(f"--bus {self.bus}: unknown; there is {', '.join(BUSES)}")
+        if self.port is not None:
+            raise SetupError(
+                f"--bus {self.bus} and --port exclude each other: servos at a port are real"
+            )
+        if not self.mock:
+            raise SetupError(
+                f"--bus {self.bus} needs --mock: it says what replaces the rig's servos"
+            )
 
     def _refuse_clashes(self, scene: str | None) -> None:
         """Refuse options that exclude each other.

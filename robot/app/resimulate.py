@@ -2,7 +2,7 @@
 
 With the configuration and code of then every command comes out the same to the bit; the
 joints are then fed as recorded. With anything changed the recorded joints would belong to
-other commands, so the emulated servos follow instead.
+other commands, so the emulated servos follow instead, ideal ones where they were ideal.
 """
 
 import tempfile
@@ -82,7 +82,8 @@ def rerun(
     with tempfile.TemporaryDirectory(prefix="gazerig-rerun-") as folder:
         with_rig = _rig(recording, rig, character, Path(folder))
         # The scene is not looked at: what it showed is in the recording.
-        options = RunOptions(mock=True, fast=True, seed=recording.info.seed, scene="visitor")
+        info = recording.info
+        options = RunOptions(True, True, info.seed, "visitor", bus=info.bus)
         again = _Resimulator(with_rig, options, fed, on_tick)
         try:
             return again.whole(recording)

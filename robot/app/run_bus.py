@@ -1,4 +1,4 @@
-"""The bus of one run: real ports, emulated servos on a pseudo-terminal, or in this process."""
+"""The bus of one run: real ports, emulated servos (on a pseudo-terminal or here), or ideal ones."""
 
 import hashlib
 from collections.abc import Callable, Mapping
@@ -11,7 +11,7 @@ from gazerig.drivers.types import ServoBus
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.app.bus_wiring import guarded_rig_bus, ports_of, rig_bus
 from gazerig.robot.app.camera_factory import HeadPose
-from gazerig.robot.app.emulation import emulated_lines, place_of
+from gazerig.robot.app.emulation import emulated_lines, ideal_bus, place_of
 from gazerig.robot.app.gaze_models import kinematics_of
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.clock import Clock
@@ -23,31 +23,8 @@ from gazerig.sim_mock.devices import build
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.pty.client import PtyBuses
 
-
-class RunBus(NamedTuple):
-    """The bus of the rig, and what is emulated behind it in this process, by the bus's name."""
-
-    bus: ServoBus
-    devices: Mapping[str, Device]
-    digest: Callable[[], str | None]
-    close: Callable[[], None]
-
-
-def run_bus(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:
-    """Return the real port, an emulated bus in this process, or one on a pseudo-terminal."""
-    if not options.mock:
-        paths, here = ports_of(rig, options.port), serial_ports()
-        for name, path in paths.items():
-            refuse_owner(path, rig.bus_named(name).kind, here)
-        return RunBus(guarded_rig_bus(rig, paths), {}, _no_digest, _nothing)
-    lines = emulated_lines(rig)
-    if not options.fast:
-        buses = PtyBuses()
-        return RunBus(guarded_rig_bus(rig, buses.start(lines)), {}, _no_digest, buses.stop)
-    sent = hashlib.sha256()
-    devices = {name: build(line, clock.now_s) for name, line in lines.items()}
-    ports = {name: InProcessPort(device, sent.update) for name, device in devices.items()}
-    return RunBus(rig_bus(rig, ports), devices, sent.hexdigest, _nothing)
+TrueSteps = Callable[[], Mapping[str, float]]
+"""Returns the true positions of the servos now in steps, by joint."""
 
 
 def _no_digest() -> str | None:
@@ -58,26 +35,69 @@ def _nothing() -> None:
     return None
 
 
-def true_head(devices: Mapping[str, Device], rig: Rig, poses: PoseHistory) -> HeadPose:
+class RunBus(NamedTuple):
+    """The bus of the rig.
+
+    true_steps: where the servos truly are, None where that is unknown in this process
+    digest: returns the SHA-256 of all bytes sent, None where they are not counted
+    close: ends what was started for it
+    """
+
+    bus: ServoBus
+    true_steps: TrueSteps | None = None
+    digest: Callable[[], str | None] = _no_digest
+    close: Callable[[], None] = _nothing
+
+
+def run_bus(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:
+    """Return the real port, ideal servos, an emulated bus here, or one on a pseudo-terminal."""
+    if not options.mock:
+        paths, here = ports_of(rig, options.port), serial_ports()
+        for name, path in paths.items():
+            refuse_owner(path, rig.bus_named(name).kind, here)
+        return RunBus(guarded_rig_bus(rig, paths))
+    if options.bus == "ideal":
+        ideal = ideal_bus(rig, clock.now_s)
+        return RunBus(ideal, lambda: dict(zip(rig.names, ideal.positions_steps(), strict=True)))
+    lines = emulated_lines(rig)
+    if not options.fast:
+        buses = PtyBuses()
+        return RunBus(guarded_rig_bus(rig, buses.start(lines)), close=buses.stop)
+    sent = hashlib.sha256()
+    devices = {name: build(line, clock.now_s) for name, line in lines.items()}
+    ports = {name: InProcessPort(device, sent.update) for name, device in devices.items()}
+    return RunBus(rig_bus(rig, ports), _true_steps(rig, devices), sent.hexdigest)
+
+
+def _true_steps(rig: Rig, devices: Mapping[str, Device]) -> TrueSteps:
+    """Return what reads the shafts of emulated devices; ``devices``: by the name of the bus."""
+    places = tuple((name, rig.joints[name].bus, place_of(rig, name)) for name in rig.names)
+
+    def now() -> dict[str, float]:
+        steps = {bus: device.positions_steps() for bus, device in devices.items()}
+        return {name: steps[bus][place] for name, bus, place in places}
+
+    return now
+
+
+def true_head(true_steps: TrueSteps | None, rig: Rig, poses: PoseHistory) -> HeadPose:
     """Return where the emulated head is: from the servos themselves where they are at hand.
 
     It is built as the rig says now, whatever is believed of it later.
     """
-    if not devices:
+    if true_steps is None:
         return poses.head_pose
     kinematics = kinematics_of(rig)
     pairs = pairs_of(rig.couplings)
-    servos = {
-        name: (rig.joints[name].made(), devices[rig.joints[name].bus], place_of(rig, name))
+    linkages = {
+        name: rig.joints[name].made()
         for name in {*NECK, *LOWER_NECK, *(other for pair in pairs for other in pair[:2])}
         & rig.joints.keys()
     }
 
     def now(_: float) -> tuple[Mat3, Vec3]:
-        angles = {
-            name: linkage.angle_rad(device.positions_steps()[place])
-            for name, (linkage, device, place) in servos.items()
-        }
+        steps = true_steps()
+        angles = {name: linkage.angle_rad(steps[name]) for name, linkage in linkages.items()}
         for first, second, coupling in pairs:
             angles[first], angles[second] = coupling.joint_rad((angles[first], angles[second]))
         yaw, pitch, roll = (angles.get(name, 0.0) for name in NECK)

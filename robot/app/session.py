@@ -80,6 +80,7 @@ def run_info(rig: Rig, options: RunOptions) -> RunInfo:
         eyes=options.looks_through or f"scene {options.scene}",
         mock=options.mock,
         fast=options.fast,
+        bus=options.bus or "emulated",
         pictures_hz=options.record_pictures,
         versions=versions(),
     )

@@ -63,6 +63,9 @@ def report(
     scanpath: Annotated[str | None, typer.Option(help="Face scanpath instead of its own.")] = None,
     saccade: Annotated[str | None, typer.Option(help="Saccades instead of its own.")] = None,
     conversation: Annotated[str | None, typer.Option(help="talk, listen or think.")] = None,
+    bus: Annotated[
+        str | None, typer.Option(help="With --scene: emulated servos (default) or ideal ones.")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of all rng.")] = 0,
     out: Annotated[
         Path | None, typer.Option(help="The page to write; .html is added where it is missing.")
@@ -76,6 +79,8 @@ def report(
             rig, file = str(file), None
         if (file is None) == (scene is None):
             raise SetupError("report takes a recording, or --scene NAME: one of them")
+        if file is not None and bus is not None:
+            raise SetupError("--bus needs --scene: a recording was made on the bus it names")
         # Drawing and models are heavy; `--help` does without them.
         from gazerig.robot.report.files import numbers_file
         from gazerig.robot.report.page import banner
@@ -89,7 +94,9 @@ def report(
             else:
                 from gazerig.robot.app.options import RunOptions
 
-                options = RunOptions(True, True, seed, scene, scanpath=scanpath, saccade=saccade)
+                options = RunOptions(
+                    True, True, seed, scene, scanpath=scanpath, saccade=saccade, bus=bus
+                ).checked()
                 layers = _Layers(rig, character, profile)
                 about, run = _simulated(options, layers, seconds, conversation, tell)
             made = report_of(run, about, target, tell, force)
@@ -167,6 +174,7 @@ def _simulated(
     facts = (
         *((name, value) for name, value in given if value is not None),
         ("scene", f"{options.scene}, simulated"),
+        ("servos", options.bus or "emulated"),
         ("seed", str(options.seed)),
     )
     walk = load_walk(rig.gaze.scanpath.transition_matrix)
@@ -224,7 +232,7 @@ def _about(recording: "RunRecording", name: str) -> "RunHeader":
         ("character", info.character or "none"),
         ("profile", info.profile),
         ("saw", f"scene {info.scene}" if info.scene else info.eyes),
-        ("servos", "emulated" if info.mock else "real"),
+        ("servos", info.bus if info.mock else "real"),
         ("time", "simulated" if info.fast else "real"),
         ("seed", str(info.seed)),
         ("started", info.started_utc),

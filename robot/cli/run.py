@@ -33,6 +33,7 @@ def run(
     seconds: options.Seconds = None,
     seed: options.Seed = 0,
     fast: options.Fast = False,
+    bus: options.Bus = None,
     profile: options.Profile = None,
     character: options.Character = None,
     rules: options.Rules = None,

@@ -36,6 +36,13 @@ Pixels = Annotated[
 Seconds = Annotated[float | None, typer.Option(min=0.0, help="Stop after S seconds.")]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of all rng.")]
 Fast = Annotated[bool, typer.Option(help="Simulated clock: as fast as it goes (needs --mock).")]
+Bus = Annotated[
+    str | None,
+    typer.Option(
+        help="What replaces the servos: emulated (byte for byte, default with --mock) or ideal "
+        "(goals in, a lag out: twice as fast)."
+    ),
+]
 Profile = Annotated[
     str | None,
     typer.Option(

@@ -23,6 +23,7 @@ class RunInfo:
     gestures_yaml: the gestures that the rig names itself, "" where it names none
     scene: what was simulated, None where a camera looked; eyes: what looked, in words
     mock: emulated servos; fast: simulated time
+    bus: "ideal" where the emulated servos had no bytes, "emulated" where they had
     rate_hz: control rate at the start; pictures_hz: rate of the recorded frames
     started_utc: wall clock at the start, ISO 8601
     versions: name -> version of the packages whose arithmetic counts
@@ -41,6 +42,7 @@ class RunInfo:
     eyes: str = ""
     mock: bool = False
     fast: bool = False
+    bus: str = "emulated"
     pictures_hz: float = 0.0
     versions: Mapping[str, str] = field(default_factory=dict)
 
@@ -110,6 +112,7 @@ def _refuse_nonsense(info: RunInfo) -> None:
         info.walk_yaml,
         info.gestures_yaml,
         info.eyes,
+        info.bus,
     )
     maybe = (info.character, info.scene)
     if not all(isinstance(word, str) for word in texts + tuple(m for m in maybe if m is not None)):

@@ -1,0 +1,129 @@
+"""Servos without bytes: goals in, a first-order lag out.
+
+For simulations that judge what is above the bus: no packets, no motor, no faults, no heat.
+The lag has a closed form, so the angles do not depend on how often they are read.
+"""
+
+from collections.abc import Callable, Sequence
+from math import exp
+from typing import NamedTuple
+
+from gazerig.drivers.types import BusHealth, Feedback, ServoConfig
+
+LAG_S = 0.008
+"""Time constant; an emulated eye on the desk rig's gains is as late."""
+WARM_C = 30.0
+
+
+class _Motion(NamedTuple):
+    """Where the shafts were at a time, in steps; they have followed the goals since."""
+
+    at_s: float
+    from_steps: tuple[float, ...]
+    goals_steps: tuple[int, ...] | None
+
+    def steps(self, now_s: float) -> tuple[float, ...]:
+        """Return the positions now; without goals the torque is off and the shafts stand still."""
+        goals = self.goals_steps
+        if goals is None or now_s <= self.at_s:
+            return self.from_steps
+        left = exp((self.at_s - now_s) / LAG_S)
+        return tuple([g + (x - g) * left for x, g in zip(self.from_steps, goals, strict=True)])
+
+
+class IdealBus:
+    """All servos of a rig; a gazerig.drivers.types.ServoBus.
+
+    Args:
+        configs: of the servos.
+        start_steps: where their shafts stand at first, in the same order.
+        measured: whether each of them has feedback.
+        now_s: the clock.
+    """
+
+    def __init__(
+        self,
+        configs: Sequence[ServoConfig],
+        start_steps: Sequence[float],
+        measured: Sequence[bool],
+        now_s: Callable[[], float],
+    ) -> None:
+        self._now_s = now_s
+        # One value, replaced as a whole: the camera may look from another thread.
+        self._motion = _Motion(now_s(), tuple(map(float, start_steps)), None)
+        self._read = self._motion.at_s, self._motion.from_steps
+        self._events: tuple[str, ...] = ()
+        self._measured = tuple(measured)
+        count = len(self._measured)
+        self._zeros, self._none = (0.0,) * count, (None,) * count
+        self._no, self._yes, self._no_faults = (False,) * count, (True,) * count, ("",) * count
+        self._warm = tuple([WARM_C if one else None for one in self._measured])
+        self.retune(configs)
+
+    def positions_steps(self) -> tuple[float, ...]:
+        """Return the true positions now, in the order of the servos."""
+        return self._motion.steps(self._now_s())
+
+    def open(self) -> None:
+        """Report the servos as set up; there is nothing to open."""
+        self._events = ("servos set up",)
+
+    def close(self) -> None:
+        """Do nothing: there is no port."""
+
+    def read(self, now_s: float) -> Feedback:
+        """Return the positions, rounded to steps, and the mean speeds since the last read."""
+        steps = self._motion.steps(now_s)
+        (last_s, last), self._read = self._read, (now_s, steps)
+        passed_s = now_s - last_s
+        speeds = self._zeros
+        if passed_s > 0.0:
+            speeds = tuple([(x - was) / passed_s for x, was in zip(steps, last, strict=True)])
+        torque = self._no if self._motion.goals_steps is None else self._yes
+        return Feedback(
+            tuple([float(round(x)) for x in steps]), speeds, self._zeros, (now_s,) * len(steps),
+            self._warm, self._none, torque, self._no_faults, self._measured, self._no, (),
+        )  # fmt: skip
+
+    def enable_torque(self) -> tuple[int, ...]:
+        """Set the goals to the present positions, within the limits, and follow them."""
+        return self._follow([round(x) for x in self.positions_steps()])
+
+    def write(self, goals_steps: Sequence[int]) -> None:
+        """Follow these goals, within the limits; with torque off they change nothing."""
+        if self._motion.goals_steps is not None:
+            self._follow(goals_steps)
+
+    def disable_torque(self) -> None:
+        """Stop the shafts where they are."""
+        now_s = self._now_s()
+        self._motion = _Motion(now_s, self._motion.steps(now_s), None)
+
+    def retune(self, setups: Sequence[ServoConfig]) -> None:
+        """Keep other limits from the next goals on."""
+        self._ranges = tuple([(one.min_steps, one.max_steps) for one in setups])
+
+    def faults(self) -> tuple[str, ...]:
+        """Return no faults."""
+        return ()
+
+    def events(self) -> tuple[str, ...]:
+        """Return what happened since the last call."""
+        events, self._events = self._events, ()
+        return events
+
+    def health(self) -> BusHealth:
+        """Return that no byte was sent."""
+        return BusHealth(0, 0, {})
+
+    def _follow(self, goals_steps: Sequence[int]) -> tuple[int, ...]:
+        """Lead the shafts to goals from where they are now; return the goals within the limits."""
+        goals = tuple(
+            [
+                low if goal < low else high if goal > high else goal
+                for goal, (low, high) in zip(goals_steps, self._ranges, strict=True)
+            ]
+        )
+        now_s = self._now_s()
+        self._motion = _Motion(now_s, self._motion.steps(now_s), goals)
+        return goals

@@ -1,0 +1,138 @@
+"""Servos without bytes as an option: which options go with it, how they move, runs done again."""
+
+import json
+from math import exp
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+import gazerig
+from gazerig.config.schema import load_rig
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.types import ServoConfig
+from gazerig.robot.app import session
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.resimulate import rerun
+from gazerig.robot.cli.main import app
+from gazerig.robot.recording.read import RunRecording
+from gazerig.sim_mock.ideal.bus import LAG_S, IdealBus
+
+CONFIGS = [ServoConfig(1, "xl330-m077", 1000, 3000, 1e4), ServoConfig(2, "mg90s", 1000, 3000, 1e4)]
+
+
+class Bench:
+    """Two servos on a clock that is set."""
+
+    def __init__(self) -> None:
+        self.now_s = 1.0
+        self.bus = IdealBus(CONFIGS, (2048.0, 1500.0), (True, False), lambda: self.now_s)
+        self.bus.open()
+
+    def after(self, seconds: float):
+        self.now_s += seconds
+        return self.bus.read(self.now_s)
+
+
+def test_goals_are_followed_with_a_lag_within_the_limits():
+    bench = Bench()
+    assert bench.bus.enable_torque() == (2048, 1500)
+    bench.bus.write((2448, 5000))
+    for k in range(1, 20):
+        found = bench.after(0.003)
+        left = exp(-0.003 * k / LAG_S)
+        assert bench.bus.positions_steps() == pytest.approx((2448 - 400 * left, 3000 - 1500 * left))
+        assert found.position_steps[0] == round(2448 - 400 * left)
+    assert found.measured == (True, False) and found.temperature_c[1] is None
+    assert found.velocity_steps_s[0] > 0.0 and found.torque == (True, True)
+
+
+def test_where_they_are_does_not_depend_on_how_often_they_are_read():
+    often, once = Bench(), Bench()
+    for bench, reads in ((often, 50), (once, 1)):
+        bench.bus.enable_torque()
+        bench.bus.write((2448, 1700))
+        for _ in range(reads):
+            bench.after(0.05 / reads)
+    assert often.bus.positions_steps() == pytest.approx(once.bus.positions_steps(), abs=1e-9)
+
+
+def test_without_torque_they_stand_still():
+    bench = Bench()
+    bench.bus.write((2448, 1700))
+    assert bench.after(1.0).position_steps == (2048.0, 1500.0)
+    bench.bus.enable_torque()
+    bench.bus.write((2448, 1700))
+    moving = bench.after(0.004)
+    bench.bus.disable_torque()
+    still = bench.after(1.0)
+    assert still.position_steps == moving.position_steps != (2448.0, 1700.0)
+    assert still.torque == (False, False)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--mock", "--bus", "perfect"), "--bus perfect: unknown; there is emulated, ideal"),
+        (("--bus", "ideal"), "--bus ideal needs --mock"),
+        (("--scene", "visitor", "--bus", "emulated"), "--bus emulated needs --mock"),
+        (("--mock", "--bus", "ideal", "--port", "/dev/x"), "--bus ideal and --port exclude"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused_in_one_line(words, said):
+    done = CliRunner().invoke(app, ["run", *words, "--no-page"])
+    assert done.exit_code == 2
+    lines = done.stderr.strip().splitlines()
+    assert len(lines) == 1 and said in lines[0]
+
+
+@pytest.mark.parametrize("rig", ["desk", "feetech", "maker"])
+def test_a_run_on_every_rig(rig):
+    words = ("--mock", "--fast", "--bus", "ideal", "--no-page", "--seconds", "2", "--summary", "-")
+    done = CliRunner().invoke(app, ["run", rig, *words])
+    assert done.exit_code == 0, done.stderr
+    figures = json.loads(done.stdout)
+    assert figures["ticks"] > 390 and figures["bus"] == {"tx_bytes": 0, "rx_bytes": 0, "errors": {}}
+
+
+def test_a_head_in_real_time_needs_no_emulator(monkeypatch):
+    monkeypatch.setattr("gazerig.robot.app.run_bus.PtyBuses", None)
+    made = assemble(load_rig("desk"), RunOptions(mock=True, bus="ideal", scene="visitor"))
+    try:
+        assert isinstance(made.robot.body.bus, IdealBus)
+        made.robot.start(made.clock)
+        made.robot.stop()
+    finally:
+        made.close()
+
+
+def test_a_program_chooses_it_and_is_refused_nonsense():
+    with gazerig.open("desk", fast=True, bus="ideal") as head:
+        head.step(0.1)
+        assert head.state.t_s > 0.0
+    with pytest.raises(SetupError, match="--bus ideal needs --mock"):
+        gazerig.open("desk", bus="ideal")
+
+
+@pytest.fixture
+def recorded(tmp_path: Path) -> Path:
+    file = tmp_path / "run.mcap"
+    options = RunOptions(mock=True, fast=True, bus="ideal", seed=3, seconds=3.0, record=file)
+    session.run(session.compose(options.checked()), lambda: None, lambda line: None)
+    return file
+
+
+def test_a_recording_names_its_bus_and_comes_out_the_same_again(recorded):
+    recording = RunRecording(recorded)
+    assert recording.info.bus == "ideal" and recording.end.tx_sha256 == ""
+    for joints in ("recorded", "emulated"):
+        again = rerun(RunRecording(recorded), joints=joints)
+        assert again.same and again.ticks > 590, (joints, again.differs)
+        assert again.tx_same is None
+
+
+def test_changed_models_move_ideal_servos_again(recorded, monkeypatch):
+    monkeypatch.setattr("gazerig.robot.app.run_bus.build", None)  # no emulated device
+    again = rerun(RunRecording(recorded), character="sleepy")
+    assert again.joints == "emulated" and not again.same
