@@ -239,7 +239,7 @@ SAID = {
     *("sudo udevadm control --reload", "sudo usermod -aG dialout $USER", "ls /dev/serial/by-id"),
     *("sudo raspi-config", "sudo usermod -aG i2c $USER", "/dev/i2c-*"),
     *("sudo systemctl stop ModemManager", "robot", "./face", "myrig.yaml.bak-20260131-235958"),
-    *("with", "pre-commit install", "_deg", "_rad", "_ms", "_m", "p_world_m"),
+    *('bus="ideal"', "with", "pre-commit install", "_deg", "_rad", "_ms", "_m", "p_world_m"),
     *(
         'page="127.0.0.1:8080"',
         "say=print",

@@ -286,7 +286,7 @@ def show(figures: dict[str, Any], before: dict[str, Any] | None) -> None:
 
 
 def table(figures: dict[str, Any], before: dict[str, Any] | None) -> Iterator[str]:
-    """Yield the rows of docs/performance.md: mean / 99th percentile, of all ticks and new frames."""
+    """Yield the rows of docs/performance.md, mean / 99th percentile of all and new frames."""
     runs = [figures] if before is None else [before, figures]
     for part in ("stages_us", "calls", "peers"):
         rows = {part: figures[part]} if part == "calls" else figures[part]
