@@ -234,6 +234,55 @@ class MovingBlob:
     flow_px_s: tuple[float, float] = (0.0, 0.0)
 
 
+_Row = tuple[float, float, float]
+
+
+class DetectionInCamera(NamedTuple):
+    """One detection with its place in the camera's axes (x right, y down, z forward).
+
+    All of it follows from the image and the calibration alone.
+
+    R_camera_face: axes of a face, None of anything else
+    confidence: 0..1
+    face_length: of a face, in lengths of the canonical one
+    depth_measured: whether the distance was measured by the camera; else a face's is from
+        its size and a thing's is assumed
+    across_sd_m, along_sd_m: standard deviations of the place, across and along the view
+    v_camera_m_s: velocity over ground, None where only the place is known;
+        across_sd_m_s, along_sd_m_s: its standard deviations
+    size_depth: of a face, its distance if it were of an adult's size, over the distance
+        measured; None where the camera measured none
+    mark: the detector's own number of it, None where it gives none
+    """
+
+    kind: str
+    p_camera_m: tuple[float, float, float]
+    R_camera_face: tuple[_Row, _Row, _Row] | None
+    radius_m: float
+    spin_rad_s: float
+    confidence: float
+    face_length: float
+    depth_measured: bool
+    across_sd_m: float
+    along_sd_m: float
+    v_camera_m_s: tuple[float, float, float] | None
+    across_sd_m_s: float
+    along_sd_m_s: float
+    size_depth: float | None
+    mark: int | None
+
+
+class LocatedFrame(NamedTuple):
+    """What one image shows, located in the camera's axes by one calibration.
+
+    intrinsics: the calibration; things: what moves, with a place
+    """
+
+    intrinsics: Intrinsics
+    faces: tuple[DetectionInCamera, ...]
+    things: tuple[DetectionInCamera, ...]
+
+
 @dataclass(frozen=True, slots=True)
 class Detections:
     """What was found in one image.
@@ -243,6 +292,7 @@ class Detections:
     depth_m: distances seen from where the image was taken, where the camera measures
         them: (height_px, width_px), NaN where unknown
     lens: the lens if the camera reports it; such images are without distortion
+    located: faces and things in the camera's axes; None: whoever needs them computes them
     """
 
     captured_s: float
@@ -254,6 +304,7 @@ class Detections:
     image: ImageArray | None = None
     depth_m: Depth | None = None
     lens: Intrinsics | None = None
+    located: LocatedFrame | None = None
 
 
 class Camera(Protocol):

@@ -24,9 +24,11 @@ from gazerig.drivers.camera.worker import CameraParts
 from gazerig.drivers.errors import CameraError, ModelFileError
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.robot.perception.frame_locator import FrameLocator
 
 PATIENCE_S = 40.0
 DETECTOR = partial(face_detector, FaceDetectorParams(work_width_px=64))
+LOCATOR = FrameLocator(None, 1.2)
 
 
 def wait_for(what) -> None:
@@ -113,7 +115,8 @@ def test_a_killed_process_is_started_again_and_the_rest_goes_on(recording):
     camera = process(partial(CameraReplay, recording), QUICK)
     camera.open()
     wait_for(lambda: camera.latest(0.0) is not None)
-    assert camera.retune(DETECTOR, None)
+    assert camera.retune(DETECTOR, None, LOCATOR)
+    wait_for(lambda: present(camera.latest(0.0)).located is not None)
     first, before = present(camera._process).pid, camera.latest(0.0)
     os.kill(present(first), signal.SIGKILL)
     assert camera.latest(0.0) is not None, "the last picture stays, and its age tells"
@@ -121,6 +124,7 @@ def test_a_killed_process_is_started_again_and_the_rest_goes_on(recording):
     after = camera.latest(0.0)
     assert present(after).number > present(before).number and present(after).image is not None
     assert present(camera._process).pid != first
+    assert present(present(after).located).intrinsics == Intrinsics(60.0, 60.0, 32.0, 24.0)
     lost, back = camera.events()
     assert lost.startswith("camera lost (the camera process has ended)")
     assert back.startswith("camera back after")

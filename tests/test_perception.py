@@ -22,7 +22,7 @@ from gazerig.robot.perception.egomotion_residual import (
     TrackedPoint,
     turning_rad_s,
 )
-from gazerig.robot.perception.localisation import Box, Reading
+from gazerig.robot.perception.frame_locator import Box, Reading
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
 

@@ -3,7 +3,7 @@
 import threading
 from collections.abc import Callable
 
-from gazerig.drivers.camera.frame_analysis import FrameAnalyzer, Motion
+from gazerig.drivers.camera.frame_analysis import FrameAnalyzer, Locate, Motion
 from gazerig.drivers.camera.params import CameraRecoveryParams
 from gazerig.drivers.camera.source import FrameSource, Shot
 from gazerig.drivers.errors import CameraError
@@ -26,6 +26,7 @@ class CaptureLoop:
         recovery: how a lost source is reopened.
         motion: finds motion, None for none.
         report: called with each event as one line, at once.
+        locate: locates what is found in the camera's axes, None for none.
     """
 
     def __init__(
@@ -36,9 +37,10 @@ class CaptureLoop:
         recovery: CameraRecoveryParams,
         motion: Motion | None,
         report: Callable[[str], None],
+        locate: Locate | None = None,
     ) -> None:
         self._source = source
-        self._frames = FrameAnalyzer(detector, motion)
+        self._frames = FrameAnalyzer(detector, motion, locate)
         self._now_s = now_s
         self._recovery = recovery
         self._counted = 0  # frames of the source before it was last opened
@@ -73,9 +75,10 @@ class CaptureLoop:
         self,
         detector: Callable[[], FaceDetector] | None,
         motion: Callable[[Motion | None], Motion | None] | None,
+        locate: Locate | None = None,
     ) -> None:
-        """Change the detectors from the next frame on, as in FrameAnalyzer."""
-        self._frames.retune(detector, motion)
+        """Change detectors and calibration from the next frame on, as in FrameAnalyzer."""
+        self._frames.retune(detector, motion, locate)
 
     def close(self) -> None:
         """Free the source; safe to call twice."""

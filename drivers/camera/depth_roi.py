@@ -46,11 +46,11 @@ def depth_at(
     box_px: x, y, width, height; of it the middle part ``shrink`` is read, as its edges hold
         background; mask: (height, width); both together are their common part
     """
-    depth = np.asarray(depth_m, dtype=np.float64)
+    depth = np.asarray(depth_m)
     if depth.ndim != 2 or not depth.size or (mask is not None and mask.shape != depth.shape):
         return _NOTHING
     top, bottom, left, right = _window(depth.shape, box_px, shrink)
-    seen = depth[top:bottom, left:right]
+    seen = np.asarray(depth[top:bottom, left:right], dtype=np.float64)
     if mask is not None:
         seen = seen[mask[top:bottom, left:right]]
     seen = seen.ravel()

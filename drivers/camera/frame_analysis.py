@@ -1,12 +1,15 @@
 """What one frame shows: faces and what moves."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.types import Detections, FaceDetector, MovingBlob
+from gazerig.drivers.types import Detections, FaceDetector, LocatedFrame, MovingBlob
 
 Motion = Callable[[Shot], tuple[MovingBlob, ...]]
 """Finds what moves, from one frame to the next."""
+Locate = Callable[[Detections], LocatedFrame]
+"""Locates what was found in the camera's axes; picklable."""
 
 
 class FrameAnalyzer:
@@ -15,17 +18,20 @@ class FrameAnalyzer:
     Args:
         detector: finds faces.
         motion: finds what moves; None: nothing does.
+        locate: locates faces and things; None: they are located by whoever needs them.
     """
 
-    def __init__(self, detector: FaceDetector, motion: Motion | None = None) -> None:
-        self._detector, self._motion = detector, motion
+    def __init__(
+        self, detector: FaceDetector, motion: Motion | None = None, locate: Locate | None = None
+    ) -> None:
+        self._detector, self._motion, self._locate = detector, motion, locate
 
     def look(self, shot: Shot) -> Detections:
-        """Find the faces of a frame, unless the camera itself has, and what moves in it."""
+        """Find and locate the faces of a frame, unless the camera itself has, and what moves."""
         faces = shot.faces if shot.faces is not None else self._detector.find(shot.image)
         blobs = self._motion(shot) if self._motion is not None else ()
         height, width = shot.image.shape[:2]
-        return Detections(
+        found = Detections(
             shot.captured_s,
             shot.number,
             width,
@@ -36,6 +42,7 @@ class FrameAnalyzer:
             shot.depth_m,
             shot.lens,
         )
+        return found if self._locate is None else replace(found, located=self._locate(found))
 
     def events(self) -> tuple[str, ...]:
         """Return what the detector has to tell since the last call, one line each."""
@@ -46,16 +53,20 @@ class FrameAnalyzer:
         self,
         detector: Callable[[], FaceDetector] | None,
         motion: Callable[[Motion | None], Motion | None] | None,
+        locate: Locate | None = None,
     ) -> None:
-        """Change the detectors from the next frame on.
+        """Change the detectors and the calibration from the next frame on.
 
         Args:
             detector: makes another one; None: no change.
             motion: returns a motion detector from the present one; None: no change.
+            locate: locates by another calibration; None: no change.
 
         Raises:
             SetupError: the detector cannot be made; the old one goes on.
         """
+        if locate is not None:
+            self._locate = locate
         if motion is not None:
             self._motion = motion(self._motion)
         if detector is not None:

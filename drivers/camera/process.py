@@ -20,7 +20,7 @@ from select import select
 from typing import NamedTuple
 
 from gazerig.drivers.camera.capture_loop import BACK, LOST
-from gazerig.drivers.camera.frame_analysis import Motion
+from gazerig.drivers.camera.frame_analysis import Locate, Motion
 from gazerig.drivers.camera.frame_watchdog import FrameWatchdog
 from gazerig.drivers.camera.params import CameraRecoveryParams
 from gazerig.drivers.camera.shared_frames import SlotReader
@@ -121,8 +121,9 @@ class CameraProcess:
         self,
         detector: Callable[[], FaceDetector] | None,
         motion: Callable[[Motion | None], Motion | None] | None,
+        locate: Locate | None = None,
     ) -> bool:
-        """Change the detectors of the process from one of the next frames on.
+        """Change detectors and calibration of the process from one of the next frames on.
 
         Never waits. A detector that cannot be made there is reported as an event, and the old
         one goes on.
@@ -130,6 +131,7 @@ class CameraProcess:
         Args:
             detector: makes another one; None: no change.
             motion: returns a motion detector from the present one; None: no change.
+            locate: locates by another calibration; None: no change.
 
         Returns:
             Whether the process has room for the request.
@@ -138,11 +140,13 @@ class CameraProcess:
         try:
             if pipe is None or not select([], [pipe], [], 0.0)[1]:
                 return False
-            pipe.send(Retune(detector, motion))
+            pipe.send(Retune(detector, motion, locate))
         except (OSError, ValueError):  # it has ended, and the next one is on its way
             return False
         # For the process after this one.
-        self._parts = self._parts._replace(detector=detector or self._parts.detector)
+        self._parts = self._parts._replace(
+            detector=detector or self._parts.detector, locate=locate or self._parts.locate
+        )
         self._motion = motion or self._motion
         return True
 
@@ -303,11 +307,9 @@ class CameraProcess:
         self._number = self._counted + found.number
         image = slots[0].take(message.image) if message.image is not None else None
         depth = slots[1].take(message.depth) if message.depth is not None else None
-        blobs = found.blobs
         if self._starts > 1:
-            first = (self._starts - 1) * _BLOB_IDS
-            blobs = tuple(replace(blob, id=first + blob.id) for blob in blobs)
-        self._newest = replace(found, number=self._number, blobs=blobs, image=image, depth_m=depth)
+            found = _renumbered(found, (self._starts - 1) * _BLOB_IDS)
+        self._newest = replace(found, number=self._number, image=image, depth_m=depth)
         now_s = self._now_s()
         if self._lost_s is not None:
             if self._owes_back:
@@ -315,6 +317,19 @@ class CameraProcess:
             self._lost_s, self._owes_back, self._back_s = None, False, now_s
         elif self._losses and now_s - self._back_s >= _STABLE_S:
             self._losses = 0
+
+
+def _renumbered(found: Detections, first: int) -> Detections:
+    """Return detections whose things are numbered from ``first`` on."""
+    located = found.located
+    if located is not None:
+        things = [
+            thing if thing.mark is None else thing._replace(mark=first + thing.mark)
+            for thing in located.things
+        ]
+        located = located._replace(things=tuple(things))
+    blobs = tuple([replace(blob, id=first + blob.id) for blob in found.blobs])
+    return replace(found, blobs=blobs, located=located)
 
 
 def _no_reply() -> SetupError:

@@ -9,10 +9,11 @@ from collections import deque
 from collections.abc import Callable
 
 from gazerig.drivers.camera.capture_loop import CaptureLoop, failed
-from gazerig.drivers.camera.frame_analysis import Motion
+from gazerig.drivers.camera.frame_analysis import Locate, Motion
 from gazerig.drivers.camera.params import CameraRecoveryParams
 from gazerig.drivers.camera.source import FrameSource
-from gazerig.drivers.errors import CameraError
+from gazerig.drivers.camera.worker import Retune
+from gazerig.drivers.errors import CameraError, SetupError
 from gazerig.drivers.types import Detections, FaceDetector
 
 # OpenCV gives up waiting for a camera after 10 s; a film stops at once.
@@ -31,6 +32,7 @@ class CameraThread:
         now_s: the host's monotonic clock, seconds.
         recovery: how a lost source is reopened.
         motion: called in the camera's thread with every frame, None for none.
+        locate: locates what is found in the camera's axes, None for none.
 
     frames, frames_with_face: counts of frames looked at since open
     """
@@ -42,11 +44,19 @@ class CameraThread:
         now_s: Callable[[], float],
         recovery: CameraRecoveryParams | None = None,
         motion: Motion | None = None,
+        locate: Locate | None = None,
     ) -> None:
         self._events: deque[str] = deque(maxlen=_MOST_EVENTS)
         self._camera = CaptureLoop(
-            source, detector, now_s, recovery or CameraRecoveryParams(), motion, self._events.append
+            source,
+            detector,
+            now_s,
+            recovery or CameraRecoveryParams(),
+            motion,
+            self._events.append,
+            locate,
         )
+        self._requests: deque[Retune] = deque()
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
         self._newest: Detections | None = None
@@ -80,6 +90,24 @@ class CameraThread:
             raise failed(self._failure) from self._failure
         return self._newest
 
+    def retune(
+        self,
+        detector: Callable[[], FaceDetector] | None,
+        motion: Callable[[Motion | None], Motion | None] | None,
+        locate: Locate | None = None,
+    ) -> bool:
+        """Change detectors and calibration from one of the next frames on; always possible.
+
+        A detector that cannot be made is reported as an event, and the old one goes on.
+
+        Args:
+            detector: makes another one; None: no change.
+            motion: returns a motion detector from the present one; None: no change.
+            locate: locates by another calibration; None: no change.
+        """
+        self._requests.append(Retune(detector, motion, locate))
+        return True
+
     def events(self) -> tuple[str, ...]:
         """Return what happened since the last call, one line each."""
         messages = []
@@ -102,8 +130,17 @@ class CameraThread:
                 self.frames += 1
                 self.frames_with_face += bool(found.faces)
                 self._newest = found
+                self._apply_requests()
         except Exception as failure:  # handed to the loop by latest()
             self._failure = failure
         finally:
             # Freed by the thread that reads it: never under a frame being fetched.
             self._camera.close()
+
+    def _apply_requests(self) -> None:
+        """Apply what has been asked for since the frame before."""
+        while self._requests:
+            try:
+                self._camera.retune(*self._requests.popleft())
+            except SetupError as error:
+                self._events.append(f"the detector stays as it was: {error}")

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import cv2
 
 from gazerig.drivers.camera.capture_loop import CaptureLoop, failed
-from gazerig.drivers.camera.frame_analysis import Motion
+from gazerig.drivers.camera.frame_analysis import Locate, Motion
 from gazerig.drivers.camera.params import CameraRecoveryParams
 from gazerig.drivers.camera.shared_frames import SlotAddress, SlotWriter
 from gazerig.drivers.camera.source import FrameSource
@@ -29,11 +29,13 @@ class CameraParts(NamedTuple):
     """How to make the parts, in the process that uses them; all must be picklable.
 
     source, detector: functions without arguments; motion: the same, or None
+    locate: locates what is found in the camera's axes; None: that is left to the loop
     """
 
     source: Callable[[], FrameSource]
     detector: Callable[[], FaceDetector]
     motion: Callable[[], Motion] | None = None
+    locate: Locate | None = None
 
 
 class Found(NamedTuple):
@@ -45,10 +47,11 @@ class Found(NamedTuple):
 
 
 class Retune(NamedTuple):
-    """Request to change detectors; None: no change. All must be picklable."""
+    """Request to change detectors or calibration; None: no change. All must be picklable."""
 
     detector: Callable[[], FaceDetector] | None
     motion: Callable[[Motion | None], Motion | None] | None
+    locate: Locate | None = None
 
 
 class Ended(NamedTuple):
@@ -74,7 +77,9 @@ def run(
     cv2.setNumThreads(max(1, (os.cpu_count() or 1) - 1))
     try:
         motion = parts.motion() if parts.motion is not None else None
-        camera = CaptureLoop(parts.source(), parts.detector(), now_s, recovery, motion, pipe.send)
+        camera = CaptureLoop(
+            parts.source(), parts.detector(), now_s, recovery, motion, pipe.send, parts.locate
+        )
         camera.open()
     except SetupError as error:
         pipe.send(error)
@@ -125,7 +130,7 @@ def _retune(camera: CaptureLoop, requests: deque[Retune], pipe: Connection) -> N
     while requests:
         message = requests.popleft()
         detector = message.detector or detector
-        camera.retune(None, message.motion)
+        camera.retune(None, message.motion, message.locate)
     if detector is None:
         return
     try:

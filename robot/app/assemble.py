@@ -22,7 +22,7 @@ from gazerig.gaze.scanpath import Scanpath, ScanpathParams, Walk, row_sums_note
 from gazerig.gaze.types import Angles2, Angles3
 from gazerig.params import choices_of
 from gazerig.robot.app.animation_tables import animation_tables
-from gazerig.robot.app.camera_factory import real_camera, scene_camera
+from gazerig.robot.app.camera_factory import locator_of, real_camera, scene_camera
 from gazerig.robot.app.gaze_models import (
     chooser_of,
     deciders,
@@ -165,7 +165,7 @@ def assemble(rig: Rig, options: RunOptions, substitutes: Substitutes = RIGS_OWN)
         seen = (
             scene_camera(
                 rig, options, scene, sight.mount, true_head(wires.true_steps, rig, sight.poses),
-                random.camera, substitutes.program,
+                random.camera, locator_of(camera), substitutes.program,
             )
             if scene is not None
             else real_camera(rig, options, clock, camera, sight.turns, substitutes.program)

@@ -16,6 +16,7 @@ from gazerig.drivers.camera.playback import CameraReplay
 from gazerig.drivers.camera.pose_buffer import PoseBuffer
 from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.source import FrameSource
+from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.camera.webcam import Webcam
 from gazerig.drivers.camera.worker import CameraParts
@@ -30,6 +31,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts, program_camera, watched
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraMount, CameraParams
+from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.motion_source import motion_finder, retuned
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.cameras.rendered import Exposure, PixelCamera, PixelCameraParams
@@ -47,16 +49,17 @@ def scene_camera(
     mount: CameraMount,
     where: HeadPose,
     rng: np.random.Generator,
+    locate: FrameLocator,
     own: ProgramParts = NO_PARTS,
 ) -> Camera:
     """Return a camera on a simulated scene, which renders frames or returns ideal detections."""
     field_deg = rig.camera.horizontal_field_deg
     if not options.pixels:
         params = SceneCameraParams(horizontal_field_deg=field_deg)
-        return SceneCamera(params, scene, mount, where, rng)
+        return SceneCamera(params, scene, mount, where, rng, locate)
     drawn = PixelCameraParams(horizontal_field_deg=field_deg)
     motion = _MotionOfDrawn(rig.motion)
-    return PixelCamera(drawn, scene, mount, where, own.find_faces(rig), rng, motion)
+    return PixelCamera(drawn, scene, mount, where, own.find_faces(rig), rng, motion, locate)
 
 
 def real_camera(
@@ -79,25 +82,30 @@ def real_camera(
     detector = partial(face_detector, rig.detector)
     field_rad = radians(placed.horizontal_field_deg)
     motion = partial(motion_finder, rig.motion, placed.lens, field_rad, turns)
+    locate = locator_of(placed)
     if own.camera is not None:
-        return program_camera(rig, own, clock, motion, options.fast)
+        return program_camera(rig, own, clock, motion, locate, options.fast)
     if options.fast:
-        return FilmCamera(
-            _film(options), own.find_faces(rig), options.film_delay_s, motion=motion()
-        )
+        film, delay_s = _film(options), options.film_delay_s
+        return FilmCamera(film, own.find_faces(rig), delay_s, motion=motion(), locate=locate)
     name = options.camera if isinstance(options.camera, str) else None
     if own.detector is not None and (name is None or is_ours(CAMERA, name)):
-        return watched(rig, own, _source(rig, options)(), clock, motion)
+        return watched(rig, own, _source(rig, options)(), clock, motion, locate)
     if name is None or is_ours(CAMERA, name):
-        parts = CameraParts(_source(rig, options), detector, motion)
+        parts = CameraParts(_source(rig, options), detector, motion, locate)
         return CameraProcess(parts, clock.now_s, rig.camera_recovery)
     params, label = _section(rig, name), find(CAMERA, name).label
     camera = camera_part(name, params)
     if is_source(camera):
-        parts = CameraParts(partial(plugin_source, name, params), detector, motion)
+        parts = CameraParts(partial(plugin_source, name, params), detector, motion, locate)
         process = CameraProcess(parts, clock.now_s, rig.camera_recovery)
         return GuardedCamera(process, label, close_s=CLOSE_PROCESS_S)
     return GuardedCamera(cast(Camera, camera), label)
+
+
+def locator_of(placed: CameraParams) -> FrameLocator:
+    """Return what locates faces and things in the axes of a camera with this lens."""
+    return FrameLocator(placed.lens, radians(placed.horizontal_field_deg))
 
 
 def _section(rig: Rig, name: str) -> object:
@@ -125,7 +133,8 @@ def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams)
     detector = partial(face_detector, after.detector) if after.detector != before.detector else None
     seen_through = after.camera.lens, after.camera.horizontal_field_deg
     before_through = before.camera.lens, before.camera.horizontal_field_deg
-    moves = after.motion != before.motion or seen_through != before_through
+    locate = locator_of(placed) if seen_through != before_through else None
+    moves = after.motion != before.motion or locate is not None
     if detector is None and not moves:
         return ""
     field_rad = radians(placed.horizontal_field_deg)
@@ -135,12 +144,17 @@ def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams)
                 return retune_camera(camera.camera, before, after, placed)
             case CameraProcess() | FilmCamera():
                 motion = partial(retuned, after.motion, placed.lens, field_rad)
-                done = camera.retune(detector, motion if moves else None)
+                done = camera.retune(detector, motion if moves else None, locate)
+            case CameraThread():  # it looks with the program's own detector
+                motion = partial(retuned, after.motion, placed.lens, field_rad)
+                done = camera.retune(None, motion if moves else None, locate)
             case PixelCamera():
                 drawn = partial(_retuned_drawn, after.motion)
-                done = camera.retune(detector, drawn if moves else None)
+                done = camera.retune(detector, drawn if moves else None, locate)
+            case SceneCamera():  # it makes up what a detector would find
+                done = locate is None or camera.retune(locate)
             case _:
-                return ""  # it makes up what a detector would find
+                return ""
     except SetupError as error:
         return f"the detector stays as it was: {error}"
     return "" if done else "the camera's process is busy and looks as before: set it once more"

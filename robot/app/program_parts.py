@@ -5,7 +5,7 @@ from typing import NamedTuple, cast
 
 from gazerig.config.schema import Rig
 from gazerig.drivers.camera.camera_plugins import CheckedSource, is_source
-from gazerig.drivers.camera.frame_analysis import Motion
+from gazerig.drivers.camera.frame_analysis import Locate, Motion
 from gazerig.drivers.camera.guarded_camera import LONGEST_S as LONGEST_CAMERA_S
 from gazerig.drivers.camera.guarded_camera import GuardedCamera
 from gazerig.drivers.camera.source import FrameSource
@@ -53,7 +53,12 @@ NO_PARTS = ProgramParts()
 
 
 def program_camera(
-    rig: Rig, parts: ProgramParts, clock: Clock, motion: Callable[[], Motion | None], fast: bool
+    rig: Rig,
+    parts: ProgramParts,
+    clock: Clock,
+    motion: Callable[[], Motion | None],
+    locate: Locate,
+    fast: bool,
 ) -> Camera:
     """Return the program's own camera, checked and watched like another package's.
 
@@ -68,7 +73,7 @@ def program_camera(
     if fast:
         raise SetupError(f"{label} gives frames in real time: in simulated time give detections")
     source = CheckedSource(cast(FrameSource, camera), label)
-    return watched(rig, parts, source, clock, motion)
+    return watched(rig, parts, source, clock, motion, locate)
 
 
 def watched(
@@ -77,10 +82,11 @@ def watched(
     source: FrameSource,
     clock: Clock,
     motion: Callable[[], Motion | None],
+    locate: Locate,
 ) -> Camera:
     """Return a source of frames with the detector looking in a thread of this program."""
     detector = parts.find_faces(rig)
-    return CameraThread(source, detector, clock.now_s, rig.camera_recovery, motion())
+    return CameraThread(source, detector, clock.now_s, rig.camera_recovery, motion(), locate)
 
 
 def _require(part: object, what: str, method: str) -> None:

@@ -5,39 +5,27 @@ the frame was taken, not where it is now; each person's own motion is told from 
 things (same_person); tracks give all of them identities and velocities (tracks).
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from math import hypot, radians
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.types import Detections
+from gazerig.drivers.types import Detections, LocatedFrame
 from gazerig.gaze.angles import add, norm, rotate, scale, sub, unit
-from gazerig.gaze.types import PARTS, Bodies, Face, Mat3, Percept, Vec3
+from gazerig.gaze.types import PARTS, Bodies, Face, Percept, Vec3
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, LensParams, PoseHistory
-from gazerig.robot.model.intrinsics import intrinsics_of_lens
 from gazerig.robot.perception.egomotion_residual import (
     EgomotionResidual,
     ResidualFigures,
     TrackedPoint,
     turning_rad_s,
 )
+from gazerig.robot.perception.frame_locator import SIZE_SPREAD, DepthAt, FrameLocator
 from gazerig.robot.perception.hand_ownership import Known, without_own_motion
-from gazerig.robot.perception.localisation import (
-    SIZE_SPREAD,
-    Box,
-    Reading,
-    blob_sighting,
-    face_sighting,
-    reader_of,
-)
-from gazerig.robot.perception.tracker import LocalisedDetection, Track, Tracker
-
-DepthAt = Callable[[NDArray[Any], Box], Reading]
-"""Reads the distance of what a box of pixels shows from a depth image."""
+from gazerig.robot.perception.localisation import placed
+from gazerig.robot.perception.tracker import Track, Tracker
 
 # The head's turn at a capture is taken over so long before and after it.
 _HALF_TURN_S = 0.015
@@ -66,9 +54,9 @@ class Perception:
         depth_at: DepthAt | None = None,
     ) -> None:
         self._mount = mount
+        self._depth_at = depth_at
         self.retune(horizontal_field_deg, parts_face_m, lens)
         self._tracker = tracker
-        self._depth_at = depth_at
         self._tracks: tuple[Track, ...] = ()
         self._p_camera: Vec3 = (0.0, 0.0, 0.0)
         self._residual = EgomotionResidual()
@@ -87,8 +75,7 @@ class Perception:
         own = parts_face_m or {}
         # A measured part is where it was measured; a canonical one is stretched with the face.
         self._parts = tuple((own.get(code, PARTS_FACE_M[code]), code in own) for code in PARTS)
-        self._field_rad = radians(horizontal_field_deg)
-        self._measured = lens
+        self._locator = FrameLocator(lens, radians(horizontal_field_deg), self._depth_at)
         self._size_px = (0, 0)
         self._intrinsics: Intrinsics | None = None
 
@@ -101,8 +88,13 @@ class Perception:
         self.frames_with_face += bool(detections.faces)
         t_s = detections.captured_s
         R, p = self._mount.pose(*poses.head_pose(t_s))
-        faces, things = self._sightings(detections, R, p)
-        faces, things = without_own_motion(faces, things, self._known(t_s), p)
+        located = self._located(detections)
+        faces, things = without_own_motion(
+            [placed(face, R, p) for face in located.faces],
+            [placed(thing, R, p) for thing in located.things],
+            self._known(t_s),
+            p,
+        )
         self._tracks = tracks = self._tracker.step([*faces, *things], p, t_s)
         self._p_camera = p
         self._note_residual(t_s, poses)
@@ -117,15 +109,17 @@ class Perception:
         """Return how fast still things seem to move while the head turns."""
         return self._residual.figures()
 
-    def _sightings(
-        self, found: Detections, R_world_camera: Mat3, p: Vec3
-    ) -> tuple[list[LocalisedDetection], list[LocalisedDetection]]:
-        """Place everything found in the world: faces, and what else moves."""
-        lens = self._lens(found)
-        depth = reader_of(found.depth_m, self._depth_at)
-        faces = [face_sighting(face, R_world_camera, p, lens, depth) for face in found.faces]
-        things = [blob_sighting(blob, R_world_camera, p) for blob in found.blobs]
-        return [f for f in faces if f is not None], [t for t in things if t is not None]
+    def _located(self, found: Detections) -> LocatedFrame:
+        """Return a frame's contents in the camera's axes.
+
+        The camera's process has located them. A camera of another package need not, and a frame
+        that was under way while the lens was changed was located by the lens of before.
+        """
+        intrinsics = self._lens(found)
+        located = found.located
+        if located is not None and located.intrinsics == intrinsics:
+            return located
+        return self._locator.locate(found, intrinsics)
 
     def _known(self, t_s: float) -> list[Known]:
         """Return where the faces of the last frame are expected now."""
@@ -171,16 +165,13 @@ class Perception:
         )
 
     def _lens(self, found: Detections) -> Intrinsics:
-        """Return the intrinsics of a frame: as measured, as the camera says, or by its field."""
-        width_px, height_px = found.width_px, found.height_px
+        """Return the intrinsics of a frame, computed once for frames of one size."""
         if found.lens is not None:
-            measured, field_rad = self._measured, self._field_rad
-            return intrinsics_of_lens(measured, field_rad, width_px, height_px, found.lens)
-        if self._size_px != (width_px, height_px) or self._intrinsics is None:
-            self._size_px = (width_px, height_px)
-            self._intrinsics = intrinsics_of_lens(
-                self._measured, self._field_rad, width_px, height_px
-            )
+            return self._locator.intrinsics(found)
+        size_px = found.width_px, found.height_px
+        if self._size_px != size_px or self._intrinsics is None:
+            self._size_px = size_px
+            self._intrinsics = self._locator.intrinsics(found)
         return self._intrinsics
 
 

@@ -7,12 +7,13 @@ now and then nothing. Not modelled: motion blur, light, occlusion, false detecti
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import radians
 from typing import Annotated
 
 import numpy as np
 
+from gazerig.drivers.camera.frame_analysis import Locate
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.angles import dot, norm, rotate, rotate_back, rotation, scale, sub, unit
@@ -44,7 +45,16 @@ class SceneCameraParams:
 
 
 class SceneCamera:
-    """A gazerig.drivers.types.Camera in a scene; frames are computed on demand."""
+    """A gazerig.drivers.types.Camera in a scene; frames are computed on demand.
+
+    Args:
+        params: resolution, rate and noise of the camera.
+        scene: what is in front of it.
+        mount: where the camera sits on the head.
+        head_pose: true rotation (3, 3) and position [m] of the head in the world at a time [s].
+        rng: for the noise.
+        locate: locates what is found in the camera's axes, None for none.
+    """
 
     def __init__(
         self,
@@ -53,12 +63,14 @@ class SceneCamera:
         mount: CameraMount,
         head_pose: Callable[[float], tuple[Mat3, Vec3]],
         rng: np.random.Generator,
+        locate: Locate | None = None,
     ) -> None:
         self._params = params
         self._scene = scene
         self._mount = mount
         self._head_pose = head_pose
         self._rng = rng
+        self._locate = locate
         self._lens = intrinsics_of_view(
             radians(params.horizontal_field_deg), params.width_px, params.height_px
         )
@@ -86,6 +98,11 @@ class SceneCamera:
             self._arrived = self._on_the_way.popleft()
         return self._arrived
 
+    def retune(self, locate: Locate) -> bool:
+        """Locate by another calibration from the next frame on; always possible."""
+        self._locate = locate
+        return True
+
     def events(self) -> tuple[str, ...]:
         """Return no events: nothing can happen to it."""
         return ()
@@ -111,9 +128,10 @@ class SceneCamera:
             blobs.extend(self._blob(thing._replace(id=_FIRST_THING_ID + thing.id), R, p))
         faces.sort(key=lambda face: -face.box_px[2])
         par = self._params
-        return Detections(
+        found = Detections(
             t_s, self._number, par.width_px, par.height_px, tuple(faces), tuple(blobs)
         )
+        return found if self._locate is None else replace(found, located=self._locate(found))
 
     def _face(self, person: ScenePerson, R: Mat3, p: Vec3) -> DetectedFace | None:
         """Project the landmarks; no detector finds what is cut off, far or turned away."""

@@ -9,7 +9,7 @@ distortion, rolling shutter, light, the smear of things that move themselves.
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import hypot, radians
 from typing import Annotated, Any, NamedTuple
 
@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.drivers.camera.frame_analysis import Locate
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.drivers.types import Detections, FaceDetector, ImageArray, MovingBlob
 from gazerig.gaze.angles import norm, sub
@@ -82,6 +83,7 @@ class PixelCamera:
         detector: finds the faces.
         rng: for the noise.
         find_motion: finds what moves, besides the faces.
+        locate: locates what is found in the camera's axes, None for none.
     """
 
     def __init__(
@@ -93,6 +95,7 @@ class PixelCamera:
         detector: FaceDetector,
         rng: np.random.Generator,
         find_motion: FindMotion | None = None,
+        locate: Locate | None = None,
     ) -> None:
         self._params = params
         self._scene = scene
@@ -101,6 +104,7 @@ class PixelCamera:
         self._detector = detector
         self._rng = rng
         self._find_motion = find_motion
+        self._locate = locate
         self.lens = intrinsics_of_view(
             radians(params.horizontal_field_deg), params.width_px, params.height_px
         )
@@ -135,16 +139,20 @@ class PixelCamera:
         self,
         detector: Callable[[], FaceDetector] | None,
         motion: Callable[[FindMotion | None], FindMotion | None] | None,
+        locate: Locate | None = None,
     ) -> bool:
-        """Change the detectors from the next frame on; always possible.
+        """Change detectors and calibration from the next frame on; always possible.
 
         Args:
             detector: makes another one; None: no change.
             motion: returns a motion detector from the present one; None: no change.
+            locate: locates by another calibration; None: no change.
 
         Raises:
             SetupError: the detector cannot be made; the old one goes on.
         """
+        if locate is not None:
+            self._locate = locate
         if motion is not None:
             self._find_motion = motion(self._find_motion)
         if detector is not None:
@@ -163,7 +171,7 @@ class PixelCamera:
         """Return the detections in a frame."""
         blobs = self._find_motion(shot, self.lens) if self._find_motion is not None else ()
         height, width = shot.image.shape[:2]
-        return Detections(
+        found = Detections(
             shot.captured_s,
             shot.number,
             width,
@@ -173,6 +181,7 @@ class PixelCamera:
             image=shot.image,
             depth_m=shot.depth_m,
         )
+        return found if self._locate is None else replace(found, located=self._locate(found))
 
     def _expose(self, t_s: float, R: Mat3, p: Vec3) -> Exposure:
         """Render one frame from the camera's pose; its time is the middle of the exposure."""

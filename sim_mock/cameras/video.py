@@ -6,7 +6,7 @@ It does not blur, distort, drop or reorder frames, and its delay is constant.
 from collections.abc import Callable
 from typing import Protocol
 
-from gazerig.drivers.camera.frame_analysis import FrameAnalyzer, Motion
+from gazerig.drivers.camera.frame_analysis import FrameAnalyzer, Locate, Motion
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import Detections, FaceDetector
 
@@ -47,6 +47,7 @@ class FilmCamera:
         delay_s: time from exposure to detections, at least 0.
         start_s: simulated time of the first exposure.
         motion: finds motion, None for none.
+        locate: locates what is found in the camera's axes, None for none.
 
     frames, frames_with_face: counts of frames looked at since open
     """
@@ -58,11 +59,12 @@ class FilmCamera:
         delay_s: float,
         start_s: float = 0.0,
         motion: Motion | None = None,
+        locate: Locate | None = None,
     ) -> None:
         if not delay_s >= 0.0:
             raise ValueError(f"detections cannot come before their frame: delay {delay_s} s")
         self._video = video
-        self._frames = FrameAnalyzer(detector, motion)
+        self._frames = FrameAnalyzer(detector, motion, locate)
         self._delay_s = delay_s
         self._start_s = start_s
         self._newest: Detections | None = None
@@ -93,9 +95,10 @@ class FilmCamera:
         self,
         detector: Callable[[], FaceDetector] | None,
         motion: Callable[[Motion | None], Motion | None] | None,
+        locate: Locate | None = None,
     ) -> bool:
-        """Change the detectors from the next frame on, as in FrameAnalyzer; always possible."""
-        self._frames.retune(detector, motion)
+        """Change detectors and calibration from the next frame on; always possible."""
+        self._frames.retune(detector, motion, locate)
         return True
 
     def events(self) -> tuple[str, ...]:

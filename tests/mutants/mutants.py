@@ -81,7 +81,7 @@ MUTANTS = (
            "a hand becomes a face", ("tracks", "perception")),
     Mutant("robot/perception/tracker.py", "t_s - t.seen_s <= par.coast_ms / 1e3", "True",
            "who has left stays in sight", ("tracks", "perception")),
-    Mutant("robot/perception/localisation.py", "    if not spread <= _MOST_SPREAD_M:", "    if False:",
+    Mutant("robot/perception/frame_locator.py", "    if not spread <= _MOST_SPREAD_M:", "    if False:",
            "a depth that is two things at once is believed", ("camera_depth", "perception")),
     Mutant("robot/perception/kalman.py", "kept = 1.0 if seen else exp(-dt_s / _STOPS_WITHIN_S)",
            "kept = 1.0", "somebody out of sight walks on for ever", ("track_filter", "tracks")),

@@ -1,0 +1,174 @@
+"""What an image shows, located in the camera's axes: by the image and the calibration alone.
+
+This is done beside the detector, in the camera's process. Across the line of view a place is
+known to about a pixel. Along it, a distance is as good as the camera's depth where it has one
+there, else as what is known of the size of faces.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import hypot, isfinite, sqrt
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.drivers.camera import depth_roi
+from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.types import (
+    DetectedFace,
+    DetectionInCamera,
+    Detections,
+    LocatedFrame,
+    MovingBlob,
+)
+from gazerig.gaze.angles import norm, scale
+from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PUPIL_DISTANCE_M
+from gazerig.robot.model.frames import LensParams
+from gazerig.robot.model.intrinsics import intrinsics_of_lens
+from gazerig.robot.perception.face_pose import FacePose, face_pose
+
+Box = tuple[float, float, float, float]
+"""x, y, width, height in pixels."""
+Reading = tuple[float | None, float, float]
+"""Distance along the optical axis (m), its spread (m), and the share of pixels with any."""
+DepthAt = Callable[[NDArray[Any], Box], Reading]
+"""Reads the distance of what a box of pixels shows from a depth image."""
+
+_FACE_RADIUS_M = 0.1
+# Error of a face's centre from five landmarks: part of a pixel, and of the eyes' distance.
+_CENTRE_PX, _CENTRE_OF_EYES = 0.4, 0.015
+# Error of its size from frame to frame, the same way. People's eyes themselves lie 6 %
+# nearer or farther apart than usual (Gordon et al., ANSUR): that stays, and no filter helps.
+_SIZE_PX, _SIZE_OF_EYES = 0.7, 0.03
+SIZE_SPREAD = 0.06
+# Depth of a face: refused where too few of its pixels have one, or where they belong to
+# more than a face; never better than a part of itself.
+_LEAST_SHARE, _MOST_SPREAD_M, _LEAST_SD = 0.3, 0.12, 0.01
+# The size of a face, over an adult's, that is believed.
+_SMALLEST, _LARGEST = 0.3, 3.0
+# A blob's middle wanders about in it; its flow is off by part of itself and of the search.
+_MIDDLE_OF_RADIUS, _PLACED_M = 0.3, 0.002
+_FLOW_SHARE, _FLOW_RAD_S, _LOOM_SD_1_S = 0.1, 0.03, 0.5
+# Legs that stride and people who part grow and shrink a patch that comes no nearer; where
+# no distance bears a growth out, it is believed the less.
+_SHAPE_1_S = 0.3
+# A place is all that is known of a face's motion; the fields stand for a velocity's errors.
+_NO_SPEED_SDS = (0.1, 0.5)
+
+
+@dataclass(frozen=True)
+class FrameLocator:
+    """Locates faces and things in the camera's axes by one calibration; picklable.
+
+    lens: as measured; field_rad: horizontal field of view, where the lens was not measured
+    depth_at: reads depth images; None: distances come from the size of faces
+    """
+
+    lens: LensParams | None
+    field_rad: float
+    depth_at: DepthAt | None = depth_roi.depth_at
+
+    def __call__(self, found: Detections) -> LocatedFrame:
+        """Return what a frame shows in the camera's axes."""
+        return self.locate(found, self.intrinsics(found))
+
+    def intrinsics(self, found: Detections) -> Intrinsics:
+        """Return the calibration of a frame: as measured, as the camera says, or by its field."""
+        size_px = found.width_px, found.height_px
+        return intrinsics_of_lens(self.lens, self.field_rad, *size_px, found.lens)
+
+    def locate(self, found: Detections, intrinsics: Intrinsics) -> LocatedFrame:
+        """Return what a frame of known intrinsics shows in the camera's axes."""
+        faces = [self._face(face, found, intrinsics) for face in found.faces]
+        things = [thing_in_camera(blob) for blob in found.blobs]
+        return LocatedFrame(
+            intrinsics,
+            tuple([face for face in faces if face is not None]),
+            tuple([thing for thing in things if thing is not None]),
+        )
+
+    def _face(
+        self, face: DetectedFace, found: Detections, lens: Intrinsics
+    ) -> DetectionInCamera | None:
+        """Locate a face, None where its landmarks show none from its front."""
+        pose = face_pose(face.landmarks_px, lens)
+        if pose is None:
+            return None
+        focal_px = sqrt(lens.fx_px * lens.fy_px)
+        eyes_px = focal_px * PUPIL_DISTANCE_M / pose.p_camera_m[2]
+        far = norm(pose.p_camera_m)
+        measured = self._measured(face, pose, found)
+        share, sd = (
+            measured if measured is not None else (1.0, hypot(_SIZE_PX / eyes_px, _SIZE_OF_EYES))
+        )
+        return DetectionInCamera(
+            "face",
+            scale(pose.p_camera_m, share),
+            pose.R_camera_face,
+            _FACE_RADIUS_M,
+            0.0,
+            face.confidence,
+            pose.length,
+            measured is not None,
+            share * far * hypot(_CENTRE_PX, _CENTRE_OF_EYES * eyes_px) / focal_px,
+            share * far * sd,
+            None,
+            *_NO_SPEED_SDS,
+            None if measured is None else 1.0 / share,
+            None,
+        )
+
+    def _measured(
+        self, face: DetectedFace, pose: FacePose, found: Detections
+    ) -> tuple[float, float] | None:
+        """Return the measured distance over that from the size, and its relative deviation.
+
+        None where the camera's depth does not tell the distance of this face.
+        """
+        if found.depth_m is None or self.depth_at is None:
+            return None
+        low, high = face.landmarks_px.min(axis=0), face.landmarks_px.max(axis=0)
+        (x, y), (width, height) = low.tolist(), (high - low).tolist()
+        z, spread, valid = self.depth_at(found.depth_m, (x, y, width, height))
+        if z is None or not (isfinite(z) and z > 0.0 and valid >= _LEAST_SHARE):
+            return None
+        if not spread <= _MOST_SPREAD_M:
+            return None
+        # Between eyes and mouth the surface lies behind the tip of the nose, the face's place.
+        behind = float((LANDMARKS_FACE_M @ np.array(pose.R_camera_face).T)[:, 2].mean())
+        share = (z - behind) / pose.p_camera_m[2]
+        if not _SMALLEST < share < _LARGEST:
+            return None
+        return share, hypot(_LEAST_SD, 0.5 * spread / z)
+
+
+def thing_in_camera(blob: MovingBlob) -> DetectionInCamera | None:
+    """Return something that moves with the errors of its place, None where it has no place."""
+    far = norm(blob.p_camera_m)
+    if not (isfinite(far) and isfinite(blob.radius_m)):
+        return None
+    drawn = blob.box_px is not None
+    v = blob.v_camera_m_s
+    if v is not None and not isfinite(norm(v)):
+        v = None
+    across = hypot(_FLOW_SHARE * (norm(v) if v else 0.0), far * _FLOW_RAD_S)
+    shape = 0.0 if blob.depth_known else _SHAPE_1_S
+    loom_sd = blob.loom_sd_1_s if blob.loom_sd_1_s > 0.0 else _LOOM_SD_1_S
+    return DetectionInCamera(
+        blob.kind,
+        blob.p_camera_m,
+        None,
+        blob.radius_m,
+        blob.spin_rad_s if isfinite(blob.spin_rad_s) else 0.0,
+        1.0,
+        1.0,
+        blob.depth_known,
+        hypot(_PLACED_M, _MIDDLE_OF_RADIUS * blob.radius_m if drawn else 0.0),
+        hypot(_LEAST_SD * far, blob.depth_sd_m if isfinite(blob.depth_sd_m) else far),
+        v,
+        across,
+        far * (min(hypot(loom_sd, shape), 10.0) if isfinite(loom_sd) else 10.0),
+        None,
+        blob.id,
+    )

@@ -1,0 +1,168 @@
+"""Faces and things are located beside the detector; the tick only places and associates them."""
+
+import pickle
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from math import radians
+
+import numpy as np
+import pytest
+from present import present
+from test_perception import STILL, face_at, picture, standing
+
+from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
+from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.camera.process import _renumbered
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.camera.thread import CameraThread
+from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
+from gazerig.gaze.types import Percept
+from gazerig.robot.model.frames import LensParams
+from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.perception import frame_locator
+from gazerig.robot.perception.frame_locator import FrameLocator
+from gazerig.robot.perception.perception import Perception
+from gazerig.robot.perception.tracker import Tracker
+
+FIELD_DEG = 69.0
+FACE = face_at((0.1, 0.05, 1.0))
+LOCATOR = FrameLocator(None, radians(FIELD_DEG))
+BALL = MovingBlob(3, "ball", (0.2, 0.1, 1.5), 0.1, v_camera_m_s=(0.1, 0.0, 0.0))
+LENS = LensParams(640, 400, 520.0, 520.0, 319.5, 199.5)
+
+
+class OneFace:
+    """A detector that always finds the same face."""
+
+    def find(self, image: np.ndarray) -> tuple[DetectedFace, ...]:
+        return (FACE,)
+
+
+def perception(lens: LensParams | None = None) -> Perception:
+    return Perception(STILL, FIELD_DEG, Tracker(TrackParams()), lens=lens)
+
+
+def percept_of(seeing: Perception, found: Detections) -> Percept:
+    return present(seeing.see(found, standing()))
+
+
+def shot(number: int) -> Shot:
+    return Shot(number / 30, number, np.zeros((400, 640, 3), np.uint8))
+
+
+def located(found: Detections, locator: FrameLocator = LOCATOR) -> Detections:
+    return replace(found, located=locator(found))
+
+
+def test_the_tick_fits_no_face_that_the_camera_has_located(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    found = located(picture(1, faces=(FACE,), blobs=(BALL,)))
+    wanted = percept_of(perception(), replace(found, located=None))
+    fits = counted(monkeypatch)
+    percept = percept_of(perception(), found)
+    assert fits == []
+    assert percept.faces == wanted.faces
+    assert percept.bodies.p_world_m.tolist() == wanted.bodies.p_world_m.tolist()
+    assert percept.bodies.v_world_m_s.tolist() == wanted.bodies.v_world_m_s.tolist()
+    assert percept.bodies.kinds == ("face", "ball")
+
+
+def test_places_of_another_calibration_are_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    under_way = located(picture(1, faces=(FACE,)))
+    wanted = percept_of(perception(LENS), replace(under_way, located=None))
+    fits = counted(monkeypatch)
+    seeing = perception()
+    seeing.retune(FIELD_DEG, None, LENS)
+    assert percept_of(seeing, under_way).faces == wanted.faces
+    assert len(fits) == 1
+    after = located(picture(2, faces=(FACE,)), FrameLocator(LENS, radians(FIELD_DEG)))
+    fits.clear()
+    percept_of(seeing, after)
+    assert fits == []
+
+
+def test_the_lens_that_a_camera_reports_is_a_calibration_of_its_own() -> None:
+    own = Intrinsics(500.0, 500.0, 320.0, 200.0)
+    found = picture(1, faces=(FACE,), lens=own)
+    assert LOCATOR(found).intrinsics == own
+    assert FrameLocator(LENS, 1.0)(found).intrinsics == Intrinsics(520.0, 520.0, 319.5, 199.5)
+
+
+def test_a_frame_comes_with_what_it_shows_located() -> None:
+    frames = FrameAnalyzer(OneFace(), lambda shot: (BALL,), LOCATOR)
+    found = frames.look(shot(1))
+    assert found.located == LOCATOR(found)
+    assert [len(of) for of in present(found.located)[1:]] == [1, 1]
+    other = FrameLocator(LENS, 1.0)
+    frames.retune(None, None, other)
+    assert frames.look(shot(2)).located == other(found)
+    assert FrameAnalyzer(OneFace()).look(shot(3)).located is None
+
+
+def test_a_locator_and_what_it_locates_pass_between_processes() -> None:
+    found = located(picture(1, faces=(FACE,), blobs=(BALL,)))
+    assert pickle.loads(pickle.dumps(LOCATOR))(found) == found.located
+    assert pickle.loads(pickle.dumps(found.located)) == found.located
+
+
+def test_things_of_a_restarted_process_get_numbers_of_their_own() -> None:
+    found = _renumbered(located(picture(1, blobs=(BALL,))), 5000)
+    assert [blob.id for blob in found.blobs] == [5003]
+    assert [thing.mark for thing in present(found.located).things] == [5003]
+
+
+class Frames:
+    """A source of frames that gives one after another."""
+
+    def __init__(self) -> None:
+        self.number = 0
+
+    def open(self) -> None: ...
+
+    def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
+        self.number += 1
+        return None if stop.wait(0.001) else shot(self.number)
+
+    def events(self) -> tuple[str, ...]:
+        return ()
+
+    def close(self) -> None: ...
+
+
+def test_a_camera_in_a_thread_takes_another_calibration() -> None:
+    camera = CameraThread(Frames(), OneFace(), time.monotonic, locate=LOCATOR)
+    camera.open()
+    other = FrameLocator(LENS, 1.0)
+
+    def used() -> Intrinsics | None:
+        found = camera.latest(0.0)
+        return None if found is None else present(found.located).intrinsics
+
+    def wait_for(wanted: Intrinsics) -> None:
+        end_s = time.monotonic() + 40.0
+        while used() != wanted:
+            assert time.monotonic() < end_s, "the calibration does not reach the frames"
+            time.sleep(0.001)
+
+    try:
+        wait_for(LOCATOR.intrinsics(picture(1)))
+        assert camera.retune(None, None, other)
+        wait_for(other.intrinsics(picture(1)))
+    finally:
+        camera.close()
+
+
+def counted(monkeypatch: pytest.MonkeyPatch) -> list[object]:
+    """Count the fits of a face to landmarks."""
+    fits: list[object] = []
+    fit = frame_locator.face_pose
+
+    def noted(landmarks_px: np.ndarray, lens: Intrinsics) -> object:
+        fits.append(lens)
+        return fit(landmarks_px, lens)
+
+    monkeypatch.setattr(frame_locator, "face_pose", noted)
+    return fits
