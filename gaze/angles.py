@@ -135,9 +135,10 @@ def rotation(head_rad: Angles3) -> Mat3:
     cy, sy = cos(yaw), sin(yaw)
     cp, sp = cos(pitch), sin(pitch)
     cr, sr = cos(roll), sin(roll)
+    cy_sp, sy_sp = -cy * sp, -sy * sp
     return (
-        (cy * cp, -cy * sp * sr - sy * cr, -cy * sp * cr + sy * sr),
-        (sy * cp, -sy * sp * sr + cy * cr, -sy * sp * cr - cy * sr),
+        (cy * cp, cy_sp * sr - sy * cr, cy_sp * cr + sy * sr),
+        (sy * cp, sy_sp * sr + cy * cr, sy_sp * cr - cy * sr),
         (sp, cp * sr, cp * cr),
     )
 

@@ -7,12 +7,13 @@ a rig does not have stands at 0, a lid that it does not have is open. Frames and
 in gaze.types; the world's origin is the neck base on the yaw axis.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import asin, atan2, hypot, pi
-from typing import Annotated
+from operator import itemgetter
+from typing import Annotated, Any
 
-from gazerig.gaze.angles import add, compose, rotate, rotate_back, rotation, sub, yaw_pitch
+from gazerig.gaze.angles import add, compose, rotate, rotate_back, rotation, sub
 from gazerig.gaze.types import Angles2, Angles3, GazeCommand, GazeState, Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.model.types import GAZE_JOINTS, JointAngles, JointState, in_order
@@ -58,23 +59,25 @@ class Kinematics:
         # What a rig does not have is looked up behind its joints, where a 0 stands.
         absent = len(self.names)
         both = {"pan": place.get("eyes_pan", absent), "tilt": place.get("eyes_tilt", absent)}
-        self._eyes = tuple(
-            place.get(f"{side}_eye_{way}", both[way])
+        eyes = [
+            place.get(f"{side}_eye_{axis}", both[axis])
             for side in ("left", "right")
-            for way in ("pan", "tilt")
-        )
-        self._neck = tuple(place.get(name, absent) for name in NECK)
-        self._lower = tuple(place.get(name, absent) for name in LOWER_NECK)
-        self._lid_places = tuple(place.get(name, absent) for name in LIDS)
+            for axis in ("pan", "tilt")
+        ]
+        neck = [place.get(name, absent) for name in (*NECK, *LOWER_NECK)]
+        lids_at = [place.get(name, absent) for name in LIDS]
+        self._angles_of = itemgetter(*neck, *eyes, *lids_at)
+        self._rates_of = itemgetter(*neck)
         self._wanted = tuple(GAZE_JOINTS.index(name) for name in self.names if name in GAZE_JOINTS)
+        self._desired_of = _picker(self._wanted)
         self._further = (0.0,) * (len(self.names) - len(self._wanted))
         self.retune(params, lids)
 
     def retune(self, params: GeometryParams, lids: Mapping[str, LidEnds]) -> None:
         """Change the geometry and lid angles."""
-        self._pivot: Vec3 = (0.0, 0.0, params.pitch_axis_height_mm / 1e3)
+        self._pivot_m = params.pitch_axis_height_mm / 1e3
         self._base: Vec3 = (0.0, 0.0, params.lower_pitch_axis_height_mm / 1e3)
-        self._arm: Vec3 = (params.eyes_ahead_mm / 1e3, 0.0, params.eyes_above_mm / 1e3)
+        self._ahead_m, self._above_m = params.eyes_ahead_mm / 1e3, params.eyes_above_mm / 1e3
         self._half = params.interocular_mm / 2e3
         # Of an absent lid, whose angle is 0, the opening comes out as 1.
         ends = [lids[name] if name in self.names else (-1.0, 0.0) for name in LIDS]
@@ -89,7 +92,13 @@ class Kinematics:
             base_rad: (yaw, pitch) of a lower neck that carries it.
         """
         R = rotation(head_rad)
-        p = add(self._pivot, rotate(R, self._arm))
+        (a, _, b), (c, _, d), (e, _, f) = R
+        ahead, above = self._ahead_m, self._above_m  # the arm from the pivot to between the eyes
+        p = (
+            a * ahead + b * above,
+            c * ahead + d * above,
+            self._pivot_m + (e * ahead + f * above),
+        )
         if base_rad == _UPRIGHT:
             return R, p
         R_world_base = rotation((*base_rad, 0.0))
@@ -109,14 +118,14 @@ class Kinematics:
         if base_rad != _UPRIGHT:
             back = rotate_back(rotation((*base_rad, 0.0)), sub(p_world_m, self._base))
             p_world_m = add(self._base, back)
-        x, y, z = sub(p_world_m, self._pivot)
+        x, y, z = p_world_m
+        z -= self._pivot_m
         level = hypot(x, y)
         distance = hypot(level, z)
-        above = self._arm[2]
-        yaw = atan2(y, x)
+        above = self._above_m
         if distance <= abs(above):
-            return (yaw, atan2(z, level))
-        return (yaw, atan2(z, level) - asin(above / distance))
+            return (atan2(y, x), atan2(z, level))
+        return (atan2(y, x), atan2(z, level) - asin(above / distance))
 
     def eyes_on(
         self, p_world_m: Vec3, R_world_head: Mat3, p_world_head_m: Vec3
@@ -125,8 +134,16 @@ class Kinematics:
 
         Eyes that cannot turn each by itself come as near to that as both together can.
         """
-        x, y, z = rotate_back(R_world_head, sub(p_world_m, p_world_head_m))
-        left, right = yaw_pitch((x, y - self._half, z)), yaw_pitch((x, y + self._half, z))
+        (a, b, c), (d, e, f), (g, h, i) = R_world_head
+        p, o = p_world_m, p_world_head_m
+        ahead, aside, above = p[0] - o[0], p[1] - o[1], p[2] - o[2]
+        # The point in the head: R^T (p - o).
+        x = a * ahead + d * aside + g * above
+        y = b * ahead + e * aside + h * above
+        z = c * ahead + f * aside + i * above
+        y_left, y_right = y - self._half, y + self._half
+        left = atan2(y_left, x), atan2(z, hypot(x, y_left))
+        right = atan2(y_right, x), atan2(z, hypot(x, y_right))
         if self.one_pan:
             yaw = _between(left[0], right[0])
             left, right = (yaw, left[1]), (yaw, right[1])
@@ -137,33 +154,32 @@ class Kinematics:
 
     def forward(self, joints: JointState) -> GazeState:
         """Return where head and eyes are for measured joints."""
-        q, rate = (*joints.position_rad, 0.0), (*joints.velocity_rad_s, 0.0)
-        yaw, pitch, roll = self._neck
-        head = (q[yaw], q[pitch], q[roll])
-        lower_yaw, lower_pitch = self._lower
-        base = (q[lower_yaw], q[lower_pitch])
+        (
+            yaw, pitch, roll, base_yaw, base_pitch,
+            pan_left, tilt_left, pan_right, tilt_right,
+            upper_left, upper_right, lower_left, lower_right,
+        ) = self._angles_of((*joints.position_rad, 0.0))  # fmt: skip
+        rates = self._rates_of((*joints.velocity_rad_s, 0.0))
+        head, base = (yaw, pitch, roll), (base_yaw, base_pitch)
         R, p_head = self.head_pose(head, base)
-        side = rotate(R, (0.0, self._half, 0.0))
-        pan_left, tilt_left, pan_right, tilt_right = self._eyes
-        upper_left, upper_right, lower_left, lower_right = (
-            min(1.0, max(0.0, (q[i] - shut) / span))
-            for i, shut, span in zip(self._lid_places, self._shut, self._span, strict=True)
-        )
+        x, y, z = p_head
+        half, shut, span = self._half, self._shut, self._span
+        aside_x, aside_y, aside_z = R[0][1] * half, R[1][1] * half, R[2][1] * half
         return GazeState(
             head,
-            (rate[yaw], rate[pitch], rate[roll]),
-            (q[pan_left], q[tilt_left]),
-            (q[pan_right], q[tilt_right]),
+            rates[:3],
+            (pan_left, tilt_left),
+            (pan_right, tilt_right),
             R,
             p_head,
-            add(p_head, side),
-            sub(p_head, side),
-            upper_left,
-            upper_right,
-            lower_left,
-            lower_right,
+            (x + aside_x, y + aside_y, z + aside_z),
+            (x - aside_x, y - aside_y, z - aside_z),
+            _share((upper_left - shut[0]) / span[0]),
+            _share((upper_right - shut[1]) / span[1]),
+            _share((lower_left - shut[2]) / span[2]),
+            _share((lower_right - shut[3]) / span[3]),
             base,
-            (rate[lower_yaw], rate[lower_pitch]),
+            rates[3:],
         )
 
     def inverse(self, command: GazeCommand, further_rad: JointAngles = ()) -> JointAngles:
@@ -173,29 +189,43 @@ class Kinematics:
             command: what gaze asks for.
             further_rad: angles of the joints that gaze does not move; 0 where not given.
         """
-        left, right, shut, span = (
-            command.eye_left_rad,
-            command.eye_right_rad,
-            self._shut,
-            self._span,
+        head, left, right, lid_left, lid_right = command[:5]
+        shut, span = self._shut, self._span
+        # In the order of GAZE_JOINTS.
+        angles = self._desired_of(
+            (
+                *left,
+                *right,
+                0.5 * (left[0] + right[0]),
+                0.5 * (left[1] + right[1]),
+                shut[0] + lid_left * span[0],
+                shut[1] + lid_right * span[1],
+                shut[2] + command.lower_left * span[2],
+                shut[3] + command.lower_right * span[3],
+                *head,
+            )
         )
-        every = (
-            *left,
-            *right,
-            0.5 * (left[0] + right[0]),
-            0.5 * (left[1] + right[1]),
-            shut[0] + command.lid_left * span[0],
-            shut[1] + command.lid_right * span[1],
-            shut[2] + command.lower_left * span[2],
-            shut[3] + command.lower_right * span[3],
-            *command.head_rad,
-        )
-        return (*[every[i] for i in self._wanted], *(further_rad or self._further))
+        return (*angles, *(further_rad or self._further)) if self._further else angles
 
     def further_rad(self, base_rad: Angles2) -> JointAngles:
         """Return the joints that gaze does not move at 0, but a lower neck at its angles."""
         lower = dict(zip(LOWER_NECK, base_rad, strict=True))
         return tuple(lower.get(name, 0.0) for name in self.names[len(self._wanted) :])
+
+
+def _share(value: float) -> float:
+    """Return a number clipped to 0..1; 0 for what is no number."""
+    return value if 0.0 < value < 1.0 else 1.0 if value >= 1.0 else 0.0
+
+
+def _picker(places: Sequence[int]) -> Callable[[Sequence[float]], JointAngles]:
+    """Return the function that picks the values at some places of a sequence."""
+    if len(places) > 1:
+        picked: Any = itemgetter(*places)
+    else:  # of one place ``itemgetter`` returns no tuple
+        picked = lambda values: tuple([values[i] for i in places])  # noqa: E731
+    chosen: Callable[[Sequence[float]], JointAngles] = picked
+    return chosen
 
 
 def _between(one: float, other: float) -> float:
