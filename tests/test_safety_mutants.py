@@ -146,6 +146,24 @@ def acceleration(m: ModuleType) -> None:
             bench.tick(way * (0.3 if k % 40 < 20 else -0.3))
 
 
+def easily(m: ModuleType) -> None:
+    """Slow joints: stopped at once from full speed, and creeping beyond their ends."""
+    for way in (1.0, -1.0):
+        bench = Bench(m)
+        for k in range(40):
+            bench.tick(way * 0.45 * ACCEL * (DT * min(k, 20)) ** 2)
+        stopped = bench.path[-1][JOINT]
+        for _ in range(40):
+            bench.tick(stopped)
+        bench = Bench(m, start_deg=degrees(HIGH if way > 0.0 else LOW) - way)
+        creep = bench.path[-1][JOINT]
+        for _ in range(100):
+            creep += way * 0.4 * ACCEL * DT * DT
+            bench.tick(creep)
+        bench = Bench(m)  # in the first tick of all as in any other
+        bench.tick(way * 1.3 * ACCEL * DT * DT)
+
+
 def no_overshoot(m: ModuleType) -> None:
     for k in range(2, 60, 4):
         bench = Bench(m)
@@ -449,6 +467,7 @@ CHECKS: tuple[Callable[[ModuleType], None], ...] = (
     range_and_braking,
     speed,
     acceleration,
+    easily,
     no_overshoot,
     stopped_loop,
     late,
@@ -518,8 +537,16 @@ MUTATIONS: tuple[Mutation, ...] = (
     (MOTION, "return v + soft * dt_s", "return v + 1.1 * soft * dt_s", gentle),
     (MOTION, "chosen = max(up, v - accel * dt_s)", "chosen = up", slower_in_flight),
     (MOTION, "chosen = min(down, v + accel * dt_s)", "chosen = down", slower_in_flight),
+    # slow joints far from their ends, which are checked in one go
+    (MOTION, "0.49 * limit.accel_rad_s2", "1.9 * limit.accel_rad_s2", acceleration),
+    (GUARD, "-easy <= v <= easy and ", "", easily),
+    (GUARD, "-easy <= wanted <= easy and ", "", acceleration),
+    (MOTION, "self.low[i] + room", "self.low[i] - 0.1", easily),
+    (MOTION, "self.high[i] - room", "self.high[i] + 0.1", easily),
+    (GUARD, "if not motion.easy_s <= dt_s <= 2.0 * motion.easy_s:", "if False:", easily),
+    (MOTION, "self.easy_s = 0.9 * dt_s", "self.easy_s = 3.0 * dt_s", easily),
     # catching up
-    (MOTION, "-step * dt_s <= self._desired[i] - p <= step * dt_s", "True", no_overshoot),
+    (MOTION, "-step * dt_s <= self.goal[i] - p <= step * dt_s", "True", no_overshoot),
     (
         MOTION,
         "closing = reachable_speed(abs(gap), soft, dt_s)",
@@ -529,8 +556,8 @@ MUTATIONS: tuple[Mutation, ...] = (
     # time
     (LATE, "return pace_s, since_s", "return since_s, since_s", stopped_loop),
     (LATE, "return pace_s, since_s", "return since_s, since_s", late),
-    (LATE, "self._recent_s.append(since_s)", "pass", slow_host),
-    (LATE, "self._soft_until_s = t_s + soft_s", "pass", late),
+    (LATE, "        recent_s.append(since_s)\n        if", "        if", slow_host),
+    (LATE, "self.soft_until_s = t_s + soft_s", "pass", late),
     (GUARD, "            self._motion.left_alone(missed_s)", "            pass", late),
     (GUARD, "soft = min(soft, self._late_accel)", "pass", late),
     (MOTION, "- limit.accel_rad_s2 * for_s", "", late),
@@ -541,7 +568,8 @@ MUTATIONS: tuple[Mutation, ...] = (
     (GUARD, "near and at_s >= stale_s and", "near and", stale_joints),
     (GUARD, "        if not fresh:", "        if False:", stale_joints),
     (GUARD, "fresh = fresh and isfinite(position)", "pass", stale_joints),
-    (GUARD, "at_s >= stale_s and not unseen and", "at_s >= stale_s and", stale_picture),
+    (GUARD, "(no_frame and self._neck[i])\n            or", "", stale_picture),
+    (GUARD, "self._all_well(joints) and not no_frame", "self._all_well(joints)", stale_picture),
     (GUARD, '_Hold("stale frame") if unseen else None', "None", stale_picture),
     (GUARD, "no_frame = not frame_age_s <=", "no_frame = frame_age_s >", stale_picture),
     # heat
@@ -576,8 +604,8 @@ MUTATIONS: tuple[Mutation, ...] = (
         not_moving,
     ),
     (STUCK, "self._until_s[i] = t_s + self._retry_s", "self._until_s[i] = t_s", not_moving),
-    (GUARD, "not watched[i]", "True", not_moving),
-    (GUARD, "near = -far <= command[i] - position <= far and", "near =", not_moving),
+    (GUARD, "not watched", "True", not_moving),
+    (GUARD, "near = -far <= p - position <= far and", "near =", not_moving),
     (GUARD, "if joints.measured and not joints.measured[i]:", "if False:", reckoned),
     (GUARD, "self._retreat[i] = back = position", "pass", not_moving),
     (GUARD, "if self._retrying[i]:\n", "if False:\n", not_moving),
@@ -598,8 +626,10 @@ MUTATIONS: tuple[Mutation, ...] = (
     (GUARD, "min(soft, self._gentle_accel)", "soft", gentle),
     (GUARD, "and self._t_s >= self._gentle_until_s[i]", "or True", gentle),
     # collisions
-    (COLLISIONS, "motion.high[i] = min(motion.high[i], span.below)", "pass", collision),
-    (COLLISIONS, "motion.low[i] = max(motion.low[i], span.above)", "pass", collision),
+    (COLLISIONS, "motion.wall_above(i, span.below)", "pass", collision),
+    (COLLISIONS, "motion.wall_below(i, span.above)", "pass", collision),
+    (MOTION, "self.high[i] = min(self.high[i], wall_rad)", "pass", collision),
+    (MOTION, "self.low[i] = max(self.low[i], wall_rad)", "pass", collision),
     (
         COLLISIONS,
         "self._keeper[k] = keeper\n        _wall_off(pair[keeper], motion)",

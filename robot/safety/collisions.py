@@ -41,6 +41,7 @@ class Collisions:
         joints: tuple[str, ...],
     ) -> None:
         self._pairs = forbidden_pairs(params, margin_deg, limits, joints)
+        self._joints = sorted({span.joint for pair in self._pairs for span in pair})
         self._keeper = [0] * len(self._pairs)
         self.exits: dict[int, float] = {}
         self.still: set[int] = set()
@@ -67,7 +68,7 @@ class Collisions:
         position: as measured
         held: joints that cannot be sent anywhere
         """
-        for i in range(len(motion.limits)):
+        for i in self._joints:
             motion.let_be(i)
         self.exits.clear()
         self.still.clear()
@@ -144,9 +145,9 @@ def _wall_off(span: ForbiddenRange, motion: MotionLimiter) -> None:
     """Limit a joint to the side on which it is."""
     i = span.joint
     if _side(span, motion) < 0:
-        motion.high[i] = min(motion.high[i], span.below)
+        motion.wall_above(i, span.below)
     else:
-        motion.low[i] = max(motion.low[i], span.above)
+        motion.wall_below(i, span.above)
 
 
 def _crosses(span: ForbiddenRange, motion: MotionLimiter, desired: JointAngles) -> bool:

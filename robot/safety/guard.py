@@ -14,7 +14,7 @@ from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 from gazerig.robot.safety.collisions import Collisions
-from gazerig.robot.safety.guard_verdict import standstill, verdict
+from gazerig.robot.safety.guard_verdict import passed, standstill, verdict
 from gazerig.robot.safety.health import JointHealth
 from gazerig.robot.safety.late_ticks import LateTicks
 from gazerig.robot.safety.motion_limiter import MotionLimiter
@@ -212,26 +212,47 @@ class Guard:
         dt_s, missed_s = self._late.split(since_s, t_s, self._params.late_ms / 1e3)
         if missed_s > 0.0:
             self._motion.left_alone(missed_s)
-        self._soft = self._late.soft(t_s)
+        self._soft = t_s < self._late.soft_until_s
         self._health.step(joints, dt_s)
         if self._collisions:
             self._collisions.look(self._motion, desired_rad, joints.position_rad, self._held)
-        stale_s = t_s - self._params.joint_timeout_ms / 1e3
         no_frame = not frame_age_s <= self._params.frame_timeout_ms / 1e3
-        usual = self._all_well(joints)
-        far, command, watched = self._stuck.far_rad, self._motion.command, self._stuck.watched
-        columns = zip(desired_rad, joints.position_rad, joints.measured_s, strict=True)
+        return self._joints(desired_rad, joints, no_frame, dt_s)
+
+    def _joints(
+        self, desired_rad: JointAngles, joints: JointState, no_frame: bool, dt_s: float
+    ) -> GuardResult:
+        """Move all joints. Nearly every desired angle is a good one and is passed on as it is."""
+        motion, far = self._motion, self._stuck.far_rad
+        if not motion.easy_s <= dt_s <= 2.0 * motion.easy_s:
+            motion.ease(dt_s)
+        command, speed, goal = motion.command, motion.speed, motion.goal
+        usual = self._all_well(joints) and not no_frame
+        stale_s = self._t_s - self._params.joint_timeout_ms / 1e3
         short: dict[int, tuple[int, str]] = {}
-        for i, (desired, position, at_s) in enumerate(columns):
+        followed = True
+        rows = zip(
+            desired_rad, joints.position_rad, joints.measured_s, self._stuck.watched,
+            command, speed, goal, motion.easy_speed, motion.easy_low, motion.easy_high, strict=True,
+        )  # fmt: skip
+        for i, (desired, position, at_s, watched, p, v, before, easy, low, high) in enumerate(rows):
+            near = -far <= p - position <= far and not watched
+            if near and at_s >= stale_s and (usual or self._well(i, joints, no_frame)):
+                wanted = (desired - p) / dt_s
+                if before is p and -easy <= wanted <= easy and -easy <= v <= easy and low <= desired <= high:  # fmt: skip
+                    command[i] = goal[i] = desired
+                    speed[i] = wanted
+                    continue
+                if motion.follow(i, desired, dt_s):
+                    continue
+            followed = False
             unseen = no_frame and self._neck[i]
-            near = -far <= command[i] - position <= far and not watched[i]
-            well = near and at_s >= stale_s and not unseen and (usual or self._well(i, joints))
-            if well and self._motion.follow(i, desired, dt_s):
-                continue  # nearly every desired angle is a good one and is passed on as it is
             outcome = self._pass(i, desired, joints, at_s >= stale_s, unseen, dt_s)
             if outcome[1]:
                 short[i] = outcome
-        return verdict(tuple(self._motion.command), desired_rad, short, self._names)
+        if followed:
+            return passed(desired_rad, self._names)
+        return verdict(tuple(command), desired_rad, short, self._names)
 
     def _all_well(self, joints: JointState) -> bool:
         """Return whether nothing but limits, ages and distances need be looked at."""
@@ -248,10 +269,11 @@ class Guard:
             or any(joints.fault)
         )
 
-    def _well(self, i: int, joints: JointState) -> bool:
+    def _well(self, i: int, joints: JointState, no_frame: bool) -> bool:
         """Whether this holds for one joint."""
         return not (
-            self._soft
+            (no_frame and self._neck[i])
+            or self._soft
             or self._gentle[i]
             or self._held[i]
             or self._health.share[i] < 1.0

@@ -14,6 +14,11 @@ def standstill(
     return GuardResult(command, "hold", reasons, desired_rad, why, reasons, joints)
 
 
+def passed(desired_rad: JointAngles, joints: tuple[str, ...]) -> GuardResult:
+    """Return the result of a tick in which every joint may do as is desired."""
+    return GuardResult(desired_rad, "ok", (), desired_rad, (), (), joints)
+
+
 def verdict(
     command: JointAngles,
     desired_rad: JointAngles,
@@ -30,7 +35,7 @@ def verdict(
         joints: their names.
     """
     if not short:
-        return GuardResult(command, "ok", (), desired_rad, joints=joints)
+        return GuardResult(command, "ok", (), desired_rad, (), (), joints)
     worst = max(rank for rank, _ in short.values())
     reasons = {i: f"{joints[i]}: {reason}" for i, (_, reason) in short.items()}
     return GuardResult(

@@ -61,9 +61,10 @@ class JointHealth:
         load, lasting = joints.load, self._params.lasting_load
         strained = bool(load) and not (max(load) <= lasting and min(load) >= -lasting)
         before = self._seen
-        seen = self._seen = (joints.temperature_c, joints.voltage_v)
+        seen = (joints.temperature_c, joints.voltage_v)
         if not strained and seen == before and not self._counting:
             return
+        self._seen = seen
         columns = [(now, old) for now, old in zip(seen, before, strict=True) if now != old]
         for i in range(len(self._limits)):
             if (

@@ -18,13 +18,15 @@ slow for its rate. Each of them taken for a gap would leave a neck at 10 deg/s."
 class LateTicks:
     """Detects late ticks, and for how long acceleration is limited after one.
 
+    soft_until_s: joints gather speed softly until then
+
     Args:
         period_s: nominal time between ticks.
     """
 
     def __init__(self, period_s: float) -> None:
         self.period_s = period_s
-        self._soft_until_s = -inf
+        self.soft_until_s = -inf
         self._recent_s: deque[float] = deque([period_s], STEADY_TICKS)
 
     def split(self, since_s: float, t_s: float, soft_s: float) -> tuple[float, float]:
@@ -35,13 +37,13 @@ class LateTicks:
             t_s: now.
             soft_s: joints gather speed softly for so long after a late tick.
         """
-        pace_s = max(self.period_s, min(SLOWEST_S, *self._recent_s))
-        self._recent_s.append(since_s)
+        recent_s = self._recent_s
+        if since_s <= LATE_PERIODS * self.period_s:
+            recent_s.append(since_s)
+            return since_s, 0.0
+        pace_s = max(self.period_s, min(SLOWEST_S, *recent_s))
+        recent_s.append(since_s)
         if since_s <= LATE_PERIODS * pace_s:
             return since_s, 0.0
-        self._soft_until_s = t_s + soft_s
+        self.soft_until_s = t_s + soft_s
         return pace_s, since_s - pace_s
-
-    def soft(self, t_s: float) -> bool:
-        """Return whether joints gather speed softly now."""
-        return t_s < self._soft_until_s

@@ -5,7 +5,7 @@ later sequence of braking steps, a joint that keeps this can always stop in time
 the length of the ticks to come.
 """
 
-from math import copysign, sqrt
+from math import copysign, inf, sqrt
 
 from gazerig.robot.model.joint_limit import JointLimit
 
@@ -16,8 +16,11 @@ class MotionLimiter:
     """The commands of all joints and their speeds, moved one step at a time.
 
     command, speed: what was sent last
+    goal: the desired angle that was aimed at last; the command itself where it was reached
     low, high: the ranges in force; a wall inside a joint's own range may be put up as
         long as the joint can stop before it (``keeps_below``, ``keeps_above``)
+    easy_speed, easy_low, easy_high: a joint whose speeds before and after a step of ``easy_s`` or
+        longer are within the first, and whose angle is between the others, keeps every limit
     """
 
     def __init__(self, limits: tuple[JointLimit, ...]) -> None:
@@ -26,11 +29,31 @@ class MotionLimiter:
         self.speed = [0.0] * len(limits)
         self.low = [limit.low_rad for limit in limits]
         self.high = [limit.high_rad for limit in limits]
-        self._desired = list(self.command)
+        self.goal = list(self.command)
+        self.easy_s = inf
+        self.easy_speed = [0.0] * len(limits)
+        self.easy_low, self.easy_high = list(self.low), list(self.high)
+
+    def ease(self, dt_s: float) -> None:
+        """Find for steps of about this length what keeps every limit without further checks."""
+        self.easy_s = 0.9 * dt_s  # ticks are not all of one length
+        for i in range(len(self.limits)):
+            self._ease(i)
+
+    def _ease(self, i: int) -> None:
+        """Find it for one joint: half the change of speed that a step allows, both ways.
+
+        The braking distance from there, v^2 / 2a, is kept twice from the ends.
+        """
+        limit = self.limits[i]
+        speed = min(limit.speed_rad_s, 0.49 * limit.accel_rad_s2 * self.easy_s)
+        room = speed * speed / limit.accel_rad_s2
+        self.easy_speed[i] = speed
+        self.easy_low[i], self.easy_high[i] = self.low[i] + room, self.high[i] - room
 
     def restart(self, i: int, angle_rad: float) -> None:
         """Reset to an angle, at rest."""
-        self.command[i] = self._desired[i] = angle_rad
+        self.command[i] = self.goal[i] = angle_rad
         self.speed[i] = 0.0
 
     def left_alone(self, for_s: float) -> None:
@@ -38,7 +61,7 @@ class MotionLimiter:
         for i, limit in enumerate(self.limits):
             left = abs(self.speed[i]) - limit.accel_rad_s2 * for_s
             self.speed[i] = copysign(left, self.speed[i]) if left > 0.0 else 0.0
-            self._desired[i] = self.command[i]
+            self.goal[i] = self.command[i]
 
     def recount(self, i: int, factor: float, offset_rad: float) -> None:
         """Count a joint's angles otherwise: what was x is factor x + offset from now on."""
@@ -51,14 +74,14 @@ class MotionLimiter:
             speed_rad_s=size * speed,
             accel_rad_s2=size * accel,
         )
-        self.command[i] = self._desired[i] = factor * self.command[i] + offset_rad
+        self.command[i] = self.goal[i] = factor * self.command[i] + offset_rad
         self.speed[i] *= factor
         self.let_be(i)
 
     def take(self, i: int, limit: JointLimit) -> None:
         """Change the limit."""
         self.limits[i] = limit
-        self._desired[i] = self.command[i]
+        self.goal[i] = self.command[i]
         self.let_be(i)
 
     def keeps(self, i: int, limit: JointLimit) -> bool:
@@ -71,6 +94,17 @@ class MotionLimiter:
         """Accept a joint's position: its range holds, and the way back into it."""
         limit, now = self.limits[i], self.command[i]
         self.low[i], self.high[i] = min(limit.low_rad, now), max(limit.high_rad, now)
+        self._ease(i)
+
+    def wall_below(self, i: int, wall_rad: float) -> None:
+        """Keep a joint above a wall."""
+        self.low[i] = max(self.low[i], wall_rad)
+        self._ease(i)
+
+    def wall_above(self, i: int, wall_rad: float) -> None:
+        """Keep a joint below a wall."""
+        self.high[i] = min(self.high[i], wall_rad)
+        self._ease(i)
 
     def keeps_below(self, i: int, wall_rad: float) -> bool:
         """Return whether a joint is below a wall and can stop there."""
@@ -96,19 +130,19 @@ class MotionLimiter:
         step, top = accel * dt_s, limit.speed_rad_s
         if not (-top <= wanted <= top and v - step <= wanted <= v + step):
             return False
-        if not -step * dt_s <= self._desired[i] - p <= step * dt_s:
+        if not -step * dt_s <= self.goal[i] - p <= step * dt_s:
             return False
         brake = 0.5 * wanted * wanted / accel
         if desired + brake > self.high[i] if wanted > 0.0 else desired - brake < self.low[i]:
             return False
-        self.command[i] = self._desired[i] = desired
+        self.command[i] = self.goal[i] = desired
         self.speed[i] = wanted
         return True
 
     def chase(self, i: int, desired: float, dt_s: float, top: float, soft: float) -> None:
         """Catch up with a desired angle that moves and fall into its pace."""
         target = min(max(desired, self.low[i]), self.high[i])
-        along = (target - self._desired[i]) / dt_s
+        along = (target - self.goal[i]) / dt_s
         if not -top <= along <= top:  # it jumped, or is too fast: there is no pace to fall into
             along = 0.0
         self.seek(i, desired, dt_s, top, soft, along)
@@ -129,14 +163,14 @@ class MotionLimiter:
         target = min(max(desired, self.low[i]), self.high[i])
         gap = target - along * dt_s - self.command[i]
         closing = reachable_speed(abs(gap), soft, dt_s)
-        self._desired[i] = target
+        self.goal[i] = target
         self._step(i, along + (closing if gap >= 0.0 else -closing), dt_s, top, soft)
 
     def brake(self, i: int, dt_s: float) -> None:
         """Come to a stop as fast as the joint may."""
         limit = self.limits[i]
         self._step(i, 0.0, dt_s, limit.speed_rad_s, limit.accel_rad_s2)
-        self._desired[i] = self.command[i]
+        self.goal[i] = self.command[i]
 
     def _step(self, i: int, wanted: float, dt_s: float, top: float, soft: float) -> None:
         """Return the speed nearest to the wanted one that keeps every limit."""
