@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from gazerig.drivers.types import Detections
 from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.control.tick_stream import TickStream, decode_plain
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop, Tune
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo, versions
@@ -76,6 +77,16 @@ def record(
     made.close()
     assert recorder.events() == () and recorder.lost == 0
     return Recorded(path, seen, info, said, goals)
+
+
+def handed_over(tick: Tick, dt_s: float = 0.005) -> tuple[list[Any], list[Any]]:
+    """Return a tick's percepts and its fields as the process that writes a recording has them."""
+    stream, batches = TickStream(print), []
+    stream.add("test", lambda batch: not batches.append(batch.data))  # type: ignore[func-returns-value]
+    stream.append(tick, dt_s, ())
+    stream.flush()
+    percepts, (row,) = decode_plain(batches[0])
+    return percepts, row
 
 
 def with_picture(tick: Tick, number: int) -> Tick:

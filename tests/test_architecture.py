@@ -22,6 +22,7 @@ OWNERS = {
     "mcap": ("drivers.camera.recording_", "robot.recording."),
     "smbus2": ("drivers.i2c.port",),
     "zstandard": ("robot.recording.",),
+    "msgspec": ("robot.control.tick_stream",),
     "orjson": ("robot.recording.",),
     "matplotlib": ("robot.report.",),
     "jinja2": ("robot.report.",),

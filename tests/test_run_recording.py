@@ -13,7 +13,17 @@ import orjson
 import pytest
 from desk import GAZE_JOINTS
 from mcap.reader import make_reader
-from recorded_run import STARTED, Recorded, assembly, exact, info_for, ordered, record, with_picture
+from recorded_run import (
+    STARTED,
+    Recorded,
+    assembly,
+    exact,
+    handed_over,
+    info_for,
+    ordered,
+    record,
+    with_picture,
+)
 
 from gazerig.config.load import load
 from gazerig.config.schema import Rig, load_rig
@@ -27,7 +37,7 @@ from gazerig.robot.model import stop_latch
 from gazerig.robot.model.commands import Ask, Jog, LookAt, Resume, Stop, Tune
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording import tick_record as moments
-from gazerig.robot.recording.frame_encoder import FrameEncoder
+from gazerig.robot.recording.frame_picker import FramePicker
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text, end_of, info_of
@@ -43,7 +53,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
 
 
 def test_every_tick_comes_back_bit_for_bit(recorded: Recorded) -> None:
-    # A new field must be recorded too: add it to moment.flat, as_json and from_json.
+    # A new field must be recorded too: add it to TickRow, as_json and from_json.
     assert Tick._fields == (
         "t_s", "joints", "pose", "detections", "percept", "target", "gaze", "desired_rad",
         "guard_result", "events", "commands", "stopped", "led", "lead",
@@ -127,12 +137,10 @@ def test_pictures_come_at_their_rate_with_their_exposure(recorded: Recorded) -> 
     assert pixels is not None and pixels.shape[:2] == (40, 60)
 
 
-def test_no_pictures_where_none_are_asked_for() -> None:
-    made = assembly()
-    encoder = FrameEncoder(0.0, at_once=True)
-    made.robot.start(made.clock)
-    encoder.look(with_picture(made.robot.tick(0.005, 0.005), 0))
-    assert list(encoder.taken()) == []
+def test_no_pictures_where_none_are_asked_for(recorded: Recorded) -> None:
+    found = with_picture(recorded.ticks[0], 0).detections
+    assert not FramePicker(0.0).picks(found)
+    assert FramePicker(2.0).picks(found)
 
 
 def test_a_picture_larger_than_a_message_arrives_whole(tmp_path: Path) -> None:
@@ -150,17 +158,22 @@ def test_a_picture_larger_than_a_message_arrives_whole(tmp_path: Path) -> None:
     assert jpeg == encode(noise)
 
 
-def test_pictures_are_encoded_beside_the_loop() -> None:
-    made = assembly()
-    made.robot.start(made.clock)
-    tick = with_picture(made.robot.tick(0.005, 0.005), 0)
-    encoder = FrameEncoder(2.0)
-    encoder.start()
-    encoder.look(tick)
-    encoder.look(tick)
-    encoder.stop()
-    (one,) = encoder.taken()
-    assert one[0] == tick.t_s - 0.03 and one[1][:2] == b"\xff\xd8"
+def test_a_picture_and_a_health_message_follow_the_tick_that_brought_them(
+    recorded: Recorded,
+) -> None:
+    with recorded.path.open("rb") as file:
+        found = list(make_reader(file).iter_messages(log_time_order=False))
+    times: dict[str, list[float]] = {fmt.FRAME: [], fmt.HEALTH: []}
+    t_s = 0.0
+    for _, channel, message in found:
+        if channel.topic == fmt.TICK:
+            t_s = json.loads(message.data)["t_s"]
+        elif channel.topic in times:
+            times[channel.topic].append(t_s)
+    exposed = [at_s for at_s, _ in RunRecording(recorded.path).frames()]
+    assert times[fmt.FRAME] == pytest.approx([at_s + 0.03 for at_s in exposed])
+    first_s = recorded.ticks[0].t_s
+    assert times[fmt.HEALTH] == pytest.approx([first_s, first_s + 1.0])
 
 
 def test_health_comes_once_a_second(recorded: Recorded) -> None:
@@ -227,28 +240,32 @@ def test_any_float_comes_back(recorded: Recorded, odd: float) -> None:
         joints=tick.joints._replace(measured_s=(odd,) * 9, temperature_c=(None, odd, *(30.0,) * 7)),
         desired_rad=(odd, *tick.desired_rad[1:]),
         target=tick.target._replace(salience=odd),
+        percept=None,
     )
-    values = orjson.loads(orjson.dumps(moments.as_json(moments.flat(tick, None, odd, ()))))
+    values = orjson.loads(orjson.dumps(moments.as_json(handed_over(tick, odd)[1])))
     back = moments.from_json(values, {})
     assert exact(back.tick) == exact(tick)
     assert repr(back.dt_s) == repr(odd)
 
 
 def test_a_level_in_an_older_recording_has_its_present_name(recorded: Recorded) -> None:
-    values = moments.as_json(moments.flat(recorded.ticks[-1], None, 0.005, ()))
+    values = moments.as_json(handed_over(recorded.ticks[-1])[1])
     values["verdict"]["level"] = "limp"
-    assert moments.from_json(values, {}).tick.guard_result.level == "torque_off"
+    assert (
+        moments.from_json({**values, "percept": None}, {}).tick.guard_result.level == "torque_off"
+    )
 
 
 @pytest.mark.parametrize("odd", [0.25, nan, -inf])
-def test_any_percept_comes_back(odd: float) -> None:
+def test_any_percept_comes_back(recorded: Recorded, odd: float) -> None:
     face = Face(3, (odd, 0.0, 1.0), (0.0,) * 3, ((1.0, 0.0, 0.0),) * 3, ((odd,) * 3,) * 8, 0.5)
     bodies = Bodies((3, 9), ("face", "hand"), *(np.full((2, 3), odd),) * 3, np.array([odd, 1.0]),
                     np.full((2, 6, 6), odd))  # fmt: skip
     for percept in (Percept(odd, bodies, (face,)), Percept(1.0)):
-        data = orjson.loads(orjson.dumps(moments.percept_as_json(moments.flat_percept(4, percept))))
+        (handed,), row = handed_over(recorded.ticks[-1]._replace(percept=percept))
+        data = orjson.loads(orjson.dumps(moments.percept_as_json(handed)))
         number, back = moments.percept_from_json(data)
-        assert number == 4 and repr(back) == repr(percept)
+        assert number == row[2] == 1 and repr(back) == repr(percept)
         assert back.bodies.p_world_m.shape == percept.bodies.p_world_m.shape
 
 

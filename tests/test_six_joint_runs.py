@@ -13,6 +13,7 @@ import pytest
 from desk import GAZE_JOINTS
 from mcap.reader import make_reader
 from mixed_rig import mixed_text
+from recorded_run import handed_over
 from six_joints import SIX
 
 from gazerig.config.schema import Rig, load_rig
@@ -37,7 +38,7 @@ from gazerig.robot.recording.run_format import HEALTH, PERCEPT, TICK, Message
 from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text
 from gazerig.robot.recording.run_writer import RunWriter
 from gazerig.robot.recording.snapshot_index import SnapshotIndex
-from gazerig.robot.recording.tick_record import as_json, flat, from_json
+from gazerig.robot.recording.tick_record import as_json, from_json
 from gazerig.robot.remote.request_handler import Pulse
 from gazerig.robot.report import report as build
 from gazerig.robot.report.compare import compare
@@ -164,7 +165,7 @@ def test_a_recording_without_names_is_of_the_joints_that_all_rigs_had(
 
 def test_words_for_numbers_come_back_for_any_number_of_joints(maker: Run) -> None:
     odd = maker.ticks[9]._replace(desired_rad=(float("nan"),) * 6)
-    data = json.loads(json.dumps(as_json(flat(odd._replace(percept=None), None, 0.005, ()))))
+    data = json.loads(json.dumps(as_json(handed_over(odd._replace(percept=None))[1])))
     assert exact(from_json(data, {}).tick) == exact(odd)
 
 

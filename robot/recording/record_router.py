@@ -2,14 +2,16 @@
 
 from typing import Any
 
-from gazerig.drivers.types import BusHealth
-from gazerig.gaze.types import GazeState, Vec3
+from gazerig.drivers.types import BusHealth, ImageArray
+from gazerig.gaze.types import GazeCommand, GazeState, Vec3
+from gazerig.robot.control.tick_stream import TickRow, all_finite, decode_plain
 from gazerig.robot.model.types import GuardResult, JointState
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording import viewer_messages as viewers
 from gazerig.robot.recording.run_writer import RunWriter
-from gazerig.robot.recording.tick_record import Flat, as_json, percept_as_json
+from gazerig.robot.recording.tick_record import as_json, percept_as_json
 
+_PERCEPT, _JOINTS = TickRow._fields.index("percept"), TickRow._fields.index("joints")
 _VIEWED_EVERY_S = 0.0399  # a little under 40 ms, so that rounding does not turn it into 45
 
 
@@ -21,13 +23,28 @@ class RecordRouter:
         self._first_s: float | None = None
         self._at_s = 0.0
         self._viewed_s = -1.0
-        self._joints: JointState | None = None
-        self._names: tuple[str, ...] = ()
+        self._newest: list[Any] | None = None
         self._faces: list[Vec3] = []
+        self._percepts: dict[int, list[Any]] = {}
+        self._written = 0
+        self._finite = False
 
-    def tick(self, values: Flat) -> None:
-        """Write a tick as ``moment.flat`` gives it, and from time to time what viewers draw."""
-        data = as_json(values)
+    def ticks(self, data: bytes) -> None:
+        """Write the ticks of a ``tick_stream.TickBatch``, each percept before the first with it."""
+        percepts, rows = decode_plain(data)
+        self._finite = all_finite(data)
+        self._percepts.update({percept[0]: percept for percept in percepts})
+        for row in rows:
+            number = row[_PERCEPT]
+            if number is not None and number > self._written:
+                self._written = number
+                self._percept(self._percepts[number])
+                self._percepts = {n: one for n, one in self._percepts.items() if n > number}
+            self._tick(row)
+
+    def _tick(self, row: list[Any]) -> None:
+        """Write a tick, and from time to time what viewers draw."""
+        data = as_json(row, self._finite)
         if self._first_s is None:
             self._first_s = data["t_s"]
         self._at_s = data["t_s"] - self._first_s
@@ -36,26 +53,27 @@ class RecordRouter:
             self._add(fmt.LOG, viewers.line(event, self._now_ns))
         for order in data["orders"]:
             self._add(fmt.ORDER, order)
-        self._joints, self._names = JointState(*values[3]), GuardResult(*values[8]).joints
+        self._newest = row
         if self._at_s - self._viewed_s >= _VIEWED_EVERY_S or self._viewed_s < 0.0:
             self._viewed_s = self._at_s
-            self._show(GazeState(*values[4]), values[6][7])
+            self._show(TickRow(*row))
 
-    def percept(self, values: Flat) -> None:
-        """Write a percept as ``moment.flat_percept`` gives it, before the ticks that go by it."""
-        data = percept_as_json(values)
+    def _percept(self, percept: list[Any]) -> None:
+        data = percept_as_json(percept, self._finite)
         self._faces = [face["p_world_m"] for face in data["faces"]]
         self._add(fmt.PERCEPT, data)
 
-    def frame(self, captured_s: float, jpeg: bytes) -> None:
-        """Write an image of the camera."""
+    def frame(self, captured_s: float, image: ImageArray) -> None:
+        """Write an image of the camera as JPEG."""
+        from gazerig.robot.dashboard.camera_overlay import encode  # loads OpenCV
+
         first_s = self._first_s if self._first_s is not None else captured_s
         exposed_ns = self._writer.time_ns(captured_s - first_s)
-        self._add(fmt.FRAME, viewers.image(jpeg, captured_s, exposed_ns))
+        self._add(fmt.FRAME, viewers.image(encode(image), captured_s, exposed_ns))
 
     def health(self, bus: BusHealth, lost: int) -> None:
         """Write the counts of the bus and the servos' figures of the newest tick."""
-        joints = self._joints
+        joints = JointState(*self._newest[_JOINTS]) if self._newest is not None else None
         servos = (
             {
                 name: getattr(joints, name)
@@ -71,13 +89,14 @@ class RecordRouter:
     def _now_ns(self) -> int:
         return self._writer.time_ns(self._at_s)
 
-    def _show(self, pose: GazeState, point_m: Vec3) -> None:
+    def _show(self, row: TickRow) -> None:
         """Write what viewers draw of the newest tick."""
         now_ns = self._now_ns
-        if self._joints is not None:
-            self._add(fmt.JOINT_STATES, viewers.joint_states(self._names, self._joints, now_ns))
+        joints, names = JointState(*row.joints), GuardResult(*row.guard_result).joints
+        pose, gaze = GazeState(*row.pose), GazeCommand(*row.gaze)
+        self._add(fmt.JOINT_STATES, viewers.joint_states(names, joints, now_ns))
         self._add(fmt.TRANSFORMS, viewers.transforms(pose, now_ns))
-        self._add(fmt.SCENE, viewers.scene(pose, point_m, self._faces, now_ns))
+        self._add(fmt.SCENE, viewers.scene(pose, gaze.gaze_point_world_m, self._faces, now_ns))
 
     def _add(self, topic: str, data: dict[str, Any]) -> None:
         self._writer.add(fmt.Message(topic, self._at_s, data))

@@ -1,37 +1,47 @@
 """Records a run without ever making the control loop wait.
 
-A process of its own writes the file (gazerig.robot.recording.writer_process); a tick is handed
-over as plain tuples and the loop goes on at once. The process outlives this program by
-as long as it takes to close the file.
+A process of its own writes the file (gazerig.robot.recording.writer_process); ticks are handed
+over as they are, some at a time, and the loop goes on at once. The process outlives this program
+by as long as it takes to close the file.
 """
 
 import os
 import secrets
 import shutil
+from collections import deque
 from collections.abc import Callable
 from math import inf
 from pathlib import Path
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.types import BusHealth
-from gazerig.gaze.types import Percept
+from gazerig.drivers.passed_image import copied
+from gazerig.drivers.types import BusHealth, Detections
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.tick_stream import (
+    LIVE_S,
+    SIMULATED_S,
+    Before,
+    TickBatch,
+    TickStream,
+    encode,
+)
 from gazerig.robot.recording import writer_process as writer
-from gazerig.robot.recording.frame_encoder import FrameEncoder
+from gazerig.robot.recording.frame_picker import FramePicker
 from gazerig.robot.recording.joint_recorder import JointRecorder
 from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text, started_ns
-from gazerig.robot.recording.tick_record import BodyRecord, MeasuredJoints, flat, flat_percept
+from gazerig.robot.recording.tick_record import BodyRecord, MeasuredJoints, plain
 from gazerig.robot.recording.writer_client import WriterClient
 
 _HEALTH_S = 1.0
-_SEND_S = 0.05
+_NOTHING: Before = ()
 
 
 class Recorder:
     """A recording of one run as the control loop sees it.
 
     lost: ticks that could not be kept
+    stream: hands the ticks on; whoever else wants them in another process joins it
     """
 
     def __init__(
@@ -51,13 +61,14 @@ class Recorder:
         self._health: Callable[[], BusHealth] = _no_counts
         self._over = over
         self._link = WriterClient(patient)
-        self._frames = FrameEncoder(info.pictures_hz, at_once=patient)
+        self._frames = FramePicker(info.pictures_hz)
         self._body_records: list[BodyRecord] = []
-        self._percept: Percept | None = None
-        self._percepts = 0
+        self._messages: deque[str] = deque()
+        self.stream = TickStream(self._messages.append, SIMULATED_S if patient else LIVE_S)
+        self.stream.add("the recording", self._take)
         self._last_s: float | None = None
         self._seconds: float | None = None
-        self._checked_s = self._sent_s = -inf
+        self._checked_s = -inf
         self._beside: Path | None = None
         self._opened = self._said = False
         self.lost = 0
@@ -77,9 +88,7 @@ class Recorder:
             self._link.open(file_fd)
         finally:
             os.close(file_fd)
-        self._link.post(writer.BEGIN, (as_text(self._info), started_ns(self._info)))
-        self._link.flush()
-        self._frames.start()
+        self._link.post(writer.BEGIN, encode((as_text(self._info), started_ns(self._info))))
 
     def begin(self) -> None:
         """Replace an older recording, now that the run has begun.
@@ -110,34 +119,57 @@ class Recorder:
 
     def record(self, tick: Tick) -> None:
         """Record a tick; called by the loop."""
-        before = tuple(
-            [
-                h
-                for h in self._body_records
-                if not (type(h) is MeasuredJoints and h.joints is tick.joints)
-            ]
-        )
-        self._body_records.clear()
+        before = self._before(tick)
         dt_s = tick.t_s - self._last_s if self._last_s is not None else self._seconds or 0.0
         self._last_s = tick.t_s
-        if not self._link.alive or self._link.failed:
-            return
-        number = self._number(tick.percept)
-        known = number is not None or tick.percept is None
-        if not known or not self._link.post(writer.TICK, flat(tick, number, dt_s, before)):
-            self.lost += 1
-        self._frames.look(tick)
-        self._post_frames()
+        self.stream.append(tick, dt_s, before)
+        if self._frames.picks(tick.detections):
+            self._post_frame(tick.detections)
         if tick.t_s - self._checked_s >= _HEALTH_S:
             self._checked_s = tick.t_s
-            self._link.post(writer.HEALTH, (tuple(self._health()), self.lost))
+            self.stream.flush()
+            sent, received, errors = self._health()
+            self._link.post(writer.HEALTH, encode(((sent, received, dict(errors)), self.lost)))
             self._link.listen()
-        if tick.t_s - self._sent_s >= _SEND_S:
-            self._sent_s = tick.t_s
-            self._link.flush()
+
+    def _before(self, tick: Tick) -> Before:
+        """Return what else the machine said since the last tick."""
+        records = self._body_records
+        if not records:
+            return _NOTHING
+        before = [
+            plain(one)
+            for one in records
+            if not (type(one) is MeasuredJoints and one.joints is tick.joints)
+        ]
+        records.clear()
+        return before
+
+    def _take(self, batch: TickBatch) -> bool:
+        """Hand ticks to the writer; False where they are lost."""
+        if not self._link.alive or self._link.failed:
+            return True  # which is told; there is none to lose a percept
+        if self._link.post(writer.TICKS, batch.data):
+            return True
+        self.lost += batch.ticks
+        return False
+
+    def _post_frame(self, found: Detections | None) -> None:
+        """Hand the frame to the writer, after the ticks so far."""
+        self.stream.flush()
+        if found is None or found.image is None or self._link.failed:
+            return
+        try:
+            image = copied(found.image)
+        except OSError:  # no memory for it, or no file descriptor: the run is what counts
+            return
+        about = encode((found.captured_s, image.shape, image.dtype))
+        self._link.post_image(about, image.fd, found.image.nbytes)
 
     def events(self) -> tuple[str, ...]:
-        """Return, once, the event that the recording cannot go on."""
+        """Return, once, the events that the recording, or who shares its ticks, cannot go on."""
+        if self._messages:
+            return (self._messages.popleft(),)
         if self._said or not self._link.failed:
             return ()
         self._said = True
@@ -151,11 +183,10 @@ class Recorder:
 
         stopped_by: what ended the run; tx_sha256: of all bytes on an emulated bus
         """
-        self._frames.stop()
-        self._post_frames()
+        self.stream.flush()
         self._link.drain()  # there is always room for how it ended
         end = RunEnd(stopped_by, self.lost, self._seconds, tx_sha256 or "")
-        self._link.post(writer.END, {name: getattr(end, name) for name in RunEnd.__slots__})
+        self._link.post(writer.END, encode({name: getattr(end, name) for name in RunEnd.__slots__}))
         self._link.close()
         if self._last_s is None:
             if self._beside is not None:
@@ -176,20 +207,6 @@ class Recorder:
     def unwritten(self) -> Path | None:
         """Return the file that is not as it was asked for, None where all is well."""
         return self._path if self._opened and self._link.failed else None
-
-    def _number(self, percept: Percept | None) -> int | None:
-        """Return a percept's number, handing it over where it is new; None where it is lost."""
-        if percept is None:
-            return None
-        if percept is not self._percept:
-            if not self._link.post(writer.PERCEPT, flat_percept(self._percepts + 1, percept)):
-                return None
-            self._percept, self._percepts = percept, self._percepts + 1
-        return self._percepts
-
-    def _post_frames(self) -> None:
-        for frame in self._frames.taken():
-            self._link.post(writer.FRAME, frame)
 
 
 def _no_counts() -> BusHealth:

@@ -1,13 +1,12 @@
-"""One recorded tick with what else entered it, as plain tuples and as JSON, and back.
+"""One recorded tick with what else entered it as JSON, and back.
 
-The control loop hands plain tuples over, which costs least; the recording holds JSON
-with every field under its own name. Floats come back bit for bit: JSON's shortest
-writing of a float is exact, and what JSON cannot write is written in words.
+The recording holds JSON with every field under its own name, made by the process that writes it.
+Floats come back bit for bit: JSON's shortest writing of a float is exact, and what JSON cannot
+write is written in words.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import isfinite
-from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,13 +22,11 @@ from gazerig.gaze.types import (
     Target,
 )
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.command_json import as_recorded
 from gazerig.robot.model.command_json import from_recording as command_from_json
 from gazerig.robot.model.lead import NO_GESTURE, NOBODY_LEADS, GestureState, LeadState
 from gazerig.robot.model.types import GAZE_JOINTS, GuardResult, JointAngles, JointState
 
 Json = dict[str, Any]
-Flat = tuple[Any, ...]
 
 
 class TorqueEnabled(NamedTuple):
@@ -87,56 +84,25 @@ _BODY_RECORDS: dict[str, type[BodyRecord]] = {
     "refused": TorqueRefused,
 }
 _BODY_RECORD_NAMES = {kind: name for name, kind in _BODY_RECORDS.items()}
+_NO_LEAD, _NO_GESTURE = list(NOBODY_LEADS), list(NO_GESTURE)
 _WORDS = {"nan": float("nan"), "inf": float("inf"), "-inf": float("-inf")}
 _ODD = "has_words_for_numbers"
-# A frozen dataclass with slots is pickled field by field; all fields at once cost a third.
-_body_values = attrgetter(*Bodies.__slots__)
-_face_values = attrgetter(*Face.__slots__)
 _SHAPES = {"p_world_m": (-1, 3), "v_world_m_s": (-1, 3), "w_world_rad_s": (-1, 3)}
 
 
-def flat(
-    tick: Tick, percept_number: int | None, dt_s: float, before: tuple[BodyRecord, ...]
-) -> Flat:
-    """Return a tick as plain tuples: pickled, they cost a third of the named ones.
+def as_json(row: Sequence[Any], finite: bool = False) -> Json:
+    """Name the fields of a tick as ``tick_stream.decode_plain`` gives them.
 
-    percept_number: which of the percepts handed over the tick went by
+    finite: it is known that all numbers in it are
     """
-    target = tick.target
-    saliences = [tuple(salience) for salience in target.saliences]
-    guard_result = tick.guard_result
-    return (
-        tick.t_s,
-        dt_s,
-        percept_number,
-        tuple(tick.joints),
-        tuple(tick.pose),
-        (*target[:-1], saliences),
-        tuple(tick.gaze),
-        tick.desired_rad,
-        # Nearly always the very same value: written once.
-        (
-            *guard_result[:3],
-            None if guard_result.desired_rad == tick.desired_rad else guard_result[3],
-            *guard_result[4:],
-        ),
-        tick.events,
-        [as_recorded(command) for command in tick.commands],
-        tick.stopped,
-        tick.led,
-        tuple(tick.lead),
-        tuple(tick.gesture),
-        [(_BODY_RECORD_NAMES[type(one)], _plain(one)) for one in before],
-    )
-
-
-def as_json(values: Flat) -> Json:
-    """Name the fields of what ``flat`` gave."""
-    finite = _finite(values)
+    finite = finite or _finite(row)
     if not finite:
-        values = _worded(values)
-    (t_s, dt_s, percept, joints, pose, target, gaze, desired, guard_result, events, commands, stopped,
-     led, lead, gesture, before) = values  # fmt: skip
+        row = _worded(row)
+    (t_s, dt_s, percept, joints, pose, target, gaze, desired, guard_result, as_desired, events,
+     commands, stopped, led, lead, gesture, before) = row  # fmt: skip
+    guard = _named(GuardResult, guard_result)
+    if as_desired:  # nearly always: written once
+        guard["desired_rad"] = None
     data: Json = {
         "t_s": t_s,
         "dt_s": dt_s,
@@ -152,15 +118,15 @@ def as_json(values: Flat) -> Json:
             "limited": [_named(Limited, one) for one in gaze[-1]],
         },
         "wish_rad": desired,
-        "verdict": _as_filed(_named(GuardResult, guard_result)),
+        "verdict": _as_filed(guard),
         "events": events,
         "orders": commands,
         "stopped": stopped,
         "led": led,
     }
-    if lead != NOBODY_LEADS:
+    if lead != _NO_LEAD:
         data["lead"] = _named(LeadState, lead)
-    if gesture != NO_GESTURE:
+    if gesture != _NO_GESTURE:
         data["gesture"] = _named(GestureState, gesture)
     if before:
         data["before"] = [
@@ -230,21 +196,15 @@ def _present_names(data: Json) -> Json:
     return {_FORMER.get(name, name): value for name, value in data.items()}
 
 
-def flat_percept(number: int, percept: Percept) -> Flat:
-    """Return a percept as plain tuples and arrays, under the number that ticks refer to."""
-    faces = [_face_values(face) for face in percept.faces]
-    return (number, percept.captured_s, _body_values(percept.bodies), faces)
-
-
-def percept_as_json(values: Flat) -> Json:
-    """Name the fields of what ``flat_percept`` gave."""
+def percept_as_json(values: Sequence[Any], finite: bool = False) -> Json:
+    """Name the fields of a percept as ``tick_stream.decode_plain`` gives them; see ``as_json``."""
     number, captured_s, bodies, faces = values
     data = {
         "captured_s": captured_s,
-        "bodies": dict(zip(Bodies.__slots__, map(_listed, bodies), strict=True)),
+        "bodies": dict(zip(Bodies.__slots__, bodies, strict=True)),
         "faces": [dict(zip(Face.__slots__, face, strict=True)) for face in faces],
     }
-    if _finite(data):
+    if finite or _finite(data):
         return {"number": number, **data}
     return {"number": number, **_worded(data), _ODD: True}
 
@@ -281,14 +241,15 @@ def _body_record(data: Json) -> BodyRecord:
     return made
 
 
-def _plain(one: BodyRecord) -> Flat:
-    """Return one thing that the machine said as plain values."""
+def plain(one: BodyRecord) -> tuple[str, Sequence[Any]]:
+    """Return one thing that the machine said: its name, and plain values."""
+    name = _BODY_RECORD_NAMES[type(one)]
     if isinstance(one, MeasuredJoints):
-        return (one.t_s, _named(JointState, tuple(one.joints)))
-    return tuple(one)
+        return name, (one.t_s, _named(JointState, one.joints))
+    return name, one
 
 
-def _named(kind: Any, values: Flat) -> Json:
+def _named(kind: Any, values: Sequence[Any]) -> Json:
     """Return a named tuple's values by name."""
     return dict(zip(kind._fields, values, strict=True))
 
@@ -311,10 +272,6 @@ def _tupled(value: Any) -> Any:
     if value and type(value[0]) is list:
         return tuple([_tupled(item) for item in value])
     return tuple(value)
-
-
-def _listed(value: Any) -> Any:
-    return value.tolist() if isinstance(value, np.ndarray) else value
 
 
 def _finite(value: Any) -> bool:

@@ -4,22 +4,35 @@ What the socket does not take stays in a queue until it does. Beyond the queue's
 what is handed over is lost, which is reported. Without the process all goes on.
 """
 
+import os
 import pickle
 import select
 import socket
 import subprocess
 from collections import deque
-from typing import Any
+from typing import Any, NamedTuple
 
 from gazerig.drivers import child_process
+from gazerig.drivers.passed_image import send
 from gazerig.robot.recording import writer_process as writer
 from gazerig.robot.recording.run_writer import WrittenFile
 
 QUEUE_BYTES = 64_000_000
 """What waits at most: some minutes of a run."""
 
+IMAGE_BYTES = 64_000_000
+"""Images that wait at most, beside it: half a minute of a webcam's."""
+
 _TRIES = 8  # messages sent in one go at most, so that a writer that is back costs no tick
 _TIMEOUT_S = 15.0
+
+
+class _Piece(NamedTuple):
+    """A message that waits: its bytes, and an image's file descriptor and size, or -1 and 0."""
+
+    data: bytes
+    fd: int = -1
+    image_bytes: int = 0
 
 
 class WriterClient:
@@ -33,9 +46,8 @@ class WriterClient:
         self._patient = patient
         self._socket: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
-        self._batch: list[bytes] = []
-        self._queue: deque[bytes] = deque()
-        self._queued = 0
+        self._queue: deque[_Piece] = deque()
+        self._queued = self._images = 0
         self.failed = ""
         self.done: WrittenFile | None = None
 
@@ -58,35 +70,47 @@ class WriterClient:
         """Return whether there is a writer to send to."""
         return self._socket is not None
 
-    def post(self, kind: str, values: Any) -> bool:
-        """Hand something over with the next ``flush``; False where it is lost."""
+    def post(self, kind: bytes, body: bytes) -> bool:
+        """Send something, or have it wait until it is taken; False where it is lost.
+
+        Every message wakes the writer, which costs the loop more than making it: so many small
+        things are better one.
+        """
         if self._socket is None or self._queued > QUEUE_BYTES:
             return False
-        data = pickle.dumps((kind, values), pickle.HIGHEST_PROTOCOL)
-        self._batch.append(data)
-        self._queued += len(data)
-        return True
-
-    def flush(self) -> None:
-        """Send what was handed over, as far as it is taken; what is not waits.
-
-        Every message wakes the writer, which costs the loop more than making it: so it is
-        better called some times a second than with every tick.
-        """
-        data = b"".join(self._batch)
-        self._batch.clear()
+        data = kind + body
         for at in range(0, len(data), writer.PIECE_BYTES):
             last = at + writer.PIECE_BYTES >= len(data)
             piece = data[at : at + writer.PIECE_BYTES]
-            self._queue.append((writer.LAST if last else writer.MORE) + piece)
+            self._enqueue(_Piece((writer.LAST if last else writer.MORE) + piece))
+        self._send_waiting()
+        return True
+
+    def post_image(self, body: bytes, fd: int, image_bytes: int) -> bool:
+        """Send an image's description and its memory; False where it is lost.
+
+        The file descriptor is closed here.
+        """
+        if self._socket is None or self._images > IMAGE_BYTES:
+            os.close(fd)
+            return False
+        self._enqueue(_Piece(writer.LAST + writer.FRAME + body, fd, image_bytes))
+        self._send_waiting()
+        return True
+
+    def _enqueue(self, piece: _Piece) -> None:
+        self._queue.append(piece)
+        self._queued += len(piece.data)
+        self._images += piece.image_bytes
+
+    def _send_waiting(self) -> None:
+        """Send what waits, as far as it is taken; a patient client waits for the rest."""
         self._send(_TRIES)
         if self._patient and self._queue:
             self.drain()
 
     def drain(self) -> None:
         """Wait until the writer has taken everything, or for long enough."""
-        if self._batch:
-            self.flush()
         while self._queue and self._socket is not None:
             if not select.select([], [self._socket], [], _TIMEOUT_S)[1]:
                 self._lose("its writer does not go on")
@@ -127,16 +151,24 @@ class WriterClient:
     def _send(self, most: int) -> None:
         """Send what waits, the oldest first, as far as the socket takes it."""
         while self._socket is not None and self._queue and most > 0:
+            piece = self._queue[0]
             try:
-                self._socket.send(self._queue[0])
+                send(self._socket, piece.data, piece.fd)
             except BlockingIOError:
                 return
             except OSError:
                 self.listen()  # it may have said why
                 self._lose("its writer has died")
                 return
-            self._queued -= len(self._queue.popleft()) - 1
+            self._forget(self._queue.popleft())
             most -= 1
+
+    def _forget(self, piece: _Piece) -> None:
+        """Free what a piece has occupied while it waited."""
+        self._queued -= len(piece.data)
+        self._images -= piece.image_bytes
+        if piece.fd >= 0:
+            os.close(piece.fd)
 
     def _receive(self, kind: str, values: Any) -> None:
         if kind == writer.DONE:
@@ -149,8 +181,7 @@ class WriterClient:
         if self._socket is not None:
             self._socket.close()
             self._socket = None
-        self._batch.clear()
-        self._queue.clear()
-        self._queued = 0
+        while self._queue:
+            self._forget(self._queue.popleft())
         if self.done is None:
             self.failed = self.failed or why

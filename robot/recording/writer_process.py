@@ -2,29 +2,31 @@
 
 Run as ``python -m gazerig.robot.recording.writer_process SOCKET FILE``, two open file descriptors,
 by gazerig.robot.recording.writer_client. A message is a letter, MORE or LAST, and a piece of some
-pickled (kind, values); the first of all is the run's beginning. When the other side is
-gone, however it ended, the file is closed as it should be.
+kind and body; the first of all is the run's beginning. Ticks come as ``control.tick_stream`` has
+encoded them, images in memory of their own; the JSON of the file and its JPEGs are made here.
+When the other side is gone, however it ended, the file is closed as it should be.
 """
 
 import contextlib
-import io
 import os
 import pickle
 import select
 import socket
 import sys
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
+from gazerig.drivers.passed_image import PassedImage, receive, taken
 from gazerig.drivers.types import BusHealth
+from gazerig.robot.control.tick_stream import decode_plain
 from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.recording.record_router import RecordRouter
 from gazerig.robot.recording.run_info import RunEnd
 from gazerig.robot.recording.run_writer import RunWriter
 
 MORE, LAST = b"+", b"."
-BEGIN, TICK, PERCEPT, FRAME, HEALTH, END = "begin", "tick", "percept", "picture", "health", "end"
-"""What may be handed over."""
+BEGIN, TICKS, FRAME, HEALTH, END = b"b", b"t", b"f", b"h", b"e"
+"""What may be handed over. Bodies are MessagePack; of TICKS, see ``tick_stream.TickBatch``."""
 FAILED, DONE = "failed", "done"
 """What is answered: why nothing more can be written; what was written."""
 PIECE_BYTES = 100_000
@@ -36,6 +38,14 @@ _WAIT_S = 0.1
 _NICE = 5
 
 
+class _Message(NamedTuple):
+    """What was handed over, and the file descriptor beside it, or -1."""
+
+    kind: bytes
+    body: bytes
+    fd: int
+
+
 def main(socket_fd: int, file_fd: int) -> None:
     """Write until the other side is gone or says that the run is over."""
     os.nice(_NICE)
@@ -44,7 +54,7 @@ def main(socket_fd: int, file_fd: int) -> None:
         first = next((one for one in messages if one is not None), None)
         if first is None:
             return
-        _, (about, started_ns) = first
+        about, started_ns = decode_plain(first.body)
         writer = RunWriter(file_fd, about, started_ns)
         end = _write(messages, writer, rig, RealClock())
         writer.close(end)
@@ -52,20 +62,19 @@ def main(socket_fd: int, file_fd: int) -> None:
 
 
 def _write(
-    messages: Iterator[tuple[str, Any] | None], writer: RunWriter, rig: socket.socket, clock: Clock
+    messages: Iterator[_Message | None], writer: RunWriter, rig: socket.socket, clock: Clock
 ) -> RunEnd:
     """Write the messages; return how the run ended."""
-    scribe = RecordRouter(writer)
+    router = RecordRouter(writer)
     end = RunEnd()
     flushed_s = synced_s = clock.now_s()
     said = False
     for one in messages:
         if one is not None:
-            kind, values = one
-            if kind == END:
-                end = RunEnd(**values)
+            if one.kind == END:
+                end = RunEnd(**decode_plain(one.body))
             else:
-                _take(scribe, kind, values)
+                _take(router, one)
         now_s = clock.now_s()
         if now_s - flushed_s >= _FLUSH_S:
             flushed_s = now_s
@@ -79,20 +88,19 @@ def _write(
     return end
 
 
-def _take(scribe: RecordRouter, kind: str, values: Any) -> None:
+def _take(router: RecordRouter, one: _Message) -> None:
     """Write one thing that was handed over."""
-    if kind == TICK:
-        scribe.tick(values)
-    elif kind == PERCEPT:
-        scribe.percept(values)
-    elif kind == FRAME:
-        scribe.frame(*values)
-    elif kind == HEALTH:
-        counts, lost = values
-        scribe.health(BusHealth(*counts), lost)
+    if one.kind == TICKS:
+        router.ticks(one.body)
+    elif one.kind == FRAME:
+        captured_s, shape, dtype = decode_plain(one.body)
+        router.frame(captured_s, taken(PassedImage(one.fd, tuple(shape), dtype)))
+    elif one.kind == HEALTH:
+        counts, lost = decode_plain(one.body)
+        router.health(BusHealth(*counts), lost)
 
 
-def _messages(rig: socket.socket, parent: int) -> Iterator[tuple[str, Any] | None]:
+def _messages(rig: socket.socket, parent: int) -> Iterator[_Message | None]:
     """Return what is handed over, None where nothing comes for a while, until the end.
 
     parent: the program's process; one that it forked may hold the socket open after its death
@@ -105,18 +113,16 @@ def _messages(rig: socket.socket, parent: int) -> Iterator[tuple[str, Any] | Non
             yield None
             continue
         try:
-            message = rig.recv(PIECE_BYTES + 1)
+            message, fd = receive(rig, PIECE_BYTES + 1)
         except OSError:
             return
         if not message:
             return
         pieces.append(message[1:])
         if message[:1] == LAST:
-            stream = io.BytesIO(b"".join(pieces))
+            body = b"".join(pieces)
             pieces.clear()
-            while stream.tell() < len(stream.getbuffer()):
-                # Only ever fed by the program that started it.
-                yield pickle.load(stream)
+            yield _Message(body[:1], body[1:], fd)
 
 
 def _answer(rig: socket.socket, kind: str, values: Any) -> None:

@@ -1,0 +1,73 @@
+"""Images passed to another process over a socket: in memory of their own, which goes along.
+
+The sender copies an image once and forgets it. The memory lives as long as one of both holds its
+file descriptor, so that nothing is left behind by a process that dies, and none is overwritten.
+"""
+
+import mmap
+import os
+import socket
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class PassedImage(NamedTuple):
+    """An image that another process can read.
+
+    fd: memory that holds the pixels; to be closed by whoever holds it
+    shape, dtype: of the array
+    """
+
+    fd: int
+    shape: tuple[int, ...]
+    dtype: str
+
+
+def copied(image: NDArray[Any]) -> PassedImage:
+    """Return a copy of an image in memory that can be passed on.
+
+    Raises:
+        OSError: there is no memory, or no more file descriptors.
+    """
+    fd = os.memfd_create("image")
+    try:
+        rest = np.ascontiguousarray(image).data.cast("B")
+        while rest:
+            rest = rest[os.write(fd, rest) :]
+    except BaseException:
+        os.close(fd)
+        raise
+    return PassedImage(fd, image.shape, image.dtype.str)
+
+
+def taken(image: PassedImage) -> NDArray[Any]:
+    """Return the pixels, read-only, and close the file descriptor."""
+    try:
+        held = mmap.mmap(image.fd, 0, prot=mmap.PROT_READ)
+    finally:
+        os.close(image.fd)
+    return np.frombuffer(held, np.dtype(image.dtype)).reshape(image.shape)
+
+
+def send(link: socket.socket, message: bytes, fd: int = -1) -> None:
+    """Send a message, with a file descriptor unless it is -1.
+
+    Raises:
+        OSError: as ``socket.send``.
+    """
+    if fd < 0:
+        link.send(message)
+    else:
+        socket.send_fds(link, [message], [fd])
+
+
+def receive(link: socket.socket, most: int, flags: int = 0) -> tuple[bytes, int]:
+    """Return a message and the file descriptor that came with it, -1 without one.
+
+    Raises:
+        OSError: as ``socket.recv``.
+    """
+    message, fds, _, _ = socket.recv_fds(link, most, 1, flags)
+    return message, fds[0] if fds else -1

@@ -1,0 +1,211 @@
+"""Ticks for other processes: some are encoded together, once for all who are sent them.
+
+Encoding a tick when it is over finds neither code nor encoder in the processor's cache; a
+batch of them some times a second costs a third of that. MessagePack holds every number bit for bit.
+"""
+
+import re
+from collections.abc import Callable, Sequence
+from math import inf
+from operator import attrgetter
+from typing import Any, NamedTuple
+
+import msgspec
+
+from gazerig.gaze.types import Bodies, Face, GazeCommand, GazeState, Percept, Target
+from gazerig.robot.control.observers import left_out
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.model.command_json import as_recorded
+from gazerig.robot.model.lead import GestureState, LeadState
+from gazerig.robot.model.types import GuardResult, JointAngles, JointState
+
+LIVE_S = 0.0399  # a little under 40 ms, so that rounding does not turn it into 45
+"""Time between two batches of a run in real time."""
+SIMULATED_S = 0.2
+"""The same in simulated time, where no user looks on."""
+
+Before = Sequence[tuple[str, Any]]
+"""What entered the run beside a tick's own fields: kind and plain values of each."""
+
+
+class TickRow(NamedTuple):
+    """A tick as the receiver reads it: fields as in ``Tick``.
+
+    dt_s: time since the tick before; percept: its number, None without one
+    as_desired: ``guard_result.desired_rad`` equals ``desired_rad``
+    commands: as ``command_json.as_recorded`` writes them
+    before: what else entered the run, for a recording
+    """
+
+    t_s: float
+    dt_s: float
+    percept: int | None
+    joints: JointState
+    pose: GazeState
+    target: Target
+    gaze: GazeCommand
+    desired_rad: JointAngles
+    guard_result: GuardResult
+    as_desired: bool
+    events: tuple[str, ...]
+    commands: list[dict[str, Any]]
+    stopped: str
+    led: str
+    lead: LeadState
+    gesture: GestureState
+    before: list[Any]
+
+
+class TickBatch(NamedTuple):
+    """Ticks in the order of time.
+
+    data: [percepts, rows]; the percepts that come into force with these ticks, each as
+        [number, captured_s, bodies, faces], and the fields of ``TickRow`` of each tick
+    ticks: how many; newest: the last of them
+    """
+
+    data: bytes
+    ticks: int
+    newest: Tick
+
+
+class _Sink(NamedTuple):
+    name: str
+    take: Callable[[TickBatch], bool]
+
+
+class TickStream:
+    """Collects ticks and hands them to its sinks in batches; belongs to the loop's thread.
+
+    Args:
+        say: gets one line about each sink that fails and is left out.
+        every_s: time between two batches.
+    """
+
+    def __init__(self, say: Callable[[str], None], every_s: float = LIVE_S) -> None:
+        self._say, self._every_s = say, every_s
+        self._sinks: tuple[_Sink, ...] = ()
+        self._ticks: list[tuple[Tick, float, Before]] = []
+        self._due_s = -inf
+        self._percept: Percept | None = None
+        self._number = 0
+        self._again = False
+
+    def add(self, name: str, take: Callable[[TickBatch], bool]) -> None:
+        """Hand every batch to one more; it returns False where the batch is lost to it."""
+        self._sinks = (*self._sinks, _Sink(name, take))
+
+    def update(self, tick: Tick) -> None:
+        """Add a tick of a run that is not recorded."""
+        self.append(tick, 0.0, ())
+
+    def append(self, tick: Tick, dt_s: float, before: Before) -> None:
+        """Add a tick with what a recording holds beside it; now and then, hand over a batch."""
+        self._ticks.append((tick, dt_s, before))
+        if not 0.0 <= self._due_s - tick.t_s <= self._every_s:
+            self.flush()
+            self._due_s = tick.t_s + self._every_s
+
+    def flush(self) -> None:
+        """Hand over what was added since the last batch."""
+        ticks = self._ticks
+        if not ticks or not self._sinks:
+            ticks.clear()
+            return
+        batch = TickBatch(self._encoded(), len(ticks), ticks[-1][0])
+        ticks.clear()
+        for sink in self._sinks:
+            try:
+                self._again |= not sink.take(batch)
+            except Exception as error:
+                self._sinks = tuple([one for one in self._sinks if one is not sink])
+                self._say(left_out(sink.name, error))
+
+    def _encoded(self) -> bytes:
+        percepts, rows = [], []
+        if self._again:  # whoever lost a batch may have lost the percept in force
+            self._again = False
+            if self._percept is not None:
+                percepts.append(_percept(self._number, self._percept))
+        for tick, dt_s, before in self._ticks:
+            percept, guard = tick.percept, tick.guard_result
+            if percept is not None and percept is not self._percept:
+                self._percept = percept
+                self._number += 1
+                percepts.append(_percept(self._number, percept))
+            rows.append((
+                tick.t_s, dt_s, None if percept is None else self._number, tick.joints, tick.pose,
+                tick.target, tick.gaze, tick.desired_rad, guard,
+                guard.desired_rad == tick.desired_rad, tick.events,
+                [as_recorded(command) for command in tick.commands], tick.stopped, tick.led,
+                tick.lead, tick.gesture, before,
+            ))  # fmt: skip
+        return encode((percepts, rows))
+
+
+def encode(value: object) -> bytes:
+    """Return plain values, named tuples and arrays as MessagePack.
+
+    Raises:
+        TypeError: a value is none of these.
+    """
+    try:
+        return _encoder.encode(value)
+    except UnicodeEncodeError:  # a name of a file or a device that is no text
+        return _encoder.encode(_writable(value))
+
+
+def decode_rows(data: bytes) -> tuple[list[Any], list[TickRow]]:
+    """Return the percepts and the ticks of ``TickBatch.data``.
+
+    Raises:
+        msgspec.MsgspecError: it is none.
+    """
+    return _rows.decode(data)
+
+
+def decode_plain(data: bytes) -> Any:
+    """Return the same as plain lists, every number of the type it had.
+
+    Raises:
+        msgspec.MsgspecError: it is no MessagePack.
+    """
+    return _plain.decode(data)
+
+
+def all_finite(data: bytes) -> bool:
+    """Return whether all numbers in MessagePack are finite; False: there may be one that is not."""
+    return _NOT_FINITE.search(data) is None
+
+
+def _percept(number: int, percept: Percept) -> tuple[Any, ...]:
+    faces = [_face_values(face) for face in percept.faces]
+    return (number, percept.captured_s, _body_values(percept.bodies), faces)
+
+
+def _array(value: Any) -> Any:
+    """Return an array or a number of NumPy's as Python's own."""
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise TypeError(f"{type(value).__name__} is no part of a tick")
+
+
+def _writable(value: Any) -> Any:
+    """Return values with texts that can be written as UTF-8."""
+    if isinstance(value, str):
+        return value.encode(errors="replace").decode()
+    if isinstance(value, tuple | list):
+        return [_writable(item) for item in value]
+    if isinstance(value, dict):
+        return {_writable(key): _writable(item) for key, item in value.items()}
+    return value
+
+
+_NOT_FINITE = re.compile(rb"\xcb[\x7f\xff][\xf0-\xff]")
+"""A double whose exponent has all bits set: nan, inf or, by chance, other bytes like it."""
+# A frozen dataclass would be written with the names of its fields.
+_body_values = attrgetter(*Bodies.__slots__)
+_face_values = attrgetter(*Face.__slots__)
+_encoder = msgspec.msgpack.Encoder(enc_hook=_array)
+_plain = msgspec.msgpack.Decoder()
+_rows = msgspec.msgpack.Decoder(tuple[list[Any], list[TickRow]])
