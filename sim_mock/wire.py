@@ -98,7 +98,11 @@ class ServoLine:
         return replies
 
     def _any_late(self, replies: list[DeviceReply]) -> bool:
-        return any(piece.late_s for reply in replies for piece in reply.pieces)
+        for _, pieces in replies:
+            for _, _, _, late_s in pieces:
+                if late_s:
+                    return True
+        return False
 
     def _queue_late(self, replies: list[DeviceReply], now_s: float) -> None:
         """Queue answers that take no time beyond the delay of a fault."""

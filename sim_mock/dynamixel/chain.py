@@ -44,7 +44,10 @@ class DynamixelChain(ServoChain[DynamixelServo, DynamixelQuirks]):
     _obeys_broadcast, _touches_eeprom = staticmethod(obeys_broadcast), staticmethod(touches_eeprom)
 
     def _apply_quirks(self, quirks: DynamixelQuirks) -> None:
-        self._framing.strict = quirks.stuffing == "strict"
+        strict = quirks.stuffing == "strict"
+        if strict != self._framing.strict:
+            self._framing.forget()
+            self._framing.strict = strict
 
     def _execute(self, instruction: Instruction) -> list[Piece]:
         """Let expired bus watchdogs trip, reset the others, then carry out the instruction."""

@@ -247,6 +247,7 @@ class DynamixelDrive(Drive):
 
     def apply_settings(self) -> None:
         """Apply the present register values."""
+        self.followed = b""
         get = self.memory.get
         self.follows = self.torque and self.mode in POSITION_MODES
         self._speed, self._ramp = get("profile_velocity"), get("profile_acceleration")

@@ -10,8 +10,15 @@ from fastcrc.crc16 import umts
 
 from gazerig.sim_mock.dynamixel.memory import ACCESS
 from gazerig.sim_mock.dynamixel.packets import CRC, HEAD, HEADER, STATUS
-from gazerig.sim_mock.dynamixel.servo import DynamixelServo
+from gazerig.sim_mock.dynamixel.servo import ALERT, DynamixelServo
 from gazerig.sim_mock.replies import BROADCAST
+
+START = {
+    (error, servo_id): bytes((error, servo_id))
+    for error in (0, ACCESS, ALERT, ALERT | ACCESS)
+    for servo_id in range(256)
+}
+"""What a servo's block begins with, by error and id."""
 
 
 def fast_reply(
@@ -23,17 +30,21 @@ def fast_reply(
 ) -> bytes:
     """Return the packet up to the first silent servo; empty if that is the first one."""
     parts = list[bytes]()
-    before, crc = HEAD.pack(HEADER, BROADCAST, length, STATUS), 0
+    before, crc, pack = HEAD.pack(HEADER, BROADCAST, length, STATUS), 0, CRC.pack
     for servo_id, address, size in rows:
         servo = servos.get(servo_id)
         if servo is None or not servo.advance(now_ms, fed_ms):
             break
         if not servo.fast_reads or servo.status_level < 1:
             break
-        data = servo.read(address, size)
-        error = servo.error_flag | (ACCESS if data is None else 0)
-        block = before + bytes((error, servo_id)) + (data or bytes(size))
+        data, error = servo.read(address, size), ALERT if servo.errors else 0
+        if data is None:
+            data, error = bytes(size), error | ACCESS
+        block = before + START[error, servo_id] + data
         crc = umts(block, crc)
         parts.append(block)
-        before = CRC.pack(crc)
-    return b"".join((*parts, before)) if parts else b""
+        before = pack(crc)
+    if not parts:
+        return b""
+    parts.append(before)
+    return b"".join(parts)

@@ -4,7 +4,8 @@ Knows the rules that follow from the table alone; what needs the servo's state (
 lock, limit registers, watchdog) is asked by gazerig.sim_mock.dynamixel.servo.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from operator import itemgetter
 from typing import NamedTuple
 
 from gazerig.drivers.dynamixel.control_table import (
@@ -38,12 +39,12 @@ Fields = tuple[tuple[DynamixelRegister, int], ...]
 class ResolvedRange(NamedTuple):
     """Real addresses behind a range, resolved through the indirect windows.
 
-    runs: of real addresses
+    fetch: returns the bytes of all real addresses, in runs of neighbours
     sensed, surroundings, profiled: whether any of them holds sensor values, voltage or
         temperature, or the state of the profile
     """
 
-    runs: tuple[slice, ...]
+    fetch: Callable[[bytearray], Iterable[bytearray]]
     sensed: bool
     surroundings: bool
     profiled: bool
@@ -62,7 +63,8 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
         self._windows = [(b.data_base, b.data_base + b.entries, b.address_base) for b in blocks]
         self._window_low = min(low for low, _, _ in self._windows)
         self._pointers_low = min(pointers for _, _, pointers in self._windows)
-        self._gathers: dict[tuple[int, int], ResolvedRange] = {}
+        self.gathers: dict[tuple[int, int], ResolvedRange] = {}
+        """Ranges that were read, until a window points elsewhere."""
         self._defined = bytearray(size)
         for register in registers:
             end = register.address + register.size
@@ -89,7 +91,7 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
         """Store a value."""
         super().put(register, value)
         if register.address >= self._pointers_low:
-            self._gathers.clear()
+            self.gathers.clear()
 
     def _decode(self, register: DynamixelRegister, data: bytes | bytearray) -> int:
         return int.from_bytes(data, "little", signed=register.signed)
@@ -105,20 +107,19 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
 
     def collect(self, gather: ResolvedRange) -> bytes:
         """Return the bytes at resolved addresses."""
-        content = self.bytes
-        return b"".join([content[run] for run in gather.runs])
+        return b"".join(gather.fetch(self.bytes))
 
     def gather(self, address: int, length: int) -> ResolvedRange | None:
         """Return the real addresses behind a range, None where an address is not defined.
 
         It is kept, as a control loop reads the same ranges again and again.
         """
-        found = self._gathers.get((address, length))
+        found = self.gathers.get((address, length))
         if found is None:
             defined = self._defined[address : address + length]
             if length == 0 or len(defined) != length or 0 in defined:
                 return None
-            found = self._gathers[address, length] = self._gather(address, address + length)
+            found = self.gathers[address, length] = self._gather(address, address + length)
         return found
 
     def _gather(self, address: int, end: int) -> ResolvedRange:
@@ -133,9 +134,13 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
         def touches(*spans: tuple[int, int]) -> bool:
             return any(low < end and high > at for low, high in runs for at, end in spans)
 
-        slices = tuple(slice(low, high) for low, high in runs)
+        slices = [slice(low, high) for low, high in runs]
+        # With a single slice itemgetter would return the bytes themselves.
         return ResolvedRange(
-            slices, touches(SENSED_SPAN), touches(SURROUNDINGS_SPAN), touches(*PROFILED)
+            itemgetter(*slices, slice(0, 0)),
+            touches(SENSED_SPAN),
+            touches(SURROUNDINGS_SPAN),
+            touches(*PROFILED),
         )
 
     def real(self, address: int) -> int:

@@ -96,6 +96,7 @@ class DynamixelServo(EmulatedServo):
 
     def _boot(self) -> None:
         """Reset to power-on, with torque if Startup Configuration asks for it."""
+        self._around: tuple[float, float] | None = None
         super()._boot()
         self.memory.set("backup_ready", self._backup.ready)
         startup = self.memory.get("startup_configuration") if self._new else 0
@@ -133,22 +134,25 @@ class DynamixelServo(EmulatedServo):
 
     def read(self, address: int, length: int) -> bytes | None:
         """Return bytes of the control table, None where an address is not defined."""
-        if address == SENSED_AT and length == SENSED.size:
-            return SENSED.pack(*self.drive.sensed(self._ms))
-        gather = self.memory.gather(address, length)
+        memory = self.memory
+        gather = memory.gathers.get((address, length)) or memory.gather(address, length)
         if gather is None:
             return None
-        into = self.memory.bytes
-        if gather.sensed:
+        fetch, sensed, surroundings, profiled = gather
+        into = memory.bytes
+        if sensed:
             SENSED.pack_into(into, SENSED_AT, *self.drive.sensed(self._ms))
-        if gather.surroundings:
-            warmth = max(0, min(255, round(self.temperature_c)))
-            SURROUNDINGS.pack_into(into, SURROUNDINGS_AT, self.voltage_01v, warmth)
-        if gather.profiled:
+        if surroundings:
+            around = self.shaft.volts, self.protection.temperature_c
+            if around != self._around:
+                self._around = around
+                warmth = max(0, min(255, round(self.temperature_c)))
+                SURROUNDINGS.pack_into(into, SURROUNDINGS_AT, self.voltage_01v, warmth)
+        if profiled:
             tick_ms = self._ms - self._booted_ms & 0x7FFF
             MOTION.pack_into(into, MOTION_AT, tick_ms, *self.drive.motion(self._ms))
             REFERENCE.pack_into(into, REFERENCE_AT, *self.drive.reference())
-        return self.memory.collect(gather)
+        return b"".join(fetch(into))
 
     # --- writing
 
@@ -171,7 +175,9 @@ class DynamixelServo(EmulatedServo):
         if error:
             return error
         self.memory.bytes[_GOAL_AT : _GOAL_AT + _GOAL_SIZE] = data
-        self.drive.set_goal(value)
+        drive = self.drive
+        drive.set_goal(value)
+        drive.followed, drive.followed_at = data, _GOAL_AT
         return 0
 
     def _act(self, name: str, value: int) -> None:

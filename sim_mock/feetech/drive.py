@@ -19,7 +19,7 @@ from gazerig.drivers.feetech.memory_table import (
 from gazerig.drivers.feetech.memory_table import STEPS_PER_TURN as TURN
 from gazerig.drivers.feetech.memory_table import TORQUE_FULL as FULL
 from gazerig.sim_mock.feetech.memory import FeetechMemory
-from gazerig.sim_mock.feetech.packets import signed
+from gazerig.sim_mock.feetech.packets import signed, unsigned
 from gazerig.sim_mock.feetech.tables import PWM, SERVO, STEP, WHEEL
 from gazerig.sim_mock.smart_servo.drive import Drive
 from gazerig.sim_mock.smart_servo.motor import DISABLED, Loop, flicker
@@ -47,13 +47,15 @@ SPEED_P_SHARE, SPEED_I_SHARE = 1 / 50, 1 / 40_000
 """What a unit of each gain makes of steps, steps times ms, and steps/ms: shares of full duty."""
 
 
-class SensedMotion(NamedTuple):
-    """The servo's measured motion, in register units with their signs."""
+class MotionWords(NamedTuple):
+    """What the servo measures of its motion, as the words of its registers."""
 
     position: int
     speed: int
     load: int
     current: int
+    target: int
+    moving: bool
 
 
 class FeetechDrive(Drive):
@@ -98,39 +100,38 @@ class FeetechDrive(Drive):
         goes_on = self.counts_turns or self.torque or self._last is not None
         return (at if goes_on else at % TURN) * self._scale
 
-    def sensed(self, now_ms: int) -> SensedMotion:
-        """Return position, speed, load and current."""
-        shaft = self.shaft
-        at = round((shaft.x + self._shift) * self._scale)
+    def motion_words(self, now_ms: int) -> MotionWords:
+        """Return what the registers say of position, speed, load, current, target, moving."""
+        shaft, scale, profile = self.shaft, self._scale, self.shaft.profile
+        at = round((shaft.x + self._shift) * scale)
         if self._last is not None:
             at = max(0, min(self._last, at))
         elif not self.counts_turns:
             at %= TURN
-        speed = round(shaft.v * self._scale * 1000.0 / self._speed_unit)
-        load, current = round(shaft.u * FULL), round(shaft.effort * self._current_full)
-        if self.torque and not shaft.v:
+        turning = shaft.v * scale * 1000.0 / self._speed_unit
+        speed, current = round(turning), round(shaft.effort * self._current_full)
+        if self.torque and not turning:
             more, speed = flicker(now_ms, *self._noise)
             current += more
-        return SensedMotion(at, speed, load, current)
+        led = self.torque and isinstance(profile, PositionProfile)
+        goal = round((profile.goal + self._shift) * scale) if led else self._goal_register()
+        return MotionWords(
+            unsigned(at, 15),
+            unsigned(speed, 15),
+            unsigned(round(shaft.u * FULL), 10),
+            unsigned(current, 15),
+            unsigned(goal, 15),
+            led and profile.running or not -self._threshold <= turning <= self._threshold,
+        )
 
-    @property
-    def moving(self) -> bool:
-        """True if its profile runs or its shaft turns."""
-        profile = self.shaft.profile
-        led = self.torque and isinstance(profile, PositionProfile) and profile.running
-        return led or abs(self.shaft.v * self._scale * 1000.0 / self._speed_unit) > self._threshold
-
-    def target(self) -> int:
-        """Return the profile's goal in the registers' terms."""
-        profile = self.shaft.profile
-        if self.torque and isinstance(profile, PositionProfile):
-            return round((profile.goal + self._shift) * self._scale)
+    def _goal_register(self) -> int:
         return self.memory.get("goal_position")
 
     # --- settings
 
     def apply_settings(self) -> None:
         """Apply the present register values."""
+        self.followed = b""
         get = self.memory.get
         phase, low, high = get("phase"), get("min_position_limit"), get("max_position_limit")
         endless = low == 0 and high == 0
@@ -189,6 +190,7 @@ class FeetechDrive(Drive):
 
     def switch(self, value: int, from_here: bool) -> None:
         """Switch the torque: 0 off, 1 on, 2 off and braked; ``from_here``: without an old goal."""
+        self.followed = b""
         was, self.torque = self.torque, value not in (0, DAMPED)
         self.damped = value == DAMPED
         if self.torque and not was:
@@ -203,6 +205,7 @@ class FeetechDrive(Drive):
 
     def _begin(self) -> None:
         """Start a profile at the shaft's position."""
+        self.followed = b""
         self._goals_followed = ()
         self._lead_from_here(self.mode == WHEEL)
         self.apply_gains()

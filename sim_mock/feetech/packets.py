@@ -10,6 +10,7 @@ protocol of the STS/SMS series.
 from gazerig.sim_mock.smart_servo.framing import Framing, Instruction
 
 HEADER = b"\xff\xff"
+BYTES = tuple(bytes((i,)) for i in range(256))
 SHORTEST = 6
 
 
@@ -21,7 +22,7 @@ def checksum(body: bytes) -> int:
 def status(servo_id: int, error: int, params: bytes) -> bytes:
     """Build a status packet."""
     body = bytes((servo_id, (len(params) + 2) & 0xFF, error)) + params
-    return HEADER + body + bytes((checksum(body),))
+    return HEADER + body + BYTES[~sum(body) & 0xFF]
 
 
 def signed(raw: int, bit: int) -> int:

@@ -15,9 +15,8 @@ from gazerig.drivers.feetech.memory_table import (
 )
 from gazerig.sim_mock.feetech.drive import CURRENT_UNIT_A, GOALS_AT, FeetechDrive
 from gazerig.sim_mock.feetech.memory import FeetechMemory
-from gazerig.sim_mock.feetech.packets import unsigned
 from gazerig.sim_mock.feetech.quirks import FeetechQuirks
-from gazerig.sim_mock.feetech.tables import model_and_table
+from gazerig.sim_mock.feetech.tables import SERVO, model_and_table
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.sim_mock.smart_servo.protection import CURRENT, HEAT, OVERLOAD, VOLTAGE
 from gazerig.sim_mock.smart_servo.servo import EmulatedServo
@@ -59,6 +58,9 @@ class FeetechServo(EmulatedServo):
         self.baud_rates = self.table.baud_rates
         self.memory = FeetechMemory(self.model, spec.id, spec.firmware, self.table)
         self.drive = FeetechDrive(self.memory, self.model, spec)
+        self._sensed = _SENSED[self.table.order]
+        self._around: tuple[float, float] | None = None
+        self._around_bytes = 0, 0
         self.apply_quirks(FeetechQuirks())
         super().__init__(spec, now_ms)
 
@@ -118,22 +120,17 @@ class FeetechServo(EmulatedServo):
 
     def _refresh(self) -> None:
         """Update the registers that change by themselves."""
-        drive = self.drive
-        sensed = drive.sensed(self._ms)
-        _SENSED[self.table.order].pack_into(
-            self.memory.bytes,
-            SENSED_AT,
-            unsigned(sensed.position, 15),
-            unsigned(sensed.speed, 15),
-            unsigned(sensed.load, 10),
-            max(0, min(255, self.voltage_01v)),
-            max(0, min(255, round(self.temperature_c))),
-            self._pending is not None,
-            self.errors,
-            drive.moving,
-            unsigned(drive.target(), 15),
-            unsigned(sensed.current, 15),
-        )
+        around = self.shaft.volts, self.protection.temperature_c
+        if around != self._around:
+            self._around = around
+            warmth = max(0, min(255, round(self.temperature_c)))
+            self._around_bytes = max(0, min(255, self.voltage_01v)), warmth
+        volts, warmth = self._around_bytes
+        position, speed, load, current, target, moving = self.drive.motion_words(self._ms)
+        self._sensed.pack_into(
+            self.memory.bytes, SENSED_AT, position, speed, load, volts, warmth,
+            self._pending is not None, self.errors, moving, target, current,
+        )  # fmt: skip
 
     # --- writing
 
@@ -145,6 +142,9 @@ class FeetechServo(EmulatedServo):
             # The one write of every tick, the short way.
             memory.bytes[address:end] = data
             self._command(address < GOAL_END and end > GOAL_AT, goal)
+            drive = self.drive
+            if drive.torque and drive.mode == SERVO:
+                drive.followed, drive.followed_at = data, address
             return 0
         written: list[int] = []
         memory.write(address, data, written.append)

@@ -262,11 +262,10 @@ class ServoChain(Generic[S, Q]):
 
     def _group_instructions(self) -> dict[int, GroupAction]:
         """Return what is done for instructions to a group, by code."""
-        rows, writes = self.instructions.sync_rows, self.instructions.sync_writes
         return {
             PING: lambda params: self._out(self._ping_all()),
-            SYNC_READ: lambda params: self._plain(rows(params)),
-            SYNC_WRITE: lambda params: self._write_all(writes(params)),
+            SYNC_READ: lambda params: self._plain(self.instructions.sync_rows(params)),
+            SYNC_WRITE: self._write_each,
         }
 
     def _ping_all(self) -> list[Answer]:
@@ -292,6 +291,8 @@ class ServoChain(Generic[S, Q]):
 
     def _plain(self, rows: Iterable[GroupRead]) -> list[Piece]:
         """Answer a group read with one status a servo, in the order asked."""
+        if not self._wire.any and not self._twins:
+            return self._undisturbed(rows)
         answers, late_s, policy = list[Answer](), 0.0, self.quirks.after_missing
         for servo_id, address, length in rows:
             answer = self._part(servo_id, address, length)
@@ -303,6 +304,41 @@ class ServoChain(Generic[S, Q]):
             elif policy == "timeout":
                 late_s += self.quirks.slot_timeout_s
         return self._out(answers)
+
+    def _undisturbed(self, rows: Iterable[GroupRead]) -> list[Piece]:
+        """Do the same for unique ids and a line without faults: this happens every tick."""
+        servos, now_ms, fed_ms = self._by_id, self._now_ms, self._fed_ms
+        pieces, late_s, policy = list[Piece](), 0.0, self.quirks.after_missing
+        for servo_id, address, length in rows:
+            servo = servos.get(servo_id)
+            if servo is not None and servo.advance(now_ms, fed_ms) and servo.answers_groups:
+                data, flag = servo.read(address, length), servo.error_flag
+                if data is None:
+                    data, flag = b"", flag | servo.unreadable
+                packet = self.status(servo_id, flag, data)
+                pieces.append(Piece(servo_id, packet, self._delay_s[servo_id], late_s))
+                late_s = 0.0
+            elif policy == "silence":
+                break
+            elif policy == "timeout":
+                late_s += self.quirks.slot_timeout_s
+        return pieces
+
+    def _write_each(self, params: bytes) -> list[Piece]:
+        """Carry out a sync write; a servo that follows these very goals already is left alone."""
+        address, rows = self.instructions.sync_writes(params)
+        if self._wire.any or self._known.twins or self._known.shadows:
+            return self._write_all([(servo_id, address, data) for servo_id, data in rows])
+        servos, now_ms, fed_ms = self._by_id, self._now_ms, self._fed_ms
+        for servo_id, data in rows:
+            servo = servos.get(servo_id)
+            if servo is None or (
+                servo.drive.followed == data and servo.drive.followed_at == address
+            ):
+                continue
+            if servo.advance(now_ms, fed_ms):
+                servo.write(address, data)
+        return []
 
     def _write_all(self, writes: Iterable[GroupWrite]) -> list[Piece]:
         """Carry out a group write; no servo answers."""

@@ -31,10 +31,14 @@ class Drive(ABC):
     Attributes:
         torque: whether it is switched on.
         mode: operating mode in force.
+        followed, followed_at: the last write of goals and its address, while the same bytes
+            again would change nothing; empty otherwise.
     """
 
     torque = False
     mode: int
+    followed = b""
+    followed_at = 0
 
     def __init__(
         self, memory: ServoMemory[Any], model: Motor, spec: ServoSpec, scale: float = 1.0
@@ -70,4 +74,5 @@ class Drive(ABC):
 
     def _set_goal_here(self) -> None:
         """Make the goal position the present one."""
+        self.followed = b""
         self.memory.set("goal_position", round(self.position_steps))

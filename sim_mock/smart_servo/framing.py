@@ -21,6 +21,11 @@ class Instruction(NamedTuple):
     end: int
 
 
+_MAX_KNOWN = 64
+_READS = frozenset((PING, READ, SYNC_READ, 0x8A))
+"""Instructions that a control loop repeats byte for byte; 0x8A is Dynamixel's fast sync read."""
+
+
 class Framing(ABC):
     """Finds instructions in bytes that arrive in pieces.
 
@@ -32,19 +37,34 @@ class Framing(ABC):
         self.gap_s = gap_s
         self._unfinished = b""
         self._arrived_s = now_s
+        self._known: dict[bytes, list[Instruction]] = {}
 
     def forget(self) -> None:
-        """Drop an unfinished packet."""
+        """Drop an unfinished packet, and the kept ones."""
         self._unfinished = b""
+        self._known.clear()
 
     def feed(self, data: bytes, now_s: float) -> list[Instruction]:
         """Return the instructions that bytes which arrive now complete."""
+        if not self._unfinished:
+            self._arrived_s = now_s
+            known = self._known.get(data)
+            return self._search_alone(data) if known is None else known
         before = 0
-        if self._unfinished and now_s - self._arrived_s < self.gap_s:
+        if now_s - self._arrived_s < self.gap_s:
             before = len(self._unfinished)
             data = self._unfinished + data
         self._arrived_s = now_s
         found, self._unfinished = self._search(data, before)
+        return found
+
+    def _search_alone(self, data: bytes) -> list[Instruction]:
+        """Return the instructions in bytes that nothing came before; keep those of a read."""
+        found, self._unfinished = self._search(data, 0)
+        if len(found) == 1 and found[0].code in _READS and not self._unfinished:
+            if len(self._known) >= _MAX_KNOWN:
+                self._known.clear()
+            self._known[data] = found
         return found
 
     @abstractmethod

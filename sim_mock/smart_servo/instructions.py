@@ -1,7 +1,8 @@
 """The instructions that all makes have, as one servo carries them out, and those of groups."""
 
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache, lru_cache
 from typing import Generic, Literal, TypeVar
 
 from gazerig.sim_mock.smart_servo.framing import ACTION, PING, READ, REBOOT, REG_WRITE, WRITE
@@ -52,23 +53,18 @@ class InstructionSet(Generic[S]):
         action = self._actions.get(code)
         return self._misunderstood if action is None else action(servo, params)
 
-    def sync_rows(self, params: bytes) -> list[GroupRead]:
+    def sync_rows(self, params: bytes) -> tuple[GroupRead, ...]:
         """Read the parameters of a sync read."""
-        if len(params) <= self._span.size:
-            return []
-        address, length = self._span.unpack_from(params)
-        return [(servo_id, address, length) for servo_id in params[self._span.size :]]
+        return _sync_rows(self._span, params)
 
-    def sync_writes(self, params: bytes) -> list[GroupWrite]:
-        """Read the parameters of a sync write; nothing where they do not add up."""
-        rows = params[self._span.size :]
+    def sync_writes(self, params: bytes) -> tuple[int, Iterable[tuple[int, bytes]]]:
+        """Return address, ids and data of a sync write; no ids where they do not add up."""
         if len(params) < self._span.size:
-            return []
+            return 0, ()
         address, length = self._span.unpack_from(params)
-        if len(rows) % (1 + length):
-            return []
-        pairs = struct.iter_unpack(f"<B{length}s", rows)
-        return [(servo_id, address, data) for servo_id, data in pairs]
+        if (len(params) - self._span.size) % (1 + length):
+            return 0, ()
+        return address, _row(length).iter_unpack(params[self._span.size :])
 
     def address_of(self, params: bytes) -> int:
         """Return the address that a write begins with."""
@@ -84,6 +80,21 @@ class InstructionSet(Generic[S]):
         if len(params) < self._address_bytes:
             return self._misunderstood
         return take(self.address_of(params), params[self._address_bytes :]), b""
+
+
+@cache
+def _row(length: int) -> struct.Struct:
+    """Return how one servo's part of a sync write stands in its packet."""
+    return struct.Struct(f"<B{length}s")
+
+
+@lru_cache(maxsize=64)
+def _sync_rows(span: struct.Struct, params: bytes) -> tuple[GroupRead, ...]:
+    """Read the parameters of a sync read; a control loop's are the same again and again."""
+    if len(params) <= span.size:
+        return ()
+    address, length = span.unpack_from(params)
+    return tuple((servo_id, address, length) for servo_id in params[span.size :])
 
 
 def _reboot(servo: EmulatedServo, params: bytes) -> Result:

@@ -119,7 +119,7 @@ class EmulatedServo(ABC):
         """
         ahead = now_ms - self._ms
         if ahead > 0:
-            if self._watchdog_ms and self.torque and now_ms >= fed_ms + self._watchdog_ms:
+            if self._watchdog_ms and now_ms >= fed_ms + self._watchdog_ms and self.torque:
                 self._trip(max(0, fed_ms + self._watchdog_ms - self._ms))
             if now_ms < self._check_ms:
                 if not self.shaft.quiet:
