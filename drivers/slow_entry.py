@@ -33,49 +33,48 @@ class SlowEntry:
 
     Args:
         setups: the servos by id.
+
+    places: those on their way by id, and where each was, None before it was looked
     """
 
     def __init__(self, setups: Mapping[int, ServoConfig]) -> None:
         self._setups = setups
-        self._places: dict[int, _Place | None] = {}
-
-    def __bool__(self) -> bool:
-        return bool(self._places)
+        self.places: dict[int, _Place | None] = {}
 
     def __contains__(self, servo_id: object) -> bool:
-        return servo_id in self._places
+        return servo_id in self.places
 
     @property
     def ids(self) -> tuple[int, ...]:
         """Return those on their way."""
-        return tuple(self._places)
+        return tuple(self.places)
 
     def begin(self, ids: Iterable[int]) -> None:
         """Lead these inside, and no others any more."""
-        self._places = dict.fromkeys(ids)
+        self.places = dict.fromkeys(ids)
 
     def add_outside(self, servo_id: int, steps: int) -> None:
         """Lead one inside if it stands outside."""
         if self._outside(servo_id, steps):
-            self._places[servo_id] = None
+            self.places[servo_id] = None
 
     def clear(self) -> None:
         """Forget all of them."""
-        self._places.clear()
+        self.places.clear()
 
     def arrived(self, servo_id: int, steps: float, now_s: float) -> bool:
         """Return whether one on its way, which is here now, has come to its limits."""
         if not self._outside(servo_id, steps, NEAR_STEPS):
             return True
-        before = self._places[servo_id]
+        before = self.places[servo_id]
         if before is None or abs(steps - before.steps) > STILL_STEPS:
-            self._places[servo_id] = _Place(steps, now_s)
+            self.places[servo_id] = _Place(steps, now_s)
             return False
         return now_s - before.since_s >= STILL_S
 
     def end(self, servo_id: int) -> None:
         """Let one go at its full speed again."""
-        self._places.pop(servo_id, None)
+        self.places.pop(servo_id, None)
 
     def _outside(self, servo_id: int, steps: float, room_steps: int = 0) -> bool:
         setup = self._setups[servo_id]

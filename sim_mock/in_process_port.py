@@ -88,6 +88,20 @@ class InProcessPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         taken, self._waiting = self._waiting[:length], self._waiting[length:]
         return taken
 
+    def exchange(self, request: bytes, length: int, deadline_s: float) -> tuple[bytes, float]:
+        """Discard received bytes, send a request and read until the deadline.
+
+        Returns:
+            What was read, and when the request had been sent.
+
+        Raises:
+            BusLost: unplugged, or the adapter takes nothing.
+        """
+        self.drain()
+        self.write(request)
+        sent_s = self.now_s()
+        return self.read_until(length, deadline_s), sent_s
+
     def drain(self) -> int:
         """Discard received bytes; return their number."""
         self._see()

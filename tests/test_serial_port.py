@@ -4,6 +4,7 @@ import errno
 import os
 import pty
 import threading
+import time
 import tty
 
 import pytest
@@ -12,7 +13,8 @@ from serial.tools import list_ports
 
 from gazerig.drivers.errors import BusLost, PortError
 from gazerig.drivers.serial import port as serial_port
-from gazerig.drivers.serial.port import BlockingPort, explain
+from gazerig.drivers.serial.open_error import explain
+from gazerig.drivers.serial.port import BlockingPort
 
 
 @pytest.fixture
@@ -69,6 +71,52 @@ def test_drain_gives_up_on_a_line_that_babbles(line, monkeypatch):
     monkeypatch.setattr(port, "_wait", lambda deadline_s: True)
     monkeypatch.setattr(port, "_take", lambda length: b"x")
     assert port.drain() > 0
+
+
+def servo_that_answers(master, *chunks):
+    """Return a thread that answers a question of three bytes, piece by piece."""
+
+    def answer():
+        assert os.read(master, 3) == b"ask"
+        for chunk in chunks:
+            time.sleep(0.02)
+            os.write(master, chunk)
+
+    servo = threading.Thread(target=answer)
+    servo.start()
+    return servo
+
+
+@pytest.mark.parametrize("chunks", [(b"answer",), (b"ans", b"wer"), (b"answer and more",)])
+def test_an_exchange_gives_the_answer_and_nothing_from_before(line, chunks):
+    master, port = line
+    os.write(master, b"before")
+    servo, began_s = servo_that_answers(master, *chunks), port.now_s()
+    raw, sent_s = port.exchange(b"ask", 6, began_s + 10.0)
+    assert raw == b"answer"
+    assert began_s <= sent_s <= port.now_s()
+    servo.join()
+
+
+def test_an_exchange_gives_what_came_before_the_deadline(line):
+    master, port = line
+    servo = servo_that_answers(master, b"ans")
+    assert port.exchange(b"ask", 6, port.now_s() + 0.2)[0] == b"ans"
+    servo.join()
+    assert port.exchange(b"ask", 6, port.now_s() - 1.0)[0] == b""
+
+
+def test_an_exchange_on_a_line_that_hung_up_or_takes_nothing_is_a_lost_bus(line):
+    master, port = line
+    with pytest.raises(BusLost, match="takes no more bytes"):
+        for _ in range(1000):
+            port.exchange(b"x" * 1024, 1, port.now_s() - 1.0)
+    os.close(master)
+    with pytest.raises(BusLost, match="is gone"):
+        port.exchange(b"ask", 6, port.now_s() + 5.0)
+    port.closePort()
+    with pytest.raises(BusLost, match="is gone"):
+        port.exchange(b"ask", 6, port.now_s() + 5.0)
 
 
 def test_write_arrives(line):

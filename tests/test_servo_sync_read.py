@@ -19,7 +19,7 @@ from gazerig.drivers.feetech.protocol import checksum
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.poll_list import AGAIN_FIRST_S, AGAIN_LAST_S, PollList, silent_servos
 from gazerig.drivers.servo_bus.sync_packets import SyncRead
-from gazerig.drivers.servo_bus.sync_read import GroupReply, ServoReply
+from gazerig.drivers.servo_bus.sync_read import ServoReply
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.dynamixel.packets import status
@@ -29,6 +29,8 @@ from gazerig.sim_mock.smart_servo.physics import ServoSpec
 IDS = (4, 1, 9)
 PLACES = {4: 1000, 1: 2000, 9: 3000}
 BLOCK = struct.pack("<HHHBBBBB2xH", 0x8006, 0x8064, 0x052C, 74, 31, 0, 0x20, 1, 0x8002)
+CALM = BLOCK[:9] + b"\x00" + BLOCK[10:]
+"""The same without a fault."""
 SENSED, ARMED = window(56), window(40)
 
 dynamixel_read = partial(SyncRead, DYNAMIXEL)
@@ -67,7 +69,7 @@ def test_a_whole_answer_is_taken_at_once(kind):
     for number in range(len(kind.windows)):
         group, raw = kind.asked(number)
         assert len(raw) == group.reply_length
-        assert group.whole(raw)[group.columns.position] == (1000, 2000, 3000)
+        assert group.whole(raw, {})[group.columns.position] == (1000, 2000, 3000)
         assert group.missing(raw) == 0
         assert {i: a.position for i, a in group.pieces(raw).samples.items()} == PLACES
 
@@ -78,7 +80,7 @@ def test_any_single_damaged_byte_is_found_and_costs_little(kind):
     for at in range(len(raw)):
         for flip in (0x01, 0x80, 0xFF):
             bad = raw[:at] + bytes([raw[at] ^ flip]) + raw[at + 1 :]
-            assert group.whole(bad) is None
+            assert group.whole(bad, {}) is None
             answers = group.pieces(bad).samples
             assert all(answer.position == PLACES[i] for i, answer in answers.items())
             # A damaged CRC of a fast block is also the start of the next block's proof.
@@ -100,7 +102,7 @@ def test_any_lost_or_added_byte_never_makes_a_wrong_value(kind):
 def test_a_short_answer_gives_what_it_has(kind):
     group, raw = kind.asked()
     cut = raw[: len(raw) - 5]
-    assert group.whole(cut) is None
+    assert group.whole(cut, {}) is None
     assert group.missing(cut) == 5
     assert set(group.pieces(cut).samples) == {4, 1}
 
@@ -108,7 +110,7 @@ def test_a_short_answer_gives_what_it_has(kind):
 def test_an_answer_of_another_reading_is_not_taken(kind):
     _, raw = kind.asked()
     now, _ = kind.asked(1)
-    assert now.whole(raw) is None
+    assert now.whole(raw, {}) is None
     assert now.pieces(raw).samples == {}
 
 
@@ -123,7 +125,7 @@ def test_stuffed_answers_are_longer_and_understood():
     group = dynamixel_read(IDS, DIRECT)
     raw = b"".join(status(i, 0, everyday if i == 1 else bytes(10)) for i in IDS)
     assert everyday[:3] + b"\xfd" in raw
-    assert group.whole(raw) is None
+    assert group.whole(raw, {}) is None
     assert group.missing(raw[: group.reply_length]) == 1
     sample = group.pieces(raw).samples[1]
     assert (sample.effort, sample.velocity, sample.position) == (-1, -3, 2000)
@@ -190,10 +192,10 @@ def test_after_trouble_no_reading_has_the_length_of_the_one_before():
 @pytest.mark.parametrize("at", range(42))
 def test_any_single_damaged_byte_of_a_whole_answer_is_found(at):
     group = feetech_read((2, 5), SENSED)
-    raw = sts_status(2, BLOCK) + sts_status(5, BLOCK)
-    assert group.whole(raw) is not None
-    assert group.whole(raw[:at] + bytes([raw[at] ^ 0x40]) + raw[at + 1 :]) is None
-    assert group.whole(sts_status(5, BLOCK) + sts_status(2, BLOCK)) is None
+    raw = sts_status(2, CALM) + sts_status(5, CALM)
+    assert group.whole(raw, {}) is not None
+    assert group.whole(raw[:at] + bytes([raw[at] ^ 0x40]) + raw[at + 1 :], {}) is None
+    assert group.whole(sts_status(5, CALM) + sts_status(2, CALM), {}) is None
 
 
 def test_twice_the_same_is_an_echo_and_two_that_differ_are_nobodys():
@@ -228,10 +230,9 @@ def both_ways(group, raw, *columns):
         for slot in range(len(group.ids)):
             each.places.place(slot, 900, 0.99)
             assert each.places.one(slot, 900, 1.0)
-    whole = GroupReply(group, raw, group.whole(raw), 1.01)
-    taken, each = one.apply_whole(whole), whole.each()
+    taken, each = one.apply_whole(group, raw, 1.01), group.pieces(raw).samples
     for slot, servo_id in enumerate(group.ids):
-        other.take(slot, each[servo_id])
+        other.take(slot, ServoReply(each[servo_id], 1.01))
     return taken
 
 

@@ -10,9 +10,9 @@ from collections.abc import Sequence
 
 from fastcrc.crc16 import umts
 
-from gazerig.drivers.dynamixel.protocol import BROADCAST, HEADER, STATUS, sync_read
+from gazerig.drivers.dynamixel.protocol import BROADCAST, CHECK, HEADER, STATUS, sync_read
 from gazerig.drivers.servo_bus.read_windows import ReadWindow, Sample
-from gazerig.drivers.servo_bus.sync_packets import PartialReply, Values
+from gazerig.drivers.servo_bus.sync_packets import PartialReply, WholeAnswer
 
 
 class FastSyncRead:
@@ -24,26 +24,14 @@ class FastSyncRead:
         self.request = sync_read(ids, window.address, window.length, fast=True)
         size = self._block * len(ids)
         self._head = struct.pack("<4sBHB", HEADER, BROADCAST, size + 1, STATUS)
-        self.reply_length = len(self._head) + size
-        self._layout = struct.Struct("<8s" + f"BB{window.layout}H" * len(ids))
+        # A block begins with its error byte.
+        heads = [bytes((0, servo_id)) for servo_id in ids]
         # From each CRC, or the header, up to the next CRC.
         first = len(self._head) + self._block - 2
-        self._parts = struct.Struct(f"{first}s" + f"{self._block}s" * (len(ids) - 1) + "2x")
-        self._stride = 3 + len(window.fields)
-        self.columns = window.columns(1, 3, self._stride)
-
-    def whole(self, raw: bytes) -> Values | None:
-        """Return all values, None where anything at all is not as it should be."""
-        if len(raw) != self.reply_length:
-            return None
-        values = self._layout.unpack(raw)
-        if values[0] != self._head or values[2 :: self._stride] != self.ids:
-            return None
-        # The last CRC alone proves too little: it is made of the bytes as they were on the
-        # line, so it is right even where two servos with one id spoilt each other's block.
-        sent = values[self._stride :: self._stride]
-        found = tuple(map(umts, self._parts.unpack(raw), (0, *sent)))
-        return values if found == sent else None
+        parts = f"{first}s" + f"{self._block}s" * (len(ids) - 1) + "2x"
+        answer = WholeAnswer(self._head, heads, window, CHECK, parts, _all_intact)
+        self.whole, self.columns = answer.values, answer.columns
+        self.reply_length, self.covers_torque = answer.length, "torque" in window.fields
 
     def missing(self, raw: bytes) -> int:
         """Count the bytes still to come."""
@@ -83,6 +71,15 @@ class FastSyncRead:
             crc = umts(block[-2:], sent)
             at += self._block
         return PartialReply(samples, frozenset(damaged), frozenset(unproved))
+
+
+def _all_intact(parts: tuple[bytes, ...], checks: tuple[int, ...]) -> bool:
+    """Return whether all CRCs of an answer are right, each made on from the one before.
+
+    The last CRC alone proves too little: it is made of the bytes as they were on the line, so it is
+    right even where two servos with one id spoilt each other's block.
+    """
+    return tuple(map(umts, parts, (0, *checks))) == checks
 
 
 _OTHERS = HEADER + bytes((BROADCAST,))

@@ -174,6 +174,17 @@ class I2cPort:
         taken, self._waiting = self._waiting[:length], self._waiting[length:]
         return taken
 
+    def exchange(self, request: bytes, length: int, deadline_s: float) -> tuple[bytes, float]:
+        """Discard received bytes, write, and read what came; return when all had been written, too.
+
+        Raises:
+            BusLost: the bus is gone.
+        """
+        self.drain()
+        self.write(request)
+        sent_s = time.monotonic()
+        return self.read_until(length, deadline_s), sent_s
+
     def getBytesAvailable(self) -> int:
         """Return how many bytes wait."""
         return len(self._waiting)

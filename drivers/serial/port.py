@@ -3,7 +3,6 @@
 Owns the host clock of the servo bus (monotonic seconds).
 """
 
-import errno
 import os
 import select
 import termios
@@ -14,10 +13,10 @@ from typing import Any, Protocol
 
 from dynamixel_sdk import PortHandler
 from serial import Serial, SerialException
-from serial.tools import list_ports
 
 from gazerig.drivers.errors import BusLost, PortError
-from gazerig.drivers.serial.list_ports import holders, lasting_name
+from gazerig.drivers.serial.list_ports import lasting_name
+from gazerig.drivers.serial.open_error import explain
 
 BITS_PER_BYTE = 10
 SDK_MARGIN_S = 0.034
@@ -63,6 +62,17 @@ class BusPort(Protocol):
 
     def read_until(self, length: int, deadline_s: float) -> bytes:
         """Return ``length`` bytes, or those that came before the deadline.
+
+        Raises:
+            BusLost: the port is gone.
+        """
+        ...
+
+    def exchange(self, request: bytes, length: int, deadline_s: float) -> tuple[bytes, float]:
+        """Clear the port, send a request and read until the deadline, all in one.
+
+        Returns:
+            What ``read_until`` returns, and when the request had been handed over.
 
         Raises:
             BusLost: the port is gone.
@@ -159,21 +169,64 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """
         if self._on_traffic is not None:
             self._on_traffic()
-        got = b""
+        return self._gather(b"", length, deadline_s)
+
+    def _gather(self, got: bytes, length: int, deadline_s: float) -> bytes:
+        """Read on until there are ``length`` bytes, or the deadline.
+
+        Raises:
+            BusLost: the port is gone.
+        """
         try:
-            while True:
+            while len(got) < length:
                 left_s = deadline_s - time.monotonic()
                 if not select.select(self._fds, (), (), left_s if left_s > 0.0 else 0.0)[0]:
                     break
                 more = self._take(length - len(got))
                 got = got + more if got else more
-                if len(got) >= length:
-                    return got
         except (OSError, ValueError) as error:
             raise self._lost(error) from error
         if not got and not os.path.exists(self.opened_as):
             raise self._lost("it was unplugged")
         return got
+
+    def exchange(self, request: bytes, length: int, deadline_s: float) -> tuple[bytes, float]:
+        """Clear the port, send a request and read until the deadline.
+
+        In every tick, so all that happens as a rule is in this one function.
+
+        Returns:
+            ``length`` bytes, or those that came; when the request had been handed over.
+
+        Raises:
+            BusLost: the port is gone or takes nothing.
+        """
+        if self._on_traffic is not None:
+            self._on_traffic()
+        fd, sent, got = self._fd, 0, b""
+        try:
+            termios.tcflush(fd, termios.TCIFLUSH)
+            sent = os.write(fd, request)
+        except BlockingIOError:
+            pass  # no room
+        except (OSError, ValueError, termios.error) as error:
+            raise self._lost(error) from error
+        if sent < len(request):
+            self.write(request[sent:])
+        sent_s = time.monotonic()
+        try:
+            left_s = deadline_s - sent_s
+            if select.select(self._fds, (), (), left_s if left_s > 0.0 else 0.0)[0]:
+                got = os.read(fd, length)
+                if not got:
+                    raise self._lost("it hung up")
+        except BlockingIOError:
+            pass  # nothing after all
+        except (OSError, ValueError) as error:
+            raise self._lost(error) from error
+        if len(got) < length:
+            got = self._gather(got, length, deadline_s)
+        return got, sent_s
 
     def drain(self) -> int:
         """Throw away what arrives until nothing came for 3 ms; return the number of bytes.
@@ -331,26 +384,3 @@ def ask_low_latency(port: Any) -> None:
         # Only some drivers have the setting (a terminal answers ENOTTY); without it the
         # bus works, only slower.
         return
-
-
-def explain(port_name: str, code: int | None) -> str:
-    """Return in one line why a port cannot be opened, with the remedy."""
-    if code == errno.ENOENT or code == errno.ENODEV or code == errno.ENXIO:
-        return f"no serial port {port_name}: plug the adapter in; ports here: {name_ports()}"
-    if code in (errno.EACCES, errno.EPERM):
-        return (
-            f"no right to open {port_name}: join its group with "
-            "'sudo usermod -aG dialout $USER' and log in again"
-        )
-    if code in (errno.EBUSY, errno.EAGAIN):
-        held = ", ".join(holders(port_name))
-        who = f", {held}," if held else ""
-        return f"{port_name} is busy: close the other program{who} that uses it"
-    reason = os.strerror(code) if code else "not a serial port"
-    return f"cannot open {port_name} ({reason}); ports here: {name_ports()}"
-
-
-def name_ports() -> str:
-    """List the serial ports there are."""
-    ports = [f"{port.device} ({port.description})" for port in list_ports.comports()]
-    return ", ".join(ports) or "none"

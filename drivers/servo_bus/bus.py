@@ -23,7 +23,7 @@ from gazerig.drivers.servo_bus.provisioning import Provisioning
 from gazerig.drivers.servo_bus.recovery import Recovery
 from gazerig.drivers.servo_bus.registers import Registers
 from gazerig.drivers.servo_bus.supervisor import Supervisor
-from gazerig.drivers.servo_bus.sync_read import GroupReply, ServoReply, SyncReader
+from gazerig.drivers.servo_bus.sync_read import OWED_S, ServoReply, SyncReader
 from gazerig.drivers.servo_bus.torque import switch_off
 from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.types import Feedback, ServoConfig
@@ -58,6 +58,7 @@ class SmartServoBus(PortBus):
                 f"{len(setups)} servos are too many for one bus: {family.most_goals} at most"
             )
         self._family = family
+        self._wary = family.weak_check or not family.faults_latch
         unit_s = family.watchdog_unit_s
         self._watchdog = ceil(params.watchdog_ms / 1000.0 / unit_s) if unit_s else 0
         self._check_setups(setups)
@@ -117,24 +118,29 @@ class SmartServoBus(PortBus):
         Raises:
             BusLost: the port is gone.
         """
-        if self._line.starved:
+        line, reader = self._line, self._reader
+        if line.starved:
             self._supervisor.recover_tripped(self._poll_list.group)
-        answer = self._reader.read(now_s)
-        if not isinstance(answer, GroupReply):
-            self._take(answer, now_s)
-        elif not self._apply_whole(answer, now_s):
-            self._take(answer.each(), now_s)
-        elif self._health.returning:
-            self._health.answered_again(now_s, self._line.lateness)
+        group = reader.next_group(now_s)
+        if group is None:
+            self._take(reader.read_troubled(now_s), now_s)
+        else:
+            raw, at_s = line.exchange(group.request, group.reply_length)
+            if (self._wary and self._in_doubt(now_s)) or not self._feedback.apply_whole(
+                group, raw, at_s
+            ):
+                self._take(reader.salvage(group, raw, at_s, now_s), now_s)
+            elif self._health.all_silent_since_s is not None:
+                self._health.answered_again(now_s, line.lateness)
         self._supervisor.service(self._poll_list.group, now_s)
 
-    def _apply_whole(self, answer: GroupReply, now_s: float) -> bool:
-        """Apply an answer without any error; return False if it must be checked servo by servo."""
+    def _in_doubt(self, now_s: float) -> bool:
+        """Return whether even a right answer must be checked servo by servo."""
         if self._family.weak_check and (
-            self._disturbed(now_s) or self._reader.any_answer_owed(now_s)
+            self._disturbed(now_s) or now_s - self._reader.unanswered_s <= OWED_S
         ):
-            return False
-        return self._supervisor.at_ease and self._feedback.apply_whole(answer)
+            return True
+        return not self._supervisor.at_ease
 
     def _take(self, replies: dict[int, ServoReply], now_s: float) -> None:
         """Apply an answer servo by servo, each with its errors."""
@@ -171,7 +177,7 @@ class SmartServoBus(PortBus):
     def _disturbed(self, now_s: float) -> bool:
         """Return whether answers have been damaged of late."""
         places = self._feedback.places
-        if (damaged := self._line.errors["corrupt"]) != self._damaged:
+        if (damaged := self._line.errors.get("corrupt", 0)) != self._damaged:
             self._damaged = damaged
             places.damaged(now_s)
         return places.disturbed(now_s)
@@ -205,10 +211,10 @@ class SmartServoBus(PortBus):
         Raises:
             BusLost: the port is gone.
         """
-        entering, speeds = self._supervisor.entering, self._speeds
-        if entering and self._family.goal_speed:
-            speeds = self._recovery.speeds(self._ids, entering.ids)
-        withheld = self._supervisor.withheld(self._now_s)
+        supervisor, speeds = self._supervisor, self._speeds
+        if supervisor.entering.places and self._family.goal_speed:
+            speeds = self._recovery.speeds(self._ids, supervisor.entering.ids)
+        withheld = supervisor.withheld(self._now_s) if supervisor.withholds else None
         if not withheld:
             self._line.send(self._goals.packet(goals, speeds))
             return
@@ -257,7 +263,9 @@ class SmartServoBus(PortBus):
         Raises:
             BusLost: port or servos have been gone for longer than ``give_up_s``.
         """
-        if not self._reachable(now_s):
+        self._now_s = now_s
+        link = self._link
+        if (link.down or link.release_due) and not self._reachable(now_s):
             return self._nothing
         try:
             self._read(now_s)

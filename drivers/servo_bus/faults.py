@@ -28,6 +28,7 @@ class ServoHealth:
 
     faults: present fault of a servo, by id
     latches: those of them that the servo itself has latched
+    all_silent_since_s: since when no servo has answered; until the end of that is reported
     """
 
     def __init__(self, setups: Mapping[int, ServoConfig], log: EventLog) -> None:
@@ -39,7 +40,7 @@ class ServoHealth:
         self._silent_since: dict[int, float] = {}
         self._reported: set[int] = set()
         self._all_silent = False
-        self._all_silent_since_s: float | None = None
+        self.all_silent_since_s: float | None = None
         self._back_s: float | None = None
         self._seldom = RateLimitedLog(log)
 
@@ -93,9 +94,9 @@ class ServoHealth:
         """
         if not answered and out:
             self._back_s = None
-            if self._all_silent_since_s is None:
-                self._all_silent_since_s = now_s
-        elif answered and self._all_silent_since_s is not None:
+            if self.all_silent_since_s is None:
+                self.all_silent_since_s = now_s
+        elif answered and self.all_silent_since_s is not None:
             self.answered_again(now_s, lateness)
             # While no servo was heard, none in particular was silent.
             self._silent_since = {i: max(t, now_s) for i, t in self._silent_since.items()}
@@ -111,34 +112,29 @@ class ServoHealth:
         if late and out and now_s - min(self._silent_since.values()) < BUSY_S:
             self._seldom.add(f"this computer is busy: {late} answers late in the last s", now_s)
             return
-        if self._all_silent_since_s is None:
+        if self.all_silent_since_s is None:
             self._tell(out, now_s, garbling)
-        elif not self._all_silent and now_s - self._all_silent_since_s >= BLAME_S:
+        elif not self._all_silent and now_s - self.all_silent_since_s >= BLAME_S:
             self._all_silent = True
             self._log.add("no servo answers: check servo power and cable")
 
-    @property
-    def returning(self) -> bool:
-        """Return whether a silence of all servos is still to be reported."""
-        return self._all_silent_since_s is not None
-
     def answered_again(self, now_s: float, lateness: HostLateness) -> None:
         """Report what a silence of all servos was, a moment later: late answers first."""
-        if self._all_silent_since_s is None:
+        if self.all_silent_since_s is None:
             return
         if self._back_s is None:
             self._back_s = now_s
         if now_s - self._back_s < OWED_S:
             return
-        silent_s = self._back_s - self._all_silent_since_s
-        if silent_s >= SILENCE_S and lateness.any_since(self._all_silent_since_s):
+        silent_s = self._back_s - self.all_silent_since_s
+        if silent_s >= SILENCE_S and lateness.any_since(self.all_silent_since_s):
             self._log.add(STOOD_STILL.format(silent_s))
         elif self._all_silent:
             who = "servos" if self._silent_since else "all servos"
             self._log.add(f"{who} answer again after {silent_s:.1f} s")
         elif silent_s >= SILENCE_S:
             self._log.add(f"no servo answered for {silent_s:.1f} s: check servo power and cable")
-        self._all_silent_since_s = self._back_s = None
+        self.all_silent_since_s = self._back_s = None
         self._all_silent = False
 
     def stopped(self, count: int, asleep_s: float, now_s: float) -> None:

@@ -8,12 +8,12 @@ agrees with it.
 
 from collections.abc import Mapping, Sequence
 from operator import mul
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from gazerig.drivers.plausibility import Plausibility
 from gazerig.drivers.servo_bus.family import Family
-from gazerig.drivers.servo_bus.read_windows import Columns
-from gazerig.drivers.servo_bus.sync_read import GroupReply, ServoReply
+from gazerig.drivers.servo_bus.sync_packets import Expected, GroupRead
+from gazerig.drivers.servo_bus.sync_read import ServoReply
 from gazerig.drivers.servo_bus.turn import nearest_turn
 from gazerig.drivers.types import Feedback, ServoConfig
 
@@ -22,6 +22,8 @@ ALIKE_C, ALIKE_TENTH_V = 3, 10
 
 MOST_CELSIUS = 125
 """A temperature above is none."""
+
+_SIGNED = ("position", "velocity", "effort")
 
 Value = TypeVar("Value")
 
@@ -45,13 +47,10 @@ class FeedbackColumns:
         self._velocity_units = (self._velocity_unit,) * len(setups)
         self._load_units = tuple(model.load_unit for model in models)
         self._turn = family.steps_per_turn if family.single_turn else 0
-        self._signs = dict(family.sign_bits)
+        self._signs = [1 << family.sign_bits[name] for name in _SIGNED if family.sign_bits]
         self._engaged = False
-        self._armed: tuple[int, ...] = (0,) * len(setups)
         self.places = Plausibility([model.no_load_steps_s for model in models])
-        self._none = none = Feedback.of_none(len(setups))
-        self.now = none
-        self._all_on = (True,) * len(setups)
+        self._none = self.now = Feedback.of_none(len(setups))
         self._tenths: tuple[int, ...] = ()
         self.set_limits(setups)
 
@@ -86,85 +85,72 @@ class FeedbackColumns:
         self._near_high = min((low for low, _ in self._ranges), default=0) + self._turn // 2 - 1
         armed = [self._family.armed(setup) for setup in setups]
         self._limits = {name: [one[name] for one in armed] for name in armed[0]} if armed else {}
+        self._expect()
+
+    def _expect(self) -> None:
+        """Set what healthy servos answer: torque as it was switched, limits as they were armed."""
+        self._torque = (self._engaged,) * len(self._ids)
+        armed = self._limits if self._engaged else {}
+        self._expected: Expected = {"torque": tuple(map(int, self._torque)), **armed}
 
     # --- an answer of all servos
 
-    def apply_whole(self, answer: GroupReply) -> bool:
-        """Apply an answer without any error; return False if it must be checked servo by servo."""
-        group, _, values, at_s = answer
-        at, now, none = group.columns, self.now, self._none
-        if any(values[at.error]) or (at.status is not None and any(values[at.status])):
+    def apply_whole(self, group: GroupRead, raw: bytes, at_s: float) -> bool:
+        """Apply an answer of all servos in which none has any news but what it has measured.
+
+        Args:
+            group: the read that it answers.
+            raw: the answer.
+            at_s: when it arrived.
+
+        Returns:
+            Whether it was applied; if not, it must be checked servo by servo.
+        """
+        values = group.whole(raw, self._expected)
+        if values is None:
             return False
-        position, velocity, effort = values[at.position], values[at.velocity], values[at.effort]
+        now = self.now
+        at_position, at_velocity, at_effort, at_temperature, at_voltage = group.columns
+        position, velocity, effort = values[at_position], values[at_velocity], values[at_effort]
         if self._signs:
-            position = _signed(position, self._signs["position"])
-            velocity = _signed(velocity, self._signs["velocity"])
-            effort = _signed(effort, self._signs["effort"])
-        torque = now.torque
-        if at.torque is not None:
-            if not self._armed_as_left(values, at.torque, at, position):
-                return False
-            torque = self._all_on if self._engaged else none.torque
-        if self._turn:
+            position, velocity, effort = map(_signed, (position, velocity, effort), self._signs)
+        # Without torque a zero may be that of an indirect block without addresses.
+        if not self._engaged and 0 in position and group.covers_torque:
+            return False
+        if self._turn and (min(position) < self._near_low or max(position) > self._near_high):
             position = self._all_near(position)
-        warm = now.temperature_c
-        if at.temperature is not None and (celsius := values[at.temperature]) != warm:
+        warm, volts = now.temperature_c, now.voltage_v
+        if at_temperature is not None and (celsius := values[at_temperature]) != warm:
             if max(celsius) > MOST_CELSIUS:
                 return False
             warm = celsius
         if not self.places.whole(position, at_s):
             return False
-        volts = now.voltage_v
-        if at.voltage is not None and (tenths := values[at.voltage]) != self._tenths:
+        if at_voltage is not None and (tenths := values[at_voltage]) != self._tenths:
             self._tenths, volts = tenths, tuple([0.1 * one for one in tenths])
         load = tuple(map(mul, effort, self._load_units))
         if max(load) > 1.0 or min(load) < -1.0:
             load = tuple([max(-1.0, min(1.0, share)) for share in load])
-        self.now = Feedback(
-            position,
-            tuple(map(mul, velocity, self._velocity_units)),
-            load,
-            (at_s,) * len(position),
-            warm,
-            volts,
-            torque,
-            now.fault,
-            none.measured,
-            none.rearmed,
-            (),
-        )
+        torque = self._torque if group.covers_torque else now.torque
+        # Without the call of a function written in Python that the class itself would cost.
+        self.now = tuple.__new__(
+            Feedback,
+            (
+                position, tuple(map(mul, velocity, self._velocity_units)), load,
+                (at_s,) * len(position), warm, volts, torque, now.fault,
+                self._none.measured, self._none.rearmed, (),
+            ),
+        )  # fmt: skip
         return True
-
-    def _armed_as_left(
-        self, values: tuple[Any, ...], torque: slice, at: Columns, position: Sequence[int]
-    ) -> bool:
-        """Return whether torque and limits of all servos are still as they were set."""
-        if values[torque] != self._armed or not self._keeps_limits(values, at):
-            return False
-        # Without torque a zero may be that of an indirect block without addresses.
-        return self._engaged or 0 not in position
 
     def _all_near(self, position: tuple[int, ...]) -> tuple[int, ...]:
         """Return positions, whole turns added, nearest to their ranges."""
-        if min(position) >= self._near_low and max(position) <= self._near_high:
-            return position
         return tuple(
             [
                 nearest_turn(p, low, high, self._turn)
                 for p, (low, high) in zip(position, self._ranges, strict=True)
             ]
         )
-
-    def _keeps_limits(self, values: tuple[Any, ...], at: Columns) -> bool:
-        """Return whether the limits in an answer, if it has them, are those that were armed."""
-        if not self._engaged:
-            return True
-        for name, wanted in self._limits.items():
-            column = getattr(at, name)
-            pairs = zip(values[column], wanted, strict=True) if column is not None else ()
-            if any(limit is not None and found != limit for found, limit in pairs):
-                return False
-        return True
 
     # --- answers servo by servo
 
@@ -245,7 +231,7 @@ class FeedbackColumns:
     def expect_torque(self, on: bool) -> None:
         """Record that the torque has been switched for all."""
         self._engaged = on
-        self._armed = (int(on),) * len(self._ids)
+        self._expect()
         self.now = self.now._replace(torque=(on,) * len(self._ids))
 
     def set_climate(self, slot: int, tenth_volts: int, temperature_c: int) -> None:
@@ -275,9 +261,8 @@ def with_value(column: tuple[Value, ...], slot: int, value: Value) -> tuple[Valu
     return (*column[:slot], value, *column[slot + 1 :])
 
 
-def _signed(column: tuple[int, ...], bit: int) -> tuple[int, ...]:
-    """Return a column whose sign is a bit of its own."""
-    sign = 1 << bit
+def _signed(column: tuple[int, ...], sign: int) -> tuple[int, ...]:
+    """Return a column whose sign is a bit of its own, of this value."""
     if max(column) < sign:
         return column
     return tuple([value if value < sign else sign - value for value in column])

@@ -90,7 +90,7 @@ class LatchedFaultSupervisor(Supervisor):
         """
         if now_s >= self._due_s:
             self._do_due(group, now_s)
-        if self.entering:
+        if self.entering.places:
             self._mark_entering(now_s)
         if self._rearmed:
             self._mark_rearmed()

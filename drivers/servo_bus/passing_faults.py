@@ -20,6 +20,8 @@ RESTART_S = 0.1
 class PassingFaultSupervisor(Supervisor):
     """Supervisor of servos whose faults come and go."""
 
+    withholds = True
+
     def __init__(self, *args: Any, **more: Any) -> None:
         super().__init__(*args, **more)
         self._torque_off: set[int] = set()
@@ -206,7 +208,7 @@ class PassingFaultSupervisor(Supervisor):
             self._look_again(group)
         if self._suspects and now_s >= self._recover_at_s:
             self._recover(group, now_s)
-        if self.entering:
+        if self.entering.places:
             self._mark_entering(now_s)
         if self._rearmed:
             self._mark_rearmed()

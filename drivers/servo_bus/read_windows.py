@@ -6,12 +6,16 @@ they have other lengths for a while, each its own: a line that says its last ans
 one answer too late, is not taken at its word.
 """
 
+import re
 import struct
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 CALM_S = 0.25
 """So long after the last trouble no answer is late any more."""
+
+KNOWN = ("torque", "status", "acceleration", "torque_limit")
+"""Fields whose values are known of a healthy servo: no fault, the rest as it was written."""
 
 
 class Sample(NamedTuple):
@@ -40,16 +44,11 @@ class Sample(NamedTuple):
 class Columns(NamedTuple):
     """Slices of a whole answer: one number a servo, in the order asked; None where not read."""
 
-    error: slice
     position: slice
     velocity: slice
     effort: slice
-    torque: slice | None = None
-    status: slice | None = None
     temperature: slice | None = None
     voltage: slice | None = None
-    acceleration: slice | None = None
-    torque_limit: slice | None = None
 
 
 class ReadWindow(NamedTuple):
@@ -74,16 +73,19 @@ class ReadWindow(NamedTuple):
             values[name] = from_sign_magnitude(values[name], bit)
         return Sample(error, **values, blank="torque" in values and not any(data))
 
-    def columns(self, error: int, first: int, stride: int) -> Columns:
-        """Return the slices of every field in a tuple of ``stride`` numbers a servo.
+    def codes(self) -> Iterator[tuple[str, str]]:
+        """Yield the struct code of every number and its field, "" for bytes without a meaning."""
+        names = iter(self.fields)
+        for code in re.findall(r"\d*x|[a-zA-Z]", self.layout):
+            yield code, "" if code.endswith("x") else next(names)
 
-        Args:
-            error: index of the first servo's error byte.
-            first: index of its first field.
-            stride: numbers a servo.
-        """
-        named = {name: slice(first + i, None, stride) for i, name in enumerate(self.fields)}
-        return Columns(slice(error, None, stride), **named)
+    def measured(self) -> tuple[str, ...]:
+        """Return the fields of which no servo's answer is known beforehand."""
+        return tuple(name for name in self.fields if name not in KNOWN)
+
+    def columns(self, stride: int) -> Columns:
+        """Return the slices of the measured fields in a tuple of ``stride`` numbers a servo."""
+        return Columns(**{name: slice(i, None, stride) for i, name in enumerate(self.measured())})
 
 
 class WindowSchedule:

@@ -32,7 +32,10 @@ class Supervisor(ABC):
 
     engaged: the torque is on
     entering: servos on their slow way into their limits
+    withholds: whether it may ever withhold goals
     """
+
+    withholds = False
 
     def __init__(
         self,

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from gazerig.drivers.servo_bus.poll_list import PollList, silent_servos
 from gazerig.drivers.servo_bus.read_plan import ReadPlan
 from gazerig.drivers.servo_bus.read_windows import ReadWindow, Sample, WindowSchedule
-from gazerig.drivers.servo_bus.sync_packets import GroupRead, SyncRead, Values
+from gazerig.drivers.servo_bus.sync_packets import GroupRead, SyncRead
 from gazerig.drivers.servo_bus.transaction import Transactions
 
 MOST_GROUPS = 64
@@ -28,20 +28,6 @@ class ServoReply(NamedTuple):
     at_s: float
 
 
-class GroupReply(NamedTuple):
-    """A faultless answer of all servos asked, and when it arrived."""
-
-    group: GroupRead
-    raw: bytes
-    values: Values
-    at_s: float
-
-    def each(self) -> dict[int, ServoReply]:
-        """Return the answer servo by servo."""
-        samples = self.group.pieces(self.raw).samples
-        return {servo_id: ServoReply(sample, self.at_s) for servo_id, sample in samples.items()}
-
-
 class SyncReader:
     """Reads all servos of a poll list.
 
@@ -49,6 +35,8 @@ class SyncReader:
         line: the bus.
         polled: the servos that are read; gets those that failed.
         plan: how they are read.
+
+    unanswered_s: when a servo left a question unanswered last, the time of reading
     """
 
     def __init__(self, line: Transactions, polled: PollList, plan: ReadPlan) -> None:
@@ -57,28 +45,38 @@ class SyncReader:
         self._together, self._alone, self._second = plan.together, plan.alone, plan.second
         self._packets, self._header = plan.packets, line.family.codec.HEADER
         self._until_s = inf
+        self._sync_read = line.family.sync_read
+        self.unanswered_s = -inf
         self._unanswered_s: dict[int, float] = {}
         self._groups: dict[tuple[tuple[int, ...], int, int], GroupRead] = {}
         self._prepared_ids: tuple[int, ...] = ()
         self._prepared: dict[int, GroupRead] = {}
 
-    def read(self, now_s: float) -> GroupReply | dict[int, ServoReply]:
-        """Read all servos that is asked now; who is not in the answer gave no good one.
+    def next_group(self, now_s: float) -> GroupRead | None:
+        """Return the read of all servos that is due; None if not all are asked in one."""
+        polled, turns = self.poll_list, self._together
+        if turns.troubled:
+            turns.calm(now_s)
+        if polled.troubled or not self._sync_read:
+            return None
+        window = turns.next()
+        # By identity: hashing ids and windows in every tick costs as much as reading the answer.
+        if polled.group is self._prepared_ids and (ready := self._prepared.get(id(window))):
+            return ready
+        return self._group(polled.group, window)
+
+    def salvage(
+        self, group: GroupRead, raw: bytes, at_s: float, now_s: float
+    ) -> dict[int, ServoReply]:
+        """Return what can be proved right of an answer to a read of all servos.
+
+        Who is not in it gave no good answer, not even when asked once more. To be called before
+        anything else is sent.
 
         Raises:
             BusLost: the port is gone.
         """
-        polled = self.poll_list
-        if self._together.troubled:
-            self._together.calm(now_s)
-        if polled.troubled or not self._line.family.sync_read:
-            return self._read_troubled(now_s)
-        group = self._group(polled.group, self._together.next())
-        raw, at_s = self._line.exchange(group.request, group.reply_length)
         self._until_s = self._line.whole_s + self._line.most_s
-        values = group.whole(raw)
-        if values is not None:
-            return GroupReply(group, raw, values, at_s)
         replies: dict[int, ServoReply] = {}
         self._save(group, raw, at_s, replies, now_s, self._together)
         return replies
@@ -90,11 +88,6 @@ class SyncReader:
         what question it was given, and neither length nor silence tells.
         """
         return now_s - self._unanswered_s.get(servo_id, -inf) <= OWED_S
-
-    def any_answer_owed(self, now_s: float) -> bool:
-        """Return whether any servo has left a question unanswered of late."""
-        unanswered_s = self._unanswered_s
-        return bool(unanswered_s) and now_s - max(unanswered_s.values()) <= OWED_S
 
     def again(self, ids: Sequence[int]) -> dict[int, ServoReply]:
         """Ask some servos once more, in one exchange; who is not in the answer gave no good one.
@@ -114,8 +107,12 @@ class SyncReader:
             replies |= {servo_id: ServoReply(sample, at_s) for servo_id, sample in samples.items()}
         return replies
 
-    def _read_troubled(self, now_s: float) -> dict[int, ServoReply]:
-        """Read the group, and one of those who are out of it."""
+    def read_troubled(self, now_s: float) -> dict[int, ServoReply]:
+        """Read the group, and one of those who are out of it; who is missing gave no good answer.
+
+        Raises:
+            BusLost: the port is gone.
+        """
         replies: dict[int, ServoReply] = {}
         together, due = self.poll_list.group, self.poll_list.due(now_s)
         self._until_s = inf
@@ -146,7 +143,6 @@ class SyncReader:
 
     def _group(self, ids: tuple[int, ...], window: ReadWindow) -> GroupRead:
         """Return the prepared exchange for some servos."""
-        # By identity: hashing ids and windows in every tick costs as much as reading the answer.
         if ids is not self._prepared_ids:
             self._prepared_ids, self._prepared = ids, {}
         group = self._prepared.get(id(window))
@@ -185,6 +181,7 @@ class SyncReader:
                 replies[servo_id] = ServoReply(sample, at_s)
             if len(samples) == len(group.ids):
                 return
+            self.unanswered_s = now_s
             for servo_id in group.ids:
                 if servo_id not in samples:
                     self._unanswered_s[servo_id] = now_s

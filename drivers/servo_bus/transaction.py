@@ -73,17 +73,18 @@ class Transactions:
         now_s = port.now_s()
         port.write(packet)
         # Up to after the write: the host may have been asleep just before the bytes left.
-        silent_s = port.now_s() - self._sent_s
-        if silent_s >= self.starving_s:
-            self.starved = True
-            self.asleep_s = max(self.asleep_s, silent_s)
+        if port.now_s() - self._sent_s >= self.starving_s:
+            self._starve(port.now_s() - self._sent_s)
         self._sent_s = now_s
         # Bytes leave after those still on their way out, at the bus's own speed.
-        free_s = self._free_s
-        if not now_s <= free_s <= now_s + _BACKLOG_S:
-            free_s = now_s
+        free_s = self._free_s if now_s <= self._free_s <= now_s + _BACKLOG_S else now_s
         self._free_s = free_s + len(packet) * self._byte_s
         self.tx_bytes += len(packet)
+
+    def _starve(self, silent_s: float) -> None:
+        """Record a silence of this computer after which the servos' watchdogs have tripped."""
+        self.starved = True
+        self.asleep_s = max(self.asleep_s, silent_s)
 
     def exchange(self, request: bytes, length: int, reserve: bool = True) -> tuple[bytes, float]:
         """Send a request, wait for ``length`` bytes; return what came, and when.
@@ -100,14 +101,19 @@ class Transactions:
         waited = self._reply_owed and bool(port.getBytesAvailable())
         if waited:
             self._note_late(port.read_until(_ROOM, port.now_s()))
-        port.clearPort()
-        self.send(request)
-        self.quiet = False
-        self.whole_s = whole_s = self._free_s + length * self._byte_s
-        prompt_s = timeout.seconds
-        wait_s = timeout.with_reserve(self._sent_s) if reserve else prompt_s
+        now_s, prompt_s = port.now_s(), timeout.seconds
+        # Times and counts as in ``send``, which would be one function more in every tick.
+        free_s = self._free_s if now_s <= self._free_s <= now_s + _BACKLOG_S else now_s
+        self._free_s = free_s = free_s + len(request) * self._byte_s
+        self.tx_bytes += len(request)
+        self.whole_s = whole_s = free_s + length * self._byte_s
+        wait_s = timeout.with_reserve(now_s) if reserve else prompt_s
         self.deadline_s = whole_s + wait_s
-        raw = port.read_until(length, self.deadline_s - 0.5 * prompt_s)
+        raw, sent_s = port.exchange(request, length, self.deadline_s - 0.5 * prompt_s)
+        if sent_s - self._sent_s >= self.starving_s:
+            self._starve(sent_s - self._sent_s)
+        self._sent_s = now_s
+        self.quiet = False
         if len(raw) < length:
             # The rest of the time-out shows whether the line has fallen silent.
             more = port.read_until(length - len(raw), self.deadline_s)

@@ -1,6 +1,7 @@
 """Joints to servos and back: the only place that knows what a step means at a joint."""
 
 from collections.abc import Mapping, Sequence
+from operator import add, mul, sub
 
 from gazerig.drivers.errors import BusLost, DriverError
 from gazerig.drivers.slow_entry import ENTRY_DEG_S
@@ -9,6 +10,7 @@ from gazerig.robot.control.coupled_servos import CoupledServos
 from gazerig.robot.model.coupling_params import CoupledPair, pair_setups
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.joint_limit import JointLimit
+from gazerig.robot.model.transmission import Line
 from gazerig.robot.model.types import JointAngles, JointState, in_order
 
 
@@ -58,7 +60,7 @@ class Body:
         self.bus = bus
         self.names = in_order(joints)
         self._pairs = tuple(pairs)
-        self._coupled = CoupledServos(pairs, self.names)
+        self._coupled = CoupledServos(pairs, self.names) if pairs else None
         self._park_rad = dict(park_rad or {})
         self._torque_off = False
         self._gentle_deg_s = gentle_deg_s
@@ -76,10 +78,11 @@ class Body:
 
     def _take(self, joints: tuple[JointParams, ...]) -> None:
         self._joints = joints
-        self._linkages = tuple(joint.made() for joint in joints)
-        self._to_steps = tuple(linkage.steps for linkage in self._linkages)
-        self._to_rad = tuple(linkage.angle_rad for linkage in self._linkages)
-        self._to_rate = tuple(linkage.rate_rad for linkage in self._linkages)
+        linkages = [joint.made() for joint in joints]
+        # All joints at once as if every linkage were straight; then those that are not.
+        lines = [linkage.line or Line(0.0, 0.0, 0.0) for linkage in linkages]
+        self._zeros, self._slopes, self._rates = zip(*lines, strict=True)
+        self._bent = [(i, one) for i, one in enumerate(linkages) if one.line is None]
 
     def retune(
         self, joints: Mapping[str, JointParams], gentle_deg_s: float
@@ -134,27 +137,34 @@ class Body:
         if feedback.missing:
             feedback = feedback.filled(self._last)
         self._last = feedback
-        if self._coupled:
+        if self._coupled is not None:
             feedback = self._coupled.completed(feedback, self._torque_off)
-        steps = feedback.position_steps
-        angles = self.angles(steps)
-        speeds = zip(feedback.velocity_steps_s, self._to_rate, steps, strict=True)
-        rates = [v * rate(s) for v, rate, s in speeds]
-        if self._coupled:
-            rates = self._coupled.speeds(angles, rates)
-        return JointState(
-            angles,
-            tuple(rates),
-            feedback.at_s,
-            tuple([self.names[i] for i in feedback.missing]),
-            feedback.torque,
-            feedback.fault,
-            feedback.load,
-            feedback.temperature_c,
-            feedback.voltage_v,
-            feedback.rearmed,
-            feedback.measured,
-        )
+        steps, speeds, load, at_s, celsius, volts, torque, fault, measured, rearmed, gone = feedback
+        rates = tuple(map(mul, speeds, self._rates))
+        if self._bent or self._coupled is not None:
+            angles = self.angles(steps)
+            rates = self._bent_rates(rates, speeds, steps)
+            if self._coupled is not None:
+                rates = tuple(self._coupled.speeds(angles, rates))
+        else:
+            angles = tuple(map(mul, map(sub, steps, self._zeros), self._rates))
+        missing = tuple([self.names[i] for i in gone]) if gone else ()
+        # Without the call of a function written in Python that the class itself would cost.
+        return tuple.__new__(
+            JointState,
+            (
+                angles, rates, at_s, missing, torque, fault, load, celsius, volts, rearmed, measured,
+            ),
+        )  # fmt: skip
+
+    def _bent_rates(
+        self, rates: tuple[float, ...], speeds: Sequence[float], steps: Sequence[float]
+    ) -> tuple[float, ...]:
+        """Return the rates of all joints, right for linkages that are not straight, too."""
+        right = list(rates)
+        for i, linkage in self._bent:
+            right[i] = speeds[i] * linkage.rate_rad(steps[i])
+        return tuple(right)
 
     def write(self, command_rad: JointAngles) -> None:
         """Send one goal to every servo."""
@@ -162,15 +172,27 @@ class Body:
 
     def _steps(self, angles_rad: JointAngles) -> list[int]:
         """Return the servo positions of joint angles."""
+        if len(angles_rad) != len(self.names):
+            raise ValueError(f"{len(angles_rad)} angles for {len(self.names)} joints")
         angles: Sequence[float] = angles_rad
-        if self._coupled:
+        if self._coupled is not None:
             angles = self._coupled.shafts(angles_rad)
-        return [round(steps(angle)) for steps, angle in zip(self._to_steps, angles, strict=True)]
+        steps = [*map(round, map(add, self._zeros, map(mul, self._slopes, angles)))]
+        for i, linkage in self._bent:
+            steps[i] = round(linkage.steps(angles[i]))
+        return steps
 
     def angles(self, steps: Sequence[float]) -> JointAngles:
         """Return the joint angles of servo positions."""
-        angles = [angle(step) for angle, step in zip(self._to_rad, steps, strict=True)]
-        return tuple(self._coupled.joints(angles) if self._coupled else angles)
+        shafts = self._shafts(steps)
+        return tuple(shafts if self._coupled is None else self._coupled.joints(shafts))
+
+    def _shafts(self, steps: Sequence[float]) -> list[float]:
+        """Return the angles of servo positions, those of coupled servos at their own shafts."""
+        angles = [*map(mul, map(sub, steps, self._zeros), self._rates)]
+        for i, linkage in self._bent:
+            angles[i] = linkage.angle_rad(steps[i])
+        return angles
 
     def disable_torque(self) -> None:
         """Torque off at once; the bus stays open and readings go on.
@@ -190,9 +212,8 @@ class Body:
         """
         goals = self.bus.enable_torque()
         self._torque_off = False
-        if self._coupled:
-            at = zip(self._to_rad, goals, strict=True)
-            self._coupled.held([angle(step) for angle, step in at])
+        if self._coupled is not None:
+            self._coupled.held(self._shafts(goals))
         self._set_up = self._joints
         return self.angles(goals)
 

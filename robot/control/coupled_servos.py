@@ -31,10 +31,6 @@ class CoupledServos:
         self._goals: dict[int, Pair] = {}
         self._last: dict[int, Feedback] = {}
 
-    def __bool__(self) -> bool:
-        """Return whether there is any pair."""
-        return bool(self._pairs)
-
     def joints(self, shafts_rad: Sequence[float]) -> list[float]:
         """Return the joint angles of servo angles."""
         angles = list(shafts_rad)

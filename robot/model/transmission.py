@@ -7,7 +7,18 @@ Radians at the joint, steps at the servo.
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from typing import Protocol
+from typing import NamedTuple, Protocol
+
+
+class Line(NamedTuple):
+    """A straight linkage.
+
+    steps = zero + slope * angle and angle = (steps - zero) * rate
+    """
+
+    zero: float
+    slope: float
+    rate: float
 
 
 class Linkage(Protocol):
@@ -15,10 +26,12 @@ class Linkage(Protocol):
 
     steepest: most steps a radian anywhere, above 0
     rising: more steps are a larger angle
+    line: where it is straight everywhere; else None
     """
 
     steepest: float
     rising: bool
+    line: "Line | None"
 
     def steps(self, angle_rad: float) -> float:
         """Return the servo position of a joint angle, not rounded."""
@@ -40,7 +53,8 @@ class Straight:
     """
 
     def __init__(self, zero: float, slope: float) -> None:
-        self._zero, self._slope, self._rate = zero, slope, 1.0 / slope
+        self.line: Line | None = Line(zero, slope, 1.0 / slope)
+        self._zero, self._slope, self._rate = self.line
         self.steepest = abs(slope)
         self.rising = slope > 0.0
 
@@ -81,6 +95,7 @@ class Curve:
                     f"place {i + 1} goes back: measure it again"
                 )
         self.rising = up
+        self.line: Line | None = None
         self._angles, self._steps = tuple(angles_rad), tuple(float(s) for s in steps)
         # Looked up by rising steps, whichever way the rod works.
         self._order = 1.0 if up else -1.0

@@ -27,7 +27,8 @@ def layers(bus: SmartServoBus) -> dict[str, Cycle]:
     reader, line, port = bus._reader, bus._line, bus._port
     ids, turns = bus._poll_list.group, reader._together
     groups = [reader._group(ids, turns.next()) for _ in range(8)]
-    groups = [group for group in groups if group.columns.acceleration is None][:2]
+    groups = [group for group in groups if "acceleration" not in group.window.fields][:2]
+    expected = bus._feedback._expected
     packet = bus._goals.packet(GOALS, bus._speeds)
 
     def port_alone(k: int) -> int:
@@ -50,14 +51,9 @@ def layers(bus: SmartServoBus) -> dict[str, Cycle]:
     def checked(k: int) -> int:
         group = groups[k & 1]
         raw, _ = line.exchange(group.request, group.reply_length)
-        values = group.whole(raw)
+        values = group.whole(raw, expected)
         line.send(packet)
         return len(IDS) * (values is not None)
-
-    def asked(k: int) -> int:
-        answer = reader.read(time.monotonic())
-        line.send(packet)
-        return len(answer) if isinstance(answer, dict) else len(IDS)
 
     def taken(k: int) -> int:
         feedback = bus.read(time.monotonic())
@@ -74,8 +70,7 @@ def layers(bus: SmartServoBus) -> dict[str, Cycle]:
         "and throw away what came before": cleared,
         "and time-outs, counts, starvation": exchange,
         "and all checks, one unpacking": checked,
-        "and who is asked, which window": asked,
-        "and plausibility, units, what is due": taken,
+        "and what is due, plausibility, units": taken,
         "and limits and packet of goals": whole,
     }
 

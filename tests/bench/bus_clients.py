@@ -177,10 +177,10 @@ def robotis(port: str | BusPort, baud: int, ids: Sequence[int] = IDS) -> Iterato
 
 
 @contextmanager
-def rustypot(
+def rustypot_halves(
     kind: str, path: str, baud: int, wait_s: float = WAIT_S, servo_ids: Sequence[int] = IDS
-) -> Iterator[Cycle]:
-    """rustypot: (fast) sync read of the position alone, as it reads one register; sync write."""
+) -> Iterator[tuple[Cycle, Cycle]]:
+    """Open rustypot: its (fast) sync read of the position, as it reads one register; sync write."""
     client: Sts3215PyController | Xl330PyController
     if kind == "feetech":
         client = Sts3215PyController(path, baud, wait_s)
@@ -189,18 +189,35 @@ def rustypot(
         fast.set_fast_sync_read(True)
     ids = list(servo_ids)
 
-    def cycle(k: int) -> int:
+    def read(k: int) -> int:
         try:
-            values = len(client.sync_read_raw_present_position(ids))
+            return len(client.sync_read_raw_present_position(ids))
         except (OSError, RuntimeError, ValueError):
-            values = 0
+            return 0
+
+    def write(k: int) -> int:
         client.sync_write_raw_goal_position(ids, [2048 + k % 8] * len(ids))
-        return values
+        return len(ids)
 
     try:
-        yield cycle
+        yield read, write
     finally:
         client.close()
+
+
+@contextmanager
+def rustypot(
+    kind: str, path: str, baud: int, wait_s: float = WAIT_S, servo_ids: Sequence[int] = IDS
+) -> Iterator[Cycle]:
+    """Cycle with rustypot: read, then write."""
+    with rustypot_halves(kind, path, baud, wait_s, servo_ids) as (read, write):
+
+        def cycle(k: int) -> int:
+            values = read(k)
+            write(k)
+            return values
+
+        yield cycle
 
 
 def clients(kind: str) -> tuple[Client, ...]:
