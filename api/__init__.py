@@ -9,7 +9,7 @@ What stands in ``__all__`` is promised: it changes only with a word in the chang
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from gazerig.config.load import ConfigError as ConfigError
+    from gazerig.config.faults import ConfigError as ConfigError
     from gazerig.config.schema import load_rig as load_rig
     from gazerig.drivers.errors import SetupError as SetupError
     from gazerig.errors import Error as Error
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     __version__: str
 
 _HOME = {
-    "ConfigError": "gazerig.config.load",
+    "ConfigError": "gazerig.config.faults",
     "Error": "gazerig.errors",
     "GazeReading": "gazerig.robot.control.head_state",
     "Head": "gazerig.head",

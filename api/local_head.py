@@ -10,7 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from gazerig.config.load import ConfigError
+from gazerig.config.faults import ConfigError
 from gazerig.errors import Error, HeadEnded, Refused
 from gazerig.head import Head
 from gazerig.order import Order

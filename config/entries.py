@@ -1,7 +1,7 @@
 """One YAML file as entries that know their lines, with every fault of the text."""
 
 import re
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import lru_cache
@@ -16,8 +16,8 @@ from ruamel.yaml.reader import ReaderError
 
 from gazerig.config.bounds import Step
 from gazerig.config.export import abbreviated, suggestion
+from gazerig.config.faults import ConfigFault
 from gazerig.drivers.file_input import FileTooLarge, NotRegularFile, read_limited
-from gazerig.errors import Error
 
 Scalar = str | int | float | bool | None
 
@@ -25,38 +25,6 @@ _DEPTH = 40  # levels; a rig has about 5, a file that refers to itself has no en
 _VALUES = 20_000  # aliases of aliases grow without bound
 _LARGEST = 1_000_000  # bytes; a rig has about 34 000
 _QUOTED = re.compile(r" *('[^']*'|\"[^\"]*\")")  # what a parser shows of the text
-
-
-@dataclass(frozen=True, slots=True)
-class ConfigFault:
-    """One thing to change in a file.
-
-    line, column: from 1, None where the file could not be read at all
-    key: dotted key path, list items counted from 0; value: what stands there, shortened
-    rule: what is wrong, and the remedy
-    """
-
-    file: str
-    line: int | None
-    key: str
-    value: str
-    rule: str
-    column: int | None = None
-
-    def __str__(self) -> str:
-        """Return ``file:line: key: rule`` on one line, whatever the key holds."""
-        place = [self.file, *(str(n) for n in (self.line, self.column) if n is not None)]
-        words = ": ".join(part for part in (":".join(place), self.key, self.rule) if part)
-        return " ".join(words.splitlines())
-
-
-class ConfigError(Error):
-    """An unusable configuration; the message lists every fault, one a line."""
-
-    def __init__(self, faults: Iterable[ConfigFault]) -> None:
-        """Keep the faults; there is at least one."""
-        self.faults = tuple(faults)
-        super().__init__("\n".join(map(str, self.faults)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,20 +6,21 @@ between two sections, still names the line to change.
 """
 
 import contextlib
-import importlib.resources
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import MISSING, asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from gazerig.config.bounds import Shape, Step, shapes_of, validate, with_stand_ins
-from gazerig.config.entries import ConfigError as ConfigError
-from gazerig.config.entries import ConfigFault as ConfigFault
 from gazerig.config.entries import Entry as Entry
 from gazerig.config.entries import read
 from gazerig.config.export import Violation, abbreviated, suggestion, violation
+from gazerig.config.faults import ConfigError as ConfigError
+from gazerig.config.faults import ConfigFault as ConfigFault
 from gazerig.config.plugin_sections import extended
 from gazerig.config.renamed import renamed
+from gazerig.config.shipped import SHIPPED
+from gazerig.config.shipped import shipped_names as shipped_names
 from gazerig.drivers.plugins import GESTURES, RIGS, PluginError, yaml_files
 
 T = TypeVar("T")
@@ -27,11 +28,7 @@ _GROUPS = {"rigs": RIGS, "gestures": GESTURES}
 """Kinds of files that packages bring too."""
 
 
-def _shipped() -> Path:
-    return Path(str(importlib.resources.files("gazerig.config")))
-
-
-RIGS_FOLDER, GESTURES_FOLDER = _shipped() / "rigs", _shipped() / "gestures"
+RIGS_FOLDER, GESTURES_FOLDER = SHIPPED / "rigs", SHIPPED / "gestures"
 """What this package registers in the groups of rigs and gestures."""
 
 
@@ -142,7 +139,7 @@ def shipped(kind: str, name: str) -> Path:
     """
     names = shipped_names(kind)
     if name in names:
-        return _shipped() / kind / f"{name}.yaml"
+        return SHIPPED / kind / f"{name}.yaml"
     if kind in _GROUPS:
         return from_packages(kind, name)
     raise _unknown(kind, name, names)
@@ -169,15 +166,6 @@ def _unknown(kind: str, name: str, names: Sequence[str]) -> ConfigError:
     known = f"there are {', '.join(names)}" if names else "there are none of this kind"
     rule = f"nothing named {name!r} is shipped{suggestion(name, names) or ';'} {known}"
     return ConfigError([ConfigFault(f"config/{kind}", None, "", repr(name), rule)])
-
-
-def shipped_names(kind: str) -> tuple[str, ...]:
-    """Return the names that ``shipped`` knows of a kind, sorted."""
-    folder = importlib.resources.files("gazerig.config") / kind
-    if not folder.is_dir():
-        return ()
-    files = (entry.name for entry in folder.iterdir())
-    return tuple(sorted(name.removesuffix(".yaml") for name in files if name.endswith(".yaml")))
 
 
 def _steps(key: str) -> tuple[str, ...]:

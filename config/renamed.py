@@ -8,7 +8,8 @@ import logging
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from gazerig.config.entries import ConfigFault, Entry
+from gazerig.config.entries import Entry
+from gazerig.config.faults import ConfigFault
 from gazerig.config.rig import Rig
 from gazerig.gaze.top_down import TopDownParams
 

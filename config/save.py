@@ -5,7 +5,6 @@ step; the old file stays beside it under a name with the time.
 """
 
 import contextlib
-import importlib.resources
 import os
 import shutil
 import stat
@@ -21,6 +20,7 @@ from gazerig.config.load import ConfigError, ConfigFault, Document, read_yaml, s
 from gazerig.config.renamed import renamed_changes
 from gazerig.config.save_text import EditRefused, Value, edited, with_new_names, written
 from gazerig.config.schema import Rig, load_rig
+from gazerig.config.shipped import SHIPPED
 from gazerig.drivers.file_input import read_limited
 
 Check = Callable[[str], Any]
@@ -250,7 +250,7 @@ def _same(held: Any, value: Value) -> bool:
 
 def _refuse_shipped(target: Path) -> None:
     """Refuse a file inside the installed package: an update would overwrite it."""
-    package = Path(os.path.realpath(str(importlib.resources.files("gazerig.config"))))
+    package = Path(os.path.realpath(SHIPPED))
     if package in target.parents:
         raise _fault(
             target,

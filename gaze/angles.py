@@ -7,7 +7,7 @@ three numbers costs as much as the whole of most functions here.
 
 from math import asin, atan2, cos, hypot, pi, sin, sqrt
 
-from gazerig.gaze.types import Angles2, Angles3, Mat3, Vec3
+from gazerig.gaze.vectors import Angles2, Angles3, Mat3, Vec3
 
 
 def wrap(angle_rad: float) -> float:

@@ -14,13 +14,11 @@ from typing import Literal, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-Vec3 = tuple[float, float, float]
-Mat3 = tuple[Vec3, Vec3, Vec3]
-"""Rows of a rotation matrix."""
-Angles2 = tuple[float, float]
-"""(yaw, pitch) in radians, yaw + left, pitch + up."""
-Angles3 = tuple[float, float, float]
-"""(yaw, pitch, roll) in radians, roll + right ear down."""
+from gazerig.gaze.vectors import Angles2 as Angles2
+from gazerig.gaze.vectors import Angles3 as Angles3
+from gazerig.gaze.vectors import Mat3 as Mat3
+from gazerig.gaze.vectors import Vec3 as Vec3
+
 Floats = NDArray[np.float64]
 
 Phase = Literal["fixate", "saccade", "pursue"]

@@ -6,6 +6,7 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,8 @@ from typer.core import TyperGroup
 
 from gazerig import __version__
 from gazerig.drivers.serial.list_ports import SerialPort
+from gazerig.robot.cli.command_group import CommandsByName
+from gazerig.robot.cli.command_list import COMMANDS
 from gazerig.robot.cli.examples import EXAMPLES
 from gazerig.robot.cli.main import app
 from gazerig.robot.cli.terminal import DEBUG_LOGGER
@@ -65,6 +68,47 @@ def commands() -> dict[str, Any]:
     group = typer.main.get_command(app)
     assert isinstance(group, TyperGroup)
     return dict(group.commands)
+
+
+def test_the_list_of_commands_is_that_of_their_modules() -> None:
+    listed = CommandsByName()
+    for name, shown in dict(listed.data).items():
+        command = listed[name]
+        assert command.name == name and command.rich_help_panel == shown.rich_help_panel
+        first = " ".join(command.help.split("\n\n")[0].split())
+        assert shown.help == first, f"{name}: mend cli/command_list.py"
+
+
+def test_no_module_has_a_command_that_is_not_listed() -> None:
+    for module in {entry.module for entry in COMMANDS.values()}:
+        app = typer.Typer()
+        app.add_typer(import_module(f"gazerig.robot.cli.{module}").app)
+        for name in typer.main.get_group(app).commands:
+            assert COMMANDS[name].module == module, f"{name} is not in cli/command_list.py"
+
+
+HEAVY = ("numpy", "cv2", "scipy", "ruamel", "serial", "mcap", "dynamixel_sdk", "aiohttp")
+"""What no help needs; each takes a twentieth of a second of a fast processor or more."""
+
+LIGHT_HELP = (
+    *("", "run", "ctl", "stop", "replay", "report", "compare", "export", "check", "kinds"),
+    *("schema", "record-camera", "fit-scanpath", "ctl set"),
+)
+"""Commands whose help is there at once; that of others imports what speaks to servos."""
+
+
+@pytest.mark.parametrize("words", LIGHT_HELP)
+def test_help_imports_nothing_heavy(words: str) -> None:
+    heavy = (*HEAVY, "pydantic") if words == "" else HEAVY  # Typer reads types with pydantic
+    code = (
+        "import sys\nfrom gazerig.robot.cli.entry_point import main\n"
+        f"sys.argv = ['gazerig', *{words.split()!r}, '--help']\n"
+        "try:\n    main()\nexcept SystemExit as end:\n    assert not end.code\n"
+        f"print('HEAVY', *[name for name in {heavy!r} if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert "Usage: gazerig" in done.stdout, done.stderr
+    assert done.stdout.splitlines()[-1] == "HEAVY"
 
 
 def test_every_command_has_examples_and_no_example_is_without_command() -> None:
@@ -133,9 +177,9 @@ def test_an_error_is_one_line_and_debug_shows_where_it_comes_from(
 
 def test_what_nobody_thought_of_is_one_line_too() -> None:
     code = (
-        "import sys; from gazerig.robot.cli import main as cli\n"
+        "import sys; from gazerig.robot.cli import main, welcome\n"
         "sys.argv = ['gazerig', *sys.argv[1:]]\n"
-        "cli.next_steps = lambda *a: 1 / 0\ncli.main()"
+        "welcome.next_steps = lambda *a: 1 / 0\nmain.main()"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.returncode == 1 and len(done.stderr.strip().splitlines()) == 1

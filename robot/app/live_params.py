@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
-from gazerig.config.load import ConfigError
+from gazerig.config.faults import ConfigError
 from gazerig.config.parameters import NEXT_START, changed, differences, live
 from gazerig.config.schema import Rig, load_walk
 from gazerig.drivers.types import Camera

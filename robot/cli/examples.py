@@ -1,13 +1,11 @@
 """Examples for every command's help, and the names a shell completes."""
 
 from collections.abc import Callable, Iterable
-from typing import Any
 
 import typer
-from typer.core import TyperGroup
 
-from gazerig.config.load import shipped_names
-from gazerig.sim_mock.scenes.registry import scenes
+from gazerig.config.shipped import shipped_names
+from gazerig.robot.cli.command_list import PANELS
 
 EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "run": (
@@ -127,31 +125,6 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
 }
 """Command -> examples, each with what it is for."""
 
-PANELS: dict[str, tuple[str, ...]] = {
-    "Run": ("run", "ctl", "stop"),
-    "Look back": ("replay", "report", "compare", "export"),
-    "Bring-up": (
-        *("scan", "setup", "doctor", "calibrate", "jog", "home", "look-at", "monitor", "reboot"),
-    ),
-    "Tools": (
-        *("check", "kinds", "schema", "emulate", "record-camera", "record-gesture"),
-        *("import-gesture", "fit-scanpath"),
-    ),
-}
-"""What help shows together."""
-
-
-class PanelGroup(TyperGroup):
-    """A group whose help shows the commands in the order of ``PANELS``."""
-
-    def list_commands(self, ctx: Any) -> list[str]:
-        """Return the names of all commands."""
-        order = [name for commands in PANELS.values() for name in commands]
-        return sorted(
-            super().list_commands(ctx),
-            key=lambda name: order.index(name) if name in order else len(order),
-        )
-
 
 def add_examples(app: typer.Typer, panels: bool = True) -> None:
     """Add examples to the help of every command of an app.
@@ -193,6 +166,8 @@ def complete_shipped(kind: str) -> Callable[[str], list[str]]:
 
 def complete_scene(incomplete: str) -> list[str]:
     """Complete a simulated scene."""
+    from gazerig.sim_mock.scenes.registry import scenes
+
     return [name for name in sorted(scenes()) if name.startswith(incomplete)]
 
 

@@ -4,15 +4,17 @@ import sys
 import threading
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gazerig.drivers.camera.params import WebcamParams
-from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.cli.terminal import clear_errors, say, signals, status
 from gazerig.robot.model.clock import RealClock
+
+if TYPE_CHECKING:
+    from gazerig.drivers.camera.source import FrameSource
 
 app = typer.Typer(add_completion=False)
 
@@ -50,7 +52,7 @@ def record_camera(
 
 def _source(
     oak: bool, camera: int | None, video: Path | None, requested: tuple[int, int | None, float]
-) -> tuple[FrameSource, str]:
+) -> tuple["FrameSource", str]:
     """Return the one source that was chosen, and its name."""
     asked = [n for n, v in (("oak", oak), ("camera", camera is not None), ("video", video)) if v]
     if len(asked) != 1:
@@ -76,7 +78,7 @@ def _source(
 
 
 def _record(
-    source: FrameSource,
+    source: "FrameSource",
     name: str,
     file: Path,
     seconds: float | None,

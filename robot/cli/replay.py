@@ -25,10 +25,10 @@ from gazerig.robot.cli.terminal import (
     say,
     signals,
 )
-from gazerig.robot.control.loop import Tick
 
 if TYPE_CHECKING:
     from gazerig.robot.app.resimulate import Resimulation
+    from gazerig.robot.control.loop import Tick
     from gazerig.robot.dashboard.snapshot import ShownRig
 
 app = typer.Typer(add_completion=False)
@@ -249,7 +249,7 @@ def _rerun(file: Path, rig: str | None, character: str | None, joints: str | Non
     with used(file), _progress("running again", recording.duration_s) as read:
         count, start_s = 0, 0.0
 
-        def on_tick(tick: Tick) -> None:
+        def on_tick(tick: "Tick") -> None:
             nonlocal count, start_s
             start_s = tick.t_s if count == 0 else start_s
             count += 1
@@ -304,7 +304,7 @@ def _words(value: object) -> str:
     return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
-def _with_progress(ticks: Iterable[Tick], read: Callable[[float], None]) -> Iterator[Tick]:
+def _with_progress(ticks: Iterable["Tick"], read: Callable[[float], None]) -> Iterator["Tick"]:
     """Pass ticks on, and tell how far they are."""
     start_s = None
     for number, tick in enumerate(ticks):

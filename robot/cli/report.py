@@ -13,7 +13,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
-from gazerig.config.load import ConfigError
+from gazerig.config.faults import ConfigError
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_output import refuse_existing
 from gazerig.robot.cli.rig_command import DEFAULT_RIG, RigCommand

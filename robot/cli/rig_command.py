@@ -5,7 +5,7 @@ from typing import Any
 
 from typer.core import TyperCommand, TyperOption
 
-from gazerig.config.load import shipped_names
+from gazerig.config.shipped import shipped_names
 from gazerig.robot.cli.terminal import say
 
 DEFAULT_RIG = "desk"

@@ -9,7 +9,7 @@ from datetime import datetime
 
 import typer
 
-from gazerig.config.load import ConfigError
+from gazerig.config.faults import ConfigError
 from gazerig.config.save import save_rig
 from gazerig.drivers.hobby_board.models import US_STEPS
 from gazerig.drivers.pca9685.board import Pca9685Board

@@ -15,7 +15,8 @@ from typing import Annotated, NoReturn
 
 import typer
 
-from gazerig.config.load import ConfigError, shipped_names
+from gazerig.config.faults import ConfigError
+from gazerig.config.shipped import shipped_names
 from gazerig.drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
 from gazerig.robot.cli.line_writer import LineWriter
 from gazerig.robot.cli.suggestions import completed, speaking_of, with_doctor

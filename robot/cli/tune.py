@@ -8,7 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from gazerig.config.load import ConfigError, read_yaml, shipped_names
+from gazerig.config.faults import ConfigError
+from gazerig.config.shipped import shipped_names
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.robot.cli import animation as cli_animation
 from gazerig.robot.cli import lead as cli_lead
@@ -256,6 +257,8 @@ def read_value(key: str, text: str) -> Any:
         file = Path(folder) / "value.yaml"
         file.write_text(f"value: {text}\n", encoding="utf-8")
         try:
+            from gazerig.config.load import read_yaml
+
             held = read_yaml(file).data
         except ConfigError as error:
             raise SetupError(f"{key}: {error.faults[0].rule}") from None

@@ -1,9 +1,10 @@
 """Joints that the guard had to hold back for a fault: said when it begins and ends, and counted."""
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from gazerig.robot.control.tick import Tick
+if TYPE_CHECKING:
+    from gazerig.robot.control.tick import Tick
 
 FAULTS = frozenset(
     {"not moving", "overloaded", "hot", "voltage", "stale joints", "torque off", "not finite"}
@@ -54,7 +55,7 @@ class JointFaults:
         self._counted: dict[tuple[str, str], tuple[int, float]] = {}
         self._first_s: float | None = None
 
-    def update(self, tick: Tick) -> None:
+    def update(self, tick: "Tick") -> None:
         """Check one tick."""
         if self._first_s is None:
             self._first_s = tick.t_s
@@ -105,7 +106,7 @@ class JointFaults:
         self._say(f"{t_s - (self._first_s or 0.0):.2f} s: {what}")
 
 
-def _held(tick: Tick) -> list[tuple[str, str]]:
+def _held(tick: "Tick") -> list[tuple[str, str]]:
     """Return joint and reason of all joints that a fault holds in this tick."""
     found = []
     faults = tick.joints.fault

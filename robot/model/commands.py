@@ -7,12 +7,14 @@ recording of a run holds it, so that the run can be done again.
 from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
-from gazerig.gaze.types import Angles2, Vec3
+from gazerig.gaze.vectors import Angles2, Vec3
 
 Value = float | int | bool | str | None | tuple["Value", ...] | Mapping[str, "Value"]
 """What a key of a rig's YAML can hold."""
 
 Frame = Literal["world", "head"]
+HEARTBEAT_S = 1.0
+"""A lead that is not to stay lapses when it was not renewed for so long."""
 FAR_M = 100.0
 """From here on the eyes look straight ahead, to what can be told."""
 
@@ -29,7 +31,7 @@ class LookAt(NamedTuple):
 
     p_world_m: metres, x ahead, y left, z up of the neck base
     who: who asks, in words; stay: until another command; else for as long as ``Renew`` comes
-        at least every ``gazerig.robot.model.lead.HEARTBEAT_S``
+        at least every ``HEARTBEAT_S``
     for_s: ends after so many seconds; None: without such an end
     """
 

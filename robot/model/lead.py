@@ -10,6 +10,7 @@ from typing import NamedTuple
 from gazerig.gaze.angles import add, scale
 from gazerig.gaze.types import Face, GazeState, Percept, Target, Vec3
 from gazerig.robot.model.commands import (
+    HEARTBEAT_S,
     Jog,
     Leading,
     Look,
@@ -22,8 +23,6 @@ from gazerig.robot.model.commands import (
 from gazerig.robot.model.gaze_error import gaze_error
 from gazerig.robot.model.types import JointAngles
 
-HEARTBEAT_S = 1.0
-"""A lead that is not to stay lapses when it was not renewed for so long."""
 ARRIVED_RAD = radians(1.0)
 """A gaze or joint that is measured nearer than this to what was asked for is there."""
 GONE_S = 2.0

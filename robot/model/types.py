@@ -6,9 +6,12 @@ Radians, metres, seconds; joints in the order of ``in_order``.
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
-from gazerig.gaze.types import Mat3, Salience, Vec3
+from gazerig.gaze.vectors import Mat3, Vec3
+
+if TYPE_CHECKING:
+    from gazerig.gaze.types import Salience
 
 GAZE_JOINTS = (
     "left_eye_pan",
@@ -310,7 +313,7 @@ class Snapshot:
     rate_hz: float
     health: str
     behaviour: str = ""
-    saliences: tuple[Salience, ...] = ()
+    saliences: tuple["Salience", ...] = ()
     perception: str = ""
     commanded_rad: JointAngles = ()
     target_kind: str = ""

@@ -14,11 +14,9 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from math import radians
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from gazerig.drivers.errors import DriverError
-from gazerig.robot.control.head_state import HeadEvent, HeadState
-from gazerig.robot.control.head_state import from_json as state_from_json
 from gazerig.robot.model.command_checks import check
 from gazerig.robot.model.command_json import as_json
 from gazerig.robot.model.commands import (
@@ -55,6 +53,9 @@ from gazerig.robot.remote.socket_io import (
     is_private,
     sockets,
 )
+
+if TYPE_CHECKING:
+    from gazerig.robot.control.head_state import HeadEvent, HeadState
 
 
 class RobotClient:
@@ -113,11 +114,14 @@ class RobotClient:
         """Hang up; the rig runs on, and leads that were not to stay end."""
         self._connection.close()
 
-    def state(self, after: int = 0) -> tuple[HeadState | None, tuple[HeadEvent, ...]]:
+    def state(self, after: int = 0) -> "tuple[HeadState | None, tuple[HeadEvent, ...]]":
         """Return the newest tick, None before the first, and events numbered above ``after``."""
         said = cast(dict[str, Any], self._connection.ask("state", after=after))
+        # Here, as who types ``gazerig stop`` must not wait for NumPy.
+        from gazerig.robot.control.head_state import HeadEvent, from_json
+
         events = tuple(HeadEvent(*one) for one in said["events"])
-        return (state_from_json(said["state"]) if said["state"] else None), events
+        return (from_json(said["state"]) if said["state"] else None), events
 
     def status(self) -> dict[str, Any]:
         """Return what the rig does: its name, target and why, guard level, joints, what it said."""

@@ -7,8 +7,7 @@ import threading
 from collections.abc import Callable
 
 from gazerig.robot.model.command_json import as_json
-from gazerig.robot.model.commands import Renew
-from gazerig.robot.model.lead import HEARTBEAT_S
+from gazerig.robot.model.commands import HEARTBEAT_S, Renew
 from gazerig.robot.remote.socket_io import MalformedMessage, Wire
 
 _EVERY_S = 0.25 * HEARTBEAT_S

@@ -1,0 +1,39 @@
+"""The commands check and schema: a rig's file alone."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gazerig.drivers.file_output import write_file
+from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say
+
+app = typer.Typer()
+
+
+@app.command()
+def check(rig: RigArgument = "desk") -> None:
+    """Check a rig's YAML and nothing else: all faults at once, no servo is touched."""
+    with clear_errors(rig):
+        from gazerig.config.schema import Rig, load_rig
+
+        found: Rig = load_rig(rig)
+        say(f"{rig}: good: rig {found.name!r}, {len(found.joints)} joints, profile {found.profile}")
+
+
+@app.command()
+def schema(
+    out: Annotated[Path | None, typer.Argument(help="File to write; default: print.")] = None,
+    force: ForceOption = False,
+) -> None:
+    """Export the JSON Schema of rig files, for editors."""
+    from gazerig.config.export import json_schema
+    from gazerig.config.schema import Rig
+
+    text = json.dumps(json_schema(Rig), indent=2) + "\n"
+    if out is None:
+        print(text, end="")
+    else:
+        with clear_errors():
+            write_file(out, text, force)
