@@ -56,16 +56,18 @@ def norm(a: Vec3) -> float:
 
 def unit(a: Vec3) -> Vec3:
     """Return the direction of a vector; straight ahead for the zero vector."""
-    length = norm(a)
+    x, y, z = a
+    length = sqrt(x * x + y * y + z * z)
     if length == 0.0:
         return (1.0, 0.0, 0.0)
-    return (a[0] / length, a[1] / length, a[2] / length)
+    return (x / length, y / length, z / length)
 
 
 def direction(yaw_pitch_rad: Angles2) -> Vec3:
     """Return the unit vector with a yaw and pitch."""
     yaw, pitch = yaw_pitch_rad
-    return (cos(pitch) * cos(yaw), cos(pitch) * sin(yaw), sin(pitch))
+    level = cos(pitch)
+    return (level * cos(yaw), level * sin(yaw), sin(pitch))
 
 
 def yaw_pitch(v: Vec3) -> Angles2:
@@ -75,7 +77,9 @@ def yaw_pitch(v: Vec3) -> Angles2:
 
 def angle_between(a: Vec3, b: Vec3) -> float:
     """Return the angle between two vectors of any length, exact also for tiny angles."""
-    return atan2(norm(cross(a, b)), dot(a, b))
+    (ax, ay, az), (bx, by, bz) = a, b
+    x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    return atan2(sqrt(x * x + y * y + z * z), ax * bx + ay * by + az * bz)
 
 
 def along_great_circle(start: Vec3, end: Vec3, fraction: float) -> Vec3:

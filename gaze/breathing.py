@@ -70,5 +70,7 @@ class Breathing:
         breaths = (t_s - self._start_s) * self._rate_hz
         if breaths <= 0.0 or (self._pitch_rad == 0.0 and self._roll_rad == 0.0):
             return _STILL
-        depth, turn = min_jerk(breaths), 2.0 * pi * breaths
+        depth, turn = min_jerk(breaths) if breaths < 1.0 else 1.0, 2.0 * pi * breaths
+        if self._roll_rad == 0.0:
+            return (0.0, depth * self._pitch_rad * sin(turn), 0.0)
         return (0.0, depth * self._pitch_rad * sin(turn), -depth * self._roll_rad * cos(turn))

@@ -76,13 +76,15 @@ class HeadModel:
         # A head that stops short by more than the eye can cover never brings the gaze
         # to the target, and a trigger beyond the eye's limit never fires.
         printed = radians(params.max_offset_deg)
+        self._comfort_rad = radians(params.comfort_deg)
         self.trigger_rad = printed if params.literal_reach else max(0.0, min(printed, reachable))
 
     def reset(self, t_s: float, head_rad: Angles3) -> None:
         """Start at rest at the present head angles."""
         self._plans = tuple(Quintic((angle, 0.0, 0.0), angle, 1.0) for angle in head_rad)
-        self._planned_s = t_s
+        self._planned_s, self._lasts_s = t_s, 1.0
         self._goal: Angles2 = (head_rad[0], head_rad[1])
+        self._rest_rad = head_rad
         self._ends_s = t_s
         self._follows = False
         self._relieves = False
@@ -105,6 +107,8 @@ class HeadModel:
         """Return head angles with yaw and pitch clipped to the neck's range."""
         (yaw_low, yaw_high), (pitch_low, pitch_high) = self._neck
         yaw, pitch, roll = head_rad
+        if yaw_low <= yaw <= yaw_high and pitch_low <= pitch <= pitch_high:
+            return head_rad
         return (min(max(yaw, yaw_low), yaw_high), min(max(pitch, pitch_low), pitch_high), roll)
 
     @property
@@ -141,9 +145,14 @@ class HeadModel:
         since_eye_onset_s: time since the eyes set off for it, negative before they do
         """
         self._decide(target, facing_rad, gaze_rad, eccentricity_rad, since_eye_onset_s, t_s)
-        now = [plan.at(t_s - self._planned_s)[0] for plan in self._plans]
+        since_s = t_s - self._planned_s
+        if since_s >= self._lasts_s:
+            return self.in_range(self._rest_rad)
+        yaw, pitch, roll = self._plans
         # A plan made again in full flight may swing past its goal, but not past the neck's range.
-        return self.in_range((now[0], now[1], now[2]))
+        return self.in_range(
+            (yaw.position(since_s), pitch.position(since_s), roll.position(since_s))
+        )
 
     def _decide(
         self,
@@ -156,12 +165,11 @@ class HeadModel:
     ) -> None:
         """Choose between turning to the target, recentring an eccentric eye, and rest."""
         par = self._params
-        if eccentricity <= radians(par.comfort_deg):
+        if eccentricity <= self._comfort_rad:
             self._aside_since_s = t_s
         moving = t_s < self._ends_s
         delay_ms = -par.lead_ms if target.top_down else par.start_delay_ms
-        late_enough = since_onset >= delay_ms / 1e3 - 1e-9
-        if eccentricity >= self.trigger_rad and late_enough:
+        if eccentricity >= self.trigger_rad and since_onset >= delay_ms / 1e3 - 1e-9:
             self._follows, self._relieves = True, False
         elif t_s - self._aside_since_s >= par.recentre_after_ms / 1e3 and not moving:
             self._follows, self._relieves = False, True
@@ -170,7 +178,7 @@ class HeadModel:
         if self._follows:
             self._follow(facing, gaze, self._stops_short(target, facing), t_s)
         elif self._relieves:
-            comfort = min(radians(par.comfort_deg) / 2.0, self.trigger_rad)
+            comfort = min(self._comfort_rad / 2.0, self.trigger_rad)
             self._follow(facing, gaze, comfort, t_s)
 
     def _follow(self, facing: Angles2, gaze: Angles2, short_rad: float, t_s: float) -> None:
@@ -179,9 +187,10 @@ class HeadModel:
         A person who steps aside is most salient while moving; a head that then took the larger
         offset of one who stands would swing back from where it has just turned to.
         """
-        way = direction(self._goal)
-        near_enough = angle_between(way, direction(facing)) <= short_rad
-        in_reach = angle_between(way, direction(gaze)) <= self.trigger_rad
+        way, to_centre = direction(self._goal), direction(facing)
+        to_gaze = to_centre if gaze is facing else direction(gaze)
+        near_enough = angle_between(way, to_centre) <= short_rad
+        in_reach = angle_between(way, to_gaze) <= self.trigger_rad
         if not (near_enough and in_reach):
             self._aim(self._reaching(facing, gaze, short_rad), t_s)
 
@@ -214,8 +223,8 @@ class HeadModel:
         self._plans = tuple(
             Quintic(start, end, duration) for start, end in zip(starts, (*goal, 0.0), strict=True)
         )
-        self._goal, self._level = goal, True
-        self._planned_s, self._ends_s = t_s, t_s + duration
+        self._goal, self._rest_rad, self._level = goal, (*goal, 0.0), True
+        self._planned_s, self._lasts_s, self._ends_s = t_s, duration, t_s + duration
 
     def _duration_s(self, amplitude_rad: float) -> float:
         """Return the time of a head movement: peak speed grows with its size."""

@@ -5,8 +5,6 @@ one opens, by less. So the middle of the fissure goes where the eye goes, and th
 narrows (Read 2006: from 9.7 to 6.4 mm at 40 deg down). Nothing here is random.
 """
 
-from typing import NamedTuple
-
 from gazerig.gaze.lid_params import LidParams
 from gazerig.gaze.saccade import min_jerk
 
@@ -14,14 +12,10 @@ _DROOP_S = 1.0  # time in which lids sink or rise when the sleepiness changes
 _GLIDE_S = 0.3  # and when what they do at rest is retuned
 
 
-class LidPair(NamedTuple):
-    """A value 0..1 of the upper and one of the lower lids."""
+LidPair = tuple[float, float]
+"""A value 0..1 of the upper and one of the lower lids."""
 
-    upper: float
-    lower: float
-
-
-_NOTHING = LidPair(0.0, 0.0)
+_NOTHING: LidPair = (0.0, 0.0)
 
 
 def openings(params: LidParams, eye_pitch_deg: float, sleepiness: float) -> LidPair:
@@ -29,7 +23,9 @@ def openings(params: LidParams, eye_pitch_deg: float, sleepiness: float) -> LidP
     share = params.follow_up_share if eye_pitch_deg > 0.0 else 1.0
     upper = _bounded(params.rest_opening + params.follow_per_deg * share * eye_pitch_deg)
     lower = _bounded(params.lower_rest_opening - params.lower_follow_per_deg * eye_pitch_deg)
-    return LidPair(
+    if sleepiness == 0.0:
+        return upper, lower
+    return (
         _bounded(upper * (1.0 - params.sleepy_droop * sleepiness)),
         _bounded(lower * (1.0 - params.lower_sleepy_rise * sleepiness)),
     )
@@ -37,7 +33,7 @@ def openings(params: LidParams, eye_pitch_deg: float, sleepiness: float) -> LidP
 
 def _bounded(opening: float) -> float:
     """Return an opening clipped to 0..1."""
-    return min(1.0, max(0.0, opening))
+    return opening if 0.0 < opening < 1.0 else 1.0 if opening >= 1.0 else 0.0
 
 
 class LidsAtRest:
@@ -63,7 +59,7 @@ class LidsAtRest:
             self.sleepy(params.sleepy_level, t_s)
         if self._shown is not None:
             upper, lower = openings(params, self._pitch_deg, self.sleepiness(t_s))
-            self._left = LidPair(self._shown.upper - upper, self._shown.lower - lower)
+            self._left = self._shown[0] - upper, self._shown[1] - lower
         self._retuned_s = t_s
 
     def sleepy(self, level: float, t_s: float) -> None:
@@ -79,6 +75,8 @@ class LidsAtRest:
 
     def sleepiness(self, t_s: float) -> float:
         """Return how sleepy the lids look by now, 0..1."""
+        if self._droop_from == self._droop_to:
+            return self._droop_from
         way = min_jerk((t_s - self._droop_since_s) / _DROOP_S)
         return self._droop_from + way * (self._droop_to - self._droop_from)
 
@@ -92,9 +90,7 @@ class LidsAtRest:
     def _glided(self, wanted: LidPair, t_s: float) -> LidPair:
         """Return openings with the difference that a retune left, which decays in 0.3 s."""
         kept = 1.0 - min_jerk((t_s - self._retuned_s) / _GLIDE_S)
-        left = self._left
+        upper, lower = self._left
         if kept == 0.0:
             self._left = _NOTHING
-        return LidPair(
-            _bounded(wanted.upper + kept * left.upper), _bounded(wanted.lower + kept * left.lower)
-        )
+        return _bounded(wanted[0] + kept * upper), _bounded(wanted[1] + kept * lower)

@@ -20,7 +20,8 @@ from gazerig.gaze.lid_rest import LidPair, LidsAtRest
 Side = Literal["left", "right"]
 LidMode = Literal["rest", "conversation"]
 
-_NOT_SHUT = LidPair(0.0, 0.0)
+_NOT_SHUT: LidPair = (0.0, 0.0)
+_ROUNDING_S = 1e-6
 
 
 class LidOpenings(NamedTuple):
@@ -77,6 +78,7 @@ class Lids:
         self._t_s = t_s
         self._blink: LidClosure | None = None
         self._winks: dict[Side, LidClosure | None] = {"left": None, "right": None}
+        self._shut_until_s = -inf
         self._redraw = False
         self._rest.reset(t_s)
         self._next_s = t_s + self._pause_s(self._length_s())
@@ -120,7 +122,9 @@ class Lids:
             raise ValueError(f"no lid {side!r}; sides: left, right")
         wink = self._winks[side]
         if wink is None or not wink.under_way(self._t_s):
-            self._winks[side] = self._closing(max(t_s, self._t_s), self._params.wink_hold_ms)
+            wink = self._closing(max(t_s, self._t_s), self._params.wink_hold_ms)
+            self._winks[side] = wink
+            self._expect(wink)
 
     def sleepy(self, level: float) -> None:
         """Set the sleepiness, which lowers the lids and slows blinks: 0 awake .. 1 hardly awake.
@@ -138,18 +142,22 @@ class Lids:
         self._t_s = t_s
         if self._redraw:
             self._redraw, self._next_s = False, t_s + self._pause_s(self._length_s())
+        upper, lower = self._rest.step(t_s, degrees(eye_pitch_rad))
+        if shift_rad is None and self._shut_until_s < t_s < self._next_s:
+            return LidOpenings(upper, upper, False, lower, lower)
         if self._due(t_s, shift_rad):
             self._begin_blink(t_s)
         blink = _shut(self._blink, t_s)
-        left, right = (_more(blink, _shut(wink, t_s)) for wink in self._winks.values())
-        upper, lower = self._rest.step(t_s, degrees(eye_pitch_rad))
+        (left, lower_left), (right, lower_right) = (
+            _more(blink, _shut(wink, t_s)) for wink in self._winks.values()
+        )
         # Closings come out at 1 and a rounding error just before they are done.
         return LidOpenings(
-            upper * max(0.0, 1.0 - left.upper),
-            upper * max(0.0, 1.0 - right.upper),
-            blink.upper > 0.0,
-            lower * max(0.0, 1.0 - left.lower),
-            lower * max(0.0, 1.0 - right.lower),
+            upper * max(0.0, 1.0 - left),
+            upper * max(0.0, 1.0 - right),
+            blink[0] > 0.0,
+            lower * max(0.0, 1.0 - lower_left),
+            lower * max(0.0, 1.0 - lower_right),
         )
 
     def closure(self, since_onset_s: float) -> float:
@@ -180,9 +188,15 @@ class Lids:
             depth=blink_depth(par, self._rng), slow=slow
         )
         self._blink = blink
+        self._expect(blink)
         double = is_double_blink(par, self._rng)
         pause_s = par.double_gap_ms / 1e3 if double else self._pause_s(blink.length_s)
         self._next_s = t_s + blink.length_s + pause_s
+
+    def _expect(self, closing: LidClosure) -> None:
+        """Record until when lids are not at rest, for a blink or wink that begins."""
+        ends_s = closing.onset_s + closing.length_s + _ROUNDING_S
+        self._shut_until_s = max(self._shut_until_s, ends_s)
 
     def _closing(self, onset_s: float, hold_ms: float) -> LidClosure:
         """Return a complete closure at no sleepiness."""
@@ -210,10 +224,10 @@ def _shut(closing: LidClosure | None, t_s: float) -> LidPair:
     shut = 0.0 if closing is None else closing.at(t_s)
     if closing is None or shut == 0.0:
         return _NOT_SHUT
-    return LidPair(shut, closing.lower_share * shut)
+    return shut, closing.lower_share * shut
 
 
 def _more(one: LidPair, other: LidPair) -> LidPair:
     if other is _NOT_SHUT:
         return one
-    return LidPair(max(one.upper, other.upper), max(one.lower, other.lower))
+    return max(one[0], other[0]), max(one[1], other[1])

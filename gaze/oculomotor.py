@@ -6,17 +6,17 @@ exactly (the vestibulo-ocular reflex), and vergence comes from each eye's own ge
 """
 
 from dataclasses import dataclass
-from math import exp
+from math import exp, sqrt
 from typing import Annotated, NamedTuple, Protocol
 
 import numpy as np
 
-from gazerig.gaze.angles import add, angle_between, norm, rotate, scale, sub, unit
+from gazerig.gaze.angles import add, angle_between, norm, scale, sub, unit
 from gazerig.gaze.animation import NO_OFFSET, PoseOffset
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.head import HeadModel
-from gazerig.gaze.lids import LidOpenings, Lids
-from gazerig.gaze.pursuit import Pursuit
+from gazerig.gaze.lids import Lids
+from gazerig.gaze.pursuit import Pursuit, sight
 from gazerig.gaze.saccade import SaccadeModel
 from gazerig.gaze.saccade_trajectory import SaccadeTrajectory, scattered_endpoint
 from gazerig.gaze.saccade_trigger import SaccadeTrigger, SaccadeTriggerParams
@@ -68,12 +68,9 @@ class Sway(Protocol):
         ...
 
 
-class _Seen(NamedTuple):
-    """The target at this tick: point, velocity, and the point that the head turns to."""
-
-    point: Vec3
-    velocity: Vec3
-    centre: Vec3
+_Seen = tuple[Vec3, Vec3, Vec3, Vec3]
+"""The target at this tick: its point and velocity, the point that the head turns to, and the way
+from between the eyes to the first."""
 
 
 class ReachableGaze(NamedTuple):
@@ -151,6 +148,8 @@ class Oculomotor:
                 "endpoint_scatter_along and endpoint_scatter_across need a random generator: give rng"
             )
         self._params, self._scatter, self._eye_limits = params, scatter, eye_limits
+        self._lag_s = params.eye_lag_ms / 1e3
+        self._horizon_s, self._fade_s = params.prediction_horizon_ms / 1e3, params.fade_ms / 1e3
         self._trigger.retune(params, any(scatter))
 
     def reset(self, t_s: float, state: GazeState) -> None:
@@ -183,30 +182,37 @@ class Oculomotor:
             self.reset(t_s, state)
         R_world_head, p_head = self._foreseen_head(state)
         seen = self._now(target, p_head, t_s)
-        self._base_rad = state.base_rad
-        facing = self._geometry.facing(seen.point, state.base_rad)
-        ahead = rotate(R_world_head, (1.0, 0.0, 0.0))
-        aside_rad = angle_between(ahead, sub(seen.point, p_head))
-        free_s = self._trajectory.ends_s if self._trajectory else t_s
-        self._trigger.record_shift(target.shift, self._head.leads_s(target, aside_rad), free_s, t_s)
-        shift_rad = self._maybe_jump(seen, p_head, t_s)
-        self._move_gaze(seen, p_head, t_s, dt_s)
-        centre = (
-            facing
-            if seen.centre is seen.point
-            else self._geometry.facing(seen.centre, state.base_rad)
-        )
-        head = self._head.step(target, centre, facing, aside_rad, t_s - self._trigger.onset_s, t_s)
+        point, velocity, centre_point, toward = seen
+        self._base_rad = base = state.base_rad
+        facing = centre = self._geometry.facing(point, base)
+        if centre_point is not point:
+            centre = self._geometry.facing(centre_point, base)
+        ahead = R_world_head[0][0], R_world_head[1][0], R_world_head[2][0]
+        aside_rad = angle_between(ahead, toward)
+        trigger = self._trigger
+        if target.shift != trigger.shift:
+            free_s = self._trajectory.ends_s if self._trajectory else t_s
+            trigger.record_shift(target.shift, self._head.leads_s(target, aside_rad), free_s, t_s)
+        shift_rad = self._move_gaze(seen, p_head, t_s, dt_s)
+        head = self._head.step(target, centre, facing, aside_rad, t_s - trigger.onset_s, t_s)
         wanted = self._geometry.eyes_on(self._gaze, R_world_head, p_head)
-        if offset.eyes_rad != (0.0, 0.0):
+        if offset.eyes_rad != NO_OFFSET.eyes_rad:
             wanted = _turned(wanted[0], offset.eyes_rad), _turned(wanted[1], offset.eyes_rad)
-        left, right = self._in_range(wanted)
-        limited = () if wanted == (left, right) else self._limited(wanted, head, facing)
+        left, right = eyes = self._in_range(wanted)
+        limited = () if eyes == wanted else self._limited(wanted, head, facing)
         lids = self._lids.step(t_s, 0.5 * (left[1] + right[1]), shift_rad)
         if offset.lids != NO_OFFSET.lids:
             lids = lids.scaled(offset.lids)
         head = self._swayed(head, offset.head_rad, t_s)
-        return self._command(head, left, right, lids, seen, limited)
+        phase: Phase = (
+            "saccade" if self._trajectory
+            else "pursue" if norm(velocity) > _MOVING_M_S
+            else "fixate"
+        )  # fmt: skip
+        return GazeCommand(
+            head, left, right, lids.left, lids.right, phase, lids.blink, self._gaze, self.saccades,
+            self.fixations, self._lids.blinks, lids.lower_left, lids.lower_right, limited,
+        )  # fmt: skip
 
     def reach(self, target: Target) -> ReachableGaze:
         """Return where head and eyes come to rest for a point that stands still."""
@@ -226,7 +232,16 @@ class Oculomotor:
         return (*self._eye_limits, self._head.range_rad)
 
     def _in_range(self, eyes: tuple[Angles2, Angles2]) -> tuple[Angles2, Angles2]:
-        """Return the angles of both eyes clipped to their ranges."""
+        """Return the angles of both eyes clipped to their ranges; the same where nothing is."""
+        (left_yaw, left_pitch), (right_yaw, right_pitch) = eyes
+        left, right = self._eye_limits
+        if (
+            left[0][0] <= left_yaw <= left[0][1]
+            and left[1][0] <= left_pitch <= left[1][1]
+            and right[0][0] <= right_yaw <= right[0][1]
+            and right[1][0] <= right_pitch <= right[1][1]
+        ):
+            return eyes
         return _clip(eyes[0], self._eye_limits[0]), _clip(eyes[1], self._eye_limits[1])
 
     def _limited(
@@ -247,105 +262,91 @@ class Oculomotor:
                 found.append(Limited(f"head {axis}", facing[i], head[i], _AT_END))
         return tuple(found)
 
-    def _command(
-        self,
-        head: Angles3,
-        left: Angles2,
-        right: Angles2,
-        lids: LidOpenings,
-        seen: _Seen,
-        limited: tuple[Limited, ...],
-    ) -> GazeCommand:
-        moving = norm(seen.velocity) > _MOVING_M_S
-        phase: Phase = "saccade" if self._trajectory else "pursue" if moving else "fixate"
-        return GazeCommand(
-            head,
-            left,
-            right,
-            lids.left,
-            lids.right,
-            phase,
-            lids.blink,
-            self._gaze,
-            self.saccades,
-            self.fixations,
-            self._lids.blinks,
-            lids.lower_left,
-            lids.lower_right,
-            limited,
-        )
-
     def _swayed(self, head: Angles3, offset: Angles3, t_s: float) -> Angles3:
         """Return the head's angles with breathing and an offset, clipped to the neck's range."""
         if self._breathing is not None:
-            head = add(head, self._breathing.step(t_s))
+            yaw, pitch, roll = self._breathing.step(t_s)
+            head = head[0] + yaw, head[1] + pitch, head[2] + roll
         elif offset == NO_OFFSET.head_rad:
             return head
-        return self._head.in_range(add(head, offset))
+        return self._head.in_range((head[0] + offset[0], head[1] + offset[1], head[2] + offset[2]))
 
     def _foreseen_head(self, state: GazeState) -> tuple[Mat3, Vec3]:
         """Return the head's pose at the time when an eye command of now takes effect."""
-        lag = self._params.eye_lag_ms / 1e3
-        (yaw, pitch, roll), rates = state.head_rad, state.head_rate_rad_s
+        lag = self._lag_s
+        (yaw, pitch, roll), (yaw_rate, pitch_rate, roll_rate) = state[:2]
         base, turning = state.base_rad, state.base_rate_rad_s
         if turning != (0.0, 0.0):
             base = base[0] + turning[0] * lag, base[1] + turning[1] * lag
         return self._geometry.head_pose(
-            (yaw + rates[0] * lag, pitch + rates[1] * lag, roll + rates[2] * lag), base
+            (yaw + yaw_rate * lag, pitch + pitch_rate * lag, roll + roll_rate * lag), base
         )
 
     def _now(self, target: Target, p_head: Vec3, t_s: float) -> _Seen:
         """Return the target predicted by its velocity, which decays beyond the horizon."""
-        par = self._params
-        age = max(0.0, t_s - target.at_s)
-        known, fade = par.prediction_horizon_ms / 1e3, par.fade_ms / 1e3
+        age, known = t_s - target.at_s, self._horizon_s
         velocity = target.v_world_m_s
-        moved = scale(velocity, min(age, known))
+        moved = scale(velocity, min(age, known) if age > 0.0 else 0.0)
         if age > known:
-            left = exp(-(age - known) / fade)
-            moved = add(moved, scale(velocity, fade * (1.0 - left)))
+            left = exp(-(age - known) / self._fade_s)
+            moved = add(moved, scale(velocity, self._fade_s * (1.0 - left)))
             velocity = scale(velocity, left)
         point = self._clear(add(target.p_world_m, moved), p_head)
-        if target.centre_world_m is None:
-            return _Seen(point, velocity, point)
-        return _Seen(point, velocity, self._clear(add(target.centre_world_m, moved), p_head))
+        centre = point
+        if target.centre_world_m is not None:
+            centre = self._clear(add(target.centre_world_m, moved), p_head)
+        return point, velocity, centre, sub(point, p_head)
 
     def _clear(self, point: Vec3, p_head: Vec3) -> Vec3:
         """Return a point moved away to ``nearest_m`` where it is nearer."""
-        rel = sub(point, p_head)
-        if norm(rel) >= self._params.nearest_m:
+        x, y, z = sub(point, p_head)
+        if sqrt(x * x + y * y + z * z) >= self._params.nearest_m:
             return point
-        return add(p_head, scale(unit(rel), self._params.nearest_m))
+        return add(p_head, scale(unit((x, y, z)), self._params.nearest_m))
 
-    def _maybe_jump(self, seen: _Seen, p_head: Vec3, t_s: float) -> float | None:
-        """Start a saccade when one is due; return its amplitude in radians, else None."""
-        if self._trajectory is not None:
-            return None
-        slip = self._pursuit.slip(self._gaze, seen.point, seen.velocity, p_head)
-        if not self._trigger.due(slip, t_s):
-            return None
-        error = angle_between(sub(self._gaze, p_head), sub(seen.point, p_head))
-        end = add(seen.point, scale(seen.velocity, self._saccade.duration_s(error)))
+    def _move_gaze(self, seen: _Seen, p_head: Vec3, t_s: float, dt_s: float) -> float | None:
+        """Move the gaze point along a saccade, or after the target.
+
+        Returns:
+            The amplitude of the saccade that starts now, radians; None where none does.
+        """
+        shift_rad = None
+        if self._trajectory is None:
+            point, velocity, _, _ = seen
+            gaze, there = sight(self._gaze, p_head), sight(point, p_head)
+            x, y, z = there[0] - gaze[0], there[1] - gaze[1], there[2] - gaze[2]
+            trigger = self._trigger
+            if not trigger.rests(sqrt(x * x + y * y + z * z)):
+                slip = self._pursuit.slip(self._gaze, point, velocity, p_head)
+                if trigger.due(slip, t_s):
+                    shift_rad = self._jump(seen, p_head, t_s)
+            if shift_rad is None:
+                if not trigger.waits and dt_s > 0.0:
+                    closing = not trigger.corrects
+                    self._gaze = self._pursuit.follow(
+                        gaze, there, point, velocity, p_head, dt_s, closing
+                    )
+                return None
+        trajectory = self._trajectory
+        assert trajectory is not None
+        self._gaze = trajectory.at(p_head, t_s)
+        if trajectory.landed(t_s):
+            self._trajectory = None
+            self._trigger.record_landing(t_s)
+            self.fixations += 1
+        return shift_rad
+
+    def _jump(self, seen: _Seen, p_head: Vec3, t_s: float) -> float:
+        """Start a saccade; return its amplitude in radians."""
+        point, velocity, _, _ = seen
+        error = angle_between(sub(self._gaze, p_head), sub(point, p_head))
+        end = add(point, scale(velocity, self._saccade.duration_s(error)))
         end = self._clear(end, p_head)
         if self._rng is not None and any(self._scatter):
             end = scattered_endpoint(end, self._gaze, p_head, *self._scatter, self._rng)
         self._trajectory = SaccadeTrajectory(self._saccade, self._gaze, end, p_head, t_s)
         self.saccades += 1
         return error
-
-    def _move_gaze(self, seen: _Seen, p_head: Vec3, t_s: float, dt_s: float) -> None:
-        """Move the gaze point along the saccade, or after the target."""
-        if self._trajectory is not None:
-            self._gaze = self._trajectory.at(p_head, t_s)
-            if self._trajectory.landed(t_s):
-                self._trajectory = None
-                self._trigger.record_landing(t_s)
-                self.fixations += 1
-        elif not self._trigger.waits:
-            closing = not self._trigger.corrects
-            self._gaze = self._pursuit.step(
-                self._gaze, seen.point, seen.velocity, p_head, dt_s, closing
-            )
 
 
 def _clip(eye: Angles2, limits: tuple[Angles2, Angles2]) -> Angles2:

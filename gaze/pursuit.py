@@ -13,17 +13,21 @@ at Kd, or at the slower Kdiv where it recedes. Larger errors of direction are sa
 """
 
 from dataclasses import dataclass
-from math import exp, radians
+from math import exp, radians, sqrt
 from typing import Annotated, NamedTuple
 
-from gazerig.gaze.angles import add, norm, scale, sub, unit
+from gazerig.gaze.angles import norm, scale, sub
 from gazerig.gaze.types import Vec3
 from gazerig.params import Bounds
+
+Sight = tuple[float, float, float, float]
+"""A point as seen from the eyes: its direction x, y, z, and its nearness, 1 / distance in 1/m."""
 
 _FARTHEST_1_M = 0.01
 """Nearness below which the lines of sight are as good as parallel (100 m)."""
 _NEAREST_1_M = 20.0
 """Nearness of a point at the eyes themselves (0.05 m); nothing nearer has a direction."""
+_NEAREST_M = 1.0 / _NEAREST_1_M
 
 
 @dataclass(frozen=True)
@@ -68,10 +72,9 @@ class Pursuit:
 
     def slip(self, gaze: Vec3, target: Vec3, v_target: Vec3, eye: Vec3) -> Slip:
         """Return error and retinal slip; all points in the world, metres."""
-        way, _ = _seen(gaze, eye)
-        there, near = _seen(target, eye)
-        across = _across(there, scale(v_target, near))
-        return Slip(sub(there, way), sub(across, self._taken(across)))
+        (x, y, z, _), (to_x, to_y, to_z, near) = sight(gaze, eye), sight(target, eye)
+        across = _across((to_x, to_y, to_z), scale(v_target, near))
+        return Slip((to_x - x, to_y - y, to_z - z), sub(across, self._taken(across)))
 
     def step(
         self, gaze: Vec3, target: Vec3, v_target: Vec3, eye: Vec3, dt_s: float, closing: bool = True
@@ -84,30 +87,77 @@ class Pursuit:
         """
         if dt_s <= 0.0:
             return gaze
+        return self.follow(
+            sight(gaze, eye), sight(target, eye), target, v_target, eye, dt_s, closing
+        )
+
+    def follow(
+        self,
+        gaze: Sight,
+        now: Sight,
+        target: Vec3,
+        v_target: Vec3,
+        eye: Vec3,
+        dt_s: float,
+        closing: bool,
+    ) -> Vec3:
+        """Return what ``step`` does, for whom has seen both points already.
+
+        gaze, now: gaze point and target as seen from ``eye``
+        dt_s: above 0
+        """
         par = self._params
-        now, near_now = _seen(target, eye)
-        before, near_before = _seen(sub(target, scale(v_target, dt_s)), eye)
-        way, near = _seen(gaze, eye)
-        move = scale(self._taken(scale(sub(now, before), 1.0 / dt_s)), dt_s)
+        (x, y, z, near), (to_x, to_y, to_z, near_now) = gaze, now
+        vx, vy, vz = v_target
+        # The target one step ago, and by how much its direction has changed since.
+        was_x, was_y, was_z, near_before = sight(
+            (target[0] - vx * dt_s, target[1] - vy * dt_s, target[2] - vz * dt_s), eye
+        )
+        rate = 1.0 / dt_s
+        move_x, move_y, move_z = self._taken(
+            ((to_x - was_x) * rate, (to_y - was_y) * rate, (to_z - was_z) * rate)
+        )
+        move_x, move_y, move_z = move_x * dt_s, move_y * dt_s, move_z * dt_s
         if closing:
-            error = _shorter(sub(before, way), self._max_error_rad)
-            move = add(move, scale(error, 1.0 - exp(-par.gain_1_s * dt_s)))
-        rate = par.vergence_gain_1_s if near_before > near else par.divergence_gain_1_s
-        near += near_now - near_before + (near_before - near) * (1.0 - exp(-rate * dt_s))
+            off_x, off_y, off_z = _shorter((was_x - x, was_y - y, was_z - z), self._max_error_rad)
+            share = 1.0 - exp(-par.gain_1_s * dt_s)
+            move_x += off_x * share
+            move_y += off_y * share
+            move_z += off_z * share
+        gain = par.vergence_gain_1_s if near_before > near else par.divergence_gain_1_s
+        near += near_now - near_before + (near_before - near) * (1.0 - exp(-gain * dt_s))
         near = min(max(near, _FARTHEST_1_M), _NEAREST_1_M)
-        return add(eye, scale(unit(add(way, move)), 1.0 / near))
+        x, y, z = x + move_x, y + move_y, z + move_z
+        length, distance = sqrt(x * x + y * y + z * z), 1.0 / near
+        if length == 0.0:  # turned back within one step
+            x = length = 1.0
+        return (
+            eye[0] + x / length * distance,
+            eye[1] + y / length * distance,
+            eye[2] + z / length * distance,
+        )
 
     def _taken(self, speed_rad_s: Vec3) -> Vec3:
         """Return the angular velocity that is taken over from a target's."""
-        if norm(speed_rad_s) > self._reject_rad_s:
+        x, y, z = speed_rad_s
+        size, gain = sqrt(x * x + y * y + z * z), self._params.velocity_gain
+        if size > self._reject_rad_s:
             return (0.0, 0.0, 0.0)
-        return scale(_shorter(speed_rad_s, self._max_rad_s), self._params.velocity_gain)
+        if size > self._max_rad_s:
+            share = self._max_rad_s / size
+            x, y, z = x * share, y * share, z * share
+        return (x * gain, y * gain, z * gain)
 
 
-def _seen(point: Vec3, eye: Vec3) -> tuple[Vec3, float]:
-    """Return the direction of a point and its nearness, one over its distance."""
-    rel = sub(point, eye)
-    return unit(rel), 1.0 / max(norm(rel), 1.0 / _NEAREST_1_M)
+def sight(point: Vec3, eye: Vec3) -> Sight:
+    """Return the direction of a point and its nearness; straight ahead for the eye itself."""
+    x, y, z = point[0] - eye[0], point[1] - eye[1], point[2] - eye[2]
+    length = sqrt(x * x + y * y + z * z)
+    if length > _NEAREST_M:
+        return x / length, y / length, z / length, 1.0 / length
+    if length == 0.0:
+        return 1.0, 0.0, 0.0, 1.0 / _NEAREST_M
+    return x / length, y / length, z / length, 1.0 / _NEAREST_M
 
 
 def _across(way: Vec3, v: Vec3) -> Vec3:

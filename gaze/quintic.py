@@ -30,9 +30,17 @@ class Quintic:
         if t_s >= self._T:
             return (self._goal, 0.0, 0.0)
         c0, c1, c2, c3, c4, c5 = self._c
-        t = max(0.0, t_s)
+        t = t_s if t_s > 0.0 else 0.0
         return (
             c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5)))),
             c1 + t * (2.0 * c2 + t * (3.0 * c3 + t * (4.0 * c4 + t * 5.0 * c5))),
             2.0 * c2 + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5)),
         )
+
+    def position(self, t_s: float) -> float:
+        """Return the position alone, the first value of ``at``."""
+        if t_s >= self._T:
+            return self._goal
+        c0, c1, c2, c3, c4, c5 = self._c
+        t = t_s if t_s > 0.0 else 0.0
+        return c0 + t * (c1 + t * (c2 + t * (c3 + t * (c4 + t * c5))))

@@ -38,7 +38,11 @@ class SaccadeTriggerParams:
 
 
 class SaccadeTrigger:
-    """State of the events that call for a saccade, and the decision when one is due."""
+    """State of the events that call for a saccade, and the decision when one is due.
+
+    shift: the target's count of gaze shifts recorded last, None before the first
+    onset_s: when the last saccade started, or the next one is to
+    """
 
     def __init__(self, params: SaccadeTriggerParams, scatters: bool) -> None:
         self.retune(params, scatters)
@@ -57,7 +61,7 @@ class SaccadeTrigger:
 
     def reset(self, t_s: float) -> None:
         """Start with no event and no refractory time."""
-        self._shift: int | None = None
+        self.shift: int | None = None
         self._due_s: float | None = None
         self._landed_s = -inf
         self._erred: bool | None = False
@@ -69,9 +73,9 @@ class SaccadeTrigger:
         wait_s: what the eyes wait beyond the latency, because the head goes first
         free_s: when a saccade in flight lands, else any time up to now
         """
-        if shift == self._shift:
+        if shift == self.shift:
             return
-        self._shift = shift
+        self.shift = shift
         self._erred = False
         if self._due_s is None:
             # The latency counts from the first event that is not answered yet; a later
@@ -82,6 +86,10 @@ class SaccadeTrigger:
         """Record the end of a saccade."""
         self._landed_s = t_s
         self._erred = None if self._scatters else False
+
+    def rests(self, error_rad: float) -> bool:
+        """Return whether nothing waits and an error calls for nothing: ``due`` would be False."""
+        return self._due_s is None and self._erred is False and error_rad <= self._saccade_rad
 
     def due(self, slip: Slip, t_s: float) -> bool:
         """Return whether a saccade starts now; to be asked only between saccades."""
