@@ -17,6 +17,7 @@ from gazerig.order import Order
 from gazerig.robot.app import session
 from gazerig.robot.app.assemble import Substitutes
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.control.head_state import HeadEvent, HeadState, head_state
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.loop import TickLoop
@@ -91,23 +92,23 @@ class LocalHead(Head):
     def get(self, prefix: str = "") -> Mapping[str, Value]:
         """Return the values in force of all keys of the rig that begin so."""
         with _as_refused():
-            return self._running().tuning.get(prefix)
+            return self._params().get(prefix)
 
     def set(self, changes: Mapping[str, Value]) -> tuple[str, ...]:
         """Put values at dotted keys in force from the next tick on, all of them or none."""
         with _as_refused():
-            return self._running().tuning.set(changes)
+            return self._params().set(changes)
 
     def save(self, path: Path | str | None = None) -> Path:
         """Write what is in force into the rig's file, or another one; return the file."""
         whole = None if path is None else Path(path).expanduser().absolute()
         with _as_refused():
-            return self._running().tuning.save(whole).path
+            return self._params().save(whole).path
 
     def revert(self) -> tuple[str, ...]:
         """Put the values of the rig's file in force again; return a line for each."""
         with _as_refused():
-            return self._running().tuning.revert()
+            return self._params().revert()
 
     def menus(self) -> Mapping[str, tuple[str, ...]]:
         """Return behaviours, modes of conversation and what the lids do; those in force first."""
@@ -141,6 +142,12 @@ class LocalHead(Head):
         if self._composed is None:
             raise Error(f"the head moves inside a block: with gazerig.open({self.rig!r}) as head:")
         return self._composed
+
+    def _params(self) -> ParamStore:
+        """Return the parameters of the run; raises as ``_running`` does."""
+        tuning = self._running().tuning
+        assert tuning is not None, "only a run without a program has none"
+        return tuning
 
     def _compose(self) -> session.ComposedRun:
         if self._composed is not None:

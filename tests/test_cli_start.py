@@ -91,8 +91,8 @@ HEAVY = ("numpy", "cv2", "scipy", "ruamel", "serial", "mcap", "dynamixel_sdk", "
 """What no help needs; each takes a twentieth of a second of a fast processor or more."""
 
 LIGHT_HELP = (
-    *("", "run", "ctl", "stop", "replay", "report", "compare", "export", "check", "kinds"),
-    *("schema", "record-camera", "fit-scanpath", "ctl set"),
+    *("", "run", "ctl", "stop", "replay", "report", "compare", "sweep", "export", "check"),
+    *("kinds", "schema", "record-camera", "fit-scanpath", "ctl set"),
 )
 """Commands whose help is there at once; that of others imports what speaks to servos."""
 

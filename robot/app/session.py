@@ -32,11 +32,14 @@ from gazerig.robot.recording.run_info import RunInfo, versions
 
 
 class ComposedRun(NamedTuple):
-    """A robot put together for one run, with what reaches into it and what records it."""
+    """A robot put together for one run, with what reaches into it and what records it.
+
+    tuning: None if its parameters cannot be changed from outside
+    """
 
     options: RunOptions
     made: Assembly
-    tuning: ParamStore
+    tuning: ParamStore | None
     recorder: Recorder | None
 
 

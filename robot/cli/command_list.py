@@ -44,6 +44,10 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
         "compare": CommandEntry(
             "report", "Show two runs side by side, with the differences that exceed chance."
         ),
+        "sweep": CommandEntry(
+            "sweep",
+            "Vary parameters over many simulated runs: a table, and a picture of what responds.",
+        ),
         "export": CommandEntry(
             "replay",
             "Write a recorded run as eye-tracking tools read it: degrees, + left and + up.",

@@ -121,6 +121,14 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("report evening.mcap", "how human was the gaze? one HTML file and frames"),
         ("report --scene face-to-face --seconds 120", "the same of a simulated scene"),
     ),
+    "sweep": (
+        ("sweep --set gaze.head.comfort_deg=4:16:7 --seeds 8", "a table and curves of 56 runs"),
+        (
+            "sweep --set gaze.lids.blinks_per_min=8:30:5 --set gaze.lids.close_ms=50,75",
+            "a heat map",
+        ),
+        ("sweep my.yaml --set gaze.head.base_speed_deg_s=40:120 --samples 50", "a sample"),
+    ),
     "compare": (("compare shy.mcap bold.mcap", "two recordings side by side"),),
 }
 """Command -> examples, each with what it is for."""

@@ -1,47 +1,33 @@
 """The commands ``gazerig report`` and ``gazerig compare``: how human the gaze of a run was."""
 
-import sys
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from gazerig.config.faults import ConfigError
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_output import refuse_existing
+from gazerig.robot.cli.progress_bar import Steps, progress_bar
 from gazerig.robot.cli.rig_command import DEFAULT_RIG, RigCommand
 from gazerig.robot.cli.terminal import ForceOption, clear_errors, say, signals
 
 if TYPE_CHECKING:
     from gazerig.config.schema import Rig
     from gazerig.gaze.scanpath import Walk
-    from gazerig.robot.app.assemble import Assembly
     from gazerig.robot.app.options import RunOptions
     from gazerig.robot.recording.read import RunRecording
-    from gazerig.robot.report.gaze_trace import GazeTrace, GazeTraceBuilder
+    from gazerig.robot.report.gaze_trace import GazeTrace
     from gazerig.robot.report.run_header import RunHeader
     from gazerig.robot.report.statistics import MeasureResult
 
 app = typer.Typer(add_completion=False)
 
-_Tell = Callable[[str, float], None]
-
 _PAGES = {".html", ".htm"}
-
-
-class _Layers(NamedTuple):
-    """What a rig is laid together from."""
-
-    rig: str
-    character: str | None
-    profile: str | None
 
 
 @app.command(cls=RigCommand)
@@ -88,17 +74,18 @@ def report(
 
         target = page_file(out or _beside(file, scene))
         refuse_existing(target, numbers_file(target), force=force)
-        with _progress() as tell:
+        with progress_bar() as tell:
             if file is not None:
                 about, run = _recorded(file, file.stem, tell)
             else:
                 from gazerig.robot.app.options import RunOptions
 
                 options = RunOptions(
-                    True, True, seed, scene, scanpath=scanpath, saccade=saccade, bus=bus
-                ).checked()
-                layers = _Layers(rig, character, profile)
-                about, run = _simulated(options, layers, seconds, conversation, tell)
+                    True, True, seed, scene, scanpath=scanpath, saccade=saccade, bus=bus, rig=rig,
+                    character=character, profile=profile, conversation=conversation,
+                    seconds=seconds,
+                ).checked()  # fmt: skip
+                about, run = _simulated(options, tell)
             made = report_of(run, about, target, tell, force)
         if text := banner(run.joints):
             say(text)
@@ -127,7 +114,7 @@ def compare(
         recordings = RunRecording(first), RunRecording(second)
         names = _names(first, second)
         abouts = _about(recordings[0], names[0]), _about(recordings[1], names[1])
-        with used(Path(f"{first} or {second}")), _progress() as tell:
+        with used(Path(f"{first} or {second}")), progress_bar() as tell:
             ticks = recordings[0].ticks(), recordings[1].ticks()
             made = comparing(ticks, abouts, target, tell, force)
         if made.warning:
@@ -143,7 +130,7 @@ def compare(
         say(f"{made.page}: {count} of {len(made.differences)} measures differ by more than chance")
 
 
-def _recorded(file: Path, name: str, tell: _Tell) -> "tuple[RunHeader, GazeTrace]":
+def _recorded(file: Path, name: str, tell: Steps) -> "tuple[RunHeader, GazeTrace]":
     """Read a recorded run."""
     from gazerig.robot.recording.read import RunRecording, used
     from gazerig.robot.report.report import read
@@ -154,71 +141,32 @@ def _recorded(file: Path, name: str, tell: _Tell) -> "tuple[RunHeader, GazeTrace
         return about, read(recording.ticks(), about, tell)
 
 
-def _simulated(
-    options: "RunOptions",
-    layers: _Layers,
-    seconds: float,
-    conversation: str | None,
-    tell: _Tell,
-) -> "tuple[RunHeader, GazeTrace]":
-    """Run a scene in simulated time."""
+def _simulated(options: "RunOptions", tell: Steps) -> "tuple[RunHeader, GazeTrace]":
+    """Run a scene in simulated time; Ctrl-C ends the run early."""
     from gazerig.config.schema import load_rig, load_walk
-    from gazerig.robot.app.assemble import assemble, with_options
-    from gazerig.robot.report.gaze_trace import GazeTraceBuilder
+    from gazerig.robot.app.assemble import with_options
+    from gazerig.robot.app.simulated_run import simulate
+    from gazerig.robot.control.tick import Tick
 
-    rig = load_rig(*layers)
-    made, gathering = assemble(rig, options), GazeTraceBuilder()
-    _run(made, gathering, seconds, conversation, tell)
-    rig = with_options(rig, options)
-    given = zip(("rig", "character", "profile"), layers, strict=True)
+    rig = with_options(load_rig(options.rig, options.character, options.profile), options)
+    seconds, start_s = options.seconds or 0.0, list[float]()
+    text = f"simulating {seconds:.0f} s"
+
+    def watch(tick: Tick) -> None:
+        start_s[:] = start_s or [tick.t_s]
+        tell(text, min(1.0, (tick.t_s - start_s[0]) / seconds))
+
+    with signals() as stopped:
+        run = simulate(rig, options, stopped, watch)
+    layers = ("rig", options.rig), ("character", options.character), ("profile", options.profile)
     facts = (
-        *((name, value) for name, value in given if value is not None),
+        *((name, value) for name, value in layers if value is not None),
         ("scene", f"{options.scene}, simulated"),
-        ("servos", options.bus or "emulated"),
         ("seed", str(options.seed)),
     )
     walk = load_walk(rig.gaze.scanpath.transition_matrix)
-    name = " ".join(filter(None, (options.scene, layers.character, layers.profile)))
-    return _described(name, facts, rig, walk), gathering.gathered()
-
-
-def _run(
-    made: "Assembly",
-    gathering: "GazeTraceBuilder",
-    seconds: float,
-    conversation: str | None,
-    tell: _Tell,
-) -> None:
-    """Run the head for this long; Ctrl-C ends the run early."""
-    from gazerig.robot.app.scripted_behaviour import ScriptedBehaviour
-    from gazerig.robot.control.loop import Tick, run
-
-    text, scene = f"simulating {seconds:.0f} s", made.scene
-    planner = ScriptedBehaviour(scene.behaviour, made.robot.ask) if scene is not None else None
-
-    def watch(tick: Tick) -> None:
-        gathering.update(tick)
-        if planner is not None:
-            planner.update(tick.t_s)
-
-    try:
-        if conversation is not None:
-            made.robot.ask("conversation", conversation)
-        with signals() as stopped:
-
-            def stop(at_s: float) -> str | None:
-                tell(text, min(1.0, at_s / seconds))
-                return stopped() or ("seconds" if at_s >= seconds else None)
-
-            made.robot.start(made.clock)
-            count = run(made.robot, made.clock, made.loop, stop, watch)
-            made.robot.stop()
-    except ValueError as error:
-        raise SetupError(str(error)) from None
-    finally:
-        made.close()
-    if count.stopped_by.startswith("fault"):
-        raise SetupError(f"the simulated run ended by a {count.stopped_by}")
+    name = " ".join(filter(None, (options.scene, options.character, options.profile)))
+    return _described(name, facts, rig, walk), run.trace
 
 
 def _about(recording: "RunRecording", name: str) -> "RunHeader":
@@ -325,19 +273,3 @@ def page_file(out: Path) -> Path:
 
 def _beside(file: Path | None, scene: str | None) -> Path:
     return file.with_suffix(".html") if file is not None else Path(f"report-{scene}.html")
-
-
-@contextmanager
-def _progress() -> Iterator[_Tell]:
-    """Draw a bar for each step on a terminal; nothing elsewhere."""
-    columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, disable=not sys.stderr.isatty()) as bar:
-        steps: dict[str, TaskID] = {}
-
-        def tell(text: str, share: float) -> None:
-            if text not in steps:
-                steps[text] = bar.add_task(text, total=1.0)
-            bar.update(steps[text], completed=share)
-
-        yield tell

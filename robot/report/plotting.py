@@ -67,10 +67,15 @@ def basis_text(runs: Sequence[Shown], group: str) -> str:
 
 def png(drawing: Drawing, runs: Sequence[Shown]) -> bytes:
     """Draw a figure of one run, or of two for comparison."""
+    return png_of(lambda figure: drawing.draw(figure, runs), drawing.size_in)
+
+
+def png_of(draw: Callable[[Figure], None], size_in: tuple[float, float]) -> bytes:
+    """Return what a function draws into an empty figure in the style of all figures."""
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=drawing.size_in, dpi=_DPI, layout="constrained")
+        figure = Figure(figsize=size_in, dpi=_DPI, layout="constrained")
         canvas = FigureCanvasAgg(figure)
-        drawing.draw(figure, runs)
+        draw(figure)
         out = BytesIO()
         # print_figure would draw everything twice, the first time only to lay it out.
         canvas.print_png(out)  # type: ignore[no-untyped-call]

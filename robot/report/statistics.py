@@ -59,16 +59,26 @@ class MeasureResult(NamedTuple):
 
 
 def judged(measured: MeasuredValue, band: NormBand) -> MeasureResult:
-    """Compare a figure with its pass band; too few events are no pass."""
-    value = figure(measured.of, measured.rows)
-    if measured.events < band.least or not isfinite(value):
-        return MeasureResult(band, measured, value, nan, nan, "too few events")
+    """Compare a figure with its pass band, and draw its bootstrap interval."""
+    result = compared(measured, band)
+    if result.verdict == "too few events":
+        return result
     spread = drawn(measured, np.random.default_rng(_SEED))
     # Figures that cannot be below 0 are larger in samples drawn again: that much is taken off.
-    bias = float(spread.mean()) - value
+    bias = float(spread.mean()) - result.value
     low, high = (float(x) - bias for x in np.percentile(spread, (2.5, 97.5)))
-    inside = band.low <= value <= band.high
-    return MeasureResult(band, measured, value, low, high, "pass" if inside else "outside")
+    return result._replace(low95=low, high95=high)
+
+
+def compared(measured: MeasuredValue, band: NormBand) -> MeasureResult:
+    """Compare a figure with its pass band, without an interval; too few events are no pass."""
+    value = figure(measured.of, measured.rows)
+    verdict: VerdictWord = "outside"
+    if measured.events < band.least or not isfinite(value):
+        verdict = "too few events"
+    elif band.low <= value <= band.high:
+        verdict = "pass"
+    return MeasureResult(band, measured, value, nan, nan, verdict)
 
 
 def drawn(measured: MeasuredValue, rng: np.random.Generator, draws: int = _DRAWS) -> Floats:

@@ -1,0 +1,40 @@
+"""Bars for what takes long, on a terminal only."""
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    Progress,
+    TaskID,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+Steps = Callable[[str, float], None]
+"""Told what is being done and the share of it that is done, 0..1."""
+
+
+@contextmanager
+def progress_bar(remaining: bool = False) -> Iterator[Steps]:
+    """Draw a bar for each step on a terminal; nothing elsewhere.
+
+    Args:
+        remaining: show how long it will still take, too.
+    """
+    columns = [TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()]
+    if remaining:
+        columns += [TextColumn("left"), TimeRemainingColumn()]
+    console = Console(stderr=True)
+    with Progress(*columns, console=console, disable=not sys.stderr.isatty()) as bar:
+        steps: dict[str, TaskID] = {}
+
+        def tell(text: str, share: float) -> None:
+            if text not in steps:
+                steps[text] = bar.add_task(text, total=1.0)
+            bar.update(steps[text], completed=share)
+
+        yield tell
