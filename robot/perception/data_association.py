@@ -1,36 +1,36 @@
-"""Who is who: the pairing of tracks and sightings that is likeliest as a whole.
+"""Data association: the pairing of tracks and detections that is likeliest as a whole.
 
 Taking the nearest pair first gives each of two people who pass each other the other's
-sighting whenever one of them happens to be nearer to both places.
+detection whenever one of them happens to be nearer to both places.
 """
 
+from collections.abc import Sequence
 from math import inf
 from typing import Final
-
-import numpy as np
-from numpy.typing import NDArray
-
-Floats = NDArray[np.float64]
 
 FORBIDDEN: Final = 1e6
 """Cost of a pair that cannot be; larger than that of all pairs that can."""
 
 
-def assign(costs: Floats) -> list[tuple[int, int]]:
+def assign(costs: Sequence[Sequence[float]]) -> list[tuple[int, int]]:
     """Return the pairs (row, column) that cost least together; as many pairs as can be.
 
     SciPy has this too, but loading it takes half a second of processor at every start.
 
-    costs: (n, m), FORBIDDEN or not a number where a pair cannot be
+    Args:
+        costs: n rows of m, FORBIDDEN or not a number where a pair cannot be.
     """
-    if costs.size == 0:
+    if not len(costs) or not len(costs[0]):
         return []
-    possible = costs < FORBIDDEN
-    finite = np.where(possible, costs, FORBIDDEN)
-    wide = finite.shape[0] <= finite.shape[1]
-    columns = _shortest_paths((finite if wide else finite.T).tolist())
-    pairs = list(enumerate(columns)) if wide else sorted((j, i) for i, j in enumerate(columns))
-    return [(i, j) for i, j in pairs if possible[i, j]]
+    finite = [[c if c < FORBIDDEN else FORBIDDEN for c in row] for row in costs]
+    if len(finite) == len(finite[0]) == 1:  # one person, most of the time
+        pairs = [(0, 0)]
+    elif len(finite) <= len(finite[0]):
+        pairs = list(enumerate(_shortest_paths(finite)))
+    else:
+        columns = _shortest_paths([list(column) for column in zip(*finite, strict=True)])
+        pairs = sorted((j, i) for i, j in enumerate(columns))
+    return [(i, j) for i, j in pairs if costs[i][j] < FORBIDDEN]
 
 
 def _shortest_paths(costs: list[list[float]]) -> list[int]:

@@ -1,23 +1,32 @@
-"""One thing's place and velocity through time: a constant-velocity Kalman filter.
+"""One thing's position and velocity through time: a constant-velocity Kalman filter.
 
-World frame, metres, seconds. The state is (x, y, z, vx, vy, vz). What moves changes its
+World frame, metres, seconds. What moves changes its
 velocity at random: little most of the time, and much at once when a person starts or
 stops. One noise for both is either nervous or late, so there are two, and an innovation
 too large for the quiet one brings the lively one in (Bar-Shalom, Li & Kirubarajan,
 "Estimation with Applications to Tracking and Navigation", 11.6).
+
+The covariance is kept as its blocks: of the position, of the velocity, and between them. A
+position or a velocity is measured whole, so that both corrections are the same three products.
 """
 
 from math import exp
 from typing import NamedTuple
 
-import cv2
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-from gazerig.gaze.angles import sub, unit
+from gazerig.gaze.angles import sub
 from gazerig.gaze.types import Vec3
-
-Floats = NDArray[np.float64]
+from gazerig.robot.perception.symmetric import (
+    Flat9,
+    Sym3,
+    applied,
+    full,
+    inverse,
+    less_product,
+    plus,
+    squared_length,
+    times,
+    transposed,
+)
 
 # Accelerations are taken to last this long, which makes the noise one of the time and not
 # of the rate of frames.
@@ -27,13 +36,7 @@ _SURPRISING = 11.3
 # What is not seen moves on, but less and less surely: people stop.
 _STOPS_WITHIN_S = 1.0
 
-_PLACE = np.hstack((np.eye(3), np.zeros((3, 3))))
-_VELOCITY = np.hstack((np.zeros((3, 3)), np.eye(3)))
-# Where the parts of a covariance (6, 6) stand.
-_I3 = np.eye(3)
-_OF_PLACE, _OF_VELOCITY = _PLACE.T @ _PLACE, _VELOCITY.T @ _VELOCITY
-_OF_BOTH = _PLACE.T @ _VELOCITY + _VELOCITY.T @ _PLACE
-_MOVE = _PLACE.T @ _VELOCITY
+_NONE: Flat9 = (0.0,) * 9
 
 
 class ProcessNoise(NamedTuple):
@@ -44,18 +47,30 @@ class ProcessNoise(NamedTuple):
 
 
 class TrackFilter:
-    """The filter of one track. Numbers given to it must be finite."""
+    """The filter of one track. Numbers given to it must be finite.
 
-    def __init__(self, p_m: Vec3, cov_m2: Floats, speed_sd_m_s: float, noise: ProcessNoise) -> None:
+    Args:
+        p_m: first position.
+        cov_m2: its covariance.
+        speed_sd_m_s: standard deviation of the velocity, which begins at 0.
+        noise: of the process.
+
+    p_m, v_m_s: position and velocity
+    p_cov, v_cov: their covariances; pv_cov: the covariance of position (rows) and velocity
+    """
+
+    def __init__(self, p_m: Vec3, cov_m2: Sym3, speed_sd_m_s: float, noise: ProcessNoise) -> None:
         self._noise = noise
         self._unseen_s = 0.0
-        # OpenCV's filter: a prediction and a correction take 37 us, in numpy 170.
-        self._kalman = cv2.KalmanFilter(6, 3, 0, cv2.CV_64F)
-        cov = _PLACE.T @ cov_m2 @ _PLACE + speed_sd_m_s**2 * _OF_VELOCITY
-        self._keep(np.array((*p_m, 0.0, 0.0, 0.0)), cov)
+        var = speed_sd_m_s * speed_sd_m_s
+        self.p_m: Vec3 = p_m
+        self.v_m_s: Vec3 = (0.0, 0.0, 0.0)
+        self.p_cov = cov_m2
+        self.pv_cov = _NONE
+        self.v_cov: Sym3 = (var, 0.0, 0.0, var, 0.0, var)
 
     def retune(self, noise: ProcessNoise) -> None:
-        """Believe in another restlessness; place and velocity stay."""
+        """Use another process noise; position and velocity stay."""
         self._noise = noise
 
     def predict(self, dt_s: float, seen: bool = True) -> None:
@@ -64,72 +79,105 @@ class TrackFilter:
             return
         kept = 1.0 if seen else exp(-dt_s / _STOPS_WITHIN_S)
         self._unseen_s += dt_s
-        move = _OF_PLACE + dt_s * _MOVE + kept * _OF_VELOCITY
-        state = move @ self.state
-        cov = move @ self.cov @ move.T + _wander(self._noise.quiet_m_s2, dt_s)
-        self._keep(state, cov)
+        (x, y, z), (vx, vy, vz) = self.p_m, self.v_m_s
+        self.p_m = (x + dt_s * vx, y + dt_s * vy, z + dt_s * vz)
+        self.v_m_s = (kept * vx, kept * vy, kept * vz)
+        V, C, P = self.v_cov, self.pv_cov, self.p_cov
+        a, b, c, d, e, f = V
+        # Position and velocity after the move, then both with the position before it.
+        D = (
+            C[0] + dt_s * a, C[1] + dt_s * b, C[2] + dt_s * c,
+            C[3] + dt_s * b, C[4] + dt_s * d, C[5] + dt_s * e,
+            C[6] + dt_s * c, C[7] + dt_s * e, C[8] + dt_s * f,
+        )  # fmt: skip
+        self.p_cov = (
+            P[0] + dt_s * (C[0] + D[0]),
+            P[1] + dt_s * (C[3] + D[1]),
+            P[2] + dt_s * (C[6] + D[2]),
+            P[3] + dt_s * (C[4] + D[4]),
+            P[4] + dt_s * (C[7] + D[5]),
+            P[5] + dt_s * (C[8] + D[8]),
+        )
+        if not seen:
+            k2 = kept * kept
+            D = tuple([kept * one for one in D])  # type: ignore[assignment]
+            self.v_cov = (k2 * a, k2 * b, k2 * c, k2 * d, k2 * e, k2 * f)
+        self.pv_cov = D
+        self._wander(self._noise.quiet_m_s2, dt_s)
 
-    def correct(self, p_m: Vec3, cov_m2: Floats) -> None:
-        """Update with a measured position (3,) and its covariance (3, 3)."""
-        off = np.subtract(p_m, self.state[:3])
-        if off @ np.linalg.solve(self.cov[:3, :3] + cov_m2, off) > _SURPRISING:
+    def correct(self, p_m: Vec3, cov_m2: Sym3) -> None:
+        """Update with a measured position and its covariance."""
+        off = sub(p_m, self.p_m)
+        information, _ = inverse(plus(self.p_cov, cov_m2))
+        if squared_length(off, information) > _SURPRISING:
             # Whatever happened may have happened at any time since the last look: a place
             # that was long unseen and is off tells less of the velocity of now.
-            more = _wander(self._noise.lively_m_s2, self._unseen_s)
-            self._keep(self.state, self.cov + more)
+            self._wander(self._noise.lively_m_s2, self._unseen_s)
+            information, _ = inverse(plus(self.p_cov, cov_m2))
         self._unseen_s = 0.0
-        self._correct(_PLACE, p_m, cov_m2)
+        step = applied(information, off)
+        P, C = full(self.p_cov), self.pv_cov
+        self.p_m = _moved(self.p_m, P, step)
+        self.v_m_s = _moved(self.v_m_s, C, step)
+        N = times(information, C)
+        self.v_cov = less_product(self.v_cov, C, N)
+        self.pv_cov = _less(C, P, N)
+        self.p_cov = less_product(self.p_cov, P, times(information, P))
 
-    def correct_velocity(self, v_m_s: Vec3, cov_m2_s2: Floats) -> None:
-        """Update with a measured velocity (3,) and its covariance (3, 3)."""
-        self._correct(_VELOCITY, v_m_s, cov_m2_s2)
+    def correct_velocity(self, v_m_s: Vec3, cov_m2_s2: Sym3) -> None:
+        """Update with a measured velocity and its covariance."""
+        information, _ = inverse(plus(self.v_cov, cov_m2_s2))
+        step = applied(information, sub(v_m_s, self.v_m_s))
+        V, C = full(self.v_cov), transposed(self.pv_cov)
+        self.p_m = _moved(self.p_m, C, step)
+        self.v_m_s = _moved(self.v_m_s, V, step)
+        N = times(information, C)
+        self.p_cov = less_product(self.p_cov, C, N)
+        self.pv_cov = transposed(_less(C, V, N))
+        self.v_cov = less_product(self.v_cov, V, times(information, V))
 
-    @property
-    def state(self) -> Floats:
-        """Return place and velocity: (6,)."""
-        state: Floats = self._state
-        return state
+    def cov_rows(self) -> list[list[float]]:
+        """Return the covariance of position and velocity, row by row: 6 x 6."""
+        C = self.pv_cov
+        D, P, V = transposed(C), full(self.p_cov), full(self.v_cov)
+        return [
+            [*P[0:3], *C[0:3]],
+            [*P[3:6], *C[3:6]],
+            [*P[6:9], *C[6:9]],
+            [*D[0:3], *V[0:3]],
+            [*D[3:6], *V[3:6]],
+            [*D[6:9], *V[6:9]],
+        ]
 
-    @property
-    def cov(self) -> Floats:
-        """Return their covariance: (6, 6)."""
-        cov: Floats = self._cov
-        return cov
-
-    def _correct(self, seen: Floats, value: Vec3, noise: Floats) -> None:
-        kalman = self._kalman
-        kalman.measurementMatrix = seen
-        kalman.measurementNoiseCov = noise
-        kalman.correct(np.array(value))
-        state, cov = np.array(kalman.statePost, float), np.array(kalman.errorCovPost, float)
-        self._keep(state[:, 0], cov)
-
-    def _keep(self, state: Floats, cov: Floats) -> None:
-        """Set the state, with its covariance made symmetric again after rounding."""
-        self._state, self._cov = state, 0.5 * (cov + cov.T)
-        kalman = self._kalman
-        kalman.statePre = kalman.statePost = state[:, None]
-        kalman.errorCovPre = kalman.errorCovPost = self._cov
-
-
-def sight_cov(p_m: Vec3, p_eye_m: Vec3, across_sd: float, along_sd: float) -> Floats:
-    """Return the covariance (3, 3) of what is known differently across and along the view."""
-    view = np.array(unit(sub(p_m, p_eye_m)))
-    more = along_sd**2 - across_sd**2
-    cov: Floats = across_sd**2 * _I3 + more * (view[:, None] * view)
-    return cov
+    def _wander(self, accel_m_s2: float, dt_s: float) -> None:
+        """Add the covariance that random acceleration makes in a time."""
+        v = accel_m_s2 * accel_m_s2 * _ACCELERATION_LASTS_S * dt_s
+        pv = v * dt_s / 2.0
+        p = v * dt_s * dt_s / 3.0
+        a, b, c, d, e, f = self.p_cov
+        self.p_cov = (a + p, b, c, d + p, e, f + p)
+        g, h, i, j, k, l_, m, n, o = self.pv_cov
+        self.pv_cov = (g + pv, h, i, j, k + pv, l_, m, n, o + pv)
+        a, b, c, d, e, f = self.v_cov
+        self.v_cov = (a + v, b, c, d + v, e, f + v)
 
 
-def far_off(off_m: ArrayLike, cov_m2: Floats) -> float:
-    """Return the squared Mahalanobis length of a difference of places."""
-    off = np.asarray(off_m, dtype=np.float64)
-    return float(off @ np.linalg.solve(cov_m2, off))
-
-
-def _wander(accel_m_s2: float, dt_s: float) -> Floats:
-    """Return the covariance (6, 6) that random acceleration adds in a time."""
-    power = accel_m_s2**2 * _ACCELERATION_LASTS_S
-    cov: Floats = power * (
-        dt_s**3 / 3.0 * _OF_PLACE + dt_s**2 / 2.0 * _OF_BOTH + dt_s * _OF_VELOCITY
+def _moved(at: Vec3, M: Flat9, step: Vec3) -> Vec3:
+    """Return a + M^T s."""
+    x, y, z = step
+    return (
+        at[0] + M[0] * x + M[3] * y + M[6] * z,
+        at[1] + M[1] * x + M[4] * y + M[7] * z,
+        at[2] + M[2] * x + M[5] * y + M[8] * z,
     )
-    return cov
+
+
+def _less(A: Flat9, M: Flat9, N: Flat9) -> Flat9:
+    """Return A - M N, M being symmetric."""
+    a, b, c, _, e, f, _, _, i = M
+    p, q, r, s, t, u, v, w, x = N
+    return (
+        A[0] - a * p - b * s - c * v, A[1] - a * q - b * t - c * w, A[2] - a * r - b * u - c * x,
+        A[3] - b * p - e * s - f * v, A[4] - b * q - e * t - f * w, A[5] - b * r - e * u - f * x,
+        A[6] - c * p - f * s - i * v, A[7] - c * q - f * t - i * w, A[8] - c * r - f * u - i * x,
+    )  # fmt: skip

@@ -6,14 +6,14 @@ things (same_person); tracks give all of them identities and velocities (tracks)
 """
 
 from collections.abc import Mapping
-from math import hypot, radians
+from math import hypot, radians, sqrt
 
 import numpy as np
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import Detections, LocatedFrame
 from gazerig.gaze.angles import add, norm, rotate, scale, sub, unit
-from gazerig.gaze.types import PARTS, Bodies, Face, Percept, Vec3
+from gazerig.gaze.types import PARTS, Bodies, Face, Mat3, Percept, Vec3
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, LensParams, PoseHistory
 from gazerig.robot.perception.egomotion_residual import (
@@ -25,6 +25,7 @@ from gazerig.robot.perception.egomotion_residual import (
 from gazerig.robot.perception.frame_locator import SIZE_SPREAD, DepthAt, FrameLocator
 from gazerig.robot.perception.hand_ownership import Known, without_own_motion
 from gazerig.robot.perception.localisation import placed
+from gazerig.robot.perception.symmetric import squared_length
 from gazerig.robot.perception.tracker import Track, Tracker
 
 # The head's turn at a capture is taken over so long before and after it.
@@ -73,7 +74,6 @@ class Perception:
     ) -> None:
         """Change field of view, parts and lens, from the next frame on."""
         own = parts_face_m or {}
-        # A measured part is where it was measured; a canonical one is stretched with the face.
         self._parts = tuple((own.get(code, PARTS_FACE_M[code]), code in own) for code in PARTS)
         self._locator = FrameLocator(lens, radians(horizontal_field_deg), self._depth_at)
         self._size_px = (0, 0)
@@ -89,12 +89,10 @@ class Perception:
         t_s = detections.captured_s
         R, p = self._mount.pose(*poses.head_pose(t_s))
         located = self._located(detections)
-        faces, things = without_own_motion(
-            [placed(face, R, p) for face in located.faces],
-            [placed(thing, R, p) for thing in located.things],
-            self._known(t_s),
-            p,
-        )
+        faces = [placed(face, R, p) for face in located.faces]
+        things = [placed(thing, R, p) for thing in located.things]
+        if things:
+            faces, things = without_own_motion(faces, things, self._known(t_s), p)
         self._tracks = tracks = self._tracker.step([*faces, *things], p, t_s)
         self._p_camera = p
         self._note_residual(t_s, poses)
@@ -146,23 +144,41 @@ class Perception:
         """Return a tracked face with its eight parts."""
         R = track.R_world_face
         assert R is not None  # faces are tracked with their pose
-        p, size = track.p_world_m, track.face_size
-        tall = size * track.face_length
+        p = track.p_world_m
         across_sd, along_sd = _deviations(track, self._p_camera)
-        parts = (
-            (x, y, z) if own else (x * size, y * size, z * tall) for (x, y, z), own in self._parts
-        )
         return Face(
             track.id,
             p,
             track.v_world_m_s,
             R,
-            tuple(add(p, rotate(R, part)) for part in parts),
+            self._face_parts(R, p, track.face_size, track.face_length),
             track.sighting.confidence,
             track.depth_from,
             across_sd,
             along_sd,
         )
+
+    def _face_parts(self, R: Mat3, p: Vec3, size: float, length: float) -> tuple[Vec3, ...]:
+        """Return the eight parts of a face in the world.
+
+        A measured part is where it was measured; a canonical one is stretched with the face.
+        """
+        (a, b, c), (d, e, f), (g, h, i) = R
+        px, py, pz = p
+        tall = size * length
+        a, d, g, b, e, h = a * size, d * size, g * size, b * size, e * size, h * size
+        c, f, i = c * tall, f * tall, i * tall
+        parts = [
+            add(p, rotate(R, at))
+            if own
+            else (
+                px + a * at[0] + b * at[1] + c * at[2],
+                py + d * at[0] + e * at[1] + f * at[2],
+                pz + g * at[0] + h * at[1] + i * at[2],
+            )
+            for at, own in self._parts
+        ]
+        return tuple(parts)
 
     def _lens(self, found: Detections) -> Intrinsics:
         """Return the intrinsics of a frame, computed once for frames of one size."""
@@ -176,31 +192,36 @@ class Perception:
 
 
 def _deviations(track: Track, p_camera: Vec3) -> tuple[float, float]:
-    """Return how well a face's place is known, across and along the view.
+    """Return how well a face's position is known, across and along the view.
 
     The filter knows of what changes from frame to frame; that this person's face is
     not of the usual size is the same in all of them.
     """
     way = sub(track.p_world_m, p_camera)
-    view = np.array(unit(way))
-    cov = track.cov[:3, :3]
-    along = float(view @ cov @ view)
-    across = 0.5 * max(0.0, float(np.trace(cov)) - along)
+    cov = track.filter.p_cov
+    along = squared_length(unit(way), cov)
+    across = 0.5 * max(0.0, cov[0] + cov[3] + cov[5] - along)
     unknown_size = 0.0 if track.depth_s is not None else SIZE_SPREAD * norm(way)
-    return across**0.5, hypot(max(0.0, along) ** 0.5, unknown_size)
+    return sqrt(across), hypot(sqrt(max(0.0, along)), unknown_size)
 
 
 def _bodies(tracks: tuple[Track, ...], p_camera: Vec3) -> Bodies:
     """List faces and moving things alike; a spin seen in the image is about the view line."""
-    spins = [
-        scale(unit(sub(track.p_world_m, p_camera)), track.sighting.spin_rad_s) for track in tracks
-    ]
+    if not tracks:
+        return Bodies(pv_cov=np.zeros((0, 6, 6)))
+    spins = [_spin(track, p_camera) for track in tracks]
     return Bodies(
-        tuple(track.id for track in tracks),
-        tuple(track.sighting.kind for track in tracks),
-        np.array([track.p_world_m for track in tracks]).reshape(-1, 3),
-        np.array([track.v_world_m_s for track in tracks]).reshape(-1, 3),
-        np.array(spins).reshape(-1, 3),
+        tuple([track.id for track in tracks]),
+        tuple([track.sighting.kind for track in tracks]),
+        np.array([track.p_world_m for track in tracks]),
+        np.array([track.v_world_m_s for track in tracks]),
+        np.array(spins),
         np.array([track.sighting.radius_m for track in tracks]),
-        np.array([track.cov for track in tracks]).reshape(-1, 6, 6),
+        np.array([track.filter.cov_rows() for track in tracks]),
     )
+
+
+def _spin(track: Track, p_camera: Vec3) -> Vec3:
+    """Return the angular velocity of what spins about the line of view."""
+    spin = track.sighting.spin_rad_s
+    return scale(unit(sub(track.p_world_m, p_camera)), spin) if spin else (0.0, 0.0, 0.0)

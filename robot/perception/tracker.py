@@ -1,21 +1,20 @@
-"""Who is who from frame to frame: identities, places and velocities of what is seen.
+"""Tracking: identities, positions and velocities of what is seen, from frame to frame.
 
-World frame, metres. Every sighting brings its own uncertainty, which along the line of
-view may be many times that across it; a pair of track and sighting is judged by the
-distance in these terms, all pairs together (assignment), and the track takes the sighting
-in by a Kalman filter (track_filter).
+World frame, metres. Every detection brings its own uncertainty, which along the line of
+view may be many times that across it; a pair of track and detection is judged by the
+distance in these terms, all pairs together (data_association), and the track is updated with
+the detection by a Kalman filter (kalman).
 """
 
 from dataclasses import dataclass
 from math import hypot, log
 
-import numpy as np
-
 from gazerig.gaze.angles import add, cross, norm, scale, sub, unit
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.data_association import FORBIDDEN, assign
-from gazerig.robot.perception.kalman import Floats, ProcessNoise, TrackFilter, far_off, sight_cov
+from gazerig.robot.perception.kalman import ProcessNoise, TrackFilter
+from gazerig.robot.perception.symmetric import inverse, plus, sight_cov, squared_length
 
 # Two numbers of the detector for one thing, as a cost: 4 standard deviations.
 _OTHER_MARK = 16.0
@@ -78,20 +77,13 @@ class Track:
 
     @property
     def p_world_m(self) -> Vec3:
-        """Return the place at ``at_s``."""
-        x, y, z = self.filter.state[:3].tolist()
-        return x, y, z
+        """Return the position at ``at_s``."""
+        return self.filter.p_m
 
     @property
     def v_world_m_s(self) -> Vec3:
         """Return the velocity."""
-        x, y, z = self.filter.state[3:].tolist()
-        return x, y, z
-
-    @property
-    def cov(self) -> Floats:
-        """Return the covariance (6, 6) of place and velocity."""
-        return self.filter.cov
+        return self.filter.v_m_s
 
     @property
     def depth_from(self) -> str:
@@ -122,18 +114,17 @@ class Tracker:
     def step(
         self, sightings: list[LocalisedDetection], p_world_camera_m: Vec3, t_s: float
     ) -> tuple[Track, ...]:
-        """Join one image's sightings to the tracks; give those that are there now."""
+        """Associate the detections of one frame with the tracks; return the tracks in sight."""
         par = self._params
         for track in self._tracks:
             track.filter.predict(t_s - track.at_s, seen=track.seen_s == track.at_s)
             track.at_s = t_s
-        costs = np.array(
+        pairs = assign(
             [
                 [self._cost(track, sighting, p_world_camera_m) for sighting in sightings]
                 for track in self._tracks
             ]
         )
-        pairs = assign(costs)
         for i, j in pairs:
             self._update(self._tracks[i], sightings[j], p_world_camera_m)
         taken = {j for _, j in pairs}
@@ -162,11 +153,13 @@ class Tracker:
         # What people do that no filter expects: a lunge, a jump of the detector.
         surprise = wide / par.gate_sigma
         across, along = hypot(sighting.across_sd_m, surprise), hypot(sighting.along_sd_m, surprise)
-        cov = track.cov[:3, :3] + sight_cov(place, p_camera, across, along)
-        far = far_off(off, cov)
+        information, det = inverse(
+            plus(track.filter.p_cov, sight_cov(place, p_camera, across, along))
+        )
+        far = squared_length(off, information)
         if far > par.gate_sigma**2:
             return FORBIDDEN
-        known = log(float(np.linalg.det(cov)) / (across**4 * along**2))
+        known = log(det / (across**4 * along**2))
         return far + known + (0.0 if _same_mark(track, sighting) else _OTHER_MARK)
 
     def _gate_m(self, track: Track, sighting: LocalisedDetection, far_m: float) -> float:
