@@ -8,15 +8,15 @@ highest factor keeps the rule's whole constant, which the paper's comparison nee
 person alone is not left for habituation, and several people share the gaze.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gazerig.gaze.angles import add, scale, sub
-from gazerig.gaze.bottom_up import BottomUp, SalienceTerms
+from gazerig.gaze.bottom_up import BottomUp, SalienceRow
 from gazerig.gaze.field_of_view import FieldOfView, line_of_sight
 from gazerig.gaze.habituation import Habituation, HabituationParams
 from gazerig.gaze.idle import Idle
@@ -27,6 +27,8 @@ from gazerig.params import Bounds
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _POINT = ("point", -1)
 _LISTED = 4
+_FEW = 24
+"""So many bodies are computed one by one, which costs less than arrays do."""
 _SPEED_OVER_S = 0.2  # a speed of the head from positions farther apart says nothing
 
 
@@ -46,18 +48,20 @@ class AttentionParams:
 class _Choice(NamedTuple):
     """Amounts of one decision.
 
-    motion:   of the n bodies, term by term
+    motion:   returns the terms of one of the n bodies
     rule, habituation, total: (n + 1,), the point that a rule may name coming after the
         bodies; the rule's constant, the factor of habituation, and the amount compared, which
         is -inf where there is nothing
+    best: row of the largest total
     """
 
     bodies: Bodies
-    motion: SalienceTerms
+    motion: Callable[[int], SalienceRow]
     rule_target: RuleTarget | None
-    rule: Floats
-    habituation: Floats
-    total: Floats
+    rule: Floats | list[float]
+    habituation: Floats | list[float]
+    total: Floats | list[float]
+    best: int
 
 
 class Attention:
@@ -107,41 +111,73 @@ class Attention:
             if self._target is not None and self._target.id >= 0:
                 self._idle.remember(self._target)
         if self._target is not None and fresh:
-            return self._settle(self._target, t_s)
+            self._target = self._settle(self._target, t_s)
+            return self._target
         return self._settle(self._idle.step(t_s), t_s)
 
     def _settle(self, target: Target, t_s: float) -> Target:
         """Count a gaze shift whenever another object is looked at."""
+        place, self._place = self._place, target.p_world_m
         identity = (target.kind, target.id)
+        if identity == self._identity and target.shift == self._shift:
+            return target
         if identity != self._identity:
             if self._identity is not None:
-                self._habituation.leave(self._place, t_s)
+                self._habituation.leave(place, t_s)
             self._identity = identity
             self._shift += 1
             self._since_s = t_s
-        self._place = target.p_world_m
         return target._replace(shift=self._shift)
 
     def _decide(self, percept: Percept, state: GazeState, t_s: float) -> Target | None:
         """Return the target of the most salient visible body or rule, None where there is none."""
-        visible = self._field_of_view.visible(percept.bodies, state)
-        made = self._compare(percept.bodies, visible, state, t_s)
-        if made.total.max(initial=-inf) == -inf:
+        compare = self._compare_few if len(percept.bodies) <= _FEW else self._compare
+        made = compare(percept.bodies, state, t_s)
+        if made.total[made.best] == -inf:
             return None
         row = self._winner(made, t_s)
         if made.rule_target is not None and row in made.rule_target.rows:
             self._favoured_id = made.bodies.ids[row]
         return _target(made, row, percept.captured_s)
 
-    def _compare(
-        self, bodies: Bodies, seen: NDArray[np.bool_], state: GazeState, t_s: float
-    ) -> _Choice:
+    def _compare_few(self, bodies: Bodies, state: GazeState, t_s: float) -> _Choice:
+        """Return what ``_compare`` does, for few bodies."""
+        n, eye, rows = len(bodies), state.p_world_head_m, bodies.rows()
+        seen = self._field_of_view.visible_rows(bodies, rows, state)
+        v_eye = self._eye_velocity(eye, t_s)
+        motion = self._bottom_up.step_rows(rows, eye, t_s, v_eye, self._gaze(state), seen)
+        rule_target = self.top_down.step_rows(rows, seen, eye, self._favoured_id)
+        attended = self._identity[1] if self._identity is not None else -1
+        habituation = [*self._habituation.step_rows(rows, eye, attended, t_s), 1.0]
+        rule = [0.0] * (n + 1)
+        amount = [*[sum(terms) for terms in motion], 0.0]
+        point = rule_target is not None and rule_target.point_world_m is not None
+        if rule_target is not None:
+            wanted = [n] if point else rule_target.rows
+            for row in wanted:
+                rule[row] = rule_target.salience
+                amount[row] = max(amount[row], rule_target.salience)
+            if not point:
+                share = [
+                    self._habituation.for_rule(habituation[row]) * near
+                    for row, near in zip(wanted, rule_target.nearness, strict=True)
+                ]
+                most = max(*share, 1e-9)
+                for row, one in zip(wanted, share, strict=True):
+                    habituation[row] = one / most
+        total = [
+            one * factor if there else -inf
+            for one, factor, there in zip(amount, habituation, (*seen, point), strict=True)
+        ]
+        best = total.index(max(total))
+        return _Choice(bodies, motion.__getitem__, rule_target, rule, habituation, total, best)
+
+    def _compare(self, bodies: Bodies, state: GazeState, t_s: float) -> _Choice:
         """Return everything that the decision rests on."""
         n, eye = len(bodies), state.p_world_head_m
-        gaze_direction = add(line_of_sight(state, left=True), line_of_sight(state, left=False))
-        motion = self._bottom_up.step(
-            bodies, eye, t_s, self._eye_velocity(eye, t_s), gaze_direction, seen
-        )
+        seen = self._field_of_view.visible(bodies, state)
+        v_eye = self._eye_velocity(eye, t_s)
+        motion = self._bottom_up.step(bodies, eye, t_s, v_eye, self._gaze(state), seen)
         rule_target = self.top_down.step(bodies, seen, eye, self._favoured_id)
         attended = self._identity[1] if self._identity is not None else -1
         habituation, rule = np.ones(n + 1), np.zeros(n + 1)
@@ -158,7 +194,14 @@ class Attention:
         total[:n][~seen] = -inf
         if rule_target is None or rule_target.point_world_m is None:
             total[n] = -inf
-        return _Choice(bodies, motion, rule_target, rule, habituation, total)
+        best = int(total.argmax())
+        return _Choice(bodies, motion.row, rule_target, rule, habituation, total, best)
+
+    def _gaze(self, state: GazeState) -> Vec3:
+        """Return where both eyes look, of any length, where the salience goes by it."""
+        if not self._bottom_up.needs_gaze:
+            return _STILL
+        return add(line_of_sight(state, left=True), line_of_sight(state, left=False))
 
     def _eye_velocity(self, p_eye_m: Vec3, t_s: float) -> Vec3:
         """Return how fast the head has carried the eyes since the decision before, m/s."""
@@ -169,7 +212,7 @@ class Attention:
 
     def _winner(self, made: _Choice, t_s: float) -> int:
         """Return the row of the strongest, the present one being favoured."""
-        best = int(made.total.argmax())
+        best = made.best
         # A change of mind does not wait for the end of a fixation.
         changed = self._behaviour != self.top_down.behaviour
         self._behaviour = self.top_down.behaviour
@@ -219,13 +262,15 @@ def _target(made: _Choice, row: int, captured_s: float) -> Target:
 def _strongest(made: _Choice, row: int) -> tuple[Salience, ...]:
     """Return the saliences of a row and of the highest others, term by term."""
     total = made.total
-    if len(total) > 64:
-        rows = np.argpartition(-total, _LISTED)[:_LISTED]
-        rows = rows[np.argsort(-total[rows], kind="stable")]
+    if isinstance(total, list):
+        rows = sorted(range(len(total)), key=lambda each: -total[each])
+    elif len(total) > 64:
+        some = np.argpartition(-total, _LISTED)[:_LISTED]
+        rows = some[np.argsort(-total[some], kind="stable")].tolist()
     else:
-        rows = np.argsort(-total, kind="stable")[:_LISTED]
-    others = [other for other in rows.tolist() if other != row and total[other] > -inf]
-    return tuple(_salience(made, each) for each in (row, *others[: _LISTED - 1]))
+        rows = np.argsort(-total, kind="stable").tolist()
+    others = [other for other in rows[:_LISTED] if other != row and total[other] > -inf]
+    return tuple([_salience(made, each) for each in (row, *others[: _LISTED - 1])])
 
 
 def _salience(made: _Choice, row: int) -> Salience:
@@ -234,9 +279,8 @@ def _salience(made: _Choice, row: int) -> Salience:
     total = float(made.total[row])
     if row == len(made.bodies):
         return Salience(-1, "point", 0.0, 0.0, 0.0, 0.0, rule, habituation, total)
-    translation, looming, rotation, onset = (float(term[row]) for term in made.motion)
     name, kind = made.bodies.ids[row], made.bodies.kinds[row]
-    return Salience(name, kind, translation, looming, rotation, onset, rule, habituation, total)
+    return Salience(name, kind, *made.motion(row), rule, habituation, total)
 
 
 def _terms(salience: Salience) -> str:

@@ -14,18 +14,20 @@ retinal   What the paper's reason, the image on the retina, demands: e from the 
 What has just come into view has a further, decaying term: the paper's behaviour
 (e), a hand that reaches in from outside the field, is not in eq 1.
 
-All bodies are computed at once; what is remembered of each is a row of an array.
+All bodies are computed at once; what is remembered of each is a row of an array. Of the few that
+there usually are each is computed by itself, in plain arithmetic: a handful of numbers costs
+less so than one call of NumPy.
 """
 
 from dataclasses import dataclass
-from math import exp
+from math import exp, sqrt
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.field_of_view import BLOCK, columns
-from gazerig.gaze.types import Bodies, Floats, Vec3
+from gazerig.gaze.types import Bodies, BodyRows, Floats, Vec3
 from gazerig.params import Bounds
 
 Ids = NDArray[np.int64]
@@ -63,6 +65,15 @@ class MotionTerms(NamedTuple):
     rotation: Floats
 
 
+class SalienceRow(NamedTuple):
+    """Amount of attention of one body, term by term."""
+
+    translation: float
+    looming: float
+    rotation: float
+    onset: float
+
+
 class SalienceTerms(NamedTuple):
     """Amount of attention of each body, term by term: (n,) arrays."""
 
@@ -78,6 +89,10 @@ class SalienceTerms(NamedTuple):
         total += self.rotation
         total += self.onset
         return total
+
+    def row(self, index: int) -> SalienceRow:
+        """Return the terms of one body."""
+        return SalienceRow(*[float(term[index]) for term in self])
 
 
 def motion_terms(v: Floats, w: Floats, e: Floats) -> MotionTerms:
@@ -101,6 +116,9 @@ def _length(v: Floats) -> Floats:
     """Return the lengths of the columns of a (3, n) array."""
     out: Floats = np.sqrt((v * v).sum(axis=0))
     return out
+
+
+_UNSEEN = SalienceRow(0.0, 0.0, 0.0, 0.0)
 
 
 class _Memory(NamedTuple):
@@ -136,6 +154,11 @@ class BottomUp:
         """Change the reference motions; the state of the bodies stays."""
         self._params = params
 
+    @property
+    def needs_gaze(self) -> bool:
+        """Return whether the form in force goes by where the eyes look."""
+        return self._params.form == "literal"
+
     def reset(self, t_s: float) -> None:
         """Forget all bodies."""
         self._ids: tuple[int, ...] = ()
@@ -167,6 +190,72 @@ class BottomUp:
         if bodies.ids != self._ids:
             self._remember(bodies.ids, t_s)
         return self._blend(now, seen, t_s)
+
+    def step_rows(
+        self,
+        rows: BodyRows,
+        p_world_eye_m: Vec3,
+        t_s: float,
+        v_world_eye_m_s: Vec3,
+        gaze_world: Vec3,
+        seen: list[bool],
+    ) -> list[SalienceRow]:
+        """Return what ``step`` does for few bodies, one row a body."""
+        self._pause(t_s)
+        if rows.ids != self._ids:
+            self._remember(rows.ids, t_s)
+        tau, onset_s, old = self._params.smoothing_s, self._params.onset_s, self._memory
+        keep = exp(min(0.0, self._at_s - t_s) / tau) if tau > 0.0 else 0.0
+        entered_s, seen_s = old.entered_s.tolist(), old.seen_s.tolist()
+        past: list[list[float]] = old.terms.T.tolist()
+        found = []
+        for i, in_view in enumerate(seen):
+            if not in_view:
+                past[i] = [0.0, 0.0, 0.0]
+                found.append(_UNSEEN)
+                continue
+            now = self._row(rows, i, p_world_eye_m, v_world_eye_m_s, gaze_world)
+            if t_s - seen_s[i] > _BLINK_S:
+                past[i], entered_s[i] = [0.0, 0.0, 0.0], self._entry_s(t_s)
+            seen_s[i] = t_s
+            slide, loom, spin = past[i]
+            slide += (1.0 - keep) * (now[0] - slide)
+            loom += (1.0 - keep) * (now[1] - loom)
+            spin += (1.0 - keep) * (now[2] - spin)
+            past[i] = [slide, loom, spin]
+            onset = self._params.onset_salience * exp((entered_s[i] - t_s) / onset_s)
+            found.append(SalienceRow(slide, loom, spin, onset))
+        terms = np.array(past).reshape(-1, 3).T
+        self._memory = _Memory(old.ids, terms, np.array(entered_s), np.array(seen_s))
+        self._at_s = t_s
+        return found
+
+    def _row(
+        self, rows: BodyRows, i: int, p_eye: Vec3, v_eye: Vec3, gaze: Vec3
+    ) -> tuple[float, float, float]:
+        """Return slide, loom and spin of one body as they are now, as ``_terms`` does of all."""
+        par = self._params
+        (vx, vy, vz), (wx, wy, wz) = rows.v_world_m_s[i], rows.w_world_rad_s[i]
+        if par.form == "literal":
+            x, y, z = gaze
+        else:
+            px, py, pz = rows.p_world_m[i]
+            x, y, z = px - p_eye[0], py - p_eye[1], pz - p_eye[2]
+            vx, vy, vz = vx - v_eye[0], vy - v_eye[1], vz - v_eye[2]
+        length = sqrt(x * x + y * y + z * z)
+        over = max(length, 1e-300)
+        x, y, z = x / over, y / over, z / over
+        along = vx * x + vy * y + vz * z
+        ax, ay, az = vx - along * x, vy - along * y, vz - along * z
+        across, spin = sqrt(ax * ax + ay * ay + az * az), abs(wx * x + wy * y + wz * z)
+        if par.form == "literal":
+            return across, abs(along), spin
+        distance = max(length, _NEAREST_M)
+        return (
+            across / (distance * par.translation_reference_rad_s),
+            abs(along) / (distance * par.looming_reference_1_s),
+            spin / par.rotation_reference_rad_s,
+        )
 
     def _terms(self, bodies: Bodies, p_eye: Vec3, v_eye: Vec3, gaze: Vec3) -> Floats:
         """Return (3, n) slide, loom and spin as they are now."""

@@ -10,13 +10,16 @@ Ruesch et al. 2008 (a Gaussian about that place that decays).
 """
 
 from dataclasses import dataclass
-from math import radians
-from typing import Annotated, NamedTuple
+from math import acos, exp, radians
+from typing import Annotated, NamedTuple, TypeVar
 
 import numpy as np
 
-from gazerig.gaze.types import Floats, Vec3
+from gazerig.gaze.angles import dot, sub, unit
+from gazerig.gaze.types import BodyRows, Floats, Vec3
 from gazerig.params import Bounds
+
+F = TypeVar("F", float, Floats)
 
 
 @dataclass(frozen=True)
@@ -80,24 +83,40 @@ class Habituation:
         ids, p_world_m: the bodies in view and their centres, (n, 3)
         attended_id: what has been looked at since the step before; -1 for nothing
         """
-        self._habituate(attended_id, max(0.0, t_s - self._at_s))
-        self._at_s = t_s
+        self._go_on(attended_id, t_s)
         habituation = np.ones(len(ids))
         for id, left in self._habituation.items():
             if id in ids:
                 habituation[ids.index(id)] = left
-        self._left = [
-            one for one in self._left if t_s - one.at_s < 4.0 * self._params.inhibition_of_return_s
-        ]
         if self._left:
             self._avoid(habituation, ids, p_world_m, p_world_eye_m, attended_id, t_s)
         return habituation
 
-    def for_rule(self, habituation: Floats) -> Floats:
-        """Return the factors of bodies that a rule points at: they do not go below the floor."""
+    def step_rows(
+        self, rows: BodyRows, p_world_eye_m: Vec3, attended_id: int, t_s: float
+    ) -> list[float]:
+        """Return what ``step`` does, for few bodies."""
+        self._go_on(attended_id, t_s)
+        if not self._left:
+            return [self._habituation.get(id, 1.0) for id in rows.ids]
+        return [
+            self._habituation.get(id, 1.0)
+            * (1.0 if id == attended_id else self._return_factor(p, p_world_eye_m, t_s))
+            for id, p in zip(rows.ids, rows.p_world_m, strict=True)
+        ]
+
+    def for_rule(self, habituation: F) -> F:
+        """Return the factors of what a rule points at: they do not go below the floor."""
         floor = self._params.rule_floor
-        out: Floats = floor + (1.0 - floor) * habituation
-        return out
+        return floor + (1.0 - floor) * habituation
+
+    def _go_on(self, attended_id: int, t_s: float) -> None:
+        """Bring all factors and the points left to the present."""
+        self._habituate(attended_id, max(0.0, t_s - self._at_s))
+        self._at_s = t_s
+        if self._left:
+            lasts_s = 4.0 * self._params.inhibition_of_return_s
+            self._left = [one for one in self._left if t_s - one.at_s < lasts_s]
 
     def _habituate(self, attended_id: int, dt_s: float) -> None:
         """Lower the factor of what is attended and raise those of the rest."""
@@ -109,6 +128,19 @@ class Habituation:
         attended = max(0.0, attended - self._params.decay_rate_1_s * dt_s)
         if attended_id >= 0 and attended < 1.0:
             self._habituation[attended_id] = attended
+
+    def _return_factor(self, p_world_m: list[float], p_eye: Vec3, t_s: float) -> float:
+        """Return the factor of one body near points left, as ``_avoid`` does of all."""
+        par = self._params
+        x, y, z = p_world_m
+        way = unit(sub((x, y, z), p_eye))
+        factor = 1.0
+        for left in self._left:
+            cosine = dot(way, unit(sub(left.p_world_m, p_eye)))
+            sigmas = acos(max(-1.0, min(1.0, cosine))) / radians(par.inhibition_of_return_sigma_deg)
+            age = (t_s - left.at_s) / par.inhibition_of_return_s
+            factor *= 1.0 - par.inhibition_of_return_strength * exp(-0.5 * sigmas * sigmas - age)
+        return factor
 
     def _avoid(
         self,

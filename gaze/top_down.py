@@ -6,15 +6,16 @@ Here a rule may point at a kind of body, at one body by its id, or at a place. W
 several bodies are of the wanted kind, each is wanted, the nearer the more.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import compress
+from math import dist
 from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.gaze.types import Bodies, Floats, Vec3
+from gazerig.gaze.types import Bodies, BodyRows, Floats, Vec3
 from gazerig.params import Bounds
 
 _BY_ID = "id:"
@@ -95,8 +96,8 @@ class RuleTarget(NamedTuple):
     salience, behaviour: the rule's constant and name
     """
 
-    rows: NDArray[np.intp]
-    nearness: Floats
+    rows: NDArray[np.intp] | list[int]
+    nearness: Floats | list[float]
     point_world_m: Vec3 | None
     salience: float
     behaviour: str
@@ -166,6 +167,29 @@ class TopDown:
             return None
         near = self._nearness(bodies, rows, p_world_eye_m, favoured_id)
         return RuleTarget(rows, near, rule.point_world_m, rule.salience, self.behaviour)
+
+    def step_rows(
+        self, bodies: BodyRows, seen: list[bool], p_world_eye_m: Vec3, favoured_id: int = -1
+    ) -> RuleTarget | None:
+        """Return what ``step`` does, for few bodies."""
+        rule = self._params.rules[self.behaviour]
+        if rule.point_world_m is not None:
+            return RuleTarget([], [], rule.point_world_m, rule.salience, self.behaviour)
+        named: Sequence[object] = bodies.kinds if rule.body_id is None else bodies.ids
+        wanted = rule.look_at if rule.body_id is None else rule.body_id
+        rows = [i for i, one in enumerate(named) if one == wanted and seen[i]]
+        if not rows:
+            return None
+        near = [1.0]
+        if len(rows) > 1:
+            stay = self._params.stay_with_person
+            away = [
+                max(dist(bodies.p_world_m[i], p_world_eye_m), 1e-3)
+                / (stay if bodies.ids[i] == favoured_id else 1.0)
+                for i in rows
+            ]
+            near = [(min(away) / one) ** self._params.nearness for one in away]
+        return RuleTarget(rows, near, None, rule.salience, self.behaviour)
 
     def _nearness(
         self, bodies: Bodies, rows: NDArray[np.intp], p_eye: Vec3, favoured_id: int

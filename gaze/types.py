@@ -63,6 +63,21 @@ class Bodies:
         """Return the number of bodies."""
         return len(self.ids)
 
+    def rows(self) -> "BodyRows":
+        """Return the bodies as plain numbers."""
+        p, v, w = self.p_world_m, self.v_world_m_s, self.w_world_rad_s
+        return BodyRows(self.ids, self.kinds, p.tolist(), v.tolist(), w.tolist())
+
+
+class BodyRows(NamedTuple):
+    """Bodies as plain numbers, for the few that there usually are; fields as in ``Bodies``."""
+
+    ids: tuple[int, ...]
+    kinds: tuple[str, ...]
+    p_world_m: list[list[float]]
+    v_world_m_s: list[list[float]]
+    w_world_rad_s: list[list[float]]
+
 
 @dataclass(frozen=True, slots=True)
 class Face:

@@ -3,13 +3,16 @@
 from dataclasses import replace
 from itertools import groupby
 from math import cos, exp, radians, sin
+from typing import Literal
 
 import numpy as np
 import pytest
 from attention_scene import FACE, attention, body, looking, percept, waving
 
+from gazerig.gaze.attention import Attention, AttentionParams
 from gazerig.gaze.bottom_up import BottomUp, BottomUpParams, motion_terms
 from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams, occluded
+from gazerig.gaze.idle import Idle, IdleParams
 from gazerig.gaze.top_down import Rule, TopDown, TopDownParams
 from gazerig.gaze.types import Bodies, Percept
 
@@ -339,3 +342,55 @@ def test_many_bodies_at_once_are_as_one_by_one() -> None:
         alone = Bodies((1,), ("x",), p[i : i + 1], v[i : i + 1], w[i : i + 1], np.full(1, 0.1))
         one = BottomUp(BottomUpParams(smoothing_s=0.0)).step(alone, (0, 0, 0), 0.0).total[0]
         assert view.visible(alone, state)[0] == seen[i] and one == pytest.approx(total[i])
+
+
+@pytest.mark.parametrize("form", ["retinal", "literal"])
+@pytest.mark.parametrize(
+    "rule", [Rule("face", 0.5), Rule("id:3", 0.6), Rule("point", 0.4, (1, 1, 0))]
+)
+@pytest.mark.parametrize("occlusion", [False, True])
+def test_a_few_bodies_are_chosen_from_as_many_are(
+    monkeypatch: pytest.MonkeyPatch,
+    form: Literal["retinal", "literal"],
+    rule: Rule,
+    occlusion: bool,
+) -> None:
+    """Both ways of computing one decision choose the same, for the same reasons."""
+
+    def model() -> Attention:
+        return Attention(
+            AttentionParams(min_dwell_ms=100.0),
+            FieldOfView(FieldOfViewParams(occlusion=occlusion, temporal_deg=60.0)),
+            BottomUp(BottomUpParams(form=form)),
+            TopDown(TopDownParams(rules={"wait": rule}, nearness=0.7)),
+            Idle(IdleParams()),
+        )
+
+    few, many, rng = model(), model(), np.random.default_rng(4)
+    places = rng.uniform((0.3, -2.0, -0.5), (3.0, 2.0, 0.5), (9, 3))
+    kinds = np.array(["face", "hand", "own", "thing", "face", "face", "thing", "hand", "face"])
+    chosen = []
+    for k in range(150):
+        t_s, there = k / 30, rng.permutation(9)[: rng.integers(0, 9)]
+        places += rng.normal(0.0, 0.03, places.shape)
+        seen = Bodies(
+            tuple(there.tolist()),
+            tuple(kinds[there].tolist()),
+            places[there],
+            rng.normal(0.0, 0.3, (len(there), 3)),
+            rng.normal(0.0, 1.0, (len(there), 3)),
+            np.full(len(there), 0.1),
+        )
+        state = looking(20.0 * sin(t_s))._replace(p_world_head_m=(0.0, 0.1 * sin(t_s), 0.0))
+        found = []
+        for one, limit in ((few, 24), (many, -1)):
+            monkeypatch.setattr("gazerig.gaze.attention._FEW", limit)
+            found.append(one.choose(Percept(t_s, seen), state, t_s))
+        a, b = found
+        assert (a.kind, a.id, a.shift, a.why) == (b.kind, b.id, b.shift, b.why)
+        assert a[:3] == b[:3]
+        assert len(a.saliences) == len(b.saliences)
+        for mine, other in zip(a.saliences, b.saliences, strict=True):
+            assert mine[:2] == other[:2] and mine[2:] == pytest.approx(other[2:], abs=1e-12)
+        chosen.append(a.id)
+    assert len(set(chosen)) > (1 if rule.look_at == "id:3" else 2)
