@@ -136,7 +136,9 @@ class Aversion:
         number rises on leaving and on returning. In mode "none" targets pass unchanged,
         but for the shifts that earlier looks away have added to the count.
         """
-        self._attend(target, t_s)
+        face = target.id if target.kind == "face" else None
+        if face != self._face:
+            self._attend(face, t_s)
         if self._face is not None and self._mode != "none" and t_s >= self._until_s:
             self._turn(target, p_world_head_m, t_s)
         if self._away is not None:
@@ -145,11 +147,8 @@ class Aversion:
             return target
         return target._replace(shift=target.shift + self._shifts)
 
-    def _attend(self, target: Target, t_s: float) -> None:
+    def _attend(self, face: int | None, t_s: float) -> None:
         """Start mutual gaze with another face; end an aversion when there is none."""
-        face = target.id if target.kind == "face" else None
-        if face == self._face:
-            return
         self._face = face
         self._return()
         if face is not None and self._mode != "none":

@@ -99,6 +99,8 @@ class GesturePlayer:
 
     def step(self, t_s: float) -> PoseOffset:
         """Return the offset at a time; at rest it is always the same object."""
+        if self._played is None and not self._fades:
+            return self._rest
         if self._fades and t_s >= self._faded_s:
             self._fades = []
         if self._played is not None and t_s >= self._begins_s + self._played.duration_s:

@@ -14,7 +14,7 @@ class GestureTrigger:
 
     def reset(self) -> None:
         """Forget what was looked at and when a gesture was played."""
-        self._seen: tuple[str, bool] = ("", False)
+        self._named_by: str | None = None
         self._played_s: dict[str, float] = {}
 
     def step(self, behaviour: str, rule: Rule, target: Target, t_s: float) -> str:
@@ -28,11 +28,13 @@ class GestureTrigger:
         """
         if not rule.gesture:
             return ""
-        before = self._seen == (behaviour, True)
+        before = self._named_by
         named = _is_named(rule, target)
-        self._seen = behaviour, named
+        self._named_by = behaviour if named else None
+        if not named or before == behaviour:
+            return ""
         ready_s = self._played_s.get(behaviour, -inf) + rule.gesture_refractory_s
-        if before or not named or t_s < ready_s:
+        if t_s < ready_s:
             return ""
         self._played_s[behaviour] = t_s
         return rule.gesture

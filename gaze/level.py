@@ -60,6 +60,8 @@ class _Level:
 class Levels:
     """All levels of a rig.
 
+    lapses_s: before this time no level lapses
+
     Args:
         ranges: what each level moves.
         joints: number of joints that gaze does not move.
@@ -81,6 +83,8 @@ class Levels:
         self._gone: list[_Level] = []
         self._flats: tuple[tuple[float, ...], ...] = ()
         self._offset = self._rest
+        self._moving = True
+        self.lapses_s = inf
 
     def retune(self, ranges: Mapping[str, LevelRange]) -> None:
         """Change what the levels move; joints move there without a jump."""
@@ -95,6 +99,7 @@ class Levels:
             elif span != self._levels[name].span:
                 self._levels[name].retune(span)
         self._ranges = dict(ranges)
+        self._moving = True
 
     def set(self, name: str, value: float, t_s: float) -> None:
         """Set a level to a value 0..1, from the next step on.
@@ -104,6 +109,8 @@ class Levels:
         """
         self.require(name)
         self._levels[name].set(value, t_s + HOLD_S)
+        self._moving = True
+        self.lapses_s = min(self.lapses_s, t_s + HOLD_S)
 
     def require(self, name: str) -> None:
         """Raise ValueError if there is no such level; the message lists those there are."""
@@ -119,10 +126,14 @@ class Levels:
                 if level.value > 0.0:
                     fallen.append(name)
                 level.set(0.0, inf)
+                self._moving = True
+        self.lapses_s = min([level.until_s for level in self._levels.values()], default=inf)
         return tuple(fallen)
 
     def step(self, t_s: float) -> PoseOffset:
         """Return what all levels add at a time; at rest it is the same object."""
+        if not self._moving:
+            return self._offset
         if self._gone:
             self._gone = [one for one in self._gone if one.blend.step(t_s) != self._rest.flat()]
         levels = (*self._levels.values(), *self._gone)
@@ -132,4 +143,5 @@ class Levels:
             for flat in flats:
                 offset = offset.plus(PoseOffset.from_flat(flat))
             self._flats, self._offset = flats, offset
+        self._moving = not all([level.blend.rests for level in levels])
         return self._offset

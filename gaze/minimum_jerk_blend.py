@@ -51,13 +51,19 @@ class MinimumJerkBlend:
 
     def step(self, t_s: float) -> Values:
         """Return the values at a time; times never go back. At rest it is the same tuple."""
-        if self._goal != self._planned and self._may_start(t_s):
+        goal = self._goal
+        if goal is not self._planned and goal != self._planned and self._may_start(t_s):
             delta = tuple([b - a for a, b in zip(self._planned, self._goal, strict=True)])
             self._moves.append(_Move(t_s, self.duration_s, delta))
             self._planned = self._goal
         if self._moves:
             self._values = self._sum(t_s)
         return self._values
+
+    @property
+    def rests(self) -> bool:
+        """Return whether ``step`` returns the same tuple from now on, until there is a new goal."""
+        return not self._moves and self._goal == self._planned
 
     def _may_start(self, t_s: float) -> bool:
         pause_s = self.duration_s / _MOVES_AT_ONCE

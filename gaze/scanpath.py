@@ -7,7 +7,7 @@ part (3.5).
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,6 +19,7 @@ from gazerig.gaze.scanpath_models import (
     MarkovWalk,
     RandomAngles,
     ScanpathModel,
+    ScanpathStep,
     SimpleCycle,
 )
 from gazerig.gaze.types import PART_NAMES, PARTS, Face, Floats, Percept, Target, Vec3
@@ -125,12 +126,48 @@ def without_refixations(matrix: ArrayLike) -> Floats:
     return normalised(np.where(away.sum(axis=1, keepdims=True) > 0.0, away, rows))
 
 
+class _Replaced(NamedTuple):
+    """A target as it was passed on, and what it was made of."""
+
+    target: Target
+    face: Face | None
+    point: Vec3 | None
+    shift: int
+    result: Target
+
+    def of(self, target: Target, face: Face | None, point: Vec3 | None, shift: int) -> bool:
+        """Return whether the same would be made of these."""
+        return (
+            point is self.point
+            and face is self.face
+            and shift == self.shift
+            and target == self.target
+        )
+
+
+def _replaced(target: Target, face: Face | None, look: ScanpathStep | None, shift: int) -> Target:
+    """Return a target with the point of its face, and counting the shifts on the face."""
+    if face is None or look is None:
+        return target._replace(shift=target.shift + shift) if shift else target
+    what = PART_NAMES[look.part] if look.part is not None else "random angles about"
+    # A lost face is waited for where it was heading, its parts with it.
+    moved = sub(target.p_world_m, face.p_world_m)
+    return target._replace(
+        p_world_m=add(look.p_world_m, moved),
+        part=look.part,
+        shift=target.shift + shift,
+        why=f"{what} of {target.why}" if look.part is not None else f"{what} {target.why}",
+        centre_world_m=target.p_world_m,
+    )
+
+
 class Scanpath:
     """Replaces a face as target by the point of the face that is to be fixated."""
 
     def __init__(self, params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> None:
         self._rng = rng
         self.looks = _looks(params, walk, rng)
+        self._last: _Replaced | None = None
         self.reset(0.0)
 
     def retune(self, params: ScanpathParams, walk: Walk) -> None:
@@ -139,12 +176,15 @@ class Scanpath:
         A model that does not know that part begins with its own first look.
         """
         before, self.looks = self.looks, _looks(params, walk, self._rng)
+        self._last = None
         if not self.looks.go_on(before):
             self._shift += 1
 
     def reset(self, t_s: float) -> None:
         """Forget the face; the next one is entered again."""
         self._face: Face | None = None
+        self._searched: Percept | None = None
+        self._last = None
         self._shift = 0
         self.looks.enter()
 
@@ -161,26 +201,27 @@ class Scanpath:
         settled: whether the gaze has arrived at the last target given
         """
         if target.kind != "face":
-            self._face = None
-            return target._replace(shift=target.shift + self._shift)
-        face = self._find(target.id, percept)
-        if face is None:
-            return target._replace(shift=target.shift + self._shift)
-        look = self.looks.step(face, p_world_head_m, t_s, settled)
-        self._shift += look.moved
-        what = PART_NAMES[look.part] if look.part is not None else "random angles about"
-        # A lost face is waited for where it was heading, its parts with it.
-        moved = sub(target.p_world_m, face.p_world_m)
-        return target._replace(
-            p_world_m=add(look.p_world_m, moved),
-            part=look.part,
-            shift=target.shift + self._shift,
-            why=f"{what} of {target.why}" if look.part is not None else f"{what} {target.why}",
-            centre_world_m=target.p_world_m,
-        )
+            self._face = face = None
+        else:
+            face = self._find(target.id, percept)
+        look = None
+        if face is not None:
+            look = self.looks.step(face, p_world_head_m, t_s, settled)
+            self._shift += look.moved
+        point = look.p_world_m if look is not None else None
+        last = self._last
+        if last is not None and last.of(target, face, point, self._shift):
+            return last.result
+        result = _replaced(target, face, look, self._shift)
+        self._last = _Replaced(target, face, point, self._shift, result)
+        return result
 
     def _find(self, face_id: int, percept: Percept | None) -> Face | None:
         """Return the target's face, the last known one while it is out of sight."""
+        known = self._face
+        if known is not None and known.id == face_id and percept is self._searched:
+            return known
+        self._searched = percept
         if self._face is None or self._face.id != face_id:
             self._face = None
         if percept is not None:

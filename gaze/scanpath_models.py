@@ -74,6 +74,7 @@ class MarkovWalk:
     def enter(self) -> None:
         """Start at the start part."""
         self._part = self._start
+        self._face: Face | None = None
         self._until_s: float | None = None
 
     @property
@@ -86,18 +87,23 @@ class MarkovWalk:
         part, until_s = before.dwell
         if part not in self._parts:
             return False
-        self._part, self._until_s = self._parts.index(part), until_s
+        self._part, self._until_s, self._face = self._parts.index(part), until_s, None
         return True
 
     def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> ScanpathStep:
         """Return the step: the dwell starts on arrival; after it another part is drawn."""
-        before = self._part
-        if self._until_s is not None:
-            self._walk(self._until_s, t_s)
-        elif settled:
-            self._until_s = t_s + self.dwell_s(self._part)
-        point = face.parts_world_m[self._columns[self._part]]
-        return ScanpathStep(point, self._parts[self._part], self._part != before)
+        before, until_s = self._part, self._until_s
+        if until_s is None:
+            if settled:
+                self._until_s = t_s + self.dwell_s(before)
+        elif t_s >= until_s:
+            self._walk(until_s, t_s)
+        moved = self._part != before
+        if moved or face is not self._face:
+            point = face.parts_world_m[self._columns[self._part]]
+            self._step = ScanpathStep(point, self._parts[self._part], moved)
+            self._face = None if moved else face
+        return self._step
 
     def next_part(self, part: int) -> int:
         """Draw the part that follows ``part``, both as indices in the order given."""

@@ -89,16 +89,15 @@ class CommandExecutor:
         taken_over, self._taken_over = self._taken_over, False
         return taken_over
 
-    def end_lapsed_lead(self, t_s: float) -> None:
-        """End a lead that was not renewed, or whose time is over."""
-        if why := self._lead.over(t_s):
-            self._messages.append(f"{self._lead.words}: {why}, so the gaze leads again")
-            self._let_lead(lambda: self._lead.end(why))
-
-    def end_lapsed_levels(self, t_s: float) -> None:
-        """Let levels that no client sets any more fall to 0."""
-        for name in self._animation.levels.lapsed(t_s):
-            self._messages.append(f"level {name}: not set any more, so it falls to 0")
+    def end_lapsed(self, t_s: float) -> None:
+        """End a lead that was not renewed or whose time is over, and levels not set any more."""
+        lead, levels = self._lead, self._animation.levels
+        if lead.words and (why := lead.over(t_s)):
+            self._messages.append(f"{lead.words}: {why}, so the gaze leads again")
+            self._let_lead(lambda: lead.end(why))
+        if t_s >= levels.lapses_s:
+            for name in levels.lapsed(t_s):
+                self._messages.append(f"level {name}: not set any more, so it falls to 0")
 
     def execute(self, command: Command, t_s: float) -> CommandReply:
         """Carry out one command; return its reply."""

@@ -27,6 +27,10 @@ class CommandQueue:
         self._commands: deque[QueuedCommand] = deque()
         self._stops: deque[QueuedCommand] = deque()
 
+    def __bool__(self) -> bool:
+        """Return whether any command waits."""
+        return bool(self._commands or self._stops)
+
     def __len__(self) -> int:
         """Return how many commands wait."""
         return len(self._commands) + len(self._stops)
@@ -60,8 +64,6 @@ class CommandQueue:
 
     def take(self) -> list[QueuedCommand]:
         """Return and remove the commands of this tick, stops first."""
-        if not self._commands and not self._stops:
-            return []
         taken = self.stops()
         tunes, most = 0, len(taken) + MAX_PER_TICK
         while self._commands and len(taken) < most:

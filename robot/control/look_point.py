@@ -5,6 +5,7 @@ from typing import NamedTuple
 from gazerig.drivers.types import Detections
 from gazerig.gaze.angles import add, direction, rotate, scale
 from gazerig.gaze.types import Face, GazeState, Percept, Vec3
+from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import (
     Command,
     Look,
@@ -18,7 +19,7 @@ from gazerig.robot.perception.pixel_to_world import PixelToWorld
 
 
 class Known(NamedTuple):
-    """What the newest tick knew, by which the next one understands commands."""
+    """What is known before the first tick; after that the newest tick stands in its place."""
 
     pose: GazeState | None = None
     detections: Detections | None = None
@@ -28,7 +29,7 @@ class Known(NamedTuple):
 class LookPoints:
     """Finds what commands name.
 
-    known: of the newest tick
+    known: pose, detections and percept of the newest tick, by which commands are understood
 
     Args:
         pixels: places pixels in the world.
@@ -36,7 +37,7 @@ class LookPoints:
 
     def __init__(self, pixels: PixelToWorld) -> None:
         self._pixels = pixels
-        self.known = Known()
+        self.known: Known | Tick = Known()
 
     def resolved(self, command: Command) -> Command:
         """Return a command with the point of its pixel, as a recording needs it."""

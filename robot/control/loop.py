@@ -230,7 +230,6 @@ class Robot:
             self._oculomotor.reset(t_s, pose)
         detections = self.camera.latest(t_s)
         percept = self.perception.see(detections, self._poses)
-        self._looks.known = Known(pose, detections, percept)
         chosen = self.attention.choose(percept, pose, t_s)
         self._executor.gesture_by_rule(chosen, t_s)
         target = self._lead.target(chosen, percept, t_s)
@@ -240,9 +239,9 @@ class Robot:
         gaze = self._oculomotor.step(target, pose, t_s, dt_s, offset)
         self._settled = gaze.phase != "saccade"
         desired = self._lead.pose_rad or self._kinematics.inverse(gaze, offset.joints_rad)
-        if self.stopped:
+        if stopped := self._stop.why:
             self._stop.keep_released(self.body, joints, t_s)
-            guard_result = at_rest(joints, desired, self.stopped, self.body.names)
+            guard_result = at_rest(joints, desired, stopped, self.body.names)
         else:
             age_s = self._frame_age_s(percept, t_s)
             guard_result = self._guard.check(desired, joints, age_s, t_s)
@@ -252,11 +251,12 @@ class Robot:
         lead = self._lead.measure(target, pose, joints.position_rad, converges, t_s)
         events = (*self._messages, *self.body.bus.events(), *self.camera.events())
         self._messages.clear()
-        return Tick(
+        tick = Tick(
             t_s, joints, pose, detections, percept, target, gaze, desired, guard_result, events, commands,
-            self.stopped, self._lead.words, lead,
-            self._gestures.state,
+            stopped, self._lead.words, lead, self._gestures.state,
         )  # fmt: skip
+        self._looks.known = tick
+        return tick
 
     def park(
         self,
@@ -301,13 +301,17 @@ class Robot:
 
     def _obey(self, t_s: float) -> tuple[Command, ...]:
         """Execute the commands that wait, and end a lead that is not renewed."""
+        taken = self._execute(t_s) if self._commands else ()
+        self._executor.end_lapsed(t_s)
+        return taken
+
+    def _execute(self, t_s: float) -> tuple[Command, ...]:
+        """Execute the commands of this tick; return them as a recording needs them."""
         taken = []
         for waiting in self._commands.take():
             command = self._looks.resolved(waiting.command)
             taken.append(command)
             waiting.ticket.answer(self._executor.execute(command, t_s))
-        self._executor.end_lapsed_lead(t_s)
-        self._executor.end_lapsed_levels(t_s)
         return tuple(taken)
 
     def _frame_age_s(self, percept: Percept | None, t_s: float) -> float:
@@ -317,7 +321,7 @@ class Robot:
         """
         if not self._lead.needs_camera:
             return 0.0
-        return percept.age_s(t_s) if percept is not None else inf
+        return t_s - percept.captured_s if percept is not None else inf
 
 
 class TickLoop:

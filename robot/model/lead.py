@@ -166,6 +166,8 @@ class Lead:
 
     def target(self, target: Target, percept: Percept | None, t_s: float) -> Target:
         """Return what a user chose to look at in the place of what attention did."""
+        if self.point is None and self.person is None:
+            return target
         chosen = self.chosen(percept, t_s)
         if chosen is None:
             return target

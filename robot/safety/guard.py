@@ -14,7 +14,7 @@ from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 from gazerig.robot.safety.collisions import Collisions
-from gazerig.robot.safety.guard_verdict import passed, standstill, verdict
+from gazerig.robot.safety.guard_verdict import findings, passed, standstill
 from gazerig.robot.safety.health import JointHealth
 from gazerig.robot.safety.late_ticks import LateTicks
 from gazerig.robot.safety.motion_limiter import MotionLimiter
@@ -69,6 +69,8 @@ class Guard:
         self._neck = tuple("neck" in name.split("_") for name in joints)
         self._motion = MotionLimiter(self._within_reach())
         self._limits = self._motion.limits
+        self._short: dict[int, tuple[int, str]] = {}
+        self._findings = findings(self._short, joints)
         self._waiting: set[int] = set()
         self._outside: set[int] = set()
         self._health = JointHealth(params.health, limits)
@@ -252,7 +254,10 @@ class Guard:
                 short[i] = outcome
         if followed:
             return passed(desired_rad, self._names)
-        return verdict(tuple(command), desired_rad, short, self._names)
+        if short != self._short:  # what is found of joints lasts for many ticks
+            self._short, self._findings = short, findings(short, self._names)
+        level, reasons, why, critical = self._findings
+        return GuardResult(tuple(command), level, reasons, desired_rad, why, critical, self._names)
 
     def _all_well(self, joints: JointState) -> bool:
         """Return whether nothing but limits, ages and distances need be looked at."""
