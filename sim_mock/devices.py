@@ -14,22 +14,8 @@ from gazerig.drivers.plugins import BUS, BusPlugin, EmulatedJoint, PluginError, 
 from gazerig.drivers.servo_models import HOBBY_KINDS, BusKind
 from gazerig.params import choices_of
 from gazerig.sim_mock.device import Device
-from gazerig.sim_mock.dynamixel.chain import DynamixelChain, build_dynamixel
-from gazerig.sim_mock.feetech.chain import FeetechChain, build_feetech
 from gazerig.sim_mock.hobby_servo import HobbySpec
-from gazerig.sim_mock.maestro import settings as maestro_settings
-from gazerig.sim_mock.maestro.board import build_board
-from gazerig.sim_mock.pca9685.bridge import build_bridge
-from gazerig.sim_mock.pca9685.faults import CASES as PCA9685_CASES
 from gazerig.sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
-
-CASES: dict[BusKind, Mapping[str, str]] = {
-    "dynamixel": DynamixelChain.commands.cases,
-    "feetech": FeetechChain.commands.cases,
-    "maestro": maestro_settings.cases(),
-    "pca9685": PCA9685_CASES,
-}
-"""What can be chosen of each kind, and the values as they are typed."""
 
 BAUDS: dict[BusKind, tuple[int, ...]] = {
     "dynamixel": DYNAMIXEL_BAUDS,
@@ -138,14 +124,23 @@ def build(what: Emulated, now_s: Callable[[], float], seed: int = 0) -> Device:
     """
     if isinstance(what, PluginLine):
         return _build_plugin(what, now_s, seed)
+    # A chain or board is imported when one is built: who starts a process for it needs none.
     if isinstance(what, MaestroLine):
+        from gazerig.sim_mock.maestro.board import build_board
+
         return build_board(
             what.channels, now_s, what.device, what.crc, what.baud, seed, what.servos
         )
     if isinstance(what, Pca9685Line):
+        from gazerig.sim_mock.pca9685.bridge import build_bridge
+
         return build_bridge(what.addresses, now_s, what.oscillator_hz, seed, what.servos)
     if isinstance(what, FeetechLine):
+        from gazerig.sim_mock.feetech.chain import build_feetech
+
         return build_feetech(what.servos, now_s, what.baud, seed=seed)
+    from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+
     return build_dynamixel(what.servos, now_s, baud=what.baud, seed=seed)
 
 

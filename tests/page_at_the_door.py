@@ -14,7 +14,8 @@ import viser
 from websockets.sync.client import ClientConnection, connect
 
 from gazerig.robot.dashboard.auth_proxy import AuthProxy
-from gazerig.robot.dashboard.stop_channel import StopListener, StopSender
+from gazerig.robot.dashboard.stop_channel import StopListener
+from gazerig.robot.dashboard.stop_sender import StopSender
 from gazerig.robot.dashboard.viser_server import open_server
 
 PATIENCE_S = 20.0

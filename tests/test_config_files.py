@@ -220,7 +220,8 @@ def test_an_unknown_shipped_name_lists_those_that_exist(
     (tmp_path / "rigs").mkdir()
     for name in ("shake.yaml", "nod.yaml", "notes.txt"):
         write(tmp_path / "rigs", GOOD, name)
-    monkeypatch.setattr("gazerig.config.load.importlib.resources.files", lambda package: tmp_path)
+    for module in ("load", "shipped"):
+        monkeypatch.setattr(f"gazerig.config.{module}.SHIPPED", tmp_path)
     assert shipped("rigs", "nod") == tmp_path / "rigs" / "nod.yaml"
     with pytest.raises(ConfigError) as caught:
         shipped("rigs", "nood")

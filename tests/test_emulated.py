@@ -6,9 +6,9 @@ from typing import cast
 
 import pytest
 
+from gazerig.sim_mock.device_cases import CASES
 from gazerig.sim_mock.devices import (
     BAUDS,
-    CASES,
     DynamixelLine,
     Emulated,
     FeetechLine,

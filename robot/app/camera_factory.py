@@ -3,22 +3,18 @@
 from collections.abc import Callable
 from functools import partial
 from math import radians
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from gazerig.config.schema import Rig
 from gazerig.drivers.camera.camera_plugins import camera_part, is_source, plugin_source
 from gazerig.drivers.camera.guarded_camera import CLOSE_PROCESS_S, GuardedCamera
-from gazerig.drivers.camera.oak.source import OakSource
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.camera.playback import CameraReplay
 from gazerig.drivers.camera.pose_buffer import PoseBuffer
 from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.camera.thread import CameraThread
-from gazerig.drivers.camera.video_file import VideoFile
-from gazerig.drivers.camera.webcam import Webcam
 from gazerig.drivers.camera.worker import CameraParts
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.plugins import CAMERA, CameraPlugin, PluginError, find, is_ours, load
@@ -37,6 +33,10 @@ from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.cameras.rendered import Exposure, PixelCamera, PixelCameraParams
 from gazerig.sim_mock.cameras.video import FilmCamera
 from gazerig.sim_mock.scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from gazerig.drivers.camera.playback import CameraReplay
+    from gazerig.drivers.camera.video_file import VideoFile
 
 HeadPose = Callable[[float], tuple[Mat3, Vec3]]
 """Gives R_world_head and p_world_head_m at a time."""
@@ -160,18 +160,32 @@ def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams)
     return "" if done else "the camera's process is busy and looks as before: set it once more"
 
 
-def _film(options: RunOptions) -> VideoFile | CameraReplay:
-    return CameraReplay(options.replay) if options.replay is not None else VideoFile(_path(options))
+def _film(options: RunOptions) -> "VideoFile | CameraReplay":
+    if options.replay is not None:
+        from gazerig.drivers.camera.playback import CameraReplay
+
+        return CameraReplay(options.replay)
+    from gazerig.drivers.camera.video_file import VideoFile
+
+    return VideoFile(_path(options))
 
 
 def _source(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
     """Return how to make the source, for the process that will use it."""
     if options.replay is not None:
+        from gazerig.drivers.camera.playback import CameraReplay
+
         return partial(CameraReplay, options.replay)
     if options.video is not None:
+        from gazerig.drivers.camera.video_file import VideoFile
+
         return partial(VideoFile, options.video)
     if options.oak or options.camera == "oak":
+        from gazerig.drivers.camera.oak.source import OakSource
+
         return partial(OakSource, rig.oak)
+    from gazerig.drivers.camera.webcam import Webcam
+
     number = options.camera if isinstance(options.camera, int) else 0
     return partial(Webcam.of, number, rig.webcam)
 

@@ -20,7 +20,6 @@ from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import LOWER_NECK, NECK
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import build
-from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.pty.client import PtyBuses
 
 TrueSteps = Callable[[], Mapping[str, float]]
@@ -63,6 +62,8 @@ def run_bus(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:
     if not options.fast:
         buses = PtyBuses()
         return RunBus(guarded_rig_bus(rig, buses.start(lines)), close=buses.stop)
+    from gazerig.sim_mock.in_process_port import InProcessPort
+
     sent = hashlib.sha256()
     devices = {name: build(line, clock.now_s) for name, line in lines.items()}
     ports = {name: InProcessPort(device, sent.update) for name, device in devices.items()}

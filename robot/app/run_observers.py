@@ -9,7 +9,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from gazerig.config.faults import ConfigError
 from gazerig.robot.app.assemble import Assembly
@@ -26,8 +26,10 @@ from gazerig.robot.dashboard.snapshot import SnapshotBuilder
 from gazerig.robot.model.commands import Command, Resume, Stop, Tune
 from gazerig.robot.model.reply import CommandTaker, Ticket
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
-from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.remote.live_server import LiveServer
+
+if TYPE_CHECKING:
+    from gazerig.robot.recording.recorder import Recorder
 
 _SWITCH_S = 0.0003
 
@@ -69,7 +71,7 @@ class RunObservers:
         say: Callable[[str], None],
         status: Callable[[str], None] | None = None,
         tuning: ParamStore | None = None,
-        recorder: Recorder | None = None,
+        recorder: "Recorder | None" = None,
         steer: SteeringButtons | None = None,
     ) -> None:
         self._steer = steer

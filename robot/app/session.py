@@ -4,7 +4,7 @@ import contextlib
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from gazerig.config.text import gestures_text, rig_text, walk_text
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.analysis.behaviour_score import BehaviourScore
 from gazerig.robot.analysis.gaze_on_face import GazeOnFace
-from gazerig.robot.analysis.heatmap import heatmap
 from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble, with_options
 from gazerig.robot.app.options import RunOptions
@@ -27,8 +26,10 @@ from gazerig.robot.control.loop import LoopCount, Robot, Tick, TickLoop
 from gazerig.robot.control.observers import Observers
 from gazerig.robot.control.power_down import Again, PowerDown
 from gazerig.robot.model.clock import RealClock
-from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo, versions
+
+if TYPE_CHECKING:
+    from gazerig.robot.recording.recorder import Recorder
 
 
 class ComposedRun(NamedTuple):
@@ -40,7 +41,7 @@ class ComposedRun(NamedTuple):
     options: RunOptions
     made: Assembly
     tuning: ParamStore | None
-    recorder: Recorder | None
+    recorder: "Recorder | None"
 
 
 def compose(options: RunOptions, substitutes: Substitutes = RIGS_OWN) -> ComposedRun:
@@ -59,6 +60,8 @@ def compose(options: RunOptions, substitutes: Substitutes = RIGS_OWN) -> Compose
     if options.record is None:
         recorder = None
     else:
+        from gazerig.robot.recording.recorder import Recorder  # with what writes and packs files
+
         info = run_info(rig, options)
         recorder = Recorder(options.record, info, options.force, patient=options.fast)
         substitutes = substitutes._replace(body=recorder.recorded)
@@ -274,6 +277,8 @@ def _draw_heatmap(
     if not face_gaze.points_face_m:
         say(f"no heat map in {out}: no face was looked at")
         return
+    from gazerig.robot.analysis.heatmap import heatmap  # with a face detector
+
     points, seconds = np.array(face_gaze.points_face_m), np.array(face_gaze.seconds)
     heatmap(points, seconds, out, options.heatmap_face, options.force)
     say(f"heat map of {sum(face_gaze.seconds):.1f} s on the face in {out}")

@@ -29,7 +29,7 @@ from yarl import URL
 from gazerig.robot.dashboard.browser_requests import ASKED_BYTES, compact, from_browser, leads
 from gazerig.robot.dashboard.browsers import Browsers, TabLimits
 from gazerig.robot.dashboard.connection_limits import Connections
-from gazerig.robot.dashboard.stop_channel import StopSender
+from gazerig.robot.dashboard.stop_sender import StopSender
 from gazerig.robot.dashboard.token_bucket import TokenBucket
 from gazerig.robot.dashboard.viser_server import (
     BROWSER_HEADER,

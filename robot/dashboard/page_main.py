@@ -35,7 +35,7 @@ from gazerig.robot.dashboard.page_process import (
     URL,
 )
 from gazerig.robot.dashboard.page_view import PageView
-from gazerig.robot.dashboard.stop_channel import StopSender
+from gazerig.robot.dashboard.stop_sender import StopSender
 from gazerig.robot.dashboard.viser_server import browser_of, open_server
 
 _FRAME_S = 0.04

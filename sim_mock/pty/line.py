@@ -6,7 +6,8 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from gazerig.sim_mock.devices import CASES, Emulated, build
+from gazerig.sim_mock.device_cases import CASES
+from gazerig.sim_mock.devices import Emulated, build
 from gazerig.sim_mock.pty.terminal import Terminal
 from gazerig.sim_mock.wire import ServoLine
 
