@@ -1,4 +1,4 @@
-"""Serial port of a servo bus: waits in select() instead of spinning, names its errors.
+"""Serial port of a servo bus: waits in the kernel instead of spinning, names its errors.
 
 Owns the host clock of the servo bus (monotonic seconds).
 """
@@ -131,7 +131,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         self._on_traffic = on_traffic
         self.ser: Serial | None = None
         self._fd = -1
-        self._fds: tuple[int, ...] = (-1,)
+        self._poll: Callable[[int], object] = _closed
         self._deadline_s = 0.0
 
     # --- what the driver's control loop uses
@@ -177,15 +177,9 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         Raises:
             BusLost: the port is gone.
         """
-        try:
-            while len(got) < length:
-                left_s = deadline_s - time.monotonic()
-                if not select.select(self._fds, (), (), left_s if left_s > 0.0 else 0.0)[0]:
-                    break
-                more = self._take(length - len(got))
-                got = got + more if got else more
-        except (OSError, ValueError) as error:
-            raise self._lost(error) from error
+        while len(got) < length and self._wait(deadline_s):
+            more = self._take(length - len(got))
+            got = got + more if got else more
         if not got and not os.path.exists(self.opened_as):
             raise self._lost("it was unplugged")
         return got
@@ -215,8 +209,8 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
             self.write(request[sent:])
         sent_s = time.monotonic()
         try:
-            left_s = deadline_s - sent_s
-            if select.select(self._fds, (), (), left_s if left_s > 0.0 else 0.0)[0]:
+            left_ms = int(1e3 * (deadline_s - sent_s))
+            if left_ms > 0 and self._poll(left_ms):
                 got = os.read(fd, length)
                 if not got:
                     raise self._lost("it hung up")
@@ -243,10 +237,14 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
     def _wait(self, deadline_s: float) -> bool:
         """Sleep until a byte has arrived; False at the deadline."""
         try:
-            ready = select.select((self._fd,), (), (), max(0.0, deadline_s - time.monotonic()))
+            left_s = deadline_s - time.monotonic()
+            # poll() takes half as long as select(), but counts in whole milliseconds.
+            if left_s >= 0.001 and self._poll(int(1e3 * left_s)):
+                return True
+            left_s = max(0.0, deadline_s - time.monotonic())
+            return bool(select.select((self._fd,), (), (), left_s)[0])
         except (OSError, ValueError) as error:
             raise self._lost(error) from error
-        return bool(ready[0])
 
     def _wait_for_room(self, deadline_s: float) -> None:
         """Sleep until a byte can be sent."""
@@ -305,7 +303,9 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         self.opened_as = os.path.realpath(where) if where != self.port_name else where
         self._lasting = lasting_name(where, self._by_id) or self._lasting
         self._fd = self.ser.fileno()
-        self._fds = (self._fd,)
+        poll = select.poll()
+        poll.register(self._fd, select.POLLIN)
+        self._poll = poll.poll
         ask_low_latency(self.ser)
         self.is_open = True
         self.is_using = False
@@ -333,7 +333,7 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
         """Close; safe to call twice."""
         if self.ser is not None:
             self.ser.close()
-        self.ser, self._fd, self._fds = None, -1, (-1,)
+        self.ser, self._fd, self._poll = None, -1, _closed
         self.is_open = self.is_using = False
 
     def clearPort(self) -> None:
@@ -374,6 +374,10 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
     def getCurrentTime(self) -> float:
         """Return monotonic milliseconds."""
         return time.monotonic() * 1000.0
+
+
+def _closed(timeout_ms: int) -> object:
+    raise ValueError("it is closed")
 
 
 def ask_low_latency(port: Any) -> None:

@@ -33,7 +33,6 @@ class Transactions:
     lateness: answers that came after waiting had ended
     quiet: nothing came any more when the last exchange was given up
     whole_s: when the last exchange's answer was due as far as the wire goes
-    deadline_s: end of the last exchange's time-out
     """
 
     def __init__(
@@ -58,7 +57,7 @@ class Transactions:
         self.lateness = HostLateness()
         self._silent = self._reply_owed = False
         self.quiet = True
-        self.whole_s = self.deadline_s = 0.0
+        self.whole_s, self._reserved = 0.0, True
         self.baud, self._byte_s = baud, BITS_PER_BYTE / baud
         self._sent_s = port.now_s()
         self._free_s = self._sent_s
@@ -107,18 +106,14 @@ class Transactions:
         self._free_s = free_s = free_s + len(request) * self._byte_s
         self.tx_bytes += len(request)
         self.whole_s = whole_s = free_s + length * self._byte_s
-        wait_s = timeout.with_reserve(now_s) if reserve else prompt_s
-        self.deadline_s = whole_s + wait_s
-        raw, sent_s = port.exchange(request, length, self.deadline_s - 0.5 * prompt_s)
+        self._reserved = reserve
+        raw, sent_s = port.exchange(request, length, whole_s + 0.5 * prompt_s)
         if sent_s - self._sent_s >= self.starving_s:
             self._starve(sent_s - self._sent_s)
         self._sent_s = now_s
         self.quiet = False
         if len(raw) < length:
-            # The rest of the time-out shows whether the line has fallen silent.
-            more = port.read_until(length - len(raw), self.deadline_s)
-            self.quiet = not more
-            raw += more
+            raw += self._wait_on(length - len(raw), 0.5 * prompt_s)
         at_s = port.now_s()
         self.rx_bytes += len(raw)
         # The first that is heard after a silence may be owed, too: more of that may follow.
@@ -129,6 +124,26 @@ class Transactions:
         else:
             timeout.waited_in_vain(at_s - whole_s - prompt_s, at_s)
         return raw, at_s
+
+    @property
+    def deadline_s(self) -> float:
+        """Return the end of the last exchange's time-out."""
+        timeout = self.timeout
+        wait_s = timeout.with_reserve(self._sent_s) if self._reserved else timeout.seconds
+        return self.whole_s + wait_s
+
+    def _wait_on(self, length: int, rest_s: float) -> bytes:
+        """Return bytes that have not come within half of the prompt time-out.
+
+        The last ``rest_s`` of the whole time-out show whether the line has fallen silent.
+        """
+        end_s = self.deadline_s
+        late = self.port.read_until(length, end_s - rest_s) if self._reserved else b""
+        if len(late) == length:
+            return late
+        more = self.port.read_until(length - len(late), end_s)
+        self.quiet = not more
+        return late + more
 
     def complete(self, raw: bytes, missing: Callable[[bytes], int], deadline_s: float) -> bytes:
         """Wait on for an answer that has turned out to be longer than its shortest form."""

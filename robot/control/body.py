@@ -167,8 +167,16 @@ class Body:
         return tuple(right)
 
     def write(self, command_rad: JointAngles) -> None:
-        """Send one goal to every servo."""
-        self.bus.write(self._steps(command_rad))
+        """Send one goal to every servo.
+
+        Raises:
+            ValueError: an angle is not a number, or there are not as many as joints.
+        """
+        if self._bent or self._coupled is not None or len(command_rad) != len(self._zeros):
+            self.bus.write(self._steps(command_rad))
+        else:
+            lines = map(add, self._zeros, map(mul, self._slopes, command_rad))
+            self.bus.write([*map(round, lines)])
 
     def _steps(self, angles_rad: JointAngles) -> list[int]:
         """Return the servo positions of joint angles."""
