@@ -1,6 +1,7 @@
 """A servo bus of another package: what it returns is checked, what it raises is one named line."""
 
 from collections.abc import Callable, Sequence
+from itertools import chain
 from math import isfinite
 from typing import Any, TypeVar
 
@@ -84,10 +85,12 @@ class CheckedBus:
         for name, column in zip(Feedback._fields[:_COLUMNS], told[:_COLUMNS], strict=True):
             if len(column) != self._count:
                 raise ValueError(f"{len(column)} values of {name} for {self._count} servos")
+        numbers: tuple[Any, ...] = told[:_NUMBERS]
+        if not told.missing and all(map(isfinite, chain.from_iterable(numbers))):
+            return told
         missing = set(told.missing)
         if not missing <= set(range(self._count)):
             raise ValueError(f"missing {sorted(missing)} of {self._count} servos")
-        numbers: tuple[Any, ...] = told[:_NUMBERS]
         wrong = {
             i
             for i in range(self._count)

@@ -12,21 +12,24 @@ MOST = 200
 
 
 class EventLog:
-    """Events as lines of text, drained by the status line, the page and the recorder."""
+    """Events as lines of text, drained by the status line, the page and the recorder.
+
+    lines: those since they were drained last
+    """
 
     def __init__(self) -> None:
-        self._lines: deque[str] = deque(maxlen=MOST)
+        self.lines: deque[str] = deque(maxlen=MOST)
 
     def add(self, text: str) -> None:
         """Add a line."""
-        self._lines.append(text)
+        self.lines.append(text)
 
     def drain(self) -> tuple[str, ...]:
         """Return the lines since the last call."""
-        if not self._lines:
+        if not self.lines:
             return ()
-        lines = tuple(self._lines)
-        self._lines.clear()
+        lines = tuple(self.lines)
+        self.lines.clear()
         return lines
 
 

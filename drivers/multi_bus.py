@@ -4,7 +4,8 @@ from collections import Counter
 from collections.abc import Sequence
 from itertools import chain
 from math import inf
-from typing import NamedTuple
+from operator import itemgetter
+from typing import Any, NamedTuple
 
 from gazerig.drivers.errors import BusLost
 from gazerig.drivers.types import BusHealth, Feedback, ServoBus, ServoConfig
@@ -70,7 +71,9 @@ class MultiBus:
             raise ValueError(f"buses share out places {places}: each from 0 on must be there once")
         self._count = len(places)
         given = [place for share in shares for place in share.places]
-        self._order = sorted(range(len(given)), key=given.__getitem__)
+        order = sorted(range(len(given)), key=given.__getitem__)
+        # None where the buses' servos follow each other as they do in the rig.
+        self._pick: Any = itemgetter(*order) if order != sorted(order) else None
         self._nothing = [Feedback.of_none(len(share.places)) for share in shares]
 
     def open(self) -> None:
@@ -117,14 +120,12 @@ class MultiBus:
 
     def _together(self, feedbacks: Sequence[Feedback]) -> Feedback:
         """Return the feedback of all buses as one."""
-        order = self._order
-        columns = [list(chain.from_iterable(parts)) for parts in zip(*feedbacks, strict=True)]
-        missing = [
-            share.places[i]
-            for share, feedback in zip(self._shares, feedbacks, strict=True)
-            for i in feedback.missing
-        ]
-        ordered = [tuple([column[k] for k in order]) for column in columns[:-1]]
+        columns = [tuple(chain.from_iterable(parts)) for parts in zip(*feedbacks, strict=True)]
+        missing = list[int]()
+        if columns.pop():
+            for share, feedback in zip(self._shares, feedbacks, strict=True):
+                missing += [share.places[i] for i in feedback.missing]
+        ordered = columns if self._pick is None else map(self._pick, columns)
         return Feedback._make((*ordered, tuple(sorted(missing))))
 
     def enable_torque(self) -> tuple[int, ...]:

@@ -100,7 +100,7 @@ class PortBus(ABC):
 
     def events(self) -> tuple[str, ...]:
         """Return what happened since the last call, one line each."""
-        return self._log.drain()
+        return self._log.drain() if self._log.lines else ()
 
     def health(self) -> BusHealth:
         """Return byte and error counts of all exchanges."""

@@ -34,6 +34,10 @@ class SlowPort(StandIn):
             return b""
         return came
 
+    def exchange(self, request, length, deadline_s):
+        self.write(request)
+        return self.read_until(length, deadline_s), 0.0
+
     def drain(self):
         self.answers = [answer for answer in self.answers if answer is not self.late]
         return 0

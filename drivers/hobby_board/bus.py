@@ -16,6 +16,7 @@ from math import inf, nan
 
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
 from gazerig.drivers.event_log import EventLog
+from gazerig.drivers.goal_limits import clipped
 from gazerig.drivers.hobby_board.board import Board, BoardLine
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.models import channel_label
@@ -57,6 +58,8 @@ class HobbyBoardBus(PortBus):
             raise ValueError(f"channels {self._ids}: each can move one servo only")
         self._log = EventLog()
         self._nothing = Feedback.of_none(len(self._ids))
+        self._loads, self._unmeasured = (0.0,) * len(self._ids), (False,) * len(self._ids)
+        self._apply_limits()
         self._reported = False
         self._begin()
 
@@ -82,6 +85,7 @@ class HobbyBoardBus(PortBus):
             ServoMissing: the board or a channel does not answer.
         """
         self._setups = self._wanted
+        self._apply_limits()
         self._begin()
         baud = self._board.timing.baud
         if not self._port.setBaudRate(baud):
@@ -106,7 +110,9 @@ class HobbyBoardBus(PortBus):
         Raises:
             BusLost: port or board have been gone for longer than ``give_up_s``.
         """
-        if not self._reachable(now_s):
+        self._now_s = now_s
+        link = self._link
+        if (link.down or link.release_due) and not self._reachable(now_s):
             return self._nothing
         try:
             answered = self._watch(now_s)
@@ -120,22 +126,27 @@ class HobbyBoardBus(PortBus):
 
     def _feedback(self, at_s: float) -> Feedback:
         """Return the estimated positions of all servos; never measured."""
-        channels, nothing = self._channels, self._nothing
-        sure = [self._supervisor.is_known(channel) for channel in channels]
-        each = tuple(zip(channels, sure, strict=True))
+        channels, nothing, pending = self._channels, self._nothing, self._supervisor.pending
+        position, velocity, on, faults = list[float](), list[float](), list[bool](), list[str]()
+        rearmed, missing = [False] * len(channels), list[int]()
+        for i, channel in enumerate(channels):
+            position.append(round(channel.ramp.shaft_steps))
+            velocity.append(channel.ramp.shaft_steps_s)
+            on.append(channel.on)
+            faults.append(channel.fault)
+            if pending and channel in pending:
+                position[i] = velocity[i] = nan
+                missing.append(i)
+            elif channel.rearmed or channel.entering:
+                rearmed[i] = channel.pop_rearmed()
+        load, times = self._loads, (at_s,) * len(channels)
+        if missing:
+            load = tuple([nan if i in missing else 0.0 for i in range(len(channels))])
+            times = tuple([-inf if i in missing else at_s for i in range(len(channels))])
         return Feedback(
-            tuple([round(c.ramp.shaft_steps) if known else nan for c, known in each]),
-            tuple([c.ramp.shaft_steps_s if known else nan for c, known in each]),
-            tuple([0.0 if known else nan for known in sure]),
-            tuple([at_s if known else -inf for known in sure]),
-            nothing.temperature_c,
-            nothing.voltage_v,
-            tuple([c.on for c in channels]),
-            tuple([c.fault for c in channels]),
-            (False,) * len(channels),
-            tuple([known and c.pop_rearmed() for c, known in each]),
-            tuple([i for i, known in enumerate(sure) if not known]),
-        )
+            tuple(position), tuple(velocity), load, times, nothing.temperature_c, nothing.voltage_v,
+            tuple(on), tuple(faults), self._unmeasured, tuple(rearmed), tuple(missing),
+        )  # fmt: skip
 
     def enable_torque(self) -> tuple[int, ...]:
         """Hold every channel at the pulse that it gives, clipped to its limits.
@@ -176,9 +187,7 @@ class HobbyBoardBus(PortBus):
         Raises:
             ValueError: a goal is not a number, or there are not as many as servos.
         """
-        goals = [
-            channel.clip(goal) for channel, goal in zip(self._channels, goals_steps, strict=True)
-        ]
+        goals = [*map(int, clipped(goals_steps, self._lowest, self._highest))]
         held = [channel for channel in self._channels if channel.held]
         if not self._supervisor.engaged or self._link.down or not held:
             return
@@ -206,9 +215,15 @@ class HobbyBoardBus(PortBus):
         for setup in setups:
             self._board.params.check(setup)
 
+    def _apply_limits(self) -> None:
+        """Apply the ranges of the setups in force."""
+        self._lowest = tuple(setup.min_steps for setup in self._setups)
+        self._highest = tuple(setup.max_steps for setup in self._setups)
+
     def _apply_wanted(self) -> None:
         """Apply the setups requested since the servos were held last."""
         self._setups = self._wanted
+        self._apply_limits()
         for channel, setup in zip(self._channels, self._setups, strict=True):
             channel.set_target(setup)
 

@@ -110,8 +110,10 @@ class Channel:
     def aim(self, goal_steps: int, now_s: float) -> None:
         """Record a goal that was sent."""
         self.advance(now_s)
-        self._recent.append((now_s, self.goal_steps))
-        self._forget(now_s)
+        recent = self._recent
+        recent.append((now_s, self.goal_steps))
+        if recent[0][0] < now_s - RECENT_S:
+            self._forget(now_s)
         if goal_steps != self.goal_steps or self._settled_s == inf:
             way = abs(goal_steps - self.ramp.pulse_steps)
             self._settled_s = now_s + self.ramp.longest_s(way) + RECENT_S
@@ -121,13 +123,16 @@ class Channel:
 
     def advance(self, now_s: float) -> None:
         """Let time pass."""
-        if self.on and self._at_s > -inf:
-            spent_s = now_s - self._at_s
+        spent_s = now_s - self._at_s
+        if self.on and 0.0 < spent_s < inf:
             if spent_s > self._longest_lead_s:
                 # It was not led on: it stood, and begins from rest.
                 self.ramp.move(self.ramp.pulse_steps, spent_s - self._longest_lead_s)
                 spent_s = self._longest_lead_s
-            self.ramp.move(self._reached(self.goal_steps), spent_s)
+            goal = self.goal_steps
+            self.ramp.move(
+                goal if self._bottom <= goal <= self._top else self._reached(goal), spent_s
+            )
         self._at_s = now_s
 
     def implausible(self, pulse_steps: int, now_s: float, led_away: bool = False) -> bool:
@@ -140,7 +145,8 @@ class Channel:
         if self._longest_lead_s < inf:
             return abs(pulse_steps - self.sent_steps) > FINE_STEPS
         self._forget(now_s)
-        places = [self.goal_steps, *(goal for _, goal in self._recent)]
+        places = [goal for _, goal in self._recent]
+        places.append(self.goal_steps)
         room: float = FINE_STEPS
         if led_away or now_s < self._settled_s:
             places.append(round(self.ramp.pulse_steps))

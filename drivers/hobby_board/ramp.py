@@ -55,30 +55,28 @@ class Ramp:
         if self.pulse_steps == goal_steps == self.shaft_steps:
             self._pulse_steps_s = self.shaft_steps_s = 0.0
             return
-        began_steps = self.shaft_steps
-        slices = 1 if for_s > _LONG_S else ceil(for_s / _SLICE_S)
+        pulse, shaft, slices = self.pulse_steps, self.shaft_steps, 1
+        if for_s <= _LONG_S:
+            slices = ceil(for_s / _SLICE_S)
+        slice_s = for_s / slices
+        limit, accel, pulse_steps_s = self.speed_steps_s, self.accel_steps_s2, self._pulse_steps_s
+        at_once = slice_s > _LONG_S or not (limit or accel)
+        reach = self.shaft_speed_steps_s * slice_s
         for _ in range(slices):
-            self._turn_pulse(goal_steps, for_s / slices)
-            self._turn_shaft(for_s / slices)
-        self.shaft_steps_s = (self.shaft_steps - began_steps) / for_s
-
-    def _turn_pulse(self, goal_steps: float, for_s: float) -> None:
-        left = goal_steps - self.pulse_steps
-        if not (self.speed_steps_s or self.accel_steps_s2) or for_s > _LONG_S or left == 0.0:
-            self.pulse_steps, self._pulse_steps_s = goal_steps, 0.0
-            return
-        way = 1.0 if left > 0.0 else -1.0
-        speed = self.speed_steps_s or abs(left) / for_s
-        if self.accel_steps_s2:
-            accel = self.accel_steps_s2
-            towards = max(0.0, way * self._pulse_steps_s)
-            speed = min(speed, towards + accel * for_s, sqrt(2.0 * accel * abs(left)))
-        if speed * for_s >= abs(left):
-            self.pulse_steps, self._pulse_steps_s = goal_steps, way * abs(left) / for_s
-        else:
-            self.pulse_steps += way * speed * for_s
-            self._pulse_steps_s = way * speed
-
-    def _turn_shaft(self, for_s: float) -> None:
-        reach = self.shaft_speed_steps_s * for_s
-        self.shaft_steps += min(reach, max(-reach, self.pulse_steps - self.shaft_steps))
+            left = goal_steps - pulse
+            if at_once or left == 0.0:
+                pulse, pulse_steps_s = goal_steps, 0.0
+            else:
+                way, far = (1.0, left) if left > 0.0 else (-1.0, -left)
+                speed = limit or far / slice_s
+                if accel:
+                    towards = max(0.0, way * pulse_steps_s)
+                    speed = min(speed, towards + accel * slice_s, sqrt(2.0 * accel * far))
+                if speed * slice_s >= far:
+                    pulse, pulse_steps_s = goal_steps, way * far / slice_s
+                else:
+                    pulse += way * speed * slice_s
+                    pulse_steps_s = way * speed
+            shaft += min(reach, max(-reach, pulse - shaft))
+        self.shaft_steps_s = (shaft - self.shaft_steps) / for_s
+        self.pulse_steps, self.shaft_steps, self._pulse_steps_s = pulse, shaft, pulse_steps_s

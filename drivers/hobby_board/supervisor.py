@@ -28,6 +28,8 @@ class BoardSupervisor:
     """Checks the board's status and recovers its channels.
 
     engaged: goals are followed
+    sure: goals may be sent, as the board has kept its settings
+    pending: channels of which it is not known where they are, until they are held again
     """
 
     def __init__(self, board: Board, channels: Sequence[Channel], log: EventLog) -> None:
@@ -37,9 +39,9 @@ class BoardSupervisor:
         self._log = log
         self._led = board.timing.longest_lead_s < inf
         self.engaged = False
-        self._pending: list[Channel] = []
+        self.pending: list[Channel] = []
         self._asked = -1
-        self._unsure = False
+        self.sure = True
         self._unhandled: tuple[str, ...] = ()
         self._restarts: list[float] = []
         self._errors_s: dict[str, float] = {}
@@ -53,19 +55,19 @@ class BoardSupervisor:
         self._restarts.clear()
         self._disturbed.clear()
         self._hold_at_s = -inf
-        self._pending.clear()
-        self._unsure, self._unhandled = False, ()
+        self.pending.clear()
+        self.sure, self._unhandled = True, ()
 
     def torque_disabled(self) -> None:
         """Stop the supervision."""
         self.engaged = False
-        self._pending.clear()
+        self.pending.clear()
         for channel in self._channels:
             channel.release()
 
     def mark_all_for_recovery(self) -> None:
         """Mark every channel to be enabled again."""
-        self._unsure = True
+        self.sure = False
         if self.engaged:
             for channel in self._channels:
                 self._drop(channel)
@@ -95,11 +97,11 @@ class BoardSupervisor:
         """
         self._asked = (self._asked + 1) % len(self._channels)
         channel = self._channels[self._asked]
-        if self.engaged:
+        if self.engaged and self._led:
             self.lead()
         found = self._board.look(channel)
         if found is None:
-            self._unsure = True
+            self.sure = False
             return False
         now_s = self._line.port.now_s()
         self.advance(now_s)
@@ -108,7 +110,7 @@ class BoardSupervisor:
             self._unhandled = (*self._unhandled, *found.errors)
             return self._service(channel, found.pulse_steps, now_s)
         channel.found(found.pulse_steps)
-        self._unsure = False
+        self.sure = True
         return True
 
     def advance(self, now_s: float) -> None:
@@ -121,7 +123,7 @@ class BoardSupervisor:
         if not self._led:
             return
         self.advance(self._line.port.now_s())
-        off = [channel.id for channel in self._pending if not channel.on]
+        off = [channel.id for channel in self.pending if not channel.on]
         if off:
             self._board.stop(off)  # noise may have begun their pulses
         if self.sure:
@@ -129,12 +131,12 @@ class BoardSupervisor:
 
     def _service(self, channel: Channel, pulse: int, now_s: float) -> bool:
         odd = channel.held and channel.implausible(pulse, now_s)
-        if self._unhandled or self._unsure or odd:
+        if self._unhandled or not self.sure or odd:
             if not self._check_all():
                 return False
         elif channel.held:
             channel.confirmed(pulse)
-        if self._pending and now_s >= self._hold_at_s:
+        if self.pending and now_s >= self._hold_at_s:
             self._recover_next(now_s)
         for one in self._channels:
             if one.entering and one.inside():
@@ -146,13 +148,13 @@ class BoardSupervisor:
         """Compare every channel's pulse with what it should be; return whether they came."""
         pulses = self._board.pulses([channel.id for channel in self._channels])
         if pulses is None:
-            self._unsure = True
+            self.sure = False
             return False
         now_s = self._line.port.now_s()
         self.advance(now_s)
-        errors, unsure = tuple(dict.fromkeys(self._unhandled)), self._unsure
-        self._unhandled, self._unsure = (), False
-        away = bool(errors or unsure)
+        errors, sure = tuple(dict.fromkeys(self._unhandled)), self.sure
+        self._unhandled, self.sure = (), True
+        away = bool(errors) or not sure
         found = dict(zip(self._channels, pulses, strict=True))
         held = [channel for channel in self._channels if channel.held]
         odd = [channel for channel in held if channel.implausible(found[channel], now_s, away)]
@@ -170,7 +172,7 @@ class BoardSupervisor:
                 channel.confirmed(found[channel])
         if away or home:
             self._restore()
-        for channel in self._pending:
+        for channel in self.pending:
             channel.found(found[channel])
         return True
 
@@ -185,7 +187,7 @@ class BoardSupervisor:
         if not held:
             return
         if not self._board.send_limits(held, confirmed=True):
-            self._unsure = True
+            self.sure = False
             return
         self._board.send_goals(held)
 
@@ -249,22 +251,22 @@ class BoardSupervisor:
     def _drop(self, channel: Channel) -> None:
         if channel.held:
             channel.release()
-            self._pending.append(channel)
+            self.pending.append(channel)
 
     def _give_up(self) -> None:
         """Leave channels that lose their pulses again and again without them."""
         fault = "restarts again and again: supply too weak"
-        for channel in self._pending:
+        for channel in self.pending:
             channel.fault = fault
             self._log.add(f"{channel_label(channel.setup)}: {fault}")
-        self._board.stop([channel.id for channel in self._pending])
-        for channel in self._pending:
+        self._board.stop([channel.id for channel in self.pending])
+        for channel in self.pending:
             channel.stop()
-        self._pending.clear()
+        self.pending.clear()
 
     def _recover_next(self, now_s: float) -> None:
         """Enable one channel again; the next one at the next read, to spare the supply."""
-        channel = self._pending[0]
+        channel = self.pending[0]
         found = self._board.pulses((channel.id,))
         if found is None:
             return
@@ -272,21 +274,10 @@ class BoardSupervisor:
         outcome = take(self._board, channel, found[0])
         if outcome is HoldResult.HELD:
             channel.rearm()
-            self._pending.remove(channel)
+            self.pending.remove(channel)
         elif outcome is HoldResult.ELSEWHERE and channel.on:
             # It does give pulses, only others: that is reported once, and it is held so.
             self._off_goal(channel, round(channel.ramp.pulse_steps))
             channel.hold()
             channel.rearm()
-            self._pending.remove(channel)
-
-    # --- state for the bus
-
-    def is_known(self, channel: Channel) -> bool:
-        """Return whether anything is known of where a channel is."""
-        return channel not in self._pending
-
-    @property
-    def sure(self) -> bool:
-        """Whether goals may be sent: the board has kept its settings."""
-        return not self._unsure
+            self.pending.remove(channel)

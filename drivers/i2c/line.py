@@ -48,21 +48,21 @@ class I2cLine:
             dropped = port.drain()
             if dropped and self.failure == "timeout":
                 self.lateness.late_answer(port.now_s())
-        else:
-            port.clearPort()
-        packet = b"".join(transfer + ASK_STATUS for transfer, _ in transfers)
-        wanted = sum(length + 1 for _, length in transfers)
-        self.send(packet)
+        packet = b"".join([transfer + ASK_STATUS for transfer, _ in transfers])
+        lengths = [length for _, length in transfers]
+        wanted = sum(lengths) + len(lengths)
         wire_s = (len(packet) + wanted) * self._byte_s
-        answer = port.read_until(wanted, port.now_s() + wire_s + self._reply_timeout_s)
+        deadline_s = port.now_s() + wire_s + self._reply_timeout_s
+        answer, _ = port.exchange(packet, wanted, deadline_s)
+        self.tx_bytes += len(packet)
         self.rx_bytes += len(answer)
-        self.failure = self._trouble(answer, [length for _, length in transfers])
+        self.failure = self._trouble(answer, lengths)
         self._late = self.failure in ("timeout", "incomplete", "damaged")
         if self.failure:
             self.errors[self.failure] += 1
             return None
         found, at = [], 0
-        for _, length in transfers:
+        for length in lengths:
             found.append(answer[at : at + length])
             at += length + 1
         return found

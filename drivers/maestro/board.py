@@ -44,6 +44,7 @@ class MaestroBoard:
             left_alone="the board goes on with its last goals as long as it has power",
         )
         self._errors_first = False
+        self._questions: dict[int, tuple[bytes, bytes]] = {}
 
     def find(self, setups: Sequence[ServoConfig], log: EventLog) -> tuple[int, ...]:
         """Greet the board and return the pulses of these servos; nothing moves.
@@ -92,16 +93,18 @@ class MaestroBoard:
 
     def look(self, channel: Channel) -> ChannelStatus | None:
         """Ask for one channel's pulse and the error register; None where no answer came."""
-        speech = self.line.speech
-        questions = (speech.position(channel.id), speech.errors())
+        questions = self._questions.get(channel.id)
+        if questions is None:
+            speech = self.line.speech
+            one, other = speech.position(channel.id), speech.errors()
+            questions = self._questions[channel.id] = one + other, other + one
         # Now in this order, now in the other: a line that says its last answer again gives a
         # pulse width in the place of the register, which cannot be one.
         self._errors_first = not self._errors_first
-        order = -1 if self._errors_first else 1
-        found = self.line.ask_words(b"".join(questions[::order]), 2)
+        found = self.line.ask_words(questions[self._errors_first], 2)
         if found is None:
             return None
-        pulse, register = found[::order]
+        pulse, register = found[::-1] if self._errors_first else found
         if register >> len(ERRORS):
             # A pulse width taken for a register, or noise: such errors do not exist.
             self.line.errors["damaged"] += 1

@@ -6,6 +6,7 @@ without its highest bit. Answers are plain bytes, low byte first, and never chec
 Source: Pololu Maestro Servo Controller User's Guide (0J40), sections 4.e and 5.
 """
 
+import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -70,15 +71,15 @@ def crc7(data: bytes) -> int:
 
 def name_errors(register: int) -> tuple[str, ...]:
     """Name the set bits of the error register."""
+    if not register:
+        return ()
     named = [name for bit, name in enumerate(ERRORS) if register >> bit & 1]
     return (*named, "unknown error") if register >> len(ERRORS) else tuple(named)
 
 
 def decode_words(answer: bytes) -> tuple[int, ...]:
     """Return the 16-bit words of an answer."""
-    return tuple(
-        int.from_bytes(answer[i : i + WORD], "little") for i in range(0, len(answer), WORD)
-    )
+    return struct.unpack(f"<{len(answer) // WORD}H", answer)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +102,7 @@ class MaestroCodec:
         Raises:
             ValueError: a data byte has its highest bit set.
         """
-        if any(not 0 <= byte < 0x80 for byte in data):
+        if data and not 0 <= min(data) <= max(data) < 0x80:
             raise ValueError(f"command {code:02X}: data bytes must be 0..127, not {data}")
         head = (code,) if self.form == "compact" else (POLOLU, self.device, code & 0x7F)
         packet = bytes((*head, *data))
@@ -119,10 +120,14 @@ class MaestroCodec:
         packet = b""
         for run in runs(sorted(goals)):
             if len(run) > 1 and self.channels > MICRO:
-                data = [byte for channel in run for byte in split(goals[channel])]
+                widths = [goals[channel] for channel in run]
+                data = [0] * (2 * len(run))
+                # As ``split``, of all at once; what does not fit is not a data byte.
+                data[0::2] = [width & 0x7F for width in widths]
+                data[1::2] = [width >> 7 for width in widths]
                 packet += self.command(SET_TARGETS, len(run), run[0], *data)
             else:
-                packet += b"".join(self.target(channel, goals[channel]) for channel in run)
+                packet += b"".join([self.target(channel, goals[channel]) for channel in run])
         return packet
 
     def speed(self, channel: int, units: int) -> bytes:

@@ -62,11 +62,10 @@ class MaestroLink:
                 self.lateness.late_answer(port.now_s())
             if not self._late and not dropped:
                 self._owed = 0
-        else:
-            port.clearPort()
-        self.send(packet)
         wire_s = (len(packet) + length) * self._byte_s
-        answer = port.read_until(length, port.now_s() + wire_s + self._reply_timeout_s)
+        deadline_s = port.now_s() + wire_s + self._reply_timeout_s
+        answer, _ = port.exchange(packet, length, deadline_s)
+        self.tx_bytes += len(packet)
         self.rx_bytes += len(answer)
         self._late = len(answer) < length
         self._owed += length - len(answer)

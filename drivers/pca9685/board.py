@@ -30,7 +30,6 @@ from gazerig.drivers.pca9685.registers import (
     SLEEP,
     START_S,
     TOTEM_POLE,
-    PulseClock,
     counts_of,
     counts_within,
     output,
@@ -87,28 +86,22 @@ class Pca9685Board:
             left_alone="the board goes on with its last pulses as long as it has power",
         )
         self._clocks = params.clocks
+        self._places = [(address, nth) for address in params.addresses for nth in range(CHANNELS)]
+        self._grains = [self._clocks[address].grain_steps for address, _ in self._places]
+        self._questions: dict[int, list[tuple[bytes, int]]] = {}
         self._sent: dict[int, tuple[int, int]] = {}
         self._sent_s = 0.0
         self._looks = 0
 
     # --- places and units
 
-    def _place(self, servo_id: int) -> tuple[int, int]:
-        """Return the address of a servo's board, and its channel there."""
-        board, channel = divmod(servo_id, CHANNELS)
-        return self.params.addresses[board], channel
-
     def _boards(self, ids: Sequence[int]) -> dict[int, list[int]]:
         """Return the channels of servos by the addresses of their boards."""
         boards: dict[int, list[int]] = defaultdict(list)
         for servo_id in ids:
-            address, channel = self._place(servo_id)
+            address, channel = self._places[servo_id]
             boards[address].append(channel)
         return boards
-
-    def _clock(self, servo_id: int) -> PulseClock:
-        """Return the clock of a servo's board."""
-        return self._clocks[self._place(servo_id)[0]]
 
     # --- finding
 
@@ -176,7 +169,7 @@ class Pca9685Board:
 
     def _forget(self, address: int) -> None:
         """Forget what was sent to a board."""
-        mine = [servo_id for servo_id in self._sent if self._place(servo_id)[0] == address]
+        mine = [servo_id for servo_id in self._sent if self._places[servo_id][0] == address]
         for servo_id in mine:
             del self._sent[servo_id]
 
@@ -187,16 +180,17 @@ class Pca9685Board:
 
         A board that was reset sleeps: then it gives no pulses, whatever else is there.
         """
-        address, nth = self._place(channel.id)
+        address, nth = self._places[channel.id]
         self._looks += 1
         with_prescale = self._looks % PRESCALE_EVERY == 0
-        questions = [
-            (bridge.read(address, MODE1, 1), 1),
-            (bridge.read(address, output(nth), BYTES), BYTES),
-        ]
-        if with_prescale:
-            questions.append((bridge.read(address, PRESCALE, 1), 1))
-        found = self.line.ask(questions)
+        questions = self._questions.get(channel.id)
+        if questions is None:
+            questions = self._questions[channel.id] = [
+                (bridge.read(address, MODE1, 1), 1),
+                (bridge.read(address, output(nth), BYTES), BYTES),
+                (bridge.read(address, PRESCALE, 1), 1),
+            ]
+        found = self.line.ask(questions if with_prescale else questions[:2])
         if found is None:
             return None
         usual = self._clocks[address].prescale
@@ -207,7 +201,7 @@ class Pca9685Board:
 
     def _look_closer(self, channel: Channel) -> ChannelStatus | None:
         """Check once more a board that has lost its setup or was read badly."""
-        address, _ = self._place(channel.id)
+        address, _ = self._places[channel.id]
         now, pulses = self._modes(address), self.pulses((channel.id,))
         if now is None or pulses is None:
             return None
@@ -220,7 +214,7 @@ class Pca9685Board:
 
     def _pulse_steps(self, servo_id: int, counts: int, prescale: int) -> int:
         """Return the pulse of counts: exactly the one sent if the counts are those sent."""
-        sent, clock = self._sent.get(servo_id), self._clock(servo_id)
+        sent, clock = self._sent.get(servo_id), self._clocks[self._places[servo_id][0]]
         if sent is not None and sent[0] == counts and prescale == clock.prescale:
             return sent[1]
         return round(counts * clock._replace(prescale=prescale).grain_steps)
@@ -287,30 +281,30 @@ class Pca9685Board:
 
     def send_goals(self, channels: Sequence[Channel]) -> None:
         """Send channels to where they are on the way to their goals, those of a board at once."""
+        counts: dict[int, int] = {}
         for channel in channels:
-            self._sent[channel.id] = self._due(channel)
-            channel.sent_steps = self._sent[channel.id][1]
-        self._send({channel.id: self._sent[channel.id][0] for channel in channels})
+            servo_id, setup, steps = channel.id, channel.setup, round(channel.ramp.pulse_steps)
+            # Where it is on its way, inside its limits.
+            width = counts_within(steps, setup.min_steps, setup.max_steps, self._grains[servo_id])
+            counts[servo_id], self._sent[servo_id] = width, (width, steps)
+            channel.sent_steps = steps
+        self._send(counts)
 
     def _send(self, counts: Mapping[int, int]) -> None:
         """Send pulses by the ids of their servos, those of a board in as few writes as can be."""
         boards: dict[int, dict[int, bytes]] = defaultdict(dict)
         for servo_id, width in counts.items():
-            address, nth = self._place(servo_id)
+            address, nth = self._places[servo_id]
             boards[address][nth] = pulse(width)
         packet = b"".join(
-            bridge.write(address, output(run[0]), b"".join(outputs[nth] for nth in run))
-            for address, outputs in boards.items()
-            for run in runs(sorted(outputs))
+            [
+                bridge.write(address, output(run[0]), b"".join([outputs[nth] for nth in run]))
+                for address, outputs in boards.items()
+                for run in runs(sorted(outputs))
+            ]
         )
         self.line.send(packet)
         self._sent_s = self.line.port.now_s()
-
-    def _due(self, channel: Channel) -> tuple[int, int]:
-        """Return where a channel is on its way: in counts inside its limits, and in steps."""
-        steps, setup = round(channel.ramp.pulse_steps), channel.setup
-        grain = self._clock(channel.id).grain_steps
-        return counts_within(steps, setup.min_steps, setup.max_steps, grain), steps
 
     def steady(self, channels: Sequence[Channel]) -> None:
         """Send pulses once more as they were sent: a byte lost in a row of them shifts the rest."""
@@ -320,9 +314,8 @@ class Pca9685Board:
         """Send pulses that are on their way a little farther, where no goals come."""
         if self.line.port.now_s() - self._sent_s < FOLLOW_UP_S:
             return
-        moving = [
-            c for c in channels if round(c.ramp.pulse_steps) != self._sent.get(c.id, (0, 0))[1]
-        ]
+        sent, none = self._sent, (0, 0)
+        moving = [c for c in channels if round(c.ramp.pulse_steps) != sent.get(c.id, none)[1]]
         if moving:
             self.send_goals(moving)
 
@@ -330,7 +323,7 @@ class Pca9685Board:
         """Stop pulses, each by one register, whatever is set; on the last try all of a board."""
         packets = []
         for servo_id in channels:
-            address, nth = self._place(servo_id)
+            address, nth = self._places[servo_id]
             self._sent.pop(servo_id, None)
             packets.append(bridge.write(address, output(nth) + BYTES - 1, bytes((FULL_OFF,))))
         if last_try:

@@ -4,6 +4,7 @@ Source: NXP, PCA9685 data sheet, rev. 4 (16 April 2015), section 7.3.
 """
 
 from collections.abc import Sequence
+from functools import lru_cache
 from math import ceil, floor
 from typing import NamedTuple
 
@@ -90,10 +91,16 @@ def counts_within(steps: int, low_steps: int, high_steps: int, grain_steps: floa
         grain_steps: what one count is.
     """
     counts = round(steps / grain_steps)
-    least, most = ceil(low_steps / grain_steps), floor(high_steps / grain_steps)
+    least, most = _counts_between(low_steps, high_steps, grain_steps)
     if not low_steps <= steps <= high_steps or least > most:
         return counts
     return min(max(counts, least), most)
+
+
+@lru_cache(maxsize=256)
+def _counts_between(low_steps: int, high_steps: int, grain_steps: float) -> tuple[int, int]:
+    """Return the least and the most counts of which no pulse is outside limits."""
+    return ceil(low_steps / grain_steps), floor(high_steps / grain_steps)
 
 
 def runs(channels: Sequence[int]) -> list[list[int]]:

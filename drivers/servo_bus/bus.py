@@ -6,6 +6,7 @@ from math import ceil
 
 from gazerig.drivers.errors import BusLost, PortError, ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog, servo_label
+from gazerig.drivers.goal_limits import clipped
 from gazerig.drivers.port_bus import CUT, PortBus
 from gazerig.drivers.released import ReleaseResult
 from gazerig.drivers.serial.port import BusPort
@@ -14,7 +15,6 @@ from gazerig.drivers.servo_bus.discovery import find
 from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.faults import ServoHealth
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
-from gazerig.drivers.servo_bus.goals import clipped
 from gazerig.drivers.servo_bus.latched_faults import LatchedFaultSupervisor
 from gazerig.drivers.servo_bus.params import BusParams
 from gazerig.drivers.servo_bus.passing_faults import PassingFaultSupervisor
