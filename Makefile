@@ -48,6 +48,7 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python tests/bench/bench_page.py
 	$(BIN)/python tests/bench/bench_recording.py
 	$(BIN)/python tests/bench/bench_api.py
+	$(BIN)/python tests/bench/bench_sweep.py
 
 # A folder with the packages under their import names, for what does not see through an install.
 links:

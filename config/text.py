@@ -3,7 +3,7 @@
 It is read back with ``gazerig.config.load.load``; values come back exactly.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +50,18 @@ def gesture_files(text: Path, folder: Path) -> tuple[str, ...]:
         file.write_text("".join(_lines(plain(gesture))), encoding="utf-8")
         files.append(str(file))
     return tuple(files)
+
+
+def changes_text(changes: Mapping[str, Any]) -> str:
+    """Return values at dotted keys as the YAML of a layer: a character's, for example."""
+    nested: dict[str, Any] = {}
+    for key, value in changes.items():
+        *over, last = key.split(".")
+        held = nested
+        for step in over:
+            held = held.setdefault(step, {})
+        held[last] = value
+    return "".join(_lines(nested))
 
 
 def _lines(values: dict[str, Any], depth: int = 0) -> Iterator[str]:

@@ -128,6 +128,7 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
             "a heat map",
         ),
         ("sweep my.yaml --set gaze.head.base_speed_deg_s=40:120 --samples 50", "a sample"),
+        ("sweep my.yaml --fit --set gaze.lids.blinks_per_min=4:40", "what is most like people"),
     ),
     "compare": (("compare shy.mcap bold.mcap", "two recordings side by side"),),
 }

@@ -21,6 +21,7 @@ from gazerig.robot.report.norm_bands import BY_KEY
 
 if TYPE_CHECKING:
     from gazerig.robot.sweep.axes import Point
+    from gazerig.robot.sweep.fit import Fit
     from gazerig.robot.sweep.outcome import Outcome
     from gazerig.robot.sweep.sweep import Progress, Sweep, SweepSpec
 
@@ -32,6 +33,7 @@ _COLUMNS = (
 )
 """What can be drawn besides the report's measures."""
 _MOST_SEEDS = 10_000
+_TRIED = 60
 
 
 @app.command(cls=RigCommand)
@@ -56,8 +58,18 @@ def sweep(
     ] = None,
     samples: Annotated[
         int | None,
-        typer.Option(min=2, max=100_000, help="A Latin hypercube of N points instead of a grid."),
+        typer.Option(
+            min=2,
+            max=100_000,
+            help="A Latin hypercube of N points instead of a grid; with --fit, points to try (60).",
+        ),
     ] = None,
+    fit: Annotated[
+        bool,
+        typer.Option(
+            "--fit", help="Search for the values with the fewest measures outside people's bands."
+        ),
+    ] = False,
     out: Annotated[
         Path | None, typer.Option(help="Folder; default: sweep-RIG-SCENE or fit-RIG-SCENE.")
     ] = None,
@@ -79,7 +91,9 @@ def sweep(
 ) -> None:
     """Vary parameters over many simulated runs: a table, and a picture of what responds.
 
-    Every finished run is kept at once: the same command goes on after Ctrl-C.
+    Every finished run is kept at once: the same command goes on after Ctrl-C. With --fit it
+    searches for the values that put most of the report's measures inside people's bands, and writes
+    them as YAML.
     """
     with clear_errors(rig):
         shown = [_column(name) for name in show or ()]
@@ -99,12 +113,17 @@ def sweep(
         if not axes:
             raise SetupError("nothing to vary: give --set KEY=VALUES, for example "
                              "--set gaze.head.comfort_deg=4:16:7")  # fmt: skip
-        points = grid(axes) if samples is None else latin_hypercube(axes, samples, seed)
-        checked(varied, axes, points)
-        search = {} if samples is None else {"samples": samples, "seed": seed}
-        spec = SweepSpec(varied, asked, tuple(axes), tuple(range(seed, seed + seeds)), search)
-        outcomes = _swept(spec, points, out or folder_of(asked, "sweep"), jobs, shown)
-        _say_failures(outcomes)
+        all_seeds = tuple(range(seed, seed + seeds))
+        if fit:
+            search = {"fit": samples or _TRIED, "seed": seed}
+            spec = SweepSpec(varied, asked, tuple(axes), all_seeds, search)
+            outcomes = _fitted(spec, out or folder_of(asked, "fit"), jobs, shown)
+        else:
+            points = grid(axes) if samples is None else latin_hypercube(axes, samples, seed)
+            checked(varied, axes, points)
+            search = {} if samples is None else {"samples": samples, "seed": seed}
+            spec = SweepSpec(varied, asked, tuple(axes), all_seeds, search)
+            outcomes = _swept(spec, points, out or folder_of(asked, "sweep"), jobs, shown)
     if all(one.failed for one in outcomes):
         raise typer.Exit(FAULT)
 
@@ -114,18 +133,73 @@ def _swept(
     shown: Sequence[str],
 ) -> "list[Outcome]":  # fmt: skip
     """Run all points, and write table and picture."""
+    with _working(spec, folder, jobs) as (work, runs):
+        outcomes = work.run(points, runs)
+    _write(spec, folder, outcomes, shown)
+    _say_failures(outcomes)
+    return outcomes
+
+
+def _fitted(
+    spec: "SweepSpec", folder: Path, jobs: int | None, shown: Sequence[str]
+) -> "list[Outcome]":
+    """Search for the best point; write it as YAML, with the table and picture of all runs."""
+    from gazerig.config.parameters import value_of
+    from gazerig.robot.sweep.fit import fit
+    from gazerig.robot.sweep.snippet import SNIPPET, snippet_of
+
+    count, seed = int(str(spec.search["fit"])), int(str(spec.search["seed"]))
+    start = {axis.key: value_of(spec.rig, axis.key) for axis in spec.axes}
+    outcomes: list[Outcome] = []
+    with _working(spec, folder, jobs) as (work, runs):
+        total = (count + 1) * len(spec.seeds)
+
+        def run(points: "Sequence[Point]") -> "Sequence[Sequence[Outcome]]":
+            before = len(outcomes)
+            outcomes.extend(work.run(points, lambda done, _: runs(before + done, total)))
+            n = len(spec.seeds)
+            return [outcomes[i : i + n] for i in range(before, len(outcomes), n)]
+
+        found = fit(run, spec.axes, start, count, seed)
+    _write(spec, folder, outcomes, shown)
+    write_file(folder / SNIPPET, snippet_of(spec.options, found.best.point), force=True)
+    _say_failures(outcomes)
+    _say_fit(found, folder / SNIPPET, spec.options)
+    return outcomes
+
+
+def _say_fit(found: "Fit", snippet: Path, asked: RunOptions) -> None:
+    """Print the best point beside the rig's own values, and how to run it."""
+    own, best = found.start, found.best
+    say(
+        f"{len(found.counted)} measures count, {len(found.trials)} points tried; outside: "
+        f"{own.outside:.3g} with the rig's own values (graded {own.score:.3g}), "
+        f"{best.outside:.3g} with the best (graded {best.score:.3g})"
+    )
+    if best is own:
+        say("no point tried is better than the rig's own values")
+        return
+    for key, value in best.point.items():
+        say(f"{key}: {own.point[key]} -> {value}")
+    names = ("profile", "rules", "behaviour", "conversation")
+    given = "".join(f" --{name} {held}" for name in names if (held := getattr(asked, name)))
+    say(f"to run it: gazerig run {asked.rig} --character {snippet}{given}")
+
+
+def _write(
+    spec: "SweepSpec", folder: Path, outcomes: "Sequence[Outcome]", shown: Sequence[str]
+) -> None:
+    """Write table and picture, and say where."""
     from gazerig.robot.sweep.response_figure import PICTURE, response_png
     from gazerig.robot.sweep.table import write_tables
 
-    with _working(spec, folder, jobs) as (work, runs):
-        outcomes = work.run(points, runs)
     files = [*write_tables(folder, outcomes)]
     if not all(one.failed for one in outcomes):
         files.append(folder / PICTURE)
         write_file(files[-1], response_png(spec.axes, outcomes, shown), force=True)
-    count = f"{len(points)} points, {len(spec.seeds)} seeds each: {len(outcomes)} runs"
+    points = len(outcomes) // len(spec.seeds)
+    count = f"{points} points, {len(spec.seeds)} seeds each: {len(outcomes)} runs"
     say(f"{files[0]}: {count}; beside it {', '.join(file.name for file in files[1:])}")
-    return outcomes
 
 
 @contextmanager

@@ -16,6 +16,7 @@ from gazerig.config.parameters import Parameter, changed, parameters, value_of
 from gazerig.config.renamed import renamed_key
 from gazerig.config.schema import Rig
 from gazerig.drivers.errors import SetupError
+from gazerig.gaze.types import Floats
 from gazerig.robot.model.commands import Value
 
 Point = Mapping[str, Value]
@@ -53,6 +54,16 @@ class Axis:
         """Return whether any number between two ends is meant."""
         return not self.values
 
+    def has(self, value: Value) -> bool:
+        """Return whether a value lies on the axis."""
+        if self.values:
+            return _frozen(value) in self.values
+        return isinstance(value, int | float) and self.low <= value <= self.high
+
+    def index(self, value: Value) -> int:
+        """Return which level a value is."""
+        return self.values.index(_frozen(value))
+
     def at(self, share: float) -> Value:
         """Return the value at a share 0 <= share <= 1 of the axis."""
         if self.values:
@@ -66,7 +77,7 @@ class Axis:
     def share(self, value: Value) -> float:
         """Return where a value lies on the axis, 0..1; of a level, the middle of its part."""
         if self.values:
-            return (self.values.index(value) + 0.5) / len(self.values)
+            return (self.index(value) + 0.5) / len(self.values)
         assert isinstance(value, int | float)
         width = self.high - self.low
         if self.whole:
@@ -77,6 +88,11 @@ class Axis:
     def label(self) -> str:
         """Return key and unit as text."""
         return f"{self.key}, {self.unit}" if self.unit else self.key
+
+
+def _frozen(value: Value) -> Value:
+    """Return lists as tuples: points are JSON once they have been on the disk."""
+    return tuple(map(_frozen, value)) if isinstance(value, list | tuple) else value
 
 
 def axes_of(rig: Rig, settings: Sequence[str], read: Callable[[str, str], Value]) -> list[Axis]:
@@ -146,7 +162,7 @@ def _axis(rig: Rig, param: Parameter, text: str, read: Callable[[str, str], Valu
         raise SetupError(f"--set {param.key}={text}: no values; write {_FORMS}")
     if len(set(map(repr, listed))) < len(listed):
         raise SetupError(f"--set {param.key}={text}: a value stands twice")
-    return Axis(param.key, tuple(listed), unit=param.unit)
+    return Axis(param.key, tuple(map(_frozen, listed)), unit=param.unit)
 
 
 def _ends(param: Parameter, text: str, found: re.Match[str]) -> tuple[float, float]:
@@ -217,10 +233,15 @@ def latin_hypercube(axes: Sequence[Axis], samples: int, seed: int) -> list[Point
         samples: how many; each axis is cut into as many parts of equal width.
         seed: of the sample.
     """
-    rng = np.random.default_rng(seed)
-    parts = rng.permuted(np.tile(np.arange(samples), (len(axes), 1)), axis=1)
-    shares = (parts + rng.random(parts.shape)) / samples
-    return [point_at(axes, column) for column in shares.T]
+    shares = latin_shares(len(axes), samples, np.random.default_rng(seed))
+    return [point_at(axes, row) for row in shares]
+
+
+def latin_shares(dimensions: int, samples: int, rng: np.random.Generator) -> Floats:
+    """Return a Latin hypercube in the unit cube, (samples, dimensions)."""
+    parts = rng.permuted(np.tile(np.arange(samples), (dimensions, 1)), axis=1)
+    shares: Floats = ((parts + rng.random(parts.shape)) / samples).T
+    return shares
 
 
 def point_at(axes: Sequence[Axis], shares: Iterable[float]) -> Point:

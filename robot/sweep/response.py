@@ -32,13 +32,7 @@ def positions(axis: Axis, outcomes: Sequence[Outcome]) -> Floats:
     """Return where each run lies on an axis: its number, or the index of its level."""
     if axis.is_range or all(is_number(value) for value in axis.values):
         return np.array([float(str(one.point[axis.key])) for one in outcomes])
-    levels = [repr(_frozen(value)) for value in axis.values]
-    return np.array([float(levels.index(repr(_frozen(one.point[axis.key])))) for one in outcomes])
-
-
-def _frozen(value: object) -> object:
-    """Return lists as tuples: points are JSON once they have been on the disk."""
-    return tuple(map(_frozen, value)) if isinstance(value, list | tuple) else value
+    return np.array([float(axis.index(one.point[axis.key])) for one in outcomes])
 
 
 def column(name: str, outcomes: Sequence[Outcome]) -> Floats:

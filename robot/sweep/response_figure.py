@@ -40,10 +40,14 @@ def response_png(
 
     Args:
         axes: what was varied.
-        outcomes: all runs; those that failed are left out.
+        outcomes: all runs; those that failed are left out, and those beside the axes.
         shown: columns; empty: measures outside their bands, and those that respond most.
     """
-    runs = [one for one in outcomes if not one.failed]
+    runs = [
+        one
+        for one in outcomes
+        if not one.failed and all(axis.has(one.point[axis.key]) for axis in axes)
+    ]
     names = list(shown) or most_responsive(axes, runs, _MOST.get(len(axes), _ROWS))
     heat = len(axes) == 2 and not any(axis.is_range for axis in axes)
     each = [(name, axis) for name in names for axis in (axes[:1] if heat else axes)]
