@@ -5,7 +5,7 @@ a hobby servo on a Maestro: a quarter of a microsecond of pulse width); what a s
 at a joint is known by gazerig.robot.control.body alone. Times are host monotonic seconds.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, nan
 from typing import NamedTuple, Protocol
@@ -305,6 +305,23 @@ class Detections:
     depth_m: Depth | None = None
     lens: Intrinsics | None = None
     located: LocatedFrame | None = None
+
+    def located_by(self, locate: "Callable[[Detections], LocatedFrame] | None") -> "Detections":
+        """Return the same with what it shows located in the camera's axes; None: as it is."""
+        if locate is None:
+            return self
+        return Detections(
+            self.captured_s,
+            self.number,
+            self.width_px,
+            self.height_px,
+            self.faces,
+            self.blobs,
+            self.image,
+            self.depth_m,
+            self.lens,
+            locate(self),
+        )
 
 
 class Camera(Protocol):

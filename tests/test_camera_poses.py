@@ -18,7 +18,7 @@ def turn(deg: float) -> np.ndarray:
 def filled(count: int, rate_deg_s: float = 100.0) -> PoseBuffer:
     ring = PoseBuffer()
     for k in range(count):
-        ring.record(10.0 + k * 0.005, turn(rate_deg_s * k * 0.005))
+        ring.record(10.0 + k * 0.005, turn(rate_deg_s * k * 0.005).tolist())
     return ring
 
 

@@ -1,7 +1,8 @@
 """From detections to a percept: distances, whose motion is whose, what the head's turn leaves."""
 
 from dataclasses import replace
-from math import radians
+from functools import partial
+from math import inf, radians
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from stand_in import StandIn
 
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
-from gazerig.gaze.angles import rotation
+from gazerig.gaze.angles import norm, rotation
 from gazerig.gaze.types import Angles2, Angles3, Mat3, Percept, Vec3
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
@@ -203,7 +204,11 @@ def test_what_is_no_number_is_not_taken_in(bad: float) -> None:
         assert np.isfinite(values).all()
 
 
-def turning_head(late_s: float, moves: bool = False) -> EgomotionResidual:
+def _the(turn: Vec3) -> Vec3:
+    return turn
+
+
+def turning_head(late_s: float, moves: bool = False, bound_by: float = 1.0) -> EgomotionResidual:
     """Let a head turn there and back before something still, with pictures that lie in time."""
     residual = EgomotionResidual()
     rng = np.random.default_rng(0)
@@ -219,7 +224,9 @@ def turning_head(late_s: float, moves: bool = False) -> EgomotionResidual:
         # Placed by the pose at t though it was taken earlier.
         off = yaw(t) - yaw(t - late_s) + rng.normal(0.0, 2e-4) + (0.5 * t if moves else 0.0)
         place = (2.0 * np.cos(off), 2.0 * np.sin(off), 0.1)
-        residual.step(t, turn, (0.0, 0.0, 0.0), [TrackedPoint(7, place, 0.0)])
+        found = [TrackedPoint(7, place, (0.0, 0.0, 0.0))]
+        bound = inf if bound_by == 0.0 else bound_by * norm(turn)
+        residual.step(t, partial(_the, turn), (0.0, 0.0, 0.0), found, bound)
     return residual
 
 
@@ -232,6 +239,14 @@ def test_the_residual_tells_by_how_much_times_are_wrong(late_s: float) -> None:
         assert figures.speed_deg_s < 1.0
     if late_s == 0.06:
         assert figures.speed_deg_s > 3.0
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.06])
+def test_frames_that_wait_while_the_head_stands_change_no_figure(late_s: float) -> None:
+    """A tight bound of the speed lets nearly all such frames wait, none lets none wait."""
+    all_evaluated = turning_head(late_s, bound_by=0.0).figures()
+    assert turning_head(late_s).figures() == all_evaluated
+    assert turning_head(late_s, bound_by=3.0).figures() == all_evaluated
 
 
 def test_what_moves_itself_is_not_taken_for_a_wrong_time() -> None:

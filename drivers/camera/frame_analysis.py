@@ -1,7 +1,6 @@
 """What one frame shows: faces and what moves."""
 
 from collections.abc import Callable
-from dataclasses import replace
 
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import Detections, FaceDetector, LocatedFrame, MovingBlob
@@ -42,7 +41,7 @@ class FrameAnalyzer:
             shot.depth_m,
             shot.lens,
         )
-        return found if self._locate is None else replace(found, located=self._locate(found))
+        return found.located_by(self._locate)
 
     def events(self) -> tuple[str, ...]:
         """Return what the detector has to tell since the last call, one line each."""

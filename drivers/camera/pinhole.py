@@ -6,7 +6,7 @@ and three radial coefficients, in the order k1 k2 p1 p2 k3.
 """
 
 from dataclasses import dataclass
-from math import tan
+from math import isfinite, pi, tan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +40,7 @@ class Intrinsics:
         """
         if not (self.fx_px > 0.0 and self.fy_px > 0.0):
             raise ValueError(f"focal lengths must be above 0, not {self.fx_px}, {self.fy_px}")
-        if len(self.distortion) != 5 or not np.isfinite(self.distortion).all():
+        if len(self.distortion) != 5 or not all(map(isfinite, self.distortion)):
             raise ValueError(f"distortion is five finite numbers, not {self.distortion}")
 
     @property
@@ -78,7 +78,7 @@ def intrinsics_of_view(view_rad: float, width_px: int, height_px: int) -> Intrin
     Raises:
         ValueError: the field of view is not between 0 and pi.
     """
-    if not 0.0 < view_rad < np.pi:
+    if not 0.0 < view_rad < pi:
         raise ValueError(f"a field of view lies between 0 and pi rad, not {view_rad}")
     focal_px = 0.5 * width_px / tan(0.5 * view_rad)
     return Intrinsics(focal_px, focal_px, 0.5 * (width_px - 1), 0.5 * (height_px - 1))

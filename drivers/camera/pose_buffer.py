@@ -6,6 +6,7 @@ the count before and after, and leaves out what may have been overwritten meanwh
 """
 
 import multiprocessing
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,11 +31,12 @@ class PoseBuffer:
         self._count = context.RawValue("q", 0)
         self._entries = context.RawArray("d", _ENTRIES * _WIDTH)
 
-    def record(self, t_s: float, R_world_camera: Floats) -> None:
-        """Record an orientation; times rise. R_world_camera: (3, 3)."""
+    def record(self, t_s: float, R_world_camera: Sequence[Sequence[float]]) -> None:
+        """Record an orientation; times rise. R_world_camera: three rows."""
+        x, y, z = R_world_camera
         count = self._count.value
         start = count % _ENTRIES * _WIDTH
-        self._entries[start : start + _WIDTH] = [t_s, *np.ravel(R_world_camera).tolist()]
+        self._entries[start : start + _WIDTH] = [t_s, *x, *y, *z]
         self._count.value = count + 1
 
     def at(self, t_s: float) -> Floats | None:

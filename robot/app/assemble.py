@@ -19,7 +19,7 @@ from gazerig.gaze.aversion import Aversion
 from gazerig.gaze.lids import Lids
 from gazerig.gaze.saccade import SaccadeParams
 from gazerig.gaze.scanpath import Scanpath, ScanpathParams, Walk, row_sums_note
-from gazerig.gaze.types import Angles2, Angles3
+from gazerig.gaze.types import Mat3
 from gazerig.params import choices_of
 from gazerig.robot.app.animation_tables import animation_tables
 from gazerig.robot.app.camera_factory import locator_of, real_camera, scene_camera
@@ -210,7 +210,7 @@ def _sight(kinematics: Kinematics, camera: CameraParams, options: RunOptions, re
     mount = CameraMount(camera)
     turns = PoseBuffer() if real and mount.on_head else None
     history = PoseHistory if options.placed_by == "capture" else NewestPose
-    return _Sight(mount, history(kinematics, tell=_turn_sender(kinematics, mount, turns)), turns)
+    return _Sight(mount, history(kinematics, tell=_turn_sender(mount, turns)), turns)
 
 
 def _components(
@@ -351,16 +351,12 @@ def _camera_params(
 
 
 def _turn_sender(
-    kinematics: Kinematics, mount: CameraMount, turns: PoseBuffer | None
-) -> Callable[[float, Angles3, Angles2], None] | None:
+    mount: CameraMount, turns: PoseBuffer | None
+) -> Callable[[float, Mat3], None] | None:
     """Return what tells the camera's process how its camera is turned, None if it is not needed."""
     if turns is None:
         return None
-
-    def tell(t_s: float, head_rad: Angles3, base_rad: Angles2) -> None:
-        turns.record(t_s, np.array(mount.pose(*kinematics.head_pose(head_rad, base_rad))[0]))
-
-    return tell
+    return lambda t_s, R_world_head: turns.record(t_s, mount.rotation(R_world_head))
 
 
 def _chosen(params: P, key: str, value: str, option: str) -> P:

@@ -206,7 +206,7 @@ class Robot:
         self._guard.reset(t_s, goals)
         joints = self.body.read(t_s)
         pose = self._kinematics.forward(joints)
-        self._poses.remember(t_s, pose.head_rad, pose.base_rad)
+        self._poses.remember(t_s, pose.head_rad, pose.base_rad, pose.R_world_head)
         self._looks.known = Known(pose)
         self.attention.reset(t_s)
         self._scanpath.reset(t_s)
@@ -225,7 +225,7 @@ class Robot:
         commands = self._obey(t_s)
         joints = self.body.read(t_s)
         pose = self._kinematics.forward(joints)
-        self._poses.remember(t_s, pose.head_rad, pose.base_rad)
+        self._poses.remember(t_s, pose.head_rad, pose.base_rad, pose.R_world_head)
         if self._executor.models_take_over():
             self._oculomotor.reset(t_s, pose)
         detections = self.camera.latest(t_s)

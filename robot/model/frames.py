@@ -4,7 +4,6 @@ A frame tells of the moment of its exposure. Placing it with the head's pose of 
 throws targets off by the head's motion in between, so poses are remembered.
 """
 
-from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -18,6 +17,9 @@ from gazerig.params import Bounds
 _OPTICAL: Mat3 = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
 """Maps camera optical axes (x right, y down, z forward) to x forward, y left, z up."""
 
+
+NeckAngles = tuple[Angles3, Angles2]
+"""(yaw, pitch, roll) of the neck and (yaw, pitch) of a lower neck, radians."""
 
 MountedOn = Literal["head", "base"]
 
@@ -62,39 +64,68 @@ class PoseHistory:
         self,
         geometry: HeadGeometry,
         ticks: int = 600,
-        tell: Callable[[float, Angles3, Angles2], None] | None = None,
+        tell: Callable[[float, Mat3], None] | None = None,
     ) -> None:
-        """Keep ``ticks`` entries; ``tell`` gets every one of them as well."""
+        """Keep ``ticks`` entries; ``tell`` gets the time and R_world_head of each as well."""
         self._geometry = geometry
         self._tell = tell
         self._times: deque[float] = deque(maxlen=ticks)
-        self._angles: deque[tuple[Angles3, Angles2]] = deque(maxlen=ticks)
+        self._angles: deque[NeckAngles] = deque(maxlen=ticks)
 
-    def remember(self, t_s: float, head_rad: Angles3, base_rad: Angles2 = (0.0, 0.0)) -> None:
-        """Record the measured angles of neck and lower neck; times must increase."""
+    def remember(
+        self,
+        t_s: float,
+        head_rad: Angles3,
+        base_rad: Angles2 = (0.0, 0.0),
+        R_world_head: Mat3 | None = None,
+    ) -> None:
+        """Record the measured angles of neck and lower neck; times must increase.
+
+        Args:
+            t_s: time of the measurement.
+            head_rad: (yaw, pitch, roll) of the neck.
+            base_rad: (yaw, pitch) of a lower neck.
+            R_world_head: of these angles, where it is known already.
+        """
         self._times.append(t_s)
         self._angles.append((head_rad, base_rad))
         if self._tell is not None:
-            self._tell(t_s, head_rad, base_rad)
+            self._tell(t_s, R_world_head or self._geometry.head_pose(head_rad, base_rad)[0])
 
     def head_pose(self, t_s: float) -> tuple[Mat3, Vec3]:
-        """Return R_world_head and p_world_head_m at an instant, interpolated between ticks.
-
-        Before the oldest and after the newest entry that entry's pose is given.
+        """Return R_world_head and p_world_head_m at an instant, as ``angles`` gives them.
 
         Raises:
             LookupError: nothing has been remembered yet.
         """
-        if not self._times:
+        return self._geometry.head_pose(*self.angles(t_s))
+
+    def pose_at(self, angles: NeckAngles) -> tuple[Mat3, Vec3]:
+        """Return R_world_head and p_world_head_m at angles of the neck and the lower neck."""
+        return self._geometry.head_pose(*angles)
+
+    def angles(self, t_s: float) -> NeckAngles:
+        """Return the angles at an instant, interpolated between ticks.
+
+        Before the oldest and after the newest entry that entry's angles are returned.
+
+        Raises:
+            LookupError: nothing has been remembered yet.
+        """
+        times, angles = self._times, self._angles
+        if not times:
             raise LookupError("no pose has been remembered yet")
-        after = bisect_left(self._times, t_s)
+        if t_s > times[-1]:
+            return angles[-1]
+        # A frame is some ticks old: the search from the newest is the shorter one.
+        after = len(times) - 1
+        while after > 0 and times[after - 1] >= t_s:
+            after -= 1
         if after == 0:
-            return self._geometry.head_pose(*self._angles[0])
-        if after == len(self._times):
-            return self._geometry.head_pose(*self._angles[-1])
-        t0, t1 = self._times[after - 1], self._times[after]
+            return angles[0]
+        t0, t1 = times[after - 1], times[after]
         share = (t_s - t0) / (t1 - t0)
-        (a, base), (b, base_next) = self._angles[after - 1], self._angles[after]
+        (a, base), (b, base_next) = angles[after - 1], angles[after]
         head = (
             a[0] + share * (b[0] - a[0]),
             a[1] + share * (b[1] - a[1]),
@@ -105,7 +136,7 @@ class PoseHistory:
                 base[0] + share * (base_next[0] - base[0]),
                 base[1] + share * (base_next[1] - base[1]),
             )
-        return self._geometry.head_pose(head, base)
+        return head, base
 
 
 class NewestPose(PoseHistory):
@@ -115,13 +146,13 @@ class NewestPose(PoseHistory):
     was when the frame was taken.
     """
 
-    def head_pose(self, t_s: float) -> tuple[Mat3, Vec3]:
-        """Return R_world_head and p_world_head_m as remembered last.
+    def angles(self, t_s: float) -> NeckAngles:
+        """Return the angles as remembered last.
 
         Raises:
             LookupError: nothing has been remembered yet.
         """
-        return super().head_pose(inf)
+        return super().angles(inf)
 
 
 class CameraMount:
@@ -139,6 +170,10 @@ class CameraMount:
             (radians(params.yaw_deg), radians(params.pitch_deg), radians(params.roll_deg))
         )
         self._R = compose(turn, _OPTICAL)
+
+    def rotation(self, R_world_head: Mat3) -> Mat3:
+        """Return R_world_camera for an orientation of the head."""
+        return compose(R_world_head, self._R) if self.on_head else self._R
 
     def pose(self, R_world_head: Mat3, p_world_head_m: Vec3) -> tuple[Mat3, Vec3]:
         """Return R_world_camera and p_world_camera_m for a pose of the head."""

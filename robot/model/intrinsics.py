@@ -5,6 +5,8 @@ whole numbers. Distortion is that of the OpenCV manual (camera calibration and 3
 reconstruction): two tangential and three radial coefficients, in the order k1 k2 p1 p2 k3.
 """
 
+from functools import lru_cache
+
 import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -20,6 +22,7 @@ _UNTIL = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-10)
 _SAME_SHAPE = 0.01
 
 
+@lru_cache(maxsize=64)
 def intrinsics_of_lens(
     lens: LensParams | None,
     view_rad: float,

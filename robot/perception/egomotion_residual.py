@@ -6,18 +6,20 @@ it: the seen shifts against the changes of the head's speed give that time. Both
 are 0 for a camera whose times, mounting and lens are as the rig says.
 
 Only what stood still before a turn and is at the same place after it is believed to have
-stood still meanwhile.
+stood still meanwhile. So while the head stands only the newest frame counts, as the one before a
+turn that may follow: it is kept as it came, and evaluated when the head turns.
 """
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from math import degrees
+from math import degrees, inf
 from statistics import median
 from typing import NamedTuple
 
 from gazerig.gaze.angles import compose, cross, dot, norm, sub, unit
 from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.model.frames import NeckAngles
 
 # The head turns or stands: rad/s.
 _TURNS_RAD_S, _STANDS_RAD_S = 0.35, 0.09
@@ -42,11 +44,23 @@ class ResidualFigures(NamedTuple):
 
 
 class TrackedPoint(NamedTuple):
-    """A tracked thing in one image: where this frame alone puts it, and its speed."""
+    """A tracked thing in one image: where this frame alone puts it, and its velocity."""
 
     id: int
     p_world_m: Vec3
-    speed_m_s: float
+    v_world_m_s: Vec3
+
+
+class _Frame(NamedTuple):
+    """One frame as it came.
+
+    turn_rad_s: returns the angular velocity of the camera at the capture, along the world's axes
+    """
+
+    t_s: float
+    turn_rad_s: Callable[[], Vec3]
+    p_world_eye_m: Vec3
+    seen: Sequence[TrackedPoint]
 
 
 @dataclass(slots=True)
@@ -70,17 +84,41 @@ class EgomotionResidual:
         self._shift_by_turn = self._turn_by_turn = 0.0
         self._before: tuple[float, Vec3, dict[int, Vec3]] | None = None
         self._turns: dict[int, _Turn] = {}
+        self._stood = False  # in the frame before
+        self._waiting: _Frame | None = None
 
     def step(
-        self, t_s: float, turn_rad_s: Vec3, p_world_eye_m: Vec3, seen: Iterable[TrackedPoint]
+        self,
+        t_s: float,
+        turn_rad_s: Callable[[], Vec3],
+        p_world_eye_m: Vec3,
+        seen: Sequence[TrackedPoint],
+        at_most_rad_s: float = inf,
     ) -> None:
         """Add one frame; times must increase.
 
-        turn_rad_s: angular velocity of the camera at the capture, along the world's axes
-        p_world_eye_m: where the camera was
+        Args:
+            t_s: time of the capture.
+            turn_rad_s: returns the angular velocity of the camera then, along the world's axes.
+            p_world_eye_m: where the camera was.
+            seen: what was tracked in the frame.
+            at_most_rad_s: what the camera's speed of turning does not exceed, however roughly.
         """
-        seen = list(seen)
-        views = {s.id: unit(sub(s.p_world_m, p_world_eye_m)) for s in seen}
+        frame = _Frame(t_s, turn_rad_s, p_world_eye_m, seen)
+        stands = at_most_rad_s < _STANDS_RAD_S
+        if stands and self._stood:
+            self._waiting = frame  # the one that waited neither begins nor ends a turn
+            return
+        if self._waiting is not None:
+            self._evaluate(self._waiting)
+            self._waiting = None
+        self._evaluate(frame)
+        self._stood = stands
+
+    def _evaluate(self, frame: _Frame) -> None:
+        """Compare where things seem to be with the frame evaluated before."""
+        t_s, turn_rad_s, seen = frame.t_s, frame.turn_rad_s(), frame.seen
+        views = {s.id: unit(sub(s.p_world_m, frame.p_world_eye_m)) for s in seen}
         before, self._before = self._before, (t_s, turn_rad_s, views)
         if before is None or t_s <= before[0]:
             return
@@ -102,14 +140,16 @@ class EgomotionResidual:
             round(degrees(median(self._speeds)), 3), round(1e3 * late, 2), len(self._speeds)
         )
 
-    def _stands(self, t_s: float, views: dict[int, Vec3], seen: list[TrackedPoint]) -> None:
+    def _stands(self, t_s: float, views: dict[int, Vec3], seen: Sequence[TrackedPoint]) -> None:
         """Believe what is where it was before the turn, and start again."""
         for id_ in sorted(views.keys() & self._turns.keys()):
             turn = self._turns[id_]
             same = norm(sub(views[id_], turn.view)) < _STILL_RAD
             if same and t_s - turn.since_s <= _LONGEST_S and any(s[3] for s in turn.shifts):
                 self._believe(turn)
-        self._turns = {s.id: _Turn(t_s, views[s.id]) for s in seen if s.speed_m_s < _STILL_M_S}
+        self._turns = {
+            s.id: _Turn(t_s, views[s.id]) for s in seen if norm(s.v_world_m_s) < _STILL_M_S
+        }
 
     def _believe(self, turn: _Turn) -> None:
         """Update the estimate with the apparent motion of one still thing."""
@@ -125,6 +165,13 @@ def turning_rad_s(R_before: Mat3, R_after: Mat3, dt_s: float) -> Vec3:
     R = compose(R_after, transposed(R_before))
     half = 0.5 / dt_s
     return ((R[2][1] - R[1][2]) * half, (R[0][2] - R[2][0]) * half, (R[1][0] - R[0][1]) * half)
+
+
+def turned_at_most(before: NeckAngles, after: NeckAngles) -> float:
+    """Return an angle that the head has not turned by more than, between two poses of the neck."""
+    (a, b, c), (d, e) = before[0], before[1]
+    (f, g, h), (i, j) = after[0], after[1]
+    return abs(f - a) + abs(g - b) + abs(h - c) + abs(i - d) + abs(j - e)
 
 
 def transposed(R: Mat3) -> Mat3:

@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.gaze.angles import compose, cross, dot, norm, rotate, rotate_back, scale, sub, unit
+from gazerig.gaze.angles import compose, cross, dot, norm, rotate_back, scale, sub, unit
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.intrinsics import rays as rays_through
-from gazerig.robot.perception.face_fit import fitted_face, nearest_m
+from gazerig.robot.perception.face_fit import Points, fitted_face, nearest_m
 
 # Usual landmark error beside the part that grows with the face.
 _NOISE_PX = 1.0
@@ -53,15 +53,15 @@ def face_pose(landmarks_px: ArrayLike, intrinsics: Intrinsics) -> FacePose | Non
         landmarks_px: (5, 2) in the order of DetectedFace.
         intrinsics: of the image.
     """
-    points = np.asarray(landmarks_px, dtype=np.float64)
-    if points.shape != (5, 2) or not isfinite(points.sum()) or not _front_seen(points.tolist()):
+    array = np.asarray(landmarks_px, dtype=np.float64)
+    points: list[list[float]] = array.tolist()
+    if array.shape != (5, 2) or not _front_seen(points):
         return None
-    rays = _rays(points.tolist(), intrinsics)
+    rays = _rays(points, intrinsics)
     R_face_camera = _facing_camera(rays)
-    turned = [rotate(R_face_camera, ray) for ray in rays]
     try:
         found = fitted_face(
-            tuple([(x / z, y / z) for x, y, z in turned]),
+            _seen_from(R_face_camera, rays),
             _NOISE_PX / sqrt(intrinsics.fx_px * intrinsics.fy_px),
         )
     except (ArithmeticError, ValueError):  # points so far from a face that they settle nothing
@@ -84,7 +84,9 @@ def _front_seen(points: list[list[float]]) -> bool:
     The sign of a projected triangle tells exactly which side of its plane is seen; one
     without any size tells nothing.
     """
-    (ax, ay), (bx, by), _, (cx, cy), (dx, dy) = points
+    (ax, ay), (bx, by), (nx, ny), (cx, cy), (dx, dy) = points
+    if not isfinite(ax + ay + bx + by + nx + ny + cx + cy + dx + dy):
+        return False
     down_x, down_y = 0.5 * (cx + dx - ax - bx), 0.5 * (cy + dy - ay - by)
     return (bx - ax) * down_y - (by - ay) * down_x > _LEAST_AREA_PX2
 
@@ -107,6 +109,16 @@ def _facing_camera(rays: list[Vec3]) -> Mat3:
     eyes = sub(b, a)
     x = unit(sub(eyes, scale(z, dot(eyes, z))))
     return x, cross(z, x), z
+
+
+def _seen_from(R_face_camera: Mat3, rays: list[Vec3]) -> Points:
+    """Return where rays meet the plane z = 1 of the camera turned towards the face."""
+    (a, b, c), (d, e, f), (g, h, i) = R_face_camera
+    found = []
+    for x, y, _ in rays:  # z is 1
+        z = g * x + h * y + i
+        found.append(((a * x + b * y + c) / z, (d * x + e * y + f) / z))
+    return tuple(found)
 
 
 def _transposed(R: Mat3) -> Mat3:

@@ -10,7 +10,6 @@ from math import hypot, radians, sqrt
 
 import numpy as np
 
-from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import Detections, LocatedFrame
 from gazerig.gaze.angles import add, norm, rotate, scale, sub, unit
 from gazerig.gaze.types import PARTS, Bodies, Face, Mat3, Percept, Vec3
@@ -20,6 +19,7 @@ from gazerig.robot.perception.egomotion_residual import (
     EgomotionResidual,
     ResidualFigures,
     TrackedPoint,
+    turned_at_most,
     turning_rad_s,
 )
 from gazerig.robot.perception.frame_locator import SIZE_SPREAD, DepthAt, FrameLocator
@@ -76,8 +76,6 @@ class Perception:
         own = parts_face_m or {}
         self._parts = tuple((own.get(code, PARTS_FACE_M[code]), code in own) for code in PARTS)
         self._locator = FrameLocator(lens, radians(horizontal_field_deg), self._depth_at)
-        self._size_px = (0, 0)
-        self._intrinsics: Intrinsics | None = None
 
     def see(self, detections: Detections | None, poses: PoseHistory) -> Percept | None:
         """Return the percept of the newest frame, None before the first."""
@@ -113,7 +111,7 @@ class Perception:
         The camera's process has located them. A camera of another package need not, and a frame
         that was under way while the lens was changed was located by the lens of before.
         """
-        intrinsics = self._lens(found)
+        intrinsics = self._locator.intrinsics(found)
         located = found.located
         if located is not None and located.intrinsics == intrinsics:
             return located
@@ -128,17 +126,22 @@ class Perception:
         ]
 
     def _note_residual(self, t_s: float, poses: PoseHistory) -> None:
-        """Compare where still things seem to be with how the head turns."""
+        """Record where things seem to be while the head turns; evaluated where it turns."""
         if not self._mount.on_head:
             return
-        before, after = (poses.head_pose(t_s + dt)[0] for dt in (-_HALF_TURN_S, _HALF_TURN_S))
-        turn = turning_rad_s(before, after, 2.0 * _HALF_TURN_S)
+        before, after = poses.angles(t_s - _HALF_TURN_S), poses.angles(t_s + _HALF_TURN_S)
+
+        def turn() -> Vec3:
+            (R_before, _), (R_after, _) = poses.pose_at(before), poses.pose_at(after)
+            return turning_rad_s(R_before, R_after, 2.0 * _HALF_TURN_S)
+
         seen = [
-            TrackedPoint(track.id, track.sighting.p_world_m, norm(track.v_world_m_s))
+            TrackedPoint(track.id, track.sighting.p_world_m, track.v_world_m_s)
             for track in self._tracks
             if track.seen_s == t_s
         ]
-        self._residual.step(t_s, turn, self._p_camera, seen)
+        most_rad_s = turned_at_most(before, after) / (2.0 * _HALF_TURN_S)
+        self._residual.step(t_s, turn, self._p_camera, seen, most_rad_s)
 
     def _face(self, track: Track) -> Face:
         """Return a tracked face with its eight parts."""
@@ -179,16 +182,6 @@ class Perception:
             for at, own in self._parts
         ]
         return tuple(parts)
-
-    def _lens(self, found: Detections) -> Intrinsics:
-        """Return the intrinsics of a frame, computed once for frames of one size."""
-        if found.lens is not None:
-            return self._locator.intrinsics(found)
-        size_px = found.width_px, found.height_px
-        if self._size_px != size_px or self._intrinsics is None:
-            self._size_px = size_px
-            self._intrinsics = self._locator.intrinsics(found)
-        return self._intrinsics
 
 
 def _deviations(track: Track, p_camera: Vec3) -> tuple[float, float]:

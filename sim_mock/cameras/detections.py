@@ -7,8 +7,8 @@ now and then nothing. Not modelled: motion blur, light, occlusion, false detecti
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from math import radians
+from dataclasses import dataclass
+from math import cos, radians
 from typing import Annotated
 
 import numpy as np
@@ -16,18 +16,19 @@ import numpy as np
 from gazerig.drivers.camera.frame_analysis import Locate
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
-from gazerig.gaze.angles import dot, norm, rotate, rotate_back, rotation, scale, sub, unit
+from gazerig.gaze.angles import add, dot, norm, rotate, rotate_back, rotation, scale, sub, unit
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount
-from gazerig.robot.model.intrinsics import project
 from gazerig.sim_mock.scenes.scene import Scene, ScenePerson, Thing
 
 _FARTHEST_FACE_M = 4.0
 _HAND_RADIUS_M = 0.07
 _FIRST_THING_ID = 1000  # hands have the numbers of their people, from 0
 _FACE_BOX_M = 0.17
+_COS_TURNED_AWAY = cos(radians(60.0))
+_LANDMARKS_FACE_M: tuple[Vec3, ...] = tuple((x, y, z) for x, y, z in LANDMARKS_FACE_M.tolist())
 
 
 @dataclass(frozen=True)
@@ -131,7 +132,7 @@ class SceneCamera:
         found = Detections(
             t_s, self._number, par.width_px, par.height_px, tuple(faces), tuple(blobs)
         )
-        return found if self._locate is None else replace(found, located=self._locate(found))
+        return found.located_by(self._locate)
 
     def _face(self, person: ScenePerson, R: Mat3, p: Vec3) -> DetectedFace | None:
         """Project the landmarks; no detector finds what is cut off, far or turned away."""
@@ -139,25 +140,31 @@ class SceneCamera:
         missed = self._rng.random() < self._params.missed_share
         yaw, pitch = person.face_yaw_pitch_rad
         R_world_face = rotation((yaw, pitch, 0.0))
-        to_camera = sub(p, person.p_world_face_m)
+        place = person.p_world_face_m
+        to_camera = sub(p, place)
         outwards = rotate(R_world_face, (1.0, 0.0, 0.0))
-        turned_away = dot(unit(to_camera), outwards) < np.cos(radians(60.0))
+        turned_away = dot(unit(to_camera), outwards) < _COS_TURNED_AWAY
         if missed or turned_away or norm(to_camera) > _FARTHEST_FACE_M:
             return None
-        points = []
-        for x, y, z in LANDMARKS_FACE_M.tolist():
-            q = rotate(R_world_face, (x, y, z))
-            world = tuple(a + b for a, b in zip(person.p_world_face_m, q, strict=True))
-            points.append(rotate_back(R, sub((world[0], world[1], world[2]), p)))
-        if min(point[2] for point in points) < 0.1:
+        points = [
+            rotate_back(R, sub(add(place, rotate(R_world_face, landmark)), p))
+            for landmark in _LANDMARKS_FACE_M
+        ]
+        if min([point[2] for point in points]) < 0.1:
             return None
-        px = project(np.array(points), self._lens)
+        pixels = [self._pixel(point) for point in points]
         size = self._lens.fx_px * _FACE_BOX_M / points[2][2]
-        x, y = px[2].tolist()
+        x, y = pixels[2]
         box = (x - size / 2, y - size / 2, size, size)
         if not self._inside(x, y, size / 2):
             return None
-        return DetectedFace(box, px + noise, 0.98)
+        return DetectedFace(box, np.array(pixels) + noise, 0.98)
+
+    def _pixel(self, p_camera_m: Vec3) -> tuple[float, float]:
+        """Return where a point before the camera appears."""
+        x, y, z = p_camera_m
+        lens = self._lens
+        return (x / z * lens.fx_px + lens.cx_px, y / z * lens.fy_px + lens.cy_px)
 
     def _blob(self, thing: Thing, R: Mat3, p: Vec3) -> tuple[MovingBlob, ...]:
         """Place a hand or thing by depth; nothing where it is behind or outside the frame."""
@@ -165,7 +172,7 @@ class SceneCamera:
         point = rotate_back(R, sub(thing.p_world_m, p))
         if point[2] < 0.1:
             return ()
-        x, y = project(np.array([point]), self._lens)[0].tolist()
+        x, y = self._pixel(point)
         if not self._inside(x, y, 0.0):
             return ()
         place = scale(point, 1.0 + noise / norm(point))

@@ -9,7 +9,7 @@ distortion, rolling shutter, light, the smear of things that move themselves.
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import hypot, radians
 from typing import Annotated, Any, NamedTuple
 
@@ -181,7 +181,7 @@ class PixelCamera:
             image=shot.image,
             depth_m=shot.depth_m,
         )
-        return found if self._locate is None else replace(found, located=self._locate(found))
+        return found.located_by(self._locate)
 
     def _expose(self, t_s: float, R: Mat3, p: Vec3) -> Exposure:
         """Render one frame from the camera's pose; its time is the middle of the exposure."""
