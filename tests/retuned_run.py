@@ -111,7 +111,7 @@ class Judge:
 
 # What is not a parameter but what the running parts have come to know and do.
 STATE = {
-    "_motion", "_limits", "_gentle", "_gentle_until_s", "_waiting", "_outside", "_set_up",
+    "_motion", "_limits", "_gentle", "_gentle_until_s", "waiting", "outside", "_set_up",
     "_next_s", "_until_s", "_search_until_s", "_redraw", "_left", "_shown", "_retuned_s",
     "_rng", "_droop_from", "_droop_to", "_droop_since_s", "_offset_rad", "_started", "_ready",
     "_part", "_at", "_keeper", "_counting", "_shift", "_heated", "_outside_s", "_last",

@@ -373,6 +373,11 @@ def gentle(m: ModuleType) -> None:
         fastest = max(fastest, before)
         assert bench.why == "starting slowly"
     assert fastest == pytest.approx(radians(60.0))
+    bench, before = Bench(m, gentle=True), 0.0
+    for k in range(60):  # a desired that a joint could keep up with
+        bench.tick(0.25 * ACCEL * (k * DT) ** 2)
+        assert bench.speed[JOINT] - before <= radians(300.0) * DT + 1e-9
+        before = bench.speed[JOINT]
 
 
 def slower_in_flight(m: ModuleType) -> None:
@@ -611,13 +616,14 @@ MUTATIONS: tuple[Mutation, ...] = (
     (GUARD, "if self._retrying[i]:\n", "if False:\n", not_moving),
     # torque and faults
     (GUARD, "        if not powered:", "        if False:", torque_off),
-    (GUARD, "or False in joints.torque", "", torque_off),
+    (GUARD, "or not all(joints.torque)", "", torque_off),
     (GUARD, "position if isfinite(position) else None, again", "None, again", torque_off),
     (GUARD, "return (3, fault) if fault else (rank, reason)", "return (rank, reason)", limp),
     (GUARD, "or any(joints.fault)", "", limp),
     (GUARD, 'if "encoder" in fault:', "if False:", limp),
     (GUARD, "if fault:  #", "if False:  #", limp),
-    (GUARD, "if True in joints.rearmed:", "if False:", rearmed),
+    (GUARD, "if any(joints.rearmed):", "if False:", rearmed),
+    (GUARD, "self._calm = followed", "self._calm = True", gentle),
     (MOTION, "        self.speed[i] = 0.0\n", "", rearmed),
     # slow passages
     (MOTION, "top = min(top, self.limits[i].speed_rad_s)", "pass", slow_joint),

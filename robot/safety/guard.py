@@ -17,6 +17,7 @@ from gazerig.robot.safety.collisions import Collisions
 from gazerig.robot.safety.guard_verdict import findings, passed, standstill
 from gazerig.robot.safety.health import JointHealth
 from gazerig.robot.safety.late_ticks import LateTicks
+from gazerig.robot.safety.limit_change import LimitChange
 from gazerig.robot.safety.motion_limiter import MotionLimiter
 from gazerig.robot.safety.stall_detector import StallDetector
 
@@ -62,17 +63,16 @@ class Guard:
         period_s: float = 0.1,
     ) -> None:
         self._take(params)
-        self._wanted, self._reach = limits, reach
         self._late = LateTicks(period_s)
         self._soft = False
+        self._calm = False  # in the last tick every joint followed, and nothing has come since
         self._names = joints
         self._neck = tuple("neck" in name.split("_") for name in joints)
-        self._motion = MotionLimiter(self._within_reach())
+        self._motion = MotionLimiter(limits)
+        self._change = LimitChange(self._motion, limits, reach)
         self._limits = self._motion.limits
         self._short: dict[int, tuple[int, str]] = {}
         self._findings = findings(self._short, joints)
-        self._waiting: set[int] = set()
-        self._outside: set[int] = set()
         self._health = JointHealth(params.health, limits)
         self._stuck = StallDetector(params.stall, len(limits))
         self._collisions = Collisions(
@@ -105,12 +105,8 @@ class Guard:
         self._take(params)
         self._health.retune(params.health)
         self._stuck.retune(params.stall)
-        self._wanted = limits
-        self._waiting = {
-            i for i, limit in enumerate(self._within_reach()) if limit != self._limits[i]
-        }
-        for i in range(len(limits)):
-            self._motion.let_be(i)  # walls of a collision that is gone
+        self._change.retune(limits)
+        self._calm = False
 
     def recount(self, i: int, factor: float, offset_rad: float) -> None:
         """Count a joint's angles otherwise, as its zero, sign or ratio was changed.
@@ -123,65 +119,22 @@ class Guard:
         self._retreat[i] = None
         self._slow_down(i)
 
-    def _within_reach(self) -> tuple[JointLimit, ...]:
-        """Return the limits in force, once joints have come to rest: those that servos keep."""
-        if self._reach is None:
-            return self._wanted
-        return tuple(map(JointLimit.within, self._wanted, self._reach()))
-
-    def _begin(self, i: int, angle_rad: float) -> None:
-        """Begin with one joint at a goal that is in force on the bus, at rest."""
-        low, high = self._limits[i][:2]
-        if self._reach is not None:
-            reach = self._reach()[i]
-            low, high = min(low, reach.low_rad), max(high, reach.high_rad)
-        self._motion.restart(i, min(max(angle_rad, low), high))
-        self._note_outside(i)
-
-    def _note_outside(self, i: int) -> None:
-        """See whether a joint has to be led into its range."""
-        limit, now = self._limits[i], self._motion.command[i]
-        if limit.low_rad - _ROUNDING_RAD <= now <= limit.high_rad + _ROUNDING_RAD:
-            self._outside.discard(i)
-        else:
-            self._outside.add(i)
-        self._motion.let_be(i)
-
-    def _change(self) -> None:
-        """Go on with what a retune has begun."""
-        if self._waiting:
-            self._adopt()
-        for i in sorted(self._outside):
-            self._note_outside(i)
-
-    def _adopt(self) -> None:
-        """Apply new limits to the joints that can keep them."""
-        limits = self._within_reach()
-        for i in sorted(self._waiting):
-            # Walls were put up for the old acceleration.
-            free = not self._collisions and self._motion.keeps(i, limits[i])
-            if self._motion.speed[i] == 0.0 or free:
-                self._motion.take(i, limits[i])
-                self._waiting.discard(i)
-                self._note_outside(i)
-
     def reset(self, t_s: float, command_rad: JointAngles) -> None:
         """Begin from the goals that are in force on the bus, at rest, gently."""
         self._t_s = t_s
-        for i, limit in enumerate(self._within_reach()):
-            self._limits[i] = limit
-        self._waiting.clear()
+        self._change.reset()
         self._held = [False] * len(self._limits)
         self._retrying = [False] * len(self._limits)
         self._retreat: list[float | None] = [None] * len(self._limits)
         self._health.reset()
         for i, angle in enumerate(command_rad):
-            self._begin(i, angle)
+            self._change.begin(i, angle)
             self._stuck.forget(i)
         self.go_gently()
 
     def go_gently(self) -> None:
         """Move slowly for a while, and each joint until it has once met its desired angle."""
+        self._calm = False
         self._gentle = [True] * len(self._limits)
         self._gentle_until_s = [self._t_s + self._params.soft_start_ms / 1e3] * len(self._limits)
 
@@ -203,14 +156,15 @@ class Guard:
         desired_rad: any numbers at all
         frame_age_s: age of the newest frame; infinity before the first
         """
-        if True in joints.rearmed:
+        if any(joints.rearmed):
             self._rearm(joints)
         since_s = t_s - self._t_s
         if not (since_s > 0.0 and isfinite(since_s)):
             return standstill(tuple(self._motion.command), desired_rad, self._names)
         self._t_s = t_s
-        if self._waiting or self._outside:
-            self._change()
+        if self._change.waiting or self._change.outside:
+            self._calm = False
+            self._change.step(bool(self._collisions))
         dt_s, missed_s = self._late.split(since_s, t_s, self._params.late_ms / 1e3)
         if missed_s > 0.0:
             self._motion.left_alone(missed_s)
@@ -252,6 +206,7 @@ class Guard:
             outcome = self._pass(i, desired, joints, at_s >= stale_s, unseen, dt_s)
             if outcome[1]:
                 short[i] = outcome
+        self._calm = followed
         if followed:
             return passed(desired_rad, self._names)
         if short != self._short:  # what is found of joints lasts for many ticks
@@ -261,16 +216,15 @@ class Guard:
 
     def _all_well(self, joints: JointState) -> bool:
         """Return whether nothing but limits, ages and distances need be looked at."""
-        return not (
+        calm = self._calm or not (
+            any(self._gentle) or any(self._held) or self._change.waiting or self._change.outside
+        )
+        return calm and not (
             self._soft
             or not self._health.fine
-            or True in self._gentle
-            or True in self._held
             or self._collisions.exits
             or self._collisions.still
-            or self._waiting
-            or self._outside
-            or False in joints.torque
+            or not all(joints.torque)
             or any(joints.fault)
         )
 
@@ -285,8 +239,8 @@ class Guard:
             or self._health.held[i]
             or i in self._collisions.exits
             or i in self._collisions.still
-            or i in self._waiting
-            or i in self._outside
+            or i in self._change.waiting
+            or i in self._change.outside
             or (joints.torque and not joints.torque[i])
             or (joints.fault and joints.fault[i])
         )
@@ -295,13 +249,14 @@ class Guard:
         """Begin where the bus has put the goals of joints whose torque came on again."""
         for i, (angle, rearmed) in enumerate(zip(joints.position_rad, joints.rearmed, strict=True)):
             if rearmed and isfinite(angle):
-                self._begin(i, angle)
+                self._change.begin(i, angle)
                 self._stuck.forget(i)
                 self._retreat[i] = None
                 self._slow_down(i)
 
     def _slow_down(self, i: int) -> None:
         """Make one joint go on slowly, as after torque-on."""
+        self._calm = False
         self._gentle[i] = True
         self._gentle_until_s[i] = self._t_s + self._params.soft_start_ms / 1e3
 
@@ -348,13 +303,13 @@ class Guard:
 
     def _outer_hold(self, i: int, desired: float, unseen: bool) -> _Hold | None:
         """Return what else keeps a joint from its desired angle."""
-        if i in self._waiting:
+        if i in self._change.waiting:
             return _Hold("new limits")
         if i in self._collisions.exits:
             return _Hold("self-collision", self._collisions.exits[i], slowly=True, again="slowly")
         if i in self._collisions.still:
             return _Hold("self-collision", again="slowly")
-        if i in self._outside:
+        if i in self._change.outside:
             limit = self._limits[i]
             end = limit.low_rad if self._motion.command[i] < limit.low_rad else limit.high_rad
             return _Hold("outside its new range", end, True, "slowly")
