@@ -7,10 +7,14 @@ file descriptor, so that nothing is left behind by a process that dies, and none
 import mmap
 import os
 import socket
+import sys
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+_FD_BYTES = 4  # a C int
+_FD_ROOM = socket.CMSG_LEN(_FD_BYTES)
 
 
 class PassedImage(NamedTuple):
@@ -69,5 +73,9 @@ def receive(link: socket.socket, most: int, flags: int = 0) -> tuple[bytes, int]
     Raises:
         OSError: as ``socket.recv``.
     """
-    message, fds, _, _ = socket.recv_fds(link, most, 1, flags)
-    return message, fds[0] if fds else -1
+    # socket.recv_fds of Python 3.11 leaves the flags out.
+    message, beside, _, _ = link.recvmsg(most, _FD_ROOM, flags)
+    for level, kind, data in beside:
+        if level == socket.SOL_SOCKET and kind == socket.SCM_RIGHTS:
+            return message, int.from_bytes(data[:_FD_BYTES], sys.byteorder)
+    return message, -1

@@ -24,6 +24,7 @@ from gazerig.robot.dashboard.inbox import (
     request_message,
     urgent,
 )
+from gazerig.robot.dashboard.live_feed import LiveFeed
 from gazerig.robot.dashboard.outbox import Outbox
 from gazerig.robot.dashboard.page_feed import drain
 from gazerig.robot.dashboard.page_process import (
@@ -180,7 +181,7 @@ def test_words_menus_and_their_way() -> None:
     with linked() as (page, theirs):
         page.offer({"behaviour": ("wait", "guard")})
         page.say("the disk is full")
-        news = drain(theirs)
+        news = drain(theirs, LiveFeed())
     assert news.others == (
         (CHOICES, {"behaviour": ["wait", "guard"]}),
         (MESSAGE, [ALL_USERS, "the disk is full"]),

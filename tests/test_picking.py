@@ -39,7 +39,7 @@ def looking(
     mount = CameraMount(CAMERA)
     picking = ClickToLook(PixelToWorld(mount, poses, lambda: CAMERA))
     found = Detections(1.0, 1, WIDTH, HEIGHT, (), (), None, depth, None)
-    picking.update(cast(Tick, SimpleNamespace(detections=found, percept=percept)))
+    picking.newest = cast(Tick, SimpleNamespace(detections=found, percept=percept))
     return picking, mount, poses
 
 
@@ -66,7 +66,7 @@ def test_without_a_picture_there_is_nothing_to_pick() -> None:
         PixelToWorld(CameraMount(CAMERA), PoseHistory(kinematics), lambda: CAMERA)
     )
     assert picking.point(0.5, 0.5) is None
-    picking.update(cast(Tick, SimpleNamespace(detections=None, percept=None)))
+    picking.newest = cast(Tick, SimpleNamespace(detections=None, percept=None))
     assert picking.point(0.5, 0.5) is None
 
 

@@ -16,7 +16,7 @@ from statistics import median
 from typing import Literal, NamedTuple, Protocol
 
 from gazerig.gaze.types import Vec3
-from gazerig.robot.control.loop import Tick
+from gazerig.robot.control.tick import Tick
 
 
 class Happening(Protocol):

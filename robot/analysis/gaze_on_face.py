@@ -3,7 +3,7 @@
 from gazerig.gaze.angles import add, dot, rotate, rotate_back, scale, sub
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.analysis.summary import cyclopean
-from gazerig.robot.control.loop import Tick
+from gazerig.robot.control.tick import Tick
 
 _PLANE_M = -0.028
 """The plane between the nose tip and the eyes and mouth, along the face's own x axis."""

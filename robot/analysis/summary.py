@@ -10,7 +10,7 @@ from gazerig.gaze.angles import add, angle_between, scale, sub, unit
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import Vec3
 from gazerig.robot.control.feedback_basis import estimated_joints
-from gazerig.robot.control.loop import Tick
+from gazerig.robot.control.tick import Tick
 
 _FIXATION_RAD_S = radians(40.0)
 """Slower is fixating; 30 is usual, and one servo step in a 5 ms tick is already 18 deg/s."""

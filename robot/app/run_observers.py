@@ -15,15 +15,18 @@ from gazerig.config.faults import ConfigError
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
-from gazerig.robot.control.loop import LoopCount, Tick
+from gazerig.robot.control.loop import LoopCount
 from gazerig.robot.control.observers import Observers, left_out
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.tick_stream import TickStream
 from gazerig.robot.dashboard.click_to_look import ClickToLook
+from gazerig.robot.dashboard.live_feed import LiveRig, RunState
 from gazerig.robot.dashboard.page_process import PageProcess
 from gazerig.robot.dashboard.param_feed import ParamFeed
-from gazerig.robot.dashboard.publisher import InForce, Publisher
+from gazerig.robot.dashboard.publisher import Publisher
 from gazerig.robot.dashboard.request_handler import PageRequestHandler
-from gazerig.robot.dashboard.snapshot import SnapshotBuilder
-from gazerig.robot.model.commands import Command, Resume, Stop, Tune
+from gazerig.robot.dashboard.status_line import StatusLine
+from gazerig.robot.model.commands import Command, Resume, Stop
 from gazerig.robot.model.reply import CommandTaker, Ticket
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
 from gazerig.robot.remote.live_server import LiveServer
@@ -76,6 +79,7 @@ class RunObservers:
     ) -> None:
         self._steer = steer
         self._made, self._fast, self._say = made, options.fast, say
+        self._rate_hz = made.loop.rate_hz
         self._tuning, self._recorder = tuning, recorder
         about = {"rig": options.rig, "pid": os.getpid()}
         self._live = (
@@ -86,11 +90,14 @@ class RunObservers:
         self._picking = ClickToLook(PixelToWorld(made.mount, made.poses, made.camera))
         address = options.page_address
         self._page = self._made_page(address) if address is not None else None
-        self._snapshots = SnapshotBuilder(made.loop.rate_hz, made.shown())
-        self._publisher = self._make_publisher(status)
-        # Simulated time runs faster than a page can show.
-        self._shown = not options.fast and (self._page is not None or status is not None)
-        self._looking = False
+        # Simulated time runs faster than a page or a line can show.
+        live = not options.fast
+        self._publisher = self._made_publisher(self._page) if live and self._page else None
+        health = made.robot.body.bus.health
+        self._status = StatusLine(status, health) if live and status is not None else None
+        self._stream = recorder.stream if recorder is not None else TickStream(say)
+        if self._publisher is not None:
+            self._stream.add("the page", self._publisher.take)
         self._observers = Observers(say)
         self.join(self._observers)
 
@@ -108,33 +115,32 @@ class RunObservers:
         )
         return PageProcess(*address, page_requests)
 
-    def _make_publisher(self, status: Callable[[str], None] | None) -> Publisher:
-        page, made, tuning = self._page, self._made, self._tuning
-        return Publisher(
-            page,
-            status,
-            self._snapshots,
-            made.robot.body.bus.health,
-            self._in_force,
-            made.robot.perception.residual,
-            made.mount,
-            made.poses,
-            lambda: made.horizontal_field_deg,
-            ParamFeed(page.send, tuning) if page is not None and tuning is not None else None,
-            self._say,
-        )
+    def _made_publisher(self, page: PageProcess) -> Publisher:
+        tuning = self._tuning
+        feed = ParamFeed(page.send, tuning) if tuning is not None else None
+        return Publisher(page, self._live_rig, self._run_state, feed, self._say)
+
+    def _live_rig(self) -> LiveRig:
+        return LiveRig(self._rate_hz, self._made.shown())
+
+    def _run_state(self) -> RunState:
+        """Return what the page shows and ticks do not tell."""
+        robot = self._made.robot
+        errors = {kind: n for kind, n in robot.body.bus.health().errors.items() if n}
+        return RunState(errors, *self._in_force(), robot.perception.residual())
 
     def join(self, observers: Observers) -> None:
         """Let all of them observe the ticks; each is left out by itself where it fails."""
-        if self._shown:
-            observers.add("page and status line", self._publisher.update)
-        if self._page is not None:
-            observers.add("picking a point on the page", self._picking.update)
-            observers.add("the page's limits", self._keep_shown)
-        if self._live is not None:
-            observers.add("the remote control", self._live.update)
         if self._recorder is not None:
             observers.add("the recording", self._recorder.record)
+        elif self._publisher is not None:
+            observers.add("the page", self._stream.update)
+        if self._page is not None:
+            observers.add("picking a point on the page", self._follow)
+        if self._status is not None:
+            observers.add("the status line", self._status.update)
+        if self._live is not None:
+            observers.add("the remote control", self._live.update)
 
     def update(self, tick: Tick) -> None:
         """Update all observers with a tick; called by a loop that does not update them itself."""
@@ -169,10 +175,6 @@ class RunObservers:
         with self._spared("the remote control"):
             if self._live is not None:
                 self._live.open()
-        with self._spared("page and status line"):
-            if self._shown:
-                self._publisher.start()
-                self._looking = True
 
     @contextlib.contextmanager
     def _spared(self, name: str) -> Iterator[None]:
@@ -205,10 +207,9 @@ class RunObservers:
         with self._spared("the remote control"):
             if self._live is not None:
                 self._live.close()
-        with self._spared("page and status line"):
-            if self._looking:
-                self._publisher.stop()
         with self._spared("the page"):
+            if self._publisher is not None:
+                self._publisher.close()
             if self._page is not None:
                 self._page.close()
         with self._spared("the recording"):
@@ -220,21 +221,23 @@ class RunObservers:
             return {STEER: self._steer.keys}
         return self._made.robot.menus()
 
-    def _in_force(self) -> InForce:
+    def _in_force(self) -> tuple[str, str, str]:
+        """Return the behaviour, the mode of conversation and the character in force."""
         if self._steer is not None:
-            return InForce(self._steer.shown(), "", "")
-        robot = self._made.robot
-        menus = robot.menus()
+            return self._steer.shown(), "", ""
+        menus = self._made.robot.menus()
         character = self._tuning.character_name if self._tuning is not None else ""
-        return InForce(menus["behaviour"][0], menus["conversation"][0], character)
+        return menus["behaviour"][0], menus["conversation"][0], character
 
     def _show_depth(self, on: bool) -> None:
-        self._publisher.depth = on
+        if self._publisher is not None:
+            self._publisher.depth = on
 
-    def _keep_shown(self, tick: Tick) -> None:
-        """Show the rig as it is built now: limits and the field of view can be tuned."""
-        if any(isinstance(command, Tune) for command in tick.commands):
-            self._snapshots.rig = self._made.shown()
+    def _follow(self, tick: Tick) -> None:
+        """Keep what a click is placed by, and show the rig as it is after tuning."""
+        self._picking.newest = tick
+        if tick.commands and self._publisher is not None:
+            self._publisher.obeyed(tick.commands)
 
 
 def only_stops(command: CommandTaker) -> CommandTaker:

@@ -11,7 +11,7 @@ from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.top_down import TopDown
 from gazerig.gaze.types import Face, GazeState, Percept, Target, Vec3
 from gazerig.robot.calibration.face_calibration import FaceCalibration, Key, point_world_m, pressed
-from gazerig.robot.control.loop import Tick
+from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.gaze_error import gaze_error
 
 AIMED_DEG = 1.0

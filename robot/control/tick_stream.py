@@ -11,8 +11,9 @@ from operator import attrgetter
 from typing import Any, NamedTuple
 
 import msgspec
+import numpy as np
 
-from gazerig.gaze.types import Bodies, Face, GazeCommand, GazeState, Percept, Target
+from gazerig.gaze.types import Bodies, Face, GazeCommand, GazeState, Mat3, Percept, Target, Vec3
 from gazerig.robot.control.observers import left_out
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.command_json import as_recorded
@@ -26,6 +27,11 @@ SIMULATED_S = 0.2
 
 Before = Sequence[tuple[str, Any]]
 """What entered the run beside a tick's own fields: kind and plain values of each."""
+
+
+_FaceRow = tuple[
+    int, Vec3, Vec3, Mat3, tuple[Vec3, ...], float, str, float, float
+]  # the fields of a Face
 
 
 class TickRow(NamedTuple):
@@ -54,6 +60,15 @@ class TickRow(NamedTuple):
     lead: LeadState
     gesture: GestureState
     before: list[Any]
+
+
+class _PerceptRow(NamedTuple):
+    """A percept as the receiver reads it; bodies: the columns of ``Bodies``."""
+
+    number: int
+    captured_s: float
+    bodies: tuple[Any, ...]
+    faces: list[_FaceRow]
 
 
 class TickBatch(NamedTuple):
@@ -155,13 +170,14 @@ def encode(value: object) -> bytes:
         return _encoder.encode(_writable(value))
 
 
-def decode_rows(data: bytes) -> tuple[list[Any], list[TickRow]]:
-    """Return the percepts and the ticks of ``TickBatch.data``.
+def decode_rows(data: bytes) -> tuple[dict[int, Percept], list[TickRow]]:
+    """Return the percepts of ``TickBatch.data`` by number, and its ticks.
 
     Raises:
         msgspec.MsgspecError: it is none.
     """
-    return _rows.decode(data)
+    percepts, rows = _rows.decode(data)
+    return {row.number: _percept_of(row) for row in percepts}, rows
 
 
 def decode_plain(data: bytes) -> Any:
@@ -176,6 +192,15 @@ def decode_plain(data: bytes) -> Any:
 def all_finite(data: bytes) -> bool:
     """Return whether all numbers in MessagePack are finite; False: there may be one that is not."""
     return _NOT_FINITE.search(data) is None
+
+
+def _percept_of(row: _PerceptRow) -> Percept:
+    """Return a percept from what ``_percept`` wrote."""
+    ids, kinds, p_m, v_m_s, w_rad_s, radius_m, cov = row.bodies
+    p, v, w = (np.array(rows, float).reshape(-1, 3) for rows in (p_m, v_m_s, w_rad_s))
+    pv_cov = None if cov is None else np.array(cov, float).reshape(-1, 6, 6)
+    bodies = Bodies(tuple(ids), tuple(kinds), p, v, w, np.array(radius_m, float), pv_cov)
+    return Percept(row.captured_s, bodies, tuple([Face(*face) for face in row.faces]))
 
 
 def _percept(number: int, percept: Percept) -> tuple[Any, ...]:
@@ -208,4 +233,4 @@ _body_values = attrgetter(*Bodies.__slots__)
 _face_values = attrgetter(*Face.__slots__)
 _encoder = msgspec.msgpack.Encoder(enc_hook=_array)
 _plain = msgspec.msgpack.Decoder()
-_rows = msgspec.msgpack.Decoder(tuple[list[Any], list[TickRow]])
+_rows = msgspec.msgpack.Decoder(tuple[list[_PerceptRow], list[TickRow]])

@@ -1,7 +1,7 @@
 """A click in the camera frame -> the point of the world that was clicked on."""
 
 from gazerig.gaze.types import Vec3
-from gazerig.robot.control.loop import Tick
+from gazerig.robot.control.tick import Tick
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
 
 
@@ -10,22 +10,20 @@ class ClickToLook:
 
     Args:
         pixels: places pixels in the world.
+
+    newest: the newest tick, left here by the loop
     """
 
     def __init__(self, pixels: PixelToWorld) -> None:
         self._pixels = pixels
-        self._tick: Tick | None = None
-
-    def update(self, tick: Tick) -> None:
-        """Leave the newest tick; called by the loop."""
-        self._tick = tick
+        self.newest: Tick | None = None
 
     def point(self, x: float, y: float) -> Vec3 | None:
         """Return the point of the world at a place of the newest frame, None without one.
 
         x, y: 0..1 from the left and from the top
         """
-        tick = self._tick
+        tick = self.newest
         if tick is None or tick.detections is None:
             return None
         found = tick.detections

@@ -1,10 +1,13 @@
-"""What the rig sends to the page's process, taken off the socket."""
+"""What the rig sends to the page's process, received from the socket."""
 
 import json
 import socket
 from typing import NamedTuple
 
+from gazerig.drivers.passed_image import receive
+from gazerig.drivers.types import ImageArray
 from gazerig.robot.dashboard.inbox import MESSAGE_BYTES
+from gazerig.robot.dashboard.live_feed import LiveFeed
 from gazerig.robot.dashboard.page_process import (
     CHOICES,
     FRAME,
@@ -21,6 +24,7 @@ from gazerig.robot.model.types import Snapshot
 class News(NamedTuple):
     """What was waiting on the socket: all snapshots, the last frame, whether it has closed.
 
+    jpeg: a recording's frame; image: a running rig's, with what was found in it, BGR
     others: what must not be lost or passed over, as (kind, what its JSON holds), oldest first
     """
 
@@ -28,20 +32,24 @@ class News(NamedTuple):
     jpeg: bytes | None
     ended: bool
     others: tuple[tuple[bytes, object], ...] = ()
+    image: ImageArray | None = None
 
 
-def drain(feed: socket.socket) -> News:
-    """Return everything that waits, without waiting for more."""
+def drain(feed: socket.socket, live: LiveFeed) -> News:
+    """Return everything that waits, without waiting for more.
+
+    live: takes what a running rig sends
+    """
     snapshots: list[Snapshot] = []
     others: list[tuple[bytes, object]] = []
     jpeg, ended = None, False
     while not ended:
         try:
-            message = feed.recv(MESSAGE_BYTES, socket.MSG_DONTWAIT)
+            message, fd = receive(feed, MESSAGE_BYTES, socket.MSG_DONTWAIT)
         except BlockingIOError:
             break
         except ConnectionResetError:
-            message = b""
+            message, fd = b"", -1
         ended = not message
         kind, body = message[:1], message[1:]
         if kind == SNAPSHOT:
@@ -50,4 +58,8 @@ def drain(feed: socket.socket) -> News:
             jpeg = body
         elif kind in (CHOICES, PARAMS, VALUES, MESSAGE, REPLAY):
             others.append((kind, json.loads(body)))
-    return News(tuple(snapshots), jpeg, ended, tuple(others))
+        else:
+            live.take(message, fd)
+    if (newest := live.snapshot()) is not None:
+        snapshots.append(newest)
+    return News(tuple(snapshots), jpeg, ended, tuple(others), live.image())

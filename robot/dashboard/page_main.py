@@ -25,6 +25,7 @@ from typing import NamedTuple
 import viser
 
 from gazerig.robot.dashboard.auth_proxy import AuthProxy
+from gazerig.robot.dashboard.live_feed import LiveFeed
 from gazerig.robot.dashboard.outbox import Outbox
 from gazerig.robot.dashboard.page_feed import drain
 from gazerig.robot.dashboard.page_process import (
@@ -122,13 +123,13 @@ def watch(feed: socket.socket, view: PageView, parent: int, door: AuthProxy) -> 
     Raises:
         RuntimeError: no browser can connect any more; a page that is started again may help.
     """
-    pause = threading.Event()
+    pause, live = threading.Event(), LiveFeed()
     while True:
         if not door.is_open():
             raise RuntimeError("the page's door has closed by itself")
         readable, _, _ = select.select([feed], [], [], _SILENT_AFTER_S)
         if readable:
-            news = drain(feed)
+            news = drain(feed, live)
             if news.ended:
                 return
             view.show(news)

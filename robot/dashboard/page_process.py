@@ -24,13 +24,15 @@ from operator import attrgetter
 from urllib.parse import urlsplit
 
 from gazerig.drivers import child_process
+from gazerig.drivers.passed_image import send
 from gazerig.robot.dashboard.inbox import MESSAGE_BYTES, REQUEST, Inbox, parse_request
 from gazerig.robot.dashboard.stop_channel import StopListener
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
 
-# The first byte of a message says what follows it. To the page: a snapshot, a frame, menus,
-# the parameters, their values, a reply or a message to all users, the position of a replay.
+# The first byte of a message says what follows it. To the page: a snapshot and a frame of a
+# recording, menus, the parameters, their values, a reply or a message to all users, the position
+# of a replay; what a running rig sends is in live_feed.py.
 SNAPSHOT, FRAME, CHOICES, PARAMS, VALUES, MESSAGE, REPLAY = b"s", b"p", b"c", b"k", b"v", b"w", b"r"
 # From the page: its address, a message for the terminal, and REQUEST, a user's request.
 URL, NOTICE = b"u", b"n"
@@ -96,7 +98,7 @@ class PageProcess:
 
     A page process that dies is started again, at the same address, after a while that grows.
 
-    dropped: snapshots the page did not take; frames_dropped: the same for frames
+    dropped: snapshots and ticks the page did not take; frames_dropped: the same for frames
     started: how often the page has come up; its feed starts again when this changes
     gone: it has ended and is not started again
     """
@@ -184,6 +186,11 @@ class PageProcess:
         if not self.send(FRAME + jpeg):
             self.frames_dropped += 1
 
+    def show_detections(self, message: bytes, fd: int = -1) -> None:
+        """Hand over what was found in a frame, with the memory of its image unless fd is -1."""
+        if not self.send(message, fd):
+            self.frames_dropped += 1
+
     def offer(self, choices: Mapping[str, tuple[str, ...]]) -> None:
         """Set the menus of the page: name of the menu -> choices, the present one first."""
         self._choices = choices
@@ -193,13 +200,16 @@ class PageProcess:
         """Show a message to all users of the page."""
         self._answer(ALL_USERS, text)
 
-    def send(self, message: bytes) -> bool:
-        """Hand over a message as it is; False where the page does not take it now."""
+    def send(self, message: bytes, fd: int = -1) -> bool:
+        """Hand over a message as it is; False where the page does not take it now.
+
+        fd: goes along, unless it is -1; it stays the caller's
+        """
         page = self._socket
         if page is None or len(message) > MESSAGE_BYTES:
             return False
         try:
-            page.send(message)
+            send(page, message, fd)
         except OSError:  # full, gone, or closed by close() in this very moment
             return False
         return True

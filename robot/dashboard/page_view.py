@@ -5,6 +5,7 @@ from math import atan
 
 import viser
 
+from gazerig.drivers.types import ImageArray
 from gazerig.robot.dashboard.control_tabs import ControlTabs
 from gazerig.robot.dashboard.head_view import FLOOR_M, HeadView
 from gazerig.robot.dashboard.outbox import Outbox
@@ -54,6 +55,7 @@ class PageView:
         self._replay: ReplayView | None = None
         self._newest: Snapshot | None = None
         self._jpeg: bytes | None = None
+        self._image: ImageArray | None = None
         self._drawn = self._watched = False
         self._add_views()
 
@@ -78,6 +80,7 @@ class PageView:
             self._newest = news.snapshots[-1]
             self._tell(self._stop_state())
         self._jpeg = news.jpeg or self._jpeg
+        self._image = news.image if news.image is not None else self._image
         watched = bool(self._server.get_clients())
         if watched and not self._watched:  # who comes late may find a rig that stands still
             self._panel.draw_all()
@@ -139,7 +142,9 @@ class PageView:
             self._drawn = True
         if self._jpeg is not None:
             self._panel.show_frame(self._jpeg)
-        self._newest = self._jpeg = None
+        if self._image is not None:
+            self._panel.show_image(self._image)
+        self._newest = self._jpeg = self._image = None
 
     def silent(self) -> None:
         """Show that no data arrives any more, with the last that arrived."""

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import viser
 
+from gazerig.drivers.types import ImageArray
 from gazerig.robot.dashboard.attention_panel import saliences, winner
 from gazerig.robot.dashboard.dwell_chart import DwellChart
 from gazerig.robot.dashboard.event_timeline import Timeline
@@ -118,10 +119,13 @@ class PanelView:
         self._shown = 0
 
     def show_frame(self, jpeg: bytes) -> None:
-        """Draw the camera image; one that cannot be decoded is skipped."""
+        """Draw a recorded camera image; one that cannot be decoded is skipped."""
         bgr = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
-        if bgr is None:
-            return
+        if bgr is not None:
+            self.show_image(np.asarray(bgr, np.uint8))
+
+    def show_image(self, bgr: ImageArray) -> None:
+        """Draw the camera image."""
         rgb = cv2.cvtColor(bgr, cv2.COLOR_BGR2RGB)
         if self._image is None:
             self._image = self._gui.add_image(rgb, label="camera", format="jpeg", order=2)

@@ -1,12 +1,14 @@
 """Sends the page what can be tuned, once, and afterwards what has changed."""
 
 import json
+import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Protocol
 
 from gazerig.robot.control.command_handler import ChangedParam, DescribedParam, plain
+from gazerig.robot.control.observers import left_out
 from gazerig.robot.dashboard.page_process import PARAMS, VALUES
 from gazerig.robot.model.commands import Value
 
@@ -72,6 +74,11 @@ class ParamFeed:
         self._due.clear()
         self._known, self._version = {}, None
 
+    @property
+    def pending(self) -> bool:
+        """Return whether there is something to send."""
+        return bool(self._due) or self._tuning.version != self._version
+
     def step(self) -> None:
         """Send what is due, as far as the page takes it."""
         if not self._due and self._tuning.version != self._version:
@@ -100,3 +107,58 @@ class ParamFeed:
         for start in range(0, max(1, len(changed)), _PIECE):
             piece = {key: plain(now[key]) for key in changed[start : start + _PIECE]}
             self._due.append(VALUES + json.dumps({**state, "values": piece}).encode())
+
+
+class ParamThread:
+    """Lets a thread send the parameters: writing them takes milliseconds, which a tick has not.
+
+    It waits until there is something to send.
+
+    Args:
+        feed: sends; belongs to the thread from now on.
+        tell: gets a line if that fails.
+    """
+
+    def __init__(self, feed: ParamFeed, tell: Callable[[str], None]) -> None:
+        self._feed, self._tell = feed, tell
+        self._wanted = threading.Event()
+        self._again = self._over = self._failed = False
+        self._thread: threading.Thread | None = None
+
+    def look(self) -> None:
+        """Have what is new sent; called by the loop."""
+        if self._feed.pending and not self._wanted.is_set():
+            if self._thread is None:
+                self._thread = threading.Thread(
+                    target=self._work, name="page parameters", daemon=True
+                )
+                self._thread.start()
+            self._wanted.set()
+
+    def begin_anew(self) -> None:
+        """Have everything sent again to a restarted page."""
+        self._again = True
+        self._wanted.set()
+
+    def close(self) -> None:
+        """End the thread."""
+        self._over = True
+        self._wanted.set()
+        if self._thread is not None:
+            self._thread.join(timeout=2.0)
+
+    def _work(self) -> None:
+        while True:
+            self._wanted.wait()
+            self._wanted.clear()
+            if self._over:
+                return
+            try:
+                if self._again:
+                    self._again = False
+                    self._feed.begin_anew()
+                self._feed.step()
+            except Exception as error:
+                if not self._failed:
+                    self._failed = True
+                    self._tell(left_out("the page's parameters", error))

@@ -10,7 +10,7 @@ from gazerig.gaze.field_of_view import FieldOfViewParams, line_of_sight
 from gazerig.gaze.types import GazeState, Vec3
 from gazerig.robot.analysis.blink_finder import BlinkEvent
 from gazerig.robot.analysis.event_detector import Event, EventDetector, FixationEvent, SaccadeEvent
-from gazerig.robot.control.loop import Tick
+from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import lead_text, target_name
 from gazerig.robot.dashboard.loop_timing import LoopTiming
 from gazerig.robot.model.frames import CameraMount
@@ -68,9 +68,7 @@ class SnapshotTexts(NamedTuple):
 class SnapshotBuilder:
     """Makes snapshots of a running rig, with all that has happened since the one before.
 
-    ``note`` belongs to the loop's thread and only lays the tick down; ``take`` does the
-    work and belongs to one other thread, so nothing shown can cost the loop its time or,
-    at fault, its life.
+    ``update`` only keeps the tick; ``take`` does the work.
     """
 
     def __init__(self, rate_hz: float, rig: ShownRig | None = None) -> None:
@@ -88,7 +86,7 @@ class SnapshotBuilder:
         self._unanswered: Counter[str] = Counter()
 
     def update(self, tick: Tick) -> None:
-        """Lay a tick down."""
+        """Add a tick."""
         self._ticks.append(tick)
 
     def take(self, said: SnapshotTexts) -> Snapshot | None:

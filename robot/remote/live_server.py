@@ -7,7 +7,7 @@ from typing import Protocol
 
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.control.command_handler import Commandable, ParamAccess
-from gazerig.robot.control.loop import Tick
+from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.remote.file_watch import FileWatch
 from gazerig.robot.remote.request_handler import Pulse, RequestHandler
@@ -64,9 +64,10 @@ class LiveServer:
             self._say(f"gazerig ctl set and stop will not find this rig: {error}")
         self._watch.start()
 
-    def update(self, tick: Tick) -> None:
-        """Leave the newest tick; called by the loop."""
-        self._pulse.update(tick)
+    @property
+    def update(self) -> Callable[[Tick], None]:
+        """Return what leaves the newest tick; called by the loop."""
+        return self._pulse.update
 
     def saved(self, path: Path) -> None:
         """Record that this program itself has written a file."""

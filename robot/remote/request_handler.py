@@ -25,7 +25,7 @@ from gazerig.robot.control.command_handler import (
 from gazerig.robot.control.feedback_basis import estimated_joints
 from gazerig.robot.control.head_state import as_json as state_as_json
 from gazerig.robot.control.head_state import head_state
-from gazerig.robot.control.loop import Tick
+from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_feed import TickFeed
 from gazerig.robot.control.tick_text import lead_text, target_name
 from gazerig.robot.model.clock import Clock
@@ -52,9 +52,10 @@ class Pulse:
         self._feed = TickFeed()
         self._never = threading.Event()
 
-    def update(self, tick: Tick) -> None:
-        """Leave the newest tick; called by the loop."""
-        self._feed.update(tick)
+    @property
+    def update(self) -> Callable[[Tick], None]:
+        """Return what leaves the newest tick; called by the loop."""
+        return self._feed.update
 
     def taken_up(self, within_s: float = _TAKEN_UP_S, ticks: int = 2) -> bool:
         """Wait until all commands given before are obeyed; tell whether that came to pass.

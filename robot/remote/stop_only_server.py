@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.control.gesture_choices import GestureInfo
-from gazerig.robot.control.loop import Tick
+from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.commands import Command, Resume, Stop
 from gazerig.robot.model.reply import CommandTaker, Ticket

@@ -1,0 +1,219 @@
+"""A running rig as the page shows it, made in the page's process of the ticks it is sent.
+
+Everything that is only shown is worked out here, at the page's rate: words, eye movements, the pose
+that was commanded, what was found drawn into the camera's image. The control loop sends plain
+ticks, and what they do not tell (``RunState``) when it has changed.
+"""
+
+import pickle
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.passed_image import PassedImage, taken
+from gazerig.drivers.types import BusHealth, DetectedFace, Detections, ImageArray, MovingBlob
+from gazerig.gaze.angles import rotate_back, sub
+from gazerig.gaze.types import Percept
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.tick_stream import TickRow, decode_plain, decode_rows, encode
+from gazerig.robot.control.tick_text import health_text, perception_text
+from gazerig.robot.dashboard.camera_overlay import draw_detections, ground
+from gazerig.robot.dashboard.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts
+from gazerig.robot.model.frames import PoseHistory
+from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
+from gazerig.robot.model.types import Snapshot
+from gazerig.robot.perception.egomotion_residual import ResidualFigures
+
+TICKS, RIG, STATE, DETECTED = b"t", b"g", b"a", b"d"
+"""First bytes of the messages: a ``TickBatch``, a ``LiveRig``, a ``RunState``, a frame."""
+
+_NEAREST_M = 0.05
+"""What is nearer to the plane of the camera, or behind it, has no place in the image."""
+
+
+class LiveRig(NamedTuple):
+    """A running rig: the rate of its loop, and how it is built."""
+
+    rate_hz: float
+    shown: ShownRig
+
+
+class RunState(NamedTuple):
+    """What a tick does not tell.
+
+    errors: of the bus, by kind; behaviour, conversation, character: those in force
+    residual: see ``ResidualFigures``
+    """
+
+    errors: dict[str, int]
+    behaviour: str
+    conversation: str
+    character: str
+    residual: tuple[float | None, float | None, int]
+
+
+class FrameHead(NamedTuple):
+    """What was found in a frame, as far as it is drawn, and what goes along with it.
+
+    faces: box, landmarks and confidence; blobs: id, kind, position and radius
+    lens: as the camera reports it: fx, fy, cx, cy in pixels
+    shape, dtype: of the array in the memory that goes along; None, "" without one
+    depth: that is the depth image; wants_depth: depth is to be shown
+    """
+
+    captured_s: float
+    number: int
+    width_px: int
+    height_px: int
+    faces: Sequence[tuple[Any, Any, float]]
+    blobs: Sequence[tuple[int, str, Any, float]]
+    lens: tuple[float, float, float, float] | None
+    shape: tuple[int, ...] | None
+    dtype: str
+    depth: bool
+    wants_depth: bool
+
+
+def rig_message(rig: LiveRig) -> bytes:
+    """Return a message that tells the page how the rig is built."""
+    return RIG + pickle.dumps(tuple(rig), pickle.HIGHEST_PROTOCOL)
+
+
+def state_message(state: RunState) -> bytes:
+    """Return a message that tells the page what ticks do not."""
+    return STATE + encode(state)
+
+
+def frame_message(
+    found: Detections, image: PassedImage | None, depth: bool, wants_depth: bool
+) -> bytes:
+    """Return a message with what was found in a frame; see ``FrameHead``."""
+    lens = found.lens
+    head = FrameHead(
+        found.captured_s,
+        found.number,
+        found.width_px,
+        found.height_px,
+        [(face.box_px, face.landmarks_px, face.confidence) for face in found.faces],
+        [(blob.id, blob.kind, blob.p_camera_m, blob.radius_m) for blob in found.blobs],
+        (lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px) if lens is not None else None,
+        image.shape if image is not None else None,
+        image.dtype if image is not None else "",
+        depth,
+        wants_depth,
+    )
+    return DETECTED + encode(head)
+
+
+class LiveFeed:
+    """Takes what the rig's side sends; returns what there is to show."""
+
+    def __init__(self) -> None:
+        self._builder: SnapshotBuilder | None = None
+        self._poses: PoseHistory | None = None
+        self._percept: Percept | None = None
+        self._state = RunState({}, "", "", "", (None, None, 0))
+        self._found: Detections | None = None
+        self._wants_depth = False
+        self._newest: Tick | None = None
+        self._new_ticks = self._new_frame = False
+
+    def take(self, message: bytes, fd: int = -1) -> bool:
+        """Take a message of one of the kinds above; False if it is none.
+
+        Only ever fed by the process that started this one.
+        """
+        kind, body = message[:1], message[1:]
+        if kind == TICKS:
+            self._take_ticks(body)
+        elif kind == STATE:
+            self._state = RunState(*decode_plain(body))
+        elif kind == RIG:
+            self._take_rig(LiveRig(*pickle.loads(body)))
+        elif kind == DETECTED:
+            self._take_frame(FrameHead(*decode_plain(body)), fd)
+        else:
+            return False
+        return True
+
+    def snapshot(self) -> Snapshot | None:
+        """Return what the rig does now and has done since the last call; None without news."""
+        if not self._new_ticks or self._builder is None or self._newest is None:
+            return None
+        self._new_ticks = False
+        state, tick = self._state, self._newest
+        perception = perception_text(tick, ResidualFigures(*state.residual))
+        health = health_text(BusHealth(0, 0, state.errors))
+        return self._builder.take(
+            SnapshotTexts(health, state.behaviour, perception, state.character, state.conversation)
+        )
+
+    def image(self) -> ImageArray | None:
+        """Return the newest frame with what was found in it; None without a new one."""
+        tick, found, builder = self._newest, self._found, self._builder
+        if not self._new_frame or tick is None or found is None or builder is None:
+            return None
+        self._new_frame = False
+        assert builder.rig is not None  # it came with the first message
+        field_rad = builder.rig.horizontal_rad
+        lens = intrinsics_of_lens(None, field_rad, found.width_px, found.height_px, found.lens)
+        gaze_px = self._gaze_px(tick, builder.rig, found, lens)
+        return draw_detections(ground(found, self._wants_depth), found, gaze_px, lens.fx_px)
+
+    def _take_rig(self, rig: LiveRig) -> None:
+        if self._builder is None:
+            self._builder = SnapshotBuilder(rig.rate_hz, rig.shown)
+            self._poses = PoseHistory(rig.shown.kinematics)
+        self._builder.rig = rig.shown
+
+    def _take_ticks(self, data: bytes) -> None:
+        if self._builder is None or self._poses is None:
+            return
+        percepts, rows = decode_rows(data)
+        for row in rows:
+            tick = self._tick(row, percepts)
+            self._builder.update(tick)
+            self._poses.remember(tick.t_s, tick.pose.head_rad, tick.pose.base_rad)
+            self._newest = tick
+        self._new_ticks = True
+
+    def _tick(self, row: TickRow, percepts: Mapping[int, Percept]) -> Tick:
+        """Return a tick; the percept before stands for one that was lost and comes again."""
+        number = row.percept
+        self._percept = None if number is None else percepts.get(number, self._percept)
+        return Tick(
+            row.t_s, row.joints, row.pose, self._found, self._percept, row.target, row.gaze,
+            row.desired_rad, row.guard_result, row.events, (), row.stopped, row.led, row.lead,
+            row.gesture,
+        )  # fmt: skip
+
+    def _take_frame(self, head: FrameHead, fd: int) -> None:
+        found = Detections(
+            head.captured_s,
+            head.number,
+            head.width_px,
+            head.height_px,
+            tuple([DetectedFace(box, np.array(marks), sure) for box, marks, sure in head.faces]),
+            tuple([MovingBlob(*blob) for blob in head.blobs]),
+            lens=Intrinsics(*head.lens) if head.lens is not None else None,
+        )
+        if fd >= 0 and head.shape is not None:
+            array = taken(PassedImage(fd, tuple(head.shape), head.dtype))
+            found = replace(found, depth_m=array) if head.depth else replace(found, image=array)
+        self._found, self._wants_depth, self._new_frame = found, head.wants_depth, True
+
+    def _gaze_px(
+        self, tick: Tick, rig: ShownRig, found: Detections, lens: Intrinsics
+    ) -> tuple[float, float] | None:
+        """Return where in the image the gaze goes, None when it is outside."""
+        if self._poses is None:
+            return None
+        R, p = rig.mount.pose(*self._poses.head_pose(found.captured_s))
+        x, y, z = rotate_back(R, sub(tick.gaze.gaze_point_world_m, p))
+        if z < _NEAREST_M:
+            return None
+        u, v = project(np.array([[x, y, z]]), lens)[0].tolist()
+        return (u, v)

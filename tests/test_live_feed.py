@@ -1,0 +1,190 @@
+"""What the page makes of a running rig's ticks: what a snapshot made beside the loop would say."""
+
+import socket
+from collections.abc import Iterator
+from dataclasses import fields, replace
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from shown_page import wait_for
+
+from gazerig.config.schema import load_rig
+from gazerig.drivers.types import Detections
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.control.loop import run
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.tick_stream import TickStream
+from gazerig.robot.control.tick_text import perception_text
+from gazerig.robot.dashboard.camera_overlay import draw_detections, ground
+from gazerig.robot.dashboard.live_feed import LiveFeed, LiveRig, RunState
+from gazerig.robot.dashboard.page_feed import drain
+from gazerig.robot.dashboard.page_process import URL, PageProcess
+from gazerig.robot.dashboard.publisher import Publisher
+from gazerig.robot.dashboard.snapshot import SnapshotBuilder, SnapshotTexts
+from gazerig.robot.model.commands import Tune
+from gazerig.robot.model.intrinsics import intrinsics_of_lens
+from gazerig.robot.model.types import Snapshot
+
+
+class Run(NamedTuple):
+    made: Assembly
+    ticks: list[Tick]
+
+
+@pytest.fixture(scope="module", params=["desk", "maker"])
+def ran(request: pytest.FixtureRequest) -> Iterator[Run]:
+    """Two simulated seconds, so that there are saccades, a fixation and a blink."""
+    options = RunOptions(rig=request.param, mock=True, fast=True, seed=0, scene="visitor")
+    made, ticks = assemble(load_rig(request.param), options), list[Tick]()
+    made.robot.start(made.clock)
+    run(made.robot, made.clock, made.loop, lambda s: "over" if s >= 2.0 else None, ticks.append)
+    made.robot.stop()
+    yield Run(made, ticks)
+    made.close()
+
+
+class Page:
+    """A page's process that is a socket here, and what feeds it."""
+
+    def __init__(self, made: Assembly, every_s: float = 0.0399) -> None:
+        ours, self.feed = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self.page = PageProcess("127.0.0.1", 0)
+        self.page.join(ours)
+        self.said: list[str] = []
+        self.state = RunState({"lost": 3}, "wait", "talking", "shy", (None, None, 0))
+        self.rigs = 0
+        self.publisher = Publisher(
+            self.page, lambda: self._rig(made), lambda: self.state, None, self.said.append
+        )
+        self.stream = TickStream(self.said.append, every_s)
+        self.stream.add("the page", self.publisher.take)
+        self.live = LiveFeed()
+
+    def _rig(self, made: Assembly) -> LiveRig:
+        self.rigs += 1
+        return LiveRig(200.0, made.shown())
+
+    def comes_up(self) -> None:
+        before = self.page.started
+        self.feed.send(URL + b"http://127.0.0.1:9/?token=x")
+        wait_for(lambda: self.page.started > before, "the page")
+
+    def shown(self) -> tuple[Snapshot, ...]:
+        return drain(self.feed, self.live).snapshots
+
+    def close(self) -> None:
+        self.page.close()
+        self.feed.close()
+
+
+@pytest.fixture
+def page(ran: Run) -> Iterator[Page]:
+    one = Page(ran.made)
+    yield one
+    one.close()
+
+
+def test_a_snapshot_is_that_of_the_ticks_themselves(ran: Run, page: Page) -> None:
+    page.comes_up()
+    direct = SnapshotBuilder(200.0, ran.made.shown())
+    shots: list[Snapshot] = []
+    for tick in ran.ticks:
+        page.stream.update(tick)
+        direct.update(tick)
+        shots += page.shown()
+    page.stream.flush()
+    shots += page.shown()
+    last = shots[-1]
+    events = tuple(event for shot in shots for event in shot.events)
+    trail = tuple(one for shot in shots for one in shot.trail)
+    tick = ran.ticks[-1]
+    perception = perception_text(
+        tick, ran.made.robot.perception.residual()._replace(speed_deg_s=None)
+    )
+    whole = direct.take(SnapshotTexts("bus: 3 lost", "wait", perception, "shy", "talking"))
+    assert whole is not None and len(whole.events) > 2
+    assert events == whole.events and trail == whole.trail
+    for field in fields(Snapshot):
+        if field.name not in ("events", "trail", "worst", "timing"):
+            assert getattr(last, field.name) == getattr(whole, field.name), field.name
+    assert last.timing is not None and last.timing.overruns_ever == 0
+    assert page.said == ["the page is at http://127.0.0.1:9/?token=x"]
+
+
+def test_nothing_is_sent_before_the_page_is_there_and_everything_again_to_another(
+    ran: Run, page: Page
+) -> None:
+    for tick in ran.ticks[:100]:
+        page.stream.update(tick)
+    assert page.shown() == () and page.rigs == 0
+    for n in (1, 2):
+        page.comes_up()
+        page.live = LiveFeed()  # another process
+        for tick in ran.ticks[n * 100 : n * 100 + 100]:
+            page.stream.update(tick)
+        (shot,) = page.shown()
+        assert page.rigs == n
+        assert (shot.health, shot.behaviour) == ("bus: 3 lost", "wait")
+        assert len(shot.faces) == 1, "the percept in force comes again"
+
+
+def test_what_has_not_changed_is_not_sent_again_and_tuning_is(ran: Run, page: Page) -> None:
+    page.comes_up()
+    for tick in ran.ticks:
+        page.stream.update(tick)
+        page.shown()
+    assert page.rigs == 1
+    page.publisher.obeyed((Tune((("camera.yaw_deg", 3.0),)),))
+    page.stream.update(ran.ticks[-1]._replace(t_s=ran.ticks[-1].t_s + 1.0))
+    assert page.rigs == 2
+
+
+@pytest.mark.parametrize("depth", [False, True])
+def test_the_image_is_drawn_as_the_camera_gave_it(ran: Run, page: Page, depth: bool) -> None:
+    page.comes_up()
+    page.publisher.depth = depth
+    rng = np.random.default_rng(0)
+    image = rng.integers(0, 255, (400, 640, 3), np.uint8)
+    metres = rng.random((400, 640), np.float32) + 0.5
+    tick = ran.ticks[-1]
+    assert tick.detections is not None
+    found = replace(tick.detections, image=image, depth_m=metres)
+    page.stream.update(tick._replace(detections=found))
+    news = drain(page.feed, page.live)
+    assert news.image is not None
+    shown = ran.made.shown()
+    lens = intrinsics_of_lens(None, shown.horizontal_rad, 640, 400, found.lens)
+    for gaze_px in (None, page.live._gaze_px(tick, shown, found, lens)):
+        drawn = draw_detections(ground(found, depth), found, gaze_px, lens.fx_px)
+        if np.array_equal(drawn, news.image):
+            break
+    else:
+        raise AssertionError("another image is drawn")
+    assert drain(page.feed, page.live).image is None
+
+
+def test_a_camera_without_images_and_depth_says_so(ran: Run, page: Page) -> None:
+    page.comes_up()
+    page.publisher.depth = True
+    page.stream.update(ran.ticks[-1]._replace(detections=Detections(0.0, 1, 640, 400)))
+    with_words = drain(page.feed, page.live).image
+    page.publisher.depth = False
+    page.stream.update(ran.ticks[-1]._replace(t_s=99.0, detections=Detections(0.0, 2, 640, 400)))
+    without = drain(page.feed, page.live).image
+    assert with_words is not None and without is not None
+    white = [bool((image.min(axis=2) > 200).any()) for image in (with_words, without)]
+    assert white == [True, False]
+
+
+def test_a_page_that_takes_nothing_delays_nothing_and_is_counted(ran: Run, page: Page) -> None:
+    page.comes_up()
+    for n in range(3):
+        for tick in ran.ticks:
+            page.stream.update(tick._replace(t_s=tick.t_s + 2.0 * n))
+    assert page.page.dropped > 500 and page.said[1:] == []
+    (shot,) = page.shown()  # what it had room for, and then the newest
+    page.stream.update(ran.ticks[-1]._replace(t_s=99.0))
+    (newest,) = page.shown()
+    assert shot.t_s < 3.0 and newest.t_s == 99.0 and newest.faces
