@@ -31,6 +31,10 @@ from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.gaze_models import gaze_parts
 from gazerig.robot.app.options import RunOptions  # noqa: E402
 from gazerig.robot.control.loop import Tick, run  # noqa: E402
+from gazerig.robot.sweep.axes import Axis, grid  # noqa: E402
+from gazerig.robot.sweep.outcome import Outcome  # noqa: E402
+from gazerig.robot.sweep.response_figure import response_png  # noqa: E402
+from gazerig.robot.sweep.worker import figures_at  # noqa: E402
 from gazerig.sim_mock.scenes.steps_aside import STEP_AT_S, STEP_S  # noqa: E402
 from gazerig.sim_mock.true_gaze import (  # noqa: E402
     angles_of_place,
@@ -57,6 +61,7 @@ def main() -> None:
         blink,
         scanpath,
         capture_time,
+        sweep,
     ):
         draw()
         print(f"docs/figures/{draw.__name__}.png")
@@ -279,6 +284,18 @@ def capture_time() -> None:
     for axes in (left, middle, right):
         axes.legend(fontsize=7)
     saved("capture_time", figure)
+
+
+def sweep() -> None:
+    """What the rate of blinks does: the picture of a small sweep on ideal servos."""
+    rig = load_rig("desk")
+    axis = Axis("gaze.lids.blinks_per_min", (8.0, 14.0, 20.0, 26.0, 32.0), unit="1/min")
+    runs = []
+    for point in grid([axis]):
+        for seed in range(3):
+            options = RunOptions(True, True, seed, "visitor", seconds=44.0, bus="ideal")
+            runs.append(Outcome(point, seed, figures_at(rig, options, point, lambda: None)))
+    (HERE / "sweep.png").write_bytes(response_png([axis], runs))
 
 
 if __name__ == "__main__":

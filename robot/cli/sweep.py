@@ -91,9 +91,9 @@ def sweep(
 ) -> None:
     """Vary parameters over many simulated runs: a table, and a picture of what responds.
 
-    Every finished run is kept at once: the same command goes on after Ctrl-C. With --fit it
-    searches for the values that put most of the report's measures inside people's bands, and writes
-    them as YAML.
+    Every finished run is kept at once: the same command goes on after Ctrl-C.
+
+    --fit searches for the values with most measures inside people's bands.
     """
     with clear_errors(rig):
         shown = [_column(name) for name in show or ()]
@@ -220,7 +220,7 @@ def _working(
 
             def runs(done: int, total: int) -> None:
                 reached[:] = done, total
-                tell("simulating", done / max(1, total))
+                tell(f"{total} runs", done / max(1, total))
 
             yield work, runs
     except SweepInterrupted:

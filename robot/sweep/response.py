@@ -11,6 +11,8 @@ from gazerig.robot.sweep.axes import Axis
 from gazerig.robot.sweep.outcome import OUTSIDE, REPORT, Outcome
 
 _BINS = 5
+_WEAK = 0.05
+"""Measures that respond less are not worth a panel."""
 
 
 class LevelGroup(NamedTuple):
@@ -79,7 +81,7 @@ def most_responsive(axes: Sequence[Axis], outcomes: Sequence[Outcome], most: int
     """Return columns to show: measures outside their bands, then the measures that respond most."""
     found = {f"{REPORT}{band.key}": strength(axes, outcomes, band) for band in BANDS}
     order = sorted(found, key=lambda name: -found[name])
-    return [OUTSIDE, *(name for name in order if found[name] > 0.0)][:most]
+    return [OUTSIDE, *(name for name in order if found[name] > _WEAK)][:most]
 
 
 def band_of(name: str) -> NormBand | None:
