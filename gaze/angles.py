@@ -158,31 +158,24 @@ def angles_of(R: Mat3) -> Angles3:
 
 def rotate(R: Mat3, v: Vec3) -> Vec3:
     """Return R v: child coordinates to parent coordinates."""
-    return (
-        R[0][0] * v[0] + R[0][1] * v[1] + R[0][2] * v[2],
-        R[1][0] * v[0] + R[1][1] * v[1] + R[1][2] * v[2],
-        R[2][0] * v[0] + R[2][1] * v[1] + R[2][2] * v[2],
-    )
+    (a, b, c), (d, e, f), (g, h, i) = R
+    x, y, z = v
+    return (a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z)
 
 
 def rotate_back(R: Mat3, v: Vec3) -> Vec3:
     """Return R^T v: parent coordinates to child coordinates."""
-    return (
-        R[0][0] * v[0] + R[1][0] * v[1] + R[2][0] * v[2],
-        R[0][1] * v[0] + R[1][1] * v[1] + R[2][1] * v[2],
-        R[0][2] * v[0] + R[1][2] * v[1] + R[2][2] * v[2],
-    )
+    (a, b, c), (d, e, f), (g, h, i) = R
+    x, y, z = v
+    return (a * x + d * y + g * z, b * x + e * y + h * z, c * x + f * y + i * z)
 
 
 def compose(A: Mat3, B: Mat3) -> Mat3:
     """Return A B."""
-    rows = []
-    for a in A:
-        rows.append(
-            (
-                a[0] * B[0][0] + a[1] * B[1][0] + a[2] * B[2][0],
-                a[0] * B[0][1] + a[1] * B[1][1] + a[2] * B[2][1],
-                a[0] * B[0][2] + a[1] * B[1][2] + a[2] * B[2][2],
-            )
-        )
-    return (rows[0], rows[1], rows[2])
+    (a, b, c), (d, e, f), (g, h, i) = B
+    (p, q, r), (s, t, u), (v, w, x) = A
+    return (
+        (p * a + q * d + r * g, p * b + q * e + r * h, p * c + q * f + r * i),
+        (s * a + t * d + u * g, s * b + t * e + u * h, s * c + t * f + u * i),
+        (v * a + w * d + x * g, v * b + w * e + x * h, v * c + w * f + x * i),
+    )

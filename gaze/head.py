@@ -83,8 +83,8 @@ class HeadModel:
         """Start at rest at the present head angles."""
         self._plans = tuple(Quintic((angle, 0.0, 0.0), angle, 1.0) for angle in head_rad)
         self._planned_s, self._lasts_s = t_s, 1.0
-        self._goal: Angles2 = (head_rad[0], head_rad[1])
         self._rest_rad = head_rad
+        self._set_goal((head_rad[0], head_rad[1]))
         self._ends_s = t_s
         self._follows = False
         self._relieves = False
@@ -187,7 +187,7 @@ class HeadModel:
         A person who steps aside is most salient while moving; a head that then took the larger
         offset of one who stands would swing back from where it has just turned to.
         """
-        way, to_centre = direction(self._goal), direction(facing)
+        way, to_centre = self._goal_direction, direction(facing)
         to_gaze = to_centre if gaze is facing else direction(gaze)
         near_enough = angle_between(way, to_centre) <= short_rad
         in_reach = angle_between(way, to_gaze) <= self.trigger_rad
@@ -223,8 +223,12 @@ class HeadModel:
         self._plans = tuple(
             Quintic(start, end, duration) for start, end in zip(starts, (*goal, 0.0), strict=True)
         )
-        self._goal, self._rest_rad, self._level = goal, (*goal, 0.0), True
+        self._set_goal(goal)
+        self._rest_rad, self._level = (*goal, 0.0), True
         self._planned_s, self._lasts_s, self._ends_s = t_s, duration, t_s + duration
+
+    def _set_goal(self, goal: Angles2) -> None:
+        self._goal, self._goal_direction = goal, direction(goal)
 
     def _duration_s(self, amplitude_rad: float) -> float:
         """Return the time of a head movement: peak speed grows with its size."""

@@ -148,7 +148,7 @@ class Oculomotor:
                 "endpoint_scatter_along and endpoint_scatter_across need a random generator: give rng"
             )
         self._params, self._scatter, self._eye_limits = params, scatter, eye_limits
-        self._lag_s = params.eye_lag_ms / 1e3
+        self._lag_s, self._nearest_m = params.eye_lag_ms / 1e3, params.nearest_m
         self._horizon_s, self._fade_s = params.prediction_horizon_ms / 1e3, params.fade_ms / 1e3
         self._trigger.retune(params, any(scatter))
 
@@ -285,24 +285,25 @@ class Oculomotor:
     def _now(self, target: Target, p_head: Vec3, t_s: float) -> _Seen:
         """Return the target predicted by its velocity, which decays beyond the horizon."""
         age, known = t_s - target.at_s, self._horizon_s
-        velocity = target.v_world_m_s
-        moved = scale(velocity, min(age, known) if age > 0.0 else 0.0)
+        x, y, z = velocity = target.v_world_m_s
+        for_s = 0.0 if age <= 0.0 else age if age <= known else known
+        x, y, z = x * for_s, y * for_s, z * for_s
         if age > known:
             left = exp(-(age - known) / self._fade_s)
-            moved = add(moved, scale(velocity, self._fade_s * (1.0 - left)))
+            x, y, z = add((x, y, z), scale(velocity, self._fade_s * (1.0 - left)))
             velocity = scale(velocity, left)
-        point = self._clear(add(target.p_world_m, moved), p_head)
-        centre = point
-        if target.centre_world_m is not None:
-            centre = self._clear(add(target.centre_world_m, moved), p_head)
+        p, p_centre = target.p_world_m, target.centre_world_m
+        point = centre = self._clear((p[0] + x, p[1] + y, p[2] + z), p_head)
+        if p_centre is not None:
+            centre = self._clear((p_centre[0] + x, p_centre[1] + y, p_centre[2] + z), p_head)
         return point, velocity, centre, sub(point, p_head)
 
     def _clear(self, point: Vec3, p_head: Vec3) -> Vec3:
         """Return a point moved away to ``nearest_m`` where it is nearer."""
-        x, y, z = sub(point, p_head)
-        if sqrt(x * x + y * y + z * z) >= self._params.nearest_m:
+        x, y, z = point[0] - p_head[0], point[1] - p_head[1], point[2] - p_head[2]
+        if sqrt(x * x + y * y + z * z) >= self._nearest_m:
             return point
-        return add(p_head, scale(unit((x, y, z)), self._params.nearest_m))
+        return add(p_head, scale(unit((x, y, z)), self._nearest_m))
 
     def _move_gaze(self, seen: _Seen, p_head: Vec3, t_s: float, dt_s: float) -> float | None:
         """Move the gaze point along a saccade, or after the target.

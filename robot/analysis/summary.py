@@ -44,18 +44,21 @@ class Summary:
         self._target_s[tick.target.kind] += dt_s
         if tick.target.part is not None:
             self._part_s[tick.target.part] += dt_s
-        if self._fixates(tick, dt_s):
-            self._errors_mdeg[round(1000.0 * degrees(gaze_error_rad(tick)))] += 1
-        self._events.extend((tick.t_s - self._first_s, event) for event in tick.events)
+        left, right = line_of_sight(tick.pose, True), line_of_sight(tick.pose, False)
+        if self._fixates(tick, unit(add(left, right)), dt_s):
+            error_rad = _gaze_error_rad(tick, left, right)
+            self._errors_mdeg[round(1000.0 * degrees(error_rad))] += 1
+        for event in tick.events:
+            self._events.append((tick.t_s - self._first_s, event))
         for reason in tick.guard_result.reasons:
             self._limited[reason.partition(": ")[2]] += 1
 
-    def _fixates(self, tick: Tick, dt_s: float) -> bool:
+    def _fixates(self, tick: Tick, gaze: Vec3, dt_s: float) -> bool:
         """Whether this is a fixation, judged by the speed of the gaze as an eye tracker does."""
-        before, self._gaze = self._gaze, cyclopean(tick)
+        before, self._gaze = self._gaze, gaze
         if before is None or dt_s <= 0.0 or tick.gaze.phase == "saccade":
             return False
-        return angle_between(before, self._gaze) < _FIXATION_RAD_S * dt_s
+        return angle_between(before, gaze) < _FIXATION_RAD_S * dt_s
 
     def figures(self) -> dict[str, object]:
         """Return what the ticks themselves tell; the caller adds bus, loop and frames."""
@@ -83,16 +86,18 @@ def cyclopean(tick: Tick) -> Vec3:
     return unit(add(line_of_sight(tick.pose, True), line_of_sight(tick.pose, False)))
 
 
-def gaze_error_rad(tick: Tick) -> float:
+def _gaze_error_rad(tick: Tick, left: Vec3, right: Vec3) -> float:
     """Return the mean angle of both measured lines of sight off the intended point.
 
     Eyes that one linkage turns sideways stay parallel: what that leaves counts too.
+
+    left, right: the lines of sight
     """
     target, pose = tick.target, tick.pose
     point = add(target.p_world_m, scale(target.v_world_m_s, max(0.0, tick.t_s - target.at_s)))
-    left = angle_between(line_of_sight(pose, True), sub(point, pose.p_world_eye_left_m))
-    right = angle_between(line_of_sight(pose, False), sub(point, pose.p_world_eye_right_m))
-    return 0.5 * (left + right)
+    error_left = angle_between(left, sub(point, pose.p_world_eye_left_m))
+    error_right = angle_between(right, sub(point, pose.p_world_eye_right_m))
+    return 0.5 * (error_left + error_right)
 
 
 def _percentile_deg(counts_mdeg: Counter[int], percent: float) -> float | None:

@@ -162,7 +162,10 @@ class Session:
 
     def _log(self, tick: Tick) -> None:
         """Print the events of a tick."""
-        for event in (*drawn_together(tick.events), *self._run_observers.events()):
+        events = tick.events
+        if events:
+            events = tuple(drawn_together(events))
+        for event in (*events, *self._run_observers.events()):
             self._say(f"{tick.t_s - self._start_s:.2f} s: {event}")
 
     def _stop(self, seconds: float) -> str | None:
