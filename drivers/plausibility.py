@@ -36,6 +36,8 @@ class Plausibility:
 
     Args:
         fastest_steps_s: speed of each servo's motor without load.
+
+    damaged_s: when an answer arrived damaged last
     """
 
     def __init__(self, fastest_steps_s: Sequence[float]) -> None:
@@ -43,7 +45,7 @@ class Plausibility:
         self._pace = tuple(MARGIN * speed for speed in fastest_steps_s)
         self._free = tuple(SLACK_STEPS + LATE_S * pace for pace in self._pace)
         self._nearest = min(self._free, default=0.0)
-        self._damaged_s = float("-inf")
+        self.damaged_s = float("-inf")
         self.forget()
 
     def forget(self) -> None:
@@ -100,11 +102,11 @@ class Plausibility:
 
     def damaged(self, at_s: float) -> None:
         """Record that an answer arrived damaged, or was not plausible."""
-        self._damaged_s = at_s
+        self.damaged_s = at_s
 
     def disturbed(self, now_s: float) -> bool:
         """Return whether answers have been damaged of late."""
-        return now_s - self._damaged_s <= DISTURBED_S
+        return now_s - self.damaged_s <= DISTURBED_S
 
     def pair(self, slot: int, first: int, first_s: float, second: int, second_s: float) -> bool:
         """Return whether two answers right after one another can both be true."""

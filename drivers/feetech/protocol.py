@@ -141,7 +141,7 @@ class GoalWrite:
         row[1::4] = goals
         row[3::4] = speeds
         body = self._head + self._rows.pack(*row)
-        return HEADER + body + bytes((checksum(body),))
+        return b"%b%b%c" % (HEADER, body, ~sum(body) & 0xFF)
 
 
 def statuses(raw: bytes) -> list[Status]:

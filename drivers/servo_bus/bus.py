@@ -1,12 +1,13 @@
 """Smart servos of one family on one serial bus: one read and one write a tick."""
 
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from math import ceil
 
 from gazerig.drivers.errors import BusLost, PortError, ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog, servo_label
 from gazerig.drivers.goal_limits import clipped
+from gazerig.drivers.plausibility import DISTURBED_S
 from gazerig.drivers.port_bus import CUT, PortBus
 from gazerig.drivers.released import ReleaseResult
 from gazerig.drivers.serial.port import BusPort
@@ -112,34 +113,14 @@ class SmartServoBus(PortBus):
 
     # --- one reading
 
-    def _read(self, now_s: float) -> None:
-        """Read all servos into the feedback's columns while the port is there.
-
-        Raises:
-            BusLost: the port is gone.
-        """
-        line, reader = self._line, self._reader
-        if line.starved:
-            self._supervisor.recover_tripped(self._poll_list.group)
-        group = reader.next_group(now_s)
-        if group is None:
-            self._take(reader.read_troubled(now_s), now_s)
-        else:
-            raw, at_s = line.exchange(group.request, group.reply_length)
-            if (self._wary and self._in_doubt(now_s)) or not self._feedback.apply_whole(
-                group, raw, at_s
-            ):
-                self._take(reader.salvage(group, raw, at_s, now_s), now_s)
-            elif self._health.all_silent_since_s is not None:
-                self._health.answered_again(now_s, line.lateness)
-        self._supervisor.service(self._poll_list.group, now_s)
-
     def _in_doubt(self, now_s: float) -> bool:
         """Return whether even a right answer must be checked servo by servo."""
-        if self._family.weak_check and (
-            self._disturbed(now_s) or now_s - self._reader.unanswered_s <= OWED_S
-        ):
-            return True
+        if self._family.weak_check:
+            corrupt = self._line.errors.get("corrupt", 0)
+            if corrupt != self._damaged or now_s - self._feedback.places.damaged_s <= DISTURBED_S:
+                return True
+            if now_s - self._reader.unanswered_s <= OWED_S:
+                return True
         return not self._supervisor.at_ease
 
     def _take(self, replies: dict[int, ServoReply], now_s: float) -> None:
@@ -205,23 +186,24 @@ class SmartServoBus(PortBus):
                 self._line.errors["unconfirmed"] += 1
         return kept
 
-    def _send(self, goals: Sequence[int]) -> None:
-        """Send goals, each within its limits, with the speeds that may be used for them.
+    def _send_to_others(self, withheld: Collection[int], goals: Sequence[int]) -> None:
+        """Send goals to all servos but those that must get none now.
 
         Raises:
             BusLost: the port is gone.
         """
-        supervisor, speeds = self._supervisor, self._speeds
-        if supervisor.entering.places and self._family.goal_speed:
-            speeds = self._recovery.speeds(self._ids, supervisor.entering.ids)
-        withheld = supervisor.withheld(self._now_s) if supervisor.withholds else None
-        if not withheld:
-            self._line.send(self._goals.packet(goals, speeds))
-            return
+        speeds = self._goal_speeds()
         kept = [k for k, servo_id in enumerate(self._ids) if servo_id not in withheld]
         if kept:
             some = self._family.goals([self._ids[k] for k in kept])
             self._line.send(some.packet([goals[k] for k in kept], [speeds[k] for k in kept]))
+
+    def _goal_speeds(self) -> Sequence[int]:
+        """Return the speeds that may be used for goals, where they go with them."""
+        entering = self._supervisor.entering
+        if entering.places and self._family.goal_speed:
+            return self._recovery.speeds(self._ids, entering.ids)
+        return self._speeds
 
     # --- the bus as others see it
 
@@ -267,14 +249,29 @@ class SmartServoBus(PortBus):
         link = self._link
         if (link.down or link.release_due) and not self._reachable(now_s):
             return self._nothing
+        line, reader, feedback = self._line, self._reader, self._feedback
+        supervisor = self._supervisor
         try:
-            self._read(now_s)
+            if line.starved:
+                supervisor.recover_tripped(self._poll_list.group)
+            group = reader.next_group(now_s)
+            if group is None:
+                self._take(reader.read_troubled(now_s), now_s)
+            else:
+                raw, at_s = line.exchange(group.request, group.reply_length)
+                doubtful = self._wary and self._in_doubt(now_s)
+                if doubtful or not feedback.apply_whole(group, raw, at_s):
+                    self._take(reader.salvage(group, raw, at_s, now_s), now_s)
+                elif self._health.all_silent_since_s is not None:
+                    self._health.answered_again(now_s, line.lateness)
+            if now_s >= supervisor.due_s:
+                supervisor.service(self._poll_list.group, now_s)
         except BusLost as lost:
             self._lose(lost)
             return self._nothing
         if self._poll_list.troubled:
             self._check_silence(now_s)
-        return self._feedback.now
+        return feedback.now
 
     def enable_torque(self) -> tuple[int, ...]:
         """Set every goal to the present position (clipped to its limits), then torque on.
@@ -314,13 +311,21 @@ class SmartServoBus(PortBus):
             ValueError: a goal is not a number, or there are not as many as servos.
         """
         goals = clipped(goals_steps, self._lowest, self._highest)
-        if not self._supervisor.engaged or self._link.down or self._line.starved:
+        supervisor, line = self._supervisor, self._line
+        if not supervisor.engaged or self._link.down or line.starved:
             return
+        withheld = supervisor.withheld(self._now_s) if supervisor.withholds else ()
+        speeds = self._goal_speeds() if supervisor.entering.places else self._speeds
         try:
-            try:
-                self._send(goals)
-            except struct.error:  # whole numbers are the rule
-                self._send([round(goal) for goal in goals])
+            packet = self._goals.packet(goals, speeds)
+        except struct.error:  # whole numbers are the rule
+            goals = [round(goal) for goal in goals]
+            packet = self._goals.packet(goals, speeds)
+        try:
+            if withheld:
+                self._send_to_others(withheld, goals)
+            else:
+                line.send(packet)
         except BusLost as lost:
             self._lose(lost)
 

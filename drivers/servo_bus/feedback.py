@@ -113,7 +113,13 @@ class FeedbackColumns:
         at_position, at_velocity, at_effort, at_temperature, at_voltage = group.columns
         position, velocity, effort = values[at_position], values[at_velocity], values[at_effort]
         if self._signs:
-            position, velocity, effort = map(_signed, (position, velocity, effort), self._signs)
+            of_position, of_velocity, of_effort = self._signs
+            if max(position) >= of_position:
+                position = _signed(position, of_position)
+            if max(velocity) >= of_velocity:
+                velocity = _signed(velocity, of_velocity)
+            if max(effort) >= of_effort:
+                effort = _signed(effort, of_effort)
         # Without torque a zero may be that of an indirect block without addresses.
         if not self._engaged and 0 in position and group.covers_torque:
             return False
@@ -263,6 +269,4 @@ def with_value(column: tuple[Value, ...], slot: int, value: Value) -> tuple[Valu
 
 def _signed(column: tuple[int, ...], sign: int) -> tuple[int, ...]:
     """Return a column whose sign is a bit of its own, of this value."""
-    if max(column) < sign:
-        return column
     return tuple([value if value < sign else sign - value for value in column])

@@ -22,18 +22,17 @@ class LatchedFaultSupervisor(Supervisor):
         super().__init__(*args, **more)
         self._unnamed: set[int] = set()
         self._name_at_s = self._slow_at_s = -inf
-        self._due_s = -inf
         self._slow = 0
 
     def mark_all_for_recovery(self) -> None:
         """Mark every servo for recovery."""
         super().mark_all_for_recovery()
-        self._due_s = -inf
+        self.due_s = -inf
 
     def torque_enabled(self, entering: Collection[int]) -> None:
         """Start the supervision under torque; ``entering``: servos outside their limits."""
         super().torque_enabled(entering)
-        self._due_s = -inf  # from now on one is checked in turn
+        self.due_s = -inf  # from now on one is checked in turn
 
     def look_first(self) -> None:
         """Check servos that have just been prepared."""
@@ -65,7 +64,7 @@ class LatchedFaultSupervisor(Supervisor):
         """Record that a servo has raised the alert bit."""
         if servo_id not in self._health.faults:
             self._unnamed.add(servo_id)
-            self._due_s = -inf
+            self.due_s = -inf
 
     def _lacks_torque(self, servo_id: int, torque: int | None) -> bool:
         """Return whether a servo's torque is off without a known reason."""
@@ -73,7 +72,7 @@ class LatchedFaultSupervisor(Supervisor):
 
     def _suspect(self, servo_id: int) -> None:
         self._suspects.add(servo_id)
-        self._due_s = -inf
+        self.due_s = -inf
 
     def _latched(self, servo_id: int, status: int) -> None:
         if self._health.latched(servo_id, self._family.name_errors(status)):
@@ -88,8 +87,7 @@ class LatchedFaultSupervisor(Supervisor):
         Raises:
             BusLost: the port is gone.
         """
-        if now_s >= self._due_s:
-            self._do_due(group, now_s)
+        self._do_due(group, now_s)
         if self.entering.places:
             self._mark_entering(now_s)
         if self._rearmed:
@@ -109,7 +107,8 @@ class LatchedFaultSupervisor(Supervisor):
                 self._check(due)
         if not covered and now_s >= self._slow_at_s:
             self._ask_slow(group, now_s)
-        self._due_s = min(
+        self.due_s = min(
+            -inf if self.entering.places or self._rearmed else inf,
             self._recover_at_s if self._suspects else inf,
             self._name_at_s if self._unnamed else inf,
             self._check_at_s if self.engaged else inf,

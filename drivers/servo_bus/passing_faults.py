@@ -3,6 +3,7 @@
 from collections.abc import Collection
 from typing import Any
 
+from gazerig.drivers.plausibility import DISTURBED_S
 from gazerig.drivers.servo_bus.read_windows import Sample
 from gazerig.drivers.servo_bus.recovery import FAR_SIDE
 from gazerig.drivers.servo_bus.supervisor import Supervisor
@@ -202,7 +203,8 @@ class PassingFaultSupervisor(Supervisor):
         Raises:
             BusLost: the port is gone.
         """
-        if self.engaged and now_s >= self._check_at_s and self._feedback.places.disturbed(now_s):
+        disturbed = now_s - self._feedback.places.damaged_s <= DISTURBED_S
+        if disturbed and self.engaged and now_s >= self._check_at_s:
             self._check_settings(group, now_s)
         if self._doubted and group:
             self._look_again(group)

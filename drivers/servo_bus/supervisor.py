@@ -33,6 +33,7 @@ class Supervisor(ABC):
     engaged: the torque is on
     entering: servos on their slow way into their limits
     withholds: whether it may ever withhold goals
+    due_s: ``service`` has nothing to do before this time
     """
 
     withholds = False
@@ -57,6 +58,7 @@ class Supervisor(ABC):
         self._plan = plan
         self._watchdog = watchdog
         self.engaged = False
+        self.due_s = -inf
         self.entering = SlowEntry(setups)
         self._suspects: set[int] = set()
         self._rearmed: set[int] = set()
@@ -103,7 +105,7 @@ class Supervisor(ABC):
 
     @abstractmethod
     def service(self, group: Collection[int], now_s: float) -> None:
-        """Do what is due after a read; servos that are well again are taken here.
+        """Do what is due after a read from ``due_s`` on; servos that are well again are taken here.
 
         Raises:
             BusLost: the port is gone.
@@ -154,6 +156,7 @@ class Supervisor(ABC):
             return
         healed = rearm_tripped(self._line, ids, self._watchdog, self._recovery.clip)
         self._rearmed.update(healed)
+        self.due_s = -inf
         self._line.errors["watchdog"] += len(healed)
         if healed:
             self._health.stopped(len(healed), self._line.asleep_s, self._line.port.now_s())
