@@ -263,7 +263,8 @@ def _strongest(made: _Choice, row: int) -> tuple[Salience, ...]:
     """Return the saliences of a row and of the highest others, term by term."""
     total = made.total
     if isinstance(total, list):
-        rows = sorted(range(len(total)), key=lambda each: -total[each])
+        there = [each for each, one in enumerate(total) if one > -inf]
+        rows = sorted(there, key=lambda each: -total[each]) if len(there) > 1 else there
     elif len(total) > 64:
         some = np.argpartition(-total, _LISTED)[:_LISTED]
         rows = some[np.argsort(-total[some], kind="stable")].tolist()
@@ -280,7 +281,8 @@ def _salience(made: _Choice, row: int) -> Salience:
     if row == len(made.bodies):
         return Salience(-1, "point", 0.0, 0.0, 0.0, 0.0, rule, habituation, total)
     name, kind = made.bodies.ids[row], made.bodies.kinds[row]
-    return Salience(name, kind, *made.motion(row), rule, habituation, total)
+    translation, looming, rotation, onset = made.motion(row)
+    return Salience(name, kind, translation, looming, rotation, onset, rule, habituation, total)
 
 
 def _terms(salience: Salience) -> str:

@@ -132,9 +132,27 @@ class _Memory(NamedTuple):
     entered_s: Floats
     seen_s: Floats
 
+    def rows(self) -> "_Rows":
+        """Return the same, body by body."""
+        return _Rows(self.ids, self.terms.T.tolist(), self.entered_s.tolist(), self.seen_s.tolist())
+
     def only(self, mask: NDArray[np.bool_]) -> "_Memory":
         """Return the memory of the bodies in the mask."""
         return _Memory(self.ids[mask], self.terms[:, mask], self.entered_s[mask], self.seen_s[mask])
+
+
+class _Rows(NamedTuple):
+    """State of few bodies, one entry a body; fields as in ``_Memory``."""
+
+    ids: Ids
+    terms: list[list[float]]
+    entered_s: list[float]
+    seen_s: list[float]
+
+    def arrays(self) -> _Memory:
+        """Return the same as arrays."""
+        terms = np.array(self.terms).reshape(-1, 3).T
+        return _Memory(self.ids, terms, np.array(self.entered_s), np.array(self.seen_s))
 
 
 def _never_seen(ids: Ids) -> _Memory:
@@ -162,7 +180,8 @@ class BottomUp:
     def reset(self, t_s: float) -> None:
         """Forget all bodies."""
         self._ids: tuple[int, ...] = ()
-        self._memory = self._gone = _never_seen(np.zeros(0, dtype=np.int64))
+        self._gone = _never_seen(np.zeros(0, dtype=np.int64))
+        self._memory: _Memory | _Rows = self._gone
         self._at_s = t_s
         self._started_s: float | None = None
 
@@ -204,10 +223,11 @@ class BottomUp:
         self._pause(t_s)
         if rows.ids != self._ids:
             self._remember(rows.ids, t_s)
-        tau, onset_s, old = self._params.smoothing_s, self._params.onset_s, self._memory
-        keep = exp(min(0.0, self._at_s - t_s) / tau) if tau > 0.0 else 0.0
-        entered_s, seen_s = old.entered_s.tolist(), old.seen_s.tolist()
-        past: list[list[float]] = old.terms.T.tolist()
+        par, memory = self._params, self._memory
+        if isinstance(memory, _Memory):
+            memory = self._memory = memory.rows()
+        _, past, entered_s, seen_s = memory  # changed in place
+        keep = exp(min(0.0, self._at_s - t_s) / par.smoothing_s) if par.smoothing_s > 0.0 else 0.0
         found = []
         for i, in_view in enumerate(seen):
             if not in_view:
@@ -223,10 +243,8 @@ class BottomUp:
             loom += (1.0 - keep) * (now[1] - loom)
             spin += (1.0 - keep) * (now[2] - spin)
             past[i] = [slide, loom, spin]
-            onset = self._params.onset_salience * exp((entered_s[i] - t_s) / onset_s)
+            onset = par.onset_salience * exp((entered_s[i] - t_s) / par.onset_s)
             found.append(SalienceRow(slide, loom, spin, onset))
-        terms = np.array(past).reshape(-1, 3).T
-        self._memory = _Memory(old.ids, terms, np.array(entered_s), np.array(seen_s))
         self._at_s = t_s
         return found
 
@@ -284,7 +302,7 @@ class BottomUp:
 
     def _blend(self, now: Floats, seen: NDArray[np.bool_], t_s: float) -> SalienceTerms:
         """Return the low-passed terms and the onset term; a new body starts at 0."""
-        tau, old = self._params.smoothing_s, self._memory
+        tau, old = self._params.smoothing_s, self._arrays()
         keep = exp(min(0.0, self._at_s - t_s) / tau) if tau > 0.0 else 0.0
         past, entered_s, seen_s = old.terms, old.entered_s, old.seen_s.copy()
         new = seen & (t_s - seen_s > _BLINK_S)
@@ -304,6 +322,10 @@ class BottomUp:
         self._at_s = t_s
         return SalienceTerms(smooth[0], smooth[1], smooth[2], onset)
 
+    def _arrays(self) -> _Memory:
+        """Return the memory as arrays."""
+        return self._memory if isinstance(self._memory, _Memory) else self._memory.arrays()
+
     def _pause(self, t_s: float) -> None:
         """Shift all times where no step was made for long, so that no body counts as gone."""
         paused_s = t_s - self._at_s
@@ -311,7 +333,8 @@ class BottomUp:
             return
         self._started_s = t_s
         if paused_s > 0.0:
-            self._memory = self._memory._replace(seen_s=self._memory.seen_s + paused_s)
+            memory = self._arrays()
+            self._memory = memory._replace(seen_s=memory.seen_s + paused_s)
             self._gone = self._gone._replace(seen_s=self._gone.seen_s + paused_s)
 
     def _entry_s(self, t_s: float) -> float:
@@ -325,7 +348,7 @@ class BottomUp:
     def _remember(self, ids: tuple[int, ...], t_s: float) -> None:
         """Rearrange the memory for other bodies, keeping those missed for a moment."""
         now = _never_seen(np.fromiter(ids, dtype=np.int64, count=len(ids)))
-        old = _joined(self._memory, self._gone)
+        old = _joined(self._arrays(), self._gone)
         old = old.only(t_s - old.seen_s <= _BLINK_S)
         order = np.argsort(old.ids, kind="stable")
         at = np.searchsorted(old.ids, now.ids, sorter=order)

@@ -99,5 +99,5 @@ def test_the_filter_is_the_one_of_the_textbooks(seed: int) -> None:
             x, P = x + K @ (measured - H @ x), P - K @ H @ P
             track.correct_velocity(tuple(measured.tolist()), of(R))
         assert np.allclose([*track.p_m, *track.v_m_s], x, rtol=1e-9, atol=1e-12)
-        assert np.allclose(track.cov_rows(), P, rtol=1e-7, atol=1e-12)
+        assert np.allclose(np.reshape(track.cov_rows(), (6, 6)), P, rtol=1e-7, atol=1e-12)
     assert surprises > 0

@@ -164,7 +164,7 @@ def test_a_sudden_step_is_followed_at_once_and_standing_stays_smooth() -> None:
 
 
 def cov_of(track: Track) -> np.ndarray:
-    return np.array(track.filter.cov_rows())
+    return np.array(track.filter.cov_rows()).reshape(6, 6)
 
 
 def test_the_covariance_tells_how_far_off_the_track_is() -> None:

@@ -136,18 +136,19 @@ class TrackFilter:
         self.pv_cov = transposed(_less(C, V, N))
         self.v_cov = less_product(self.v_cov, V, times(information, V))
 
-    def cov_rows(self) -> list[list[float]]:
-        """Return the covariance of position and velocity, row by row: 6 x 6."""
-        C = self.pv_cov
-        D, P, V = transposed(C), full(self.p_cov), full(self.v_cov)
-        return [
-            [*P[0:3], *C[0:3]],
-            [*P[3:6], *C[3:6]],
-            [*P[6:9], *C[6:9]],
-            [*D[0:3], *V[0:3]],
-            [*D[3:6], *V[3:6]],
-            [*D[6:9], *V[6:9]],
-        ]
+    def cov_rows(self) -> tuple[float, ...]:
+        """Return the covariance of position and velocity: 6 x 6 numbers, row by row."""
+        a, b, c, d, e, f = self.p_cov
+        g, h, i, j, k, l_, m, n, o = self.pv_cov
+        p, q, r, s, t, u = self.v_cov
+        return (
+            a, b, c, g, h, i,
+            b, d, e, j, k, l_,
+            c, e, f, m, n, o,
+            g, j, m, p, q, r,
+            h, k, n, q, s, t,
+            i, l_, o, r, t, u,
+        )  # fmt: skip
 
     def _wander(self, accel_m_s2: float, dt_s: float) -> None:
         """Add the covariance that random acceleration makes in a time."""

@@ -113,7 +113,9 @@ class Perception:
         """
         intrinsics = self._locator.intrinsics(found)
         located = found.located
-        if located is not None and located.intrinsics == intrinsics:
+        if located is not None and (
+            located.intrinsics is intrinsics or located.intrinsics == intrinsics
+        ):
             return located
         return self._locator.locate(found, intrinsics)
 
@@ -202,15 +204,26 @@ def _bodies(tracks: tuple[Track, ...], p_camera: Vec3) -> Bodies:
     """List faces and moving things alike; a spin seen in the image is about the view line."""
     if not tracks:
         return Bodies(pv_cov=np.zeros((0, 6, 6)))
-    spins = [_spin(track, p_camera) for track in tracks]
+    table = np.array(
+        [
+            (
+                *track.filter.p_m,
+                *track.filter.v_m_s,
+                *_spin(track, p_camera),
+                track.sighting.radius_m,
+                *track.filter.cov_rows(),
+            )
+            for track in tracks
+        ]
+    )
     return Bodies(
         tuple([track.id for track in tracks]),
         tuple([track.sighting.kind for track in tracks]),
-        np.array([track.p_world_m for track in tracks]),
-        np.array([track.v_world_m_s for track in tracks]),
-        np.array(spins),
-        np.array([track.sighting.radius_m for track in tracks]),
-        np.array([track.filter.cov_rows() for track in tracks]),
+        table[:, 0:3],
+        table[:, 3:6],
+        table[:, 6:9],
+        table[:, 9],
+        table[:, 10:].reshape(-1, 6, 6),
     )
 
 
