@@ -104,7 +104,8 @@ class Attention:
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
         """Return the target in force at ``t_s``."""
-        fresh = percept is not None and percept.age_s(t_s) <= self._params.stale_ms / 1e3
+        stale_s = self._params.stale_ms / 1e3
+        fresh = percept is not None and t_s - percept.captured_s <= stale_s
         if percept is not None and fresh and percept.captured_s != self._seen_s:
             self._seen_s = percept.captured_s
             self._target = self._decide(percept, state, t_s)

@@ -8,7 +8,7 @@ now and then nothing. Not modelled: motion blur, light, occlusion, false detecti
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import cos, radians
+from math import cos, inf, radians
 from typing import Annotated
 
 import numpy as np
@@ -82,22 +82,30 @@ class SceneCamera:
         self._arrived: Detections | None = None
         self._start_s: float | None = None
         self._number = 0
+        self._due_s = -inf
+        self._arrives_s = inf
 
     def latest(self, now_s: float) -> Detections | None:
         """Return the newest detections that have arrived by ``now_s``."""
-        if self._start_s is None:
-            self._start_s = now_s
-        if now_s >= self._start_s + self._number / self._params.rate_hz - 1e-9:
+        if now_s >= self._due_s:
+            if self._start_s is None:
+                self._start_s = now_s
             # A late look skips the frames it missed, as a real camera's slot does.
             due = int((now_s - self._start_s) * self._params.rate_hz + 1e-6)
             self._number = max(self._number, due) + 1
             self._on_the_way.append(self._expose(now_s))
-        while (
-            self._on_the_way
-            and now_s >= self._on_the_way[0].captured_s + self._params.latency_ms / 1e3 - 1e-9
-        ):
+            self._due_s = self._start_s + self._number / self._params.rate_hz - 1e-9
+            self._arrives_s = self._arrival_s()
+        while now_s >= self._arrives_s:
             self._arrived = self._on_the_way.popleft()
+            self._arrives_s = self._arrival_s()
         return self._arrived
+
+    def _arrival_s(self) -> float:
+        """Return when the oldest frame under way arrives."""
+        if not self._on_the_way:
+            return inf
+        return self._on_the_way[0].captured_s + self._params.latency_ms / 1e3 - 1e-9
 
     def retune(self, locate: Locate) -> bool:
         """Locate by another calibration from the next frame on; always possible."""
