@@ -8,7 +8,7 @@ import numpy as np
 
 from gazerig.gaze.angles import add, angle_between, scale, sub, unit
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.types import Vec3
+from gazerig.gaze.types import GazeState, Target, Vec3
 from gazerig.robot.control.feedback_basis import estimated_joints
 from gazerig.robot.control.tick import Tick
 
@@ -17,6 +17,12 @@ _FIXATION_RAD_S = radians(40.0)
 
 _EVENTS_KEPT = 100
 """The newest; a rig that runs for weeks must not fill the memory."""
+
+_TOGETHER = 16
+"""Ticks counted together: few enough for the rest of a slot, also on a slow machine."""
+
+_TickPart = tuple[float, GazeState, Target, str, tuple[str, ...]]
+"""What is counted of a tick: its time, pose, target, phase, and the guard's reasons."""
 
 
 class Summary:
@@ -31,37 +37,46 @@ class Summary:
         self._errors_mdeg: Counter[int] = Counter()
         self._first_s: float | None = None
         self._last: Tick | None = None
+        self._waiting: list[_TickPart] = []
+        self._counted_s: float | None = None
         self._gaze: Vec3 | None = None
 
     def update(self, tick: Tick) -> None:
-        """Count one tick."""
-        if self._first_s is None or self._last is None:
+        """Add one tick; some are counted together, which costs a fraction of one at a time."""
+        if self._first_s is None:
             self._first_s = tick.t_s
-            dt_s = 0.0
-        else:
-            dt_s = tick.t_s - self._last.t_s
         self._last = tick
-        self._target_s[tick.target.kind] += dt_s
-        if tick.target.part is not None:
-            self._part_s[tick.target.part] += dt_s
-        left, right = line_of_sight(tick.pose, True), line_of_sight(tick.pose, False)
-        if self._fixates(tick, unit(add(left, right)), dt_s):
-            error_rad = _gaze_error_rad(tick, left, right)
-            self._errors_mdeg[round(1000.0 * degrees(error_rad))] += 1
         for event in tick.events:
             self._events.append((tick.t_s - self._first_s, event))
-        for reason in tick.guard_result.reasons:
-            self._limited[reason.partition(": ")[2]] += 1
+        self._waiting.append(
+            (tick.t_s, tick.pose, tick.target, tick.gaze.phase, tick.guard_result.reasons)
+        )
+        if len(self._waiting) >= _TOGETHER:
+            self._count()
 
-    def _fixates(self, tick: Tick, gaze: Vec3, dt_s: float) -> bool:
-        """Whether this is a fixation, judged by the speed of the gaze as an eye tracker does."""
-        before, self._gaze = self._gaze, gaze
-        if before is None or dt_s <= 0.0 or tick.gaze.phase == "saccade":
-            return False
-        return angle_between(before, gaze) < _FIXATION_RAD_S * dt_s
+    def _count(self) -> None:
+        """Count the ticks that wait."""
+        for t_s, pose, target, phase, reasons in self._waiting:
+            dt_s = t_s - self._counted_s if self._counted_s is not None else 0.0
+            self._counted_s = t_s
+            self._target_s[target.kind] += dt_s
+            if target.part is not None:
+                self._part_s[target.part] += dt_s
+            for reason in reasons:
+                self._limited[reason.partition(": ")[2]] += 1
+            left, right = line_of_sight(pose, True), line_of_sight(pose, False)
+            before, self._gaze = self._gaze, unit(add(left, right))
+            if before is None or dt_s <= 0.0 or phase == "saccade":
+                continue
+            # A fixation is judged by the speed of the gaze, as an eye tracker does.
+            if angle_between(before, self._gaze) < _FIXATION_RAD_S * dt_s:
+                error_rad = _gaze_error_rad(t_s, pose, target, left, right)
+                self._errors_mdeg[round(1000.0 * degrees(error_rad))] += 1
+        self._waiting.clear()
 
     def figures(self) -> dict[str, object]:
         """Return what the ticks themselves tell; the caller adds bus, loop and frames."""
+        self._count()
         last = self._last
         return {
             "seconds": round(last.t_s - (self._first_s or 0.0), 6) if last else 0.0,
@@ -86,18 +101,15 @@ def cyclopean(tick: Tick) -> Vec3:
     return unit(add(line_of_sight(tick.pose, True), line_of_sight(tick.pose, False)))
 
 
-def _gaze_error_rad(tick: Tick, left: Vec3, right: Vec3) -> float:
+def _gaze_error_rad(t_s: float, pose: GazeState, target: Target, left: Vec3, right: Vec3) -> float:
     """Return the mean angle of both measured lines of sight off the intended point.
 
     Eyes that one linkage turns sideways stay parallel: what that leaves counts too.
-
-    left, right: the lines of sight
     """
-    target, pose = tick.target, tick.pose
-    point = add(target.p_world_m, scale(target.v_world_m_s, max(0.0, tick.t_s - target.at_s)))
-    error_left = angle_between(left, sub(point, pose.p_world_eye_left_m))
-    error_right = angle_between(right, sub(point, pose.p_world_eye_right_m))
-    return 0.5 * (error_left + error_right)
+    point = add(target.p_world_m, scale(target.v_world_m_s, max(0.0, t_s - target.at_s)))
+    off_left = angle_between(left, sub(point, pose.p_world_eye_left_m))
+    off_right = angle_between(right, sub(point, pose.p_world_eye_right_m))
+    return 0.5 * (off_left + off_right)
 
 
 def _percentile_deg(counts_mdeg: Counter[int], percent: float) -> float | None:

@@ -9,7 +9,8 @@ one core. Then, with one browser, seconds in which nobody tunes, the door is kno
 times a second, a parameter is changed ten times a second, another program sets a value ten times
 a second, or it reads all of them as often, in turn. Then the time until the page can be opened,
 until a browser has its first picture, and from a slider that is moved (and from a stop) to the
-goals on the bus.
+goals on the bus. Last, what the page, a recording and both add to the loop's process
+(observer_cost.py, which also runs alone).
 """
 
 import os
@@ -335,4 +336,7 @@ def main(seconds: float) -> None:
 
 
 if __name__ == "__main__":
+    import observer_cost
+
     main(float(sys.argv[1]) if len(sys.argv) > 1 else 10.0)
+    observer_cost.show(20.0)
