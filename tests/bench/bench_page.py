@@ -10,19 +10,22 @@ times a second, a parameter is changed ten times a second, another program sets 
 a second, or it reads all of them as often, in turn. Then the time until the page can be opened,
 until a browser has its first picture, and from a slider that is moved (and from a stop) to the
 goals on the bus. Last, what the page, a recording and both add to the loop's process
-(observer_cost.py, which also runs alone).
+(observer_cost.py, which also runs alone); before that, the same figures as above with five
+browsers, a recording, images and a camera's process that never waits, all at once.
 """
 
 import os
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from contextlib import ExitStack
+from dataclasses import replace
 from math import radians
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import msgspec
 import numpy as np
@@ -30,14 +33,18 @@ from websockets.sync.client import ClientConnection
 from websockets.sync.connection import Connection
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.app.assemble import assemble
+from gazerig.drivers.types import Camera, Detections
+from gazerig.robot.app.assemble import RIGS_OWN, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.run_observers import RunObservers
 from gazerig.robot.control.loop import LoopCount, Tick, run
+from gazerig.robot.recording.recorder import Recorder
 
 TESTS = Path(__file__).parents[1]
 sys.path.insert(0, str(TESTS))
+import observer_cost  # noqa: E402
+from observer_cost import recorder_at  # noqa: E402
 from page_visitor import LOOKING, Visitor, unpacked  # noqa: E402
 
 TRIES = 30
@@ -66,14 +73,18 @@ class Run(NamedTuple):
 class Bench:
     """A rig that runs in a thread of this process, as gazerig run does."""
 
-    def __init__(self, page: bool) -> None:
-        self.made = made = assemble(
-            load_rig("desk"), RunOptions(mock=True, fast=False, seed=0, scene="visitor")
-        )
+    def __init__(self, page: bool, recorder: Recorder | None = None) -> None:
+        substitutes = Substitutes(body=recorder.recorded) if recorder is not None else RIGS_OWN
+        asked = RunOptions(mock=True, fast=False, seed=0, scene="visitor")
+        self.made = made = assemble(load_rig("desk"), asked, substitutes)
         robot = made.robot
         tuning = ParamStore(made.live, robot.command, "desk")
         options = RunOptions(page="127.0.0.1:8700" if page else None)
-        self.audience = RunObservers(made, options, lambda _: None, lambda _: None, tuning)
+        quiet = lambda _: None  # noqa: E731
+        self.audience = RunObservers(made, options, quiet, quiet, tuning, recorder)
+        self.audience.open_files()
+        if recorder is not None:
+            robot.camera = cast(Camera, _WithImages(robot.camera))
         self.page = self.audience._page
         self.times: list[float] = []
         self.obeyed: list[tuple[float, object]] = []
@@ -120,6 +131,48 @@ class Bench:
         self.made.close()
 
 
+class _WithImages:
+    """A camera whose detections carry an image, as a webcam's do."""
+
+    def __init__(self, camera: Camera) -> None:
+        self._camera = camera
+        self._image = np.random.default_rng(0).integers(0, 255, (480, 640, 3), np.uint8)
+        self._found: Detections | None = None
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._camera, name)
+
+    def latest(self, now_s: float) -> Detections | None:
+        found = self._camera.latest(now_s)
+        if found is not None and (self._found is None or found.number != self._found.number):
+            self._found = replace(found, image=self._image.copy())
+        return self._found
+
+
+BUSY = """
+import os, cv2, numpy as np
+os.nice(5)
+image = np.random.default_rng(0).integers(0, 255, (480, 640, 3), np.uint8)
+while True:
+    cv2.resize(image, (320, 240)); cv2.GaussianBlur(image, (9, 9), 0)
+"""
+"""A camera's process that never waits."""
+
+
+def flat_out(seconds: float) -> None:
+    """Print the jitter with everything at once: five browsers, a recording, a busy camera."""
+    busy = subprocess.Popen([sys.executable, "-c", BUSY])
+    with tempfile.TemporaryDirectory() as folder:
+        bench = Bench(page=True, recorder=recorder_at(Path(folder) / "run.mcap"))
+        spectators = watched(bench.url(), 5)
+        time.sleep(3)
+        show("everything", bench.measure(seconds))
+        for one in (spectators, busy):
+            one.kill()
+            one.wait()
+        bench.close()
+
+
 def cpu_s(pid: int | None) -> float:
     """Processor time of a process so far."""
     if pid is None:
@@ -163,20 +216,20 @@ from page_visitor import Visitor
 visitor = Visitor({url!r})
 for n in itertools.count():
     time.sleep(1 / 10)
-    visitor.ask({{"tune": {{"set": {{"gaze.head.align": 0.5 + 0.001 * (n % 100)}}}}}})
+    visitor.ask({{"do": "set", "changes": {{"gaze.head.align": 0.5 + 0.001 * (n % 100)}}}})
 """,
     "remote set": """
 import itertools, time
-from gazerig.robot.remote.client import RunningRig
-rig = RunningRig.connect({pid})
+from gazerig.robot.remote.client import RobotClient
+rig = RobotClient.connect({pid})
 for n in itertools.count():
     time.sleep(0.1)
     rig.set("gaze.head.align", 0.5 + 0.001 * (n % 100))
 """,
     "remote get": """
 import time
-from gazerig.robot.remote.client import RunningRig
-rig = RunningRig.connect({pid})
+from gazerig.robot.remote.client import RobotClient
+rig = RobotClient.connect({pid})
 while True:
     time.sleep(0.1)
     rig.get()
@@ -336,7 +389,6 @@ def main(seconds: float) -> None:
 
 
 if __name__ == "__main__":
-    import observer_cost
-
     main(float(sys.argv[1]) if len(sys.argv) > 1 else 10.0)
+    flat_out(float(sys.argv[1]) if len(sys.argv) > 1 else 10.0)
     observer_cost.show(20.0)

@@ -91,7 +91,7 @@ class Costs:
 def show(seconds: float) -> None:
     """Measure and print all."""
     with tempfile.TemporaryDirectory() as folder:
-        recorder = _recorder(Path(folder) / "run.mcap")
+        recorder = recorder_at(Path(folder) / "run.mcap")
         substitutes = Substitutes(body=recorder.recorded)
         asked = RunOptions(mock=True, fast=False, seed=0, scene="visitor")
         made = assemble(load_rig("desk"), asked, substitutes)
@@ -152,7 +152,8 @@ def _drop(line: str) -> None:
     """Print nothing."""
 
 
-def _recorder(path: Path) -> Recorder:
+def recorder_at(path: Path) -> Recorder:
+    """Return a recorder of the desk rig's run."""
     rig = load_rig("desk")
     info = RunInfo(
         "desk", rig.profile, rig_text(rig), 0, rig.loop.rate_hz, "2026-01-31T00:00:00+00:00",
