@@ -89,12 +89,23 @@ def test_rates_are_the_slopes_of_the_angles(kind: str) -> None:
         assert joint_rates(rates, (rates[0][0], rates[1][0])) == pytest.approx((1.0, 0.0))
 
 
+def test_a_measured_point_is_found_in_the_triangle_that_holds_it_or_is_nearest() -> None:
+    table = KINDS["measured"].made()
+    assert isinstance(table, MeasuredGrid)
+    beyond = 0
+    for servos in np.random.default_rng(0).uniform(-1.2, 1.2, (300, 2)).tolist():
+        at = servos[0], servos[1]
+        weights = [triangle.inside(at) for triangle in table._triangles]
+        best = table._triangles[weights.index(max(weights))]
+        assert table.joint_rad(at) == best.joints(at)
+        beyond += max(weights) < 0.0
+    assert 50 < beyond < 250
+
+
 def test_push_rods_keep_their_length() -> None:
     for at in ((0.0, 0.0), (0.5, 0.3), (-0.4, -0.4)):
-        for (error, _, _), servo in (
-            (RODS._rod_error(at, side, angle), angle)
-            for side, angle in zip((1.0, -1.0), RODS.servo_rad(at), strict=True)
-        ):
+        for side, servo in zip((1.0, -1.0), RODS.servo_rad(at), strict=True):
+            error, _, _ = RODS._rod_error(at, side, RODS._tip(servo, side))
             assert abs(error) < 1e-15 and abs(servo) < radians(60)
 
 

@@ -83,25 +83,24 @@ class CoupledServos:
         return feedback
 
     def _complete(self, now: Feedback, i: int, j: int, released: bool) -> Feedback:
-        absent = {i, j} & set(now.missing)
+        absent = bool(now.missing) and (i in now.missing or j in now.missing)
         if not absent:
             self._last[i] = now
         last = self._last.get(i, now)
         oldest = min(last.at_s[i], last.at_s[j])
-        load = max((now.load[i], now.load[j]), key=abs)
-        on = now.torque[i], now.torque[j]
-        powered = any(on) if released else all(on)
+        load_i, load_j = now.load[i], now.load[j]
+        load = load_j if abs(load_j) > abs(load_i) else load_i
+        on_i, on_j = now.torque[i], now.torque[j]
+        powered = on_i or on_j if released else on_i and on_j
         anew = now.rearmed[i] or now.rearmed[j]
         fault = now.fault[i] or now.fault[j]
-        faults = [
-            now.fault[k] or (f"{fault} (of its coupled servo)" if fault else "") for k in (i, j)
-        ]
+        shared = f"{fault} (of its coupled servo)" if fault else ""
         now = now._replace(
             at_s=_with(now.at_s, i, oldest, j, oldest),
             load=_with(now.load, i, load, j, load),
             torque=_with(now.torque, i, powered, j, powered),
             rearmed=_with(now.rearmed, i, anew, j, anew),
-            fault=_with(now.fault, i, faults[0], j, faults[1]),
+            fault=_with(now.fault, i, now.fault[i] or shared, j, now.fault[j] or shared),
         )
         if not absent:
             return now
@@ -117,7 +116,9 @@ T = TypeVar("T")
 
 
 def _with(values: tuple[T, ...], i: int, at_i: T, j: int, at_j: T) -> tuple[T, ...]:
-    """Return values with others at two places."""
+    """Return values with others at two places; the same where they are no others."""
+    if values[i] == at_i and values[j] == at_j:
+        return values
     changed = list(values)
     changed[i], changed[j] = at_i, at_j
     return tuple(changed)

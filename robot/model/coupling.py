@@ -6,7 +6,7 @@ whatever their sign, ratio and zero are given for). A neck's pitch and roll are 
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from math import acos, atan2, cos, hypot, isfinite, pi, sin
+from math import acos, atan2, cos, floor, hypot, isfinite, pi, sin
 from typing import Protocol
 
 from gazerig.gaze.types import Vec3
@@ -108,24 +108,33 @@ class PushRods:
         """Return the joint angles of servo angles, by Newton's method from the level head."""
         offset = servos[0] - self._level[0], servos[1] - self._level[1]
         joints = _times(self._inverse, offset)
+        tip_a, tip_b = self._tip(servos[0], 1.0), self._tip(servos[1], -1.0)
         for _ in range(30):
-            (fa, da, _), (fb, db, _) = (self._rod_error(joints, s, t) for s, t in _sides(servos))
-            det = da[0] * db[1] - da[1] * db[0]
+            fa, a_first, a_second = self._rod_error(joints, 1.0, tip_a)
+            fb, b_first, b_second = self._rod_error(joints, -1.0, tip_b)
+            det = a_first * b_second - a_second * b_first
             if abs(det) < 1e-18:
                 break
-            step = (fa * db[1] - fb * da[1]) / det, (fb * da[0] - fa * db[0]) / det
-            joints = _clipped(joints[0] - step[0]), _clipped(joints[1] - step[1])
-            if abs(step[0]) + abs(step[1]) < 1e-13:
+            first = (fa * b_second - fb * a_second) / det
+            second = (fb * a_first - fa * b_first) / det
+            joints = _clipped(joints[0] - first), _clipped(joints[1] - second)
+            if abs(first) + abs(second) < 1e-13:
                 break
         return joints
 
     def rates(self, joints: Pair) -> Rates:
         """Return how fast the servos turn for each joint's speed, at joint angles."""
-        found = []
-        for side, horn in _sides(self.servo_rad(joints)):
-            _, (first, second), turn = self._rod_error(joints, side, horn)
-            found.append((-first / turn, -second / turn))
-        return found[0], found[1]
+        a, b = self.servo_rad(joints)
+        return self._slopes(joints, 1.0, a), self._slopes(joints, -1.0, b)
+
+    def _slopes(self, joints: Pair, side: float, horn_rad: float) -> Pair:
+        """Return how fast one horn turns for each joint's speed."""
+        tip = self._tip(horn_rad, side)
+        _, first, second = self._rod_error(joints, side, tip)
+        x, _, z = _tilted(self._anchor, joints, side)
+        across = (x - tip[0]) * self._horn * sin(horn_rad)
+        turn = 2.0 * (across - (z - tip[2]) * abs(self._horn) * cos(horn_rad))
+        return -first / turn, -second / turn
 
     def _horn_rad(self, joints: Pair, side: float) -> float:
         """Return the angle of one horn, on the branch that the level head is on."""
@@ -141,23 +150,30 @@ class PushRods:
 
     def _gap(self, joints: Pair, side: float) -> tuple[Vec3, float]:
         """Return the way from the horn's axis to the rod's anchor, and its square."""
-        anchor = _tilted(self._anchor, joints, side)[0]
-        x, y, z = self._servo
-        gap = anchor[0] - x, anchor[1] - side * y, anchor[2] - z
-        return gap, gap[0] ** 2 + gap[1] ** 2 + gap[2] ** 2
+        at_x, at_y, at_z = _tilted(self._anchor, joints, side)
+        x, y, z = at_x - self._servo[0], at_y - side * self._servo[1], at_z - self._servo[2]
+        return (x, y, z), x * x + y * y + z * z
 
-    def _rod_error(self, joints: Pair, side: float, horn_rad: float) -> tuple[float, Pair, float]:
-        """Return by how much a rod's squared length is off, and its slopes by joints and horn."""
-        anchor, by_first, by_second = _tilted(self._anchor, joints, side)
+    def _tip(self, horn_rad: float, side: float) -> Vec3:
+        """Return where the end of a horn is."""
         x, y, z = self._servo
-        h, up = self._horn, abs(self._horn)
-        tip = x + h * cos(horn_rad), side * y, z + up * sin(horn_rad)
-        rod = anchor[0] - tip[0], anchor[1] - tip[1], anchor[2] - tip[2]
-        error = rod[0] ** 2 + rod[1] ** 2 + rod[2] ** 2 - self._rod**2
-        first = 2.0 * sum(r * d for r, d in zip(rod, by_first, strict=True))
-        second = 2.0 * sum(r * d for r, d in zip(rod, by_second, strict=True))
-        turn = 2.0 * (rod[0] * h * sin(horn_rad) - rod[2] * up * cos(horn_rad))
-        return error, (first, second), turn
+        along, up = self._horn * cos(horn_rad), abs(self._horn) * sin(horn_rad)
+        return x + along, side * y, z + up
+
+    def _rod_error(self, joints: Pair, side: float, tip: Vec3) -> tuple[float, float, float]:
+        """Return by how much a rod's squared length is off, and its slopes by both joints."""
+        first, second = joints
+        cp, sp = cos(first), sin(first)
+        cr, sr = cos(second), sin(second)
+        ahead, aside, above = self._anchor
+        aside *= side
+        y, z = aside * cr - above * sr, aside * sr + above * cr
+        at_x, at_z = ahead * cp - z * sp, ahead * sp + z * cp
+        rod_x, rod_y, rod_z = at_x - tip[0], y - tip[1], at_z - tip[2]
+        error = rod_x * rod_x + rod_y * rod_y + rod_z * rod_z - self._rod * self._rod
+        by_first = 2.0 * (rod_z * at_x - rod_x * at_z)
+        by_second = 2.0 * (rod_z * (y * cp) - rod_x * (y * sp) - rod_y * z)
+        return error, by_first, by_second
 
 
 class MeasuredGrid:
@@ -191,6 +207,7 @@ class MeasuredGrid:
             for j in range(len(self._seconds) - 1)
             for corners in self._corners(i, j)
         ]
+        self._cells = _Cells(self._triangles)
         turns = [triangle.turn for triangle in self._triangles]
         for triangle in self._triangles:
             if triangle.turn * turns[0] <= 0.0:
@@ -213,8 +230,11 @@ class MeasuredGrid:
 
     def joint_rad(self, servos: Pair) -> Pair:
         """Return the joint angles of servo angles."""
-        best = max(self._triangles, key=lambda triangle: triangle.inside(servos))
-        return best.joints(servos)
+        near = self._cells.near(servos)
+        weights = [triangle.inside(servos) for triangle in near]
+        if not weights or max(weights) < 0.0:  # beyond the grid
+            near, weights = self._triangles, [one.inside(servos) for one in self._triangles]
+        return near[weights.index(max(weights))].joints(servos)
 
     def rates(self, joints: Pair) -> Rates:
         """Return how fast the servos turn for each joint's speed, at joint angles."""
@@ -240,6 +260,7 @@ class _Triangle:
     """One plane piece of a measured grid.
 
     at: its first corner; slopes: servo angles by joint angles; turn: their determinant
+    low, high: the servo angles between which it lies
     """
 
     def __init__(self, corners: tuple[Pair, Pair, Pair], known: dict[Pair, Pair]) -> None:
@@ -255,6 +276,9 @@ class _Triangle:
         self.turn = p * s - q * r
         self._back = _inverted(self.slopes) if self.turn else None
         self._legs = (u1, v1), (u2, v2), area
+        places = [known[corner] for corner in corners]
+        self.low = min(a for a, _ in places), min(b for _, b in places)
+        self.high = max(a for a, _ in places), max(b for _, b in places)
 
     def servos(self, joints: Pair) -> Pair:
         a, b = _times(self.slopes, _less(joints, self.at))
@@ -268,9 +292,42 @@ class _Triangle:
     def inside(self, servos: Pair) -> float:
         """Return the least of a point's three weights: negative outside."""
         (u1, v1), (u2, v2), area = self._legs
-        u, v = _less(self.joints(servos), self.at)
+        assert self._back is not None
+        (p, q), (r, s) = self._back
+        a, b = servos[0] - self._base[0], servos[1] - self._base[1]
+        u, v = p * a + q * b, r * a + s * b
         one, two = (u * v2 - u2 * v) / area, (u1 * v - u * v1) / area
         return min(one, two, 1.0 - one - two)
+
+
+class _Cells:
+    """The triangles of a grid by where they lie: servo angles in rows and columns of cells."""
+
+    def __init__(self, triangles: Sequence[_Triangle]) -> None:
+        self._low = min(one.low[0] for one in triangles), min(one.low[1] for one in triangles)
+        high = max(one.high[0] for one in triangles), max(one.high[1] for one in triangles)
+        self._count = max(1, round(len(triangles) ** 0.5))
+        self._size = [
+            (h - low) / self._count or 1.0 for low, h in zip(self._low, high, strict=True)
+        ]
+        self._cells: dict[tuple[int, int], list[_Triangle]] = {}
+        for one in triangles:
+            (first, left), (last, right) = self._cell(one.low), self._cell(one.high)
+            for i in range(first, last + 1):
+                for j in range(left, right + 1):
+                    self._cells.setdefault((i, j), []).append(one)
+
+    def near(self, servos: Pair) -> Sequence[_Triangle]:
+        """Return all triangles that may hold a point, none beyond the grid."""
+        if not (isfinite(servos[0]) and isfinite(servos[1])):
+            return ()
+        return self._cells.get(self._cell(servos), ())
+
+    def _cell(self, servos: Pair) -> tuple[int, int]:
+        return (
+            floor((servos[0] - self._low[0]) / self._size[0]),
+            floor((servos[1] - self._low[1]) / self._size[1]),
+        )
 
 
 def _less(one: Pair, other: Pair) -> Pair:
@@ -294,23 +351,19 @@ def joint_rates(rates: Rates, servo_rates: Pair) -> Pair:
     return _times(_inverted(rates), servo_rates) if p * s - q * r else (0.0, 0.0)
 
 
-def _sides(servos: Pair) -> tuple[Pair, Pair]:
-    return (1.0, servos[0]), (-1.0, servos[1])
-
-
 def _clipped(angle: float) -> float:
     return min(max(angle, -0.5 * pi), 0.5 * pi) if isfinite(angle) else 0.0
 
 
-def _tilted(p: Vec3, joints: Pair, side: float) -> tuple[Vec3, Vec3, Vec3]:
-    """Return a point, mirrored for the right side, pitched and rolled, and its slopes by both.
+def _tilted(p: Vec3, joints: Pair, side: float) -> Vec3:
+    """Return a point, mirrored for the right side, pitched and rolled.
 
     The rotation is that of ``gazerig.gaze.angles.rotation`` without yaw.
     """
-    x, (cp, sp), (cr, sr) = p[0], *((cos(angle), sin(angle)) for angle in joints)
+    first, second = joints
+    cp, sp, cr, sr = cos(first), sin(first), cos(second), sin(second)
     y, z = side * p[1] * cr - p[2] * sr, side * p[1] * sr + p[2] * cr
-    point = x * cp - z * sp, y, x * sp + z * cp
-    return point, (-point[2], 0.0, point[0]), (-y * sp, -z, y * cp)
+    return p[0] * cp - z * sp, y, p[0] * sp + z * cp
 
 
 def _degrees(pair: Pair) -> str:
