@@ -154,3 +154,12 @@ def test_a_small_fit_goes_on_where_it_stopped_and_writes_what_it_found(tmp_path:
     again = invoked(*words)
     assert again.code == 0 and again.err.splitlines() == done.err.splitlines()
     assert (out / "table.csv").read_text(encoding="utf-8").splitlines() == rows
+
+
+def test_levels_and_ends_of_a_fit_are_checked_before_anything_runs(tmp_path: Path) -> None:
+    words = ("sweep", "--fit", "--out", str(tmp_path / "fit"), "--bus", "ideal")
+    done = invoked(*words, "--set", "gaze.lids.close_ms=50,5000")
+    assert done.code == 2 and "gaze.lids.close_ms: 5000 is above 500 (unit ms)" in done.err
+    done = invoked(*words, "--set", "gaze.lids.close_ms=5:90")
+    assert done.code == 2 and "gaze.lids.close_ms: 5.0 is below 30 (unit ms)" in done.err
+    assert not (tmp_path / "fit").exists()

@@ -4,15 +4,16 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
 from gazerig.config.export import suggestion
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_output import write_file
-from gazerig.robot.app.options import BUSES, DEFAULT_SCENE, RunOptions
+from gazerig.robot.app.options import DEFAULT_SCENE, RunOptions
 from gazerig.robot.cli import run_options as options
+from gazerig.robot.cli import sweep_options as own
 from gazerig.robot.cli.progress_bar import progress_bar
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import FAULT, INTERRUPTED, RigArgument, clear_errors, say, signals
@@ -32,57 +33,24 @@ _COLUMNS = (
     *("gaze_error_deg.median", "gaze_error_deg.p95"),
 )
 """What can be drawn besides the report's measures."""
-_MOST_SEEDS = 10_000
 _TRIED = 60
+"""Points of a search where nothing is said; the help of --samples says so."""
 
 
 @app.command(cls=RigCommand)
 def sweep(
     rig: RigArgument = "desk",
-    setting: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--set",
-            metavar="KEY=VALUES",
-            help="A key of the rig's YAML and what it takes: LOW:HIGH:STEPS or A,B,C; with --samples "
-            "or --fit also LOW:HIGH. Repeat it for more keys.",
-        ),
-    ] = None,
+    setting: own.Settings = None,
     scene: options.Scene = DEFAULT_SCENE,
-    seeds: Annotated[
-        int, typer.Option(min=1, max=_MOST_SEEDS, help="Runs at each point, each with a seed.")
-    ] = 4,
-    seed: Annotated[int, typer.Option(min=0, help="The first of them, and of the samples.")] = 0,
-    seconds: Annotated[
-        float | None, typer.Option(min=0.1, help="Length of a run; default: the scene's round.")
-    ] = None,
-    samples: Annotated[
-        int | None,
-        typer.Option(
-            min=2,
-            max=100_000,
-            help="A Latin hypercube of N points instead of a grid; with --fit, points to try (60).",
-        ),
-    ] = None,
-    fit: Annotated[
-        bool,
-        typer.Option(
-            "--fit", help="Search for the values with the fewest measures outside people's bands."
-        ),
-    ] = False,
-    out: Annotated[
-        Path | None, typer.Option(help="Folder; default: sweep-RIG-SCENE or fit-RIG-SCENE.")
-    ] = None,
-    jobs: Annotated[
-        int | None, typer.Option(min=1, max=512, help="Processes; default: one a processor.")
-    ] = None,
-    show: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="MEASURE", help="Draw this one; default: those that respond most. Repeatable."
-        ),
-    ] = None,
-    bus: Annotated[str, typer.Option(help=f"Servos: {' or '.join(BUSES)}.")] = "emulated",
+    seeds: own.Seeds = 4,
+    seed: own.FirstSeed = 0,
+    seconds: own.Seconds = None,
+    samples: own.Samples = None,
+    fit: own.Fit = False,
+    out: own.Out = None,
+    jobs: own.Jobs = None,
+    show: own.Show = None,
+    bus: own.Bus = "emulated",
     profile: options.Profile = None,
     character: options.Character = None,
     rules: options.Rules = None,
@@ -97,35 +65,49 @@ def sweep(
     """
     with clear_errors(rig):
         shown = [_column(name) for name in show or ()]
-        # Models and drawing are heavy; `--help` does without them.
-        from gazerig.robot.app.simulated_run import refuse_unfit
-        from gazerig.robot.sweep.axes import axes_of, checked, grid, latin_hypercube
-        from gazerig.robot.sweep.sweep import SweepSpec, folder_of
-        from gazerig.robot.sweep.worker import rig_of
-
         asked = RunOptions(
             mock=True, fast=True, scene=scene, seconds=seconds, bus=bus, rig=rig, profile=profile,
             character=character, rules=rules, behaviour=behaviour, conversation=conversation,
         ).checked()  # fmt: skip
-        varied = rig_of(asked)
-        refuse_unfit(varied, asked)
-        axes = axes_of(varied, setting or (), read_value)
-        if not axes:
-            raise SetupError("nothing to vary: give --set KEY=VALUES, for example "
-                             "--set gaze.head.comfort_deg=4:16:7")  # fmt: skip
-        all_seeds = tuple(range(seed, seed + seeds))
+        number = samples if samples is not None or not fit else _TRIED
+        spec, points = _checked(asked, setting or (), range(seed, seed + seeds), number, fit)
+        folder = out or Path(f"{'fit' if fit else 'sweep'}-{Path(rig).stem}-{scene}")
         if fit:
-            search = {"fit": samples or _TRIED, "seed": seed}
-            spec = SweepSpec(varied, asked, tuple(axes), all_seeds, search)
-            outcomes = _fitted(spec, out or folder_of(asked, "fit"), jobs, shown)
+            outcomes = _fitted(spec, folder, jobs, shown)
         else:
-            points = grid(axes) if samples is None else latin_hypercube(axes, samples, seed)
-            checked(varied, axes, points)
-            search = {} if samples is None else {"samples": samples, "seed": seed}
-            spec = SweepSpec(varied, asked, tuple(axes), all_seeds, search)
-            outcomes = _swept(spec, points, out or folder_of(asked, "sweep"), jobs, shown)
+            outcomes = _swept(spec, points, folder, jobs, shown)
     if all(one.failed for one in outcomes):
         raise typer.Exit(FAULT)
+
+
+def _checked(
+    asked: RunOptions, settings: Sequence[str], seeds: range, number: int | None, fit: bool
+) -> "tuple[SweepSpec, Sequence[Point]]":
+    """Return what is to be run, with its points unless a search is to find them.
+
+    Raises:
+        ConfigError, SetupError: something in it cannot be run.
+    """
+    # Models are heavy; `--help` does without them.
+    from gazerig.robot.app.simulated_run import refuse_unfit
+    from gazerig.robot.sweep.axes import axes_of, checked, grid, latin_hypercube, one_by_one
+    from gazerig.robot.sweep.sweep import SweepSpec
+    from gazerig.robot.sweep.worker import rig_of
+
+    rig = rig_of(asked)
+    refuse_unfit(rig, asked)
+    axes = axes_of(rig, settings, read_value)
+    if not axes:
+        example = "--set gaze.head.comfort_deg=4:16:7"
+        raise SetupError(f"nothing to vary: give --set KEY=VALUES, for example {example}")
+    if fit:
+        points = one_by_one(axes)
+    else:
+        points = grid(axes) if number is None else latin_hypercube(axes, number, seeds[0])
+    checked(rig, axes, points)
+    how = "fit" if fit else "samples"
+    search = {how: number, "seed": seeds[0]} if number is not None else {}
+    return SweepSpec(rig, asked, tuple(axes), tuple(seeds), search), points
 
 
 def _swept(

@@ -223,6 +223,11 @@ def grid(axes: Sequence[Axis]) -> list[Point]:
     return [dict(zip(keys, row, strict=True)) for row in product(*(a.values for a in axes))]
 
 
+def one_by_one(axes: Sequence[Axis]) -> list[Point]:
+    """Return the rig's own values, and each level with the rig's own values of all other axes."""
+    return [{}, *({axis.key: value} for axis in axes for value in axis.values)]
+
+
 def latin_hypercube(axes: Sequence[Axis], samples: int, seed: int) -> list[Point]:
     """Return samples of which each falls into a part of its own of every axis (McKay 1979).
 

@@ -122,8 +122,3 @@ def working(
 def _levels(axis: Axis) -> object:
     """Return what an axis takes as JSON values."""
     return f"{axis.low:g}:{axis.high:g}" if axis.is_range else list(axis.values)
-
-
-def folder_of(options: RunOptions, kind: str) -> Path:
-    """Return the folder of a sweep that names none, e.g. sweep-desk-visitor."""
-    return Path(f"{kind}-{Path(options.rig).stem}-{options.scene}")
