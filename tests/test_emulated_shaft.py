@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.drivers.dynamixel.control_table import MODELS
-from gazerig.sim_mock.smart_servo.motor import DISABLED, Loop, Shaft
+from gazerig.sim_mock.smart_servo.controller import DISABLED, Loop
+from gazerig.sim_mock.smart_servo.motor import Shaft
 from gazerig.sim_mock.smart_servo.physics import Physics, checked
 from gazerig.sim_mock.smart_servo.profile import PositionProfile
 
@@ -113,7 +114,7 @@ def test_the_first_feed_forward_gain_shortens_the_lag():
 
 def test_the_second_feed_forward_gain_shortens_the_lag_of_acceleration():
     errors = []
-    for f2 in (0.0, 0.7 / Shaft(MODELS["xl330-m077"], Physics(), 0.0)._accel):
+    for f2 in (0.0, 0.7 / Shaft(MODELS["xl330-m077"], Physics(), 0.0)._built.accel):
         made = shaft(loop=Loop(p=P, d=D, f1=1 / 27.0, f2=f2), **SMOOTH)
         go(made, 4000, 60, cruise=20.0, ramp=0.1)
         errors.append(made.profile.r - made.x)

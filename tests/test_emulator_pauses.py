@@ -6,7 +6,9 @@ from servo_bench import FeetechBench
 
 from gazerig.drivers.dynamixel.control_table import MODELS
 from gazerig.sim_mock.dynamixel.servo import DynamixelServo
-from gazerig.sim_mock.smart_servo.motor import PAUSE_MS, Loop, Shaft, long_pause
+from gazerig.sim_mock.smart_servo.controller import Loop
+from gazerig.sim_mock.smart_servo.motor import Shaft
+from gazerig.sim_mock.smart_servo.pauses import PAUSE_MS, long_pause
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 from gazerig.sim_mock.smart_servo.protection import ServoProtection

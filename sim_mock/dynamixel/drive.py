@@ -22,8 +22,8 @@ from gazerig.sim_mock.dynamixel.modes import (
     VELOCITY,
     loop_of,
 )
+from gazerig.sim_mock.smart_servo.controller import DISABLED
 from gazerig.sim_mock.smart_servo.drive import Drive
-from gazerig.sim_mock.smart_servo.motor import DISABLED, flicker
 from gazerig.sim_mock.smart_servo.physics import Quirks, ServoSpec
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 
@@ -90,15 +90,16 @@ class DynamixelDrive(Drive):
     def sensed(self, now_ms: int) -> tuple[int, int, int]:
         """Return present current, velocity and position in register units."""
         shaft, side = self.shaft, self._side
-        at = round(side * shaft.x + self._shift)
+        v, at = shaft.v, round(side * shaft.x + self._shift)
         current = side * shaft.effort * self._current_full
-        if shaft.v:
-            return round(current), round(side * shaft.v / _SPEED_UNIT), at
+        if v:
+            return round(current), round(side * v / _SPEED_UNIT), at
         if not self.torque:
             return 0, 0, at
-        amps, speed = flicker(now_ms, *self._noise)
+        amps, speed = self._flicker(now_ms)
         amps += round(current)
-        return max(-self._max_current, min(self._max_current, amps)), speed, at
+        most = self._max_current
+        return (amps if -most <= amps <= most else most if amps > 0 else -most), speed, at
 
     def motion(self, now_ms: int) -> tuple[bool, int, int]:
         """Return moving, moving status and PWM in register units."""
@@ -247,7 +248,7 @@ class DynamixelDrive(Drive):
 
     def apply_settings(self) -> None:
         """Apply the present register values."""
-        self.followed = b""
+        self.followed = None
         get = self.memory.get
         self.follows = self.torque and self.mode in POSITION_MODES
         self._speed, self._ramp = get("profile_velocity"), get("profile_acceleration")

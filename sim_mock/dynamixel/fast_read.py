@@ -13,13 +13,6 @@ from gazerig.sim_mock.dynamixel.packets import CRC, HEAD, HEADER, STATUS
 from gazerig.sim_mock.dynamixel.servo import ALERT, DynamixelServo
 from gazerig.sim_mock.replies import BROADCAST
 
-START = {
-    (error, servo_id): bytes((error, servo_id))
-    for error in (0, ACCESS, ALERT, ALERT | ACCESS)
-    for servo_id in range(256)
-}
-"""What a servo's block begins with, by error and id."""
-
 
 def fast_reply(
     servos: Mapping[int, DynamixelServo],
@@ -31,16 +24,26 @@ def fast_reply(
     """Return the packet up to the first silent servo; empty if that is the first one."""
     parts = list[bytes]()
     before, crc, pack = HEAD.pack(HEADER, BROADCAST, length, STATUS), 0, CRC.pack
-    for servo_id, address, size in rows:
+    for row in rows:
+        servo_id = row[0]
         servo = servos.get(servo_id)
         if servo is None or not servo.advance(now_ms, fed_ms):
             break
         if not servo.fast_reads or servo.status_level < 1:
             break
-        data, error = servo.read(address, size), ALERT if servo.errors else 0
-        if data is None:
-            data, error = bytes(size), error | ACCESS
-        block = before + START[error, servo_id] + data
+        error = ALERT if servo.errors else 0
+        windows = servo.memory.windows
+        window = windows[row] if row in windows else servo.window(row)
+        if servo.stale_surroundings and window is not None and window.surroundings:
+            window = servo.window(row)
+        if window is not None:
+            amps, speed, at = servo.drive.sensed(now_ms)
+            block = before + window[0].pack(error, servo_id, window[1], amps, speed, at, window[2])
+        else:
+            data = servo.read(row[1], row[2])
+            if data is None:
+                data, error = bytes(row[2]), error | ACCESS
+            block = before + bytes((error, servo_id)) + data
         crc = umts(block, crc)
         parts.append(block)
         before = pack(crc)

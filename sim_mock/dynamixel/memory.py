@@ -4,6 +4,7 @@ Knows the rules that follow from the table alone; what needs the servo's state (
 lock, limit registers, watchdog) is asked by gazerig.sim_mock.dynamixel.servo.
 """
 
+import struct
 from collections.abc import Callable, Iterable, Iterator
 from operator import itemgetter
 from typing import NamedTuple
@@ -39,15 +40,34 @@ Fields = tuple[tuple[DynamixelRegister, int], ...]
 class ResolvedRange(NamedTuple):
     """Real addresses behind a range, resolved through the indirect windows.
 
+    runs: first address and end of each run of neighbours
     fetch: returns the bytes of all real addresses, in runs of neighbours
     sensed, surroundings, profiled: whether any of them holds sensor values, voltage or
         temperature, or the state of the profile
     """
 
+    runs: tuple[tuple[int, int], ...]
     fetch: Callable[[bytearray], Iterable[bytearray]]
     sensed: bool
     surroundings: bool
     profiled: bool
+
+
+class SensedWindow(NamedTuple):
+    """Current, velocity and position amid registers that change seldom, as a block is packed.
+
+    layout: error, id, ``before``, current, velocity, position, ``after``
+    surroundings: whether voltage or temperature are among the others
+    """
+
+    layout: struct.Struct
+    before: bytes
+    after: bytes
+    surroundings: bool
+
+
+GOAL_AT, GOAL_END = 116, 120
+"""Addresses of the goal position."""
 
 
 class DynamixelMemory(ServoMemory[DynamixelRegister]):
@@ -63,6 +83,8 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
         self._windows = [(b.data_base, b.data_base + b.entries, b.address_base) for b in blocks]
         self._window_low = min(low for low, _, _ in self._windows)
         self._pointers_low = min(pointers for _, _, pointers in self._windows)
+        self.windows: dict[tuple[int, int, int], SensedWindow | None] = {}
+        """Windows by what asks for them, until anything else in them changes."""
         self.gathers: dict[tuple[int, int], ResolvedRange] = {}
         """Ranges that were read, until a window points elsewhere."""
         self._defined = bytearray(size)
@@ -90,6 +112,7 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
     def put(self, register: DynamixelRegister, value: int) -> None:
         """Store a value."""
         super().put(register, value)
+        self.windows.clear()
         if register.address >= self._pointers_low:
             self.gathers.clear()
 
@@ -122,6 +145,25 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
             found = self.gathers[address, length] = self._gather(address, address + length)
         return found
 
+    def window(self, wanted: tuple[int, int, int]) -> "SensedWindow | None":
+        """Return how a servo's part of a fast read is made, None if that is not so simple.
+
+        Args:
+            wanted: id, address, length.
+        """
+        gather = self.gather(*wanted[1:])
+        found: SensedWindow | None = None
+        if gather is not None and SENSED_SPAN in gather.runs and not gather.profiled:
+            at = gather.runs.index(SENSED_SPAN)
+            before, after = gather.runs[:at], gather.runs[at + 1 :]
+            if not any(low < GOAL_END and high > GOAL_AT for low, high in gather.runs):
+                start = b"".join([self.bytes[low:high] for low, high in before])
+                end = b"".join([self.bytes[low:high] for low, high in after])
+                layout = struct.Struct(f"<BB{len(start)}shii{len(end)}s")
+                found = SensedWindow(layout, start, end, gather.surroundings)
+        self.windows[wanted] = found
+        return found
+
     def _gather(self, address: int, end: int) -> ResolvedRange:
         """Join neighbouring real addresses to runs."""
         runs: list[list[int]] = []
@@ -137,6 +179,7 @@ class DynamixelMemory(ServoMemory[DynamixelRegister]):
         slices = [slice(low, high) for low, high in runs]
         # With a single slice itemgetter would return the bytes themselves.
         return ResolvedRange(
+            tuple((low, high) for low, high in runs),
             itemgetter(*slices, slice(0, 0)),
             touches(SENSED_SPAN),
             touches(SURROUNDINGS_SPAN),

@@ -32,14 +32,17 @@ from gazerig.sim_mock.dynamixel.live_registers import (
 from gazerig.sim_mock.dynamixel.memory import (
     ACCESS,
     DATA_RANGE,
+    GOAL_AT,
+    GOAL_END,
     INSTRUCTION_ERROR,
     RESULT_FAIL,
     Backup,
     DynamixelMemory,
+    SensedWindow,
     in_eeprom,
 )
 from gazerig.sim_mock.dynamixel.modes import DRIVEN_BY, TORQUE_ON_BY_GOAL
-from gazerig.sim_mock.dynamixel.write_rules import GOALS, WriteRules
+from gazerig.sim_mock.dynamixel.write_rules import GOALS, WATCHDOG_AT, WriteRules
 from gazerig.sim_mock.smart_servo.physics import Quirks, ServoSpec
 from gazerig.sim_mock.smart_servo.servo import EmulatedServo
 
@@ -52,7 +55,6 @@ STARTS_WITH_TORQUE, RESTORES_RAM = 1, 2
 KEPT_BY_RESET: dict[int, tuple[str, ...]] = {0xFF: (), 1: ("id",), 2: ("id", "baud_rate")}
 """What each option of Factory Reset leaves alone."""
 
-_GOAL_AT, _GOAL_SIZE = 116, 4
 _IDENTITY = struct.Struct("<HB")
 
 
@@ -96,7 +98,7 @@ class DynamixelServo(EmulatedServo):
 
     def _boot(self) -> None:
         """Reset to power-on, with torque if Startup Configuration asks for it."""
-        self._around: tuple[float, float] | None = None
+        self._around: tuple[int, int] | None = None
         super()._boot()
         self.memory.set("backup_ready", self._backup.ready)
         startup = self.memory.get("startup_configuration") if self._new else 0
@@ -138,27 +140,47 @@ class DynamixelServo(EmulatedServo):
         gather = memory.gathers.get((address, length)) or memory.gather(address, length)
         if gather is None:
             return None
-        fetch, sensed, surroundings, profiled = gather
+        _, fetch, sensed, surroundings, profiled = gather
         into = memory.bytes
         if sensed:
             SENSED.pack_into(into, SENSED_AT, *self.drive.sensed(self._ms))
-        if surroundings:
-            around = self.shaft.volts, self.protection.temperature_c
-            if around != self._around:
-                self._around = around
-                warmth = max(0, min(255, round(self.temperature_c)))
-                SURROUNDINGS.pack_into(into, SURROUNDINGS_AT, self.voltage_01v, warmth)
+        if surroundings and self.stale_surroundings:
+            self._refresh_surroundings()
         if profiled:
             tick_ms = self._ms - self._booted_ms & 0x7FFF
             MOTION.pack_into(into, MOTION_AT, tick_ms, *self.drive.motion(self._ms))
             REFERENCE.pack_into(into, REFERENCE_AT, *self.drive.reference())
         return b"".join(fetch(into))
 
+    def window(self, wanted: tuple[int, int, int]) -> SensedWindow | None:
+        """Return how its part of a fast read is packed, None where ``read`` has to do it.
+
+        Args:
+            wanted: id, address, length.
+        """
+        memory = self.memory
+        if wanted not in memory.windows:
+            memory.window(wanted)
+        found = memory.windows[wanted]
+        if found is not None and found.surroundings and self.stale_surroundings:
+            self._refresh_surroundings()
+            return memory.windows.get(wanted) or memory.window(wanted)
+        return found
+
+    def _refresh_surroundings(self) -> None:
+        """Update voltage and temperature."""
+        self.stale_surroundings = False
+        around = self.voltage_01v, self.warmth_c
+        if around != self._around:
+            self._around = around
+            SURROUNDINGS.pack_into(self.memory.bytes, SURROUNDINGS_AT, *around)
+            self.memory.windows.clear()
+
     # --- writing
 
     def write(self, address: int, data: bytes) -> int:
         """Write bytes as an instruction does; return the error number, 0 when done."""
-        if address == _GOAL_AT and len(data) == _GOAL_SIZE and self.drive.follows:
+        if address == GOAL_AT and len(data) == GOAL_END - GOAL_AT and self.drive.follows:
             return self._take_goal(data)
         fields = self._rules.permitted(address, data)
         if isinstance(fields, int):
@@ -171,13 +193,13 @@ class DynamixelServo(EmulatedServo):
     def _take_goal(self, data: bytes) -> int:
         """Write a goal position under torque without the general path: this happens every tick."""
         value = int.from_bytes(data, "little", signed=True)
-        error = self._rules.goal_error(value)
-        if error:
-            return error
-        self.memory.bytes[_GOAL_AT : _GOAL_AT + _GOAL_SIZE] = data
+        low, high = self._rules.goal_range
+        if not low <= value <= high or self.memory.bytes[WATCHDOG_AT] == TRIPPED:
+            return self._rules.goal_error(value)
+        self.memory.bytes[GOAL_AT:GOAL_END] = data
         drive = self.drive
         drive.set_goal(value)
-        drive.followed, drive.followed_at = data, _GOAL_AT
+        drive.followed = GOAL_AT, data
         return 0
 
     def _act(self, name: str, value: int) -> None:

@@ -21,8 +21,8 @@ from gazerig.drivers.feetech.memory_table import TORQUE_FULL as FULL
 from gazerig.sim_mock.feetech.memory import FeetechMemory
 from gazerig.sim_mock.feetech.packets import signed, unsigned
 from gazerig.sim_mock.feetech.tables import PWM, SERVO, STEP, WHEEL
+from gazerig.sim_mock.smart_servo.controller import DISABLED, Loop
 from gazerig.sim_mock.smart_servo.drive import Drive
-from gazerig.sim_mock.smart_servo.motor import DISABLED, Loop, flicker
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 
@@ -111,7 +111,7 @@ class FeetechDrive(Drive):
         turning = shaft.v * scale * 1000.0 / self._speed_unit
         speed, current = round(turning), round(shaft.effort * self._current_full)
         if self.torque and not turning:
-            more, speed = flicker(now_ms, *self._noise)
+            more, speed = self._flicker(now_ms)
             current += more
         led = self.torque and isinstance(profile, PositionProfile)
         goal = round((profile.goal + self._shift) * scale) if led else self._goal_register()
@@ -131,7 +131,7 @@ class FeetechDrive(Drive):
 
     def apply_settings(self) -> None:
         """Apply the present register values."""
-        self.followed = b""
+        self.followed = None
         get = self.memory.get
         phase, low, high = get("phase"), get("min_position_limit"), get("max_position_limit")
         endless = low == 0 and high == 0
@@ -190,7 +190,7 @@ class FeetechDrive(Drive):
 
     def switch(self, value: int, from_here: bool) -> None:
         """Switch the torque: 0 off, 1 on, 2 off and braked; ``from_here``: without an old goal."""
-        self.followed = b""
+        self.followed = None
         was, self.torque = self.torque, value not in (0, DAMPED)
         self.damped = value == DAMPED
         if self.torque and not was:
@@ -205,7 +205,7 @@ class FeetechDrive(Drive):
 
     def _begin(self) -> None:
         """Start a profile at the shaft's position."""
-        self.followed = b""
+        self.followed = None
         self._goals_followed = ()
         self._lead_from_here(self.mode == WHEEL)
         self.apply_gains()

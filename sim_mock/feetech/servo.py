@@ -59,8 +59,7 @@ class FeetechServo(EmulatedServo):
         self.memory = FeetechMemory(self.model, spec.id, spec.firmware, self.table)
         self.drive = FeetechDrive(self.memory, self.model, spec)
         self._sensed = _SENSED[self.table.order]
-        self._around: tuple[float, float] | None = None
-        self._around_bytes = 0, 0
+        self._around = 0, 0
         self.apply_quirks(FeetechQuirks())
         super().__init__(spec, now_ms)
 
@@ -120,12 +119,10 @@ class FeetechServo(EmulatedServo):
 
     def _refresh(self) -> None:
         """Update the registers that change by themselves."""
-        around = self.shaft.volts, self.protection.temperature_c
-        if around != self._around:
-            self._around = around
-            warmth = max(0, min(255, round(self.temperature_c)))
-            self._around_bytes = max(0, min(255, self.voltage_01v)), warmth
-        volts, warmth = self._around_bytes
+        if self.stale_surroundings:
+            self.stale_surroundings = False
+            self._around = max(0, min(255, self.voltage_01v)), self.warmth_c
+        volts, warmth = self._around
         position, speed, load, current, target, moving = self.drive.motion_words(self._ms)
         self._sensed.pack_into(
             self.memory.bytes, SENSED_AT, position, speed, load, volts, warmth,
@@ -144,7 +141,7 @@ class FeetechServo(EmulatedServo):
             self._command(address < GOAL_END and end > GOAL_AT, goal)
             drive = self.drive
             if drive.torque and drive.mode == SERVO:
-                drive.followed, drive.followed_at = data, address
+                drive.followed = address, data
             return 0
         written: list[int] = []
         memory.write(address, data, written.append)

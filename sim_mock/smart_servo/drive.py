@@ -1,20 +1,14 @@
 """What every emulated smart servo has between its registers and its shaft."""
 
 from abc import ABC, abstractmethod
-from typing import Any, NamedTuple
+from typing import Any
 
+from gazerig.sim_mock.smart_servo.controller import Motor
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
-from gazerig.sim_mock.smart_servo.motor import Motor, Shaft
+from gazerig.sim_mock.smart_servo.motor import Shaft
+from gazerig.sim_mock.smart_servo.noise import LENGTH, SEED_APART_MS, flicker
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
-
-
-class Noise(NamedTuple):
-    """Seed and largest flicker of current and velocity, in register units."""
-
-    seed: int
-    current: int
-    velocity: int
 
 
 class Drive(ABC):
@@ -31,14 +25,13 @@ class Drive(ABC):
     Attributes:
         torque: whether it is switched on.
         mode: operating mode in force.
-        followed, followed_at: the last write of goals and its address, while the same bytes
-            again would change nothing; empty otherwise.
+        followed: address and bytes of the last write of goals, while the same again would
+            change nothing; None otherwise.
     """
 
     torque = False
     mode: int
-    followed = b""
-    followed_at = 0
+    followed: tuple[int, bytes] | None = None
 
     def __init__(
         self, memory: ServoMemory[Any], model: Motor, spec: ServoSpec, scale: float = 1.0
@@ -47,7 +40,8 @@ class Drive(ABC):
         self.memory = memory
         self.shaft = Shaft(model, physics, spec.start_steps / scale)
         seed = spec.id if spec.seed is None else spec.seed
-        self._noise = Noise(seed, physics.noise_current, physics.noise_velocity)
+        self._noise = flicker(physics.noise_current, physics.noise_velocity)
+        self._noise_from_ms = seed * SEED_APART_MS
         self.boot()
 
     @abstractmethod
@@ -67,6 +61,10 @@ class Drive(ABC):
     def turn(self, steps: float) -> None:
         """Turn the joint by hand, in the registers' direction."""
 
+    def _flicker(self, now_ms: int) -> tuple[int, int]:
+        """Return the noise of current and velocity while the shaft holds still."""
+        return self._noise[now_ms + self._noise_from_ms & LENGTH - 1]
+
     def _lead_from_here(self, by_speed: bool) -> None:
         """Start a profile, of speeds or of positions, at the shaft's position."""
         shaft = self.shaft
@@ -74,5 +72,5 @@ class Drive(ABC):
 
     def _set_goal_here(self) -> None:
         """Make the goal position the present one."""
-        self.followed = b""
+        self.followed = None
         self.memory.set("goal_position", round(self.position_steps))

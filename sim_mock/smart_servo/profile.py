@@ -36,10 +36,21 @@ class PositionProfile:
 
     def rest(self, position: float) -> None:
         """Stand at a position."""
+        self._t = 0
         self.r = self.goal = position
         self.v = 0.0
         self.kind = STEP
         self.running = False
+
+    def state(self) -> tuple[float, ...]:
+        """Return where on its plan it is, for ``restore``."""
+        return self._t, self.r, self.v, self.running
+
+    def restore(self, state: tuple[float, ...]) -> None:
+        """Go back on the same plan."""
+        t, self.r, self.v, running = state
+        self._t = int(t)
+        self.running = bool(running)
 
     def step(self, goal: float) -> None:
         """Jump to a goal with the next millisecond."""
@@ -48,6 +59,8 @@ class PositionProfile:
         self.running = True
         self._t = 0
         self._t1 = self._t2 = self._t3 = 0.0
+        self._from = self._p1 = goal
+        self._start = self._out = self._cruise = self._slow = 0.0
 
     def by_velocity(self, goal: float, cruise: float, ramp: float) -> None:
         """Plan to a goal at a speed (steps/ms, 0: step) with a ramp (steps/ms2, 0: rectangle)."""
@@ -58,6 +71,7 @@ class PositionProfile:
             distance = goal - self.r
             self.goal, self.kind, self.running = goal, RECTANGLE, True
             self._t, self._t1, self._p1, self._slow = 0, 0.0, self.r, 0.0
+            self._from, self._start, self._out = self.r, 0.0, 0.0
             self._cruise = cruise if distance >= 0.0 else -cruise
             self._t2 = self._t3 = distance / self._cruise
         else:
@@ -111,37 +125,41 @@ class PositionProfile:
         if t3 <= begun + 1:
             self.r, self.v, self.running = goal, 0.0, False
             return [goal] * ticks
-        path = []
-        for t in range(begun + 1, begun + ticks + 1):
-            if t < t1:
-                path.append(self._from + t * (self._start + t * self._out))
-            elif t < t2:
-                path.append(self._p1 + (t - t1) * self._cruise)
-            elif t < t3:
-                path.append(goal - (t3 - t) * (t3 - t) * self._slow)
-            else:
-                path.append(goal)
+        begin, start, out, p1 = self._from, self._start, self._out, self._p1
+        cruise, slow, end = self._cruise, self._slow, begun + ticks
+        path = [
+            begin + t * (start + t * out)
+            if t < t1
+            else p1 + (t - t1) * cruise
+            if t < t2
+            else goal - (t3 - t) * (t3 - t) * slow
+            if t < t3
+            else goal
+            for t in range(begun + 1, end + 1)
+        ]
         self.r = path[-1]
-        self._t = begun + ticks
-        self._speed(begun + ticks)
+        self._t = end
+        self._speed(end)
         return path
+
+    def _at(self, t: int) -> float:
+        """Return the position at a time of the plan."""
+        if t >= self._t3:
+            return self.goal
+        if t >= self._t2:
+            left = self._t3 - t
+            return self.goal - left * left * self._slow
+        if t >= self._t1:
+            return self._p1 + (t - self._t1) * self._cruise
+        return self._from + t * (self._start + t * self._out)
 
     def skip(self, ticks: int) -> None:
         """Advance by many milliseconds at once."""
         if not self.running:
             return
         self._t = t = self._t + ticks
-        if t >= self._t3:
-            self.r, self.v, self.running = self.goal, 0.0, False
-        elif t >= self._t2:
-            self.r = self.goal - (self._t3 - t) * (self._t3 - t) * self._slow
-            self._speed(t)
-        elif t >= self._t1:
-            self.r = self._p1 + (t - self._t1) * self._cruise
-            self._speed(t)
-        else:
-            self.r = self._from + t * (self._start + t * self._out)
-            self._speed(t)
+        self.r = self._at(t)
+        self._speed(t)
 
     def _speed(self, t: int) -> None:
         """Update the speed to a time of the plan."""
@@ -171,6 +189,15 @@ class SpeedProfile:
         self._ramp = 0.0
         self.kind = STEP
         self.running = False
+
+    def state(self) -> tuple[float, ...]:
+        """Return where on its plan it is, for ``restore``."""
+        return self.r, self.v, self.running
+
+    def restore(self, state: tuple[float, ...]) -> None:
+        """Go back on the same plan."""
+        self.r, self.v, running = state
+        self.running = bool(running)
 
     def set_goal(self, speed: float, ramp: float) -> None:
         """Plan to a speed (steps/ms) with a ramp (steps/ms2, 0: at once)."""

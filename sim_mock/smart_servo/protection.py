@@ -7,7 +7,7 @@ asked. A heavy load is torque, not duty: a motor at full speed has all the duty 
 from math import inf
 from typing import NamedTuple
 
-from gazerig.sim_mock.smart_servo.motor import Motor
+from gazerig.sim_mock.smart_servo.controller import Motor
 from gazerig.sim_mock.smart_servo.physics import Physics
 
 CHECK_MS = 20
@@ -69,9 +69,12 @@ class ServoProtection:
         """
         physics, limits = self._physics, self.limits
         target = self.ambient_c + physics.stall_rise_c * effort * effort
-        self.temperature_c = temperature_after(
-            self.temperature_c, target, physics.thermal_s, checks
-        )
+        if checks == 1:
+            self.temperature_c += (target - self.temperature_c) * (CHECK_S / physics.thermal_s)
+        else:
+            self.temperature_c = temperature_after(
+                self.temperature_c, target, physics.thermal_s, checks
+            )
         effort = abs(effort)
         heavy = effort > 0.0 and effort >= limits.overload_share * volts - 1e-11
         self._heavy_checks = self._heavy_checks + checks if heavy else 0

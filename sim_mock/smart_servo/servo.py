@@ -8,10 +8,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Protocol
 
+from gazerig.sim_mock.smart_servo.controller import Motor
 from gazerig.sim_mock.smart_servo.drive import Drive
 from gazerig.sim_mock.smart_servo.framing import PING, READ, REBOOT
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
-from gazerig.sim_mock.smart_servo.motor import Motor, long_pause
+from gazerig.sim_mock.smart_servo.pauses import PAUSE_MS, long_pause
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec, checked
 from gazerig.sim_mock.smart_servo.protection import CHECK_MS, Limits, ServoProtection
 
@@ -62,6 +63,8 @@ class EmulatedServo(ABC):
     id: int
     answers_groups = True
     """Whether it answers its part of a group read."""
+    stale_surroundings = True
+    """Whether voltage and temperature were measured again since their registers were read."""
     shadow_id: int | None = None
     """An id under which it carries out writes to RAM and never answers."""
 
@@ -81,6 +84,7 @@ class EmulatedServo(ABC):
         self.memory.power_up()
         self._pending: tuple[int, bytes] | None = None
         self._watchdog_ms = 0
+        self._measure_surroundings()
         self.errors = 0
         self.protection.restart()
         self.drive.boot()
@@ -125,6 +129,8 @@ class EmulatedServo(ABC):
                 if not self.shaft.quiet:
                     self.shaft.run(now_ms - self._ms)
                 self._ms = now_ms
+            elif ahead < PAUSE_MS:
+                self._run_until(now_ms)
             else:
                 self._move(now_ms)
         return now_ms >= self._deaf_until_ms
@@ -159,9 +165,15 @@ class EmulatedServo(ABC):
         before_c = protection.temperature_c
         bits = protection.check(shaft.effort, shaft.volts, checks)
         self._calm = protection.temperature_c == before_c and protection.steady
+        self._measure_surroundings()
         self._protect_from(bits)
         if protection.browned_out(shaft.volts):
             self.restart()
+
+    def _measure_surroundings(self) -> None:
+        """Measure voltage and temperature, as is done every 20 ms."""
+        self._measured = self.shaft.volts, self.protection.temperature_c
+        self.stale_surroundings = True
 
     def restart(self) -> None:
         """Restart by instruction or a dip of the supply: deaf for a while, then as at power-on."""
@@ -273,8 +285,13 @@ class EmulatedServo(ABC):
 
     @property
     def voltage_01v(self) -> int:
-        """Voltage at the servo, in 0.1 V."""
-        return round(self.shaft.volts * self.model.rated_v * 10.0)
+        """Voltage at the servo as it was last measured, in 0.1 V."""
+        return round(self._measured[0] * self.model.rated_v * 10.0)
+
+    @property
+    def warmth_c(self) -> int:
+        """Temperature of the motor as it was last measured, as registers hold it."""
+        return max(0, min(255, round(self._measured[1])))
 
     def fail(self, error: str) -> str:
         """Let an error arise by name, as the servo's own protection would; return what it does.
@@ -312,6 +329,7 @@ class EmulatedServo(ABC):
     def supply_v(self, volts: float) -> None:
         self._calm = False
         self.shaft.feed(max(0.0, volts) / self.model.rated_v)
+        self._measure_surroundings()
 
     @property
     def temperature_c(self) -> float:
@@ -322,6 +340,7 @@ class EmulatedServo(ABC):
     def temperature_c(self, celsius: float) -> None:
         self._calm = False
         self.protection.temperature_c = celsius
+        self._measure_surroundings()
 
     @property
     def ambient_c(self) -> float:

@@ -1,0 +1,324 @@
+"""How an emulated shaft moves on: by steps of 1 ms, or by five of them at once.
+
+One step is an implicit one: P and D act on position and speed at its end, as the real loop, much
+faster than 1 kHz, would make them act on the way. So no gain the registers allow can shake the
+numbers to infinity. Five steps are one linear map while nothing changes sides (see span.py).
+"""
+
+from collections.abc import Sequence
+from math import inf, sin
+from typing import NamedTuple
+
+from gazerig.sim_mock.smart_servo.controller import STEPS_PER_RAD, Loop, Mechanics
+from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
+from gazerig.sim_mock.smart_servo.span import (
+    SMOOTHING,
+    SPAN_MS,
+    VOLTAGE_LEVELS,
+    SpanWeights,
+    span_weights,
+)
+
+SLOWEST = 1e-4
+"""Speeds below, in steps/ms, are none."""
+
+HELD_SAFELY = 0.999
+"""Share of the dry friction that surely holds."""
+
+RESOLUTION = 0.5
+"""The encoder sees no smaller error: the I part rests inside it, in steps."""
+
+
+class ShaftState(NamedTuple):
+    """All that moves of a shaft, and where its profile is."""
+
+    x: float
+    v: float
+    rv: float
+    u: float
+    effort: float
+    integral: float
+    joint: float
+    volts: float
+    profile: tuple[float, ...]
+
+
+class ShaftMotion:
+    """What moves of a shaft, and how.
+
+    x, v: position in steps and speed in steps/ms, as the encoder would see them, unrounded
+    joint: position of the joint behind the play
+    u, effort: PWM and torque (which is current) as shares
+    supply: open-circuit voltage, and
+    volts: present voltage, both as shares of the rated one
+    quiet: nothing will change until something is written or a hand pushes
+    """
+
+    __slots__ = (
+        "_built", "_high", "_integral", "_linear", "_load", "_loop", "_low", "_rv", "_since_ms",
+        "_span_start", "_weights",
+        "effort", "joint", "profile", "quiet", "supply", "u", "v", "volts", "x",
+    )  # fmt: skip
+
+    x: float
+    v: float
+    joint: float
+    u: float
+    effort: float
+    supply: float
+    volts: float
+    quiet: bool
+    profile: PositionProfile | SpeedProfile
+    _built: Mechanics
+    _loop: Loop
+    _linear: bool
+    _low: float
+    _high: float
+    _load: float
+    _integral: float
+    _rv: float
+    _since_ms: int
+    _span_start: ShaftState | None
+    _weights: dict[tuple[int, float], SpanWeights]
+
+    def run(self, ticks: int) -> None:
+        """Move on by so many milliseconds.
+
+        The shaft moves from change to change in spans of 5 ms. What is read in the middle of one
+        is computed from the span's start each time, so it does not change how the span ends.
+        """
+        if ticks == SPAN_MS and not self._since_ms and not self.quiet:
+            self._advance(SPAN_MS)  # this happens every tick of a loop at 200 Hz
+            return
+        while ticks > 0 and not self.quiet:
+            since = self._since_ms
+            until = min(since + ticks, SPAN_MS)
+            if since and self._span_start is not None:
+                self._return_to(self._span_start)
+            elif until < SPAN_MS:
+                self._span_start = self._state()
+            self._advance(until)
+            self._since_ms = until % SPAN_MS
+            ticks -= until - since
+
+    def _state(self) -> ShaftState:
+        return ShaftState(
+            self.x, self.v, self._rv, self.u, self.effort, self._integral, self.joint, self.volts,
+            self.profile.state(),
+        )  # fmt: skip
+
+    def _return_to(self, state: ShaftState) -> None:
+        self.x, self.v, self._rv, self.u, self.effort, self._integral, self.joint, self.volts = (
+            state[:8]
+        )
+        self.profile.restore(state.profile)
+
+    def _advance(self, ticks: int) -> None:
+        """Move on by some milliseconds, at once if that can be, else one by one."""
+        loop, profile = self._loop, self.profile
+        # Where there is no speed to follow, D brakes only.
+        kr = 0.0 if profile.jumps else loop.d + loop.f1
+        led = profile.running
+        before = profile.r
+        path = profile.ahead(ticks)
+        if ticks == SPAN_MS and self._linear and self._integral == 0.0:
+            # The quick ways: it moves on, or friction holds it. Where the duty may change only
+            # slowly, as in X330 servos, it meets that limit too often.
+            if abs(self.v) > self._built.dry:
+                if loop.slew == inf and self._glide(path if led else None, before, kr):
+                    return
+            elif self.v == 0.0 and not led and self._stick(kr):
+                return
+        was = self.x, self.u, self._integral, self.joint, self.volts
+        if not (self._linear and self._integral == 0.0 and self._step(path, before, kr)):
+            self._follow(path, before, kr)
+        if self.v == 0.0 and self._rv == 0.0 and not profile.running:
+            self.quiet = was == (self.x, self.u, self._integral, self.joint, self.volts)
+
+    def _stick(self, kr: float) -> bool:
+        """Stay where it is for a span if friction holds it; return False if it may not."""
+        kp, slew, u_max, built = self._loop.p, self._loop.slew, self._loop.u_max, self._built
+        rv, pulled = self._rv, kp * (self.profile.r - self.x)
+        push, load = built.accel * self.supply, self._load
+        u_first = pulled + kr * (rv * (1.0 - SMOOTHING))
+        for _ in range(SPAN_MS):
+            rv -= rv * SMOOTHING
+            if -SLOWEST < rv < SLOWEST:
+                rv = 0.0
+        u = pulled + kr * rv
+        hold = built.dry * HELD_SAFELY
+        if not (
+            -hold <= load + push * u_first <= hold
+            and -hold <= load + push * u <= hold
+            and abs(u_first - self.u) <= slew
+            and abs(u_first) <= u_max
+        ):
+            return False
+        volts = self.supply / (1.0 + built.sag * u * u)
+        self.quiet = rv == self._rv and u == self.u and volts == self.volts
+        self._rv, self.u, self.volts = rv, u, volts
+        self.effort = u * volts
+        return True
+
+    def _glide(self, path: Sequence[float] | None, before: float, kr: float) -> bool:
+        """Move for a span if nothing changes sides in it; return False if something may.
+
+        path: the profile's position after each millisecond, None where it rests
+        before: that at the start
+        """
+        loop = self._loop
+        accel, drag, _, dry, rate, _, _, play, sag = self._built
+        kp, kd, u_max = loop.p, loop.d, loop.u_max
+        v, rv, volts, error = self.v, self._rv, self.volts, before - self.x
+        level = round(volts * VOLTAGE_LEVELS)
+        weights = self._weights.get((level, kr))
+        if weights is None:
+            weights = self._weights[level, kr] = span_weights(drag, accel, kp, kd, kr, level)
+        still, led, push, divisor = weights
+        end, first, jump = before, 0.0, 0.0
+        if path is not None:
+            p1, p2, p3, p4, end = path
+            first, d2, d3, d4, d5 = p1 - before, p2 - p1, p3 - p2, p4 - p3, end - p4
+            bend = abs(d3 - d2 - d2 + first) + abs(d4 - d3 - d3 + d2) + abs(d5 - d4 - d4 + d3)
+            # So much the duty may change beyond its first change where the profile bends.
+            jump = (kp + kr * SMOOTHING) * bend * drag / divisor
+        torque = self._load - dry if v > 0.0 else self._load + dry
+        rv_first = rv + (first - rv) * SMOOTHING
+        v_first = (v + push * (kp * (error + first) + kr * rv_first) + torque) / divisor
+        u_first = kp * (error + first - v_first) + kr * rv_first - kd * v_first
+        if not ((v_first > dry if v > 0.0 else v_first < -dry) and abs(u_first) + jump <= u_max):
+            return False
+        ee, ev, er, et, ve, vv, vr, vt, rr = still
+        error_end = ee * error + ev * v + er * rv + et * torque
+        v_end = ve * error + vv * v + vr * rv + vt * torque
+        rv_end = rr * rv
+        if path is not None:
+            e1, e2, e3, e4, e5, v1, v2, v3, v4, v5, r1, r2, r3, r4, r5 = led
+            error_end += e1 * first + e2 * d2 + e3 * d3 + e4 * d4 + e5 * d5
+            v_end += v1 * first + v2 * d2 + v3 * d3 + v4 * d4 + v5 * d5
+            rv_end += r1 * first + r2 * d2 + r3 * d3 + r4 * d4 + r5 * d5
+        u, x = kp * error_end + kr * rv_end - kd * v_end, end - error_end
+        if not (
+            (v_end > dry if v > 0.0 else v_end < -dry)
+            and abs(u) + jump <= u_max
+            and self._low <= x <= self._high
+        ):
+            return False
+        self.x, self.v, self.u = x, v_end, u
+        self._rv = 0.0 if -SLOWEST < rv_end < SLOWEST else rv_end
+        self.effort = t = u * volts - v_end * rate
+        power = u * t
+        self.volts = self.supply - sag * power if power > 0.0 else self.supply
+        if not -play <= x - self.joint <= play:
+            self.joint = x - play if x > self.joint else x + play
+        return True
+
+    def _step(self, path: Sequence[float], before: float, kr: float) -> bool:
+        """Do what ``_follow`` does, the same to the bit, while no limit is met; else return False.
+
+        This happens every tick to whatever starts, stops or turns round.
+        """
+        kp, u_max, slew = self._loop.p, self._loop.u_max, self._loop.slew
+        accel, drag, _, dry, rate, _, _, play, sag = self._built
+        x, v, u, joint, rv = self.x, self.v, self.u, self.joint, self._rv
+        low, high, supply, volts, load = self._low, self._high, self.supply, self.volts, self._load
+        u_least, slew_down, play_low, t = -u_max, -slew, -play, self.effort
+        k = kp + self._loop.d
+        for r in path:
+            rv += (r - before - rv) * SMOOTHING
+            if -SLOWEST < rv < SLOWEST:
+                rv = 0.0
+            before = r
+            c = kp * (r - x) + kr * rv
+            push = accel * volts
+            w = v + load + push * c
+            if w > dry:
+                v = (w - dry) / (drag + push * k)
+            elif w < -dry:
+                v = (w + dry) / (drag + push * k)
+            else:
+                v = 0.0
+            earlier, u = u, c - k * v
+            x += v
+            if not (
+                u_least <= u <= u_max and slew_down <= u - earlier <= slew and low <= x <= high
+            ):
+                return False
+            t = u * volts - v * rate
+            power = u * t
+            volts = supply - sag * power if power > 0.0 else supply
+            if not play_low <= x - joint <= play:
+                joint = x - play if x > joint else x + play
+        self.x, self.v, self.u, self.effort = x, v, u, t
+        self.joint, self.volts, self._rv = joint, volts, rv
+        return True
+
+    def _follow(self, path: Sequence[float], before: float, kr: float) -> None:
+        """Follow a path of one position a millisecond, with a gain on its speed."""
+        kp, ki, kd, vi, _, kf2, bias, u_max, torque_max, slew = self._loop
+        accel, drag, free, dry, rate, gravity, upright, play, sag = self._built
+        x, v, u, t, i, joint = self.x, self.v, self.u, self.effort, self._integral, self.joint
+        low, high, supply, volts, load = self._low, self._high, self.supply, self.volts, self._load
+        rv, u_least, t_least, slew_down, play_low = self._rv, -u_max, -torque_max, -slew, -play
+        integrating = ki != 0.0 or vi != 0.0
+        k = kp + kd
+        special = kf2 != 0.0 or gravity != 0.0
+        for r in path:
+            last = rv
+            rv += (r - before - rv) * SMOOTHING
+            if -SLOWEST < rv < SLOWEST:
+                rv = 0.0
+            before = r
+            c = kp * (r - x) + kr * rv + i + bias
+            if special:
+                c += kf2 * (rv - last)
+                load = self._load + gravity * sin((x - upright) / STEPS_PER_RAD)
+            pull = v + load
+            push = accel * volts
+            w = pull + push * c
+            # Dry friction stops what the torque of 1 ms cannot move.
+            if w > dry:
+                v = (w - dry) / (drag + push * k)
+            else:
+                v = (w + dry) / (drag + push * k) if w < -dry else 0.0
+            earlier, u = u, c - k * v
+            clipped = not (u_least <= u <= u_max and slew_down <= u - earlier <= slew)
+            if clipped:
+                least, most = earlier - slew, earlier + slew
+                u = most if u > most else least if u < least else u
+                u = u_max if u > u_max else u_least if u < u_least else u
+                w = pull + push * u
+                v = (w - dry) / drag if w > dry else (w + dry) / drag if w < -dry else 0.0
+            t = u * volts - v * rate
+            if not t_least <= t <= torque_max:
+                clipped = True
+                t = torque_max if t > torque_max else t_least
+                w = pull + accel * t
+                v = (w - dry) / free if w > dry else (w + dry) / free if w < -dry else 0.0
+                u = (t + v * rate) / volts if volts > 0.0 and torque_max > 0.0 else 0.0
+            x += v
+            if not low <= x <= high:
+                x, v = high if x > high else low, 0.0
+                u = min(max(c, earlier - slew, u_least), earlier + slew, u_max)
+                u, t = _stalled(u, volts, torque_max)
+            power = u * t
+            volts = supply - sag * power if power > 0.0 else supply
+            if integrating and not clipped:
+                if vi:
+                    i += vi * (rv - v)
+                elif r - x > RESOLUTION or x - r > RESOLUTION:
+                    i += ki * (r - x)
+                i = u_max if i > u_max else u_least if i < u_least else i
+            if not play_low <= x - joint <= play:
+                joint = x - play if x > joint else x + play
+        self.x, self.v, self.u, self.effort, self._integral = x, v, u, t, i
+        self.joint, self.volts, self._rv = joint, volts, rv
+
+
+def _stalled(u: float, volts: float, torque_max: float) -> tuple[float, float]:
+    """Return PWM and torque of a shaft that cannot move, within its torque limit."""
+    t = u * volts
+    if -torque_max <= t <= torque_max:
+        return u, t
+    t = torque_max if t > torque_max else -torque_max
+    return (t / volts if volts > 0.0 and torque_max > 0.0 else 0.0), t

@@ -1,0 +1,27 @@
+"""Noise of the readings of a servo that holds still."""
+
+from functools import lru_cache
+
+LENGTH = 4096
+"""Milliseconds after which it repeats; a power of 2."""
+SEED_APART_MS = 1009
+"""Servos of different seeds are so far apart in it."""
+
+
+@lru_cache(maxsize=8)
+def flicker(current: int, velocity: int) -> tuple[tuple[int, int], ...]:
+    """Return the noise of current and velocity for each of ``LENGTH`` milliseconds.
+
+    A number of the time alone, so that reading does not change it; velocity is mostly 0.
+    """
+    return tuple(_noise(now_ms, current, velocity) for now_ms in range(LENGTH))
+
+
+def _noise(now_ms: int, current: int, velocity: int) -> tuple[int, int]:
+    mixed = (now_ms * 0x9E3779B1) & 0xFFFFFFFF
+    mixed = ((mixed ^ mixed >> 15) * 0x85EBCA6B) & 0xFFFFFFFF
+    mixed ^= mixed >> 13
+    amps = mixed % (2 * current + 1) - current
+    if mixed >> 24 & 3:
+        return amps, 0
+    return amps, (mixed >> 8) % (2 * velocity + 1) - velocity

@@ -1,0 +1,65 @@
+"""Five milliseconds of a shaft at once: while nothing changes sides its steps are one linear map.
+
+The weights of that map are those of the steps themselves (gazerig.sim_mock.smart_servo.motor), made
+once for each controller and voltage with nothing but sums and products: the same on every machine.
+"""
+
+from functools import lru_cache
+
+SPAN_MS = 5
+SMOOTHING = 0.25
+"""Share of the profile's new speed that D and feed-forward take over in 1 ms: what differs from
+one millisecond to the next must be smoothed in any servo, the time of 4 ms is assumed."""
+
+VOLTAGE_LEVELS = 1024
+"""The voltage counts as constant meanwhile, rounded to this part of the rated one."""
+
+Still = tuple[float, ...]
+"""Weights of error, speed, reference speed and constant torque: for the error after the span (4),
+for the speed (4); and of the reference speed for itself (1)."""
+Led = tuple[float, ...]
+"""Weights of the profile's motion in each millisecond: 5 each for error, speed, profile speed."""
+
+SpanWeights = tuple[Still, Led, float, float]
+"""With push and divisor of the first millisecond."""
+
+
+@lru_cache(maxsize=4096)
+def span_weights(
+    drag: float, accel: float, kp: float, kd: float, kr: float, level: int
+) -> SpanWeights:
+    """Return the weights for one controller and voltage.
+
+    Args:
+        drag: what divides a speed after 1 ms, without the controller.
+        accel: speed that the stall torque adds in 1 ms.
+        kp: gain on the position error.
+        kd: gain on the speed.
+        kr: gain on the reference speed.
+        level: voltage as a share of the rated one, in parts of ``VOLTAGE_LEVELS``.
+    """
+    push = accel * level / VOLTAGE_LEVELS
+    divisor = drag + push * (kp + kd)
+    none = (0.0,) * SPAN_MS
+
+    def after(
+        error: float, v: float, rv: float, torque: float, moves: tuple[float, ...]
+    ) -> tuple[float, float, float]:
+        for d in moves:
+            rv += (d - rv) * SMOOTHING
+            v = (v + push * (kp * (error + d) + kr * rv) + torque) / divisor
+            error += d - v
+        return error, v, rv
+
+    own = (
+        after(1.0, 0.0, 0.0, 0.0, none),
+        after(0.0, 1.0, 0.0, 0.0, none),
+        after(0.0, 0.0, 1.0, 0.0, none),
+        after(0.0, 0.0, 0.0, 1.0, none),
+    )
+    moved = tuple(
+        after(0.0, 0.0, 0.0, 0.0, (*none[:i], 1.0, *none[i + 1 :])) for i in range(SPAN_MS)
+    )
+    still = (*(one[0] for one in own), *(one[1] for one in own), own[2][2])
+    led = tuple(one[part] for part in range(3) for one in moved)
+    return still, led, push, divisor
