@@ -235,14 +235,12 @@ class Oculomotor:
         """Return the angles of both eyes clipped to their ranges; the same where nothing is."""
         (left_yaw, left_pitch), (right_yaw, right_pitch) = eyes
         left, right = self._eye_limits
-        if (
-            left[0][0] <= left_yaw <= left[0][1]
-            and left[1][0] <= left_pitch <= left[1][1]
-            and right[0][0] <= right_yaw <= right[0][1]
-            and right[1][0] <= right_pitch <= right[1][1]
-        ):
-            return eyes
-        return _clip(eyes[0], self._eye_limits[0]), _clip(eyes[1], self._eye_limits[1])
+        (yaw_low, yaw_high), (pitch_low, pitch_high) = left
+        if yaw_low <= left_yaw <= yaw_high and pitch_low <= left_pitch <= pitch_high:
+            (yaw_low, yaw_high), (pitch_low, pitch_high) = right
+            if yaw_low <= right_yaw <= yaw_high and pitch_low <= right_pitch <= pitch_high:
+                return eyes
+        return _clip(eyes[0], left), _clip(eyes[1], right)
 
     def _limited(
         self, wanted: tuple[Angles2, Angles2], head: Angles3, facing: Angles2

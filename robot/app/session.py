@@ -210,7 +210,7 @@ class Session:
                     say(note)
                 run_observers.open()
                 loop = TickLoop(
-                    made.robot, made.clock, lambda: made.loop, run_observers.timed(self._stop),
+                    made.robot, made.clock, lambda: made.live.rig.loop, run_observers.timed(self._stop),
                     self._observers.update,
                 )  # fmt: skip
                 yield loop

@@ -1,4 +1,4 @@
-"""Orders on their way from any thread to the tick: bounded, and a stop before all else."""
+"""Commands on their way from any thread to the tick: bounded, and a stop before all else."""
 
 from collections import deque
 from contextlib import suppress
@@ -9,7 +9,7 @@ from gazerig.robot.model.reply import CommandReply, Ticket
 
 MAX_WAITING = 64
 MAX_PER_TICK = 8
-"""Orders obeyed in one tick, stops not counted; among them one change of parameters at most,
+"""Commands executed in one tick, stops not counted; among them one change of parameters at most,
 as that takes longest."""
 
 
@@ -21,7 +21,7 @@ class QueuedCommand(NamedTuple):
 
 
 class CommandQueue:
-    """What was asked for since the last tick."""
+    """The commands that have come since the last tick."""
 
     def __init__(self) -> None:
         self._commands: deque[QueuedCommand] = deque()

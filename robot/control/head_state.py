@@ -29,9 +29,9 @@ class JointReading:
         velocity_rad_s: as measured.
         estimated: the servo tells nothing: ``measured_rad`` is its goal moved by its known speed.
         limited: why ``commanded_rad`` is another angle than ``desired_rad``, "" where it is not.
-        torque: whether the torque is on; None where nobody knows.
+        torque: whether the torque is on; None where that is not known.
         fault: latched hardware errors, "" for none.
-        load: share of the stall torque, signed, -1..1; None where nobody knows.
+        load: share of the stall torque, signed, -1..1; None where that is not known.
         temperature_c: None before the first reading.
         voltage_v: None before the first reading.
     """

@@ -1,4 +1,4 @@
-"""Joints that the guard had to hold back for a fault: said when it begins and ends, and counted."""
+"""Joints that the guard held for a fault: reported when that begins and ends, and counted."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
@@ -12,13 +12,13 @@ FAULTS = frozenset(
 """Reasons of the guard to hold a joint that something is wrong with; latched errors besides."""
 
 _PASSING_S = {"stale joints": 0.5, "torque off": 0.5}
-"""A lost answer or a restart that is over sooner is none."""
+"""A lost answer or a restart that is over sooner is no fault."""
 _OVER_S = 1.0
-"""A joint that tries again is not well yet: it is when it has not been held for so long."""
+"""A fault is over when the joint has not been held for so long; a retry alone does not end it."""
 
 
 class JointFault(NamedTuple):
-    """What befell one joint in a run.
+    """A fault of one joint in a run.
 
     times: how often it began; seconds: how long it lasted in all
     """
@@ -29,7 +29,7 @@ class JointFault(NamedTuple):
     seconds: float
 
     def __str__(self) -> str:
-        """Write it for a line."""
+        """Return it as text."""
         often = "" if self.times == 1 else f", {self.times} times"
         return f"{self.joint} {self.reason} ({self.seconds:.1f} s{often})"
 

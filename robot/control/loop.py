@@ -265,11 +265,11 @@ class Robot:
         params: LoopParams,
         again: Callable[[], bool] | None = None,
     ) -> bool:
-        """Move slowly to the parking pose; tell whether it was reached in time.
+        """Move slowly to the parking pose; return whether it was reached in time.
 
         A user's stop ends it: the torque is off then. Other commands wait for nothing any more.
 
-        again: asked at every step, tells whether the rest is to be skipped
+        again: asked at every step, returns whether the rest is to be skipped
         """
         self._guard.go_gently()
         start_s = clock.now_s()

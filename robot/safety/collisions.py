@@ -62,7 +62,7 @@ class Collisions:
         position: JointAngles,
         held: Sequence[bool],
     ) -> None:
-        """Set this tick's limits, and return which joints have to leave a forbidden range first.
+        """Set this tick's limits, and find which joints have to leave a forbidden range first.
 
         desired: where the joints want to go, any numbers at all
         position: as measured
@@ -88,7 +88,7 @@ class Collisions:
         desired: JointAngles,
         position: JointAngles,
     ) -> bool:
-        """Wall off the keeper of a pair; tell whether there is one."""
+        """Wall off the keeper of a pair; return whether there is one."""
         keeper = self._keeper[k]
         if not _side(pair[keeper], motion):
             keeper = 1 - keeper

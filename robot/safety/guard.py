@@ -263,7 +263,7 @@ class Guard:
     def _pass(
         self, i: int, desired: float, joints: JointState, fresh: bool, unseen: bool, dt_s: float
     ) -> tuple[int, str]:
-        """Move one joint; give the rank of the level and the reason, if there is one."""
+        """Move one joint; return the rank of the level and the reason, if there is one."""
         position = joints.position_rad[i]
         fault = joints.fault[i] if joints.fault else ""
         fresh = fresh and isfinite(position)
@@ -353,7 +353,7 @@ class Guard:
             self._motion.seek(i, hold.goal, dt_s, limit.speed_rad_s, limit.accel_rad_s2)
 
     def _go(self, i: int, desired: float, position: float, dt_s: float) -> str:
-        """Move a joint towards its desired angle as far as it may; give why it fell short."""
+        """Move a joint towards its desired angle as far as it may; return why it fell short."""
         motion, limit, share = self._motion, self._limits[i], self._health.share[i]
         began = motion.command[i]
         target = min(max(desired, motion.low[i]), motion.high[i])
