@@ -2,7 +2,6 @@
 
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -88,6 +87,8 @@ def resized(depth_m: Depth, width_px: int, height_px: int) -> Depth:
     """Resize a depth image to its colour image, without inventing distances."""
     if depth_m.shape == (height_px, width_px):
         return depth_m
+    import cv2  # here, as the control loop's process reads depths, but resizes nothing
+
     size = width_px, height_px
     found = np.asarray(cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST), np.float32)
     found.setflags(write=False)

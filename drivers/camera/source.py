@@ -4,7 +4,6 @@ import threading
 from collections.abc import Callable
 from typing import Any, NamedTuple, Protocol
 
-import cv2
 import numpy as np
 
 from gazerig.drivers.camera.pinhole import Intrinsics
@@ -72,6 +71,8 @@ def bgr(pixels: Any) -> ImageArray | None:
     channels = 1 if found.ndim == 2 else found.shape[2] if found.ndim == 3 else 0
     if found.dtype != np.uint8 or not found.size or channels not in (1, 3, 4):
         return None
+    if channels != 3:
+        import cv2  # in the process that has a camera, and not in that of the control loop
     if channels == 1:
         found = np.asarray(cv2.cvtColor(found, cv2.COLOR_GRAY2BGR), np.uint8)
     elif channels == 4:

@@ -10,8 +10,6 @@ from dataclasses import replace
 from multiprocessing.connection import Connection
 from typing import NamedTuple
 
-import cv2
-
 from gazerig.drivers.camera.capture_loop import CaptureLoop, failed
 from gazerig.drivers.camera.frame_analysis import Locate, Motion
 from gazerig.drivers.camera.params import CameraRecoveryParams
@@ -68,6 +66,8 @@ def run(
     pipe: Connection, parts: CameraParts, now_s: Callable[[], float], recovery: CameraRecoveryParams
 ) -> None:
     """Run the process: open, detect and report, until stopped or the other side is gone."""
+    import cv2  # the control loop's process, which imports this module too, does without
+
     # Ctrl-C reaches all processes of a terminal; it is the loop's to end this one.
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)

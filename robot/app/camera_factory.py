@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from gazerig.config.schema import Rig
+from gazerig.drivers.camera import sources
 from gazerig.drivers.camera.camera_plugins import camera_part, is_source, plugin_source
+from gazerig.drivers.camera.frame_analysis import Motion
 from gazerig.drivers.camera.guarded_camera import CLOSE_PROCESS_S, GuardedCamera
-from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.pose_buffer import PoseBuffer
 from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.source import FrameSource
@@ -18,10 +19,8 @@ from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.camera.worker import CameraParts
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.plugins import CAMERA, CameraPlugin, PluginError, find, is_ours, load
-from gazerig.drivers.types import Camera, MovingBlob
+from gazerig.drivers.types import Camera, FaceDetector
 from gazerig.drivers.vision.face.detector import face_detector
-from gazerig.drivers.vision.motion.detector import MotionDetector, turned_between
-from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts, program_camera, watched
@@ -30,8 +29,6 @@ from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.motion_source import motion_finder, retuned
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
-from gazerig.sim_mock.cameras.rendered import Exposure, PixelCamera, PixelCameraParams
-from gazerig.sim_mock.cameras.video import FilmCamera
 from gazerig.sim_mock.scenes.scene import Scene
 
 if TYPE_CHECKING:
@@ -57,8 +54,12 @@ def scene_camera(
     if not options.pixels:
         params = SceneCameraParams(horizontal_field_deg=field_deg)
         return SceneCamera(params, scene, mount, where, rng, locate)
+    # Drawing and detecting, with OpenCV.
+    from gazerig.robot.app.drawn_motion import MotionOfDrawn
+    from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
+
     drawn = PixelCameraParams(horizontal_field_deg=field_deg)
-    motion = _MotionOfDrawn(rig.motion)
+    motion = MotionOfDrawn(rig.motion)
     return PixelCamera(drawn, scene, mount, where, own.find_faces(rig), rng, motion, locate)
 
 
@@ -86,6 +87,8 @@ def real_camera(
     if own.camera is not None:
         return program_camera(rig, own, clock, motion, locate, options.fast)
     if options.fast:
+        from gazerig.sim_mock.cameras.video import FilmCamera
+
         film, delay_s = _film(options), options.film_delay_s
         return FilmCamera(film, own.find_faces(rig), delay_s, motion=motion(), locate=locate)
     name = options.camera if isinstance(options.camera, str) else None
@@ -142,22 +145,40 @@ def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams)
         match camera:
             case GuardedCamera():
                 return retune_camera(camera.camera, before, after, placed)
-            case CameraProcess() | FilmCamera():
+            case CameraProcess():
                 motion = partial(retuned, after.motion, placed.lens, field_rad)
                 done = camera.retune(detector, motion if moves else None, locate)
             case CameraThread():  # it looks with the program's own detector
                 motion = partial(retuned, after.motion, placed.lens, field_rad)
                 done = camera.retune(None, motion if moves else None, locate)
-            case PixelCamera():
-                drawn = partial(_retuned_drawn, after.motion)
-                done = camera.retune(detector, drawn if moves else None, locate)
             case SceneCamera():  # it makes up what a detector would find
                 done = locate is None or camera.retune(locate)
             case _:
-                return ""
+                motion = partial(retuned, after.motion, placed.lens, field_rad)
+                done = _retune_detecting(camera, after, detector, motion if moves else None, locate)
     except SetupError as error:
         return f"the detector stays as it was: {error}"
     return "" if done else "the camera's process is busy and looks as before: set it once more"
+
+
+def _retune_detecting(
+    camera: Camera,
+    after: Rig,
+    detector: Callable[[], FaceDetector] | None,
+    motion: Callable[[Motion | None], Motion | None] | None,
+    locate: FrameLocator | None,
+) -> bool:
+    """Change a camera that looks for faces in simulated time; others have nothing to change."""
+    from gazerig.robot.app.drawn_motion import retuned_drawn
+    from gazerig.sim_mock.cameras.rendered import PixelCamera
+    from gazerig.sim_mock.cameras.video import FilmCamera
+
+    if isinstance(camera, FilmCamera):
+        return camera.retune(detector, motion, locate)
+    if isinstance(camera, PixelCamera):
+        drawn = partial(retuned_drawn, after.motion) if motion is not None else None
+        return camera.retune(detector, drawn, locate)
+    return True
 
 
 def _film(options: RunOptions) -> "VideoFile | CameraReplay":
@@ -173,59 +194,14 @@ def _film(options: RunOptions) -> "VideoFile | CameraReplay":
 def _source(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
     """Return how to make the source, for the process that will use it."""
     if options.replay is not None:
-        from gazerig.drivers.camera.playback import CameraReplay
-
-        return partial(CameraReplay, options.replay)
+        return partial(sources.recording, options.replay)
     if options.video is not None:
-        from gazerig.drivers.camera.video_file import VideoFile
-
-        return partial(VideoFile, options.video)
+        return partial(sources.film, _path(options))
     if options.oak or options.camera == "oak":
-        from gazerig.drivers.camera.oak.source import OakSource
-
-        return partial(OakSource, rig.oak)
-    from gazerig.drivers.camera.webcam import Webcam
-
+        return partial(sources.oak, rig.oak)
     number = options.camera if isinstance(options.camera, int) else 0
-    return partial(Webcam.of, number, rig.webcam)
+    return partial(sources.webcam, number, rig.webcam)
 
 
 def _path(options: RunOptions) -> str:
     return str(options.video)
-
-
-class _MotionOfDrawn:
-    """Finds what moves in drawn frames, which know how the camera was turned."""
-
-    def __init__(self, params: MotionParams) -> None:
-        self._enabled = params.enabled
-        self._detector = MotionDetector(params)
-        self._before: Mat3 | None = None
-
-    def retune(self, params: MotionParams) -> None:
-        """Use new parameters from the next frame on; tracked faces are kept."""
-        self._enabled = params.enabled
-        self._detector.retune(params)
-        if not params.enabled:
-            self._detector.forget()
-
-    def __call__(self, shot: Exposure, lens: Intrinsics) -> tuple[MovingBlob, ...]:
-        """Find what has moved since the frame before; nothing while not enabled."""
-        before, self._before = self._before, shot.R_world_camera
-        if not self._enabled:
-            return ()
-        turned = (
-            turned_between(np.array(shot.R_world_camera), np.array(before))
-            if before is not None and self._detector.before_s is not None
-            else None
-        )
-        return self._detector.find(shot.image, shot.captured_s, lens, turned, shot.depth_m)
-
-
-FindMotion = Callable[[Exposure, Intrinsics], tuple[MovingBlob, ...]]
-
-
-def _retuned_drawn(params: MotionParams, find: FindMotion | None) -> FindMotion | None:
-    if isinstance(find, _MotionOfDrawn):
-        find.retune(params)
-    return find

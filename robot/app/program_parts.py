@@ -12,8 +12,7 @@ from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import Camera, FaceDetector
-from gazerig.drivers.vision.face.detector import CheckedDetector, face_detector
-from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
+from gazerig.drivers.vision.face.detector import CheckedDetector, face_detector, mtcnn
 from gazerig.robot.control.chooser import LONGEST_S, Chooser, GuardedChooser, TargetChooser
 from gazerig.robot.model.clock import Clock
 
@@ -36,7 +35,7 @@ class ProgramParts(NamedTuple):
             return face_detector(rig.detector)
         _require(self.detector, "detector", "find")
         label = _label("detector", self.detector)
-        return CheckedDetector(self.detector, label, lambda: MtcnnDetector(rig.detector))
+        return CheckedDetector(self.detector, label, lambda: mtcnn(rig.detector))
 
     def choose(
         self, own: TargetChooser, say: Callable[[str], None], simulated: bool

@@ -20,7 +20,6 @@ from gazerig.gaze.types import Percept
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickRow, decode_plain, decode_rows, encode
 from gazerig.robot.control.tick_text import health_text, perception_text
-from gazerig.robot.dashboard.camera_overlay import draw_detections, ground
 from gazerig.robot.dashboard.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
@@ -161,6 +160,9 @@ class LiveFeed:
         field_rad = builder.rig.horizontal_rad
         lens = intrinsics_of_lens(None, field_rad, found.width_px, found.height_px, found.lens)
         gaze_px = self._gaze_px(tick, builder.rig, found, lens)
+        # The page's process draws; the control loop's imports this module too, without OpenCV.
+        from gazerig.robot.dashboard.camera_overlay import draw_detections, ground
+
         return draw_detections(ground(found, self._wants_depth), found, gaze_px, lens.fx_px)
 
     def _take_rig(self, rig: LiveRig) -> None:

@@ -7,7 +7,6 @@ reconstruction): two tangential and three radial coefficients, in the order k1 k
 
 from functools import lru_cache
 
-import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -16,8 +15,8 @@ from gazerig.robot.model.frames import LensParams
 
 Floats = NDArray[np.float64]
 
-# Undistorting is a search; with strong lenses OpenCV's usual five rounds leave a pixel.
-_UNTIL = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-10)
+# Undistorting is a search; with strong lenses the usual five rounds leave a pixel.
+_ROUNDS, _LEAST_STEP = 40, 1e-12
 # Two sizes of image show the same field if their shapes differ by no more than rounding.
 _SAME_SHAPE = 0.01
 
@@ -77,10 +76,9 @@ def rays(points_px: ArrayLike, intrinsics: Intrinsics) -> Floats:
     i = intrinsics
     found = np.ones((len(points), 3))
     if i.distorts and len(points):
-        flat = cv2.undistortPointsIter(
-            points[:, None], i.matrix, np.array(i.distortion), np.eye(3), np.eye(3), _UNTIL
+        found[:, :2] = _undistorted(
+            (points - (i.cx_px, i.cy_px)) / (i.fx_px, i.fy_px), i.distortion
         )
-        found[:, :2] = flat[:, 0]
     else:
         found[:, :2] = (points - (i.cx_px, i.cy_px)) / (i.fx_px, i.fy_px)
     return found
@@ -91,6 +89,29 @@ def undistorted(points_px: ArrayLike, intrinsics: Intrinsics) -> Floats:
     i = intrinsics
     points: Floats = rays(points_px, i)[:, :2] * (i.fx_px, i.fy_px) + (i.cx_px, i.cy_px)
     return points
+
+
+def _undistorted(plane: Floats, distortion: Distortion) -> Floats:
+    """Return the points of the plane z = 1 that the lens moves to these, by fixed-point rounds.
+
+    Where the model of the lens has no such point, what it moves is returned as it is.
+    """
+    k1, k2, p1, p2, k3 = distortion
+    found = plane
+    for _ in range(_ROUNDS):
+        x, y = found[:, 0], found[:, 1]
+        r2 = x * x + y * y
+        radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))
+        dx = 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x)
+        dy = p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
+        with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+            nearer = (plane - np.stack((dx, dy), axis=1)) / radial[:, None]
+        nearer = np.where(radial[:, None] > 0.0, nearer, plane)
+        step = np.abs(nearer - found).max(initial=0.0)
+        found = nearer
+        if step < _LEAST_STEP:
+            break
+    return found
 
 
 def _distorted(plane: Floats, distortion: Distortion) -> Floats:

@@ -6,7 +6,6 @@ from gazerig.drivers.camera.frame_analysis import Motion
 from gazerig.drivers.camera.pose_buffer import PoseBuffer
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import MovingBlob
-from gazerig.drivers.vision.motion.detector import MotionDetector
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.gaze.types import Floats
 from gazerig.robot.model.frames import LensParams
@@ -30,6 +29,9 @@ class MotionSource:
         field_rad: float,
         turns: PoseBuffer | None,
     ) -> None:
+        # Here, with OpenCV: the control loop's process only tells another to make one.
+        from gazerig.drivers.vision.motion.detector import MotionDetector
+
         self._enabled, self._lens, self._field_rad = params.enabled, lens, field_rad
         self._turns = turns
         self._detector = MotionDetector(params)

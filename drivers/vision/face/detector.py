@@ -21,17 +21,24 @@ from gazerig.drivers.plugins import (
     made,
 )
 from gazerig.drivers.types import DetectedFace, FaceDetector, ImageArray
-from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
-from gazerig.drivers.vision.face.yunet import YunetDetector
+
+
+def mtcnn(params: FaceDetectorParams) -> FaceDetector:
+    """Make the detector that needs no file; OpenCV is imported with it."""
+    from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
+
+    return MtcnnDetector(params)
 
 
 def _yunet(params: FaceDetectorParams) -> FaceDetector:
+    from gazerig.drivers.vision.face.yunet import YunetDetector
+
     return YunetDetector(params, params.model_file)
 
 
 MTCNN = DetectorPlugin(
-    MtcnnDetector, FaceDetectorParams, ("landmarks",), Evidence(tested="photographs and films")
+    mtcnn, FaceDetectorParams, ("landmarks",), Evidence(tested="photographs and films")
 )
 YUNET = DetectorPlugin(_yunet, FaceDetectorParams, ("landmarks",))
 
@@ -47,7 +54,7 @@ def face_detector(params: FaceDetectorParams) -> FaceDetector:
     if is_ours(DETECTOR, params.kind):
         return cast(FaceDetector, part.make(params))
     found = made(DETECTOR, params.kind, part, getattr(params, params.kind))
-    return CheckedDetector(found, find(DETECTOR, params.kind).label, lambda: MtcnnDetector(params))
+    return CheckedDetector(found, find(DETECTOR, params.kind).label, lambda: mtcnn(params))
 
 
 class CheckedDetector:

@@ -1,0 +1,50 @@
+"""What moves in frames that are drawn of a simulated scene."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.types import MovingBlob
+from gazerig.drivers.vision.motion.detector import MotionDetector, turned_between
+from gazerig.drivers.vision.motion.params import MotionParams
+from gazerig.gaze.types import Mat3
+from gazerig.sim_mock.cameras.rendered import Exposure
+
+
+class MotionOfDrawn:
+    """Finds what moves in drawn frames, which know how the camera was turned."""
+
+    def __init__(self, params: MotionParams) -> None:
+        self._enabled = params.enabled
+        self._detector = MotionDetector(params)
+        self._before: Mat3 | None = None
+
+    def retune(self, params: MotionParams) -> None:
+        """Use new parameters from the next frame on; tracked faces are kept."""
+        self._enabled = params.enabled
+        self._detector.retune(params)
+        if not params.enabled:
+            self._detector.forget()
+
+    def __call__(self, shot: Exposure, lens: Intrinsics) -> tuple[MovingBlob, ...]:
+        """Find what has moved since the frame before; nothing while not enabled."""
+        before, self._before = self._before, shot.R_world_camera
+        if not self._enabled:
+            return ()
+        turned = (
+            turned_between(np.array(shot.R_world_camera), np.array(before))
+            if before is not None and self._detector.before_s is not None
+            else None
+        )
+        return self._detector.find(shot.image, shot.captured_s, lens, turned, shot.depth_m)
+
+
+FindMotion = Callable[[Exposure, Intrinsics], tuple[MovingBlob, ...]]
+
+
+def retuned_drawn(params: MotionParams, find: FindMotion | None) -> FindMotion | None:
+    """Change the parameters of what finds motion in drawn frames."""
+    if isinstance(find, MotionOfDrawn):
+        find.retune(params)
+    return find
