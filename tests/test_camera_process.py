@@ -17,11 +17,13 @@ from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.playback import CameraReplay
 from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.recording_writer import RecordingWriter
+from gazerig.drivers.camera.shared_detections import SharedDetections
 from gazerig.drivers.camera.shared_frames import SlotReader, SlotWriter
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.camera.worker import CameraParts
 from gazerig.drivers.errors import CameraError, ModelFileError
+from gazerig.drivers.types import Detections
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.robot.perception.frame_locator import FrameLocator
@@ -31,12 +33,13 @@ DETECTOR = partial(face_detector, FaceDetectorParams(work_width_px=64))
 LOCATOR = FrameLocator(None, 1.2)
 
 
-def wait_for(what) -> None:
-    """Wait until something holds."""
+def wait_for(what):
+    """Wait until something holds; return it."""
     end = time.monotonic() + PATIENCE_S
-    while not what():
+    while not (found := what()):
         assert time.monotonic() < end, "the camera process is stuck"
         time.sleep(0.002)
+    return found
 
 
 @pytest.fixture
@@ -57,6 +60,12 @@ def process(source, care=None) -> CameraProcess:
     return CameraProcess(CameraParts(source, DETECTOR), time.monotonic, care)
 
 
+def whole(camera):
+    """Return the newest detections unless their slots have been written again meanwhile."""
+    found = camera.latest(0.0)
+    return found if found.image is not None and found.depth_m is not None else None
+
+
 def test_what_was_found_comes_over_with_picture_depth_and_lens(recording):
     camera = process(partial(CameraReplay, recording))
     assert camera.latest(0.0) is None
@@ -67,7 +76,7 @@ def test_what_was_found_comes_over_with_picture_depth_and_lens(recording):
     numbers = set()
     wait_for(lambda: camera.frames >= 5)
     for _ in range(20):
-        found = camera.latest(0.0)
+        found = wait_for(lambda: whole(camera))
         k = (present(found).number - 1) % 20
         assert (present(found).width_px, present(found).height_px, present(found).faces) == (
             64,
@@ -122,7 +131,8 @@ def test_a_killed_process_is_started_again_and_the_rest_goes_on(recording):
     assert camera.latest(0.0) is not None, "the last picture stays, and its age tells"
     wait_for(lambda: present(camera.latest(0.0)).captured_s > present(before).captured_s + 0.2)
     after = camera.latest(0.0)
-    assert present(after).number > present(before).number and present(after).image is not None
+    assert present(after).number > present(before).number
+    assert wait_for(lambda: whole(camera)).image is not None
     assert present(camera._process).pid != first
     assert present(present(after).located).intrinsics == Intrinsics(60.0, 60.0, 32.0, 24.0)
     lost, back = camera.events()
@@ -250,3 +260,31 @@ def test_slots_carry_arrays_of_any_shape_and_give_up_overwritten_ones():
         reader.close()
         writer.close()
     assert SlotReader().take(newest) is None
+
+
+def test_a_frame_is_copied_when_it_is_asked_for_and_then_stays():
+    writer, reader = SlotWriter(), SlotReader()
+    image = np.full((4, 5, 3), 7, np.uint8)
+    found = Detections(1.0, 3, 5, 4, faces=())
+    early, late, without = (
+        SharedDetections(found, address, None, (reader, SlotReader()))
+        for address in (writer.put(image), writer.put(image), None)
+    )
+    assert early.number == 3 and early.depth_m is None and without.image is None
+    assert np.array_equal(present(early.image), image)
+    for _ in range(10):
+        writer.put(np.zeros_like(image))
+    assert np.array_equal(present(early.image), image)
+    assert late.image is None
+    reader.close()
+    writer.close()
+
+
+def test_memory_of_a_writer_that_died_is_freed_though_nothing_was_read():
+    writer, reader = SlotWriter(), SlotReader()
+    where = writer.put(np.zeros((2, 3), np.uint8))
+    reader.see(where)
+    reader.forget()
+    assert SlotReader().take(where) is None
+    reader.forget()
+    present(writer._memory).close()

@@ -2,7 +2,8 @@
 
 Python runs one thread of a process at a time, so what finds faces would cost a loop in the
 same process milliseconds now and then; and where processors are few, the loop's process is
-to go first. What was found comes back through a pipe, frames through shared memory.
+to go first. What was found comes back through a pipe, frames through shared memory, from which they
+are copied when they are asked for.
 
 A process that crashes, or is blocked in a camera's driver, is started again while the loop
 goes on without frames: the last detections stay, and their age shows the loss.
@@ -23,6 +24,7 @@ from gazerig.drivers.camera.capture_loop import BACK, LOST
 from gazerig.drivers.camera.frame_analysis import Locate, Motion
 from gazerig.drivers.camera.frame_watchdog import FrameWatchdog
 from gazerig.drivers.camera.params import CameraRecoveryParams
+from gazerig.drivers.camera.shared_detections import SharedDetections
 from gazerig.drivers.camera.shared_frames import SlotReader
 from gazerig.drivers.camera.worker import LONGEST_END_S, CameraParts, Ended, Found, Retune, run
 from gazerig.drivers.child_process import hidden_script
@@ -300,16 +302,17 @@ class CameraProcess:
         return verdict == "hung"
 
     def _publish(self, message: Found, slots: tuple[SlotReader, SlotReader]) -> None:
-        """Publish detections, with the frame if it is still in its slot."""
+        """Publish detections, which copy the frame from its slot if it is asked for."""
         found = message.detections
         self.frames += 1
         self.frames_with_face += bool(found.faces)
         self._number = self._counted + found.number
-        image = slots[0].take(message.image) if message.image is not None else None
-        depth = slots[1].take(message.depth) if message.depth is not None else None
         if self._starts > 1:
             found = _renumbered(found, (self._starts - 1) * _BLOB_IDS)
-        self._newest = replace(found, number=self._number, image=image, depth_m=depth)
+        slots[0].see(message.image)
+        slots[1].see(message.depth)
+        found = replace(found, number=self._number)
+        self._newest = SharedDetections(found, message.image, message.depth, slots)
         now_s = self._now_s()
         if self._lost_s is not None:
             if self._owes_back:

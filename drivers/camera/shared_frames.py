@@ -4,6 +4,7 @@ The reader copies a slot out and looks at its stamp before and after; a slot tha
 meanwhile is given up. Neither side waits.
 """
 
+import threading
 from contextlib import suppress
 from multiprocessing.shared_memory import SharedMemory
 from typing import Any, NamedTuple
@@ -69,13 +70,24 @@ class SlotWriter:
 
 
 class SlotReader:
-    """Reads arrays out of slots of shared memory."""
+    """Reads arrays out of slots of shared memory, in any thread."""
 
     def __init__(self) -> None:
+        self._lock = threading.RLock()
         self._memory: SharedMemory | None = None
+        self._name = ""
+
+    def see(self, where: SlotAddress | None) -> None:
+        """Record where the writer's memory is, also if nothing is ever read of it."""
+        if where is not None:
+            self._name = where.memory
 
     def take(self, where: SlotAddress) -> NDArray[Any] | None:
         """Copy an array out, read-only; None where its slot was written again meanwhile."""
+        with self._lock:
+            return self._taken(where)
+
+    def _taken(self, where: SlotAddress) -> NDArray[Any] | None:
         if self._memory is None or self._memory.name != where.memory:
             self.close()
             try:
@@ -93,16 +105,20 @@ class SlotReader:
 
     def close(self) -> None:
         """Let the memory go; safe to call twice."""
-        if self._memory is not None:
-            self._memory.close()
-        self._memory = None
+        with self._lock:
+            if self._memory is not None:
+                self._memory.close()
+            self._memory = None
 
     def forget(self) -> None:
-        """Let the memory go for a writer that has died without doing so."""
-        memory = self._memory
-        self.close()
-        if memory is not None:
+        """Free the memory of a writer that has died without doing so."""
+        with self._lock:
+            self.close()
+            name, self._name = self._name, ""
+        if name:
             with suppress(FileNotFoundError):  # the writer has done so
+                memory = SharedMemory(name)
+                memory.close()
                 memory.unlink()
 
 

@@ -57,6 +57,7 @@ class Publisher:
         self._sent: RunState | None = None
         self._state_s = self._frame_s = -inf
         self._frame = 0
+        self._images = False
 
     def obeyed(self, commands: Iterable[Command]) -> None:
         """Note commands that the loop has obeyed: tuning may have changed how the rig is built."""
@@ -121,9 +122,12 @@ class Publisher:
         self._frame = found.number
         depth = self.depth and found.depth_m is not None
         array = found.depth_m if depth else found.image
+        if array is None and self._images:
+            return  # its slot has been written again
         if array is None:
             self._page.show_detections(frame_message(found, None, False, self.depth))
             return
+        self._images = True
         image = copied(array)
         try:
             self._page.show_detections(frame_message(found, image, depth, self.depth), image.fd)

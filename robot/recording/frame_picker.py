@@ -19,10 +19,12 @@ class FramePicker:
 
     def picks(self, found: Detections | None) -> bool:
         """Return whether the frame is a new one and due."""
-        if found is None or found.number == self._number or found.image is None:
+        if found is None or found.number == self._number:
             return False
         self._number = found.number
         if found.captured_s < self._due_s or self._every_s == inf:
+            return False
+        if found.image is None:  # asked last, as an image may have to be copied then
             return False
         # A frame that came late does not put off those that follow.
         late_s = found.captured_s - self._due_s
