@@ -102,6 +102,15 @@ def test_a_frame_comes_with_what_it_shows_located() -> None:
     assert FrameAnalyzer(OneFace()).look(shot(3)).located is None
 
 
+def test_faces_of_a_recording_that_holds_no_poses_are_located_as_it_is_played() -> None:
+    """A camera recording keeps images and the faces that the camera found, and nothing of this."""
+    recorded = shot(1)._replace(faces=(FACE,))
+    played = FrameAnalyzer(OneFace(), None, LOCATOR).look(recorded)
+    wanted = percept_of(perception(), picture(1, faces=(FACE,)))
+    assert played.located is not None
+    assert percept_of(perception(), played).faces == wanted.faces
+
+
 def test_a_locator_and_what_it_locates_pass_between_processes() -> None:
     found = located(picture(1, faces=(FACE,), blobs=(BALL,)))
     assert pickle.loads(pickle.dumps(LOCATOR))(found) == found.located

@@ -205,8 +205,8 @@ def test_e56_own_parts_move_and_turn_with_the_face(turn_deg: float, aside_m: flo
     own = {code: (-0.03, 0.02 * i - 0.07, 0.05 - 0.015 * i) for i, code in enumerate(PARTS)}
     perception = Perception(MOUNT, 69.0, Tracker(TrackParams()), own)
     nose, R = (1.0, aside_m, 0.25), rotation((radians(180.0 + turn_deg), 0.0, 0.0))
-    sighting = LocalisedDetection("face", nose, R, 0.1, 0.0, 0.9)
-    (track,) = Tracker(TrackParams()).step([sighting], (0.0, 0.0, 0.2), 0.0)
+    detection = LocalisedDetection("face", nose, R, 0.1, 0.0, 0.9)
+    (track,) = Tracker(TrackParams()).step([detection], (0.0, 0.0, 0.2), 0.0)
     face = perception._face(track)
     eye = (0.0, 0.0, 0.2)
     for code, seen in zip(PARTS, face.parts_world_m, strict=True):

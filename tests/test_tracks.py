@@ -63,7 +63,7 @@ def test_far_apart_is_somebody_else_and_kinds_never_mix() -> None:
     tracker = Tracker(TrackParams())
     (one,) = tracker.step([face(1.0, 0.0)], CAMERA, 0.0)
     after = tracker.step([face(1.0, 0.6), face(1.0, 0.01, "hand")], CAMERA, 0.033)
-    assert {track.sighting.kind for track in after if track.id != one.id} == {"face", "hand"}
+    assert {track.detection.kind for track in after if track.id != one.id} == {"face", "hand"}
 
 
 def test_blended_rotations_stay_rotations() -> None:

@@ -1,1 +1,1 @@
-"""From what a camera gives to people and things placed in the world."""
+"""From detections in camera frames to people and things localised in the world."""

@@ -141,7 +141,7 @@ class EgomotionResidual:
         )
 
     def _stands(self, t_s: float, views: dict[int, Vec3], seen: Sequence[TrackedPoint]) -> None:
-        """Believe what is where it was before the turn, and start again."""
+        """Use the turns of things that are where they were before, and begin new ones."""
         for id_ in sorted(views.keys() & self._turns.keys()):
             turn = self._turns[id_]
             same = norm(sub(views[id_], turn.view)) < _STILL_RAD

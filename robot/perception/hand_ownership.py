@@ -1,9 +1,9 @@
-"""Which motion belongs to whom: a face and the body below it are one thing to look at.
+"""Association of moving image patches with people: a face and its body are one target.
 
-A person who walks is seen twice, as a face and as a patch of flow. The patch would compete
-with the face, and for being larger would often win. It is therefore taken for the person's
-own where it is on the head, or is below it and moves along with it; an arm that waves moves
-otherwise, so it stays a thing of its own, which is what draws the eye to a wave.
+A person who walks is detected twice, as a face and as a patch of optical flow. The patch would
+compete with the face, and would often win because it is larger. A patch therefore belongs to the
+person if it is on the head, or is below it and moves along with it. A waving arm moves
+otherwise and remains a thing of its own, so that a wave draws the gaze.
 """
 
 from collections.abc import Iterable
@@ -54,14 +54,14 @@ def without_own_motion(
 
 
 def _velocity(face: LocalisedDetection, tracked: list[Known]) -> Vec3 | None:
-    """Return the velocity of the tracked face at a sighting's place, None where there is none."""
+    """Return the velocity of the tracked face at a detection's place, None where there is none."""
     near = [(norm(sub(p, face.p_world_m)), v) for p, v in tracked]
     away, v = min(near, key=lambda pair: pair[0], default=(1.0, None))
     return v if away < _HEAD_M else None
 
 
 def _owner(thing: LocalisedDetection, faces: list[Known], p_camera: Vec3) -> int | None:
-    """Find the face whose own motion this is."""
+    """Return the index of the face to which a patch belongs, None where it belongs to none."""
     if thing.kind != _UNNAMED:
         return None
     for k, (p_face, v_face) in enumerate(faces):

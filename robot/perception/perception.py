@@ -1,8 +1,8 @@
-"""Detections and the head's pose at their capture time to a percept in the world.
+"""From detections and the head's pose at their capture time to a percept in the world.
 
-Faces and moving things are placed in the world (sightings) by where the camera was when
-the frame was taken, not where it is now; each person's own motion is told from other
-things (same_person); tracks give all of them identities and velocities (tracks).
+Faces and moving things are localised in the world by the camera's pose when the frame was
+taken, not by its present one (localisation); motion of a person's own body is separated from
+that of other things (hand_ownership); a tracker gives all of them identities and velocities.
 """
 
 from collections.abc import Mapping
@@ -33,7 +33,7 @@ _HALF_TURN_S = 0.015
 
 
 class Perception:
-    """Sees: one percept for each new frame.
+    """Makes one percept of each new frame.
 
     Args:
         mount: where the camera sits.
@@ -97,12 +97,12 @@ class Perception:
         self._percept = Percept(
             t_s,
             _bodies(tracks, p),
-            tuple(self._face(track) for track in tracks if track.sighting.kind == "face"),
+            tuple(self._face(track) for track in tracks if track.detection.kind == "face"),
         )
         return self._percept
 
     def residual(self) -> ResidualFigures:
-        """Return how fast still things seem to move while the head turns."""
+        """Return the apparent speed of stationary things while the head turns, and its cause."""
         return self._residual.figures()
 
     def _located(self, found: Detections) -> LocatedFrame:
@@ -124,7 +124,7 @@ class Perception:
         return [
             (add(t.p_world_m, scale(t.v_world_m_s, t_s - t.at_s)), t.v_world_m_s)
             for t in self._tracks
-            if t.sighting.kind == "face"
+            if t.detection.kind == "face"
         ]
 
     def _note_residual(self, t_s: float, poses: PoseHistory) -> None:
@@ -138,7 +138,7 @@ class Perception:
             return turning_rad_s(R_before, R_after, 2.0 * _HALF_TURN_S)
 
         seen = [
-            TrackedPoint(track.id, track.sighting.p_world_m, track.v_world_m_s)
+            TrackedPoint(track.id, track.detection.p_world_m, track.v_world_m_s)
             for track in self._tracks
             if track.seen_s == t_s
         ]
@@ -157,7 +157,7 @@ class Perception:
             track.v_world_m_s,
             R,
             self._face_parts(R, p, track.face_size, track.face_length),
-            track.sighting.confidence,
+            track.detection.confidence,
             track.depth_from,
             across_sd,
             along_sd,
@@ -210,7 +210,7 @@ def _bodies(tracks: tuple[Track, ...], p_camera: Vec3) -> Bodies:
                 *track.filter.p_m,
                 *track.filter.v_m_s,
                 *_spin(track, p_camera),
-                track.sighting.radius_m,
+                track.detection.radius_m,
                 *track.filter.cov_rows(),
             )
             for track in tracks
@@ -218,7 +218,7 @@ def _bodies(tracks: tuple[Track, ...], p_camera: Vec3) -> Bodies:
     )
     return Bodies(
         tuple([track.id for track in tracks]),
-        tuple([track.sighting.kind for track in tracks]),
+        tuple([track.detection.kind for track in tracks]),
         table[:, 0:3],
         table[:, 3:6],
         table[:, 6:9],
@@ -229,5 +229,5 @@ def _bodies(tracks: tuple[Track, ...], p_camera: Vec3) -> Bodies:
 
 def _spin(track: Track, p_camera: Vec3) -> Vec3:
     """Return the angular velocity of what spins about the line of view."""
-    spin = track.sighting.spin_rad_s
+    spin = track.detection.spin_rad_s
     return scale(unit(sub(track.p_world_m, p_camera)), spin) if spin else (0.0, 0.0, 0.0)

@@ -94,7 +94,7 @@ def seen_distance_m(percept: Percept | None, p_world_m: Vec3, direction_world: V
 
 
 def _depth_m(found: Detections, pixel: tuple[float, float]) -> float | None:
-    """Read the depth image about a pixel of the camera frame, None where it says nothing."""
+    """Return the measured depth about a pixel of the camera frame, None where there is none."""
     if found.depth_m is None:
         return None
     height, width = found.depth_m.shape[:2]

@@ -60,13 +60,13 @@ class LocalisedDetection:
 class Track:
     """One thing through time.
 
-    seen_s, at_s: capture times of its last sighting and of its place
+    seen_s, at_s: capture times of its last detection and of its place
     face_size: of a face, its size over an adult's, learned where the camera measures depth
     depth_s: capture time of the last measured distance, None before the first
     """
 
     id: int
-    sighting: LocalisedDetection
+    detection: LocalisedDetection
     filter: TrackFilter
     R_world_face: Mat3 | None
     seen_s: float
@@ -88,7 +88,7 @@ class Track:
     @property
     def depth_from(self) -> str:
         """Return the source of its distance: "camera", "face size" or "assumed"."""
-        if self.sighting.depth_measured:
+        if self.detection.depth_measured:
             return "camera"
         return "face size" if self.R_world_face is not None else "assumed"
 
@@ -102,17 +102,17 @@ class Tracker:
         self.retune(params)
 
     def retune(self, params: TrackParams) -> None:
-        """Believe otherwise from now on; all tracks stay."""
+        """Use other parameters from now on; all tracks stay."""
         self._params = params
         lively = params.lively_accel_m_s2
         self._of_faces = ProcessNoise(params.quiet_accel_m_s2, lively)
         self._of_things = ProcessNoise(params.things_accel_m_s2, lively)
         for track in self._tracks:
-            is_face = track.sighting.R_world_face is not None
+            is_face = track.detection.R_world_face is not None
             track.filter.retune(self._of_faces if is_face else self._of_things)
 
     def step(
-        self, sightings: list[LocalisedDetection], p_world_camera_m: Vec3, t_s: float
+        self, detections: list[LocalisedDetection], p_world_camera_m: Vec3, t_s: float
     ) -> tuple[Track, ...]:
         """Associate the detections of one frame with the tracks; return the tracks in sight."""
         par = self._params
@@ -121,38 +121,41 @@ class Tracker:
             track.at_s = t_s
         pairs = assign(
             [
-                [self._cost(track, sighting, p_world_camera_m) for sighting in sightings]
+                [self._cost(track, detection, p_world_camera_m) for detection in detections]
                 for track in self._tracks
             ]
         )
         for i, j in pairs:
-            self._update(self._tracks[i], sightings[j], p_world_camera_m)
+            self._update(self._tracks[i], detections[j], p_world_camera_m)
         taken = {j for _, j in pairs}
-        for j, sighting in enumerate(sightings):
+        for j, detection in enumerate(detections):
             if j not in taken:
-                self._tracks.append(self._begin(sighting, p_world_camera_m, t_s))
+                self._tracks.append(self._begin(detection, p_world_camera_m, t_s))
         self._tracks = [t for t in self._tracks if t_s - t.seen_s <= par.forget_ms / 1e3]
         return tuple(t for t in self._tracks if t_s - t.seen_s <= par.coast_ms / 1e3)
 
-    def _cost(self, track: Track, sighting: LocalisedDetection, p_camera: Vec3) -> float:
+    def _cost(self, track: Track, detection: LocalisedDetection, p_camera: Vec3) -> float:
         """Return how unlikely it is that a track is seen so: minus twice the log likelihood.
 
         A track long unseen could be anywhere; without the logarithm that would make it
         the best match of everything.
         """
         par = self._params
-        if track.sighting.kind != sighting.kind:
+        if track.detection.kind != detection.kind:
             return FORBIDDEN
-        place = sized(track, sighting, p_camera)
+        place = sized(track, detection, p_camera)
         off = sub(place, track.p_world_m)
         view = sub(place, p_camera)
-        wide = self._gate_m(track, sighting, norm(view))
+        wide = self._gate_m(track, detection, norm(view))
         unseen_s = track.at_s - track.seen_s
         if norm(cross(unit(view), off)) > wide + par.gate_speed_m_s * unseen_s:
             return FORBIDDEN
         # What people do that no filter expects: a lunge, a jump of the detector.
         surprise = wide / par.gate_sigma
-        across, along = hypot(sighting.across_sd_m, surprise), hypot(sighting.along_sd_m, surprise)
+        across, along = (
+            hypot(detection.across_sd_m, surprise),
+            hypot(detection.along_sd_m, surprise),
+        )
         information, det = inverse(
             plus(track.filter.p_cov, sight_cov(place, p_camera, across, along))
         )
@@ -160,89 +163,89 @@ class Tracker:
         if far > par.gate_sigma**2:
             return FORBIDDEN
         known = log(det / (across**4 * along**2))
-        return far + known + (0.0 if _same_mark(track, sighting) else _OTHER_MARK)
+        return far + known + (0.0 if _same_mark(track, detection) else _OTHER_MARK)
 
-    def _gate_m(self, track: Track, sighting: LocalisedDetection, far_m: float) -> float:
+    def _gate_m(self, track: Track, detection: LocalisedDetection, far_m: float) -> float:
         """Return the farthest from its expected place that something is taken for the same.
 
         A detector that tells things apart in the image has already judged; what it gave
         another number is the same only about where the track's own outline is.
         """
         widest = self._params.gate_m * max(1.0, far_m)
-        if _same_mark(track, sighting):
+        if _same_mark(track, detection):
             return widest
-        return min(widest, _OUTLINE * max(track.sighting.radius_m, sighting.radius_m))
+        return min(widest, _OUTLINE * max(track.detection.radius_m, detection.radius_m))
 
-    def _begin(self, sighting: LocalisedDetection, p_camera: Vec3, t_s: float) -> Track:
-        place = sighting.p_world_m
+    def _begin(self, detection: LocalisedDetection, p_camera: Vec3, t_s: float) -> Track:
+        place = detection.p_world_m
         track = Track(
             self._next_id,
-            sighting,
+            detection,
             TrackFilter(
                 place,
-                sight_cov(place, p_camera, sighting.across_sd_m, sighting.along_sd_m),
+                sight_cov(place, p_camera, detection.across_sd_m, detection.along_sd_m),
                 self._params.first_speed_m_s,
-                self._of_faces if sighting.R_world_face is not None else self._of_things,
+                self._of_faces if detection.R_world_face is not None else self._of_things,
             ),
-            sighting.R_world_face,
+            detection.R_world_face,
             t_s,
             t_s,
-            sighting.face_length,
+            detection.face_length,
         )
         self._next_id += 1
-        self._learn_size(track, sighting, 1.0)
-        self._velocity(track, sighting, p_camera)
+        self._learn_size(track, detection, 1.0)
+        self._velocity(track, detection, p_camera)
         return track
 
-    def _update(self, track: Track, sighting: LocalisedDetection, p_camera: Vec3) -> None:
+    def _update(self, track: Track, detection: LocalisedDetection, p_camera: Vec3) -> None:
         """Update a track with a detection."""
-        place = sized(track, sighting, p_camera)
+        place = sized(track, detection, p_camera)
         track.filter.correct(
-            place, sight_cov(place, p_camera, sighting.across_sd_m, sighting.along_sd_m)
+            place, sight_cov(place, p_camera, detection.across_sd_m, detection.along_sd_m)
         )
-        self._velocity(track, sighting, p_camera)
+        self._velocity(track, detection, p_camera)
         gain = self._params.shape_gain
-        if track.R_world_face is not None and sighting.R_world_face is not None:
+        if track.R_world_face is not None and detection.R_world_face is not None:
             track.R_world_face = blended(
-                track.R_world_face, sighting.R_world_face, self._params.turn_gain
+                track.R_world_face, detection.R_world_face, self._params.turn_gain
             )
-            track.face_length += gain * (sighting.face_length - track.face_length)
-        self._learn_size(track, sighting, gain)
-        track.sighting, track.seen_s = sighting, track.at_s
+            track.face_length += gain * (detection.face_length - track.face_length)
+        self._learn_size(track, detection, gain)
+        track.detection, track.seen_s = detection, track.at_s
 
-    def _velocity(self, track: Track, sighting: LocalisedDetection, p_camera: Vec3) -> None:
+    def _velocity(self, track: Track, detection: LocalisedDetection, p_camera: Vec3) -> None:
         """Update with a velocity that was measured in the image."""
-        if sighting.v_world_m_s is None:
+        if detection.v_world_m_s is None:
             return
         share = 1.0
-        if not sighting.depth_measured:
+        if not detection.depth_measured:
             # What was seen is an angle a second; at another distance that is another speed.
             away = norm(sub(track.p_world_m, p_camera))
-            share = away / max(norm(sub(sighting.p_world_m, p_camera)), _NEAREST_M)
-        sds = share * sighting.across_sd_m_s, share * sighting.along_sd_m_s
-        cov = sight_cov(sighting.p_world_m, p_camera, *sds)
-        track.filter.correct_velocity(scale(sighting.v_world_m_s, share), cov)
+            share = away / max(norm(sub(detection.p_world_m, p_camera)), _NEAREST_M)
+        sds = share * detection.across_sd_m_s, share * detection.along_sd_m_s
+        cov = sight_cov(detection.p_world_m, p_camera, *sds)
+        track.filter.correct_velocity(scale(detection.v_world_m_s, share), cov)
 
-    def _learn_size(self, track: Track, sighting: LocalisedDetection, gain: float) -> None:
+    def _learn_size(self, track: Track, detection: LocalisedDetection, gain: float) -> None:
         """Learn how large a face is where its distance is known otherwise."""
-        if sighting.size_depth is None:
+        if detection.size_depth is None:
             return
         gain = 1.0 if track.depth_s is None else gain
-        track.face_size += gain * (1.0 / sighting.size_depth - track.face_size)
+        track.face_size += gain * (1.0 / detection.size_depth - track.face_size)
         track.depth_s = track.at_s
 
 
-def _same_mark(track: Track, sighting: LocalisedDetection) -> bool:
-    """Return whether the detector takes both for the same, or does not tell things apart."""
-    marks = track.sighting.mark, sighting.mark
+def _same_mark(track: Track, detection: LocalisedDetection) -> bool:
+    """Return whether the detector gave both one number, or numbers nothing."""
+    marks = track.detection.mark, detection.mark
     return None in marks or marks[0] == marks[1]
 
 
-def sized(track: Track, sighting: LocalisedDetection, p_camera: Vec3) -> Vec3:
-    """Return a sighting's place with the distance that the size learned of this face tells."""
-    if sighting.depth_measured or track.depth_s is None:
-        return sighting.p_world_m
-    return add(p_camera, scale(sub(sighting.p_world_m, p_camera), track.face_size))
+def sized(track: Track, detection: LocalisedDetection, p_camera: Vec3) -> Vec3:
+    """Return a detection's position with its distance corrected by the learned size of the face."""
+    if detection.depth_measured or track.depth_s is None:
+        return detection.p_world_m
+    return add(p_camera, scale(sub(detection.p_world_m, p_camera), track.face_size))
 
 
 def blended(A: Mat3, B: Mat3, share: float) -> Mat3:

@@ -77,7 +77,7 @@ MUTANTS = (
     Mutant("robot/perception/perception.py", "self._mount.pose(*poses.head_pose(t_s))",
            "self._mount.pose(*poses.head_pose(1e9))", "frames are placed by the newest pose of the head",
            ("perception", "camera_poses")),
-    Mutant("robot/perception/tracker.py", "if track.sighting.kind != sighting.kind:", "if False:",
+    Mutant("robot/perception/tracker.py", "if track.detection.kind != detection.kind:", "if False:",
            "a hand becomes a face", ("tracks", "perception")),
     Mutant("robot/perception/tracker.py", "t_s - t.seen_s <= par.coast_ms / 1e3", "True",
            "who has left stays in sight", ("tracks", "perception")),
