@@ -44,7 +44,6 @@ class Animation:
         self.expressions = Expressions(tables.expressions, tables.blend_s, len(joints))
         self.levels = Levels(tables.levels, len(joints))
         self.gestures = GesturePlayer(len(joints))
-        self._parts = (NO_OFFSET,) * 3
         self._sum = NO_OFFSET
 
     def reset(self, t_s: float) -> None:
@@ -60,10 +59,8 @@ class Animation:
 
     def step(self, t_s: float) -> PoseOffset:
         """Return what is added to the pose in this tick."""
-        face, levels = self.expressions.step(t_s), self.levels.step(t_s)
-        gesture, before = self.gestures.step(t_s), self._parts
-        # Each is the same object as long as it rests.
-        if face is not before[0] or levels is not before[1] or gesture is not before[2]:
-            self._parts = face, levels, gesture
-            self._sum = face.plus(levels).plus(gesture)
+        expressions, levels, gestures = self.expressions, self.levels, self.gestures
+        if expressions.moves or levels.moves or gestures.moves:
+            face = expressions.step(t_s).plus(levels.step(t_s))
+            self._sum = face.plus(gestures.step(t_s))
         return self._sum

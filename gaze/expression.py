@@ -13,6 +13,7 @@ class Expressions:
     """The expression in force, and the way to it.
 
     name, strength: in force; strength 1 is the expression as written, 0 none of it
+    moves: ``step`` may return another offset than the last time
 
     Args:
         offsets: the expressions by name.
@@ -38,6 +39,7 @@ class Expressions:
         self._blend.reset(self._goal())
         self._flat = self._goal()
         self._offset = PoseOffset.from_flat(self._flat)
+        self.moves = True
 
     def retune(self, offsets: Mapping[str, PoseOffset], blend_s: float) -> None:
         """Change the table; the face moves to what its expression is now, without a jump."""
@@ -46,6 +48,7 @@ class Expressions:
         if self.name not in self._offsets:
             self.name, self.strength = NEUTRAL, 1.0
         self._blend.move_to(self._goal())
+        self.moves = True
 
     def express(self, name: str, strength: float = 1.0) -> None:
         """Move to an expression, from the next step on.
@@ -56,6 +59,7 @@ class Expressions:
         self.require(name)
         self.name, self.strength = name, strength
         self._blend.move_to(self._goal())
+        self.moves = True
 
     def require(self, name: str) -> None:
         """Raise ValueError if there is no such expression; the message lists those there are."""
@@ -68,6 +72,7 @@ class Expressions:
         flat = self._blend.step(t_s)
         if flat is not self._flat:
             self._flat, self._offset = flat, PoseOffset.from_flat(flat)
+        self.moves = not self._blend.rests
         return self._offset
 
     def _with_neutral(self, offsets: Mapping[str, PoseOffset]) -> dict[str, PoseOffset]:

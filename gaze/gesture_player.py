@@ -44,6 +44,8 @@ class OffsetState(NamedTuple):
 class GesturePlayer:
     """The gesture under way.
 
+    moves: ``step`` may return another offset than the last time
+
     Args:
         joints: number of joints that gaze does not move.
     """
@@ -59,6 +61,7 @@ class GesturePlayer:
         self._begins_s = 0.0
         self._fades: list[tuple[int, Quintic]] = []
         self._fades_from_s = self._faded_s = 0.0
+        self.moves = True
 
     @property
     def playing(self) -> str:
@@ -82,6 +85,7 @@ class GesturePlayer:
         ]
         self._fades_from_s, self._faded_s = t_s, t_s + fade_s
         self._played, self._begins_s = played, t_s + wait_s
+        self.moves = True
 
     def state(self, t_s: float) -> OffsetState:
         """Return the offset at a time, with its speed and acceleration."""
@@ -99,13 +103,12 @@ class GesturePlayer:
 
     def step(self, t_s: float) -> PoseOffset:
         """Return the offset at a time; at rest it is always the same object."""
-        if self._played is None and not self._fades:
-            return self._rest
         if self._fades and t_s >= self._faded_s:
             self._fades = []
         if self._played is not None and t_s >= self._begins_s + self._played.duration_s:
             self._played = None
         if self._played is None and not self._fades:
+            self.moves = False
             return self._rest
         flat = list(self._rest_flat)
         for i, fade in self._fades:

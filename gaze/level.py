@@ -61,6 +61,7 @@ class Levels:
     """All levels of a rig.
 
     lapses_s: before this time no level lapses
+    moves: ``step`` may return another offset than the last time
 
     Args:
         ranges: what each level moves.
@@ -83,7 +84,7 @@ class Levels:
         self._gone: list[_Level] = []
         self._flats: tuple[tuple[float, ...], ...] = ()
         self._offset = self._rest
-        self._moving = True
+        self.moves = True
         self.lapses_s = inf
 
     def retune(self, ranges: Mapping[str, LevelRange]) -> None:
@@ -99,7 +100,7 @@ class Levels:
             elif span != self._levels[name].span:
                 self._levels[name].retune(span)
         self._ranges = dict(ranges)
-        self._moving = True
+        self.moves = True
 
     def set(self, name: str, value: float, t_s: float) -> None:
         """Set a level to a value 0..1, from the next step on.
@@ -109,7 +110,7 @@ class Levels:
         """
         self.require(name)
         self._levels[name].set(value, t_s + HOLD_S)
-        self._moving = True
+        self.moves = True
         self.lapses_s = min(self.lapses_s, t_s + HOLD_S)
 
     def require(self, name: str) -> None:
@@ -126,13 +127,13 @@ class Levels:
                 if level.value > 0.0:
                     fallen.append(name)
                 level.set(0.0, inf)
-                self._moving = True
+                self.moves = True
         self.lapses_s = min([level.until_s for level in self._levels.values()], default=inf)
         return tuple(fallen)
 
     def step(self, t_s: float) -> PoseOffset:
         """Return what all levels add at a time; at rest it is the same object."""
-        if not self._moving:
+        if not self.moves:
             return self._offset
         if self._gone:
             self._gone = [one for one in self._gone if one.blend.step(t_s) != self._rest.flat()]
@@ -143,5 +144,5 @@ class Levels:
             for flat in flats:
                 offset = offset.plus(PoseOffset.from_flat(flat))
             self._flats, self._offset = flats, offset
-        self._moving = not all([level.blend.rests for level in levels])
+        self.moves = not all([level.blend.rests for level in levels])
         return self._offset

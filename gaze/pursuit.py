@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from math import exp, radians, sqrt
 from typing import Annotated, NamedTuple
 
-from gazerig.gaze.angles import norm, scale, sub
+from gazerig.gaze.angles import scale, sub
 from gazerig.gaze.types import Vec3
 from gazerig.params import Bounds
 
@@ -119,14 +119,18 @@ class Pursuit:
         )
         move_x, move_y, move_z = move_x * dt_s, move_y * dt_s, move_z * dt_s
         if closing:
-            off_x, off_y, off_z = _shorter((was_x - x, was_y - y, was_z - z), self._max_error_rad)
+            off_x, off_y, off_z = was_x - x, was_y - y, was_z - z
+            size, most = sqrt(off_x * off_x + off_y * off_y + off_z * off_z), self._max_error_rad
+            if size > most:
+                off_x, off_y, off_z = scale((off_x, off_y, off_z), most / size)
             share = 1.0 - exp(-par.gain_1_s * dt_s)
             move_x += off_x * share
             move_y += off_y * share
             move_z += off_z * share
         gain = par.vergence_gain_1_s if near_before > near else par.divergence_gain_1_s
         near += near_now - near_before + (near_before - near) * (1.0 - exp(-gain * dt_s))
-        near = min(max(near, _FARTHEST_1_M), _NEAREST_1_M)
+        if not _FARTHEST_1_M <= near <= _NEAREST_1_M:
+            near = min(max(near, _FARTHEST_1_M), _NEAREST_1_M)
         x, y, z = x + move_x, y + move_y, z + move_z
         length, distance = sqrt(x * x + y * y + z * z), 1.0 / near
         if length == 0.0:  # turned back within one step
@@ -164,9 +168,3 @@ def _across(way: Vec3, v: Vec3) -> Vec3:
     """Return the part of a vector that is perpendicular to a direction."""
     along = way[0] * v[0] + way[1] * v[1] + way[2] * v[2]
     return sub(v, scale(way, along))
-
-
-def _shorter(v: Vec3, longest: float) -> Vec3:
-    """Return a vector shortened to ``longest``."""
-    length = norm(v)
-    return scale(v, longest / length) if length > longest else v
