@@ -205,7 +205,7 @@ def test_faults_by_command(strict, client):
 
 
 def test_a_late_answer_comes_late(strict, client):
-    strict.command("delay 1 30 count 1")
+    strict.command("delay 1 300 count 1")
     client.write(bytes.fromhex("FFFFFD0001030001194E"))
     began = time.monotonic()
     assert client.read_until(14, began + 0.02) == b""

@@ -39,8 +39,10 @@ def layers(bus: SmartServoBus) -> dict[str, Cycle]:
         return len(IDS) * (len(raw) == group.reply_length)
 
     def cleared(k: int) -> int:
-        port.clearPort()
-        return port_alone(k)
+        group = groups[k & 1]
+        raw, _ = port.exchange(group.request, group.reply_length, time.monotonic() + WAIT_S)
+        port.write(packet)
+        return len(IDS) * (len(raw) == group.reply_length)
 
     def exchange(k: int) -> int:
         group = groups[k & 1]
@@ -66,8 +68,8 @@ def layers(bus: SmartServoBus) -> dict[str, Cycle]:
         return len(IDS) - len(feedback.missing)
 
     return {
-        "write, select, read, write": port_alone,
-        "and throw away what came before": cleared,
+        "write, poll, read, write": port_alone,
+        "and look for what came before": cleared,
         "and time-outs, counts, starvation": exchange,
         "and all checks, one unpacking": checked,
         "and what is due, plausibility, units": taken,

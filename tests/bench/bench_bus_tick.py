@@ -102,11 +102,12 @@ def ours(kind: str) -> Iterator[Client]:
         body = Body(made(kind, server.start_device(device(kind)), setups(joints, {})), joints)
         body.start()
 
-        def write(k: int) -> None:
-            body.write(tuple([0.1 * sin(0.01 * k + i) for i in IDS]))
+        goals = [tuple([0.1 * sin(0.01 * k + i) for i in IDS]) for k in range(629)]
 
         try:
-            yield Client(lambda k: body.read(time.monotonic()), write)
+            yield Client(
+                lambda k: body.read(time.monotonic()), lambda k: body.write(goals[k % len(goals)])
+            )
         finally:
             body.stop()
 
