@@ -171,7 +171,7 @@ class SyncRead:
             elif not status.params and status.error & self._codec.REFUSAL:
                 samples[status.id] = Sample(status.error)
             else:
-                # GroupReply, but not what was asked for: late, or the servo is out of its mind.
+                # An answer, but not what was asked for: late, or the servo is out of its mind.
                 damaged.add(status.id)
         for servo_id in twofold:
             del samples[servo_id]

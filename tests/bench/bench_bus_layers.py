@@ -68,7 +68,7 @@ def layers(bus: SmartServoBus) -> dict[str, Cycle]:
         return len(IDS) - len(feedback.missing)
 
     return {
-        "write, poll, read, write": port_alone,
+        "the port alone: write, poll, read, write": port_alone,
         "and look for what came before": cleared,
         "and time-outs, counts, starvation": exchange,
         "and all checks, one unpacking": checked,
