@@ -9,7 +9,6 @@ dead zones (26, 27), so that friction keeps it up to 2 steps from its goal, as i
 """
 
 import struct
-from typing import NamedTuple
 
 from gazerig.drivers.feetech.memory_table import (
     ACCELERATION_UNIT_STEPS_S2,
@@ -38,6 +37,9 @@ GOALS_AT = 41
 GOALS = {"little": struct.Struct("<BHHH"), "big": struct.Struct(">BHHH")}
 """Acceleration, goal position, goal time, goal speed: written together ever again."""
 
+SIGN = 1 << 15
+"""Bit of the sign of most words."""
+
 DAMPED = 2
 """Torque (40): the windings are shorted, which brakes."""
 
@@ -47,15 +49,8 @@ SPEED_P_SHARE, SPEED_I_SHARE = 1 / 50, 1 / 40_000
 """What a unit of each gain makes of steps, steps times ms, and steps/ms: shares of full duty."""
 
 
-class MotionWords(NamedTuple):
-    """What the servo measures of its motion, as the words of its registers."""
-
-    position: int
-    speed: int
-    load: int
-    current: int
-    target: int
-    moving: bool
+MotionWords = tuple[int, int, int, int, int, bool]
+"""Position, speed, load, current, target and whether it moves, as the words of their registers."""
 
 
 class FeetechDrive(Drive):
@@ -115,12 +110,14 @@ class FeetechDrive(Drive):
             current += more
         led = self.torque and isinstance(profile, PositionProfile)
         goal = round((profile.goal + self._shift) * scale) if led else self._goal_register()
-        return MotionWords(
-            unsigned(at, 15),
-            unsigned(speed, 15),
-            unsigned(round(shaft.u * FULL), 10),
-            unsigned(current, 15),
-            unsigned(goal, 15),
+        load = round(shaft.u * FULL)
+        # Half of them have no sign: their words are themselves.
+        return (
+            at if 0 <= at < SIGN else unsigned(at, 15),
+            speed if 0 <= speed < SIGN else unsigned(speed, 15),
+            load if 0 <= load <= FULL else unsigned(load, 10),
+            current if 0 <= current < SIGN else unsigned(current, 15),
+            goal if 0 <= goal < SIGN else unsigned(goal, 15),
             led and profile.running or not -self._threshold <= turning <= self._threshold,
         )
 

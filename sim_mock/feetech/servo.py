@@ -113,20 +113,22 @@ class FeetechServo(EmulatedServo):
 
     def read(self, address: int, length: int) -> bytes:
         """Return bytes of the memory; what is no register is 0."""
+        if address == SENSED_AT and length == SENSED_END - SENSED_AT:
+            return self._sensed.pack(*self._live_words())  # what a control loop reads every tick
         if address < SENSED_END and address + length > SENSED_AT:
-            self._refresh()
+            self._sensed.pack_into(self.memory.bytes, SENSED_AT, *self._live_words())
         return self.memory.read(address, length)
 
-    def _refresh(self) -> None:
-        """Update the registers that change by themselves."""
+    def _live_words(self) -> tuple[int, ...]:
+        """Return the registers that change by themselves, 56 to 70."""
         if self.stale_surroundings:
             self.stale_surroundings = False
             self._around = max(0, min(255, self.voltage_01v)), self.warmth_c
         volts, warmth = self._around
         position, speed, load, current, target, moving = self.drive.motion_words(self._ms)
-        self._sensed.pack_into(
-            self.memory.bytes, SENSED_AT, position, speed, load, volts, warmth,
-            self._pending is not None, self.errors, moving, target, current,
+        pending = self._pending is not None
+        return (
+            position, speed, load, volts, warmth, pending, self.errors, moving, target, current,
         )  # fmt: skip
 
     # --- writing

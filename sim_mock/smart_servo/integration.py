@@ -129,10 +129,11 @@ class ShaftMotion:
                     return
             elif self.v == 0.0 and not led and self._stick(kr):
                 return
-        was = self.x, self.u, self._integral, self.joint, self.volts
+        still = self.v == 0.0
+        was = (self.x, self.u, self._integral, self.joint, self.volts) if still else None
         if not (self._linear and self._integral == 0.0 and self._step(path, before, kr)):
             self._follow(path, before, kr)
-        if self.v == 0.0 and self._rv == 0.0 and not profile.running:
+        if still and self.v == 0.0 and self._rv == 0.0 and not profile.running:
             self.quiet = was == (self.x, self.u, self._integral, self.joint, self.volts)
 
     def _stick(self, kr: float) -> bool:

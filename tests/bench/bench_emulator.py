@@ -1,7 +1,8 @@
 """What the emulated bus costs and how true its wire time is: python tests/bench/bench_emulator.py
 
-One run prints packets per second in this process and through a pseudo-terminal,
-simulated seconds per second of processor time of nine servos, and the cycle time on a line
+One run prints how fast the shipped rigs run on emulated and on ideal servos, what the emulated
+side costs a tick, packets per second in this process and through a pseudo-terminal, simulated
+seconds per second of processor time of nine servos, and the cycle time on a line
 with wire time beside the formula. What runs in this process alone is measured in processor
 time, the rest in real time. Nothing here passes or fails: machines differ and are shared, so
 compare figures of one run with each other.
@@ -17,6 +18,7 @@ import numpy as np
 from fastcrc.crc16 import umts
 from rich.console import Console
 from rich.table import Table
+from simulated_runs import RIGS, emulated_cost, simulated
 
 from gazerig.drivers.serial.port import BlockingPort
 from gazerig.sim_mock.dynamixel.chain import DynamixelChain, build_dynamixel
@@ -55,12 +57,36 @@ def main() -> None:
     """Run all parts and print their figures."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--cycles", type=int, default=2000)
-    cycles = parser.parse_args().cycles
+    parser.add_argument("--seconds", type=float, default=30.0, help="of each simulated run")
+    chosen = parser.parse_args()
+    cycles, seconds = chosen.cycles, chosen.seconds
     console = Console(width=100)
     console.print(f"{os.cpu_count()} processors, load {os.getloadavg()[0]:.2f} at the start")
+    console.print(runs(seconds))
+    console.print(emulated_side())
     console.print(packets_per_second(cycles))
     console.print(simulated_seconds())
     console.print(wire_time(cycles))
+
+
+def runs(seconds: float) -> Table:
+    """Run all rigs with scene visitor in simulated time, byte-true and ideal."""
+    table = Table("simulated seconds per second of processor", "emulated servos", "ideal servos")
+    for rig in RIGS:
+        table.add_row(
+            rig, *(f"{simulated(rig, bus, seconds):8.1f}" for bus in ("emulated", "ideal"))
+        )
+    return table
+
+
+def emulated_side() -> Table:
+    """Measure what the emulated servos of a run cost, by part."""
+    table = Table("emulated servos, us a tick", "all", "replies", "of these motion", "goals")
+    for rig in RIGS:
+        cost = emulated_cost(rig)
+        parts = cost.whole, cost.replies, cost.motion, cost.others
+        table.add_row(rig, *(f"{part:8.1f}" for part in parts))
+    return table
 
 
 def packets_per_second(cycles: int) -> Table:
