@@ -5,11 +5,12 @@ import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from math import radians
+from math import radians, tan
 
 import numpy as np
 import pytest
 from present import present
+from retuned_run import started
 from test_perception import STILL, face_at, picture, standing
 
 from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
@@ -109,6 +110,21 @@ def test_faces_of_a_recording_that_holds_no_poses_are_located_as_it_is_played() 
     wanted = percept_of(perception(), picture(1, faces=(FACE,)))
     assert played.located is not None
     assert percept_of(perception(), played).faces == wanted.faces
+
+
+def test_a_lens_tuned_while_running_reaches_the_camera() -> None:
+    running = started("visitor")
+
+    def used_px() -> float:
+        return present(present(running.go(20).detections).located).intrinsics.fx_px
+
+    before_px = used_px()
+    running.tune({"camera.horizontal_field_deg": 50.0})
+    running.go(1)
+    assert used_px() == pytest.approx(320.0 / tan(radians(25.0)))
+    running.tune({"camera.horizontal_field_deg": FIELD_DEG})
+    running.go(1)
+    assert used_px() == before_px
 
 
 def test_a_locator_and_what_it_locates_pass_between_processes() -> None:
