@@ -42,27 +42,31 @@ class Costs:
     def __init__(self, observers: RunObservers, recorder: Recorder) -> None:
         self._observers, self._recorder = observers, recorder
         self._sinks = {sink.name: sink for sink in recorder.stream._sinks}
-        self.windows: dict[str, list[tuple[float, float]]] = {way: [] for way in WAYS}
+        self.windows: dict[str, list[tuple[float, float, float]]] = {way: [] for way in WAYS}
         self._way, self._number, self._start = "both", 0, (0, 0)
+        self._calls_ns = 0
 
     def watch(self, tick: Tick) -> None:
         """Hand a tick to those whose turn it is, and read the clocks."""
         way, observers = self._way, self._observers
+        start_ns = time.thread_time_ns()
         if way == "recording":
             self._recorder.record(tick)
         elif way != "alone":
             observers.update(tick)
+        self._calls_ns += time.thread_time_ns() - start_ns
         self._number += 1
         place = self._number % WINDOW_TICKS
         if place == SKIPPED:
-            self._start = time.process_time_ns(), time.thread_time_ns()
+            self._start, self._calls_ns = (time.process_time_ns(), time.thread_time_ns()), 0
         elif place == 0:
             now = time.process_time_ns(), time.thread_time_ns()
             process, thread = (
                 (end - start) / (WINDOW_TICKS - SKIPPED) / 1e3
                 for start, end in zip(self._start, now, strict=True)
             )
-            self.windows[way].append((process, thread))
+            calls = self._calls_ns / (WINDOW_TICKS - SKIPPED) / 1e3
+            self.windows[way].append((process, thread, calls))
             self._turn()
 
     def _turn(self) -> None:
@@ -75,16 +79,16 @@ class Costs:
     def show(self) -> None:
         """Print the lower quartile of the windows: other programs only ever make them longer."""
         low = {way: np.percentile(windows, 25, axis=0) for way, windows in self.windows.items()}
-        process, thread = low["alone"]
+        process, thread, _ = low["alone"]
         print(
             f"loop's process alone: {process:.0f} us of processor a tick, of these {thread:.0f} in "
             "the loop's thread"
         )
         for way in WAYS[1:]:
-            process, thread = low[way] - low["alone"]
+            process, thread, calls = low[way] - low["alone"]
             print(
                 f"loop's process: {process:4.0f} us a tick added by {way}, of these {thread:4.0f} "
-                "in the loop's thread"
+                f"in the loop's thread; the calls themselves take {calls:.0f}"
             )
 
 
