@@ -34,6 +34,7 @@ package: $(VENV)/.installed-dev
 bench: $(VENV)/.installed-dev
 	$(BIN)/python tests/bench/bench_run.py
 	$(BIN)/python tests/bench/bench_tick.py
+	$(BIN)/python tests/bench/bench_start.py
 	$(BIN)/python tests/bench/bench_gaze.py
 	$(BIN)/python tests/bench/bench_bus.py
 	$(BIN)/python tests/bench/bench_bus_peers.py
