@@ -67,7 +67,8 @@ class ServoProtection:
 
         checks: go on by so many times 20 ms at once
         """
-        physics, limits = self._physics, self.limits
+        physics = self._physics
+        hottest_c, highest, lowest, heavy_share, heavy_s, current_a, current_s = self.limits
         target = self.ambient_c + physics.stall_rise_c * effort * effort
         if checks == 1:
             self.temperature_c += (target - self.temperature_c) * (CHECK_S / physics.thermal_s)
@@ -76,19 +77,22 @@ class ServoProtection:
                 self.temperature_c, target, physics.thermal_s, checks
             )
         effort = abs(effort)
-        heavy = effort > 0.0 and effort >= limits.overload_share * volts - 1e-11
-        self._heavy_checks = self._heavy_checks + checks if heavy else 0
-        strong = effort * self._model.stall_current_a > limits.current_a
-        self._strong_checks = self._strong_checks + checks if strong else 0
-        tenths = volts * self._model.rated_v * 10.0
         bits = 0
-        if heavy and self._heavy_checks * CHECK_S >= limits.overload_s:
-            bits |= OVERLOAD
-        if strong and self._strong_checks * CHECK_S >= limits.current_s:
-            bits |= CURRENT
-        if self.temperature_c > limits.hottest_c:
+        if effort > 0.0 and effort >= heavy_share * volts - 1e-11:
+            self._heavy_checks += checks
+            if self._heavy_checks * CHECK_S >= heavy_s:
+                bits |= OVERLOAD
+        else:
+            self._heavy_checks = 0
+        if effort * self._model.stall_current_a > current_a:
+            self._strong_checks += checks
+            if self._strong_checks * CHECK_S >= current_s:
+                bits |= CURRENT
+        else:
+            self._strong_checks = 0
+        if self.temperature_c > hottest_c:
             bits |= HEAT
-        if not limits.lowest_01v - 0.5 <= tenths <= limits.highest_01v + 0.5:
+        if not lowest - 0.5 <= volts * self._model.rated_v * 10.0 <= highest + 0.5:
             bits |= VOLTAGE
         return bits
 

@@ -166,7 +166,8 @@ class EmulatedServo(ABC):
         bits = protection.check(shaft.effort, shaft.volts, checks)
         self._calm = protection.temperature_c == before_c and protection.steady
         self._measure_surroundings()
-        self._protect_from(bits)
+        if bits or self.errors:
+            self._protect_from(bits)
         if protection.browned_out(shaft.volts):
             self.restart()
 
