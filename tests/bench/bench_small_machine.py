@@ -131,6 +131,7 @@ def apart(args: argparse.Namespace, share: float, asked: dict[str, Any]) -> dict
 def pin(asked: dict[str, Any]) -> None:
     """Go to the slow core, with all threads and processes that are started later."""
     os.sched_setaffinity(0, {asked["core"]})
+    os.setpriority(os.PRIO_PROCESS, 0, -19)  # before whatever else runs on that core
     if asked["group"]:
         (GROUP / "cgroup.procs").write_text(str(os.getpid()))
 
