@@ -1,5 +1,6 @@
 """Which camera is taken, and what is said where none can be; device calls are stood in for."""
 
+import gc
 import threading
 from datetime import timedelta
 from types import SimpleNamespace
@@ -246,6 +247,17 @@ def test_camera_that_does_not_start_is_freed_and_named():
     with pytest.raises(CameraError, match="X_LINK_DEVICE_ALREADY_IN_USE somewhere.*unplug") as it:
         rig.source().open()
     assert "\n" not in str(it.value)
+    assert rig.waited and rig.device.closed == 1  # type: ignore[attr-defined]
+
+
+def test_camera_that_is_dropped_open_is_closed():
+    rig = Rig()
+    source = rig.source()
+    source.open()
+    held = [source]
+    held.append(held)  # as the frames of a traceback hold it: only the garbage collector finds it
+    del source, held
+    gc.collect()
     assert rig.waited and rig.device.closed == 1  # type: ignore[attr-defined]
 
 

@@ -116,6 +116,10 @@ class OakSource:
                 except RuntimeError as error:
                     self._events.append(f"closing the OAK camera: {_line(error)}")
 
+    def __del__(self) -> None:
+        """Close a camera that was dropped open: the SDK's own destructor would wait for ever."""
+        self.close()
+
     def _connect(self) -> Any:
         """Open the device, and see how fast its USB is."""
         info = find_oak(self._dai, self._params.device)
