@@ -63,13 +63,15 @@ class CheckedBus:
             BusLost: the port is gone, or the package fails.
         """
         began_s = self._now_s() if self._now_s is not None else 0.0
-        told = self._tried(lambda: self._bus.read(now_s), "read")
+        feedback = self._tried(lambda: self._bus.read(now_s), "read")
         if self._now_s is not None:
             self._time(self._now_s() - began_s, now_s)
-        if not isinstance(told, Feedback):
-            raise BusLost(f"{self._label}: read returned a {type(told).__name__}, wanted Feedback")
+        if not isinstance(feedback, Feedback):
+            raise BusLost(
+                f"{self._label}: read returned a {type(feedback).__name__}, wanted Feedback"
+            )
         try:
-            return self._sound(told, now_s)
+            return self._sound(feedback, now_s)
         except (TypeError, ValueError) as error:
             raise BusLost(f"{self._label}: read returned no feedback: {failure(error)}") from error
 
@@ -81,14 +83,14 @@ class CheckedBus:
             text = f"{self._label}: a read took {took_s * 1e3:.0f} ms, as long as a tick"
             self._seldom.add(f"{text}: lower loop.rate_hz", now_s, "slow")
 
-    def _sound(self, told: Feedback, now_s: float) -> Feedback:
-        for name, column in zip(Feedback._fields[:_COLUMNS], told[:_COLUMNS], strict=True):
+    def _sound(self, feedback: Feedback, now_s: float) -> Feedback:
+        for name, column in zip(Feedback._fields[:_COLUMNS], feedback[:_COLUMNS], strict=True):
             if len(column) != self._count:
                 raise ValueError(f"{len(column)} values of {name} for {self._count} servos")
-        numbers: tuple[Any, ...] = told[:_NUMBERS]
-        if not told.missing and all(map(isfinite, chain.from_iterable(numbers))):
-            return told
-        missing = set(told.missing)
+        numbers: tuple[Any, ...] = feedback[:_NUMBERS]
+        if not feedback.missing and all(map(isfinite, chain.from_iterable(numbers))):
+            return feedback
+        missing = set(feedback.missing)
         if not missing <= set(range(self._count)):
             raise ValueError(f"missing {sorted(missing)} of {self._count} servos")
         wrong = {
@@ -97,7 +99,7 @@ class CheckedBus:
             if i not in missing and not all([isfinite(column[i]) for column in numbers])
         }
         if not wrong:
-            return told
+            return feedback
         names = ", ".join(servo_label(self._setups[i]) for i in sorted(wrong))
         text = (
             f"{self._label}: no finite position, speed, load or time of {names}: taken as missing"
@@ -106,7 +108,7 @@ class CheckedBus:
         empty = Feedback.of_none(self._count)
         columns = [
             tuple([none[i] if i in wrong else column[i] for i in range(self._count)])
-            for column, none in zip(told[:_COLUMNS], empty[:_COLUMNS], strict=True)
+            for column, none in zip(feedback[:_COLUMNS], empty[:_COLUMNS], strict=True)
         ]
         return Feedback._make((*columns, tuple(sorted(missing | wrong))))
 
@@ -172,8 +174,8 @@ class CheckedBus:
 
     def health(self) -> BusHealth:
         """Return byte and error counts."""
-        told: Any = self._tried(self._bus.health, "health")
-        return told if isinstance(told, BusHealth) else BusHealth(0, 0, {})
+        health: Any = self._tried(self._bus.health, "health")
+        return health if isinstance(health, BusHealth) else BusHealth(0, 0, {})
 
     def close(self) -> None:
         """Close the port; safe to call twice."""

@@ -45,8 +45,8 @@ class FrameAnalyzer:
 
     def events(self) -> tuple[str, ...]:
         """Return what the detector has to tell since the last call, one line each."""
-        told = getattr(self._detector, "events", None)
-        return told() if told is not None else ()
+        events = getattr(self._detector, "events", None)
+        return events() if events is not None else ()
 
     def retune(
         self,

@@ -280,9 +280,9 @@ def _robot(
     rig: Rig,
     simulated: bool,
 ) -> Robot:
-    told: list[str] = []
-    chooser = chooser_of(rig, parts.attention, told.append, simulated)
-    chooser = substitutes.program.choose(chooser, told.append, simulated)
+    messages: list[str] = []
+    chooser = chooser_of(rig, parts.attention, messages.append, simulated)
+    chooser = substitutes.program.choose(chooser, messages.append, simulated)
     return Robot(
         substitutes.body(parts.body),
         parts.kinematics,
@@ -299,7 +299,7 @@ def _robot(
         parts.guard,
         live,
         PixelToWorld(parts.mount, poses, lambda: live.camera),
-        told,
+        messages,
     )
 
 

@@ -89,15 +89,15 @@ def record_gesture(
         from gazerig.robot.app.gesture_file import gesture_text
 
         loaded = load_rig(rig)
-        told = [one for one in loaded.names if loaded.joints[one].facts.measured]
-        if not told:
+        measured = [one for one in loaded.names if loaded.joints[one].facts.measured]
+        if not measured:
             raise SetupError(
                 f"{rig}: hobby servos do not tell where they are: none can be recorded"
             )
         gesture_name(f"{name}.yaml")
         refuse_existing(folder / f"{name}.yaml", force=force)
         _ask_to_let_go(yes)
-        recorded = _recorded(loaded, told, seconds, mock, port)
+        recorded = _recorded(loaded, measured, seconds, mock, port)
         if recorded is None:
             say("ended by Ctrl-C: the torque is off, nothing is written")
             raise typer.Exit(INTERRUPTED)

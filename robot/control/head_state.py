@@ -240,7 +240,7 @@ def _joints(tick: Tick) -> dict[str, JointReading]:
         guard.command_rad,
         state.position_rad,
         state.velocity_rad_s,
-        [not told for told in state.measured] or [False] * count,
+        [not measured for measured in state.measured] or [False] * count,
         guard.why or [""] * count,
         _or_none(state.torque, count),
         state.fault or [""] * count,

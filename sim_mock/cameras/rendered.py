@@ -161,8 +161,8 @@ class PixelCamera:
 
     def events(self) -> tuple[str, ...]:
         """Return what the detector has to tell since the last call: nothing else can happen."""
-        told = getattr(self._detector, "events", None)
-        return told() if told is not None else ()
+        events = getattr(self._detector, "events", None)
+        return events() if events is not None else ()
 
     def close(self) -> None:
         """Stop; there is nothing to free."""
