@@ -201,6 +201,29 @@ def late(m: ModuleType) -> None:
             before, speed = now, (now - before) / DT
 
 
+def late_while_gentle(m: ModuleType) -> None:
+    """Every third tick misses two slots: a slow joint regains its speed, and no more than that."""
+    limit = JointLimit(LOW, HIGH, TOP, ACCEL, 70.0, 3.5, 7.0)
+    params = GuardParams(soft_start_speed_deg_s=20.0, soft_start_accel_deg_s2=50.0)
+    for missed in (2, 60):
+        guard = m.Guard(params, (limit,) * 9, GAZE_JOINTS, period_s=DT)
+        guard.reset(0.0, (LOW,) * 9)
+        t_s, before, fastest, last = 0.0, LOW, 0.0, 0.0
+        for k in range(1, 400):
+            gap = missed if k % 3 == 0 else 0
+            t_s += (1 + gap) * DT
+            joints = JointState((before,) * 9, (0.0,) * 9, (t_s,) * 9, ())
+            now = guard.check((HIGH,) * 9, joints, 0.0, t_s).command_rad[0]
+            speed, before = (now - before) / DT, now
+            assert speed <= min(radians(20.0), fastest + radians(50.0) * DT) + 1e-9
+            braked = max(0.0, last - ACCEL * gap * DT)
+            assert abs(speed - braked) <= ACCEL * DT + 1e-9
+            if gap > 50:  # longer than that it begins as from rest
+                assert speed <= braked + radians(50.0) * DT + 1e-9
+            fastest, last = max(fastest, speed), speed
+        assert (now > LOW + 0.05) == (missed == 2)
+
+
 def slow_host(m: ModuleType) -> None:
     """A loop that always takes two slots is a slower loop, and joints come to their speed."""
     limit = JointLimit(LOW, HIGH, TOP, ACCEL, 70.0, 3.5, 7.0)
@@ -476,6 +499,7 @@ CHECKS: tuple[Callable[[ModuleType], None], ...] = (
     no_overshoot,
     stopped_loop,
     late,
+    late_while_gentle,
     slow_host,
     not_finite,
     stale_joints,
@@ -566,6 +590,10 @@ MUTATIONS: tuple[Mutation, ...] = (
     (GUARD, "            self._motion.left_alone(missed_s)", "            pass", late),
     (GUARD, "soft = min(soft, self._late_accel)", "pass", late),
     (MOTION, "- limit.accel_rad_s2 * for_s", "", late),
+    (MOTION, "min(lost, v + regain * dt_s)", "v", late_while_gentle),
+    (MOTION, "min(lost, v + regain * dt_s)", "v + regain * dt_s", late_while_gentle),
+    (MOTION, "min(lost, v + regain * dt_s)", "lost", late_while_gentle),
+    (MOTION, "short = for_s <= SHORT_GAP_S", "short = True", late_while_gentle),
     (GUARD, "since_s > 0.0 and isfinite(since_s)", "isfinite(since_s)", stopped_loop),
     (GUARD, "since_s > 0.0 and isfinite(since_s)", "since_s > 0.0", stopped_loop),
     # numbers and ages
@@ -629,7 +657,7 @@ MUTATIONS: tuple[Mutation, ...] = (
     (MOTION, "top = min(top, self.limits[i].speed_rad_s)", "pass", slow_joint),
     (MOTION, "soft = min(soft, self.limits[i].accel_rad_s2)", "pass", slow_joint),
     (GUARD, "min(top, self._gentle_speed)", "top", gentle),
-    (GUARD, "min(soft, self._gentle_accel)", "soft", gentle),
+    (GUARD, "min(accel, self._gentle_accel)", "accel", gentle),
     (GUARD, "and self._t_s >= self._gentle_until_s[i]", "or True", gentle),
     # collisions
     (COLLISIONS, "motion.wall_above(i, span.below)", "pass", collision),

@@ -272,20 +272,20 @@ class Robot:
         again: asked at every step, returns whether the rest is to be skipped
         """
         self._guard.go_gently()
-        start_s = clock.now_s()
-        end_s = start_s + params.park_s + 0.5 / params.rate_hz
-        for slot in range(1, int(params.park_s * params.rate_hz) + 1):
-            clock.sleep_until(start_s + slot / params.rate_hz)
+        rate_hz, start_s, slot = params.rate_hz, clock.now_s(), 0
+        end_s = start_s + params.park_s + 0.5 / rate_hz
+        last = int(params.park_s * rate_hz)
+        while (slot := max(slot, int((clock.now_s() - start_s) * rate_hz + 1e-6)) + 1) <= last:
+            clock.sleep_until(start_s + slot / rate_hz)
             t_s = clock.now_s()
-            # A bus that is slow to answer must not make it longer.
+            # A bus that is slow to answer must not make it longer; missed slots are skipped.
             if t_s > end_s or (again is not None and again()):
                 return False
             if stops := self._commands.stops():
                 for stop in stops:
                     stop.ticket.answer(self._executor.execute(stop.command, t_s))
                 return False
-            joints = self.body.read(t_s)
-            # Parking goes home whatever the camera shows.
+            joints = self.body.read(t_s)  # it goes home whatever the camera shows
             self.body.write(self._guard.check(pose_rad, joints, 0.0, t_s).command_rad)
             errors = zip(pose_rad, joints.position_rad, strict=True)
             if max(abs(desired - now) for desired, now in errors) < radians(2.0):

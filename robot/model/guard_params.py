@@ -80,7 +80,7 @@ class GuardParams:
     late_ms: Annotated[float, Bounds(0, 5000),
         "acceleration is limited to late_accel_deg_s2 for this long after a tick that missed its slot"] = 50.0
     late_accel_deg_s2: Annotated[float, Bounds(10, 200_000),
-        "acceleration limit after a late tick, as servos have braked when no goals came"] = 15000.0
+        "acceleration limit after a late tick, as servos have braked when no goals came; slow motion regains its speed with it"] = 15000.0
     health: Annotated[HealthParams, "what the servos bear"] = field(default_factory=HealthParams)
     stall: Annotated[StallParams, "joints that are told to move and do not"] = field(default_factory=StallParams)
     collision_margin_deg: Annotated[float, Bounds(0.1, 20),

@@ -7,7 +7,7 @@ stops, each joint by itself. Radians.
 """
 
 from collections.abc import Callable
-from math import isfinite, radians
+from math import inf, isfinite, radians
 from typing import Literal, NamedTuple
 
 from gazerig.robot.model.guard_params import GuardParams
@@ -135,6 +135,8 @@ class Guard:
     def go_gently(self) -> None:
         """Move slowly for a while, and each joint until it has once met its desired angle."""
         self._calm = False
+        for i in range(len(self._limits)):
+            self._motion.forget_gaps(i)
         self._gentle = [True] * len(self._limits)
         self._gentle_until_s = [self._t_s + self._params.soft_start_ms / 1e3] * len(self._limits)
 
@@ -257,6 +259,8 @@ class Guard:
     def _slow_down(self, i: int) -> None:
         """Make one joint go on slowly, as after torque-on."""
         self._calm = False
+        if not self._gentle[i]:
+            self._motion.forget_gaps(i)
         self._gentle[i] = True
         self._gentle_until_s[i] = self._t_s + self._params.soft_start_ms / 1e3
 
@@ -347,10 +351,17 @@ class Guard:
         if hold.goal is None:
             self._motion.brake(i, dt_s)
         elif hold.slowly:
-            self._motion.seek(i, hold.goal, dt_s, self._gentle_speed, self._gentle_accel)
+            self._seek_gently(i, hold.goal, dt_s)
         else:
             limit = self._limits[i]
             self._motion.seek(i, hold.goal, dt_s, limit.speed_rad_s, limit.accel_rad_s2)
+
+    def _seek_gently(
+        self, i: int, goal: float, dt_s: float, top: float = inf, accel: float = inf
+    ) -> None:
+        """Go to a goal slowly; what a late tick costs of the slow speed is regained at once."""
+        speed, soft = min(top, self._gentle_speed), min(accel, self._gentle_accel)
+        self._motion.seek(i, goal, dt_s, speed, soft, regain=min(accel, self._late_accel))
 
     def _go(self, i: int, desired: float, position: float, dt_s: float) -> str:
         """Move a joint towards its desired angle as far as it may; return why it fell short."""
@@ -364,7 +375,7 @@ class Guard:
             pull, lead = desired, self._stuck.lead_rad
             if self._retrying[i]:
                 pull = min(max(desired, position - lead), position + lead)
-            motion.seek(i, pull, dt_s, min(top, self._gentle_speed), min(soft, self._gentle_accel))
+            self._seek_gently(i, pull, dt_s, top, soft)
             if abs(target - motion.command[i]) < _NEAR_RAD and self._t_s >= self._gentle_until_s[i]:
                 self._gentle[i] = self._retrying[i] = False
         elif self._soft or share < 1.0 or not motion.follow(i, desired, dt_s):

@@ -10,6 +10,8 @@ from math import copysign, inf, sqrt
 from gazerig.robot.model.joint_limit import JointLimit
 
 _ROUNDING_RAD = 1e-9
+SHORT_GAP_S = 0.05
+"""After a longer time without goals a joint begins as from rest."""
 
 
 class MotionLimiter:
@@ -30,6 +32,7 @@ class MotionLimiter:
         self.low = [limit.low_rad for limit in limits]
         self.high = [limit.high_rad for limit in limits]
         self.goal = list(self.command)
+        self._lost = [0.0] * len(limits)
         self.easy_s = inf
         self.easy_speed = [0.0] * len(limits)
         self.easy_low, self.easy_high = list(self.low), list(self.high)
@@ -55,13 +58,27 @@ class MotionLimiter:
         """Reset to an angle, at rest."""
         self.command[i] = self.goal[i] = angle_rad
         self.speed[i] = 0.0
+        self._lost[i] = 0.0
 
     def left_alone(self, for_s: float) -> None:
-        """Record that servos got no goals for a time, in which they braked to their last ones."""
+        """Record that servos got no goals for a time, in which they braked to their last ones.
+
+        What a short gap costs of a speed may be regained faster than it was gathered (``seek``).
+        """
+        short = for_s <= SHORT_GAP_S
         for i, limit in enumerate(self.limits):
-            left = abs(self.speed[i]) - limit.accel_rad_s2 * for_s
-            self.speed[i] = copysign(left, self.speed[i]) if left > 0.0 else 0.0
+            speed, lost = self.speed[i], self._lost[i]
+            left = abs(speed) - limit.accel_rad_s2 * for_s
+            if not short:
+                self._lost[i] = 0.0
+            elif lost * speed < 0.0 or abs(speed) > abs(lost):
+                self._lost[i] = speed
+            self.speed[i] = copysign(left, speed) if left > 0.0 else 0.0
             self.goal[i] = self.command[i]
+
+    def forget_gaps(self, i: int) -> None:
+        """Regain no speed that a joint had before a gap."""
+        self._lost[i] = 0.0
 
     def recount(self, i: int, factor: float, offset_rad: float) -> None:
         """Count a joint's angles otherwise: what was x is factor x + offset from now on."""
@@ -76,6 +93,7 @@ class MotionLimiter:
         )
         self.command[i] = self.goal[i] = factor * self.command[i] + offset_rad
         self.speed[i] *= factor
+        self._lost[i] = 0.0
         self.let_be(i)
 
     def take(self, i: int, limit: JointLimit) -> None:
@@ -148,7 +166,14 @@ class MotionLimiter:
         self.seek(i, desired, dt_s, top, soft, along)
 
     def seek(
-        self, i: int, desired: float, dt_s: float, top: float, soft: float, along: float = 0.0
+        self,
+        i: int,
+        desired: float,
+        dt_s: float,
+        top: float,
+        soft: float,
+        along: float = 0.0,
+        regain: float = 0.0,
     ) -> None:
         """Go to a desired angle below a speed ``top``, gathering it with ``soft``, to end there.
 
@@ -157,26 +182,40 @@ class MotionLimiter:
 
         top, soft: the joint's own speed and acceleration hold all the same
         along: the speed of the goal itself
+        regain: acceleration up to the speed that the joint had before a short gap. With ``soft``
+            alone, a joint that misses a tick now and then would hardly move at all.
         """
         top = min(top, self.limits[i].speed_rad_s)
         soft = min(soft, self.limits[i].accel_rad_s2)
+        regain = min(regain, self.limits[i].accel_rad_s2)
         target = min(max(desired, self.low[i]), self.high[i])
         gap = target - along * dt_s - self.command[i]
         closing = reachable_speed(abs(gap), soft, dt_s)
         self.goal[i] = target
-        self._step(i, along + (closing if gap >= 0.0 else -closing), dt_s, top, soft)
+        self._step(i, along + (closing if gap >= 0.0 else -closing), dt_s, top, soft, regain)
 
     def brake(self, i: int, dt_s: float) -> None:
         """Come to a stop as fast as the joint may."""
         limit = self.limits[i]
         self._step(i, 0.0, dt_s, limit.speed_rad_s, limit.accel_rad_s2)
         self.goal[i] = self.command[i]
+        self._lost[i] = 0.0
 
-    def _step(self, i: int, wanted: float, dt_s: float, top: float, soft: float) -> None:
-        """Return the speed nearest to the wanted one that keeps every limit."""
+    def _step(
+        self, i: int, wanted: float, dt_s: float, top: float, soft: float, regain: float = 0.0
+    ) -> None:
+        """Move with the speed nearest to the wanted one that keeps every limit."""
         accel = self.limits[i].accel_rad_s2
         p, v, low, high = self.command[i], self.speed[i], self.low[i], self.high[i]
         most, least = _faster(v, accel, soft, dt_s), -_faster(-v, accel, soft, dt_s)
+        lost = self._lost[i]
+        if lost != 0.0:
+            if lost > 0.0 <= v:
+                most = max(most, min(lost, v + regain * dt_s))
+            elif lost < 0.0 >= v:
+                least = min(least, max(lost, v - regain * dt_s))
+            if least <= wanted <= most or wanted * lost <= 0.0:  # as fast as it is to be
+                self._lost[i] = 0.0
         chosen = most if wanted > most else least if wanted < least else wanted
         # Top speed, range and braking distance win over softness, never over the joint's own
         # acceleration, which is enough for them as long as every step is taken here.
