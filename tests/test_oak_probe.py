@@ -254,7 +254,7 @@ def test_camera_that_is_dropped_open_is_closed():
     rig = Rig()
     source = rig.source()
     source.open()
-    held = [source]
+    held: list[object] = [source]
     held.append(held)  # as the frames of a traceback hold it: only the garbage collector finds it
     del source, held
     gc.collect()
