@@ -5,7 +5,9 @@ The lag has a closed form, so the angles do not depend on how often they are rea
 """
 
 from collections.abc import Callable, Sequence
+from itertools import repeat
 from math import exp
+from operator import add, gt, lt, mul, sub, truediv
 from typing import NamedTuple
 
 from gazerig.drivers.types import BusHealth, Feedback, ServoConfig
@@ -28,7 +30,8 @@ class _Motion(NamedTuple):
         if goals is None or now_s <= self.at_s:
             return self.from_steps
         left = exp((self.at_s - now_s) / LAG_S)
-        return tuple([g + (x - g) * left for x, g in zip(self.from_steps, goals, strict=True)])
+        ahead = map(mul, map(sub, self.from_steps, goals), repeat(left))
+        return tuple(map(add, goals, ahead))
 
 
 class IdealBus:
@@ -52,6 +55,7 @@ class IdealBus:
         # One value, replaced as a whole: the camera may look from another thread.
         self._motion = _Motion(now_s(), tuple(map(float, start_steps)), None)
         self._read = self._motion.at_s, self._motion.from_steps
+        self._reached = self._motion, *self._read  # where a motion has got to, when read last
         self._events: tuple[str, ...] = ()
         self._measured = tuple(measured)
         count = len(self._measured)
@@ -73,16 +77,21 @@ class IdealBus:
 
     def read(self, now_s: float) -> Feedback:
         """Return the positions, rounded to steps, and the mean speeds since the last read."""
-        steps = self._motion.steps(now_s)
+        motion = self._motion
+        steps = motion.steps(now_s)
         (last_s, last), self._read = self._read, (now_s, steps)
+        self._reached = motion, now_s, steps
         passed_s = now_s - last_s
         speeds = self._zeros
         if passed_s > 0.0:
-            speeds = tuple([(x - was) / passed_s for x, was in zip(steps, last, strict=True)])
-        torque = self._no if self._motion.goals_steps is None else self._yes
-        return Feedback(
-            tuple([float(round(x)) for x in steps]), speeds, self._zeros, (now_s,) * len(steps),
-            self._warm, self._none, torque, self._no_faults, self._measured, self._no, (),
+            speeds = tuple(map(truediv, map(sub, steps, last), repeat(passed_s)))
+        torque = self._no if motion.goals_steps is None else self._yes
+        return tuple.__new__(
+            Feedback,
+            (
+                tuple(map(float, map(round, steps))), speeds, self._zeros, (now_s,) * len(steps),
+                self._warm, self._none, torque, self._no_faults, self._measured, self._no, (),
+            ),
         )  # fmt: skip
 
     def enable_torque(self) -> tuple[int, ...]:
@@ -101,7 +110,8 @@ class IdealBus:
 
     def retune(self, setups: Sequence[ServoConfig]) -> None:
         """Keep other limits from the next goals on."""
-        self._ranges = tuple([(one.min_steps, one.max_steps) for one in setups])
+        self._lowest = tuple([one.min_steps for one in setups])
+        self._highest = tuple([one.max_steps for one in setups])
 
     def faults(self) -> tuple[str, ...]:
         """Return no faults."""
@@ -118,12 +128,14 @@ class IdealBus:
 
     def _follow(self, goals_steps: Sequence[int]) -> tuple[int, ...]:
         """Lead the shafts to goals from where they are now; return the goals within the limits."""
-        goals = tuple(
-            [
-                low if goal < low else high if goal > high else goal
-                for goal, (low, high) in zip(goals_steps, self._ranges, strict=True)
-            ]
-        )
-        now_s = self._now_s()
-        self._motion = _Motion(now_s, self._motion.steps(now_s), goals)
+        goals, low, high = tuple(goals_steps), self._lowest, self._highest
+        if len(goals) != len(low):
+            raise ValueError(f"{len(goals)} goals for {len(low)} servos")
+        if True in map(lt, goals, low) or True in map(gt, goals, high):
+            goals = tuple(map(min, map(max, goals, low), high))
+        now_s, motion = self._now_s(), self._motion
+        of, at_s, steps = self._reached
+        if of is not motion or at_s != now_s:
+            steps = motion.steps(now_s)
+        self._motion = _Motion(now_s, steps, goals)
         return goals
