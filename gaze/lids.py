@@ -144,7 +144,7 @@ class Lids:
             self._redraw, self._next_s = False, t_s + self._pause_s(self._length_s())
         upper, lower = self._rest.step(t_s, degrees(eye_pitch_rad))
         if shift_rad is None and self._shut_until_s < t_s < self._next_s:
-            return LidOpenings(upper, upper, False, lower, lower)
+            return tuple.__new__(LidOpenings, (upper, upper, False, lower, lower))
         if self._due(t_s, shift_rad):
             self._begin_blink(t_s)
         blink = _shut(self._blink, t_s)

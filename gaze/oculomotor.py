@@ -209,9 +209,14 @@ class Oculomotor:
             else "pursue" if norm(velocity) > _MOVING_M_S
             else "fixate"
         )  # fmt: skip
-        return GazeCommand(
-            head, left, right, lids.left, lids.right, phase, lids.blink, self._gaze, self.saccades,
-            self.fixations, self._lids.blinks, lids.lower_left, lids.lower_right, limited,
+        # Without the call of a function written in Python that the class itself would cost.
+        return tuple.__new__(
+            GazeCommand,
+            (
+                head, left, right, lids.left, lids.right, phase, lids.blink, self._gaze,
+                self.saccades, self.fixations, self._lids.blinks, lids.lower_left,
+                lids.lower_right, limited,
+            ),
         )  # fmt: skip
 
     def reach(self, target: Target) -> ReachableGaze:

@@ -251,10 +251,10 @@ class Robot:
         lead = self._lead.measure(target, pose, joints.position_rad, converges, t_s)
         events = (*self._messages, *self.body.bus.events(), *self.camera.events())
         self._messages.clear()
-        tick = Tick(
+        tick = tuple.__new__(Tick, (
             t_s, joints, pose, detections, percept, target, gaze, desired, guard_result, events, commands,
             stopped, self._lead.words, lead, self._gestures.state,
-        )  # fmt: skip
+        ))  # fmt: skip
         self._looks.known = tick
         return tick
 

@@ -165,21 +165,25 @@ class Kinematics:
         x, y, z = p_head
         half, shut, span = self._half, self._shut, self._span
         aside_x, aside_y, aside_z = R[0][1] * half, R[1][1] * half, R[2][1] * half
-        return GazeState(
-            head,
-            rates[:3],
-            (pan_left, tilt_left),
-            (pan_right, tilt_right),
-            R,
-            p_head,
-            (x + aside_x, y + aside_y, z + aside_z),
-            (x - aside_x, y - aside_y, z - aside_z),
-            _share((upper_left - shut[0]) / span[0]),
-            _share((upper_right - shut[1]) / span[1]),
-            _share((lower_left - shut[2]) / span[2]),
-            _share((lower_right - shut[3]) / span[3]),
-            base,
-            rates[3:],
+        # Without the call of a function written in Python that the class itself would cost.
+        return tuple.__new__(
+            GazeState,
+            (
+                head,
+                rates[:3],
+                (pan_left, tilt_left),
+                (pan_right, tilt_right),
+                R,
+                p_head,
+                (x + aside_x, y + aside_y, z + aside_z),
+                (x - aside_x, y - aside_y, z - aside_z),
+                _share((upper_left - shut[0]) / span[0]),
+                _share((upper_right - shut[1]) / span[1]),
+                _share((lower_left - shut[2]) / span[2]),
+                _share((lower_right - shut[3]) / span[3]),
+                base,
+                rates[3:],
+            ),
         )
 
     def inverse(self, command: GazeCommand, further_rad: JointAngles = ()) -> JointAngles:

@@ -18,7 +18,8 @@ def standstill(
 
 def passed(desired_rad: JointAngles, joints: tuple[str, ...]) -> GuardResult:
     """Return the result of a tick in which every joint may do as is desired."""
-    return GuardResult(desired_rad, "ok", (), desired_rad, (), (), joints)
+    # Without the call of a function written in Python that the class itself would cost.
+    return tuple.__new__(GuardResult, (desired_rad, "ok", (), desired_rad, (), (), joints))
 
 
 class Findings(NamedTuple):

@@ -16,7 +16,7 @@ import numpy as np
 from gazerig.drivers.camera.frame_analysis import Locate
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
-from gazerig.gaze.angles import add, dot, norm, rotate, rotate_back, rotation, scale, sub, unit
+from gazerig.gaze.angles import dot, norm, rotate, rotate_back, rotation, scale, sub, unit
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
@@ -154,14 +154,13 @@ class SceneCamera:
         turned_away = dot(unit(to_camera), outwards) < _COS_TURNED_AWAY
         if missed or turned_away or norm(to_camera) > _FARTHEST_FACE_M:
             return None
-        points = [
-            rotate_back(R, sub(add(place, rotate(R_world_face, landmark)), p))
-            for landmark in _LANDMARKS_FACE_M
-        ]
-        if min([point[2] for point in points]) < 0.1:
+        points = _landmarks_before(R, p, R_world_face, place)
+        if min([z for _, _, z in points]) < 0.1:
             return None
-        pixels = [self._pixel(point) for point in points]
-        size = self._lens.fx_px * _FACE_BOX_M / points[2][2]
+        lens = self._lens
+        fx, fy, cx, cy = lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px
+        pixels = [(x / z * fx + cx, y / z * fy + cy) for x, y, z in points]
+        size = fx * _FACE_BOX_M / points[2][2]
         x, y = pixels[2]
         box = (x - size / 2, y - size / 2, size, size)
         if not self._inside(x, y, size / 2):
@@ -189,3 +188,20 @@ class SceneCamera:
     def _inside(self, x: float, y: float, margin: float) -> bool:
         par = self._params
         return margin <= x <= par.width_px - margin and margin <= y <= par.height_px - margin
+
+
+def _landmarks_before(R: Mat3, p: Vec3, R_world_face: Mat3, p_world_face_m: Vec3) -> list[Vec3]:
+    """Return the landmarks of a face in the axes of a camera.
+
+    R, p: rotation and place of the camera in the world
+    """
+    (a, b, c), (d, e, f), (g, h, i) = R_world_face
+    (k, l, m), (n, o, q), (r, s, t) = R  # noqa: E741
+    (face_x, face_y, face_z), (from_x, from_y, from_z) = p_world_face_m, p
+    found = []
+    for x, y, z in _LANDMARKS_FACE_M:
+        u = face_x + (a * x + b * y + c * z) - from_x
+        v = face_y + (d * x + e * y + f * z) - from_y
+        w = face_z + (g * x + h * y + i * z) - from_z
+        found.append((k * u + n * v + r * w, l * u + o * v + s * w, m * u + q * v + t * w))
+    return found

@@ -15,6 +15,8 @@ from gazerig.drivers.types import BusHealth, Feedback, ServoConfig
 LAG_S = 0.008
 """Time constant; an emulated eye on the desk rig's gains is as late."""
 WARM_C = 30.0
+_TO_WHOLE = repeat(1.5 * 2.0**52)
+"""Added and subtracted again it rounds as ``round`` does: floats of its size have no fraction."""
 
 
 class _Motion(NamedTuple):
@@ -89,7 +91,7 @@ class IdealBus:
         return tuple.__new__(
             Feedback,
             (
-                tuple(map(float, map(round, steps))), speeds, self._zeros, (now_s,) * len(steps),
+                tuple(map(sub, map(add, steps, _TO_WHOLE), _TO_WHOLE)), speeds, self._zeros, (now_s,) * len(steps),
                 self._warm, self._none, torque, self._no_faults, self._measured, self._no, (),
             ),
         )  # fmt: skip
@@ -137,5 +139,5 @@ class IdealBus:
         of, at_s, steps = self._reached
         if of is not motion or at_s != now_s:
             steps = motion.steps(now_s)
-        self._motion = _Motion(now_s, steps, goals)
+        self._motion = tuple.__new__(_Motion, (now_s, steps, goals))
         return goals
