@@ -24,6 +24,7 @@ from gazerig.sim_mock.dynamixel.modes import (
 )
 from gazerig.sim_mock.smart_servo.controller import DISABLED
 from gazerig.sim_mock.smart_servo.drive import Drive
+from gazerig.sim_mock.smart_servo.noise import LENGTH
 from gazerig.sim_mock.smart_servo.physics import Quirks, ServoSpec
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 
@@ -91,14 +92,13 @@ class DynamixelDrive(Drive):
         """Return present current, velocity and position in register units."""
         shaft, side = self.shaft, self._side
         v, at = shaft.v, round(side * shaft.x + self._shift)
-        current = side * shaft.effort * self._current_full
+        current = round(side * shaft.effort * self._current_full)
         if v:
-            return round(current), round(side * v / _SPEED_UNIT), at
+            return current, round(side * v / _SPEED_UNIT), at
         if not self.torque:
             return 0, 0, at
-        amps, speed = self._flicker(now_ms)
-        amps += round(current)
-        most = self._max_current
+        amps, speed = self._noise[now_ms + self._noise_from_ms & LENGTH - 1]
+        amps, most = amps + current, self._max_current
         return (amps if -most <= amps <= most else most if amps > 0 else -most), speed, at
 
     def motion(self, now_ms: int) -> tuple[bool, int, int]:

@@ -32,13 +32,13 @@ def fast_reply(
         if not servo.fast_reads or servo.status_level < 1:
             break
         error = ALERT if servo.errors else 0
-        windows = servo.memory.windows
-        window = windows[row] if row in windows else servo.window(row)
-        if servo.stale_surroundings and window is not None and window.surroundings:
+        window = servo.memory.windows.get(row)
+        if window is None or (servo.stale_surroundings and window[3]):
             window = servo.window(row)
         if window is not None:
+            layout, ahead, behind, _ = window
             amps, speed, at = servo.drive.sensed(now_ms)
-            block = before + window[0].pack(error, servo_id, window[1], amps, speed, at, window[2])
+            block = before + layout.pack(error, servo_id, ahead, amps, speed, at, behind)
         else:
             data = servo.read(row[1], row[2])
             if data is None:

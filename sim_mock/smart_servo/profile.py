@@ -127,19 +127,27 @@ class PositionProfile:
             return [goal] * ticks
         begin, start, out, p1 = self._from, self._start, self._out, self._p1
         cruise, slow, end = self._cruise, self._slow, begun + ticks
-        path = [
-            begin + t * (start + t * out)
-            if t < t1
-            else p1 + (t - t1) * cruise
-            if t < t2
-            else goal - (t3 - t) * (t3 - t) * slow
-            if t < t3
-            else goal
-            for t in range(begun + 1, end + 1)
-        ]
+        times = range(begun + 1, end + 1)
+        if end < t1:  # the everyday ones: all in one phase
+            path = [begin + t * (start + t * out) for t in times]
+            self.v = start + 2.0 * end * out
+        elif t1 <= begun + 1 and end < t2:
+            path = [p1 + (t - t1) * cruise for t in times]
+            self.v = cruise
+        else:
+            path = [
+                begin + t * (start + t * out)
+                if t < t1
+                else p1 + (t - t1) * cruise
+                if t < t2
+                else goal - (t3 - t) * (t3 - t) * slow
+                if t < t3
+                else goal
+                for t in times
+            ]
+            self._speed(end)
         self.r = path[-1]
         self._t = end
-        self._speed(end)
         return path
 
     def _at(self, t: int) -> float:
