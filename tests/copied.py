@@ -36,9 +36,28 @@ def _same(thing: Any, memo: dict[int, Any]) -> Any:
     return thing
 
 
+_UNCHANGING: dict[int, tuple[Any, ...]] = {}
+"""Tuples that were found to hold nothing that changes, by id: large tables, in every copy again.
+
+Kept, so that no other tuple gets the id.
+"""
+
+
+def _tuple(thing: tuple[Any, ...], memo: dict[int, Any]) -> tuple[Any, ...]:
+    if id(thing) in _UNCHANGING:
+        return thing
+    made: tuple[Any, ...] = _COPY_TUPLE(thing, memo)
+    if made is thing:
+        _UNCHANGING[id(thing)] = thing
+    return made
+
+
+_COPY_TUPLE = copy._deepcopy_dispatch[tuple]  # type: ignore[attr-defined]
+
 _WAYS = {
     FunctionType: _function,
     BuiltinMethodType: _method,
+    tuple: _tuple,
     struct.Struct: _same,
     ModuleType: _same,
 }

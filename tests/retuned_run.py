@@ -121,30 +121,40 @@ STATE = {
 
 def inside(thing: Any, path: str, seen: dict[int, Any]) -> dict[str, Any]:
     """Return path -> value of all parameters that a part holds, functions with what they hold."""
+    out: dict[str, Any] = {}
+    _fill(out, thing, path, seen)
+    return out
+
+
+def _fill(out: dict[str, Any], thing: Any, path: str, seen: dict[int, Any]) -> None:
     if isinstance(thing, str | int | float | bool | None | type):
-        return {path: thing}
+        out[path] = thing
+        return
     if id(thing) in seen or isinstance(thing, np.random.Generator):
-        return {}  # told already; kept in ``seen``, so that no other thing gets its id
+        return  # told already; kept in ``seen``, so that no other thing gets its id
     seen[id(thing)] = thing
     if isinstance(thing, np.ndarray):
-        return {path: thing.tolist()}
+        # Whole maps of what is seen: as bytes (0 added: -0.0 equals 0.0), as lists take long.
+        numbers = thing.tolist() if thing.dtype.hasobject else (thing + 0).tobytes()
+        out[path] = thing.shape, thing.dtype.str, numbers
+        return
     if isinstance(thing, Mapping):
         items = [(str(key), item) for key, item in thing.items()]
     elif isinstance(thing, set | frozenset):
-        return {path: sorted(map(str, thing))}
+        out[path] = sorted(map(str, thing))
+        return
     elif isinstance(thing, list | tuple | deque):
         items = [(str(i), item) for i, item in enumerate(thing)]
     elif isinstance(thing, FunctionType):
-        cells = [cell.cell_contents for cell in thing.__closure__ or ()]
-        return {path: thing.__qualname__, **inside(cells, path, seen)}
+        out[path] = thing.__qualname__
+        _fill(out, [cell.cell_contents for cell in thing.__closure__ or ()], path, seen)
+        return
     elif hasattr(thing, "__dict__"):
         items = [(k, v) for k, v in vars(thing).items() if k not in STATE]
     else:
-        return {}
-    out: dict[str, Any] = {}
+        return
     for key, item in items:
-        out |= inside(item, f"{path}.{key}", seen)
-    return out
+        _fill(out, item, f"{path}.{key}", seen)
 
 
 def fresh(rig: Rig) -> Assembly:
