@@ -6,7 +6,6 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from scipy.optimize import linear_sum_assignment
 
 from gazerig.robot.perception.data_association import FORBIDDEN, assign
 
@@ -50,6 +49,8 @@ ANY_COSTS = st.tuples(st.integers(1, 12), st.integers(1, 12)).flatmap(
 
 @given(ANY_COSTS)
 def test_as_cheap_as_the_solver_of_scipy(costs: np.ndarray) -> None:
+    from scipy.optimize import linear_sum_assignment
+
     pairs = assign(costs.tolist())
     rows, columns = linear_sum_assignment(costs)
     assert len(pairs) == len(rows) and pairs == sorted(pairs)
@@ -58,6 +59,8 @@ def test_as_cheap_as_the_solver_of_scipy(costs: np.ndarray) -> None:
 
 
 def test_the_very_pairs_of_scipy_where_no_two_ways_cost_the_same() -> None:
+    from scipy.optimize import linear_sum_assignment
+
     dice = np.random.default_rng(3)
     for _ in range(200):
         costs = dice.normal(0.0, 10.0, dice.integers(1, 9, 2))

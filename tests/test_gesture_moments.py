@@ -42,24 +42,25 @@ def joint_angles(rig_name: str, offsets: list[PoseOffset]) -> Floats:
     """Return (n, joints) angles of a head that looks at a point straight ahead all the while."""
     rig = load_rig(rig_name)
     kinematics, ends = kinematics_of(rig), lid_ends(rig)
-    columns: dict[str, list[float]] = {name: [] for name in rig.names}
-    for offset in offsets:
-        left, right = kinematics.eyes_on(TARGET, *kinematics.head_pose(offset.head_rad))
-        yaw, pitch = offset.eyes_rad
-        lids = LidOpenings(0.9, 0.9, False, 0.9, 0.9).scaled(offset.lids)
-        openings = lids.left, lids.right, lids.lower_left, lids.lower_right
-        angles = {
-            "left_eye_pan": left[0] + yaw, "left_eye_tilt": left[1] + pitch,
-            "right_eye_pan": right[0] + yaw, "right_eye_tilt": right[1] + pitch,
-            "eyes_pan": 0.5 * (left[0] + right[0]) + yaw, "eyes_tilt": left[1] + pitch,
-            **dict(zip(NECK, offset.head_rad, strict=True)),
-            **dict(zip(further(rig.joints), offset.joints_rad, strict=True)),
-            **{lid: ends[lid][0] + opening * (ends[lid][1] - ends[lid][0])
-               for lid, opening in zip(LIDS, openings, strict=True) if lid in ends},
-        }  # fmt: skip
-        for name, column in columns.items():
-            column.append(angles[name])
-    return np.array(list(columns.values())).T
+    eyes = [kinematics.eyes_on(TARGET, *kinematics.head_pose(one.head_rad)) for one in offsets]
+    left, right = np.array(eyes)[:, 0, :2].T, np.array(eyes)[:, 1, :2].T
+    yaw, pitch = np.array([one.eyes_rad for one in offsets]).T
+    lids = [LidOpenings(0.9, 0.9, False, 0.9, 0.9).scaled(one.lids) for one in offsets]
+    openings = np.array([(one.left, one.right, one.lower_left, one.lower_right) for one in lids]).T
+    head, joints = (
+        np.array([one.head_rad for one in offsets]).T,
+        np.array([one.joints_rad for one in offsets]).T,
+    )
+    angles = {
+        "left_eye_pan": left[0] + yaw, "left_eye_tilt": left[1] + pitch,
+        "right_eye_pan": right[0] + yaw, "right_eye_tilt": right[1] + pitch,
+        "eyes_pan": 0.5 * (left[0] + right[0]) + yaw, "eyes_tilt": left[1] + pitch,
+        **dict(zip(NECK, head, strict=True)),
+        **dict(zip(further(rig.joints), joints, strict=True)),
+        **{lid: ends[lid][0] + opening * (ends[lid][1] - ends[lid][0])
+           for lid, opening in zip(LIDS, openings, strict=True) if lid in ends},
+    }  # fmt: skip
+    return np.stack([angles[name] for name in rig.names], axis=1)
 
 
 def interrupted(gesture: str, rig_name: str, moments: int, seed: int) -> Moments:
@@ -71,7 +72,7 @@ def interrupted(gesture: str, rig_name: str, moments: int, seed: int) -> Moments
     at_rest = tuple([0.0] * len(rig.names))
     offsets, t, began = [player.step(0.0)] * 3, 0.0, 0
     for _ in range(moments):
-        name = gesture if not player.playing else str(random.choice(others))
+        name = gesture if not player.playing else others[int(random.integers(len(others)))]
         speed = float(random.uniform(0.5, 2.0))
         reply = choices.play(Play(name, speed), t, at_rest, bounds)
         began += bool(name) and not reply.refused

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.interpolate import make_interp_spline
 
 from gazerig.config.gestures import gestures_of, load_gesture, shipped_gestures
 from gazerig.config.load import ConfigError, shipped, shipped_names
@@ -55,6 +54,8 @@ def test_every_shipped_gesture_is_done_by_every_shipped_rig_as_written(name: str
 
 
 def spline_of_least_jerk(times: Floats, values: Floats, at: Floats) -> tuple[Floats, Floats]:
+    from scipy.interpolate import make_interp_spline
+
     rest = [(1, 0.0), (2, 0.0)]
     spline = make_interp_spline([0.0, *times], [0.0, *values], k=5, bc_type=(rest, rest))
     return spline(at), spline(at, 1)

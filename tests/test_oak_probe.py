@@ -15,16 +15,20 @@ from gazerig.drivers.camera.oak.sdk import load_depthai
 from gazerig.drivers.camera.oak.source import OakSource
 from gazerig.drivers.errors import CameraError
 
-real = load_depthai()
+
+def real():
+    """Return depthai; it takes a second to import, which only who runs these tests waits for."""
+    return load_depthai()
 
 
 def info(device_id="14442C10", name="1.2", status=None):
     return SimpleNamespace(
-        deviceId=device_id, name=name, status=status or real.XLinkError_t.X_LINK_SUCCESS
+        deviceId=device_id, name=name, status=status or real().XLinkError_t.X_LINK_SUCCESS
     )
 
 
-NO_RIGHTS = real.XLinkError_t.X_LINK_INSUFFICIENT_PERMISSIONS
+def no_rights():
+    return real().XLinkError_t.X_LINK_INSUFFICIENT_PERMISSIONS
 
 
 def sdk(free=(), connected=()):
@@ -37,8 +41,8 @@ def sdk(free=(), connected=()):
     return SimpleNamespace(
         Device=SimpleNamespace(getAllAvailableDevices=lambda: list(free)),
         XLinkConnection=SimpleNamespace(getAllConnectedDevices=everything),
-        XLinkDeviceState=real.XLinkDeviceState,
-        XLinkError_t=real.XLinkError_t,
+        XLinkDeviceState=real().XLinkDeviceState,
+        XLinkError_t=real().XLinkError_t,
     )
 
 
@@ -55,15 +59,15 @@ def test_no_camera_says_what_to_look_at(tmp_path):
 
 
 def test_real_sdk_without_a_camera_says_the_same(tmp_path):
-    if real.Device.getAllAvailableDevices():
+    if real().Device.getAllAvailableDevices():
         pytest.skip("an OAK camera is plugged in")
     with pytest.raises(CameraError, match="no OAK camera"):
-        find_oak(real, usb=tmp_path)
+        find_oak(real(), usb=tmp_path)
 
 
 @pytest.mark.parametrize("listed_free", [True, False])
 def test_camera_without_rights_gives_the_udev_rule(tmp_path, listed_free):
-    forbidden = [info(status=NO_RIGHTS)]
+    forbidden = [info(status=no_rights())]
     dai = sdk(forbidden if listed_free else [], forbidden)
     with pytest.raises(CameraError) as caught:
         find_oak(dai, usb=tmp_path)
@@ -124,7 +128,7 @@ class Message:
         return SimpleNamespace(getIntrinsicMatrix=lambda: np.eye(3))
 
     def getTimestampDevice(self, offset):  # noqa: N802
-        assert offset == real.CameraExposureOffset.MIDDLE
+        assert offset == real().CameraExposureOffset.MIDDLE
         return timedelta(seconds=self.device_s)
 
     def getTimestamp(self, offset):  # noqa: N802
@@ -156,7 +160,7 @@ class Rig:
     """A whole stand-in for depthai with one device."""
 
     def __init__(self, speed="SUPER", start_fault=None) -> None:
-        self.device = Device(getattr(real.UsbSpeed, speed))
+        self.device = Device(getattr(real().UsbSpeed, speed))
         self.queue = Queue()
         rig = self
 
@@ -192,10 +196,10 @@ class Rig:
 
         self.dai = SimpleNamespace(
             **vars(sdk([info()])),
-            UsbSpeed=real.UsbSpeed,
+            UsbSpeed=real().UsbSpeed,
             Pipeline=Pipeline,
-            MessageQueue=real.MessageQueue,
-            CameraExposureOffset=real.CameraExposureOffset,
+            MessageQueue=real().MessageQueue,
+            CameraExposureOffset=real().CameraExposureOffset,
             node=SimpleNamespace(Sync=Sync),
         )
         del self.dai.Device
@@ -270,7 +274,7 @@ def test_unplugged_camera_is_lost():
     rig = Rig()
     source = rig.source()
     source.open()
-    rig.queue.fed.append(real.XLinkReadError("Couldn't read data from stream"))
+    rig.queue.fed.append(real().XLinkReadError("Couldn't read data from stream"))
     with pytest.raises(CameraError, match="was lost .Couldn't read data"):
         source.take(lambda: 0.0, threading.Event())
 

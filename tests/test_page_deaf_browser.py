@@ -22,8 +22,6 @@ from gazerig.robot.dashboard.page_process import PageProcess
 from gazerig.robot.model.command_json import as_json
 from gazerig.robot.model.commands import Stop
 
-# Noise does not compress: what the deaf browser is owed soon fills all buffers.
-NOISE = np.random.default_rng(0).integers(0, 255, (8, 360, 480, 3)).astype(np.uint8)
 OWED_BYTES = 16_000_000
 """More than Linux keeps for one connection on its way through the door."""
 
@@ -84,7 +82,9 @@ class Rig:
         return str(self.page.url())
 
     def _feed(self) -> None:
-        jpegs = [encode(picture) for picture in NOISE]
+        # Noise does not compress: what the deaf browser is owed soon fills all buffers.
+        noise = np.random.default_rng(0).integers(0, 255, (8, 360, 480, 3)).astype(np.uint8)
+        jpegs = [encode(picture) for picture in noise]
         while not self._over.wait(0.02):
             self.rounds += 1
             self.page.show(replace(self.snapshot, t_s=0.02 * self.rounds))

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from gazerig.config.load import load, shipped
 from gazerig.gaze.angles import add, angle_between, norm, rotation, scale, sub, yaw_pitch
@@ -84,6 +83,8 @@ def test_e41_simple_model_waits_for_arrival_and_takes_another_order() -> None:
 
 
 def test_e42_random_baseline() -> None:
+    from scipy import stats
+
     dt = 0.005
     looks = looks_of(ScanpathParams(model="random"), 300.0, dt, seed=6)
     starts = [0] + [k for k in range(1, len(looks)) if looks[k].shift != looks[k - 1].shift]

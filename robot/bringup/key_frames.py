@@ -5,7 +5,6 @@ through the keys would be farther from it than a tolerance.
 """
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 from gazerig.gaze.minimum_jerk_curve import MinimumJerkCurve
 from gazerig.gaze.types import Floats
@@ -27,6 +26,8 @@ def smoothed(times_s: Floats, values: Floats) -> tuple[Floats, Floats]:
         Times in steps of ``GRID_S`` from 0, and values by a local cubic (Savitzky and Golay
         1964), which keeps peaks where a mean would flatten them.
     """
+    from scipy.signal import savgol_filter  # nearly a second of processor
+
     even = np.arange(0.0, times_s[-1] - times_s[0] + 1e-9, GRID_S)
     found = np.interp(even, times_s - times_s[0], values)
     window = min(2 * round(_SMOOTHED_OVER_S / GRID_S / 2.0) + 1, len(found) - (len(found) + 1) % 2)

@@ -1,7 +1,6 @@
 """The tick, and the loop that keeps its time."""
 
 import contextlib
-import gc
 from collections.abc import Callable
 from math import inf, radians
 from typing import NamedTuple
@@ -24,12 +23,13 @@ from gazerig.robot.control.command_choices import (
 )
 from gazerig.robot.control.command_executor import CommandExecutor
 from gazerig.robot.control.command_queue import CommandQueue
+from gazerig.robot.control.garbage import set_aside
 from gazerig.robot.control.gesture_choices import GestureChoices, GestureInfo
 from gazerig.robot.control.look_point import Known, LookPoints
 from gazerig.robot.control.stop_control import StopControl
 from gazerig.robot.control.tick import Tick as Tick
 from gazerig.robot.control.tick import at_rest
-from gazerig.robot.model.clock import Clock
+from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.model.command_checks import check
 from gazerig.robot.model.commands import Ask, Command, Express, Jog, Play, SetLevel, Tune
 from gazerig.robot.model.frames import PoseHistory
@@ -181,11 +181,8 @@ class Robot:
         Raises:
             SetupError: something is absent or not as configured.
         """
-        # A full pass of the garbage collector over all that start-up made takes 20 ms, four
-        # slots; what is there now stays, so later passes need not look at it. Before torque
-        # is on, as nothing may keep the servos waiting after.
-        gc.collect()
-        gc.freeze()
+        if isinstance(clock, RealClock):
+            set_aside()
         self.camera.open()
         try:
             if ready is not None:

@@ -1,0 +1,46 @@
+"""What is set aside from the garbage collector, when, and that it does not stay for ever."""
+
+import gc
+import weakref
+
+import pytest
+
+import gazerig.robot.control.loop as loop
+from gazerig.config.schema import load_rig
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.control.garbage import set_aside
+from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
+
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
+
+class Head:
+    """Holds itself, as parts that call each other do."""
+
+    def __init__(self) -> None:
+        self.itself = self
+
+
+def test_what_an_earlier_robot_left_is_let_go_at_the_next_start() -> None:
+    head = Head()
+    left = weakref.ref(head)
+    set_aside()
+    del head
+    gc.collect()
+    assert left() is not None  # set aside: no pass looks at it
+    set_aside()
+    assert left() is None
+
+
+@pytest.mark.parametrize(("clock", "times"), [(RealClock(), 1), (SimulatedClock(), 0)])
+def test_only_a_robot_that_has_slots_to_miss_sets_garbage_aside(
+    monkeypatch: pytest.MonkeyPatch, clock: Clock, times: int
+) -> None:
+    calls: list[None] = []
+    monkeypatch.setattr(loop, "set_aside", lambda: calls.append(None))
+    made = assemble(load_rig("desk"), RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
+    made.robot.start(clock)
+    made.robot.stop()
+    made.close()
+    assert len(calls) == times
