@@ -66,7 +66,7 @@ class Guard:
         self._late = LateTicks(period_s)
         self._soft = False
         self._calm = False  # in the last tick every joint followed, and nothing has come since
-        self._names = joints
+        self._names, self._numbers = joints, range(len(limits))
         self._neck = tuple("neck" in name.split("_") for name in joints)
         self._motion = MotionLimiter(limits)
         self._change = LimitChange(self._motion, limits, reach)
@@ -190,10 +190,10 @@ class Guard:
         short: dict[int, tuple[int, str]] = {}
         followed = True
         rows = zip(
-            desired_rad, joints.position_rad, joints.measured_s, self._stuck.watched,
+            self._numbers, desired_rad, joints.position_rad, joints.measured_s, self._stuck.watched,
             command, speed, goal, motion.easy_speed, motion.easy_low, motion.easy_high, strict=True,
         )  # fmt: skip
-        for i, (desired, position, at_s, watched, p, v, before, easy, low, high) in enumerate(rows):
+        for i, desired, position, at_s, watched, p, v, before, easy, low, high in rows:
             near = -far <= p - position <= far and not watched
             if near and at_s >= stale_s and (usual or self._well(i, joints, no_frame)):
                 wanted = (desired - p) / dt_s
