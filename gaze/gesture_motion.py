@@ -11,6 +11,7 @@ from gazerig.gaze.types import Floats
 
 _SAMPLE_S = 0.005
 _MOST_SAMPLES = 6000
+_FIRST_EYE = POSE_TRACKS.index(EYE_TRACKS[0])
 
 
 class MotionSamples(NamedTuple):
@@ -55,7 +56,8 @@ class GestureMotion:
         self, tracks: Mapping[str, TrackKeys], joints: tuple[str, ...], eyes_follow_head: bool
     ) -> None:
         channels = (*POSE_TRACKS, *joints)
-        self.rest = np.array([rest_of(name) for name in channels])
+        self._rests = [rest_of(name) for name in channels]
+        self.rest = np.array(self._rests)
         self._follow = eyes_follow_head
         self._curves = [
             (channels.index(name), MinimumJerkCurve(rest_of(name), keys.times_s, keys.values))
@@ -80,7 +82,7 @@ class GestureMotion:
         for i, _ in self._curves:
             columns[0][:, i] -= self.rest[i]
         if self._follow:
-            first = POSE_TRACKS.index(EYE_TRACKS[0])
+            first = _FIRST_EYE
             for column in columns:
                 column[:, first : first + 2] += column[:, :2]
         return MotionSamples(times_s, *columns)
@@ -93,9 +95,9 @@ class GestureMotion:
             t_s: time since the start, at the speed as written.
             sizes: factor of every channel.
         """
-        first = POSE_TRACKS.index(EYE_TRACKS[0])
+        first, rest = _FIRST_EYE, self._rests
         for i, curve in self._curves:
-            moved = sizes[i] * (curve.at(t_s) - rest_of(POSE_TRACKS[i]) if i < len(POSE_TRACKS) else curve.at(t_s))  # fmt: skip
+            moved = sizes[i] * (curve.at(t_s) - rest[i])
             flat[i] += moved
             if self._follow and i < 2:
                 flat[first + i] += moved

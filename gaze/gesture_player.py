@@ -112,7 +112,7 @@ class GesturePlayer:
             return self._rest
         flat = list(self._rest_flat)
         for i, fade in self._fades:
-            flat[i] += fade.at(t_s - self._fades_from_s)[0]
+            flat[i] += fade.position(t_s - self._fades_from_s)
         if self._played is not None:
             _, motion, speed, sizes = self._played
             motion.add_to(flat, max(0.0, t_s - self._begins_s) * speed, sizes)

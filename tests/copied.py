@@ -37,7 +37,7 @@ def _same(thing: Any, memo: dict[int, Any]) -> Any:
 
 
 _UNCHANGING: dict[int, tuple[Any, ...]] = {}
-"""Tuples that were found to hold nothing that changes, by id: large tables, in every copy again.
+"""Tuples, also named ones, that were found to hold nothing that changes, by id: large tables.
 
 Kept, so that no other tuple gets the id.
 """
@@ -49,7 +49,8 @@ def _tuple(thing: tuple[Any, ...], memo: dict[int, Any]) -> tuple[Any, ...]:
     made: tuple[Any, ...] = _COPY_TUPLE(thing, memo)
     if made is thing:
         _UNCHANGING[id(thing)] = thing
-    return made
+        return thing
+    return made if type(thing) is tuple else type(thing)(*made)
 
 
 _COPY_TUPLE = copy._deepcopy_dispatch[tuple]  # type: ignore[attr-defined]
@@ -65,5 +66,6 @@ _WAYS = {
 
 def copied(thing: Any) -> Any:
     """Return a deep copy that shares nothing that changes."""
-    with patch.dict(copy._deepcopy_dispatch, _WAYS):  # type: ignore[attr-defined]
+    named = {kind: _tuple for kind in tuple.__subclasses__() if hasattr(kind, "_fields")}
+    with patch.dict(copy._deepcopy_dispatch, {**named, **_WAYS}):  # type: ignore[attr-defined]
         return copy.deepcopy(thing)

@@ -81,6 +81,8 @@ class ActiveFaults:
 
     def take(self, kind: str, servo_id: int | None, now_s: float) -> LineFault | None:
         """Find a fault that hits this servo now and count it as used once."""
+        if not self.any:
+            return None
         for fault in self._faults:
             if fault.kind != kind or fault.servo_id not in (None, servo_id):
                 continue
