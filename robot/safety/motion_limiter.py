@@ -33,6 +33,7 @@ class MotionLimiter:
         self.high = [limit.high_rad for limit in limits]
         self.goal = list(self.command)
         self._lost = [0.0] * len(limits)
+        self._slow = [False] * len(limits)
         self.easy_s = inf
         self.easy_speed = [0.0] * len(limits)
         self.easy_low, self.easy_high = list(self.low), list(self.high)
@@ -63,13 +64,13 @@ class MotionLimiter:
     def left_alone(self, for_s: float) -> None:
         """Record that servos got no goals for a time, in which they braked to their last ones.
 
-        What a short gap costs of a speed may be regained faster than it was gathered (``seek``).
+        What a short gap costs of a slow speed is regained faster than it was gathered (``seek``).
         """
         short = for_s <= SHORT_GAP_S
         for i, limit in enumerate(self.limits):
             speed, lost = self.speed[i], self._lost[i]
             left = abs(speed) - limit.accel_rad_s2 * for_s
-            if not short:
+            if not (short and self._slow[i]):
                 self._lost[i] = 0.0
             elif lost * speed < 0.0 or abs(speed) > abs(lost):
                 self._lost[i] = speed
@@ -77,8 +78,8 @@ class MotionLimiter:
             self.goal[i] = self.command[i]
 
     def forget_gaps(self, i: int) -> None:
-        """Regain no speed that a joint had before a gap."""
-        self._lost[i] = 0.0
+        """Regain no speed that a joint has had so far, as its slow motion only begins."""
+        self._lost[i], self._slow[i] = 0.0, False
 
     def recount(self, i: int, factor: float, offset_rad: float) -> None:
         """Count a joint's angles otherwise: what was x is factor x + offset from now on."""
@@ -188,6 +189,7 @@ class MotionLimiter:
         top = min(top, self.limits[i].speed_rad_s)
         soft = min(soft, self.limits[i].accel_rad_s2)
         regain = min(regain, self.limits[i].accel_rad_s2)
+        self._slow[i] = regain > 0.0
         target = min(max(desired, self.low[i]), self.high[i])
         gap = target - along * dt_s - self.command[i]
         closing = reachable_speed(abs(gap), soft, dt_s)
