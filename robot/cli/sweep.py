@@ -22,7 +22,7 @@ from gazerig.robot.report.norm_bands import BY_KEY
 
 if TYPE_CHECKING:
     from gazerig.robot.sweep.axes import Point
-    from gazerig.robot.sweep.fit import Fit
+    from gazerig.robot.sweep.fit import SweepFit
     from gazerig.robot.sweep.outcome import Outcome
     from gazerig.robot.sweep.sweep import Progress, Sweep, SweepSpec
 
@@ -150,7 +150,7 @@ def _fitted(
     return outcomes
 
 
-def _say_fit(found: "Fit", snippet: Path, asked: RunOptions) -> None:
+def _say_fit(found: "SweepFit", snippet: Path, asked: RunOptions) -> None:
     """Print the best point beside the rig's own values, and how to run it."""
     own, best = found.start, found.best
     say(

@@ -121,7 +121,7 @@ class LiveFeed:
         self._new_ticks = self._new_frame = False
 
     def take(self, message: bytes, fd: int = -1) -> bool:
-        """Take a message of one of the kinds above; False if it is none.
+        """Handle a message of one of the kinds above; False if it is none.
 
         Only ever fed by the process that started this one.
         """

@@ -36,7 +36,7 @@ class Trial(NamedTuple):
     failed: str = ""
 
 
-class Fit(NamedTuple):
+class SweepFit(NamedTuple):
     """What a search found.
 
     Attributes:
@@ -52,7 +52,7 @@ class Fit(NamedTuple):
     trials: tuple[Trial, ...]
 
 
-def fit(run: Runner, axes: Sequence[Axis], start: Point, count: int, seed: int) -> Fit:
+def fit(run: Runner, axes: Sequence[Axis], start: Point, count: int, seed: int) -> SweepFit:
     """Search the axes for the best point.
 
     The same arguments and outcomes make the same search: an interrupted one is repeated from runs
@@ -80,7 +80,7 @@ def fit(run: Runner, axes: Sequence[Axis], start: Point, count: int, seed: int) 
 
     search(scores, axes, start, count, seed)
     trials = tuple(tried.values())
-    return Fit(counted, trials[0], min(trials, key=lambda trial: trial.score), trials)
+    return SweepFit(counted, trials[0], min(trials, key=lambda trial: trial.score), trials)
 
 
 def counted_in(outcomes: Sequence[Outcome]) -> tuple[str, ...]:
