@@ -1,0 +1,263 @@
+"""Runs of the product in simulated time, from the shipped scene to measured joints.
+
+The rig ``desk`` with byte-true emulated servos goes through the whole loop; what it did is kept as
+columns, in memory, once for each process. ``tests/human/row_*.py`` measure on it.
+"""
+
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from math import nan
+from typing import Any, Protocol
+
+import numpy as np
+
+from gazerig.config.parameters import changed
+from gazerig.config.schema import load_rig
+from gazerig.gaze.angles import add, scale, sub, yaw_pitch
+from gazerig.robot.app import assemble
+from gazerig.robot.app.assemble import with_options
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.simulated_run import simulate
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.model.commands import Value
+from gazerig.robot.recording.gaze_angles import GazeAngles, GazeAnglesBuilder, target_text
+from gazerig.robot.report.gaze_trace import GazeTrace
+from gazerig.sim_mock.scenes.scene import Scene
+
+BEGIN_S = 3.0
+"""So long the head straightens up slowly: rows of a measured run begin after it."""
+
+_EYES = ("left_eye_pan", "left_eye_tilt", "right_eye_pan", "right_eye_tilt")
+_NECK = ("neck_yaw", "neck_pitch", "neck_roll")
+_LONGEST_EXTRAPOLATED_S = 0.3
+
+
+@dataclass(frozen=True)
+class MeasuredRun:
+    """One run as columns of n ticks; degrees, yaw + left, pitch + up, roll + right ear down.
+
+    t_s: (n,) seconds since the run's beginning; the first ``BEGIN_S`` are left out
+    gaze_deg: (n, 2) measured gaze in space, the mean of both eyes on the head
+    eyes_deg, eyes_goal_deg: (n, 2, 2) left and right eye in the head, measured; as commanded, after
+        the guard
+    head_deg, head_goal_deg: (n, 3) yaw, pitch, roll of the neck, measured; as commanded
+    plan_deg: (n, 2) direction of the planned gaze point from the head
+    lids, lids_goal: (n, 2) opening of left and right upper lid, 0 shut .. 1 open, measured; planned
+    phase: (n,) "fixate", "saccade" or "pursue", as planned; blink: (n,) whether a blink lasts
+    saccades, blinks: (n,) number of those planned so far
+    target_m: (n, 3) the target's position at the tick; target_deg: (n, 2) direction from the head
+    shift: (n,) counts up with each newly chosen target
+    target_name: (n,) such as "face 3"; part: (n,) face part or ""; salience: (n,)
+    truth: positions that the scene held, (n, 3) by "face 0", "hand 0" (of person 0), "thing 7";
+        nan where there is none
+    head_m: (n, 3) position of the midpoint of the eyes in the world
+    angles: what exports are made of; trace: what the report is made of (both of the whole run)
+    figures: the summary's
+    """
+
+    t_s: np.ndarray
+    gaze_deg: np.ndarray
+    eyes_deg: np.ndarray
+    head_deg: np.ndarray
+    eyes_goal_deg: np.ndarray
+    head_goal_deg: np.ndarray
+    plan_deg: np.ndarray
+    lids: np.ndarray
+    lids_goal: np.ndarray
+    phase: np.ndarray
+    blink: np.ndarray
+    saccades: np.ndarray
+    blinks: np.ndarray
+    target_m: np.ndarray
+    target_deg: np.ndarray
+    shift: np.ndarray
+    target_name: np.ndarray
+    part: np.ndarray
+    salience: np.ndarray
+    head_m: np.ndarray
+    truth: dict[str, np.ndarray]
+    angles: GazeAngles
+    trace: GazeTrace
+    figures: dict[str, object]
+
+    def truth_deg(self, name: str) -> np.ndarray:
+        """Return the direction of something in the scene from the head, (n, 2)."""
+        x, y, z = (self.truth[name] - self.head_m).T
+        return np.degrees(np.column_stack((np.arctan2(y, x), np.arctan2(z, np.hypot(x, y)))))
+
+
+class Runner(Protocol):
+    """``measured_run``, or what a test puts in its place."""
+
+    def __call__(
+        self,
+        scene: str | Scene,
+        profile: str = "robot",
+        seed: int = 0,
+        seconds: float = 60.0,
+        overrides: Mapping[str, Value] | None = None,
+        **options: Any,
+    ) -> MeasuredRun:
+        """Return the columns of one run."""
+        ...
+
+
+Measure = Callable[[Runner, float, Sequence[int]], dict[str, float]]
+"""``measure`` of a row: (run, seconds of each run, seeds) -> figures by name."""
+
+_kept: dict[str, MeasuredRun] = {}
+
+
+def measured_run(
+    scene: str | Scene,
+    profile: str = "robot",
+    seed: int = 0,
+    seconds: float = 60.0,
+    overrides: Mapping[str, Value] | None = None,
+    **options: Any,
+) -> MeasuredRun:
+    """Return a run's columns; the same arguments are run once for each process.
+
+    Args:
+        scene: a shipped scene's name, or a scene of the test's own with a name that no other has.
+        profile: style of gaze.
+        seed: of all random generators.
+        seconds: length of the run, ``BEGIN_S`` included.
+        overrides: values of the rig's keys by dotted name, e.g. {"gaze.pursuit.gain": 0.9}.
+        options: further fields of RunOptions, e.g. conversation="talk".
+    """
+    name = scene if isinstance(scene, str) else scene.name
+    key = repr(
+        (name, profile, seed, seconds, sorted((overrides or {}).items()), sorted(options.items()))
+    )
+    if key not in _kept:
+        with _scenes(scene):
+            _kept[key] = _run(name, profile, seed, seconds, overrides or {}, options)
+    return _kept[key]
+
+
+@contextmanager
+def _scenes(scene: str | Scene) -> Any:
+    """Have a scene of a test's own among those that a run can be put into."""
+    shipped = assemble.scenes
+    if not isinstance(scene, str):
+        assemble.scenes = lambda: {**shipped(), scene.name: scene}
+    try:
+        yield
+    finally:
+        assemble.scenes = shipped
+
+
+def _run(
+    scene: str,
+    profile: str,
+    seed: int,
+    seconds: float,
+    overrides: Mapping[str, Value],
+    more: Mapping[str, Any],
+) -> MeasuredRun:
+    options = replace(
+        RunOptions(True, True, seed, scene, profile=profile, seconds=seconds, bus="emulated"),
+        **more,
+    ).checked()
+    rig = changed(
+        with_options(load_rig(options.rig, options.character, options.profile), options), overrides
+    )
+    columns, held = _Columns(), assemble.scenes()[scene]
+    made = simulate(rig, options, watch=columns.update)
+    return columns.gathered(held, made.trace, made.figures)
+
+
+class _Columns:
+    """Gathers ticks as columns."""
+
+    def __init__(self) -> None:
+        self._rows: defaultdict[str, list[Any]] = defaultdict(list)
+        self._angles = GazeAnglesBuilder()
+        self._at: tuple[list[int], list[int]] | None = None
+        self._start_s = nan
+
+    def update(self, tick: Tick) -> None:
+        """Add a tick."""
+        self._angles.update(tick)
+        if self._at is None:
+            self._start_s = tick.t_s
+            names = tick.guard_result.joints
+            self._at = [names.index(n) for n in _EYES], [names.index(n) for n in _NECK]
+        t_s = tick.t_s - self._start_s
+        if t_s < BEGIN_S:
+            return
+        rows, pose, target, gaze = self._rows, tick.pose, tick.target, tick.gaze
+        eyes, neck = self._at
+        measured, commanded = tick.joints.position_rad, tick.guard_result.command_rad
+        since_s = min(max(0.0, tick.t_s - target.at_s), _LONGEST_EXTRAPOLATED_S)
+        point = add(target.p_world_m, scale(target.v_world_m_s, since_s))
+        rows["t_s"].append(t_s)
+        rows["clock_s"].append(tick.t_s)
+        rows["eyes"].append([measured[i] for i in eyes])
+        rows["neck"].append([measured[i] for i in neck])
+        rows["eyes_goal"].append([commanded[i] for i in eyes])
+        rows["neck_goal"].append([commanded[i] for i in neck])
+        rows["plan"].append(yaw_pitch(sub(gaze.gaze_point_world_m, pose.p_world_head_m)))
+        rows["lids"].append((pose.lid_left, pose.lid_right))
+        rows["lids_goal"].append((gaze.lid_left, gaze.lid_right))
+        rows["phase"].append(gaze.phase)
+        rows["counts"].append((gaze.blink, gaze.saccades, gaze.blinks, target.shift))
+        rows["target_m"].append(point)
+        rows["target"].append(yaw_pitch(sub(point, pose.p_world_head_m)))
+        rows["name"].append(target_text(target))
+        rows["part"].append(target.part or "")
+        rows["salience"].append(target.salience)
+        rows["head_m"].append(pose.p_world_head_m)
+
+    def gathered(self, scene: Scene, trace: GazeTrace, figures: dict[str, object]) -> MeasuredRun:
+        """Return the columns."""
+        rows, angles = self._rows, self._angles.trace()
+        eyes, eyes_goal = (
+            np.degrees(np.array(rows[name])).reshape(-1, 2, 2) for name in ("eyes", "eyes_goal")
+        )
+        head, head_goal, plan, target = (
+            np.degrees(np.array(rows[name])) for name in ("neck", "neck_goal", "plan", "target")
+        )
+        blink, saccades, blinks, shift = np.array(rows["counts"]).T
+        return MeasuredRun(
+            t_s=np.array(rows["t_s"]),
+            gaze_deg=angles.cyclopean_deg[-len(rows["t_s"]) :],
+            eyes_deg=eyes,
+            head_deg=head,
+            eyes_goal_deg=eyes_goal,
+            head_goal_deg=head_goal,
+            plan_deg=plan,
+            lids=np.array(rows["lids"]),
+            lids_goal=np.array(rows["lids_goal"]),
+            phase=np.array(rows["phase"]),
+            blink=blink > 0,
+            saccades=saccades,
+            blinks=blinks,
+            target_m=np.array(rows["target_m"]),
+            target_deg=target,
+            shift=shift,
+            target_name=np.array(rows["name"]),
+            part=np.array(rows["part"]),
+            salience=np.array(rows["salience"]),
+            head_m=np.array(rows["head_m"]),
+            truth=_truth(scene, rows["clock_s"]),
+            angles=angles,
+            trace=trace,
+            figures=figures,
+        )
+
+
+def _truth(scene: Scene, times_s: Sequence[float]) -> dict[str, np.ndarray]:
+    """Return what a scene held at these times of the clock."""
+    out: defaultdict[str, np.ndarray] = defaultdict(lambda: np.full((len(times_s), 3), nan))
+    for row, t_s in enumerate(times_s):
+        for number, person in enumerate(scene.people(t_s)):
+            out[f"face {number}"][row] = person.p_world_face_m
+            if person.hand is not None:
+                out[f"hand {number}"][row] = person.hand
+        for thing in scene.things(t_s):
+            out[f"thing {thing.id}"][row] = thing.p_world_m
+    return dict(out)

@@ -1,0 +1,30 @@
+"""Independent judges find the saccades the robot commanded in its export, and hardly any other."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from human.measured_run import Runner
+from human.saccade_judges import JUDGES, exported, marks
+
+SCENES = ("visitor", "face-to-face")
+
+WANTED = {
+    f"{scene}, {judge}: {what}": band
+    for scene in SCENES
+    for judge in JUDGES
+    for what, band in (("found, %", (95.0, 100.0)), ("not ours, %", (0.0, 3.0)))
+}
+
+
+def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+    """Return found and not ours of each scene and judge, over all seeds, in percent."""
+    out = {}
+    for scene in SCENES:
+        runs = [exported(run(scene, seed=seed, seconds=seconds)) for seed in seeds]
+        for name, judge in JUDGES.items():
+            each = [marks(one, judge(one)) for one in runs]
+            ours = np.concatenate([mark.ours for mark in each])
+            seen = np.concatenate([mark.seen[:, 2] for mark in each])
+            out[f"{scene}, {name}: found, %"] = 100.0 * float(ours.mean())
+            out[f"{scene}, {name}: not ours, %"] = 100.0 * float(1.0 - seen.mean())
+    return out

@@ -1,0 +1,125 @@
+"""Independent judges of an exported run: the saccades that pymovements and REMoDNaV find in it.
+
+Both get what a laboratory gets: the file ``STEM_samples.csv`` of ``gazerig export --csv``.
+"""
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+import numpy as np
+from human.measured_run import BEGIN_S, MeasuredRun
+
+from gazerig.robot.recording.export_csv import write_csv
+from gazerig.robot.recording.gaze_labels import labels_of, stretches_of
+
+
+class Exported(NamedTuple):
+    """The columns of an exported run that judges and their marks rest on.
+
+    time_s: (n,); gaze_deg: (n, 2), yaw and pitch in space
+    commanded: (m, 2) onset and end of each commanded saccade as the export's events tell them;
+    amplitude_deg: (m,) of it
+    """
+
+    time_s: np.ndarray
+    gaze_deg: np.ndarray
+    commanded: np.ndarray
+    amplitude_deg: np.ndarray
+
+
+class Marks(NamedTuple):
+    """What a judge found of our saccades.
+
+    found: share of the commanded ones that overlap one of the judge's
+    not_ours: share of the judge's that overlap none of ours
+    ours, seen: (m,), (k,) the same, saccade by saccade
+    """
+
+    found: float
+    not_ours: float
+    ours: np.ndarray
+    seen: np.ndarray
+
+
+Judge = Callable[[Exported], np.ndarray]
+"""Samples -> (k, 2) onset and end of each saccade, in s."""
+
+
+def exported(run: MeasuredRun) -> Exported:
+    """Write a run as the product's CSV files, and read them."""
+    labels = labels_of(run.angles)
+    with TemporaryDirectory() as folder:
+        stem = Path(folder) / "run"
+        write_csv(run.angles, labels, stretches_of(run.angles, labels), stem)
+        samples = _read(stem.with_name("run_samples.csv"))
+        events = [
+            row for row in _read(stem.with_name("run_events.csv")) if row["event"] == "saccade"
+        ]
+    time_s = _column(samples, "time_s")
+    gaze = np.column_stack([_column(samples, "x_deg"), _column(samples, "y_deg")])
+    onset, length = _column(events, "onset_s"), _column(events, "duration_s")
+    late = time_s >= BEGIN_S
+    kept = (onset >= BEGIN_S + 0.2) & (onset + length <= time_s[-1] - 0.2)
+    commanded = np.column_stack([onset, onset + length])[kept]
+    return Exported(time_s[late], gaze[late], commanded, _column(events, "amplitude_deg")[kept])
+
+
+def pymovements_saccades(run: Exported) -> np.ndarray:
+    """Return the saccades of Engbert & Kliegl's algorithm as pymovements has it."""
+    import pymovements
+
+    rate_hz = _rate_hz(run)
+    recording = pymovements.gaze.from_numpy(
+        time=np.round(1000.0 * run.time_s).astype(np.int64),
+        position=run.gaze_deg.T,
+        experiment=pymovements.Experiment(1920, 1080, 60, 34, 65, "center", rate_hz),
+    )
+    recording.pos2vel("smooth")
+    recording.detect("microsaccades", minimum_duration=15, threshold_factor=6)
+    found = recording.events.frame.select("onset", "offset").to_numpy()
+    return found.reshape(-1, 2) / 1000.0
+
+
+def remodnav_saccades(run: Exported) -> np.ndarray:
+    """Return the saccades of REMoDNaV (Dar, Wagner & Hanke 2021), those between fixations too."""
+    import logging
+
+    from remodnav import EyegazeClassifier
+
+    logging.getLogger("remodnav").setLevel(logging.ERROR)
+    judge = EyegazeClassifier(px2deg=1.0, sampling_rate=_rate_hz(run))
+    data = np.rec.fromarrays([*run.gaze_deg.T, np.zeros(len(run.time_s))], names="x,y,pupil")
+    events = judge(judge.preproc(data), classify_isp=True, sort_events=True)
+    spans = [(e["start_time"], e["end_time"]) for e in events if e["label"] in ("SACC", "ISAC")]
+    return run.time_s[0] + np.array(spans).reshape(-1, 2)
+
+
+JUDGES: dict[str, Judge] = {"pymovements": pymovements_saccades, "remodnav": remodnav_saccades}
+
+
+def marks(run: Exported, seen: np.ndarray) -> Marks:
+    """Compare a judge's saccades with ours."""
+    seen = seen[(seen[:, 0] >= run.time_s[0] + 0.2) & (seen[:, 1] <= run.time_s[-1] - 0.2)]
+    over = (seen[None, :, 0] <= run.commanded[:, None, 1]) & (
+        seen[None, :, 1] >= run.commanded[:, None, 0]
+    )
+    ours, theirs = over.any(axis=1), over.any(axis=0)
+    return Marks(
+        float(ours.mean()), float(1.0 - theirs.mean()), ours, np.column_stack([seen, theirs])
+    )
+
+
+def _rate_hz(run: Exported) -> float:
+    return float(round(1.0 / np.median(np.diff(run.time_s))))
+
+
+def _read(path: Path) -> list[dict[str, str]]:
+    with path.open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def _column(rows: list[dict[str, str]], name: str) -> np.ndarray:
+    return np.array([float(row[name] or "nan") for row in rows])
