@@ -20,6 +20,7 @@ from gazerig.gaze.bottom_up import BottomUp, SalienceRow
 from gazerig.gaze.field_of_view import FieldOfView, line_of_sight
 from gazerig.gaze.habituation import Habituation, HabituationParams
 from gazerig.gaze.idle import Idle
+from gazerig.gaze.reaction import Reaction, ReactionParams
 from gazerig.gaze.top_down import RuleTarget, TopDown
 from gazerig.gaze.types import Bodies, Floats, GazeState, Percept, Salience, Target, Vec3
 from gazerig.params import Bounds
@@ -30,18 +31,23 @@ _LISTED = 4
 _FEW = 24
 """So many bodies are computed one by one, which costs less than arrays do."""
 _SPEED_OVER_S = 0.2  # a speed of the head from positions farther apart says nothing
+_DECIDED_S = 0.2
+"""A camera may show the target of a new behaviour so long after the change."""
 
 
 @dataclass(frozen=True)
 class AttentionParams:
-    """Hysteresis of the choice, and the greatest age of a frame."""
+    """Hysteresis of the choice, reaction time, and the greatest age of a frame."""
 
     # fmt: off
     hysteresis_ratio: Annotated[float, Bounds(1, 10),
         "another body becomes the target if its salience exceeds the present target's by this factor"] = 1.2
     min_dwell_ms: Annotated[float, Bounds(0, 10000), "shortest time on one target"] = 300.0
     stale_ms: Annotated[float, Bounds(20, 10000), "a frame older than this is not used"] = 400.0
+    face_memory_s: Annotated[float, Bounds(0, 600),
+        "when a thing is lost from view, the gaze returns to where a face was looked at, if the face was seen within this time"] = 10.0
     habituation: Annotated[HabituationParams, "habituation and inhibition of return"] = field(default_factory=HabituationParams)
+    reaction: Annotated[ReactionParams, "reaction time"] = field(default_factory=ReactionParams)
     # fmt: on
 
 
@@ -65,7 +71,16 @@ class _Choice(NamedTuple):
 
 
 class Attention:
-    """Choice of the target, once for each new frame."""
+    """Choice of the target, once for each new frame.
+
+    Args:
+        params: hysteresis, habituation and reaction time.
+        field_of_view: which bodies an eye can see.
+        bottom_up: salience by motion.
+        top_down: the rules.
+        idle: where to look with nothing in sight.
+        rng: draws reaction times; None: every change of target is at once.
+    """
 
     def __init__(
         self,
@@ -74,6 +89,7 @@ class Attention:
         bottom_up: BottomUp,
         top_down: TopDown,
         idle: Idle,
+        rng: np.random.Generator | None = None,
     ) -> None:
         self._params = params
         self._field_of_view = field_of_view
@@ -81,17 +97,20 @@ class Attention:
         self.top_down = top_down
         self._idle = idle
         self._habituation = Habituation(params.habituation)
+        self._reaction = Reaction(params.reaction, rng)
         self.reset(0.0)
 
     def retune(self, params: AttentionParams) -> None:
         """Change the hysteresis; the target in force and all habituation stay."""
         self._params = params
         self._habituation.retune(params.habituation)
+        self._reaction.retune(params.reaction)
 
     def reset(self, t_s: float) -> None:
         """Forget everything seen."""
         for model in (self._bottom_up, self.top_down, self._idle, self._habituation):
             model.reset(t_s)
+        self._reaction.reset(t_s)
         self._seen_s = -inf
         self._target: Target | None = None
         self._shift = 0
@@ -100,7 +119,9 @@ class Attention:
         self._place = _STILL
         self._favoured_id = -1
         self._behaviour = self.top_down.behaviour
+        self._changed_s = -inf
         self._eye: tuple[Vec3, float] | None = None
+        self._face: Target | None = None
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
         """Return the target in force at ``t_s``."""
@@ -109,12 +130,36 @@ class Attention:
         if percept is not None and fresh and percept.captured_s != self._seen_s:
             self._seen_s = percept.captured_s
             self._target = self._decide(percept, state, t_s)
-            if self._target is not None and self._target.id >= 0:
-                self._idle.remember(self._target)
-        if self._target is not None and fresh:
-            self._target = self._settle(self._target, t_s)
-            return self._target
-        return self._settle(self._idle.step(t_s), t_s)
+            self._update_face(percept)
+        if fresh:
+            self._target = self._reaction.take(t_s) or self._target
+        else:
+            self._target = None
+            self._reaction.drop()
+        if self._target is None:
+            return self._settle(self._idle.step(t_s), t_s)
+        if self._target.kind == "face":
+            self._face = self._target
+        if self._target.id >= 0:
+            self._idle.remember(self._expected(self._target, t_s))
+        self._target = self._settle(self._target, t_s)
+        return self._target
+
+    def _update_face(self, percept: Percept) -> None:
+        """Update where the face that was looked at last is."""
+        face = self._face
+        if face is not None and face.id in percept.bodies.ids:
+            place = percept.bodies.p_world_m[percept.bodies.ids.index(face.id)]
+            self._face = face._replace(
+                p_world_m=_vec(place), v_world_m_s=_STILL, at_s=percept.captured_s
+            )
+
+    def _expected(self, target: Target, t_s: float) -> Target:
+        """Return where to look once a target is lost: where it was, or the face beside a thing."""
+        face = self._face
+        if face is None or target.kind == "face":
+            return target
+        return face if t_s - face.at_s < self._params.face_memory_s else target
 
     def _settle(self, target: Target, t_s: float) -> Target:
         """Count a gaze shift whenever another object is looked at."""
@@ -125,21 +170,39 @@ class Attention:
         if identity != self._identity:
             if self._identity is not None:
                 self._habituation.leave(place, t_s)
+                self._reaction.record_left(*self._identity, t_s)
             self._identity = identity
             self._shift += 1
             self._since_s = t_s
         return target._replace(shift=self._shift)
 
     def _decide(self, percept: Percept, state: GazeState, t_s: float) -> Target | None:
-        """Return the target of the most salient visible body or rule, None where there is none."""
+        """Return the present target as it is now, None where there is nothing to look at.
+
+        What wins over it waits for its reaction time; a present target that is gone stays where it
+        was until then.
+        """
         compare = self._compare_few if len(percept.bodies) <= _FEW else self._compare
         made = compare(percept.bodies, state, t_s)
         if made.total[made.best] == -inf:
+            self._reaction.drop()
             return None
-        row = self._winner(made, t_s)
-        if made.rule_target is not None and row in made.rule_target.rows:
+        changed = self._behaviour != self.top_down.behaviour
+        if changed:
+            self._behaviour, self._changed_s = self.top_down.behaviour, t_s
+        present = self._present_row(made)
+        row = self._winner(made, present)
+        named = made.rule_target is not None and row in made.rule_target.rows
+        if named:
             self._favoured_id = made.bodies.ids[row]
-        return _target(made, row, percept.captured_s)
+        winner = _target(made, row, percept.captured_s)
+        # A change of mind waits neither for a reaction nor for the end of a fixation.
+        if row == present or changed or (named and t_s - self._changed_s <= _DECIDED_S):
+            self._reaction.drop()
+            return winner
+        dwelt_s = -inf if present is None else self._since_s + self._params.min_dwell_ms / 1e3
+        self._reaction.wait(winner, dwelt_s)
+        return self._target if present is None else _target(made, present, percept.captured_s)
 
     def _compare_few(self, bodies: Bodies, state: GazeState, t_s: float) -> _Choice:
         """Return what ``_compare`` does, for few bodies."""
@@ -211,18 +274,12 @@ class Attention:
             return _STILL
         return scale(sub(p_eye_m, before[0]), 1.0 / (t_s - before[1]))
 
-    def _winner(self, made: _Choice, t_s: float) -> int:
+    def _winner(self, made: _Choice, present: int | None) -> int:
         """Return the row of the strongest, the present one being favoured."""
-        best = made.best
-        # A change of mind does not wait for the end of a fixation.
-        changed = self._behaviour != self.top_down.behaviour
-        self._behaviour = self.top_down.behaviour
-        row = self._present_row(made)
-        if row is None:
-            return best
-        young = t_s - self._since_s < self._params.min_dwell_ms / 1e3 and not changed
-        stays = young or made.total[best] < made.total[row] * self._params.hysteresis_ratio
-        return row if stays else best
+        if present is None:
+            return made.best
+        stays = made.total[made.best] < made.total[present] * self._params.hysteresis_ratio
+        return present if stays else made.best
 
     def _present_row(self, made: _Choice) -> int | None:
         """Return the row of what is looked at now, None where it is no longer there."""

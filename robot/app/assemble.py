@@ -153,7 +153,8 @@ def assemble(rig: Rig, options: RunOptions, substitutes: Substitutes = RIGS_OWN)
     """
     rig = with_options(rig, options)
     scene = _scene(rig, options.scene) if options.scene is not None else None
-    random = _Generators(*map(np.random.default_rng, np.random.SeedSequence(options.seed).spawn(6)))
+    seeds = np.random.SeedSequence(options.seed).spawn(len(_Generators._fields))
+    random = _Generators(*map(np.random.default_rng, seeds))
     clock: Clock = SimulatedClock() if options.fast else RealClock()
     kinematics = kinematics_of(rig)
     camera, notes = _camera_params(rig, options, kinematics)
@@ -196,6 +197,7 @@ class _Generators(NamedTuple):
     idle: np.random.Generator
     aversion: np.random.Generator
     endpoint: np.random.Generator
+    reaction: np.random.Generator
 
 
 class _Sight(NamedTuple):
@@ -239,7 +241,7 @@ def _components(
             mount, placed.horizontal_field_deg, tracker, own_parts(rig), placed.lens, depth_at
         ),
         tracker=tracker,
-        attention=Attention(rig.gaze.attention, *decides),
+        attention=Attention(rig.gaze.attention, *decides, random.reaction),
         field_of_view=decides.field_of_view,
         bottom_up=decides.bottom_up,
         top_down=decides.top_down,

@@ -1,0 +1,108 @@
+"""Reaction time: from what wins attention to the change of target.
+
+People look at something new 150 to 250 ms after it has appeared, hardly ever before 120 ms
+(express saccades), and the times are skewed: log-normal here. The time counts from the capture
+of the frame in which the new target won, so the delay of the camera is a part of it and not
+added to it. What wins while the time runs takes it over, since a saccade is programmed as a
+time and a goal; what no longer wins is not looked at. Meanwhile the present target is
+looked at as before.
+
+What comes nearer fast is answered sooner, and so is a face that was looked at a moment ago. A
+change of behaviour is the robot's own decision, not a stimulus: it waits for nothing.
+"""
+
+from dataclasses import dataclass
+from math import exp, inf
+from typing import Annotated
+
+import numpy as np
+
+from gazerig.gaze.types import Target
+from gazerig.params import Bounds
+
+
+@dataclass(frozen=True)
+class ReactionParams:
+    """Distribution of reaction times, and what shortens them."""
+
+    # fmt: off
+    median_ms: Annotated[float, Bounds(0, 1000),
+        "median time from the frame in which something else wins attention to the change of target; 0: at once; people 150 to 250"] = 175.0
+    spread: Annotated[float, Bounds(0, 1), "standard deviation of the logarithm of that time"] = 0.15
+    looming_ratio: Annotated[float, Bounds(0, 1), "share of that time for what comes nearer fast"] = 0.75
+    return_ratio: Annotated[float, Bounds(0, 1), "share of that time for a face that was looked at within return_s"] = 0.8
+    return_s: Annotated[float, Bounds(0, 600), "time for which a face counts as just looked at"] = 5.0
+    # fmt: on
+
+
+class Reaction:
+    """The next target, which waits for its reaction time to be over.
+
+    Args:
+        params: the distribution.
+        rng: draws one time for each change of target; None: all changes are at once.
+    """
+
+    def __init__(self, params: ReactionParams, rng: np.random.Generator | None = None) -> None:
+        self._rng = rng
+        self._params = params
+        self.reset(0.0)
+
+    def retune(self, params: ReactionParams) -> None:
+        """Change the distribution; a reaction under way is as quick or slow among the new times."""
+        self._params = params
+
+    def reset(self, t_s: float) -> None:
+        """Forget what waits and what was looked at."""
+        self._next: Target | None = None
+        self._deviation = 0.0
+        self._won_s = self._free_s = t_s
+        self._left_s: dict[int, float] = {}
+
+    def record_left(self, kind: str, id: int, t_s: float) -> None:
+        """Record that the gaze has left something."""
+        if kind == "face":
+            lasts_s = self._params.return_s
+            self._left_s = {k: at_s for k, at_s in self._left_s.items() if t_s - at_s < lasts_s}
+            self._left_s[id] = t_s
+
+    def wait(self, target: Target, free_s: float) -> None:
+        """Let a target that wins wait for its time; if another waits, it takes over its time.
+
+        free_s: not before this, however quick the reaction
+        """
+        if self._next is None:
+            self._won_s = target.at_s
+            self._deviation = float(self._rng.standard_normal()) if self._rng is not None else 0.0
+        self._next, self._free_s = target, free_s
+
+    def drop(self) -> None:
+        """Drop what waits: it no longer wins."""
+        self._next = None
+
+    def take(self, t_s: float) -> Target | None:
+        """Return the target whose time is over, once; None while there is none."""
+        target = self._next
+        if target is None or t_s < max(self._free_s, self._due_s(target)) - 1e-9:
+            return None
+        self._next = None
+        return target
+
+    def _due_s(self, target: Target) -> float:
+        """Return when the reaction time of a target is over."""
+        par = self._params
+        if self._rng is None or par.median_ms <= 0.0:
+            return -inf
+        drawn_s = 1e-3 * par.median_ms * exp(par.spread * self._deviation)
+        return self._won_s + self._ratio(target) * drawn_s
+
+    def _ratio(self, target: Target) -> float:
+        """Return the share of the drawn time that a target takes."""
+        par, first = self._params, target.saliences[0]
+        ratio = 1.0
+        if first.looming > max(first.translation, first.rotation, first.onset, first.rule):
+            ratio = par.looming_ratio
+        left_s = self._left_s.get(target.id, -inf)
+        if target.kind == "face" and target.at_s - left_s <= par.return_s:
+            ratio = min(ratio, par.return_ratio)
+        return ratio

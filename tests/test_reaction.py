@@ -1,0 +1,169 @@
+"""Reaction times: how long after something new wins attention the target changes."""
+
+from math import exp
+from typing import Any
+
+import numpy as np
+import pytest
+from attention_scene import FACE, body, looking, percept
+
+from gazerig.gaze.attention import Attention, AttentionParams
+from gazerig.gaze.bottom_up import BottomUp, BottomUpParams
+from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
+from gazerig.gaze.idle import Idle, IdleParams
+from gazerig.gaze.reaction import ReactionParams
+from gazerig.gaze.top_down import TopDown, TopDownParams
+from gazerig.gaze.types import Floats, Percept
+
+FRAME_S, TICK_S, DELAY_S = 1 / 30, 1 / 200, 0.06
+REACHES = body(2, "hand", (0.8, 0.3, -0.1), (0.0, 1.0, 0.0))
+NEARS = body(2, "hand", (0.8, 0.0, -0.1), (-1.0, 0.0, 0.1))
+
+
+def attention(seed: int | None = 0, dwell_ms: float = 0.0, **reaction: Any) -> Attention:
+    return Attention(
+        AttentionParams(min_dwell_ms=dwell_ms, reaction=ReactionParams(**reaction)),
+        FieldOfView(FieldOfViewParams()),
+        BottomUp(BottomUpParams(smoothing_s=0.0)),
+        TopDown(TopDownParams()),
+        Idle(IdleParams()),
+        None if seed is None else np.random.default_rng(seed),
+    )
+
+
+class Viewer:
+    """Attention before a camera that shows frames late and now and then."""
+
+    def __init__(self, model: Attention) -> None:
+        self.model = model
+        self._t_s = 0.0
+        self._shown: list[tuple[float, list[Any]]] = []
+
+    def show(self, rows: list[Any], for_s: float) -> list[tuple[float, str, int]]:
+        """Show bodies; return what is looked at, tick by tick: time since, kind and id."""
+        start_s, looks = self._t_s, []
+        self._shown.append((start_s, rows))
+        for k in range(round(for_s / TICK_S)):
+            t_s = start_s + k * TICK_S
+            exposed_s = int((t_s - DELAY_S) / FRAME_S + 1e-9) * FRAME_S
+            target = self.model.choose(self._percept(exposed_s), looking(), t_s)
+            looks.append((k * TICK_S, target.kind, target.id))
+        self._t_s = start_s + round(for_s / TICK_S) * TICK_S
+        return looks
+
+    def _percept(self, exposed_s: float) -> Percept | None:
+        before = [rows for since_s, rows in self._shown if since_s <= exposed_s + 1e-9]
+        return percept(exposed_s, *before[-1]) if before and exposed_s >= 0.0 else None
+
+    def reaction_s(self, rows: list[Any], kind: str) -> float:
+        """Return the time from showing something to the first look at it."""
+        return next(t_s for t_s, looked_at, _ in self.show(rows, 0.8) if looked_at == kind)
+
+
+def reactions(row: Any, count: int = 120, **reaction: Any) -> Floats:
+    times = []
+    for seed in range(count):
+        viewer = Viewer(attention(seed, **reaction))
+        viewer.show([FACE], 0.5)
+        times.append(viewer.reaction_s([FACE, row], "hand"))
+    return np.array(times)
+
+
+def test_e70_reactions_are_those_of_people() -> None:
+    times = reactions(REACHES)
+    assert 0.15 <= np.median(times) <= 0.25
+    assert (times < 0.12).mean() <= 0.05
+    assert ((times > 0.13) & (times < 0.26)).mean() > 0.9
+    # Log-normal: the logarithms scatter as given, and their tails are alike.
+    assert np.log(times).std() == pytest.approx(0.15, abs=0.03)
+    assert len(np.unique(times.round(3))) > 15
+
+
+def test_e70_what_comes_nearer_is_answered_sooner() -> None:
+    aside, nearer = np.median(reactions(REACHES, 40)), np.median(reactions(NEARS, 40))
+    assert nearer == pytest.approx(0.75 * aside, abs=0.01)
+
+
+@pytest.mark.parametrize(("median_ms", "seed"), [(0.0, 0), (175.0, None)])
+def test_a_head_may_react_at_once(median_ms: float, seed: int | None) -> None:
+    viewer = Viewer(attention(seed, median_ms=median_ms))
+    viewer.show([FACE], 0.5)
+    assert viewer.reaction_s([FACE, REACHES], "hand") == pytest.approx(DELAY_S, abs=TICK_S)
+
+
+def test_a_face_that_was_just_left_is_returned_to_sooner() -> None:
+    first, again = [], []
+    for seed in range(20):
+        viewer = Viewer(attention(seed, spread=0.0))
+        first.append(viewer.reaction_s([FACE], "face"))
+        viewer.show([FACE, REACHES], 0.7)
+        # The hand is gone and its amount with it; the face was there all the time.
+        again.append(viewer.reaction_s([FACE], "face"))
+    assert np.mean(first) == pytest.approx(0.175, abs=0.006)
+    assert np.mean(again) == pytest.approx(0.8 * 0.175, abs=0.006)
+
+
+def test_what_has_stopped_before_its_time_is_not_looked_at() -> None:
+    viewer = Viewer(attention(spread=0.0))
+    viewer.show([FACE], 0.5)
+    assert {kind for _, kind, _ in viewer.show([FACE, REACHES], 0.1)} == {"face"}
+    viewer.model._bottom_up.retune(BottomUpParams(smoothing_s=0.0, onset_salience=0.0))
+    resting = body(2, "hand", (0.8, 0.3, -0.1))
+    assert {kind for _, kind, _ in viewer.show([FACE, resting], 0.5)} == {"face"}
+
+
+def test_what_wins_meanwhile_takes_over_the_time() -> None:
+    viewer = Viewer(attention(spread=0.0))
+    viewer.show([FACE], 0.5)
+    viewer.show([FACE, REACHES], 0.1)
+    faster = body(3, "hand", (0.8, -0.3, -0.1), (0.0, 4.0, 0.0))
+    looks = viewer.show([FACE, REACHES, faster], 0.3)
+    first = next((t_s, id) for t_s, kind, id in looks if kind == "hand")
+    assert first == (pytest.approx(0.075, abs=TICK_S), 3)
+
+
+def test_the_shortest_time_on_a_target_and_the_reaction_run_side_by_side() -> None:
+    viewer = Viewer(attention(dwell_ms=300.0, spread=0.0))
+    viewer.show([FACE], 0.2)  # looked at from 0.175 s on
+    assert viewer.reaction_s([FACE, REACHES], "hand") == pytest.approx(0.275, abs=0.006)
+
+
+def test_a_change_of_behaviour_waits_for_nothing() -> None:
+    viewer = Viewer(attention())
+    place = body(9, "attack_target", (0.8, -0.2, 0.0))
+    viewer.show([FACE], 0.5)
+    viewer.model.top_down.behave("attack")
+    assert viewer.reaction_s([FACE, place], "attack_target") == pytest.approx(0.06, abs=TICK_S)
+
+
+def test_a_reaction_under_way_is_as_quick_among_the_new_times() -> None:
+    waited = []
+    for median_ms in (175.0, 350.0):
+        viewer = Viewer(attention())
+        viewer.show([FACE], 0.5)
+        viewer.show([FACE, REACHES], 0.1)
+        reaction = ReactionParams(median_ms=median_ms)
+        viewer.model.retune(AttentionParams(min_dwell_ms=0.0, reaction=reaction))
+        deviation = viewer.model._reaction._deviation
+        waited.append(0.1 + viewer.reaction_s([FACE, REACHES], "hand"))
+        assert waited[-1] == pytest.approx(median_ms / 1e3 * exp(0.15 * deviation), abs=0.006)
+    assert waited[1] == pytest.approx(2.0 * waited[0], abs=0.012)
+
+
+def test_when_a_thing_is_lost_the_gaze_returns_to_the_face_that_was_there() -> None:
+    for memory_s, kind in ((10.0, "face"), (0.0, "hand")):
+        model = Attention(
+            AttentionParams(face_memory_s=memory_s),
+            FieldOfView(FieldOfViewParams()),
+            BottomUp(BottomUpParams()),
+            TopDown(TopDownParams()),
+            Idle(IdleParams()),
+        )
+        viewer = Viewer(model)
+        viewer.show([FACE], 0.5)
+        viewer.show([body(2, "hand", (0.8, 0.5, -0.1), (0.0, 1.0, 0.0))], 0.5)
+        viewer.show([], 0.2)
+        target = model.choose(percept(1.2), looking(), 1.2)
+        assert (target.kind, target.why) == (kind, "lost, waiting")
+        if kind == "face":
+            assert target.p_world_m == (1.0, 0.0, 0.0)
