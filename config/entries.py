@@ -116,7 +116,7 @@ class _BoundedComposer(Composer):
         return super().compose_node(parent, index)
 
 
-@lru_cache(maxsize=16)
+@lru_cache(maxsize=64)
 def _composed(text: str) -> Node | None:
     """Return YAML parsed as far as nodes, which know their lines and are only read.
 

@@ -87,6 +87,18 @@ class GestureMotion:
                 column[:, first : first + 2] += column[:, :2]
         return MotionSamples(times_s, *columns)
 
+    def state_at(self, t_s: float) -> tuple[list[float], list[float], list[float]]:
+        """Return value, speed and acceleration of every channel at a time, relative to rest."""
+        value, speed, acceleration = ([0.0] * len(self._rests) for _ in range(3))
+        for i, curve in self._curves:
+            at, speed[i], acceleration[i] = curve.state_at(t_s)
+            value[i] = at - self._rests[i]
+        if self._follow:
+            for column in (value, speed, acceleration):
+                for axis in (0, 1):
+                    column[_FIRST_EYE + axis] += column[axis]
+        return value, speed, acceleration
+
     def add_to(self, flat: list[float], t_s: float, sizes: tuple[float, ...]) -> None:
         """Add the motion at one time to a flat PoseOffset.
 

@@ -95,10 +95,11 @@ class GesturePlayer:
                 column[i] += number
         if self._played is not None:
             _, motion, speed, sizes = self._played
-            since = np.array([max(0.0, t_s - self._begins_s) * speed])
-            samples = motion.sampled(since).scaled(np.array(sizes), speed)
-            for column, found in zip(total, samples[1:], strict=True):
-                column += found[0]
+            found = motion.state_at(max(0.0, t_s - self._begins_s) * speed)
+            size = np.array(sizes)
+            rates = size, size * speed, size * speed * speed
+            for column, now, rate in zip(total, found, rates, strict=True):
+                column += np.array(now) * rate
         return OffsetState(*total)
 
     def step(self, t_s: float) -> PoseOffset:

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 import child_processes
 import pytest
 import running_order
+import shared_compiling
 import starvation
 from _pytest.runner import runtestprotocol
 from hypothesis import settings
@@ -42,9 +43,14 @@ for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "OPENCV_FOR_THREADS_N
 
 
 @pytest.hookimpl(hookwrapper=True)
-def pytest_collection() -> Iterator[None]:
-    """Let what is imported lie: it stays, and looking it through takes a third of the time."""
+def pytest_collection(session: pytest.Session) -> Iterator[None]:
+    """Share compiling among workers, and let what is imported lie.
+
+    It stays, and looking it through takes a third of the time.
+    """
     gc.disable()
+    if worker := os.environ.get("PYTEST_XDIST_WORKER"):
+        shared_compiling.compile_missing(worker, session.config)
     yield
     gc.freeze()
     gc.enable()

@@ -19,7 +19,7 @@ from gazerig.robot.model.commands import Play
 from gazerig.robot.model.kinematics import LIDS, NECK
 from gazerig.robot.model.types import further
 
-DT = 0.005
+DT_S = 0.01
 TARGET = (1.0, 0.0, 0.25)
 
 
@@ -63,7 +63,9 @@ def joint_angles(rig_name: str, offsets: list[PoseOffset]) -> Floats:
     return np.stack([angles[name] for name in rig.names], axis=1)
 
 
-def interrupted(gesture: str, rig_name: str, moments: int, seed: int) -> Moments:
+def interrupted(
+    gesture: str, rig_name: str, moments: int, seed: int, dt_s: float = DT_S
+) -> Moments:
     """Play a gesture and, at random moments, another one, the same again, or nothing."""
     rig, random = load_rig(rig_name), np.random.default_rng(seed)
     player = GesturePlayer(len(further(rig.joints)))
@@ -76,16 +78,16 @@ def interrupted(gesture: str, rig_name: str, moments: int, seed: int) -> Moments
         speed = float(random.uniform(0.5, 2.0))
         reply = choices.play(Play(name, speed), t, at_rest, bounds)
         began += bool(name) and not reply.refused
-        for _ in range(int(random.integers(1, 50))):
-            t += DT
+        for _ in range(int(random.integers(1, round(0.25 / dt_s)))):
+            t += dt_s
             offsets.append(player.step(t))
     angles = joint_angles(rig_name, offsets)
     step = np.abs(np.diff(angles, axis=0)).max(axis=0)
-    accel = np.abs(np.diff(angles, 2, axis=0)).max(axis=0) / DT**2
+    accel = np.abs(np.diff(angles, 2, axis=0)).max(axis=0) / dt_s**2
     return Moments(
         rig.names,
         np.degrees(step),
-        step / DT / [one.speed_rad_s for one in bounds],
+        step / dt_s / [one.speed_rad_s for one in bounds],
         accel / [one.accel_rad_s2 for one in bounds],
         began,
     )
@@ -119,7 +121,7 @@ if __name__ == "__main__":
         for name in shipped_gestures():
             if name == "brow_shrug" and rig_name != "expressive":
                 continue
-            one = interrupted(name, rig_name, 1000, seed=7)
+            one = interrupted(name, rig_name, 1000, seed=7, dt_s=0.005)
             k, a = int(one.step_deg.argmax()), int(one.accel_share.argmax())
             print(
                 f"{rig_name:10} {name:12} largest step {one.step_deg[k]:.2f} deg ({one.joints[k]}), "

@@ -1,0 +1,45 @@
+"""Workers that run side by side compile the modules together.
+
+Each worker imports the whole product and all test files. In a fresh checkout each would compile
+all of it and rewrite the assertions of the tests, eleven seconds of processor time a worker. Here
+each goes through the files in an order of its own and leaves out what another has written
+meanwhile, so that nearly all of it is done once.
+"""
+
+import importlib.util
+import py_compile
+import random
+from collections.abc import Iterable
+from pathlib import Path
+
+import pytest
+from _pytest.assertion import rewrite
+
+ROOT = Path(__file__).resolve().parents[1]
+ROOMS = ("api", "config", "drivers", "gaze", "robot", "sim_mock")
+
+
+def compile_missing(worker: str, config: pytest.Config) -> None:
+    """Write what pytest and Python would write for each module, where there is nothing yet.
+
+    Args:
+        worker: name of this one; it gives the order.
+        config: of pytest.
+    """
+    tests = ROOT.glob("tests/test_*.py")
+    for file in order_of(worker, tests):
+        cached = rewrite.get_cache_dir(file) / (file.stem + rewrite.PYC_TAIL)
+        if not cached.exists() and rewrite.try_makedirs(cached.parent):
+            source_hash, code = rewrite._rewrite_test(file, config)
+            rewrite._write_pyc(config.stash[rewrite.assertstate_key], code, source_hash, cached)
+    modules = (file for room in ROOMS for file in ROOT.glob(f"{room}/**/*.py"))
+    for file in order_of(worker, modules):
+        if not Path(importlib.util.cache_from_source(str(file))).exists():
+            py_compile.compile(str(file))
+
+
+def order_of(worker: str, files: Iterable[Path]) -> list[Path]:
+    """Return the files in the order of one worker; no two follow each other for long."""
+    ordered = sorted(files)
+    random.Random(worker).shuffle(ordered)
+    return ordered
