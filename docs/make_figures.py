@@ -97,7 +97,7 @@ def main_sequence() -> None:
 
 def head_goal() -> None:
     """Offset of the head goal over the amount of attention (eq 7)."""
-    params = HeadParams(min_salience=0.0, max_salience=1.0)
+    params = HeadParams(goal_model="attention", min_salience=0.0, max_salience=1.0)
     limits = ((-2.0, 2.0), (-1.0, 1.0))
     pulls = np.linspace(-0.2, 1.2, 200)
     figure, axes = plt.subplots(figsize=(4.8, 3.4))

@@ -121,16 +121,20 @@ def turned(v: Vec3, axis: Vec3, angle_rad: float) -> Vec3:
     )
 
 
-def shortened(v: Vec3, offset_rad: float) -> Vec3:
-    """Return a direction moved towards straight ahead by ``offset_rad`` along the great circle.
+def shortened(v: Vec3, offset_rad: float, start: Vec3 = (1.0, 0.0, 0.0)) -> Vec3:
+    """Return a direction moved back towards another by an angle along the great circle.
 
-    A direction closer than the offset becomes straight ahead.
+    A direction closer than the offset becomes that other one.
+
+    Args:
+        v: direction of any length.
+        offset_rad: how far it is moved.
+        start: unit vector towards which it is moved; straight ahead.
     """
-    ahead = (1.0, 0.0, 0.0)
-    arc = angle_between(ahead, v)
+    arc = angle_between(start, v)
     if arc <= offset_rad or arc == 0.0:
-        return ahead
-    return along_great_circle(ahead, unit(v), (arc - offset_rad) / arc)
+        return start
+    return along_great_circle(start, unit(v), (arc - offset_rad) / arc)
 
 
 def rotation(head_rad: Angles3) -> Mat3:

@@ -222,7 +222,7 @@ class Oculomotor:
     def reach(self, target: Target) -> ReachableGaze:
         """Return where head and eyes come to rest for a point that stands still."""
         facing = self._geometry.facing(target.p_world_m, self._base_rad)
-        head = (*self._head.destination_rad(target, facing), 0.0)
+        head = self._head.destination_rad(target, facing)
         R_world_head, p_head = self._geometry.head_pose(head, self._base_rad)
         exact = self._geometry.eyes_on(target.p_world_m, R_world_head, p_head)
         point = self._clear(target.p_world_m, p_head)

@@ -12,11 +12,14 @@ from gazerig.gaze.quintic import Quintic
 from gazerig.gaze.types import Floats, Target
 
 NECK = ((-2.0, 2.0), (-1.0, 1.0))
+EQ_7 = HeadParams(goal_model="attention")
 
 
 def head(eye_deg: float = 55.0, params: HeadParams | None = None) -> HeadModel:
     return HeadModel(
-        params or HeadParams(min_salience=0.0, max_salience=1.0), radians(eye_deg), NECK
+        params or HeadParams(goal_model="attention", min_salience=0.0, max_salience=1.0),
+        radians(eye_deg),
+        NECK,
     )
 
 
@@ -84,7 +87,7 @@ def test_attention_bounds_must_be_in_order() -> None:
 
 
 def test_an_eye_held_aside_is_relieved_slowly() -> None:
-    model = HeadModel(HeadParams(), radians(35.0), NECK)
+    model = HeadModel(EQ_7, radians(35.0), NECK)
     model.reset(0.0, (0.0, 0.0, 0.0))
     target = Target((1.0, 0.4, 0.0), (0, 0, 0), 0.0, "face", 1, 0.5, True, None, 1, "")
     yaw = radians(21.0)
@@ -111,7 +114,7 @@ def aimed(params: HeadParams, centre: float, point: float, top_down: bool = Fals
 
 
 def test_head_turns_to_the_centre_but_never_so_that_the_point_is_out_of_reach() -> None:
-    still = HeadParams(min_salience=0.0, recentre_after_ms=60_000.0)
+    still = HeadParams(goal_model="attention", min_salience=0.0, recentre_after_ms=60_000.0)
     assert aimed(still, 40.0, 41.0) == pytest.approx(40.0 - 15.0, abs=0.1)
     assert aimed(still, 40.0, 50.0) == pytest.approx(50.0 - 18.0, abs=0.1)
 
@@ -140,7 +143,9 @@ def test_stahl_share_of_a_wide_eye_range() -> None:
 
 
 def test_literal_reach_keeps_30_degrees_and_so_the_gaze_short() -> None:
-    params = HeadParams(min_salience=0.5, max_salience=1.0, literal_reach=True)
+    params = HeadParams(
+        goal_model="attention", min_salience=0.5, max_salience=1.0, literal_reach=True
+    )
     model = HeadModel(params, radians(20.0), NECK)
     assert degrees(model.trigger_rad) == pytest.approx(30.0)
     assert degrees(model.offset_rad(0.5)) == pytest.approx(29.97, abs=0.01)
@@ -152,7 +157,7 @@ def test_literal_reach_keeps_30_degrees_and_so_the_gaze_short() -> None:
     ("size", "peak"), [(20.0, 65.0), (30.0, 84.0), (40.0, 103.0), (60.0, 140.0)]
 )
 def test_larger_head_movements_are_faster(size: float, peak: float) -> None:
-    model = HeadModel(HeadParams(), radians(5.0), NECK)
+    model = HeadModel(EQ_7, radians(5.0), NECK)
     model.reset(0.0, (0.0, 0.0, 0.0))
     target = Target((1.0, 0, 0), (0, 0, 0), 0.0, "face", 1, 2.0, True, None, 1, "")
     facing = (radians(size), 0.0)
@@ -175,14 +180,14 @@ def turned(params: HeadParams, yaw: float, salience: Callable[[float], float]) -
 
 
 def test_a_head_does_not_turn_away_because_the_interest_has_fallen() -> None:
-    yaws = turned(HeadParams(), 36.0, lambda t: 1.5 if t < 0.5 else 0.5)
+    yaws = turned(EQ_7, 36.0, lambda t: 1.5 if t < 0.5 else 0.5)
     assert np.diff(yaws).min() > -1e-9
     assert 30.0 < yaws[-1] <= 36.0
 
 
 def test_an_eye_left_aside_by_a_shift_is_relieved_all_the_same() -> None:
     """The least interested head stops far short of the target; later it comes after the eyes."""
-    yaws = turned(HeadParams(recentre_after_ms=300.0), 50.0, lambda t: 0.2)
+    yaws = turned(HeadParams(goal_model="attention", recentre_after_ms=300.0), 50.0, lambda t: 0.2)
     assert yaws[int(0.6 / 0.005)] < 22.0
     assert 50.0 - yaws[-1] < 8.0
 

@@ -85,7 +85,7 @@ def test_latency_delays_the_saccade_and_the_gaze_waits_where_it_is() -> None:
 
 @pytest.mark.parametrize("top_down", [False, True])
 def test_the_head_goes_first_only_where_it_is_wanted(top_down: bool) -> None:
-    head = HeadParams(recentre_after_ms=60_000.0, lead_ms=100.0)
+    head = HeadParams(goal_model="attention", recentre_after_ms=60_000.0, lead_ms=100.0)
     trace = Rig(head=head).run(still(45.0, top_down=top_down), 1.0)
     eyes = np.argmax([c.phase == "saccade" for c in trace.commands])
     turns = np.argmax(np.abs(trace.head) > 1e-9)
@@ -135,7 +135,7 @@ def test_breathing_moves_the_head_and_not_the_gaze() -> None:
 
 
 def test_the_head_faces_the_centre_while_the_gaze_wanders_over_parts() -> None:
-    rig = Rig(head=HeadParams(recentre_after_ms=60_000.0))
+    rig = Rig(head=HeadParams(goal_model="attention", recentre_after_ms=60_000.0))
     centre = scale(direction((radians(45.0), 0.0)), 1.0)
 
     def where(t: float) -> Target:

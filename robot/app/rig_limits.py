@@ -49,11 +49,15 @@ def eye_limits(rig: Rig) -> EyeLimits:
     return (_eye(rig, "left"), _eye(rig, "right"))
 
 
-def head_limits(rig: Rig) -> tuple[float, tuple[Angles2, Angles2]]:
-    """Return the smallest eye limit and the neck's ((yaw low, high), (pitch low, high))."""
+def head_limits(rig: Rig) -> tuple[float, tuple[Angles2, Angles2], Angles2]:
+    """Return the smallest eye limit and the neck's ranges.
+
+    Returns:
+        The limit, ((yaw low, high), (pitch low, high)) and (roll low, high), radians.
+    """
     smallest = min(abs(end) for eye in eye_limits(rig) for span in eye for end in span)
     neck = _span(rig, "neck_yaw", rig.ranges.neck_yaw_deg), _span(rig, "neck_pitch", 180.0)
-    return smallest, neck
+    return smallest, neck, neck_span(rig, "neck_roll")
 
 
 def neck_span(rig: Rig, name: str) -> Angles2:

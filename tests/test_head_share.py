@@ -1,0 +1,159 @@
+"""How far the head goes from any start to any target: never past it, and no less for more interest.
+
+Numbered checks are listed in docs/checks.md.
+"""
+
+from math import degrees, radians
+from typing import Literal
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gazerig.gaze.angles import angle_between, direction
+from gazerig.gaze.head import HeadModel, HeadParams
+from gazerig.gaze.head_share import HeadShare
+from gazerig.gaze.types import Angles2, Floats, Target
+from gazerig.robot.analysis.human_norms import STAHL_FREE_DEG, STAHL_SLOPE
+
+NECK = ((-2.0, 2.0), (-1.2, 1.2))
+ROLL = (radians(-25.0), radians(25.0))
+NO_RELIEF = 60_000.0
+Model = Literal["attention", "align", "stahl"]
+
+MODELS = st.sampled_from(("attention", "align", "stahl"))
+PLACES = st.tuples(st.floats(-75.0, 75.0), st.floats(-40.0, 40.0))
+INTERESTS = st.floats(0.0, 1.6)
+EYES = st.floats(10.0, 60.0)
+
+
+def ends(
+    model: Model, eyes_deg: float, start: Angles2, place: Angles2, salience: float
+) -> tuple[float, float, float]:
+    """Let a head at rest turn to a place; angles in degrees.
+
+    Returns:
+        The target's arc from the start, how far the head went, and what is left to the target.
+    """
+    params = HeadParams(goal_model=model, recentre_after_ms=NO_RELIEF)
+    head = HeadModel(params, radians(eyes_deg), NECK, ROLL)
+    at = (radians(start[0]), radians(start[1]))
+    facing = (radians(place[0]), radians(place[1]))
+    head.reset(0.0, (*at, 0.0))
+    target = Target((1.0, 0, 0), (0, 0, 0), 0.0, "face", 1, salience, False, None, 1, "")
+    arc = angle_between(direction(at), direction(facing))
+    for t in (0.0, 0.4, 3.0):
+        yaw, pitch, _ = head.step(target, facing, facing, arc, 1.0, t)
+    way = direction((yaw, pitch))
+    went, left = angle_between(direction(at), way), angle_between(way, direction(facing))
+    return degrees(arc), degrees(went), degrees(left)
+
+
+@settings(max_examples=300, deadline=None)
+@given(MODELS, EYES, PLACES, PLACES, INTERESTS)
+def test_e65_the_head_never_goes_past_the_target_as_seen_from_where_it_comes(
+    model: Model, eyes_deg: float, start: Angles2, place: Angles2, salience: float
+) -> None:
+    arc, went, left = ends(model, eyes_deg, start, place, salience)
+    assert went <= arc + 1e-6
+    assert went + left == pytest.approx(arc, abs=1e-4), "along the great circle"
+
+
+@settings(max_examples=300, deadline=None)
+@given(MODELS, EYES, PLACES, PLACES, INTERESTS, INTERESTS)
+def test_e65_less_interest_never_turns_the_head_further(
+    model: Model, eyes_deg: float, start: Angles2, place: Angles2, one: float, other: float
+) -> None:
+    less, more = sorted((one, other))
+    moved = [ends(model, eyes_deg, start, place, salience)[1] for salience in (less, more)]
+    assert moved[0] <= moved[1] + 1e-6
+
+
+@pytest.mark.parametrize("model", ["attention", "align", "stahl"])
+@pytest.mark.parametrize("salience", [0.0, 0.2, 0.5, 1.0])
+def test_e65_from_60_to_25_a_head_does_not_go_to_0(model: Model, salience: float) -> None:
+    _, went, _ = ends(model, 55.0, (60.0, 0.0), (25.0, 0.0), salience)
+    assert 0.0 <= went <= 35.0
+    if salience == 0.2 and model == "attention":
+        assert went == pytest.approx(35.0 - 29.97, abs=0.1)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.floats(0.0, 60.0), st.floats(0.0, 1.0), PLACES, PLACES, INTERESTS)
+def test_e75_stahls_law_holds_outward_and_homeward(
+    range_deg: float, slope: float, start: Angles2, place: Angles2, salience: float
+) -> None:
+    params = HeadParams(eye_only_range_deg=range_deg, head_slope=slope, recentre_after_ms=NO_RELIEF)
+    arc = radians(70.0) * (place[0] + 75.0) / 150.0
+    went = arc - HeadShare(params, radians(170.0)).short_rad(salience, arc)
+    law = slope * max(0.0, degrees(arc) - range_deg / 2.0)
+    assert degrees(went) == pytest.approx(law, abs=1e-9)
+
+
+@pytest.mark.parametrize("start", [-60.0, -20.0, 0.0, 35.0, 60.0])
+@pytest.mark.parametrize("place", [-60.0, -31.0, 0.0, 16.0, 25.0, 60.0])
+def test_e75_the_model_goes_as_far_as_the_report_expects_of_people(
+    start: float, place: float
+) -> None:
+    arc, went, _ = ends("stahl", 75.0, (start, 0.0), (place, 0.0), 0.5)
+    assert went == pytest.approx(STAHL_SLOPE * max(0.0, arc - STAHL_FREE_DEG), abs=1.0)
+
+
+def flight(seconds: float, *places: tuple[float, float]) -> Floats:
+    """Return the head's yaws with targets that appear at times; (time, degrees), 5 ms apart."""
+    head = HeadModel(HeadParams(recentre_after_ms=NO_RELIEF), radians(35.0), NECK, ROLL)
+    yaws = [0.0]
+    for k in range(round(seconds / 0.005)):
+        t = k * 0.005
+        number = sum(at <= t for at, _ in places)
+        facing = (radians(places[number - 1][1]), 0.0)
+        target = Target((1, 0, 0), (0, 0, 0), t, "face", number, 0.5, False, None, number, "")
+        yaws.append(head.step(target, facing, facing, abs(facing[0] - yaws[-1]), 1.0, t)[0])
+    return np.degrees(yaws)
+
+
+def test_e65_a_head_in_flight_stops_where_it_can_and_not_behind_a_nearer_target() -> None:
+    yaws = flight(2.0, (0.0, 65.0), (0.25, 30.0))
+    switched = yaws[50]
+    assert 3.0 < switched < 20.0
+    assert yaws.max() <= 30.0
+    assert np.diff(yaws[50:]).min() > -0.02, "it does not swing back"
+
+
+def test_parts_of_a_face_do_not_pull_the_head_further_each_time() -> None:
+    """The same person all the while: the law counts from where the head was at first."""
+    head = HeadModel(HeadParams(recentre_after_ms=NO_RELIEF), radians(50.0), NECK, ROLL)
+    rng, yaw = np.random.default_rng(0), 0.0
+    for k in range(800):
+        t, shift = k * 0.005, k // 60
+        gaze = (radians(45.0 + 2.0 * float(rng.standard_normal())), 0.0)
+        facing = (radians(45.0), 0.0)
+        target = Target((1, 0, 0), (0, 0, 0), t, "face", 1, 0.5, False, None, shift, "")
+        yaw = head.step(target, facing, gaze, abs(gaze[0] - yaw), 1.0, t)[0]
+    assert degrees(yaw) == pytest.approx(0.77 * (45.0 - 17.9), abs=0.5)
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.floats(-80.0, 80.0), INTERESTS, INTERESTS)
+def test_e75_the_roll_goes_to_the_side_of_the_target_and_grows_with_interest(
+    yaw_deg: float, one: float, other: float
+) -> None:
+    share = HeadShare(HeadParams(), radians(35.0))
+    less, more = (abs(share.roll_rad(s, radians(yaw_deg))) for s in sorted((one, other)))
+    assert less <= more + 1e-12 and degrees(more) <= 4.0
+    assert share.roll_rad(one, radians(yaw_deg)) * yaw_deg <= 0.0
+    if abs(yaw_deg) >= 20.0:
+        assert degrees(less) >= 1.0
+
+
+def test_e75_a_neck_without_a_roll_joint_does_not_roll() -> None:
+    facing = (radians(60.0), 0.0)
+    target = Target((1, 0, 0), (0, 0, 0), 0.0, "face", 1, 1.0, False, None, 1, "")
+    rolls = []
+    for limits in ((0.0, 0.0), ROLL):
+        head = HeadModel(HeadParams(), radians(35.0), NECK, limits)
+        for t in (0.0, 0.5, 3.0):
+            roll = head.step(target, facing, facing, radians(60.0), 1.0, t)[2]
+        rolls.append(degrees(roll))
+    assert rolls[0] == 0.0 and rolls[1] == pytest.approx(-4.0, abs=0.1)
