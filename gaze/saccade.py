@@ -1,22 +1,23 @@
 """Saccade profiles: the angle covered as a function of the time since onset.
 
-Three profiles with one interface. ``min_jerk`` is eqs 2-6 of Mitake et al., minimum
-jerk with a cap on the speed. ``main_sequence`` has the duration and the early peak of
-human saccades. ``literal_frame`` is the rule of Nakamoto & Tsuruno 3.3, 0.8 of the way
-in each frame. All are closed forms of the time: a late tick lands on the curve instead
-of stretching it. Radians and seconds inside; parameters in degrees and milliseconds.
+Four profiles with one interface. ``human`` has the duration, the peak speed and the early
+peak of human saccades. ``main_sequence`` has one ratio of peak to mean speed instead of a
+measured peak speed. ``min_jerk`` is eqs 2-6 of Mitake et al., minimum jerk with a cap on the
+speed. ``literal_frame`` is the rule of Nakamoto & Tsuruno 3.3, 0.8 of the way in each frame.
+All are closed forms of the time: a late tick lands on the curve instead of stretching it.
+Radians and seconds inside; parameters in degrees and milliseconds.
 """
 
 from dataclasses import dataclass
-from math import degrees, exp, log, radians
+from math import degrees, exp, log, radians, sqrt
 from typing import Annotated, Literal, Protocol
 
 from gazerig.params import Bounds
 
 MIN_JERK_PEAK = 1.875
 """Peak over mean speed of a minimum-jerk movement."""
-_NARROWEST = 1.1
-"""Least peak over mean speed of the main-sequence profile: some time goes to its flanks."""
+_FLANK_PEAK_ACCELERATION = 1.5396
+"""Highest acceleration of half a minimum-jerk movement, times its time, over its speed."""
 _LITERAL_REST_RAD = radians(0.05)
 """What the 0.8-per-frame rule may leave when its saccade counts as landed."""
 
@@ -26,15 +27,20 @@ class SaccadeParams:
     """Profile, speed cap L, shortest duration T, and the constants of the other profiles."""
 
     # fmt: off
-    profile: Annotated[Literal["min_jerk", "main_sequence", "literal_frame"],
-        "velocity profile of a saccade: minimum jerk (eqs 2-6), the human main sequence, or a fixed share of the way each "
-        "frame"] = "min_jerk"
+    profile: Annotated[Literal["human", "main_sequence", "min_jerk", "literal_frame"],
+        "velocity profile of a saccade: human duration and peak speed, human duration alone, minimum jerk (eqs 2-6), or a "
+        "fixed share of the way each frame"] = "human"
     max_speed_deg_s: Annotated[float, Bounds(10, 1000), "fastest eye speed L; the paper's 8.7266 rad/s is 500 deg/s"] = 500.0
     min_duration_ms: Annotated[float, Bounds(10, 1000), "shortest saccade T of the profile min_jerk"] = 50.0
-    human_base_ms: Annotated[float, Bounds(1, 200), "main sequence: duration at amplitude 0"] = 21.0
-    human_per_deg_ms: Annotated[float, Bounds(0.1, 20), "main sequence: increase of the duration with amplitude"] = 2.2
-    human_peak_over_mean: Annotated[float, Bounds(1.2, 1.875), "main sequence: peak over mean speed, below max_speed_deg_s"] = 1.65
-    device_floor_ms: Annotated[float, Bounds(1, 500), "shortest saccade that the servos can make, with the profile main_sequence"] = 20.0
+    max_acceleration_deg_s2: Annotated[float, Bounds(100, 200_000),
+        "highest acceleration that the eye servos follow; human and main_sequence saccades that need more take longer"] = 38000.0
+    human_base_ms: Annotated[float, Bounds(1, 200), "human, main_sequence: duration at amplitude 0"] = 25.0
+    human_per_deg_ms: Annotated[float, Bounds(0.1, 20), "human, main_sequence: increase of the duration with amplitude"] = 2.5
+    human_peak_deg_s: Annotated[float, Bounds(10, 1000), "human: peak speed V of large saccades, V (1 - exp(-A / A0))"] = 530.0
+    human_peak_scale_deg: Annotated[float, Bounds(0.5, 90), "human: amplitude A0 in that peak speed"] = 11.0
+    human_peak_over_mean: Annotated[float, Bounds(1.2, 1.875), "main_sequence: peak over mean speed, below max_speed_deg_s"] = 1.65
+    device_floor_ms: Annotated[float, Bounds(1, 500),
+        "shortest saccade that the servos can make, with the profiles human and main_sequence"] = 20.0
     frame_share: Annotated[float, Bounds(0.05, 0.99), "share of the remaining way per frame of the profile literal_frame"] = 0.8
     frame_ms: Annotated[float, Bounds(1, 200), "length of such a frame; the authors' display showed 90 a second"] = 11.1
     # fmt: on
@@ -100,43 +106,39 @@ class MinJerkProfile:
         return max(0.0, (amplitude_rad - self.largest_uncapped_rad) / self._L)
 
 
-class MainSequenceProfile:
-    """Duration and skew of human saccades, the speed capped.
+class HumanProfile:
+    """Duration, peak speed and skew of human saccades; speed and acceleration capped.
+
+    The duration is human_base_ms + human_per_deg_ms A and the peak speed
+    human_peak_deg_s (1 - exp(-A / human_peak_scale_deg)), as one source measured them.
 
     The speed rises like the first half of a minimum-jerk movement, stays at its peak
-    for a while, and falls like the second half. Rise and fall share their time .45 to
-    .55 up to 10 deg and .25 to .75 from 50 deg on (Collewijn 1988); the time at the
-    peak follows from the ratio of peak to mean speed, which the cap lowers.
+    for a while, and falls like the second half. Rise and fall share their time .38 to .62
+    up to 10 deg and .14 to .86 from 50 deg on; the time at the peak follows from the ratio
+    of peak to mean speed. Its middle is then at .43 of the duration of small saccades and at
+    .25 of large ones, as Collewijn et al. (1988) measured, less what servos delay it by.
     """
 
     def __init__(self, params: SaccadeParams) -> None:
         self._L = radians(params.max_speed_deg_s)
+        self._most_rad_s2 = radians(params.max_acceleration_deg_s2)
         self._params = params
 
     def duration_s(self, amplitude_rad: float) -> float:
-        """Return the time from onset to landing: max(floor, 21 ms + 2.2 ms a degree)."""
-        par = self._params
-        human = par.human_base_ms + par.human_per_deg_ms * degrees(amplitude_rad)
-        # A low cap needs more time than people do.
-        capped = _NARROWEST * amplitude_rad / self._L
-        return max(par.device_floor_ms / 1e3, human / 1e3, capped)
+        """Return the time from onset to landing, not shorter than the servos can."""
+        return self._shape(amplitude_rad)[0]
 
     def peak_speed_rad_s(self, amplitude_rad: float) -> float:
         """Return the highest speed, never above L."""
-        mean = amplitude_rad / self.duration_s(amplitude_rad)
-        return min(self._params.human_peak_over_mean * mean, self._L)
+        return self._shape(amplitude_rad)[1]
 
     def displacement_rad(self, amplitude_rad: float, t_s: float) -> float:
         """Return the angle covered ``t_s`` after onset."""
-        D = self.duration_s(amplitude_rad)
         if t_s <= 0.0 or amplitude_rad <= 0.0:
             return 0.0
+        D, V, rise, flanks = self._shape(amplitude_rad)
         if t_s >= D:
             return amplitude_rad
-        V = self.peak_speed_rad_s(amplitude_rad)
-        # A = V (flanks / 1.875 + cruise), flanks + cruise = D.
-        flanks = (V * D - amplitude_rad) / (V * (1.0 - 1.0 / MIN_JERK_PEAK))
-        rise = flanks * self._skew(amplitude_rad)
         cruise_ends = rise + D - flanks
         if t_s < rise:
             return _flank(V, rise, t_s)
@@ -144,10 +146,43 @@ class MainSequenceProfile:
             return _flank(V, rise, rise) + V * (t_s - rise)
         return amplitude_rad - _flank(V, flanks - rise, D - t_s)
 
-    def _skew(self, amplitude_rad: float) -> float:
+    def _shape(self, amplitude_rad: float) -> tuple[float, float, float, float]:
+        """Return duration, peak speed, time of the rise, and of rise and fall together."""
+        par, A, most = self._params, amplitude_rad, self._most_rad_s2
+        D = (par.human_base_ms + par.human_per_deg_ms * degrees(A)) / 1e3
+        D = max(D, par.device_floor_ms / 1e3)
+        if A <= 0.0:
+            return D, 0.0, 0.5 * D, D
+        share = self._rise_share(A)
+        # A = V (flanks / 1.875 + cruise), flanks + cruise = D. Without a cruise, the speed that
+        # the highest acceleration leads to:
+        reached = sqrt(MIN_JERK_PEAK * A * most * share / _FLANK_PEAK_ACCELERATION)
+        V = min(self._peak_rad_s(A, D), self._L, reached)
+        # Low speed or acceleration need more time than people do.
+        shortest = _FLANK_PEAK_ACCELERATION * V / (most * share)
+        D = max(D, A / V + shortest * (1.0 - 1.0 / MIN_JERK_PEAK))
+        V = min(V, MIN_JERK_PEAK * A / D)
+        flanks = (V * D - A) / (V * (1.0 - 1.0 / MIN_JERK_PEAK))
+        return D, V, flanks * share, flanks
+
+    def _rise_share(self, amplitude_rad: float) -> float:
         """Return the share of the rise in the time of rise and fall."""
         over = (degrees(amplitude_rad) - 10.0) / 40.0
-        return 0.45 - 0.20 * min(1.0, max(0.0, over))
+        return 0.38 - 0.24 * min(1.0, max(0.0, over))
+
+    def _peak_rad_s(self, amplitude_rad: float, duration_s: float) -> float:
+        """Return the peak speed of people at an amplitude."""
+        par = self._params
+        share = 1.0 - exp(-degrees(amplitude_rad) / par.human_peak_scale_deg)
+        return radians(par.human_peak_deg_s) * share
+
+
+class MainSequenceProfile(HumanProfile):
+    """The same with one ratio of peak to mean speed for all amplitudes."""
+
+    def _peak_rad_s(self, amplitude_rad: float, duration_s: float) -> float:
+        """Return the peak speed for an amplitude and a duration."""
+        return self._params.human_peak_over_mean * amplitude_rad / duration_s
 
 
 def _flank(peak_rad_s: float, length_s: float, t_s: float) -> float:
@@ -214,6 +249,8 @@ class SaccadeModel:
 
 def _profile(params: SaccadeParams) -> SaccadeProfile:
     """Return the profile that the parameters name."""
+    if params.profile == "human":
+        return HumanProfile(params)
     if params.profile == "main_sequence":
         return MainSequenceProfile(params)
     if params.profile == "literal_frame":

@@ -42,10 +42,10 @@ NO_RELIEF = HeadParams(goal_model="attention", recentre_after_ms=60_000.0)
 AT_ONCE = OculomotorParams(eye_lag_ms=DT * 1e3)
 
 
-SACCADE = SaccadeParams()
+SACCADE = SaccadeParams(profile="min_jerk")
 
 
-HUMAN = SaccadeParams(profile="main_sequence")
+HUMAN = SaccadeParams(profile="human")
 
 
 class Trace(NamedTuple):

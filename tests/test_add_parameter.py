@@ -21,9 +21,9 @@ from gazerig.gaze.saccade import SaccadeModel
 rig, key = load_rig("desk"), "gaze.saccade.rise_share"
 (knob,) = [one for one in parameters(rig, rig) if one.key == key]
 other = changed(rig, {key: 0.3})
-model = SaccadeModel(changed(rig, {"gaze.saccade.profile": "main_sequence"}).gaze.saccade)
+model = SaccadeModel(changed(rig, {"gaze.saccade.profile": "human"}).gaze.saccade)
 before = model.displacement_rad(0.1, 0.01)
-model.retune(changed(other, {"gaze.saccade.profile": "main_sequence"}).gaze.saccade)
+model.retune(changed(other, {"gaze.saccade.profile": "human"}).gaze.saccade)
 try:
     changed(rig, {key: 0.6})
     refused = ""
@@ -70,7 +70,7 @@ def test_adding_a_parameter_takes_what_the_paper_says(tmp_path: Path) -> None:
     assert found.returncode == 0, found.stderr
     made = json.loads(found.stdout)
     knob = made["knob"]
-    assert (knob["low"], knob["high"], knob["default"], knob["unit"]) == (0.3, 0.5, 0.45, "")
+    assert (knob["low"], knob["high"], knob["default"], knob["unit"]) == (0.3, 0.5, 0.38, "")
     assert knob["live"] == "next tick" and "share of the rise" in knob["description"]
     assert (made["schema"]["minimum"], made["schema"]["maximum"]) == (0.3, 0.5)
     assert "gaze.saccade.rise_share: 0.6 is above 0.5" in made["refused"]

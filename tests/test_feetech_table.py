@@ -86,4 +86,10 @@ def test_names_of_errors():
 
 def test_a_limit_is_never_written_as_none():
     assert [speed_units(v) for v in (0.0, 0.4, 3000.9, 1e9)] == [1, 1, 3000, 32767]
-    assert [acceleration_units(a) for a in (None, 0.0, 250.0, 1e9)] == [0, 1, 2, 254]
+    assert [acceleration_units(a) for a in (None, 0.0, 250.0, 25_400.0, 25_401.0)] == [
+        0,
+        1,
+        2,
+        254,
+        0,
+    ]

@@ -61,7 +61,7 @@ def stepped(yaw_deg: np.ndarray) -> np.ndarray:
 def trace(amplitudes: tuple[float, ...], rate_hz: float, slow_deg_s: float = 0.0) -> np.ndarray:
     """Jump every half second, onto something that moves with ``slow_deg_s``."""
     t = np.arange(0.0, 0.5 * len(amplitudes) + 0.5, 1.0 / rate_hz)
-    jump, yaw = Jumps(SaccadeParams()), slow_deg_s * t
+    jump, yaw = Jumps(SaccadeParams(profile="min_jerk")), slow_deg_s * t
     for n, size in enumerate(amplitudes):
         gone = [jump.displacement_rad(radians(abs(size)), s - 0.25 - 0.5 * n) for s in t]
         yaw = yaw + np.sign(size) * np.degrees(gone)
@@ -75,7 +75,7 @@ SIZES = (2.0, -3.0, 5.0, -8.0, 12.0, -20.0, 30.0, -30.0, 1.5, -10.0)
 def test_every_jump_is_found_with_its_size_time_and_speed(rate_hz: float) -> None:
     found = jumps(stepped(trace(SIZES, rate_hz)), rate_hz)
     assert len(found) == len(SIZES)
-    law = Jumps(SaccadeParams())
+    law = Jumps(SaccadeParams(profile="min_jerk"))
     for n, (jump, size) in enumerate(zip(found, SIZES, strict=True)):
         size = radians(abs(size))
         assert np.radians(jump.amplitude_deg) == pytest.approx(size, rel=0.08, abs=0.002)
@@ -97,7 +97,7 @@ def test_following_is_no_saccade_and_hides_none(slow_deg_s: float) -> None:
 
 
 def test_an_early_peak_is_told_from_a_symmetric_one() -> None:
-    law = Jumps(SaccadeParams(profile="main_sequence"))
+    law = Jumps(SaccadeParams(profile="human"))
     t = np.arange(0.0, 0.6, 0.005)
     yaw = np.degrees([law.displacement_rad(radians(40.0), s - 0.25) for s in t])
     (jump,) = jumps(yaw, 200.0)
@@ -114,7 +114,7 @@ def test_noise_and_a_gap_make_no_saccade() -> None:
 
 def test_an_eye_that_swings_back_has_landed_where_it_turned() -> None:
     t = np.arange(0.0, 1.0, 0.005)
-    law = Jumps(SaccadeParams())
+    law = Jumps(SaccadeParams(profile="min_jerk"))
     yaw = np.degrees([law.displacement_rad(radians(10.0), s - 0.25) for s in t])
     since = np.maximum(0.0, t - 0.30)
     yaw = yaw + 2.0 * np.sin(2 * np.pi * since / 0.09) * np.exp(-since / 0.03) * (t > 0.30)

@@ -204,8 +204,10 @@ def in_use(key: str) -> dict[str, Value]:
     name = key.split(".")[-1]
     if key.startswith("gaze.scanpath.") and name.split("_")[0] in ("simple", "random"):
         return {"gaze.scanpath.model": name.split("_")[0]}
-    if key.startswith("gaze.saccade.") and name.split("_")[0] in ("human", "device"):
+    if key == "gaze.saccade.human_peak_over_mean":
         return {"gaze.saccade.profile": "main_sequence"}
+    if key == "gaze.saccade.min_duration_ms":
+        return {"gaze.saccade.profile": "min_jerk"}
     if key.startswith("gaze.saccade.frame"):
         return {"gaze.saccade.profile": "literal_frame"}
     return {}

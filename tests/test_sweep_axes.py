@@ -54,7 +54,11 @@ def test_whole_numbers_stay_whole() -> None:
     [
         ("gaze.head.comfrt_deg=4:16:7", ConfigError, "unknown key 'comfrt_deg'; did you mean"),
         (f"{COMFORT}=4:160", ConfigError, "160.0 is above 90 (unit deg)"),
-        ("gaze.saccade.profile=1:3:3", SetupError, "profile=min_jerk,main_sequence,literal_frame"),
+        (
+            "gaze.saccade.profile=1:3:3",
+            SetupError,
+            "profile=human,main_sequence,min_jerk,literal_frame",
+        ),
         (f"{COMFORT}", SetupError, "not KEY=VALUES; values are LOW:HIGH:STEPS"),
         (f"{COMFORT}=", SetupError, "not KEY=VALUES"),
         (f"{COMFORT}=9:4:3", SetupError, "9 is not below 4"),

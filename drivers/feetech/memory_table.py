@@ -264,8 +264,10 @@ def speed_units(speed_steps_s: float) -> int:
 def acceleration_units(accel_steps_s2: float | None) -> int:
     """Return an acceleration in units of Acceleration, never more than asked for but at least 1.
 
-    None: 0, as fast as it can.
+    0, as fast as it can, for None and for more than the register can hold: its greatest value,
+    2232 deg/s2, would make a saccade of 10 deg twice as long. Goals are planned within the joint's
+    own acceleration anyway.
     """
-    if accel_steps_s2 is None:
+    if accel_steps_s2 is None or accel_steps_s2 > HARDEST * ACCELERATION_UNIT_STEPS_S2:
         return 0
-    return max(1, min(HARDEST, int(accel_steps_s2 / ACCELERATION_UNIT_STEPS_S2)))
+    return max(1, int(accel_steps_s2 / ACCELERATION_UNIT_STEPS_S2))

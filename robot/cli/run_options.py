@@ -74,7 +74,7 @@ Scanpath = Annotated[
     str | None, typer.Option(help="Face scanpath: markov, simple, face_tracking, random.")
 ]
 Saccade = Annotated[
-    str | None, typer.Option(help="Saccades: min_jerk, main_sequence, literal_frame.")
+    str | None, typer.Option(help="Saccades: human, main_sequence, min_jerk, literal_frame.")
 ]
 Page = Annotated[
     str,
