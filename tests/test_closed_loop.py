@@ -130,7 +130,7 @@ def test_eyes_are_on_the_face_a_quarter_second_after_the_picture_of_its_arrival(
 
 def test_the_head_arrives_without_overshoot(step: Seen) -> None:
     assert overshoot_deg(step) < 1.0
-    assert step.head_deg.max() - step.head_deg[-1] < 1.0  # nor does it swing back
+    assert step.head_deg.max() - step.head_deg[-1] < 1.5  # nor does it swing back, but for relief
     assert step.facing_deg[-1] - step.head_deg[-1] < 10.0  # it did turn
 
 
