@@ -6,7 +6,7 @@ exactly (the vestibulo-ocular reflex), and vergence comes from each eye's own ge
 """
 
 from dataclasses import dataclass
-from math import exp, sqrt
+from math import sqrt
 from typing import Annotated, NamedTuple, Protocol
 
 import numpy as np
@@ -20,6 +20,7 @@ from gazerig.gaze.pursuit import Pursuit, sight
 from gazerig.gaze.saccade import SaccadeModel
 from gazerig.gaze.saccade_trajectory import SaccadeTrajectory, scattered_endpoint
 from gazerig.gaze.saccade_trigger import SaccadeTrigger, SaccadeTriggerParams
+from gazerig.gaze.target_prediction import PredictionModel, TargetPrediction
 from gazerig.gaze.types import (
     Angles2,
     Angles3,
@@ -47,6 +48,9 @@ class OculomotorParams(SaccadeTriggerParams):
     prediction_horizon_ms: Annotated[float, Bounds(0, 2000),
         "longest time over which a target's position is extrapolated with its velocity"] = 200.0
     fade_ms: Annotated[float, Bounds(1, 5000), "time constant with which that velocity decays after that time"] = 300.0
+    target_prediction: Annotated[PredictionModel,
+        "where a target is expected: where its frame showed it, moved on with its velocity, or along its curve and its swing, "
+        "which is recognised after one to two cycles"] = "periodic"
     eye_lag_ms: Annotated[float, Bounds(0, 200), "delay from command to motion of an eye; the head's motion during it is predicted"] = 15.0
     nearest_m: Annotated[float, Bounds(0.05, 2), "nearest distance on which the eyes converge (0.2 m is 17.6 deg of vergence)"] = 0.2
     endpoint_scatter_along: Annotated[float, Bounds(0, 0.2),
@@ -122,6 +126,7 @@ class Oculomotor:
     ) -> None:
         self._rng = rng
         self._trigger = SaccadeTrigger(params, False)
+        self._prediction = TargetPrediction("none", 0.0, 1.0)
         self.retune(params, eye_limits)
         self._geometry = geometry
         self._saccade = saccade
@@ -149,7 +154,9 @@ class Oculomotor:
             )
         self._params, self._scatter, self._eye_limits = params, scatter, eye_limits
         self._lag_s, self._nearest_m = params.eye_lag_ms / 1e3, params.nearest_m
-        self._horizon_s, self._fade_s = params.prediction_horizon_ms / 1e3, params.fade_ms / 1e3
+        self._prediction.retune(
+            params.target_prediction, params.prediction_horizon_ms / 1e3, params.fade_ms / 1e3
+        )
         self._trigger.retune(params, any(scatter))
 
     def reset(self, t_s: float, state: GazeState) -> None:
@@ -159,6 +166,7 @@ class Oculomotor:
         if self._breathing is not None:
             self._breathing.reset(t_s)
         self._trigger.reset(t_s)
+        self._prediction.reset()
         self._gaze = _meeting_point(state)
         self._trajectory: SaccadeTrajectory | None = None
         self.saccades = self.fixations = 0
@@ -286,20 +294,20 @@ class Oculomotor:
         )
 
     def _now(self, target: Target, p_head: Vec3, t_s: float) -> _Seen:
-        """Return the target predicted by its velocity, which decays beyond the horizon."""
-        age, known = t_s - target.at_s, self._horizon_s
-        x, y, z = velocity = target.v_world_m_s
-        for_s = 0.0 if age <= 0.0 else age if age <= known else known
-        x, y, z = x * for_s, y * for_s, z * for_s
-        if age > known:
-            left = exp(-(age - known) / self._fade_s)
-            x, y, z = add((x, y, z), scale(velocity, self._fade_s * (1.0 - left)))
-            velocity = scale(velocity, left)
-        p, p_centre = target.p_world_m, target.centre_world_m
-        point = centre = self._clear((p[0] + x, p[1] + y, p[2] + z), p_head)
-        if p_centre is not None:
-            centre = self._clear((p_centre[0] + x, p_centre[1] + y, p_centre[2] + z), p_head)
-        return point, velocity, centre, sub(point, p_head)
+        """Return the target where it is predicted to be now."""
+        prediction = self._prediction
+        prediction.see(target, p_head, self._pursuit.fastest_swing_rad_s)
+        moved, velocity = prediction.displacement(t_s), prediction.velocity(t_s)
+        p, centre = target.p_world_m, target.centre_world_m
+        point = self._clear(add(p, moved), p_head)
+        middle = prediction.to_middle
+        if middle is not None:
+            head_point = self._clear(add(p if centre is None else centre, middle), p_head)
+        elif centre is None:
+            head_point = point
+        else:
+            head_point = self._clear(add(centre, moved), p_head)
+        return point, velocity, head_point, sub(point, p_head)
 
     def _clear(self, point: Vec3, p_head: Vec3) -> Vec3:
         """Return a point moved away to ``nearest_m`` where it is nearer."""
@@ -342,9 +350,11 @@ class Oculomotor:
 
     def _jump(self, seen: _Seen, p_head: Vec3, t_s: float) -> float:
         """Start a saccade; return its amplitude in radians."""
-        point, velocity, _, _ = seen
+        point = seen[0]
         error = angle_between(sub(self._gaze, p_head), sub(point, p_head))
-        end = add(point, scale(velocity, self._saccade.duration_s(error)))
+        after_s = t_s + self._saccade.duration_s(error)
+        moved, until = self._prediction.displacement(t_s), self._prediction.displacement(after_s)
+        end = add(point, sub(until, moved))
         end = self._clear(end, p_head)
         if self._rng is not None and any(self._scatter):
             end = scattered_endpoint(end, self._gaze, p_head, *self._scatter, self._rng)

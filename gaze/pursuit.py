@@ -27,6 +27,9 @@ _FARTHEST_1_M = 0.01
 """Nearness below which the lines of sight are as good as parallel (100 m)."""
 _NEAREST_1_M = 20.0
 """Nearness of a point at the eyes themselves (0.05 m); nothing nearer has a direction."""
+_PEAK_SHARE = 1.15
+"""Peak speed of a swing that is followed, over the fastest pursuit: what is cut off at its middle
+is made up for at its ends."""
 _NEAREST_M = 1.0 / _NEAREST_1_M
 
 
@@ -39,7 +42,7 @@ class PursuitParams:
     velocity_gain: Annotated[float, Bounds(0, 1), "gain Gp: share of the target's velocity that the eye follows at once; people .95"] = 0.95
     vergence_gain_1_s: Annotated[float, Bounds(0, 50), "rate Kd at which the error in depth is closed"] = 4.0
     divergence_gain_1_s: Annotated[float, Bounds(0, 50), "rate Kdiv instead of Kd if the target is farther away than the gaze point"] = 3.0
-    max_speed_deg_s: Annotated[float, Bounds(1, 200), "fastest smooth pursuit; human pursuit saturates near 63 deg/s"] = 60.0
+    max_speed_deg_s: Annotated[float, Bounds(1, 200), "fastest smooth pursuit, closing of the error included; people 63 deg/s"] = 60.0
     reject_deg_s: Annotated[float, Bounds(1, 1000), "a target reported as faster than this is taken as a jump and not pursued"] = 100.0
     max_error_deg: Annotated[float, Bounds(0.1, 90),
         "the rate of closing applies to at most this error; larger errors are closed no faster"] = 5.0
@@ -69,6 +72,7 @@ class Pursuit:
         self._max_rad_s = radians(params.max_speed_deg_s)
         self._reject_rad_s = radians(params.reject_deg_s)
         self._max_error_rad = radians(params.max_error_deg)
+        self.fastest_swing_rad_s = _PEAK_SHARE * self._max_rad_s
 
     def slip(self, gaze: Vec3, target: Vec3, v_target: Vec3, eye: Vec3) -> Slip:
         """Return error and retinal slip; all points in the world, metres."""
@@ -127,6 +131,10 @@ class Pursuit:
             move_x += off_x * share
             move_y += off_y * share
             move_z += off_z * share
+            size = sqrt(move_x * move_x + move_y * move_y + move_z * move_z)
+            most = self._max_rad_s * dt_s
+            if size > most:
+                move_x, move_y, move_z = scale((move_x, move_y, move_z), most / size)
         gain = par.vergence_gain_1_s if near_before > near else par.divergence_gain_1_s
         near += near_now - near_before + (near_before - near) * (1.0 - exp(-gain * dt_s))
         if not _FARTHEST_1_M <= near <= _NEAREST_1_M:

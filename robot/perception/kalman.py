@@ -10,7 +10,7 @@ The covariance is kept as its blocks: of the position, of the velocity, and betw
 position or a velocity is measured whole, so that both corrections are the same three products.
 """
 
-from math import exp
+from math import exp, sqrt
 from typing import NamedTuple
 
 from gazerig.gaze.angles import sub
@@ -33,6 +33,10 @@ from gazerig.robot.perception.symmetric import (
 _ACCELERATION_LASTS_S = 0.1
 # Squared Mahalanobis distance that one innovation of 3 numbers in 100 exceeds by chance.
 _SURPRISING = 11.3
+# The squared distance of an ordinary one: its mean is 3.
+_EXPECTED = 4.0
+# What has changed its speed goes on changing it for about so long.
+_CHANGES_FOR_S = 0.5
 # What is not seen moves on, but less and less surely: people stop.
 _STOPS_WITHIN_S = 1.0
 
@@ -61,7 +65,7 @@ class TrackFilter:
 
     def __init__(self, p_m: Vec3, cov_m2: Sym3, speed_sd_m_s: float, noise: ProcessNoise) -> None:
         self._noise = noise
-        self._unseen_s = 0.0
+        self._unseen_s = self._accel_m_s2 = 0.0
         var = speed_sd_m_s * speed_sd_m_s
         self.p_m: Vec3 = p_m
         self.v_m_s: Vec3 = (0.0, 0.0, 0.0)
@@ -103,17 +107,15 @@ class TrackFilter:
             D = tuple([kept * one for one in D])  # type: ignore[assignment]
             self.v_cov = (k2 * a, k2 * b, k2 * c, k2 * d, k2 * e, k2 * f)
         self.pv_cov = D
-        self._wander(self._noise.quiet_m_s2, dt_s)
+        self._accel_m_s2 *= exp(-dt_s / _CHANGES_FOR_S)
+        self._wander(max(self._noise.quiet_m_s2, self._accel_m_s2), dt_s)
 
     def correct(self, p_m: Vec3, cov_m2: Sym3) -> None:
         """Update with a measured position and its covariance."""
         off = sub(p_m, self.p_m)
         information, _ = inverse(plus(self.p_cov, cov_m2))
         if squared_length(off, information) > _SURPRISING:
-            # Whatever happened may have happened at any time since the last look: a place
-            # that was long unseen and is off tells less of the velocity of now.
-            self._wander(self._noise.lively_m_s2, self._unseen_s)
-            information, _ = inverse(plus(self.p_cov, cov_m2))
+            information = self._adapted(off, cov_m2)
         self._unseen_s = 0.0
         step = applied(information, off)
         P, C = full(self.p_cov), self.pv_cov
@@ -123,6 +125,24 @@ class TrackFilter:
         self.v_cov = less_product(self.v_cov, C, N)
         self.pv_cov = _less(C, P, N)
         self.p_cov = less_product(self.p_cov, P, times(information, P))
+
+    def _adapted(self, off: Vec3, cov_m2: Sym3) -> Sym3:
+        """Raise the noise until an innovation is no surprise; return the information matrix.
+
+        No higher than that: the largest noise at once would take a small change of speed for a
+        large one, and the velocity would overshoot by as much as it had lagged behind.
+        """
+        # Whatever happened may have happened at any time since the last look: a place
+        # that was long unseen and is off tells less of the velocity of now.
+        accel, most = max(self._accel_m_s2, self._noise.quiet_m_s2), self._noise.lively_m_s2
+        while True:
+            before, accel = accel, min(2.0 * accel, most)
+            if accel > before:
+                self._wander(sqrt(accel * accel - before * before), self._unseen_s)
+            information, _ = inverse(plus(self.p_cov, cov_m2))
+            if accel >= most or squared_length(off, information) < _EXPECTED:
+                self._accel_m_s2 = accel
+                return information
 
     def correct_velocity(self, v_m_s: Vec3, cov_m2_s2: Sym3) -> None:
         """Update with a measured velocity and its covariance."""
