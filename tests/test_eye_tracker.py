@@ -1,129 +1,59 @@
-"""Our own trace before an independent judge: pymovements, as a laboratory would use it.
+"""The exported file of a run with motors before independent judges, as a laboratory would use them.
 
-Half a minute of the default head on a body that follows perfectly, looking about on a face
-and now and then aside, written as an eye tracker writes it (time, x, y in degrees, with a
-tracker's noise), and segmented by the velocity algorithm of Engbert & Kliegl.
+The shipped scene, the default profile and byte-true emulated servos; the CSV that `gazerig export`
+writes; pymovements (Engbert & Kliegl) and REMoDNaV (Dar, Wagner & Hanke 2021) find its saccades.
 """
-
-from math import degrees, radians
-from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from desk import GAZE_JOINTS, LIDS
+from human.measured_run import measured_run
+from human.row_07_judges import measure
+from human.saccade_judges import JUDGES, Exported, exported, marks
 
-from gazerig.gaze.angles import add, scale, unit, yaw_pitch
-from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.head import HeadModel, HeadParams
-from gazerig.gaze.lids import LidParams, Lids
-from gazerig.gaze.oculomotor import Oculomotor, OculomotorParams
-from gazerig.gaze.pursuit import Pursuit, PursuitParams
-from gazerig.gaze.saccade import SaccadeModel, SaccadeParams
-from gazerig.gaze.types import Target, Vec3
-from gazerig.robot.model.kinematics import GeometryParams, Kinematics
-from gazerig.robot.model.types import JointState
-
-RATE_HZ = 1000
-SECONDS = 36
-NOISE_DEG = 0.01
-# Eight places on a face of usual size, m: sideways and up of the nose.
-PARTS = np.array(
-    [
-        [0.0, -0.08],
-        [0.07, 0.0],
-        [0.031, 0.035],
-        [0.0, -0.035],
-        [0.0, 0.0],
-        [-0.07, 0.0],
-        [-0.031, 0.035],
-        [0.0, 0.08],
-    ]
-)
+SECONDS = 33.0
 
 
-class Trace(NamedTuple):
-    """Time in ms, gaze in space in degrees (n, 2), and our own saccade onsets in ms."""
-
-    ms: np.ndarray
-    gaze_deg: np.ndarray
-    onsets_ms: np.ndarray
+@pytest.fixture(scope="module")
+def run() -> Exported:
+    return exported(measured_run("face-to-face", seconds=SECONDS))
 
 
-def walk(rng: np.random.Generator) -> list[tuple[float, Vec3, Vec3]]:
-    """Return when which point is looked at, and its velocity: a face that drifts, and things."""
-    t, last, plan = 0.0, -1, []
-    while t < SECONDS:
-        velocity: Vec3 = (0.0, 0.02, 0.0) if t % 20 > 12 else (0.0, 0.0, 0.0)
-        if rng.random() < 0.12:
-            yaw = float(rng.uniform(-0.6, 0.6))
-            point: Vec3 = (1.2, 1.2 * yaw, float(rng.uniform(-0.2, 0.3)))
-            last, velocity = -1, (0.0, 0.0, 0.0)
-        else:
-            part = int(rng.choice([k for k in range(8) if k != last]))
-            y, z = PARTS[part]
-            last, point = part, (1.0, float(y), float(z) + 0.15)
-        plan.append((t, point, velocity))
-        t += float(rng.lognormal(-1.2, 0.5)) + 0.12
-    return plan
+@pytest.mark.parametrize("name", JUDGES)
+def test_e67_a_judge_finds_our_saccades_and_hardly_any_other(name: str, run: Exported) -> None:
+    pytest.importorskip(name, reason=f"{name} is not installed: pip install -e '.[dev]'")
+    assert len(run.commanded) > 40
+    seen = JUDGES[name](run)
+    mark = marks(run, seen)
+    assert mark.ours.mean() >= 0.95
+    assert np.mean(~mark.theirs) <= 0.03
+    # And it is these saccades that agree, not any: of half as many commanded, half are not ours.
+    fewer = run._replace(commanded=run.commanded[::2])
+    assert 0.3 < np.mean(~marks(fewer, seen).theirs) < 0.7
+    # A rest in which nothing was commanded is none of ours either.
+    later = run._replace(commanded=run.commanded + 0.15)
+    assert marks(later, seen).ours.mean() < 0.75
 
 
-def look_about(seed: int, saccade: SaccadeParams) -> Trace:
-    rng = np.random.default_rng(seed)
-    kinematics = Kinematics(GeometryParams(60.0, 40.0, 50.0), GAZE_JOINTS, LIDS)
-    span, neck = (-radians(35.0), radians(35.0)), (-radians(70.0), radians(70.0))
-    oculomotor = Oculomotor(
-        OculomotorParams(eye_lag_ms=1000.0 / RATE_HZ),
-        kinematics,
-        ((span, span), (span, span)),
-        SaccadeModel(saccade),
-        Pursuit(PursuitParams()),
-        HeadModel(HeadParams(), radians(35.0), (neck, neck)),
-        Lids(LidParams(), np.random.default_rng(0)),
+def test_a_saccade_that_nobody_commanded_is_not_ours(run: Exported) -> None:
+    pytest.importorskip("pymovements")
+    gap = np.argmax(np.diff(run.commanded[:, 0]))
+    middle = 0.5 * (run.commanded[gap, 1] + run.commanded[gap + 1, 0])
+    thrown = np.clip((run.time_s - middle) / 0.03, 0.0, 1.0)[:, None] * np.array([3.0, 0.0])
+    judge = JUDGES["pymovements"]
+    before, after = (
+        marks(one, judge(one)) for one in (run, run._replace(gaze_deg=run.gaze_deg + thrown))
     )
-    joints, plan, k = JointState((0.0,) * 9, (0.0,) * 9, (0.0,) * 9, ()), walk(rng), 0
-    dt, gaze, onsets, count = 1.0 / RATE_HZ, [], [], 0
-    for n in range(RATE_HZ * SECONDS):
-        t = n * dt
-        while k + 1 < len(plan) and plan[k + 1][0] <= t:
-            k += 1
-        since, point, velocity = plan[k]
-        moved = add(point, scale(velocity, t - since))
-        target = Target(moved, velocity, t, "face", 1, 0.5, True, None, k, "")
-        command = oculomotor.step(target, kinematics.forward(joints), t, dt)
-        now = kinematics.inverse(command)
-        rates = tuple((a - b) / dt for a, b in zip(now, joints.position_rad, strict=True))
-        joints = JointState(now, rates, (t,) * 9, ())
-        state = kinematics.forward(joints)
-        way = unit(add(line_of_sight(state, True), line_of_sight(state, False)))
-        gaze.append([degrees(a) for a in yaw_pitch(way)])
-        if command.saccades > count:
-            count = command.saccades
-            onsets.append(n)
-    noise = rng.normal(0.0, NOISE_DEG, (len(gaze), 2))
-    return Trace(np.arange(len(gaze)), np.array(gaze) + noise, np.array(onsets))
+    assert np.sum(~after.theirs) == np.sum(~before.theirs) + 1
 
 
-def judged(trace: Trace) -> np.ndarray:
-    """Return onset and end of every saccade that the judge sees, in ms."""
-    pymovements = pytest.importorskip("pymovements")  # a second of processor: not while collecting
-    recording = pymovements.gaze.from_numpy(
-        time=trace.ms,
-        position=trace.gaze_deg.T,
-        experiment=pymovements.Experiment(1920, 1080, 60, 34, 65, "center", RATE_HZ),
-    )
-    recording.pos2vel("savitzky_golay", window_length=11, degree=2)
-    recording.detect("microsaccades", minimum_duration=10, threshold_factor=6)
-    return recording.events.frame.select("onset", "offset").to_numpy()
+def test_the_row_counts_all_seeds_and_both_scenes() -> None:
+    pytest.importorskip("pymovements")
+    pytest.importorskip("remodnav")
+    still = measured_run("face-to-face", seconds=SECONDS)
 
+    def runner(scene: object, **_: object) -> object:
+        return still
 
-@pytest.mark.parametrize("profile", ["min_jerk", "main_sequence"])
-def test_the_judge_finds_our_saccades_and_hardly_any_other(profile: Any) -> None:
-    trace = look_about(1, SaccadeParams(profile=profile))
-    seen = judged(trace)
-    assert len(trace.onsets_ms) > 60
-    apart = np.abs(seen[:, 0][None, :] - trace.onsets_ms[:, None])
-    assert np.mean(apart.min(axis=1) <= 10) >= 0.95
-    assert np.mean(apart.min(axis=0) > 10) <= 0.02
-    # And it is the onsets that agree: 40 ms later there is none.
-    late = np.abs(seen[:, 0][None, :] - trace.onsets_ms[:, None] - 40)
-    assert np.mean(late.min(axis=1) <= 10) < 0.1
+    found = measure(runner, SECONDS, (0,))  # type: ignore[arg-type]
+    assert found["visitor, remodnav: found, %"] == found["face-to-face, remodnav: found, %"]
+    assert all(0.0 <= value <= 100.0 for value in found.values())

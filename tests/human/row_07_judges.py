@@ -23,8 +23,11 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
         runs = [exported(run(scene, seed=seed, seconds=seconds)) for seed in seeds]
         for name, judge in JUDGES.items():
             each = [marks(one, judge(one)) for one in runs]
-            ours = np.concatenate([mark.ours for mark in each])
-            seen = np.concatenate([mark.seen[:, 2] for mark in each])
-            out[f"{scene}, {name}: found, %"] = 100.0 * float(ours.mean())
-            out[f"{scene}, {name}: not ours, %"] = 100.0 * float(1.0 - seen.mean())
+            out[f"{scene}, {name}: found, %"] = _percent([mark.ours for mark in each])
+            out[f"{scene}, {name}: not ours, %"] = _percent([~mark.theirs for mark in each])
     return out
+
+
+def _percent(true: list[np.ndarray]) -> float:
+    every = np.concatenate(true)
+    return 100.0 * float(every.mean()) if len(every) else float("nan")

@@ -1,6 +1,8 @@
 """Independent judges of an exported run: the saccades that pymovements and REMoDNaV find in it.
 
-Both get what a laboratory gets: the file ``STEM_samples.csv`` of ``gazerig export --csv``.
+Both get what a laboratory gets: the file ``STEM_samples.csv`` of ``gazerig export --csv``, with the
+noise that a good eye tracker adds. Encoders have none: at rest their speed is exactly 0, and both
+algorithms, which set their thresholds by the noise, would have none either.
 """
 
 import csv
@@ -14,6 +16,17 @@ from human.measured_run import BEGIN_S, MeasuredRun
 
 from gazerig.robot.recording.export_csv import write_csv
 from gazerig.robot.recording.gaze_labels import labels_of, stretches_of
+
+NOISE_DEG = 0.02
+"""Standard deviation of each sample, as of a tower-mounted tracker (0.01 to 0.05)."""
+
+THRESHOLD_DEG_S = 35.0
+"""Of Engbert & Kliegl's ellipse. They take six times the noise of a recording at rest, which here
+would be less than a person's walk; this is six times that of a head-worn tracker (0.08 deg)."""
+
+_SHORTEST_MS, _FACTOR, _EDGE_S = 15, 6.0, 0.2
+_SMOOTHED_S = 0.026
+"""Five samples at 200 Hz. REMoDNaV's own 19 ms would be three, which smooth nothing."""
 
 
 class Exported(NamedTuple):
@@ -33,15 +46,13 @@ class Exported(NamedTuple):
 class Marks(NamedTuple):
     """What a judge found of our saccades.
 
-    found: share of the commanded ones that overlap one of the judge's
-    not_ours: share of the judge's that overlap none of ours
-    ours, seen: (m,), (k,) the same, saccade by saccade
+    ours: (m,) whether each commanded one overlaps one of the judge's
+    seen: (k, 2) onset and end of the judge's; theirs: (k,) whether each overlaps one of ours
     """
 
-    found: float
-    not_ours: float
     ours: np.ndarray
     seen: np.ndarray
+    theirs: np.ndarray
 
 
 Judge = Callable[[Exported], np.ndarray]
@@ -49,22 +60,22 @@ Judge = Callable[[Exported], np.ndarray]
 
 
 def exported(run: MeasuredRun) -> Exported:
-    """Write a run as the product's CSV files, and read them."""
+    """Write a run as the product's CSV files, and read them with a tracker's noise."""
     labels = labels_of(run.angles)
     with TemporaryDirectory() as folder:
         stem = Path(folder) / "run"
         write_csv(run.angles, labels, stretches_of(run.angles, labels), stem)
         samples = _read(stem.with_name("run_samples.csv"))
-        events = [
-            row for row in _read(stem.with_name("run_events.csv")) if row["event"] == "saccade"
-        ]
+        events = _read(stem.with_name("run_events.csv"))
     time_s = _column(samples, "time_s")
     gaze = np.column_stack([_column(samples, "x_deg"), _column(samples, "y_deg")])
-    onset, length = _column(events, "onset_s"), _column(events, "duration_s")
+    gaze += np.random.default_rng(0).normal(0.0, NOISE_DEG, gaze.shape)
+    saccades = [row for row in events if row["event"] == "saccade"]
+    onset, length = _column(saccades, "onset_s"), _column(saccades, "duration_s")
     late = time_s >= BEGIN_S
-    kept = (onset >= BEGIN_S + 0.2) & (onset + length <= time_s[-1] - 0.2)
+    kept = (onset >= BEGIN_S + _EDGE_S) & (onset + length <= time_s[-1] - _EDGE_S)
     commanded = np.column_stack([onset, onset + length])[kept]
-    return Exported(time_s[late], gaze[late], commanded, _column(events, "amplitude_deg")[kept])
+    return Exported(time_s[late], gaze[late], commanded, _column(saccades, "amplitude_deg")[kept])
 
 
 def pymovements_saccades(run: Exported) -> np.ndarray:
@@ -78,7 +89,10 @@ def pymovements_saccades(run: Exported) -> np.ndarray:
         experiment=pymovements.Experiment(1920, 1080, 60, 34, 65, "center", rate_hz),
     )
     recording.pos2vel("smooth")
-    recording.detect("microsaccades", minimum_duration=15, threshold_factor=6)
+    each = (THRESHOLD_DEG_S / _FACTOR,) * 2
+    recording.detect(
+        "microsaccades", minimum_duration=_SHORTEST_MS, threshold=each, threshold_factor=_FACTOR
+    )
     found = recording.events.frame.select("onset", "offset").to_numpy()
     return found.reshape(-1, 2) / 1000.0
 
@@ -91,8 +105,10 @@ def remodnav_saccades(run: Exported) -> np.ndarray:
 
     logging.getLogger("remodnav").setLevel(logging.ERROR)
     judge = EyegazeClassifier(px2deg=1.0, sampling_rate=_rate_hz(run))
-    data = np.rec.fromarrays([*run.gaze_deg.T, np.zeros(len(run.time_s))], names="x,y,pupil")
-    events = judge(judge.preproc(data), classify_isp=True, sort_events=True)
+    data = np.rec.fromarrays(list(run.gaze_deg.T), names=["x", "y"])  # type: ignore[call-overload]
+    events = judge(
+        judge.preproc(data, savgol_length=_SMOOTHED_S), classify_isp=True, sort_events=True
+    )
     spans = [(e["start_time"], e["end_time"]) for e in events if e["label"] in ("SACC", "ISAC")]
     return run.time_s[0] + np.array(spans).reshape(-1, 2)
 
@@ -102,14 +118,11 @@ JUDGES: dict[str, Judge] = {"pymovements": pymovements_saccades, "remodnav": rem
 
 def marks(run: Exported, seen: np.ndarray) -> Marks:
     """Compare a judge's saccades with ours."""
-    seen = seen[(seen[:, 0] >= run.time_s[0] + 0.2) & (seen[:, 1] <= run.time_s[-1] - 0.2)]
-    over = (seen[None, :, 0] <= run.commanded[:, None, 1]) & (
+    seen = seen[(seen[:, 0] >= run.time_s[0] + _EDGE_S) & (seen[:, 1] <= run.time_s[-1] - _EDGE_S)]
+    over: np.ndarray = (seen[None, :, 0] <= run.commanded[:, None, 1]) & (
         seen[None, :, 1] >= run.commanded[:, None, 0]
     )
-    ours, theirs = over.any(axis=1), over.any(axis=0)
-    return Marks(
-        float(ours.mean()), float(1.0 - theirs.mean()), ours, np.column_stack([seen, theirs])
-    )
+    return Marks(np.any(over, axis=1), seen, np.any(over, axis=0))
 
 
 def _rate_hz(run: Exported) -> float:
