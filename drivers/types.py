@@ -191,11 +191,14 @@ class DetectedFace:
     landmarks_px: (5, 2): right eye, left eye, nose tip, right and left mouth corner;
         left and right are the owner's (the right eye lies left in the image)
     confidence: 0..1
+    gaze_camera: unit vector along which the eyes look, in the camera frame (x right, y down,
+        z forward); None where the detector does not find it
     """
 
     box_px: tuple[float, float, float, float]
     landmarks_px: Pixels
     confidence: float
+    gaze_camera: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,6 +256,8 @@ class DetectionInCamera(NamedTuple):
     size_depth: of a face, its distance if it were of an adult's size, over the distance
         measured; None where the camera measured none
     mark: the detector's own number of it, None where it gives none
+    turn_sd_rad: of a face, standard deviation of its turn
+    gaze_camera: of a face, unit vector along which the eyes look, None where it is unknown
     """
 
     kind: str
@@ -270,6 +275,8 @@ class DetectionInCamera(NamedTuple):
     along_sd_m_s: float
     size_depth: float | None
     mark: int | None
+    turn_sd_rad: float = 0.0
+    gaze_camera: tuple[float, float, float] | None = None
 
 
 class LocatedFrame(NamedTuple):

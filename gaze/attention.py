@@ -11,6 +11,7 @@ person alone is not left for habituation, and several people share the gaze.
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf
+from operator import mul
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -44,6 +45,8 @@ class AttentionParams:
         "another body becomes the target if its salience exceeds the present target's by this factor"] = 1.2
     min_dwell_ms: Annotated[float, Bounds(0, 10000), "shortest time on one target"] = 300.0
     stale_ms: Annotated[float, Bounds(20, 10000), "a frame older than this is not used"] = 400.0
+    looks_elsewhere_ratio: Annotated[float, Bounds(0, 1),
+        "share of its salience that a face keeps while the person does not look at the head; 1: all"] = 0.85
     face_memory_s: Annotated[float, Bounds(0, 600),
         "when a thing is lost from view, the gaze returns to where a face was looked at, if the face was seen within this time"] = 10.0
     habituation: Annotated[HabituationParams, "habituation and inhibition of return"] = field(default_factory=HabituationParams)
@@ -56,8 +59,8 @@ class _Choice(NamedTuple):
 
     motion:   returns the terms of one of the n bodies
     rule, habituation, total: (n + 1,), the point that a rule may name coming after the
-        bodies; the rule's constant, the factor of habituation, and the amount compared, which
-        is -inf where there is nothing
+        bodies; the rule's constant, the factor of habituation and of faces that look elsewhere,
+        and the amount compared, which is -inf where there is nothing
     best: row of the largest total
     """
 
@@ -183,7 +186,10 @@ class Attention:
         was until then.
         """
         compare = self._compare_few if len(percept.bodies) <= _FEW else self._compare
-        made = compare(percept.bodies, state, t_s)
+        ratio = self._params.looks_elsewhere_ratio
+        elsewhere = [face.id for face in percept.faces if face.looks_at_head is False]
+        worth = [ratio if id in elsewhere else 1.0 for id in percept.bodies.ids]
+        made = compare(percept.bodies, worth, state, t_s)
         if made.total[made.best] == -inf:
             self._reaction.drop()
             return None
@@ -204,7 +210,9 @@ class Attention:
         self._reaction.wait(winner, dwelt_s)
         return self._target if present is None else _target(made, present, percept.captured_s)
 
-    def _compare_few(self, bodies: Bodies, state: GazeState, t_s: float) -> _Choice:
+    def _compare_few(
+        self, bodies: Bodies, worth: list[float], state: GazeState, t_s: float
+    ) -> _Choice:
         """Return what ``_compare`` does, for few bodies."""
         n, eye, rows = len(bodies), state.p_world_head_m, bodies.rows()
         seen = self._field_of_view.visible_rows(bodies, rows, state)
@@ -212,7 +220,8 @@ class Attention:
         motion = self._bottom_up.step_rows(rows, eye, t_s, v_eye, self._gaze(state), seen)
         rule_target = self.top_down.step_rows(rows, seen, eye, self._favoured_id)
         attended = self._identity[1] if self._identity is not None else -1
-        habituation = [*self._habituation.step_rows(rows, eye, attended, t_s), 1.0]
+        left = self._habituation.step_rows(rows, eye, attended, t_s)
+        habituation = [*map(mul, left, worth), 1.0]
         rule = [0.0] * (n + 1)
         amount = [*[sum(terms) for terms in motion], 0.0]
         point = rule_target is not None and rule_target.point_world_m is not None
@@ -223,7 +232,7 @@ class Attention:
                 amount[row] = max(amount[row], rule_target.salience)
             if not point:
                 share = [
-                    self._habituation.for_rule(habituation[row]) * near
+                    self._habituation.for_rule(left[row]) * near * worth[row]
                     for row, near in zip(wanted, rule_target.nearness, strict=True)
                 ]
                 most = max(*share, 1e-9)
@@ -236,8 +245,11 @@ class Attention:
         best = total.index(max(total))
         return _Choice(bodies, motion.__getitem__, rule_target, rule, habituation, total, best)
 
-    def _compare(self, bodies: Bodies, state: GazeState, t_s: float) -> _Choice:
-        """Return everything that the decision rests on."""
+    def _compare(self, bodies: Bodies, worth: list[float], state: GazeState, t_s: float) -> _Choice:
+        """Return everything that the decision rests on.
+
+        worth: share of its salience that each body keeps besides
+        """
         n, eye = len(bodies), state.p_world_head_m
         seen = self._field_of_view.visible(bodies, state)
         v_eye = self._eye_velocity(eye, t_s)
@@ -245,14 +257,16 @@ class Attention:
         rule_target = self.top_down.step(bodies, seen, eye, self._favoured_id)
         attended = self._identity[1] if self._identity is not None else -1
         habituation, rule = np.ones(n + 1), np.zeros(n + 1)
-        habituation[:n] = self._habituation.step(bodies.ids, bodies.p_world_m, eye, attended, t_s)
+        left = self._habituation.step(bodies.ids, bodies.p_world_m, eye, attended, t_s)
+        habituation[:n] = left * worth
         amount = np.append(motion.total, 0.0)
         if rule_target is not None:
             rows = rule_target.rows if rule_target.point_world_m is None else np.array([n])
             rule[rows] = rule_target.salience
             amount[rows] = np.maximum(amount[rows], rule_target.salience)
         if rule_target is not None and rule_target.point_world_m is None:
-            share = self._habituation.for_rule(habituation[rows]) * rule_target.nearness
+            share = self._habituation.for_rule(left[rows]) * rule_target.nearness
+            share *= np.array(worth)[rows]
             habituation[rows] = share / max(float(share.max()), 1e-9)
         total = amount * habituation
         total[:n][~seen] = -inf

@@ -31,7 +31,7 @@ class HabituationParams:
         "rate at which the salience factor of the present target decreases from 1; 0: never"] = 0.2
     recovery_rate_1_s: Annotated[float, Bounds(0.01, 10), "rate at which the salience factors of everything else recover to 1"] = 1.0
     rule_floor: Annotated[float, Bounds(0, 1),
-        "lowest salience factor of the target of a rule; lower: the gaze changes sooner between several people"] = 0.6
+        "lowest salience factor of the target of a rule; lower: the gaze changes sooner between several people"] = 0.5
     inhibition_of_return_strength: Annotated[float, Bounds(0, 1),
         "how strongly the point that the gaze has just left is avoided; 0: not at all"] = 0.5
     inhibition_of_return_sigma_deg: Annotated[float, Bounds(0.1, 45), "standard deviation of that inhibition around the point"] = 4.0

@@ -92,6 +92,11 @@ class Face:
     distance_from: what the distance rests on: "camera", its depth; "face size", that of an
         adult or as learned of this person; "" where unknown
     across_sd_m, along_sd_m: standard deviations of the place, across and along the view
+    off_head_rad:  angle between where the person looks and the direction to the robot's head; None
+        in recordings that do not hold it
+    looks_at_head: whether the person looks at the robot's head (gaze at robot: one side of mutual
+        gaze); None where that is too uncertain
+    gaze_world:    direction of the gaze of the eyes; None where the detector does not find it
     """
 
     id: int
@@ -103,6 +108,9 @@ class Face:
     distance_from: str = ""
     across_sd_m: float = 0.0
     along_sd_m: float = 0.0
+    off_head_rad: float | None = None
+    looks_at_head: bool | None = None
+    gaze_world: Vec3 | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,7 +131,7 @@ class Salience(NamedTuple):
 
     translation, looming, rotation: the three terms of eq 1; onset: of having just come into view
     rule:     constant of the rule that points at it, 0 without one
-    habituation: factor 0..1 of habituation and inhibition of return
+    habituation: factor 0..1 of habituation, inhibition of return, and a face that looks elsewhere
     total:    the amount of attention that was compared
     """
 

@@ -154,6 +154,9 @@ def fault_of_face(face: Any) -> str:
     shape = getattr(face.landmarks_px, "shape", None)
     if shape != (5, 2) or not all(map(_finite, face.landmarks_px.ravel().tolist())):
         return "a face whose landmarks are not five finite points"
+    gaze = face.gaze_camera
+    if gaze is not None and (len(gaze) != 3 or not all(map(_finite, gaze)) or not any(gaze)):
+        return f"a face with the gaze {gaze!r}, wanted a direction (x, y, z) or None"
     return ""
 
 

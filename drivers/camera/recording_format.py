@@ -160,10 +160,12 @@ def faces(data: bytes) -> tuple[DetectedFace, ...]:
     for face in _load(data, "faces"):
         landmarks = np.asarray(face["landmarks_px"], dtype=np.float64)
         box = tuple(map(float, face["box_px"]))
-        if landmarks.shape != (5, 2) or len(box) != 4:
+        gaze = face.get("gaze_camera")
+        gaze = None if gaze is None else tuple(map(float, gaze))
+        if landmarks.shape != (5, 2) or len(box) != 4 or (gaze is not None and len(gaze) != 3):
             raise BadMessage("no faces in it")
         landmarks.setflags(write=False)
-        found.append(DetectedFace(box, landmarks, float(face["confidence"])))
+        found.append(DetectedFace(box, landmarks, float(face["confidence"]), gaze))
     return tuple(found)
 
 
@@ -184,11 +186,14 @@ def _lens(of: Intrinsics, shown: ImageArray, stamp: int) -> dict[str, Any]:
 
 
 def _face(face: DetectedFace) -> dict[str, Any]:
-    return {
+    data: dict[str, Any] = {
         "box_px": list(face.box_px),
         "landmarks_px": face.landmarks_px.tolist(),
         "confidence": face.confidence,
     }
+    if face.gaze_camera is not None:
+        data["gaze_camera"] = list(face.gaze_camera)
+    return data
 
 
 def _image(kind: str, file: bytes, stamp: int) -> dict[str, Any]:

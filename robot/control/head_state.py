@@ -116,6 +116,7 @@ class Person:
         confidence: of the detector, 0..1.
         distance_from: what the distance rests on: "camera", "face size", or "" where unknown.
         age_s: of the frame.
+        looks_at_head: whether the person looks at the head; None where that is too uncertain.
     """
 
     id: int
@@ -126,6 +127,7 @@ class Person:
     confidence: float
     distance_from: str
     age_s: float
+    looks_at_head: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -286,4 +288,5 @@ def _person(face: Face, age_s: float) -> Person:
         face.confidence,
         face.distance_from,
         age_s,
+        face.looks_at_head,
     )

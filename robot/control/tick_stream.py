@@ -30,7 +30,18 @@ Before = Sequence[tuple[str, Any]]
 
 
 _FaceRow = tuple[
-    int, Vec3, Vec3, Mat3, tuple[Vec3, ...], float, str, float, float
+    int,
+    Vec3,
+    Vec3,
+    Mat3,
+    tuple[Vec3, ...],
+    float,
+    str,
+    float,
+    float,
+    float | None,
+    bool | None,
+    Vec3 | None,
 ]  # the fields of a Face
 
 

@@ -58,8 +58,8 @@ class _FaceView:
         self._parts = [self._add_part(part) for part in PARTS]
         self._halo = self._add("halo", ring(0.019, 0.0022), _TARGET)
         top_m = (0.0, 0.0, float(parts_m[:, 2].max()) + 0.035)
-        scene.add_label(
-            f"{self._name}/label", f"face {face.id}", position=top_m, anchor="bottom-center"
+        self._label = scene.add_label(
+            f"{self._name}/label", face_label(face), position=top_m, anchor="bottom-center"
         )
 
     def _add(self, name: str, mesh: Mesh, colour: Colour) -> viser.MeshHandle:
@@ -92,6 +92,7 @@ class _FaceView:
         """Move the face and put the halo around the part that is looked at."""
         put(self._frame, face.p_world_m, quaternion(face.R_world_face))
         self._shade.below(face.p_world_m)
+        self._label.text = face_label(face)
         parts_m = _parts_in_face(face)
         for handle, p_m in zip(self._parts, parts_m.tolist(), strict=True):
             put(handle, p_m)
@@ -160,6 +161,12 @@ class PeopleView:
             self._bodies[body.id].show(body)
         put(self._target, snapshot.p_world_target_m)
         self._label.text = snapshot.target_name
+
+
+def face_label(face: SeenFace) -> str:
+    """Return what stands above a face, e.g. "face 3, looks at the head"."""
+    looks = ", looks at the head" if face.looks_at_head else ""
+    return f"face {face.id}{looks}"
 
 
 def fixated_part(face: SeenFace, p_world_target_m: Vec3) -> int | None:

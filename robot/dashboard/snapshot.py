@@ -216,7 +216,14 @@ def _faces(tick: Tick) -> tuple[SeenFace, ...]:
     if tick.percept is None:
         return ()
     return tuple(
-        SeenFace(face.id, face.p_world_m, face.R_world_face, face.parts_world_m, face.v_world_m_s)
+        SeenFace(
+            face.id,
+            face.p_world_m,
+            face.R_world_face,
+            face.parts_world_m,
+            face.v_world_m_s,
+            face.looks_at_head,
+        )
         for face in tick.percept.faces
     )
 

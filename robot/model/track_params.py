@@ -26,6 +26,9 @@ class TrackParams:
     gate_speed_m_s: Annotated[float, Bounds(0, 20), "speed at which gate_m widens while a track gets no detection"] = 1.0
     turn_gain: Annotated[float, Bounds(0.01, 1), "weight of a new frame in the smoothed orientation of a face"] = 0.3
     shape_gain: Annotated[float, Bounds(0.01, 1), "weight of a new frame in the smoothed length and size of a face"] = 0.15
+    face_at_head_deg: Annotated[float, Bounds(1, 60),
+        "a person whose face is turned to the head within this angle looks at it, where the detector finds no gaze of the eyes"] = 10.0
+    eyes_at_head_deg: Annotated[float, Bounds(1, 60), "the same of the gaze of the eyes, where the detector finds it"] = 6.0
     coast_ms: Annotated[float, Bounds(0, 5000), "a track without a detection is still reported for this long"] = 250.0
     forget_ms: Annotated[float, Bounds(0, 60000),
         "a track without a detection is deleted after this long; what returns later gets a new id"] = 1500.0

@@ -140,6 +140,7 @@ class SeenFace:
     """A face as the page draws it: identity, centre, axes and the eight parts, world frame.
 
     v_world_m_s: velocity of the centre; places are those at the frame's capture
+    looks_at_head: whether the person looks at the head, None where that is too uncertain
     """
 
     id: int
@@ -147,6 +148,7 @@ class SeenFace:
     R_world_face: Mat3
     parts_world_m: tuple[Vec3, ...]
     v_world_m_s: Vec3 = (0.0, 0.0, 0.0)
+    looks_at_head: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -117,6 +117,20 @@ def fitted_face(seen: Points, noise: float) -> FittedFace | None:
     return None
 
 
+def turn_sd_rad(away_m: float, noise: float) -> float:
+    """Return the standard deviation of a face's yaw, which is known less well than its pitch.
+
+    The nose stands out from the plane of eyes and mouth, and where it appears tells the turn.
+
+    Args:
+        away_m: distance of the face.
+        noise: as in ``fitted_face``.
+    """
+    per_rad = _NOSE_OUT_M / away_m
+    variance = noise * noise + (_NOISE_OF_EYES * PUPIL_DISTANCE_M / away_m) ** 2
+    return 1.0 / sqrt(per_rad * per_rad / (_OF_FIVE * variance) + _YAW_INFO)
+
+
 def rotation_by(turn_rad: Vec3) -> Mat3:
     """Return the rotation by a rotation vector (Rodrigues' formula)."""
     x, y, z = turn_rad

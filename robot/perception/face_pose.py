@@ -23,7 +23,7 @@ from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.gaze.angles import compose, cross, dot, norm, rotate_back, scale, sub, unit
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.intrinsics import rays as rays_through
-from gazerig.robot.perception.face_fit import Points, fitted_face, nearest_m
+from gazerig.robot.perception.face_fit import Points, fitted_face, nearest_m, turn_sd_rad
 
 # Usual landmark error beside the part that grows with the face.
 _NOISE_PX = 1.0
@@ -39,11 +39,13 @@ class FacePose(NamedTuple):
     p_camera_m:    tip of the nose
     R_camera_face: face axes in the camera frame
     length:        length of the face over the canonical one's
+    turn_sd_rad:   standard deviation of its turn, the larger of yaw and pitch
     """
 
     p_camera_m: Vec3
     R_camera_face: Mat3
     length: float
+    turn_sd_rad: float = 0.0
 
 
 def face_pose(landmarks_px: ArrayLike, intrinsics: Intrinsics) -> FacePose | None:
@@ -75,7 +77,8 @@ def face_pose(landmarks_px: ArrayLike, intrinsics: Intrinsics) -> FacePose | Non
         return None
     if not nearest_m(R, p, found.length) > 0.0:
         return None
-    return FacePose(p, R, found.length)
+    noise = _NOISE_PX / sqrt(intrinsics.fx_px * intrinsics.fy_px)
+    return FacePose(p, R, found.length, turn_sd_rad(norm(p), noise))
 
 
 def _front_seen(points: list[list[float]]) -> bool:

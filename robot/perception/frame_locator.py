@@ -117,6 +117,8 @@ class FrameLocator:
             *_NO_SPEED_SDS,
             None if measured is None else 1.0 / share,
             None,
+            pose.turn_sd_rad,
+            face.gaze_camera,
         )
 
     def _measured(

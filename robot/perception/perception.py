@@ -23,6 +23,7 @@ from gazerig.robot.perception.egomotion_residual import (
     turning_rad_s,
 )
 from gazerig.robot.perception.frame_locator import SIZE_SPREAD, DepthAt, FrameLocator
+from gazerig.robot.perception.gaze_at_head import angle_off_head_rad, looks_at_head
 from gazerig.robot.perception.hand_ownership import Known, without_own_motion
 from gazerig.robot.perception.localisation import placed
 from gazerig.robot.perception.symmetric import squared_length
@@ -60,6 +61,7 @@ class Perception:
         self._tracker = tracker
         self._tracks: tuple[Track, ...] = ()
         self._p_camera: Vec3 = (0.0, 0.0, 0.0)
+        self._p_head: Vec3 = (0.0, 0.0, 0.0)
         self._residual = EgomotionResidual()
         self._percept: Percept | None = None
         self._number = 0
@@ -85,7 +87,8 @@ class Perception:
         self.frames += 1
         self.frames_with_face += bool(detections.faces)
         t_s = detections.captured_s
-        R, p = self._mount.pose(*poses.head_pose(t_s))
+        R_head, self._p_head = poses.head_pose(t_s)
+        R, p = self._mount.pose(R_head, self._p_head)
         located = self._located(detections)
         faces = [placed(face, R, p) for face in located.faces]
         things = [placed(thing, R, p) for thing in located.things]
@@ -151,16 +154,29 @@ class Perception:
         assert R is not None  # faces are tracked with their pose
         p = track.p_world_m
         across_sd, along_sd = _deviations(track, self._p_camera)
+        found = track.detection
+        off_rad = angle_off_head_rad(R, found.gaze_world, sub(self._p_head, p))
+        if track.seen_s == track.at_s:
+            track.looks_at_head = looks_at_head(
+                self._tracker.params,
+                off_rad,
+                found.turn_sd_rad,
+                found.gaze_world is not None,
+                track.looks_at_head,
+            )
         return Face(
             track.id,
             p,
             track.v_world_m_s,
             R,
             self._face_parts(R, p, track.face_size, track.face_length),
-            track.detection.confidence,
+            found.confidence,
             track.depth_from,
             across_sd,
             along_sd,
+            off_rad,
+            track.looks_at_head,
+            found.gaze_world,
         )
 
     def _face_parts(self, R: Mat3, p: Vec3, size: float, length: float) -> tuple[Vec3, ...]:

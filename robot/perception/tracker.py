@@ -37,6 +37,8 @@ class LocalisedDetection:
     size_depth: of a face, its distance if it were of an adult's size, over the distance
         measured; None where the camera measured none
     mark: the detector's own number of it, None where it gives none
+    turn_sd_rad: of a face, standard deviation of its turn
+    gaze_world: of a face, direction of the gaze of the eyes, None where it is unknown
     """
 
     kind: str
@@ -54,6 +56,8 @@ class LocalisedDetection:
     along_sd_m_s: float = 0.5
     size_depth: float | None = None
     mark: int | None = None
+    turn_sd_rad: float = 0.0
+    gaze_world: Vec3 | None = None
 
 
 @dataclass(slots=True)
@@ -63,6 +67,8 @@ class Track:
     seen_s, at_s: capture times of its last detection and of its place
     face_size: of a face, its size over an adult's, learned where the camera measures depth
     depth_s: capture time of the last measured distance, None before the first
+    looks_at_head: of a face, whether the person looked at the head in its last frame; None where
+        that was too uncertain
     """
 
     id: int
@@ -74,6 +80,7 @@ class Track:
     face_length: float
     face_size: float = 1.0
     depth_s: float | None = None
+    looks_at_head: bool | None = None
 
     @property
     def p_world_m(self) -> Vec3:
@@ -110,6 +117,11 @@ class Tracker:
         for track in self._tracks:
             is_face = track.detection.R_world_face is not None
             track.filter.retune(self._of_faces if is_face else self._of_things)
+
+    @property
+    def params(self) -> TrackParams:
+        """Return the parameters in force."""
+        return self._params
 
     def step(
         self, detections: list[LocalisedDetection], p_world_camera_m: Vec3, t_s: float

@@ -43,6 +43,8 @@ _NUMBER: Schema = {"type": "number"}
 _MAYBE: Schema = {"type": ["number", "null"]}
 _WHOLE: Schema = {"type": "integer"}
 _YES: Schema = {"type": "boolean"}
+_MAYBE_YES: Schema = {"type": ["boolean", "null"]}
+_MAYBE_NUMBERS: Schema = {"type": ["array", "null"], "items": {"type": "number"}}
 _TEXT: Schema = {"type": "string"}
 _NUMBERS, _TEXTS = _list(_NUMBER), _list(_TEXT)
 _TIME = _object(sec=_WHOLE, nsec=_WHOLE)
@@ -126,7 +128,9 @@ _PERCEPT = _says(
         faces=_list(_object(
             id=_WHOLE, p_world_m=_NUMBERS, v_world_m_s=_NUMBERS, R_world_face=_MATRIX,
             parts_world_m=_MATRIX, confidence=_NUMBER, distance_from=_TEXT, across_sd_m=_NUMBER,
-            along_sd_m=_NUMBER,
+            along_sd_m=_NUMBER, off_head_rad=_MAYBE,
+            looks_at_head=_says(_MAYBE_YES, "null: too uncertain"),
+            gaze_world=_says(_MAYBE_NUMBERS, "null: the detector does not find the eyes' gaze"),
         )),
     ),
     "what one frame showed, placed in the world by the head's pose at its capture",
