@@ -10,13 +10,13 @@ import time
 from collections.abc import Callable
 from typing import IO
 
-from command_line import GAZERIG
+from branch import Branch, become, gazerig
 
 
 def start(*words: str) -> subprocess.Popen[str]:
     """Start a command with pipes for all that it reads and writes."""
     pipe = subprocess.PIPE
-    return subprocess.Popen([*GAZERIG, *words], stdin=pipe, stdout=pipe, stderr=pipe, text=True)
+    return Branch(gazerig(*words), stdin=pipe, stdout=pipe, stderr=pipe, text=True)
 
 
 def hear(stream: IO[str] | None, wanted: str, within_s: float = 60.0) -> None:
@@ -49,7 +49,7 @@ class OnTerminal:
         self.said = ""
         self.pid, self.fd = pty.fork()
         if self.pid == 0:
-            os.execv(GAZERIG[0], [*GAZERIG, *words])
+            become(gazerig(*words))
 
     def reads(self, words: str) -> None:
         """Wait for words that have not been waited for."""

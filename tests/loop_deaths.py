@@ -3,15 +3,16 @@
 import json
 import os
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from branch import Branch
 from struck_rigs import rig_of
 
 from gazerig.config.rig import Rig
@@ -143,9 +144,8 @@ def driven(kind: str, guarded: bool = True, watchdog: bool = True) -> Iterator[D
     with PtyBuses() as buses:
         rig = slow(kind)
         (path,) = buses.start(emulated_lines(rig)).values()
-        words = [kind, str(int(guarded)), str(int(watchdog)), path]
-        loop = subprocess.Popen(
-            [sys.executable, __file__, *words], stdout=subprocess.PIPE, text=True
+        loop = Branch(
+            partial(drive, kind, guarded, watchdog, path), stdout=subprocess.PIPE, text=True
         )
         # A line that never comes fails the test instead of hanging it.
         late = threading.Timer(2.0 * PATIENCE_S, loop.kill)
@@ -160,7 +160,3 @@ def driven(kind: str, guarded: bool = True, watchdog: bool = True) -> Iterator[D
             loop.wait()
             assert loop.stdout is not None
             loop.stdout.close()
-
-
-if __name__ == "__main__":
-    drive(sys.argv[1], sys.argv[2] == "1", sys.argv[3] == "1", sys.argv[4])

@@ -5,12 +5,12 @@ import os
 import signal
 import subprocess
 import sys
-import time
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-import child_processes
 import pytest
+from branch import Branch
 from dynamixel_sdk import COMM_SUCCESS, PacketHandler
 from present import present
 from typer.testing import CliRunner
@@ -29,15 +29,13 @@ COMMAND = [sys.executable, "-c", "from gazerig.robot.cli.emulate import app; app
 
 
 class Emulator:
-    """The command beside the test: in a process of its own, or in a branch of this one.
-
-    A branch saves the start of Python; it has standard streams and signals of its own.
-    """
+    """The command beside the test: in a process of its own, or in a branch of this one."""
 
     def __init__(self, *options, command=None, stdin=subprocess.PIPE, stderr=None):
-        start = Branch if command is None else subprocess.Popen
+        start: Any = partial(Branch, partial(app, options))
+        if command is not None:
+            start = partial(subprocess.Popen, [*command, *options])
         self.process = start(
-            [*(command or ()), *options],
             cwd=ROOT,
             stdin=stdin,
             stdout=subprocess.PIPE,
@@ -62,65 +60,6 @@ class Emulator:
             if pipe is not None:
                 pipe.close()
         return code
-
-
-class Branch:
-    """What a test wants of subprocess.Popen, for the command in a fork of this process."""
-
-    def __init__(self, options, cwd, stdin, stdout, stderr, text):
-        ours: list[Any] = [None, None, None]
-        theirs = [None if file is subprocess.PIPE else file for file in (stdin, stdout, stderr)]
-        for number, file in enumerate((stdin, stdout, stderr)):
-            if file is subprocess.PIPE:
-                read, write = os.pipe()
-                own, theirs[number] = (write, read) if number == 0 else (read, write)
-                ours[number] = os.fdopen(own, "w" if number == 0 else "r")
-        self.stdin, self.stdout, self.stderr = ours
-        self.pid = os.fork()
-        if self.pid == 0:
-            code = 1
-            try:
-                child_processes.end_with_parent()
-                code = _command(options, cwd, ours, theirs)
-            finally:
-                os._exit(code)
-        for file in theirs:
-            if isinstance(file, int):
-                os.close(file)
-
-    def send_signal(self, number):
-        os.kill(self.pid, number)
-
-    def wait(self, timeout_s):
-        deadline = time.monotonic() + timeout_s
-        while time.monotonic() < deadline:
-            pid, status = os.waitpid(self.pid, os.WNOHANG)
-            if pid:
-                return os.waitstatus_to_exitcode(status)
-            time.sleep(0.002)
-        raise TimeoutError(f"process {self.pid} goes on")
-
-
-def _command(options, cwd, ours, theirs):
-    """Run the command in a fork, with streams as a fresh process would have them."""
-    for file in ours:
-        if file is not None:
-            file.close()
-    for number, file in enumerate(theirs):
-        if file is not None:
-            os.dup2(file if isinstance(file, int) else file.fileno(), number)
-    sys.stdin, sys.stdout = os.fdopen(0), os.fdopen(1, "w")
-    sys.stderr = os.fdopen(2, "w")
-    os.chdir(cwd)
-    sys.argv = ["emulate", *options]
-    try:
-        app()
-    except SystemExit as end:
-        return end.code or 0
-    finally:
-        sys.stdout.flush()
-        sys.stderr.flush()
-    return 0
 
 
 def connect(path, baud=1_000_000):

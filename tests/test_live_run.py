@@ -3,14 +3,13 @@
 import os
 import shutil
 import signal
-import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from branch import Branch, gazerig
 
 from gazerig.config.save import copy_shipped
 from gazerig.config.schema import load_rig
@@ -42,13 +41,9 @@ class Run:
         self.file, self.log = place / "my.yaml", place / "log"
         if not self.file.exists():
             copy_shipped("desk", self.file)
-        code = "from gazerig.robot.cli.main import main; main()"
         with self.log.open("w") as log:
-            self.process = subprocess.Popen(
-                [sys.executable, "-c", code, "run", str(self.file), "--mock", "--no-page"],
-                stderr=log,
-                env=dict(os.environ),
-            )
+            work = gazerig("run", str(self.file), "--mock", "--no-page")
+            self.process = Branch(work, stderr=log)
 
     def connected(self) -> RobotClient:
         for _ in range(600):

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from command_line import GAZERIG
+from branch import Branch, gazerig
 
 DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
 
@@ -29,8 +29,8 @@ def rig_at(file: Path, rate_hz: float, give_up_s: float = 60.0) -> str:
 
 def begun(*words: str) -> "subprocess.Popen[str]":
     """Start a run in a process of its own; give it once torque is on."""
-    process = subprocess.Popen(
-        [*GAZERIG, "run", *words, "--mock", "--no-page", "--summary", "-"],
+    process = Branch(
+        gazerig("run", *words, "--mock", "--no-page", "--summary", "-"),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

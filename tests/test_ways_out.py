@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 from attack.ways_out import START, attack, bench
+from branch import Branch, gazerig
 
 import gazerig.robot.app.run_bus as run_bus
 from gazerig.config.schema import load_rig
@@ -348,6 +349,11 @@ def test_a_run_without_faults_has_none(devices: list[Device]) -> None:
 # --- programs of their own
 
 
+def begun(words: list[str], breaks: str, **options: Any) -> Branch:
+    assert not breaks
+    return Branch(gazerig(*words), **options)
+
+
 # Parking takes a bounded time, in which a starved machine does not come all the way.
 @pytest.mark.own_timeouts
 @pytest.mark.parametrize(
@@ -363,7 +369,7 @@ def test_a_run_without_faults_has_none(devices: list[Device]) -> None:
 )
 def test_no_servo_stays_on(rig: str, command: str, way: str) -> None:
     with bench(rig) as at:
-        row = attack(at, command, way)
+        row = attack(at, command, way, begun)
     assert row.code is not None and row.on == 0, row
     assert row.off_park_deg < 6.0 or command == "home", row
 

@@ -23,6 +23,7 @@ import sys
 import termios
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import product
 from math import degrees
 from pathlib import Path
@@ -133,10 +134,20 @@ def typed(words: list[str], breaks: str = "") -> list[str]:
     return [sys.executable, "-c", breaks + START, *words]
 
 
-def started(words: list[str], way: str) -> Started:
+Begin = Callable[..., "subprocess.Popen[bytes]"]
+"""Starts gazerig with words that are typed and options of subprocess.Popen."""
+
+
+def fresh(words: list[str], breaks: str = "", **options: Any) -> "subprocess.Popen[bytes]":
+    """Start it as a shell does."""
+    return subprocess.Popen(typed(words, breaks), **options)
+
+
+def started(words: list[str], way: str, begin: Begin = fresh) -> Started:
     """Start a command the way that its end needs."""
     env = {**os.environ, "COLUMNS": "100"}
-    command = typed(words, BROKEN.get(way, ""))
+    breaks = BROKEN.get(way, "")
+    command = typed(words, breaks)
     pipe = subprocess.PIPE
     if way == "| head -1":
         line = '"$@" 2>&1 </dev/null | head -1; exit ${PIPESTATUS[0]}'
@@ -147,16 +158,18 @@ def started(words: list[str], way: str) -> Started:
         master, slave = pty.openpty()
 
         def own() -> None:
+            os.close(master)
             os.setsid()
             fcntl.ioctl(0, termios.TIOCSCTTY, 0)
 
-        process = subprocess.Popen(
-            command, stdin=slave, stdout=slave, stderr=slave, env=env, preexec_fn=own
+        process = begin(
+            words, breaks, stdin=slave, stdout=slave, stderr=slave, env=env, preexec_fn=own
         )
         os.close(slave)
         return Started(process, -1, master)
     if way == "stderr and stdout closed":
-        command = ["bash", "-c", 'exec "$@" >&- 2>&-', "-", *command]
+        shell = ["bash", "-c", 'exec "$@" >&- 2>&-', "-", *command]
+        begin = partial(_shelled, shell)
     errors: int = pipe
     if way == "stderr on a full disk":
         errors = os.open("/dev/full", os.O_WRONLY)
@@ -166,8 +179,8 @@ def started(words: list[str], way: str) -> Started:
         if way == "recorder's disk full":
             resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
 
-    process = subprocess.Popen(
-        command, stdin=pipe, stdout=pipe, stderr=errors, env=env, preexec_fn=small_files
+    process = begin(
+        words, breaks, stdin=pipe, stdout=pipe, stderr=errors, env=env, preexec_fn=small_files
     )
     assert process.stderr is not None or errors != pipe
     got = process.stderr.fileno() if process.stderr is not None else -1
@@ -179,6 +192,10 @@ def started(words: list[str], way: str) -> Started:
                 os.write(full, b"." * 4096)
         os.close(full)
     return Started(process, got, -1)
+
+
+def _shelled(shell: list[str], *_: object, **options: Any) -> "subprocess.Popen[bytes]":
+    return subprocess.Popen(shell, **options)
 
 
 def wait_until(true: Callable[[], bool], within_s: float = 60.0) -> bool:
@@ -277,7 +294,7 @@ class Row(NamedTuple):
     said: str
 
 
-def attack(at: Bench, name: str, way: str) -> Row:
+def attack(at: Bench, name: str, way: str, begin: Begin = fresh) -> Row:
     """Start a command, wait for the torque, end it one way, look at the servos."""
     words = [*commands(at.name, at.file)[name], "--port", at.port]
     folder = TemporaryDirectory()
@@ -285,7 +302,7 @@ def attack(at: Bench, name: str, way: str) -> Row:
         words.remove("--no-page")
     if way == "recorder's disk full":
         words += ["--record", f"{folder.name}/full.mcap", "--force"]
-    run = started(words, way)
+    run = started(words, way, begin)
     if name == "calibrate" and at.name in BOARDS and run.process.stdin is not None:
         with contextlib.suppress(OSError):
             run.process.stdin.write(b"1500\n+40\n")

@@ -1,0 +1,153 @@
+"""A program in a branch of this process: it has all that a process has, only its start is saved.
+
+It has its own id, standard streams, signals and exit status, and what it imports has been imported
+already: Python and the whole program take .8 s of a processor to start, in every process anew.
+Tests of the start itself (test_cli_start.py, command_line.gazerig) have processes of their own.
+"""
+
+import atexit
+import gc
+import inspect
+import os
+import signal
+import subprocess
+import sys
+import threading
+import traceback
+from collections.abc import Callable, Iterable
+from typing import Any, NoReturn
+
+import child_processes
+
+_GIVEN = inspect.signature(subprocess.Popen._execute_child)  # type: ignore[attr-defined]
+_SIGNALS = (
+    *(signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT),
+    *(signal.SIGTTIN, signal.SIGTTOU, signal.SIGTSTP, signal.SIGUSR1),
+)
+
+
+class Branch(subprocess.Popen[Any]):
+    """A program in a fork of this process, with all that subprocess.Popen has.
+
+    Args:
+        work: the program; what it raises becomes an exit status as it does in Python.
+        options: as for subprocess.Popen.
+    """
+
+    def __init__(self, work: Callable[[], object], **options: Any) -> None:
+        self._work = work
+        super().__init__(["branch"], **options)
+
+    def _execute_child(self, *given: Any) -> None:
+        """Fork; the parent goes on as after a program has been started."""
+        a = _GIVEN.bind(self, *given).arguments
+        standard = a["p2cread"], a["c2pwrite"], a["errwrite"]
+        ends = a["p2cwrite"], a["c2pread"], a["errread"]
+        self.pid = os.fork()
+        if self.pid == 0:
+            become(self._work, standard, ends, a["cwd"], a["env"], a["preexec_fn"])
+        self._child_created = True
+        self._close_pipe_fds(  # type: ignore[attr-defined]
+            *(a[name] for name in ("p2cread", "p2cwrite", "c2pread", "c2pwrite")),
+            *(a["errread"], a["errwrite"]),
+        )
+
+
+def become(
+    work: Callable[[], object],
+    standard: Iterable[int] = (),
+    ends: Iterable[int] = (),
+    cwd: str | os.PathLike[str] | None = None,
+    env: dict[str, str] | None = None,
+    first: Callable[[], object] | None = None,
+) -> NoReturn:
+    """Be another program from here on, in a process that has just been forked.
+
+    Args:
+        work: the program.
+        standard: what becomes standard input, output and error; -1 leaves what there is.
+        ends: the parent's ends of pipes.
+        cwd: working directory.
+        env: environment.
+        first: called before the program begins.
+    """
+    code = 1
+    try:
+        child_processes.end_with_parent()
+        for fd in ends:
+            if fd != -1:
+                os.close(fd)
+        for number, fd in enumerate(standard):
+            if fd != -1:
+                os.dup2(fd, number)
+        if cwd is not None:
+            os.chdir(cwd)
+        if env is not None:
+            os.environ.clear()
+            os.environ.update(env)
+        if first is not None:
+            first()
+        _begin_afresh()
+        code = _status(work)
+        threading._shutdown()  # type: ignore[attr-defined]
+        atexit._run_exitfuncs()
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+    finally:
+        os._exit(code)
+
+
+def _begin_afresh() -> None:
+    """Leave behind what the parent, a run of tests, has that a fresh process has not."""
+    gc.freeze()
+    gc.unfreeze = lambda: None  # a full pass would copy all of the parent's memory
+    for number in _SIGNALS:
+        signal.signal(number, signal.SIG_DFL)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    atexit._clear()
+    sys.excepthook, sys.unraisablehook = sys.__excepthook__, sys.__unraisablehook__
+    threading.excepthook = threading.__excepthook__
+    kept.append((sys.stdin, sys.stdout, sys.stderr))  # else their files would be closed
+    sys.stdin, sys.stdout = os.fdopen(0, closefd=False), os.fdopen(1, "w", closefd=False)
+    sys.stderr = os.fdopen(2, "w", buffering=1, errors="backslashreplace", closefd=False)
+
+
+kept: list[object] = []
+
+
+def _status(work: Callable[[], object]) -> int:
+    """Do the work; return the exit status that Python makes of its end."""
+    try:
+        work()
+    except SystemExit as end:
+        if end.code is None or isinstance(end.code, int):
+            return end.code or 0
+        print(end.code, file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        traceback.print_exc()
+        sys.stderr.flush()
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        os.kill(os.getpid(), signal.SIGINT)
+        return 1
+    except BaseException:
+        traceback.print_exc()
+        return 1
+    return 0
+
+
+def gazerig(*words: str) -> Callable[[], None]:
+    """Return the program gazerig with these arguments."""
+
+    def work() -> None:
+        from gazerig.robot.cli import terminal
+        from gazerig.robot.cli.entry_point import main
+        from gazerig.robot.cli.line_writer import LineWriter
+
+        # That of the parent may have had a thread, which a fork has not.
+        terminal._writer = LineWriter(2)
+        atexit.register(terminal._writer.flush, 1.0)
+        sys.argv = ["gazerig", *words]
+        main()
+
+    return work
