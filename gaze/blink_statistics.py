@@ -6,6 +6,9 @@ import numpy as np
 
 from gazerig.gaze.lid_params import LidParams
 
+_NEARLY_SHUT = 0.95
+"""Beyond this a blink counts as complete."""
+
 
 def blink_pause_s(
     params: LidParams, per_min: float, length_s: float, rng: np.random.Generator
@@ -30,19 +33,44 @@ def blink_pause_s(
 
 
 def evokes_blink(params: LidParams, shift_deg: float, rng: np.random.Generator) -> bool:
-    """Return whether a gaze shift brings a blink with it (Evinger 1994)."""
+    """Return whether a gaze shift brings a blink with it (Evinger 1994).
+
+    The logistic curve through the published points would have one shift in twenty of 3 deg blink;
+    it is lowered such that it begins at ``gaze_evoked_blink_least_deg``, and 1 stays 1.
+    """
     if params.gaze_evoked_blink_literal:
         return shift_deg > params.gaze_evoked_blink_literal_deg
+    if shift_deg <= params.gaze_evoked_blink_least_deg:
+        return False
+    least = _logistic(params, params.gaze_evoked_blink_least_deg)
+    chance = (_logistic(params, shift_deg) - least) / max(1.0 - least, 1e-9)
+    return float(rng.random()) < chance
+
+
+def _logistic(params: LidParams, shift_deg: float) -> float:
     beyond = shift_deg - params.gaze_evoked_blink_middle_deg
     # Of the steepest slope the exponential would be beyond what a number can hold.
-    against = exp(min(700.0, -params.gaze_evoked_blink_steepness_1_deg * beyond))
-    return float(rng.random()) < 1.0 / (1.0 + against)
+    return 1.0 / (1.0 + exp(min(700.0, -params.gaze_evoked_blink_steepness_1_deg * beyond)))
+
+
+def evoked_delay_s(params: LidParams, rng: np.random.Generator) -> float:
+    """Draw the time from the onset of a gaze shift to that of its blink.
+
+    Blinks set off with eyes and head, some before them (Evinger 1994). A shift is known when
+    it starts, so what would have come before it comes as long after it.
+    """
+    spread_s = params.gaze_evoked_blink_jitter_ms / 1e3
+    if spread_s == 0.0:
+        return 0.0
+    return min(abs(spread_s * float(rng.standard_normal())), 2.0 * spread_s)
 
 
 def blink_depth(params: LidParams, rng: np.random.Generator) -> float:
-    """Draw the depth of a blink: 1 is complete closure."""
-    shallow = rng.random() < params.incomplete_share
-    return float(rng.uniform(0.70, 0.85)) if shallow else 1.0
+    """Draw the depth of a blink, 1 is complete closure; of incomplete ones most are nearly so."""
+    if rng.random() >= params.incomplete_share:
+        return 1.0
+    least = min(params.incomplete_least, _NEARLY_SHUT)
+    return least + (_NEARLY_SHUT - least) * sqrt(float(rng.random()))
 
 
 def is_double_blink(params: LidParams, rng: np.random.Generator) -> bool:

@@ -21,6 +21,7 @@ _BRAKES_S = 0.12
 """A head in flight goes on for as far as its speed takes it in this time."""
 
 _ROUNDING_RAD = 1e-6
+_ROLLS_S = 0.5
 _SWINGS = 2.5
 """A movement longer than so many times the way over the present speed swings past its goal."""
 
@@ -176,7 +177,7 @@ class HeadModel:
         if t_s - self._aside_since_s >= par.recentre_after_ms / 1e3 and not moving:
             self._follows, self._relieves = False, True
         elif eccentricity >= share.trigger_rad and since_onset >= delay_ms / 1e3 - 1e-9:
-            self._follows, self._relieves = True, self._relieves and moving
+            self._follows, self._relieves = True, False
         elif not moving:
             self._follows = self._relieves = False
         if self._relieves:
@@ -235,8 +236,10 @@ class HeadModel:
         starts = [plan.at(t_s - self._planned_s) for plan in self._plans]
         (yaw, yaw_rate, _), (pitch, pitch_rate, _), _ = starts
         duration = self._duration_s(goal[0] - yaw, goal[1] - pitch, yaw_rate, pitch_rate)
+        # A roll under way would swing far in a long turn.
+        lasts = (duration, duration, min(duration, _ROLLS_S))
         self._plans = tuple(
-            Quintic(start, end, duration) for start, end in zip(starts, goal, strict=True)
+            Quintic(start, end, each) for start, end, each in zip(starts, goal, lasts, strict=True)
         )
         self._set_goal(goal)
         self._level = True

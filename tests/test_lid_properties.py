@@ -126,6 +126,7 @@ def test_a_full_blink_shuts_all_lids_whose_share_is_whole(
     params: LidParams, pitch_deg: float, level: float
 ) -> None:
     whole = {"lower_close_share": 1.0, "incomplete_share": 0.0, "gaze_evoked_blink_literal": True}
+    whole["gaze_evoked_blink_jitter_ms"] = 0.0
     never = {"blinks_per_min": 0.0, "gaze_evoked_blink_literal_deg": 0.0, "sleepy_level": 0.0}
     chosen = LidParams(**{**vars(params), **whole, **never, "sleepy_slowness": 0.0})
     model = Lids(chosen, np.random.default_rng(0))
@@ -153,6 +154,7 @@ def test_the_steepest_rule_of_evoked_blinks_can_be_reckoned() -> None:
     steep = LidParams(
         gaze_evoked_blink_steepness_1_deg=5.0,
         gaze_evoked_blink_middle_deg=180.0,
+        gaze_evoked_blink_jitter_ms=0.0,
         blinks_per_min=0.0,
     )
     model = Lids(steep, np.random.default_rng(0))
