@@ -12,8 +12,8 @@ from typing import Annotated, Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gazerig.gaze.angles import add, sub
-from gazerig.gaze.scanpath_dwell import LAWS, Draw, dwell_distribution
+from gazerig.gaze.angles import add, angle_between, sub
+from gazerig.gaze.scanpath_dwell import LAWS, Draw
 from gazerig.gaze.scanpath_models import (
     FaceTracking,
     MarkovWalk,
@@ -22,6 +22,7 @@ from gazerig.gaze.scanpath_models import (
     ScanpathStep,
     SimpleCycle,
 )
+from gazerig.gaze.scanpath_rest import rests_s, shifted, stationary, visits_s
 from gazerig.gaze.types import PART_NAMES, PARTS, Face, Floats, Percept, Target, Vec3
 from gazerig.params import Bounds, Choices
 
@@ -81,15 +82,21 @@ class ScanpathParams:
     model: Annotated[Literal["markov", "simple", "face_tracking", "random"],
         "model of the scan path: the measured Markov walk, or one of the three baselines it is compared with"] = "markov"
     transition_matrix: Annotated[str, "name of a shipped transition matrix or path of a YAML file"] = "nakamoto_tsuruno"
-    start: Annotated[str, Choices("as_walk", *PARTS),
-        "face part that is looked at first, named as in the matrix; as_walk: as the matrix file says"] = "as_walk"
+    start: Annotated[str, Choices("nearest", "as_walk", *PARTS),
+        "face part that is looked at first, named as in the matrix; nearest: the one nearest to where the gaze comes from; "
+        "as_walk: as the matrix file says"] = "nearest"
     viewers_left: Annotated[bool,
         "left and right in the matrix and in simple_order are as the viewer sees them, not as the face's owner does"] = False
-    diagonal: Annotated[Literal["refixation", "whole_visit"],
-        "meaning of the matrix's diagonal, the same part again: another dwell (refixation), or included in the dwell of "
-        "the visit (whole_visit)"] = "refixation"
+    diagonal: Annotated[Literal["one_rest", "refixation", "whole_visit"],
+        "meaning of the matrix's diagonal, the same part again: another dwell (refixation), included in the dwell of the visit "
+        "(whole_visit), or another dwell that makes one rest with the last, spread by rest_spread (one_rest)"] = "one_rest"
     dwell_distribution: Annotated[str, Choices(*LAWS), "distribution of the dwell times"] = "lognormal"
-    min_dwell_ms: Annotated[float, Bounds(0, 2000), "shortest dwell; servos cannot show shorter ones"] = 120.0
+    min_dwell_ms: Annotated[float, Bounds(0, 2000),
+        "shortest dwell, from landing to departure; what lasts longer is distributed above it, with the same mean"] = 140.0
+    rest_spread: Annotated[float, Bounds(0.05, 3),
+        "with diagonal one_rest: standard deviation over mean of what a rest lasts beyond min_dwell_ms"] = 0.6
+    shift_ms: Annotated[float, Bounds(0, 500),
+        "with diagonal one_rest: duration of a shift between parts, which the times of the table include"] = 57.0
     rate_scale: Annotated[float, Bounds(0.1, 10), "dwell times are divided by this: with 2 the gaze wanders twice as fast"] = 1.0
     simple_order: Annotated[tuple[str, ...], Choices(*PARTS), "order of the parts in the simple model"] = ("N", "RE", "LE")
     simple_dwell_ms: Annotated[tuple[float, ...], Bounds(1, 60000), "dwell on each part of simple_order"] = (459.42, 408.21, 408.21)
@@ -195,15 +202,19 @@ class Scanpath:
         t_s: float,
         settled: bool,
         p_world_head_m: Vec3 = (0.0, 0.0, 0.2),
+        gaze_world_m: Vec3 | None = None,
     ) -> Target:
         """Replace a face target by the point of it that is due; pass anything else on.
 
         settled: whether the gaze has arrived at the last target given
+        gaze_world_m: where both eyes point now; None where that is unknown
         """
         if target.kind != "face":
             self._face = face = None
         else:
-            face = self._find(target.id, percept)
+            face, entered = self._find(target.id, percept)
+            if face is not None and entered:
+                self.looks.enter(_nearest(face, p_world_head_m, gaze_world_m))
         look = None
         if face is not None:
             look = self.looks.step(face, p_world_head_m, t_s, settled)
@@ -216,21 +227,26 @@ class Scanpath:
         self._last = _Replaced(target, face, point, self._shift, result)
         return result
 
-    def _find(self, face_id: int, percept: Percept | None) -> Face | None:
-        """Return the target's face, the last known one while it is out of sight."""
+    def _find(self, face_id: int, percept: Percept | None) -> tuple[Face | None, bool]:
+        """Return the face, the last known while it is out of sight, and whether it is new."""
         known = self._face
-        if known is not None and known.id == face_id and percept is self._searched:
-            return known
+        if known is not None and known.id != face_id:
+            known = None
+        if known is not None and percept is self._searched:
+            return known, False
         self._searched = percept
-        if self._face is None or self._face.id != face_id:
-            self._face = None
-        if percept is not None:
-            for face in percept.faces:
-                if face.id == face_id:
-                    if self._face is None:
-                        self.looks.enter()
-                    self._face = face
-        return self._face
+        seen = () if percept is None else percept.faces
+        self._face = next((face for face in seen if face.id == face_id), known)
+        return self._face, known is None and self._face is not None
+
+
+def _nearest(face: Face, p_world_head_m: Vec3, gaze_world_m: Vec3 | None) -> str | None:
+    """Return the part of a face nearest to where the eyes point, None where that is unknown."""
+    if gaze_world_m is None:
+        return None
+    gaze = sub(gaze_world_m, p_world_head_m)
+    away = [angle_between(gaze, sub(part, p_world_head_m)) for part in face.parts_world_m]
+    return PARTS[away.index(min(away))]
 
 
 def _looks(params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> ScanpathModel:
@@ -249,12 +265,31 @@ def _looks(params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> Scan
 
 def markov_walk(params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> MarkovWalk:
     """Return the walk with the chosen reading of its diagonal, sides and start."""
-    merged = params.diagonal == "whole_visit"
-    matrix = without_refixations(walk.matrix) if merged else normalised(walk.matrix)
-    statistics = zip(walk.dwell_mean_s, walk.dwell_sd_s, strict=True)
-    dwells = [_dwell(params, mean, sd) for mean, sd in statistics]
-    start = walk.start if params.start == "as_walk" else params.start
-    return MarkovWalk(_owners(params, walk.order), matrix, dwells, walk.order.index(start), rng)
+    matrix, dwells = steps_and_dwells(params, walk)
+    start = walk.start if params.start in ("nearest", "as_walk") else params.start
+    return MarkovWalk(
+        _owners(params, walk.order), matrix, dwells, walk.order.index(start), rng,
+        enters_nearest=params.start == "nearest",
+    )  # fmt: skip
+
+
+def steps_and_dwells(params: ScanpathParams, walk: Walk) -> tuple[Floats, list[Draw]]:
+    """Return the matrix of the steps that are drawn and the dwell law of each part.
+
+    Parts are in the walk's order; the matrix is normalised, rows from.
+    """
+    steps = normalised(walk.matrix)
+    if params.diagonal != "refixation":
+        steps = without_refixations(walk.matrix)
+    law, floor_s = params.dwell_distribution, params.min_dwell_ms / 1e3
+    mean_s = np.array(walk.dwell_mean_s) / params.rate_scale
+    sd_s = np.array(walk.dwell_sd_s) / params.rate_scale
+    if params.diagonal == "one_rest":
+        visit_s = visits_s(normalised(walk.matrix), mean_s)
+        mean_s = rests_s(stationary(steps), visit_s, params.shift_ms / 1e3, floor_s)
+        sd_s = params.rest_spread * (mean_s - floor_s)
+    pairs = zip(mean_s.tolist(), sd_s.tolist(), strict=True)
+    return steps, [shifted(law, mean, sd, floor_s) for mean, sd in pairs]
 
 
 def _owners(params: ScanpathParams, parts: tuple[str, ...]) -> tuple[str, ...]:
@@ -262,10 +297,3 @@ def _owners(params: ScanpathParams, parts: tuple[str, ...]) -> tuple[str, ...]:
     if not params.viewers_left:
         return parts
     return tuple(_OTHER_SIDE.get(part, part) for part in parts)
-
-
-def _dwell(params: ScanpathParams, mean_s: float, sd_s: float) -> Draw:
-    """Return a part's dwell law at this robot's tempo and above its floor."""
-    law = dwell_distribution(params.dwell_distribution, mean_s, sd_s)
-    tempo, floor_s = params.rate_scale, params.min_dwell_ms / 1e3
-    return lambda rng: max(law(rng) / tempo, floor_s)

@@ -5,8 +5,8 @@ SimpleCycle    face centre, right eye, left eye, again (4.4.2)
 FaceTracking   the face centre, always (4.4.3)
 RandomAngles   eyes to random angles at random intervals (4.4.4)
 
-Time and random generator are arguments of all; ``enter`` is called when another face is
-looked at, then ``step`` every tick.
+Time and random generator are arguments of all; ``enter`` is called when a face is looked at that
+was not before, then ``step`` every tick.
 """
 
 from collections.abc import Sequence
@@ -31,8 +31,8 @@ class ScanpathStep(NamedTuple):
 class ScanpathModel(Protocol):
     """The interface of the scanpath models."""
 
-    def enter(self) -> None:
-        """Start on another face."""
+    def enter(self, nearest: str | None = None) -> None:
+        """Start on a face; ``nearest``: its part nearest to the gaze, None where not known."""
         ...
 
     @property
@@ -62,18 +62,21 @@ class MarkovWalk:
         dwells: Sequence[Draw],
         start: int,
         rng: np.random.Generator,
+        enters_nearest: bool = False,
     ) -> None:
         self._parts = tuple(parts)
         self._columns = tuple(PARTS.index(part) for part in parts)
         self._cumulative: list[list[float]] = np.cumsum(matrix, axis=1).tolist()
         self._dwells = tuple(dwells)
         self._start = start
+        self._enters_nearest = enters_nearest
         self._rng = rng
         self.enter()
 
-    def enter(self) -> None:
-        """Start at the start part."""
-        self._part = self._start
+    def enter(self, nearest: str | None = None) -> None:
+        """Start at the start part, or at the nearest one where that is asked for and known."""
+        known = nearest is not None and self._enters_nearest
+        self._part = self._parts.index(str(nearest)) if known else self._start
         self._face: Face | None = None
         self._until_s: float | None = None
 
@@ -138,7 +141,7 @@ class SimpleCycle:
         self._dwell_s = tuple(dwell_s)
         self.enter()
 
-    def enter(self) -> None:
+    def enter(self, nearest: str | None = None) -> None:
         """Start at the first part."""
         self._at = 0
         self._until_s: float | None = None
@@ -174,7 +177,7 @@ class SimpleCycle:
 class FaceTracking:
     """The face centre, always; the paper takes the tip of the nose for it (4.4.2)."""
 
-    def enter(self) -> None:
+    def enter(self, nearest: str | None = None) -> None:
         """Do nothing: this model has no state."""
 
     @property
@@ -205,7 +208,7 @@ class RandomAngles:
         self._rng = rng
         self.enter()
 
-    def enter(self) -> None:
+    def enter(self, nearest: str | None = None) -> None:
         """Start with angles drawn at once."""
         self._offset_rad: Angles2 = self._angles()
         self._until_s: float | None = None

@@ -75,8 +75,8 @@ def test_long_times_keep_the_measured_spread() -> None:
     assert min(away) >= 0.2 - 1e-9
 
 
-def test_without_a_conversation_targets_pass_untouched() -> None:
-    model, target = aversion(), face()
+def test_who_never_looks_away_in_silence_passes_targets_untouched() -> None:
+    model, target = aversion(silent_mutual_s=0.0), face()
     for k in range(5000):
         assert model.step(target, HEAD, k * DT) is target
 
@@ -234,3 +234,41 @@ def test_reset_forgets_and_keeps_the_mode() -> None:
     model.reset(40.0)
     assert model.mode == "talk"
     assert model.step(face(), HEAD, 40.0) == face()
+
+
+# ---- without a conversation -----------------------------------------------------------
+
+
+def test_silent_bouts_of_mutual_gaze_last_as_long_as_people_prefer() -> None:
+    found = stays(aversion(17), 6000.0)
+    mutual = np.array([s.seconds for s in found if s.kind == "face"])
+    away = np.array([s.seconds for s in found if s.kind == "away"])
+    assert np.median(mutual) == pytest.approx(3.3, rel=0.06)
+    assert np.std(np.log(mutual)) == pytest.approx(0.43, abs=0.04)
+    assert mutual.max() <= 14.5 + DT
+    assert away.mean() == pytest.approx(0.6, rel=0.06) and away.max() < 4.0
+
+
+def test_a_target_that_a_user_has_chosen_is_left_in_a_conversation_only() -> None:
+    model = aversion(18)
+    t = 0.0
+    while model.step(face(), HEAD, t).kind == "face":
+        t += DT
+    looks = [model.step(face(), HEAD, t + k * DT, ordered=True) for k in range(1000)]
+    assert {look.kind for look in looks} == {"face"}
+    t += 20.0
+    again = [model.step(face(), HEAD, t + k * DT).kind for k in range(1000)]
+    assert again[0] == "face" and "away" in again
+    model.converse("talk", t + 20.0)
+    kinds = {model.step(face(), HEAD, t + 20.0 + k * DT, ordered=True).kind for k in range(2000)}
+    assert kinds == {"face", "away"}
+
+
+def test_looking_away_in_silence_can_be_switched_on_and_off_while_it_runs() -> None:
+    model = aversion(19, silent_mutual_s=0.0)
+    assert {s.kind for s in stays(model, 60.0)} == set()
+    model.retune(AversionParams())
+    assert "away" in {model.step(face(), HEAD, 60.0 + k * DT).kind for k in range(1000)}
+    model.retune(AversionParams(silent_mutual_s=0.0))
+    kinds = [model.step(face(), HEAD, 90.0 + k * DT).kind for k in range(2000)]
+    assert set(kinds[1000:]) == {"face"}

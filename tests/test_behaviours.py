@@ -274,6 +274,7 @@ def test_face_to_face_keeps_the_face_through_all_heights() -> None:
     lived = Lived(made_for("face-to-face", rate_hz=100.0), scene, scene.round_s + 0.05)
     figure = lived.score.figures()["face"]
     assert figure["seen"] == figure["of"] == 1
-    assert figure["share"] is not None and figure["share"] > 0.9
+    # Bouts of mutual gaze of 3.6 s on average and looks away of 0.6 s.
+    assert figure["share"] is not None and 0.8 < figure["share"] < 0.95
     pitch = [degrees(each.pose.head_rad[1]) for each in lived.ticks]
     assert max(pitch) > 8.0 and min(pitch) < -3.0

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from gazerig.config.parameters import changed
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.gaze_models import gaze_parts
@@ -21,7 +22,8 @@ from gazerig.sim_mock.scenes.steps_aside import STEP_AT_S, STEP_S
 from gazerig.sim_mock.scenes.walks_past import HALF_WAY_M, WALK_M_S
 from gazerig.sim_mock.true_gaze import angles_of_place, gaze_angles, gaze_off_rad, true_part
 
-RIG = load_rig("desk")
+RIG = changed(load_rig("desk"), {"gaze.aversion.silent_mutual_s": 0.0})
+"""The gaze stays on the face, on which it is measured."""
 ARRIVED_S = STEP_AT_S + STEP_S
 Column = NDArray[np.float64]
 PlacedBy = Literal["capture", "newest"]
@@ -142,7 +144,8 @@ def test_the_gaze_rests_on_the_true_face_part_after_a_second(step: Seen) -> None
 
 @pytest.mark.slow
 def test_by_the_newest_pose_head_and_eyes_overshoot(step: Seen, step_by_newest: Seen) -> None:
-    assert overshoot_deg(step_by_newest) > overshoot_deg(step) + 1.5
+    # By how much depends on the parts of the face that the gaze is on while the head turns.
+    assert overshoot_deg(step_by_newest) > max(0.0, overshoot_deg(step) + 0.8)
     settled = ARRIVED_S + 0.25
     off = [np.median(seen.off_deg[seen.t_s > settled][:100]) for seen in (step, step_by_newest)]
     assert off[1] > 2.0 * off[0]

@@ -46,7 +46,7 @@ def boxes(tmp_path: Path) -> PartBoxes:
 
 def walked(count: int, seed: int, dwell_s: float | None = None) -> Iterator[tuple[str, float]]:
     """Parts and dwell times of the known walk."""
-    params = ScanpathParams(dwell_distribution="gamma", min_dwell_ms=0.0)
+    params = ScanpathParams(dwell_distribution="gamma", min_dwell_ms=0.0, diagonal="refixation")
     walk = markov_walk(params, WALK, np.random.default_rng(seed))
     part = 5
     for _ in range(count):

@@ -13,16 +13,17 @@ from gazerig.gaze.scanpath_models import MarkovWalk
 from gazerig.gaze.types import PARTS, Bodies, Face, Percept, Target
 
 WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
-NO_FLOOR = ScanpathParams(min_dwell_ms=0.0)
+PRINTED = ScanpathParams(min_dwell_ms=0.0, diagonal="refixation", start="as_walk")
+"""The walk as the paper has it."""
 
 
-def walker(seed: int = 1, params: ScanpathParams = NO_FLOOR) -> Scanpath:
+def walker(seed: int = 1, params: ScanpathParams = PRINTED) -> Scanpath:
     return Scanpath(params, WALK, np.random.default_rng(seed))
 
 
 @cache
 def drawn(count: int) -> np.ndarray:
-    walk, parts = markov_walk(NO_FLOOR, WALK, np.random.default_rng(1)), [0]
+    walk, parts = markov_walk(PRINTED, WALK, np.random.default_rng(1)), [0]
     for _ in range(count):
         parts.append(walk.next_part(parts[-1]))
     return np.array(parts)
@@ -78,7 +79,7 @@ def test_e37_face_time_share() -> None:
 
 
 def test_e40_dwell_times() -> None:
-    walk = markov_walk(NO_FLOOR, WALK, np.random.default_rng(3))
+    walk = markov_walk(PRINTED, WALK, np.random.default_rng(3))
     for part in range(8):
         times = np.array([walk.dwell_s(part) for _ in range(200_000)])
         assert times.min() > 0.0
@@ -86,14 +87,12 @@ def test_e40_dwell_times() -> None:
         assert times.std() == pytest.approx(WALK.dwell_sd_s[part], rel=0.10)
 
 
-def test_floor_and_tempo() -> None:
+def test_tempo() -> None:
     def walk(seed: int, params: ScanpathParams) -> MarkovWalk:
         return markov_walk(params, WALK, np.random.default_rng(seed))
 
-    floored = walk(4, ScanpathParams(min_dwell_ms=120.0))
-    assert min(floored.dwell_s(2) for _ in range(2000)) == 0.12
-    slow = walk(5, ScanpathParams(min_dwell_ms=0.0, rate_scale=0.5))
-    quick = walk(5, NO_FLOOR)
+    slow = walk(5, replace(PRINTED, rate_scale=0.5))
+    quick = walk(5, PRINTED)
     assert slow.dwell_s(1) == pytest.approx(2.0 * quick.dwell_s(1))
 
 
@@ -138,3 +137,87 @@ def test_wrong_shapes_are_named() -> None:
         replace(WALK, matrix=(*WALK.matrix[:7], (0.0,) * 8))
     with pytest.raises(ValueError, match="8 numbers each"):
         replace(WALK, dwell_sd_s=(0.1,))
+
+
+# ---- rests as the default robot makes them ----------------------------------------------
+
+
+def rests(count: int, rate_scale: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+    """Return the parts of a walk in their order of the matrix, and the rest on each."""
+    walk = markov_walk(ScanpathParams(rate_scale=rate_scale), WALK, np.random.default_rng(4))
+    parts, times, part = [], [], 0
+    for _ in range(count):
+        part = walk.next_part(part)
+        parts.append(part)
+        times.append(walk.dwell_s(part))
+    return np.array(parts), np.array(times)
+
+
+def test_rests_are_never_short_and_keep_the_rate_of_the_table() -> None:
+    params = ScanpathParams()
+    parts, times = rests(40_000)
+    assert (np.diff(parts) != 0).all()
+    assert times.min() >= params.min_dwell_ms / 1e3
+    assert (times < 0.15).mean() < 0.08
+    visit_s = times.mean() + params.shift_ms / 1e3
+    assert visit_s == pytest.approx(0.2715, rel=0.01)
+    assert np.histogram(times, np.arange(0.0, 2.0, 0.01))[0].max() / len(times) < 0.13
+
+
+def test_parts_are_visited_for_as_long_as_in_the_table_but_for_the_two_shortest() -> None:
+    parts, times = rests(40_000)
+    visits = [times[parts == part].mean() + ScanpathParams().shift_ms / 1e3 for part in range(8)]
+    table = (0.244, 0.480, 0.173, 0.261, 0.288, 0.286, 0.286, 0.165)
+    for name, visit, wanted in zip(WALK.order, visits, table, strict=True):
+        low, high = (1.15, 1.35) if name in ("LE", "UP") else (0.9, 1.0)
+        assert low * wanted < visit < high * wanted, name
+
+
+@pytest.mark.parametrize("rate_scale", [0.5, 1.1])
+def test_a_rate_that_rests_allow_is_kept(rate_scale: float) -> None:
+    _, times = rests(20_000, rate_scale=rate_scale)
+    visit_s = times.mean() + ScanpathParams().shift_ms / 1e3
+    assert visit_s == pytest.approx(0.2715 / rate_scale, rel=0.02)
+
+
+def test_a_rate_beyond_the_shortest_rests_is_as_fast_as_they_allow() -> None:
+    _, times = rests(5000, rate_scale=5.0)
+    assert times.min() >= 0.14 and times.mean() == pytest.approx(0.14 * 1.15, rel=0.02)
+
+
+def test_a_walk_with_a_part_that_is_never_left_still_rests() -> None:
+    stuck = replace(WALK, matrix=(*WALK.matrix[:7], (0.0,) * 7 + (1.0,)))
+    walk = markov_walk(ScanpathParams(), stuck, np.random.default_rng(0))
+    assert walk.next_part(7) == 7
+    assert all(0.14 <= walk.dwell_s(part) < 30.0 for part in range(8))
+
+
+@pytest.mark.parametrize("diagonal", ["refixation", "whole_visit"])
+def test_any_reading_begins_at_the_shortest_dwell_and_keeps_the_means_above(diagonal: str) -> None:
+    params = ScanpathParams(diagonal=diagonal, min_dwell_ms=100.0)  # type: ignore[arg-type]
+    walk = markov_walk(params, WALK, np.random.default_rng(6))
+    for part, mean_s in enumerate(WALK.dwell_mean_s):
+        times = np.array([walk.dwell_s(part) for _ in range(20_000)])
+        assert times.min() >= 0.1
+        assert (times == times.min()).sum() == 1  # drawn, not cut off
+        if mean_s > 0.15:
+            assert times.mean() == pytest.approx(mean_s, rel=0.12)
+
+
+@pytest.mark.parametrize(
+    ("gaze_m", "part"),
+    [((1.0, -0.5, 0.2), "first"), ((1.0, 0.9, 0.2), "last"), ((0.5, 0.015, 0.2), "RE")],
+)
+def test_a_face_is_entered_at_the_part_nearest_to_the_gaze(
+    gaze_m: tuple[float, float, float], part: str
+) -> None:
+    # The parts of FACE stand in a row, the first in the middle, the last farthest to the left.
+    walk = walker(6, ScanpathParams())
+    wanted = {"first": PARTS[0], "last": PARTS[-1], "RE": PARTS[3]}[part]
+    head = (0.0, 0.0, 0.2)
+    assert walk.wander(TARGET, PERCEPT, 0.0, False, head, gaze_m).part == wanted
+    # Once on the face, the walk goes on from where it is, wherever the gaze points.
+    assert walk.wander(TARGET, PERCEPT, 0.1, False, head, (0.0, 1.0, 0.2)).part == wanted
+    away = TARGET._replace(kind="away")
+    assert walk.wander(away, PERCEPT, 0.2, True, head, (1.0, 0.9, 0.2)).part is None
+    assert walk.wander(TARGET, PERCEPT, 0.3, True, head, (1.0, 0.9, 0.2)).part == PARTS[-1]

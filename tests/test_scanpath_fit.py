@@ -15,7 +15,9 @@ WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
 
 def walked(count: int, seed: int = 1, dwell_distribution: str = "gamma") -> list[PartFixation]:
     """Fixations of the known walk, 20 ms of flight between them."""
-    params = ScanpathParams(min_dwell_ms=0.0, dwell_distribution=dwell_distribution)
+    params = ScanpathParams(
+        min_dwell_ms=0.0, diagonal="refixation", dwell_distribution=dwell_distribution
+    )
     walk = markov_walk(params, WALK, np.random.default_rng(seed))
     part, t_s, out = 5, 0.0, []
     for _ in range(count):

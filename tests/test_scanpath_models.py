@@ -202,7 +202,7 @@ def test_whole_visit_shares_of_steps_and_rate() -> None:
 
 
 def test_refixations_give_a_human_rate_of_gaze_shifts() -> None:
-    looks = looks_of(ScanpathParams(min_dwell_ms=0.0), 450.0, 0.003)
+    looks = looks_of(ScanpathParams(min_dwell_ms=0.0, diagonal="refixation"), 450.0, 0.003)
     shifts = sum(a.shift != b.shift for a, b in zip(looks, looks[1:], strict=False)) / 450.0
     assert shifts == pytest.approx(3.68, abs=0.2)
 

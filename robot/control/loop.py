@@ -12,7 +12,7 @@ from gazerig.gaze.aversion import Aversion
 from gazerig.gaze.lids import Lids
 from gazerig.gaze.oculomotor import Oculomotor
 from gazerig.gaze.scanpath import Scanpath
-from gazerig.gaze.types import Percept
+from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import TargetChooser
 from gazerig.robot.control.command_choices import (
@@ -106,6 +106,7 @@ class Robot:
         self._gestures = gestures
         self._guard = guard
         self._settled = True
+        self._gaze_m: Vec3 | None = None
         self._commands = CommandQueue()
         self._lead = Lead()
         self._messages: list[str] = messages if messages is not None else []
@@ -206,8 +207,9 @@ class Robot:
         self._poses.remember(t_s, pose.head_rad, pose.base_rad, pose.R_world_head)
         self._looks.known = Known(pose)
         self.attention.reset(t_s)
-        self._scanpath.reset(t_s)
         self._aversion.reset(t_s)
+        self._scanpath.reset(t_s)
+        self._gaze_m = None
         self._oculomotor.reset(t_s, pose)
         self._animation.reset(t_s)
         self._executor.reset()
@@ -230,11 +232,13 @@ class Robot:
         chosen = self.attention.choose(percept, pose, t_s)
         self._executor.gesture_by_rule(chosen, t_s)
         target = self._lead.target(chosen, percept, t_s)
-        target = self._scanpath.wander(target, percept, t_s, self._settled, pose.p_world_head_m)
-        target = self._aversion.step(target, pose.p_world_head_m, t_s)
+        target = self._aversion.step(target, pose.p_world_head_m, t_s, self._lead.active)
+        target = self._scanpath.wander(
+            target, percept, t_s, self._settled, pose.p_world_head_m, self._gaze_m
+        )
         offset = self._animation.step(t_s)
         gaze = self._oculomotor.step(target, pose, t_s, dt_s, offset)
-        self._settled = gaze.phase != "saccade"
+        self._settled, self._gaze_m = gaze.phase != "saccade", gaze.gaze_point_world_m
         desired = self._lead.pose_rad or self._kinematics.inverse(gaze, offset.joints_rad)
         if stopped := self._stop.why:
             self._stop.keep_released(self.body, joints, t_s)
