@@ -32,6 +32,7 @@ def test_e67_a_judge_finds_our_saccades_and_hardly_any_other(name: str, run: Exp
     # A rest in which nothing was commanded is none of ours either.
     later = run._replace(commanded=run.commanded + 0.15)
     assert marks(later, seen).ours.mean() < 0.75
+    assert run.fast.mean() < 0.1
 
 
 def test_a_saccade_that_nobody_commanded_is_not_ours(run: Exported) -> None:

@@ -22,9 +22,13 @@ def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, floa
     for scene in SCENES:
         runs = [exported(run(scene, seed=seed, seconds=seconds)) for seed in seeds]
         for name, judge in JUDGES.items():
-            each = [marks(one, judge(one)) for one in runs]
+            seen = [judge(one) for one in runs]
+            each = [marks(*pair) for pair in zip(runs, seen, strict=True)]
+            all_of_it = [marks(*pair, True) for pair in zip(runs, seen, strict=True)]
             out[f"{scene}, {name}: found, %"] = _percent([mark.ours for mark in each])
             out[f"{scene}, {name}: not ours, %"] = _percent([~mark.theirs for mark in each])
+            every = [~mark.theirs for mark in all_of_it]
+            out[f"{scene}, {name}: not ours, fast following too, %"] = _percent(every)
     return out
 
 

@@ -24,6 +24,10 @@ THRESHOLD_DEG_S = 35.0
 """Of Engbert & Kliegl's ellipse. They take six times the noise of a recording at rest, which here
 would be less than a person's walk; this is six times that of a head-worn tracker (0.08 deg)."""
 
+FAST_DEG_S, _AROUND_S = 25.0, 0.1
+"""What is followed faster than this, and what is that near to it in time, is no judge's case: both
+take smooth motion for saccades there, a person's too."""
+
 _SHORTEST_MS, _FACTOR, _EDGE_S = 15, 6.0, 0.2
 _SMOOTHED_S = 0.026
 """Five samples at 200 Hz. REMoDNaV's own 19 ms would be three, which smooth nothing."""
@@ -35,12 +39,14 @@ class Exported(NamedTuple):
     time_s: (n,); gaze_deg: (n, 2), yaw and pitch in space
     commanded: (m, 2) onset and end of each commanded saccade as the export's events tell them;
     amplitude_deg: (m,) of it
+    fast: (n,) whether what the robot followed moved faster than ``FAST_DEG_S``
     """
 
     time_s: np.ndarray
     gaze_deg: np.ndarray
     commanded: np.ndarray
     amplitude_deg: np.ndarray
+    fast: np.ndarray
 
 
 class Marks(NamedTuple):
@@ -75,7 +81,17 @@ def exported(run: MeasuredRun) -> Exported:
     late = time_s >= BEGIN_S
     kept = (onset >= BEGIN_S + _EDGE_S) & (onset + length <= time_s[-1] - _EDGE_S)
     commanded = np.column_stack([onset, onset + length])[kept]
-    return Exported(time_s[late], gaze[late], commanded, _column(saccades, "amplitude_deg")[kept])
+    amplitude = _column(saccades, "amplitude_deg")[kept]
+    return Exported(time_s[late], gaze[late], commanded, amplitude, _fast(run)[late])
+
+
+def _fast(run: MeasuredRun) -> np.ndarray:
+    """Return (n,) whether the target moves fast about that time, seen from the head."""
+    trace = run.trace
+    speed = np.hypot(trace.column("target_yaw_rate"), trace.column("target_pitch_rate"))
+    around = 2 * round(_AROUND_S * trace.rate_hz) + 1
+    spread = np.convolve(speed > FAST_DEG_S, np.ones(around), mode="same") > 0.5
+    return np.interp(run.angles.time_s, trace.column("t") - trace.column("t")[0], spread) > 0.5
 
 
 def pymovements_saccades(run: Exported) -> np.ndarray:
@@ -116,13 +132,26 @@ def remodnav_saccades(run: Exported) -> np.ndarray:
 JUDGES: dict[str, Judge] = {"pymovements": pymovements_saccades, "remodnav": remodnav_saccades}
 
 
-def marks(run: Exported, seen: np.ndarray) -> Marks:
-    """Compare a judge's saccades with ours."""
+def marks(run: Exported, seen: np.ndarray, with_fast: bool = False) -> Marks:
+    """Compare a judge's saccades with ours.
+
+    Args:
+        run: what was judged.
+        seen: (k, 2) onset and end of the judge's saccades.
+        with_fast: also those during fast following.
+    """
     seen = seen[(seen[:, 0] >= run.time_s[0] + _EDGE_S) & (seen[:, 1] <= run.time_s[-1] - _EDGE_S)]
     over: np.ndarray = (seen[None, :, 0] <= run.commanded[:, None, 1]) & (
         seen[None, :, 1] >= run.commanded[:, None, 0]
     )
-    return Marks(np.any(over, axis=1), seen, np.any(over, axis=0))
+    ours, theirs = _judged(run, run.commanded, with_fast), _judged(run, seen, with_fast)
+    return Marks(np.any(over, axis=1)[ours], seen[theirs], np.any(over, axis=0)[theirs])
+
+
+def _judged(run: Exported, spans: np.ndarray, with_fast: bool) -> np.ndarray:
+    """Return (k,) whether each of these spans counts."""
+    at = np.searchsorted(run.time_s, 0.5 * (spans[:, 0] + spans[:, 1]))
+    return np.full(len(spans), True) if with_fast else ~run.fast[np.minimum(at, len(run.fast) - 1)]
 
 
 def _rate_hz(run: Exported) -> float:
