@@ -137,6 +137,26 @@ def ideal_servos() -> Iterator[None]:
 
 
 @pytest.fixture
+def unlaid_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Draw figures without finding room for their labels, in less than half the time.
+
+    tests/test_report.py draws all of them as users see them.
+    """
+    from gazerig.robot.report import plotting
+
+    monkeypatch.setattr(plotting, "_LAYOUT", None)
+
+
+@pytest.fixture
+def few_drawings(unlaid_figures: None, monkeypatch: pytest.MonkeyPatch) -> int:
+    """Draw the first three figures alone: all of them take longest, and are drawn elsewhere."""
+    from gazerig.robot.report import report
+
+    monkeypatch.setattr(report, "DRAWINGS", report.DRAWINGS[:3])
+    return 3
+
+
+@pytest.fixture
 def simulated_wires(request: pytest.FixtureRequest) -> Iterator[None]:
     """Have emulated buses in this process and in simulated time; see simulated_wires.py.
 

@@ -115,14 +115,8 @@ def hard(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.fixture
-def few_drawings(monkeypatch: pytest.MonkeyPatch) -> int:
-    """Draw the first three figures alone: all of them take longest, and are drawn elsewhere."""
-    monkeypatch.setattr(build, "DRAWINGS", build.DRAWINGS[:3])
-    return 3
-
-
 @pytest.mark.slow
+@pytest.mark.usefixtures("unlaid_figures")
 def test_two_recordings_on_the_command_line(soft: Path, hard: Path, tmp_path: Path) -> None:
     out, runner = tmp_path / "both.html", CliRunner()
     done = runner.invoke(app, ["compare", str(soft), str(hard), "--out", str(tmp_path / "both")])

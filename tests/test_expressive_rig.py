@@ -88,6 +88,7 @@ def test_a_recorded_face_is_rerun_with_the_same_angles(
     assert len([c for t in ticks for c in t.commands]) == 30
 
 
+@pytest.mark.usefixtures("few_drawings")
 def test_it_is_exported_and_reported(
     recorded: tuple[RunRecording, list[Tick]], tmp_path: Path
 ) -> None:

@@ -238,6 +238,7 @@ def test_the_whole_report_is_written(walking: GazeTrace, tmp_path: Path) -> None
 HOSTILE = "<img src=x onerror=alert(1)> $\\frac{$"
 
 
+@pytest.mark.usefixtures("unlaid_figures")
 def test_names_are_never_markup_nor_formulas(walking: GazeTrace) -> None:
     about = RunHeader(HOSTILE, (("rig", HOSTILE), (HOSTILE, "x")), warnings=(HOSTILE,))
     findings = build.found(walking)
@@ -252,6 +253,7 @@ def test_names_are_never_markup_nor_formulas(walking: GazeTrace) -> None:
         assert "<img src=x" not in page and page.count("&lt;img src=x onerror=alert(1)&gt;") >= 3
 
 
+@pytest.mark.usefixtures("unlaid_figures")
 @pytest.mark.parametrize("drawing", DRAWINGS, ids=[d.key for d in DRAWINGS])
 def test_a_figure_of_nothing_says_so(drawing: object) -> None:
     assert png(drawing, [Shown("none", EMPTY, COLOURS[0])])[:4] == b"\x89PNG"  # type: ignore[arg-type]

@@ -221,6 +221,7 @@ def quiet(words: str, share: float) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unlaid_figures")
 def test_a_report_of_estimated_joints_says_so_everywhere(maker: Run, tmp_path: Path) -> None:
     out = tmp_path / "six.html"
     made = build.report(maker.ticks, RunHeader("six"), out, quiet)
@@ -248,6 +249,7 @@ def test_a_report_of_measured_joints_claims_it(desk: Run) -> None:
     assert np.isnan(run.column("lower_lid")).all() and np.isfinite(run.column("lid")).all()
 
 
+@pytest.mark.usefixtures("unlaid_figures")
 def test_a_measured_run_beside_a_estimated_one_is_warned_of(
     maker: Run, desk: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -29,6 +29,9 @@ _STYLE: Any = {
     "figure.facecolor": "white",
 }  # fmt: skip
 _DPI = 110
+_LAYOUT: Literal["constrained"] | None = "constrained"
+"""Finds room for all labels, which takes most of the time of drawing; tests do without."""
+
 _Corner = Literal["upper left", "upper right", "lower right", "center right"]
 
 
@@ -73,7 +76,7 @@ def png(drawing: Drawing, runs: Sequence[Shown]) -> bytes:
 def png_of(draw: Callable[[Figure], None], size_in: tuple[float, float]) -> bytes:
     """Return what a function draws into an empty figure in the style of all figures."""
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=size_in, dpi=_DPI, layout="constrained")
+        figure = Figure(figsize=size_in, dpi=_DPI, layout=_LAYOUT)
         canvas = FigureCanvasAgg(figure)
         draw(figure)
         out = BytesIO()
