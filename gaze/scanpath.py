@@ -92,11 +92,11 @@ class ScanpathParams:
         "(whole_visit), or another dwell that makes one rest with the last, spread by rest_spread (one_rest)"] = "one_rest"
     dwell_distribution: Annotated[str, Choices(*LAWS), "distribution of the dwell times"] = "lognormal"
     min_dwell_ms: Annotated[float, Bounds(0, 2000),
-        "shortest dwell, from landing to departure; what lasts longer is distributed above it, with the same mean"] = 140.0
+        "shortest dwell, from landing to departure; what lasts longer is distributed above it, with the same mean"] = 130.0
     rest_spread: Annotated[float, Bounds(0.05, 3),
         "with diagonal one_rest: standard deviation over mean of what a rest lasts beyond min_dwell_ms"] = 0.6
     shift_ms: Annotated[float, Bounds(0, 500),
-        "with diagonal one_rest: duration of a shift between parts, which the times of the table include"] = 57.0
+        "with diagonal one_rest: duration of a shift between parts, which the times of the table include"] = 44.0
     rate_scale: Annotated[float, Bounds(0.1, 10), "dwell times are divided by this: with 2 the gaze wanders twice as fast"] = 1.0
     simple_order: Annotated[tuple[str, ...], Choices(*PARTS), "order of the parts in the simple model"] = ("N", "RE", "LE")
     simple_dwell_ms: Annotated[tuple[float, ...], Bounds(1, 60000), "dwell on each part of simple_order"] = (459.42, 408.21, 408.21)

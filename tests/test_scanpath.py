@@ -158,7 +158,7 @@ def test_rests_are_never_short_and_keep_the_rate_of_the_table() -> None:
     parts, times = rests(40_000)
     assert (np.diff(parts) != 0).all()
     assert times.min() >= params.min_dwell_ms / 1e3
-    assert (times < 0.15).mean() < 0.08
+    assert (times < 0.14).mean() < 0.04  # which servos and ticks make 150 ms
     visit_s = times.mean() + params.shift_ms / 1e3
     assert visit_s == pytest.approx(0.2715, rel=0.01)
     assert np.histogram(times, np.arange(0.0, 2.0, 0.01))[0].max() / len(times) < 0.13
@@ -169,7 +169,7 @@ def test_parts_are_visited_for_as_long_as_in_the_table_but_for_the_two_shortest(
     visits = [times[parts == part].mean() + ScanpathParams().shift_ms / 1e3 for part in range(8)]
     table = (0.244, 0.480, 0.173, 0.261, 0.288, 0.286, 0.286, 0.165)
     for name, visit, wanted in zip(WALK.order, visits, table, strict=True):
-        low, high = (1.15, 1.35) if name in ("LE", "UP") else (0.9, 1.0)
+        low, high = (1.05, 1.2) if name in ("LE", "UP") else (0.95, 1.0)
         assert low * wanted < visit < high * wanted, name
 
 
@@ -182,14 +182,14 @@ def test_a_rate_that_rests_allow_is_kept(rate_scale: float) -> None:
 
 def test_a_rate_beyond_the_shortest_rests_is_as_fast_as_they_allow() -> None:
     _, times = rests(5000, rate_scale=5.0)
-    assert times.min() >= 0.14 and times.mean() == pytest.approx(0.14 * 1.15, rel=0.02)
+    assert times.min() >= 0.13 and times.mean() == pytest.approx(0.13 * 1.15, rel=0.02)
 
 
 def test_a_walk_with_a_part_that_is_never_left_still_rests() -> None:
     stuck = replace(WALK, matrix=(*WALK.matrix[:7], (0.0,) * 7 + (1.0,)))
     walk = markov_walk(ScanpathParams(), stuck, np.random.default_rng(0))
     assert walk.next_part(7) == 7
-    assert all(0.14 <= walk.dwell_s(part) < 30.0 for part in range(8))
+    assert all(0.13 <= walk.dwell_s(part) < 30.0 for part in range(8))
 
 
 @pytest.mark.parametrize("diagonal", ["refixation", "whole_visit"])

@@ -1,0 +1,67 @@
+"""Mutual gaze without a conversation: bouts of some 3.3 s, entries where the gaze comes from."""
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+import numpy as np
+from human.measured_run import MeasuredRun, Runner
+
+from gazerig.gaze.types import PARTS
+from gazerig.robot.model.face_geometry import PARTS_FACE_M
+
+SCENE = "face-to-face"
+
+WANTED = {
+    "median bout, s": (2.6, 4.0),
+    "spread of bouts, SD of the logarithm": (0.3, 0.75),
+    "longest bout, s": (4.0, 15.0),
+    "median look away, s": (0.3, 1.2),
+    "time on the face, %": (75.0, 92.0),
+    "entries at the nearest part, %": (85.0, 100.0),
+    "entries at the paper's first part, %": (0.0, 40.0),
+}
+
+
+def stays(run: MeasuredRun) -> Iterator[tuple[bool, float, int]]:
+    """Yield whether a complete stay is on the face, its length, and the tick of its beginning."""
+    on = run.part != ""
+    edges = np.flatnonzero(np.diff(on)) + 1
+    for begin, end in pairwise(edges.tolist()):
+        yield bool(on[begin]), float(run.t_s[end] - run.t_s[begin]), begin
+
+
+def nearest(run: MeasuredRun, begin: int) -> set[str]:
+    """Return the parts that are nearest to the gaze of a tick, within the camera's error."""
+    face = run.target_deg[begin] - _part_deg(run, begin, str(run.part[begin]))
+    gaze = run.plan_deg[begin - 1]
+    away = {part: float(np.hypot(*(face + _part_deg(run, begin, part) - gaze))) for part in PARTS}
+    return {part for part, angle in away.items() if angle < min(away.values()) + 0.7}
+
+
+def _part_deg(run: MeasuredRun, at: int, part: str) -> np.ndarray:
+    """Return where a part is on a face that is turned to the head, from the face's centre."""
+    _, left, up = PARTS_FACE_M[part]
+    distance_m = np.linalg.norm(run.target_m[at] - run.head_m[at])
+    # The owner's left is on the right of who looks.
+    return np.degrees(np.array([-left, up]) / distance_m)
+
+
+def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+    """Return the figures over all seeds."""
+    runs = [run(SCENE, seed=seed, seconds=seconds) for seed in seeds]
+    every = [(one, *stay) for one in runs for stay in stays(one)]
+    bouts = np.array([seconds for _, on, seconds, _ in every if on])
+    away = np.array([seconds for _, on, seconds, _ in every if not on])
+    entries = [(one, begin) for one, on, _, begin in every if on]
+    return {
+        "median bout, s": float(np.median(bouts)),
+        "spread of bouts, SD of the logarithm": float(np.log(bouts).std()),
+        "longest bout, s": float(bouts.max()),
+        "median look away, s": float(np.median(away)),
+        "time on the face, %": 100.0 * float(np.mean([(one.part != "").mean() for one in runs])),
+        "entries at the nearest part, %": 100.0
+        * float(np.mean([one.part[begin] in nearest(one, begin) for one, begin in entries])),
+        "entries at the paper's first part, %": 100.0
+        * float(np.mean([one.part[begin] == "FR" for one, begin in entries])),
+        "bouts": float(len(bouts)),
+    }

@@ -1,0 +1,45 @@
+"""Rests on a face and looks away from it in a running robot; the long form is tests/human."""
+
+import numpy as np
+import pytest
+from human.measured_run import MeasuredRun, measured_run
+from human.row_03_rests import TABLE_S, beyond_the_law, visits
+from human.row_09_mutual_gaze import nearest, stays
+
+
+@pytest.fixture(scope="module")
+def run() -> MeasuredRun:
+    # Rests are those of the plan, which servos without bytes show as well.
+    return measured_run("face-to-face", seconds=45.0, bus="ideal")
+
+
+def test_e63_rests_on_a_face_are_as_the_table_and_seldom_short(run: MeasuredRun) -> None:
+    found = visits(run)
+    rests = np.array([visit.rest_s for visit in found])
+    lasting = np.array([visit.seconds for visit in found])
+    assert len(found) > 100
+    assert 1.0 / lasting.mean() == pytest.approx(3.69, rel=0.1)
+    assert (rests < 0.15 - 1e-6).mean() <= 0.08
+    # Of 120 rests a slot of 10 ms has .03 more than the law's by chance.
+    assert beyond_the_law(rests, [visit.part for visit in found]) < 0.09
+    for part in ("FL", "N", "RE"):
+        of = lasting[[visit.part == part for visit in found]]
+        assert of.mean() == pytest.approx(TABLE_S[part], rel=0.45), part
+
+
+def test_e63_a_floor_by_max_is_seen_by_the_measure() -> None:
+    rests = np.maximum(np.random.default_rng(0).lognormal(-2.2, 1.0, 200), 0.125)
+    assert beyond_the_law(rests, ["RE"] * 200) > 0.3
+
+
+def test_e69_a_face_is_left_after_bouts_and_entered_where_the_gaze_comes_from(
+    run: MeasuredRun,
+) -> None:
+    every = list(stays(run))
+    bouts = [seconds for on, seconds, _ in every if on]
+    away = [seconds for on, seconds, _ in every if not on]
+    assert len(bouts) >= 7 and 2.0 < np.median(bouts) < 5.0 and max(bouts) < 15.0
+    assert 0.25 < np.median(away) < 1.2
+    entries = [begin for on, _, begin in every if on]
+    assert all(run.part[begin] in nearest(run, begin) for begin in entries)
+    assert len({run.part[begin] for begin in entries}) >= 3
