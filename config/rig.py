@@ -27,7 +27,7 @@ from gazerig.gaze.idle import IdleParams
 from gazerig.gaze.level import LevelParams
 from gazerig.gaze.lids import LidParams
 from gazerig.gaze.oculomotor import OculomotorParams
-from gazerig.gaze.pursuit import PursuitParams
+from gazerig.gaze.pursuit_params import PursuitParams
 from gazerig.gaze.saccade import SaccadeParams
 from gazerig.gaze.scanpath import ScanpathParams
 from gazerig.gaze.top_down import TopDownParams

@@ -16,14 +16,11 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402  # the backend must be chosen before
 
 from gazerig.config.schema import load_rig, load_walk  # noqa: E402
-from gazerig.gaze.binocular import (  # noqa: E402
-    AT_REST,
-    BinocularController,
-    BinocularParams,
-    HeadMotion,
-)
+from gazerig.gaze.angles import rotation  # noqa: E402
+from gazerig.gaze.binocular import BinocularController  # noqa: E402
 from gazerig.gaze.head import HeadModel, HeadParams  # noqa: E402
 from gazerig.gaze.lids import LidParams, Lids  # noqa: E402
+from gazerig.gaze.pursuit_params import PursuitParams  # noqa: E402
 from gazerig.gaze.saccade import SaccadeModel, SaccadeParams  # noqa: E402
 from gazerig.gaze.scanpath import ScanpathParams, markov_walk, normalised  # noqa: E402
 from gazerig.gaze.types import PART_NAMES  # noqa: E402
@@ -115,38 +112,45 @@ def head_goal() -> None:
 
 
 def followed(
-    left: Callable[[float], float | None],
-    right: Callable[[float], float | None],
+    where: Callable[[float], tuple[float, float] | None],
     seconds: float,
-    head: Callable[[float], HeadMotion] = lambda t: AT_REST,
+    head: Callable[[float], float] = lambda t: 0.0,
+    start: tuple[float, float] = (0.0, 0.0),
 ) -> np.ndarray:
-    """Run the binocular controller on a target; return time, version, vergence (degrees)."""
-    controller = BinocularController(BinocularParams())
-    controller.reset(0.0)
-    rows = []
-    for k in range(round(seconds / TICK_S)):
-        seen = [None if a is None else radians(a) for a in (left(k * TICK_S), right(k * TICK_S))]
-        controller.step(seen[0], seen[1], head(k * TICK_S), TICK_S)
-        rows.append(((k + 1) * TICK_S, controller.version_rad, controller.vergence_rad))
-    table = np.array(rows)
-    table[:, 1:] = np.degrees(table[:, 1:])
-    return table
+    """Run the binocular controller of the profile mitake; return time, version, vergence (degrees).
+
+    where: version and vergence that the target asks for, None: not seen; head: its yaw, degrees
+    """
+
+    def eyes(version: float, vergence: float) -> tuple[tuple[float, float], tuple[float, float]]:
+        return (radians(version - vergence / 2), 0.0), (radians(version + vergence / 2), 0.0)
+
+    controller, rows = BinocularController(PursuitParams(model="binocular")), []
+    for k in range(round((seconds + 1.0) / TICK_S)):
+        t = k * TICK_S - 1.0
+        seen = where(t - controller.delay_s) if t >= controller.delay_s else start
+        if where(0.0) is None:
+            seen = None
+        R = rotation((radians(head(max(0.0, t))), 0.0, 0.0))
+        if k == 0:
+            controller.hold(eyes(*start), None if seen is None else eyes(*seen), R, t)
+        left, right = controller.step(None if seen is None else eyes(*seen), R, t, TICK_S)
+        if t >= 0.0:
+            version, vergence = 0.5 * (left[0] + right[0]), right[0] - left[0]
+            rows.append((t + TICK_S, degrees(version), degrees(vergence)))
+    return np.array(rows)
 
 
 def pursuit() -> None:
     """Following a ramp and a sine that are seen 0.1 s late."""
     figure, (left, right) = plt.subplots(1, 2, figsize=(9.0, 3.4))
     for speed in (10.0, 20.0, 30.0):
-        t, version, _ = followed(lambda t, v=speed: v * t, lambda t, v=speed: v * t, 0.8).T
+        t, version, _ = followed(lambda t, v=speed: (v * t, 0.0), 0.8).T
         left.plot(t, np.gradient(version, t), label=f"{speed:.0f} deg/s")
     left.axvline(0.1, color=HUMAN, ls="--", label="human latency, 100 ms (Robinson 1986)")
     left.set(xlabel="s", ylabel="eye speed, deg/s", title="ramps")
     for hz, style in ((0.2, "-"), (0.5, "--")):
-        t, version, _ = followed(
-            lambda t, f=hz: 5 * np.sin(2 * np.pi * f * t),
-            lambda t, f=hz: 5 * np.sin(2 * np.pi * f * t),
-            5.0,
-        ).T
+        t, version, _ = followed(lambda t, f=hz: (5 * np.sin(2 * np.pi * f * t), 0.0), 5.0).T
         right.plot(t, version, INK, ls=style, label=f"eye, {hz} Hz")
         right.plot(t, 5 * np.sin(2 * np.pi * hz * t), HUMAN, ls=style, lw=0.8, label="target")
     right.set(xlabel="s", ylabel="deg", title="sines")
@@ -159,15 +163,8 @@ def vergence() -> None:
     """Steps in depth: converging and diverging by 4 deg."""
     figure, axes = plt.subplots(figsize=(4.8, 3.2))
     for start, step in ((2.0, 4.0), (8.0, -4.0)):
-        controller = BinocularController(BinocularParams())
-        controller.reset(0.0, 0.0, radians(start))
-        half = radians(start + step) / 2
-        values = []
-        for _ in range(400):
-            controller.step(-half, half, AT_REST, TICK_S)
-            values.append(degrees(controller.vergence_rad))
-        times = TICK_S * np.arange(1, 401)
-        axes.plot(times, values, label=f"{start:.0f} to {start + step:.0f} deg")
+        t, _, values = followed(lambda t, v=start + step: (0.0, v), 2.0, start=(0.0, start)).T
+        axes.plot(t, values, label=f"{start:.0f} to {start + step:.0f} deg")
     axes.set(xlabel="s", ylabel="vergence, deg", title="vergence: slower apart than together")
     axes.legend(fontsize=7)
     saved("vergence", figure)
@@ -175,12 +172,7 @@ def vergence() -> None:
 
 def reflex() -> None:
     """The eye against a head that swings in the dark."""
-
-    def head(t: float) -> HeadMotion:
-        w = 2 * np.pi * 0.5
-        return HeadMotion(radians(10 * np.sin(w * t)), radians(10 * w * np.cos(w * t)))
-
-    t, version, _ = followed(lambda t: None, lambda t: None, 4.0, head).T
+    t, version, _ = followed(lambda t: None, 4.0, lambda t: 10 * np.sin(np.pi * t)).T
     swing = 10 * np.sin(np.pi * t)
     figure, axes = plt.subplots(figsize=(4.8, 3.2))
     axes.plot(t, swing, HUMAN, label="head, 0.5 Hz")

@@ -63,6 +63,14 @@ def unit(a: Vec3) -> Vec3:
     return (x / length, y / length, z / length)
 
 
+def no_nearer(point: Vec3, eye: Vec3, least_m: float) -> Vec3:
+    """Return a point, moved straight away from the eye where it is nearer than a distance."""
+    x, y, z = point[0] - eye[0], point[1] - eye[1], point[2] - eye[2]
+    if sqrt(x * x + y * y + z * z) >= least_m:
+        return point
+    return add(eye, scale(unit((x, y, z)), least_m))
+
+
 def direction(yaw_pitch_rad: Angles2) -> Vec3:
     """Return the unit vector with a yaw and pitch."""
     yaw, pitch = yaw_pitch_rad

@@ -1,205 +1,291 @@
-"""Binocular controller in eye angles: pursuit, vergence and vestibulo-ocular reflex.
+"""Binocular controller: pursuit, vergence and vestibulo-ocular reflex of both eyes.
 
-Zhang & Wakamatsu's structure, as a pure model of the human system with the delay of its
-own sensors: one conjugate control and one vergence control over a shared integrator,
-the efference copy that takes the delay out of the loop, a covered eye that goes with
-the seeing one, and the reflex against the motion of the head. The head on the desk,
-whose frames are placed in space at their time of capture, runs the same two controls in
-gaze space (gaze.pursuit). Head frame; yaw + left, or pitch + up with one value for both
-eyes; radians inside, degrees and milliseconds in the parameters.
+Zhang & Wakamatsu's controller, which Mitake et al. 3.3.5 use and the profile mitake runs; its
+gains are not public, its structure is. The sum of both eyes is controlled by a conjugate channel,
+their difference by a vergence channel with dynamics of its own. A frame tells where in space the
+target was when it was taken (efference copy), which is smoothed and compared with the gaze of
+now, so that no delay remains in the loop:
+
+    w = d(S_f)/dt,  u_c = Gp sat(w) + Kc sat(S_f - G),  u_d = Kd (V_demand - V)
+
+S_f: smoothed direction of the target, G: direction of the gaze, V: vergence. The reflex turns
+the eyes against the head, by the inverse of its rotation and not by opposite angles, which err
+by degrees. Directions are unit vectors in the world, so that a channel needs no axes.
+
+tests/reference has the same controller in angles of one axis, with two covered eyes and with
+feedback of the delayed error alone; both are held to the same numbers.
 """
 
 from collections import deque
-from dataclasses import dataclass
-from math import radians
-from typing import Annotated, Literal, NamedTuple
+from collections.abc import Callable
+from math import exp, radians, sqrt, tan
+from typing import NamedTuple, Protocol
 
-from gazerig.gaze.angles import clip
-from gazerig.gaze.channels import ConjugateChannel, LeakyIntegrator, VergenceChannel
-from gazerig.gaze.vestibular import SemicircularCanals, distance_m, translational_rad_s
-from gazerig.params import Bounds
+from gazerig.gaze.angles import (
+    add,
+    direction,
+    no_nearer,
+    norm,
+    rotate,
+    rotate_back,
+    scale,
+    sub,
+    unit,
+    yaw_pitch,
+)
+from gazerig.gaze.pursuit_params import PursuitParams
+from gazerig.gaze.types import Angles2, Mat3, Target, Vec3
 
+Eyes = tuple[Angles2, Angles2]
+"""(yaw, pitch) of the left and right eye in the head, rad."""
 
-@dataclass(frozen=True)
-class BinocularParams:
-    """Gains, delays and ranges."""
-
-    # fmt: off
-    delay_ms: Annotated[float, Bounds(0, 500), "delay tau_c of seeing"] = 100.0
-    smooth_ms: Annotated[float, Bounds(0.1, 500), "smoothing Tf of what is seen"] = 40.0
-    velocity_gain: Annotated[float, Bounds(0, 1.2), "share Gp of the target's speed that is taken over at once"] = 0.95
-    max_speed_deg_s: Annotated[float, Bounds(1, 200), "fastest pursuit v_max"] = 60.0
-    reject_deg_s: Annotated[float, Bounds(1, 1000), "faster than this is a jump of the target and not a motion, v_rej"] = 100.0
-    gain_1_s: Annotated[float, Bounds(0, 50), "conjugate gain Kc"] = 8.0
-    max_error_deg: Annotated[float, Bounds(0.1, 180), "largest error e_max that counts; larger ones are saccades"] = 5.0
-    lead_ms: Annotated[float, Bounds(0, 100), "lead h on a moving target"] = 0.0
-    vergence_delay_ms: Annotated[float, Bounds(0, 500), "delay tau_d of vergence"] = 160.0
-    converge_1_s: Annotated[float, Bounds(0, 50), "vergence gain Kd"] = 4.0
-    diverge_1_s: Annotated[float, Bounds(0, 50), "gain Kdiv when diverging"] = 3.0
-    max_vergence_deg: Annotated[float, Bounds(1, 60), "largest vergence"] = 20.0
-    hold_s: Annotated[float, Bounds(0, 600), "time constant T_N of gaze holding; 0 holds for ever, 25 in the dark"] = 0.0
-    fade_ms: Annotated[float, Bounds(1, 5000), "decay of the eye's speed when the target is lost"] = 300.0
-    vor_gain: Annotated[float, Bounds(0, 1.5), "gain of the reflex; people .95"] = 1.0
-    vor_delay_ms: Annotated[float, Bounds(0, 100), "delay tau_vor of the reflex"] = 10.0
-    storage_s: Annotated[float, Bounds(0, 600), "velocity storage T_vs; 0 with a perfect gyroscope"] = 16.0
-    servo_lead_ms: Annotated[float, Bounds(0, 30), "lead for the servos' own lag"] = 0.0
-    interocular_mm: Annotated[float, Bounds(10, 500), "between the eye centres"] = 61.9
-    eye_limit_deg: Annotated[float, Bounds(1, 90), "largest eye rotation to the left and to the right"] = 55.0
-    covered: Annotated[Literal["copy", "cross"], "a covered eye goes all the way with the other, or by the crossed path only"] = "copy"
-    efference: Annotated[bool, "know where the eyes were; without it only delayed errors steer"] = True
-    # fmt: on
+_STRAIGHT: Vec3 = (1.0, 0.0, 0.0)
+_NONE: Vec3 = (0.0, 0.0, 0.0)
+_FARTHEST_M = 100.0
+_LOST_S = 0.04
+"""A moving target without a frame for so long is lost from sight, until the next one."""
 
 
-class HeadMotion(NamedTuple):
-    """The head at this moment: yaw and its rate, velocity ahead and left, gate of the reflex."""
+class Version(NamedTuple):
+    """Both eyes as one direction in the head and the angle between them.
 
-    yaw_rad: float = 0.0
-    rate_rad_s: float = 0.0
-    ahead_m_s: float = 0.0
-    left_m_s: float = 0.0
-    gate: float = 1.0
+    ahead: unit vector in the head; vergence_rad: right yaw less left yaw, positive where they meet
+    """
 
-
-class _Moment(NamedTuple):
-    left: float | None
-    right: float | None
-    eye_left: float
-    eye_right: float
-    head: float
+    ahead: Vec3
+    vergence_rad: float
 
 
-AT_REST = HeadMotion()
+class HeadView(NamedTuple):
+    """The head at the time when commands of now take effect, and what its eyes can do.
+
+    eyes_on: returns the eye angles that fixate a point from a pose of the head
+    nearest_m: nearest distance on which the eyes converge
+    """
+
+    R_world_head: Mat3
+    p_head: Vec3
+    eyes_on: Callable[[Vec3, Mat3, Vec3], Eyes]
+    nearest_m: float
+
+    def eyes_to(self, point: Vec3) -> Eyes:
+        """Return the eye angles that fixate a point."""
+        point = no_nearer(point, self.p_head, self.nearest_m)
+        return self.eyes_on(point, self.R_world_head, self.p_head)
+
+
+class SaccadeState(Protocol):
+    """What the saccades want meanwhile (gazerig.gaze.saccade_trigger)."""
+
+    @property
+    def waits(self) -> bool:
+        """Return whether a new target has come and its saccade is still to start."""
+        ...
+
+    @property
+    def corrects(self) -> bool:
+        """Return whether an error waits for a corrective saccade."""
+        ...
+
+
+def version_of(eyes: Eyes) -> Version:
+    """Return the mean direction and the vergence of two eyes."""
+    (left_yaw, left_pitch), (right_yaw, right_pitch) = eyes
+    mean = 0.5 * (left_yaw + right_yaw), 0.5 * (left_pitch + right_pitch)
+    return Version(direction(mean), right_yaw - left_yaw)
+
+
+class DelayedSight:
+    """Where a target was a fixed delay ago, from frames that come now and then and are late."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all frames."""
+        self._frames: deque[tuple[float, Vec3, Vec3]] = deque()
+        self._shift = -1
+
+    def place(self, target: Target, t_s: float) -> Vec3 | None:
+        """Return where the target was at a time in the past; None: lost from sight by then.
+
+        A new target is known at once: that it was chosen shows that it has been seen.
+        """
+        frames = self._frames
+        if target.shift != self._shift:
+            self._shift = target.shift
+            frames.clear()
+        if not frames or target.at_s > frames[-1][0]:
+            frames.append((target.at_s, target.p_world_m, target.v_world_m_s))
+        while len(frames) > 1 and frames[1][0] <= t_s + 1e-9:
+            frames.popleft()
+        at_s, p, v = frames[0]
+        if v == _NONE:
+            return p
+        return None if t_s - at_s > _LOST_S else add(p, scale(v, t_s - at_s))
 
 
 class BinocularController:
-    """Controls one axis of both eyes; for the vertical axis both get the same target."""
+    """Controls both eyes between saccades.
 
-    def __init__(self, params: BinocularParams) -> None:
-        par = self._params = params
-        self._conjugate = ConjugateChannel(
-            par.gain_1_s,
-            par.velocity_gain,
-            radians(par.max_error_deg),
-            radians(par.max_speed_deg_s),
-            radians(par.reject_deg_s),
-            par.smooth_ms / 1e3,
-            par.lead_ms / 1e3,
-            par.fade_ms / 1e3,
-        )
-        self._vergence = VergenceChannel(par.converge_1_s, par.diverge_1_s)
-        self._leak = LeakyIntegrator(par.hold_s)
-        self._canals = SemicircularCanals(par.vor_delay_ms / 1e3, par.storage_s)
-        self._limit = radians(par.eye_limit_deg)
-        self.reset(0.0)
+    sight: where the target was a delay ago
+    version: where the eyes are commanded to; started: whether that has been set since the reset
+    """
 
-    def reset(self, t_s: float, version_rad: float = 0.0, vergence_rad: float = 0.0) -> None:
-        """Start at rest at the given eye angles, with no target seen."""
-        self.version_rad, self.vergence_rad = version_rad, vergence_rad
-        self._conjugate.reset()
-        self._canals.reset()
-        self._past: deque[_Moment] = deque()
-        self._eyes = self._angles(0.0, 0.0)
+    def __init__(self, params: PursuitParams) -> None:
+        self.sight = DelayedSight()
+        self.retune(params)
+        self.reset()
+
+    def retune(self, params: PursuitParams) -> None:
+        """Change gains and delays; the eyes and what they have seen stay."""
+        self._params = params
+        self.delay_s = params.delay_ms / 1e3
+        self._smooth_s, self._fade_s = params.smooth_ms / 1e3, params.lost_fade_ms / 1e3
+        self._reflex_delay_s = params.reflex_delay_ms / 1e3
+        self._vergence_delay_s = params.vergence_delay_ms / 1e3
+        self._max_rad_s = radians(params.max_speed_deg_s)
+        self._reject_rad_s = radians(params.reject_deg_s)
+        self._max_error_rad = radians(params.max_error_deg)
+        self._widest_rad = radians(params.max_vergence_deg)
+
+    def reset(self) -> None:
+        """Forget target and head; the eyes begin where ``hold`` sets them, or straight ahead."""
+        self.version = Version(_STRAIGHT, 0.0)
+        self.started = False
+        self.sight.reset()
+        self._seen: Vec3 | None = None
+        self._known = False
+        self._smoothed, self._velocity = _NONE, _NONE
+        self._heads: deque[tuple[float, Mat3]] = deque()
+        self._demands: deque[tuple[float, float]] = deque()
+
+    def fixate(
+        self,
+        target: Target,
+        gaze: Vec3,
+        prescribed: Eyes | None,
+        saccades: SaccadeState,
+        view: HeadView,
+        t_s: float,
+        dt_s: float,
+    ) -> tuple[Eyes, Vec3]:
+        """Return the eye angles for the next period, and the point that they fixate.
+
+        gaze: the point fixated so far, or that a saccade prescribes
+        prescribed: eye angles of a saccade; None: no saccade is under way
+        """
+        place = self.sight.place(target, t_s - self.delay_s)
+        seen = None if place is None else view.eyes_to(place)
+        if prescribed is not None or dt_s <= 0.0 or not self.started:
+            eyes = view.eyes_to(gaze) if prescribed is None else prescribed
+            self.hold(eyes, seen, view.R_world_head, t_s)
+            return eyes, gaze
+        if saccades.waits:
+            seen = None
+        eyes = self.step(seen, view.R_world_head, t_s, dt_s, not saccades.corrects)
+        p_head, ahead = view.p_head, rotate(view.R_world_head, self.version.ahead)
+        one_m = view.eyes_to(add(p_head, ahead))
+        distance = self.distance_m(one_m, norm(sub(target.p_world_m, p_head)))
+        return eyes, add(p_head, scale(ahead, max(distance, view.nearest_m)))
+
+    def hold(self, eyes: Eyes, target: Eyes | None, R_world_head: Mat3, t_s: float) -> None:
+        """Take over the angles that a saccade prescribes; the target's velocity is kept.
+
+        target: eye angles that fixate the target as seen, from the present pose of the head
+        """
+        self.version, self.started = version_of(eyes), True
+        self._turned(R_world_head, t_s)
+        if target is not None:
+            self._shift(rotate(R_world_head, version_of(target).ahead))
+            self._demand(version_of(target).vergence_rad, t_s)
 
     def step(
-        self,
-        left_rad: float | None,
-        right_rad: float | None,
-        head: HeadMotion,
-        dt_s: float,
-        saccade: tuple[float, float] | None = None,
-    ) -> tuple[float, float]:
-        """Return the left and right eye angle in the head for the next period.
+        self, target: Eyes | None, R_world_head: Mat3, t_s: float, dt_s: float, closing: bool = True
+    ) -> Eyes:
+        """Return the angles of both eyes in the head for the next period.
 
-        left_rad, right_rad: direction in space of the target from each eye; None: not seen
-        saccade: version and vergence that a saccade under way prescribes
+        target: eye angles that fixate the target as seen, from the present pose of the head;
+            None: not seen
+        closing: whether the error of direction is closed; False leaves it to a saccade
         """
-        par = self._params
-        eye_left, eye_right = self._eyes
-        self._past.append(_Moment(left_rad, right_rad, eye_left, eye_right, head.yaw_rad))
-        seen = self._ago(par.delay_ms / 1e3, dt_s)
-        reflex = self._reflex(head, dt_s)
-        if saccade is not None:
-            self._conjugate.hold(_place(seen))
-            self.version_rad, self.vergence_rad = saccade
-            u_c = u_d = 0.0
+        par, (ahead, vergence) = self._params, self.version
+        turned = self._turned(R_world_head, t_s)
+        if turned is not None:
+            held = rotate_back(turned[1], rotate(turned[0], ahead))
+            ahead = unit(add(ahead, scale(sub(held, ahead), par.reflex_gain)))
+        gaze = rotate(R_world_head, ahead)
+        if target is None:
+            self._known = False
+            self._velocity = scale(self._velocity, exp(-dt_s / self._fade_s))
+            rate = scale(_clipped(self._velocity, self._max_rad_s), par.velocity_gain)
         else:
-            u_c, u_d = self._wishes(seen, head.yaw_rad, dt_s)
-            u_c -= reflex
-            self.version_rad = self._leak.step(self.version_rad, u_c, dt_s)
-            self.vergence_rad = self._leak.step(self.vergence_rad, u_d, dt_s)
-        self.version_rad = clip(self.version_rad, self._limit)
-        widest = radians(par.max_vergence_deg)
-        self.vergence_rad = min(max(self.vergence_rad, 0.0), widest)
-        self._eyes = self._angles(u_c, u_d)
-        return self._eyes
+            seen, demand_rad = version_of(target)
+            self._follow(rotate(R_world_head, seen), dt_s)
+            rate = scale(_clipped(self._velocity, self._max_rad_s), par.velocity_gain)
+            if closing:
+                error = _clipped(sub(self._smoothed, gaze), self._max_error_rad)
+                rate = add(rate, scale(error, par.gain_1_s))
+            past_rad = self._demand(demand_rad, t_s)
+            if past_rad is not None:
+                off = past_rad - vergence
+                gain = par.vergence_gain_1_s if off >= 0.0 else par.divergence_gain_1_s
+                vergence += gain * off * dt_s
+        vergence = min(max(vergence, 0.0), self._widest_rad)
+        ahead = rotate_back(R_world_head, unit(add(gaze, scale(rate, dt_s))))
+        self.version = Version(ahead, vergence)
+        yaw, pitch = yaw_pitch(ahead)
+        return (yaw - 0.5 * vergence, pitch), (yaw + 0.5 * vergence, pitch)
 
-    def _wishes(self, seen: _Moment | None, head: float, dt_s: float) -> tuple[float, float]:
-        """Return the conjugate and the vergence rate."""
-        par = self._params
-        gaze = self.version_rad + head
-        place = _place(seen)
-        if place is None or seen is None:
-            return self._conjugate.step(None, gaze, dt_s), 0.0
-        if not par.efference:
-            # Only the error as it was: what the eyes did since is not known.
-            was = 0.5 * (seen.eye_left + seen.eye_right) + seen.head
-            u_c = par.gain_1_s * clip(place - was, radians(par.max_error_deg))
-        else:
-            u_c = self._conjugate.step(place, gaze, dt_s)
-        if seen.left is not None and seen.right is not None:
-            return u_c, self._vergence.step(self._demand(dt_s), self.vergence_rad)
-        if par.covered == "copy":
-            return u_c, 0.0
-        # The blind side sends nothing: the seeing eye gets rho, the covered one chi.
-        side = 1.0 if seen.left is not None else -1.0
-        return 0.5 * u_c, -side * par.converge_1_s * u_c / par.gain_1_s
+    def distance_m(self, one_m: Eyes, otherwise_m: float) -> float:
+        """Return the distance at which both lines of sight meet.
 
-    def _demand(self, dt_s: float) -> float | None:
-        """Return the vergence that the target asked for when it was seen."""
-        then = self._ago(self._params.vergence_delay_ms / 1e3, dt_s)
-        if then is None or then.left is None or then.right is None:
-            return None
-        return then.right - then.left
+        one_m: eye angles that fixate a point in the same direction 1 m away
+        otherwise_m: for eyes that cannot converge
+        """
+        half_m = tan(0.5 * version_of(one_m).vergence_rad)
+        if half_m <= 0.0:
+            return otherwise_m
+        vergence = self.version.vergence_rad
+        return min(half_m / tan(0.5 * vergence), _FARTHEST_M) if vergence > 0.0 else _FARTHEST_M
 
-    def _reflex(self, head: HeadMotion, dt_s: float) -> float:
-        """Return the conjugate rate that the head's turning and moving call for."""
-        par = self._params
-        turning = par.vor_gain * head.gate * self._canals.step(head.rate_rad_s, dt_s)
-        if head.ahead_m_s == 0.0 and head.left_m_s == 0.0:
-            return turning
-        distance = distance_m(self.vergence_rad, par.interocular_mm / 1e3)
-        return turning - translational_rad_s(
-            self.version_rad, head.ahead_m_s, head.left_m_s, distance
-        )
+    def _turned(self, R_world_head: Mat3, t_s: float) -> tuple[Mat3, Mat3] | None:
+        """Return the head's rotations between which the reflex acts in this period."""
+        heads = self._heads
+        before = heads[0][1] if heads else None
+        heads.append((t_s, R_world_head))
+        while len(heads) > 1 and heads[1][0] <= t_s - self._reflex_delay_s + 1e-9:
+            heads.popleft()
+        return (before, heads[0][1]) if before is not None else None
 
-    def _ago(self, delay_s: float, dt_s: float) -> _Moment | None:
-        """Return what there was a delay ago, None before the beginning."""
-        par = self._params
-        longest = round(max(par.delay_ms, par.vergence_delay_ms) / 1e3 / dt_s)
-        while len(self._past) > longest + 1:
-            self._past.popleft()
-        back = round(delay_s / dt_s)
-        return self._past[-1 - back] if len(self._past) > back else None
+    def _demand(self, vergence_rad: float, t_s: float) -> float | None:
+        """Return the vergence that the target asked for a delay ago, None before there was one."""
+        demands = self._demands
+        demands.append((t_s, vergence_rad))
+        due_s = t_s - self._vergence_delay_s + 1e-9
+        while len(demands) > 1 and demands[1][0] <= due_s:
+            demands.popleft()
+        return demands[0][1] if demands[0][0] <= due_s else None
 
-    def _angles(self, u_c: float, u_d: float) -> tuple[float, float]:
-        """Return both eyes' angles, led by the servos' lag and kept in range."""
-        lead = self._params.servo_lead_ms / 1e3
-        c, v = self.version_rad, self.vergence_rad
-        return (
-            clip(c - 0.5 * v + lead * (u_c - 0.5 * u_d), self._limit),
-            clip(c + 0.5 * v + lead * (u_c + 0.5 * u_d), self._limit),
-        )
+    def _shift(self, seen: Vec3) -> None:
+        """Take a jump of the target over, which is no velocity."""
+        moved = _NONE if self._seen is None else sub(seen, self._seen)
+        self._smoothed = seen if self._seen is None else add(self._smoothed, moved)
+        self._seen, self._known = seen, True
+
+    def _follow(self, seen: Vec3, dt_s: float) -> None:
+        """Low-pass the direction of the target and differentiate it."""
+        before = self._seen
+        if before is None or not self._known or norm(sub(seen, before)) > self._reject_rad_s * dt_s:
+            self._shift(seen)
+        self._seen = seen
+        kept = exp(-dt_s / self._smooth_s)
+        smoothed = add(scale(self._smoothed, kept), scale(seen, 1.0 - kept))
+        self._velocity = scale(sub(smoothed, self._smoothed), 1.0 / dt_s)
+        self._smoothed = smoothed
 
 
-def _place(seen: _Moment | None) -> float | None:
-    """Return where in space the target was: the retinal error plus the gaze of that moment."""
-    if seen is None:
-        return None
-    errors = []
-    if seen.left is not None:
-        errors.append(seen.left - seen.head - seen.eye_left)
-    if seen.right is not None:
-        errors.append(seen.right - seen.head - seen.eye_right)
-    if not errors:
-        return None
-    return sum(errors) / len(errors) + 0.5 * (seen.eye_left + seen.eye_right) + seen.head
+def _clipped(v: Vec3, most: float) -> Vec3:
+    """Return a vector no longer than ``most``."""
+    size = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    return v if size <= most else scale(v, most / size)

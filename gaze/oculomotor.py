@@ -11,8 +11,9 @@ from typing import Annotated, NamedTuple, Protocol
 
 import numpy as np
 
-from gazerig.gaze.angles import add, angle_between, norm, scale, sub, unit
+from gazerig.gaze.angles import add, angle_between, no_nearer, norm, sub, unit
 from gazerig.gaze.animation import NO_OFFSET, PoseOffset
+from gazerig.gaze.binocular import HeadView
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.head import HeadModel
 from gazerig.gaze.lids import Lids
@@ -46,7 +47,7 @@ class OculomotorParams(SaccadeTriggerParams):
 
     # fmt: off
     prediction_horizon_ms: Annotated[float, Bounds(0, 2000),
-        "longest time over which a target's position is extrapolated with its velocity"] = 200.0
+        "longest time over which a target's position is extrapolated with its velocity"] = 120.0
     fade_ms: Annotated[float, Bounds(1, 5000), "time constant with which that velocity decays after that time"] = 300.0
     target_prediction: Annotated[PredictionModel,
         "where a target is expected: where its frame showed it, moved on with its velocity, or along its curve and its swing, "
@@ -167,6 +168,7 @@ class Oculomotor:
             self._breathing.reset(t_s)
         self._trigger.reset(t_s)
         self._prediction.reset()
+        self._pursuit.binocular.reset()
         self._gaze = _meeting_point(state)
         self._trajectory: SaccadeTrajectory | None = None
         self.saccades = self.fixations = 0
@@ -201,9 +203,16 @@ class Oculomotor:
         if target.shift != trigger.shift:
             free_s = self._trajectory.ends_s if self._trajectory else t_s
             trigger.record_shift(target.shift, self._head.leads_s(target, aside_rad), free_s, t_s)
+        jumps = self._trajectory is not None
         shift_rad = self._move_gaze(seen, p_head, t_s, dt_s)
         head = self._head.step(target, centre, facing, aside_rad, t_s - trigger.onset_s, t_s)
         wanted = self._geometry.eyes_on(self._gaze, R_world_head, p_head)
+        if self._pursuit.is_binocular:
+            jumps = jumps or shift_rad is not None
+            view = HeadView(R_world_head, p_head, self._geometry.eyes_on, self._nearest_m)
+            wanted, self._gaze = self._pursuit.binocular.fixate(
+                target, self._gaze, wanted if jumps else None, trigger, view, t_s, dt_s
+            )
         if offset.eyes_rad != NO_OFFSET.eyes_rad:
             wanted = _turned(wanted[0], offset.eyes_rad), _turned(wanted[1], offset.eyes_rad)
         left, right = eyes = self._in_range(wanted)
@@ -311,10 +320,7 @@ class Oculomotor:
 
     def _clear(self, point: Vec3, p_head: Vec3) -> Vec3:
         """Return a point moved away to ``nearest_m`` where it is nearer."""
-        x, y, z = point[0] - p_head[0], point[1] - p_head[1], point[2] - p_head[2]
-        if sqrt(x * x + y * y + z * z) >= self._nearest_m:
-            return point
-        return add(p_head, scale(unit((x, y, z)), self._nearest_m))
+        return no_nearer(point, p_head, self._nearest_m)
 
     def _move_gaze(self, seen: _Seen, p_head: Vec3, t_s: float, dt_s: float) -> float | None:
         """Move the gaze point along a saccade, or after the target.
@@ -333,7 +339,7 @@ class Oculomotor:
                 if trigger.due(slip, t_s):
                     shift_rad = self._jump(seen, p_head, t_s)
             if shift_rad is None:
-                if not trigger.waits and dt_s > 0.0:
+                if not trigger.waits and dt_s > 0.0 and not self._pursuit.is_binocular:
                     closing = not trigger.corrects
                     self._gaze = self._pursuit.follow(
                         gaze, there, point, velocity, p_head, dt_s, closing

@@ -1,24 +1,22 @@
 """Smooth following of a moving target between saccades, in gaze space.
 
-The two controls of the binocular controller (gaze.binocular), conjugate and vergence,
-for a target whose frame was placed in space at its time of capture: its place is known
-without the eyes' own motion (efference copy), the delay is the measured one, and the
-target's own speed stands for the smoothed derivative. So a jump of the place never
-enters the speed, an eye that sees nothing goes with the other one, and a head that
-turns or moves changes nothing, near targets included.
+Two controls, conjugate and vergence, as in the binocular controller (gaze.binocular, which
+takes the place of this one with ``model: binocular``), on a target that is predicted to where
+it is now (gaze.target_prediction): no delay of seeing is left, a jump of the place never
+enters the speed, and a head that turns or moves changes nothing, near targets included.
 
-The direction takes over the share Gp of the target's angular speed, up to the speed that
-human pursuit reaches, and closes the error at the rate Kc; the nearness closes its own
+The direction takes over the share Gp of the target's angular speed and closes the error
+at the rate Kc, both together no faster than human pursuit; the nearness closes its own
 at Kd, or at the slower Kdiv where it recedes. Larger errors of direction are saccades.
 """
 
-from dataclasses import dataclass
 from math import exp, radians, sqrt
-from typing import Annotated, NamedTuple
+from typing import NamedTuple
 
 from gazerig.gaze.angles import scale, sub
+from gazerig.gaze.binocular import BinocularController
+from gazerig.gaze.pursuit_params import PursuitParams
 from gazerig.gaze.types import Vec3
-from gazerig.params import Bounds
 
 Sight = tuple[float, float, float, float]
 """A point as seen from the eyes: its direction x, y, z, and its nearness, 1 / distance in 1/m."""
@@ -31,22 +29,6 @@ _PEAK_SHARE = 1.15
 """Peak speed of a swing that is followed, over the fastest pursuit: what is cut off at its middle
 is made up for at its ends."""
 _NEAREST_M = 1.0 / _NEAREST_1_M
-
-
-@dataclass(frozen=True)
-class PursuitParams:
-    """Gains and limits of the following."""
-
-    # fmt: off
-    gain_1_s: Annotated[float, Bounds(0, 50), "rate Kc at which the position error is closed"] = 8.0
-    velocity_gain: Annotated[float, Bounds(0, 1), "gain Gp: share of the target's velocity that the eye follows at once; people .95"] = 0.95
-    vergence_gain_1_s: Annotated[float, Bounds(0, 50), "rate Kd at which the error in depth is closed"] = 4.0
-    divergence_gain_1_s: Annotated[float, Bounds(0, 50), "rate Kdiv instead of Kd if the target is farther away than the gaze point"] = 3.0
-    max_speed_deg_s: Annotated[float, Bounds(1, 200), "fastest smooth pursuit, closing of the error included; people 63 deg/s"] = 60.0
-    reject_deg_s: Annotated[float, Bounds(1, 1000), "a target reported as faster than this is taken as a jump and not pursued"] = 100.0
-    max_error_deg: Annotated[float, Bounds(0.1, 90),
-        "the rate of closing applies to at most this error; larger errors are closed no faster"] = 5.0
-    # fmt: on
 
 
 class Slip(NamedTuple):
@@ -64,11 +46,14 @@ class Pursuit:
     """Smooth pursuit of a target point by the gaze point."""
 
     def __init__(self, params: PursuitParams) -> None:
+        self.binocular = BinocularController(params)
         self.retune(params)
 
     def retune(self, params: PursuitParams) -> None:
         """Change gains and limits."""
         self._params = params
+        self.is_binocular = params.model == "binocular"
+        self.binocular.retune(params)
         self._max_rad_s = radians(params.max_speed_deg_s)
         self._reject_rad_s = radians(params.reject_deg_s)
         self._max_error_rad = radians(params.max_error_deg)

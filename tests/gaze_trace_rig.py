@@ -20,7 +20,8 @@ from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.head import HeadModel, HeadParams
 from gazerig.gaze.lids import LidParams, Lids
 from gazerig.gaze.oculomotor import Oculomotor, OculomotorParams
-from gazerig.gaze.pursuit import Pursuit, PursuitParams
+from gazerig.gaze.pursuit import Pursuit
+from gazerig.gaze.pursuit_params import PursuitParams
 from gazerig.gaze.saccade import SaccadeModel, SaccadeParams
 from gazerig.gaze.types import GazeCommand, Target
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
@@ -71,6 +72,7 @@ class Rig:
         saccade: SaccadeParams = SACCADE,
         breathing: Breathing | None = None,
         dice: int | None = None,
+        pursuit: PursuitParams | None = None,
     ) -> None:
         self.kinematics = Kinematics(geometry, GAZE_JOINTS, LIDS)
         span = (-radians(eye_deg), radians(eye_deg))
@@ -80,7 +82,7 @@ class Rig:
             self.kinematics,
             ((span, span), (span, span)),
             SaccadeModel(saccade),
-            Pursuit(PursuitParams()),
+            Pursuit(pursuit if pursuit is not None else PursuitParams()),
             HeadModel(head, radians(eye_deg), (neck, neck)),
             Lids(LidParams(), np.random.default_rng(0)),
             breathing,

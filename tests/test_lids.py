@@ -11,7 +11,8 @@ from gazerig.gaze.blink_statistics import blink_pause_s
 from gazerig.gaze.head import HeadModel, HeadParams
 from gazerig.gaze.lids import LidMode, LidParams, Lids, Side
 from gazerig.gaze.oculomotor import Oculomotor, OculomotorParams
-from gazerig.gaze.pursuit import Pursuit, PursuitParams
+from gazerig.gaze.pursuit import Pursuit
+from gazerig.gaze.pursuit_params import PursuitParams
 from gazerig.gaze.saccade import SaccadeModel, SaccadeParams
 from gazerig.gaze.types import Target
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics

@@ -151,7 +151,7 @@ def test_the_head_faces_the_centre_while_the_gaze_wanders_over_parts() -> None:
 
 
 def test_e58_a_lost_target_is_followed_for_a_moment_and_then_no_more() -> None:
-    rig = Rig(params=OculomotorParams(eye_lag_ms=5.0, prediction_horizon_ms=100.0))
+    rig = Rig(params=OculomotorParams(eye_lag_ms=5.0))
     v = radians(20.0)
 
     def where(t: float) -> Target:

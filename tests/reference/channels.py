@@ -1,4 +1,4 @@
-"""The separate parts of the binocular controller: conjugate, vergence and leak.
+"""The separate parts of the reference model: conjugate, vergence and leak.
 
 Zhang & Wakamatsu's controller splits into two independent controls with different
 dynamics. With a direct gain rho and a crossed gain chi on the mirror-symmetric sides,

@@ -1,8 +1,7 @@
-"""Vestibulo-ocular reflex: eye velocity against the head's own motion.
+"""Vestibulo-ocular reflex by signals of rotation and translation, for the reference model.
 
-Used where eyes are driven by signals of rotation and translation, as in the binocular
-controller. The robot's own gaze is planned in space instead, which compensates the same
-motions exactly (the gaze-feedback hypothesis, Daye 2015). Radians, metres, seconds.
+The robot's gaze is planned in space instead, which compensates the same motions exactly (the
+gaze-feedback hypothesis, Daye 2015). Radians, metres, seconds.
 """
 
 from collections import deque
