@@ -18,6 +18,7 @@ import numpy as np
 
 from gazerig.gaze.angles import add, scale, sub
 from gazerig.gaze.bottom_up import BottomUp, SalienceRow
+from gazerig.gaze.face_memory import FaceMemory
 from gazerig.gaze.field_of_view import FieldOfView, line_of_sight
 from gazerig.gaze.habituation import Habituation, HabituationParams
 from gazerig.gaze.idle import Idle
@@ -48,7 +49,7 @@ class AttentionParams:
     looks_elsewhere_ratio: Annotated[float, Bounds(0, 1),
         "share of its salience that a face keeps while the person does not look at the head; 1: all"] = 0.85
     face_memory_s: Annotated[float, Bounds(0, 600),
-        "when a thing is lost from view, the gaze returns to where a face was looked at, if the face was seen within this time"] = 10.0
+        "a face that leaves the view while something else is looked at is remembered where it was for this time; 0: not at all"] = 15.0
     habituation: Annotated[HabituationParams, "habituation and inhibition of return"] = field(default_factory=HabituationParams)
     reaction: Annotated[ReactionParams, "reaction time"] = field(default_factory=ReactionParams)
     # fmt: on
@@ -101,6 +102,7 @@ class Attention:
         self._idle = idle
         self._habituation = Habituation(params.habituation)
         self._reaction = Reaction(params.reaction, rng)
+        self._memory = FaceMemory()
         self.reset(0.0)
 
     def retune(self, params: AttentionParams) -> None:
@@ -114,6 +116,7 @@ class Attention:
         for model in (self._bottom_up, self.top_down, self._idle, self._habituation):
             model.reset(t_s)
         self._reaction.reset(t_s)
+        self._memory.reset()
         self._seen_s = -inf
         self._target: Target | None = None
         self._shift = 0
@@ -124,7 +127,6 @@ class Attention:
         self._behaviour = self.top_down.behaviour
         self._changed_s = -inf
         self._eye: tuple[Vec3, float] | None = None
-        self._face: Target | None = None
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
         """Return the target in force at ``t_s``."""
@@ -133,7 +135,6 @@ class Attention:
         if percept is not None and fresh and percept.captured_s != self._seen_s:
             self._seen_s = percept.captured_s
             self._target = self._decide(percept, state, t_s)
-            self._update_face(percept)
         if fresh:
             self._target = self._reaction.take(t_s) or self._target
         else:
@@ -141,28 +142,10 @@ class Attention:
             self._reaction.drop()
         if self._target is None:
             return self._settle(self._idle.step(t_s), t_s)
-        if self._target.kind == "face":
-            self._face = self._target
         if self._target.id >= 0:
-            self._idle.remember(self._expected(self._target, t_s))
+            self._idle.remember(self._target)
         self._target = self._settle(self._target, t_s)
         return self._target
-
-    def _update_face(self, percept: Percept) -> None:
-        """Update where the face that was looked at last is."""
-        face = self._face
-        if face is not None and face.id in percept.bodies.ids:
-            place = percept.bodies.p_world_m[percept.bodies.ids.index(face.id)]
-            self._face = face._replace(
-                p_world_m=_vec(place), v_world_m_s=_STILL, at_s=percept.captured_s
-            )
-
-    def _expected(self, target: Target, t_s: float) -> Target:
-        """Return where to look once a target is lost: where it was, or the face beside a thing."""
-        face = self._face
-        if face is None or target.kind == "face":
-            return target
-        return face if t_s - face.at_s < self._params.face_memory_s else target
 
     def _settle(self, target: Target, t_s: float) -> Target:
         """Count a gaze shift whenever another object is looked at."""
@@ -185,11 +168,14 @@ class Attention:
         What wins over it waits for its reaction time; a present target that is gone stays where it
         was until then.
         """
-        compare = self._compare_few if len(percept.bodies) <= _FEW else self._compare
+        attended = self._identity[1] if self._identity is not None else -1
+        lasts_s = self._params.face_memory_s
+        bodies = self._memory.step(percept.bodies, attended, percept.captured_s, lasts_s)
+        compare = self._compare_few if len(bodies) <= _FEW else self._compare
         ratio = self._params.looks_elsewhere_ratio
         elsewhere = [face.id for face in percept.faces if face.looks_at_head is False]
-        worth = [ratio if id in elsewhere else 1.0 for id in percept.bodies.ids]
-        made = compare(percept.bodies, worth, state, t_s)
+        worth = [ratio if id in elsewhere else 1.0 for id in bodies.ids]
+        made = compare(bodies, worth, state, t_s)
         if made.total[made.best] == -inf:
             self._reaction.drop()
             return None

@@ -148,22 +148,3 @@ def test_a_reaction_under_way_is_as_quick_among_the_new_times() -> None:
         waited.append(0.1 + viewer.reaction_s([FACE, REACHES], "hand"))
         assert waited[-1] == pytest.approx(median_ms / 1e3 * exp(0.15 * deviation), abs=0.006)
     assert waited[1] == pytest.approx(2.0 * waited[0], abs=0.012)
-
-
-def test_when_a_thing_is_lost_the_gaze_returns_to_the_face_that_was_there() -> None:
-    for memory_s, kind in ((10.0, "face"), (0.0, "hand")):
-        model = Attention(
-            AttentionParams(face_memory_s=memory_s),
-            FieldOfView(FieldOfViewParams()),
-            BottomUp(BottomUpParams()),
-            TopDown(TopDownParams()),
-            Idle(IdleParams()),
-        )
-        viewer = Viewer(model)
-        viewer.show([FACE], 0.5)
-        viewer.show([body(2, "hand", (0.8, 0.5, -0.1), (0.0, 1.0, 0.0))], 0.5)
-        viewer.show([], 0.2)
-        target = model.choose(percept(1.2), looking(), 1.2)
-        assert (target.kind, target.why) == (kind, "lost, waiting")
-        if kind == "face":
-            assert target.p_world_m == (1.0, 0.0, 0.0)

@@ -10,7 +10,10 @@ from gazerig.sim_mock.scenes.face_to_face import FaceToFace
 from gazerig.sim_mock.scenes.registry import scenes
 from gazerig.sim_mock.scenes.scene import Event, Key, Scene, Thing, between, there_and_back
 
-NAMES = ("boxing", "face-to-face", "sits-still", "steps-aside", "visitor", "walks-past")
+NAMES = (
+    "boxing", "face-to-face", "sits-still", "steps-aside", "three-people", "two-people", "visitor",
+    "walks-past",
+)  # fmt: skip
 DT_S = 0.01
 
 

@@ -55,8 +55,29 @@ def test_a_missed_picture_coasts_and_a_short_absence_keeps_the_identity() -> Non
     assert [track.id for track in tracker.step([], CAMERA, 0.1)] == [seen.id]
     assert tracker.step([], CAMERA, 0.6) == ()
     assert tracker.step([face(1.0, 0.05)], CAMERA, 1.0)[0].id == seen.id
+
+
+@pytest.mark.parametrize(
+    ("y", "after_s", "remember_s", "same"),
+    [(0.05, 10.0, 20.0, True), (0.5, 10.0, 20.0, False), (0.05, 25.0, 20.0, False),
+     (0.05, 10.0, 0.0, False)],
+)  # fmt: skip
+def test_a_face_that_stays_where_it_was_is_known_again_after_long(
+    y: float, after_s: float, remember_s: float, same: bool
+) -> None:
+    tracker = Tracker(TrackParams(remember_face_s=remember_s))
+    for k in range(10):
+        (seen,) = tracker.step([face(1.0, 0.0)], CAMERA, k / 30)
+    for k in range(10, round(30 * after_s)):
+        assert k < 20 or tracker.step([], CAMERA, k / 30) == ()
+    assert (tracker.step([face(1.0, y)], CAMERA, after_s)[0].id == seen.id) is same
+
+
+def test_a_thing_out_of_sight_is_not_remembered() -> None:
+    tracker = Tracker(TrackParams())
+    (hand,) = tracker.step([face(1.0, 0.0, "hand")], CAMERA, 0.0)
     assert tracker.step([], CAMERA, 3.0) == ()
-    assert tracker.step([face(1.0, 0.05)], CAMERA, 3.1)[0].id != seen.id
+    assert tracker.step([face(1.0, 0.0, "hand")], CAMERA, 3.1)[0].id != hand.id
 
 
 def test_far_apart_is_somebody_else_and_kinds_never_mix() -> None:

@@ -32,4 +32,6 @@ class TrackParams:
     coast_ms: Annotated[float, Bounds(0, 5000), "a track without a detection is still reported for this long"] = 250.0
     forget_ms: Annotated[float, Bounds(0, 60000),
         "a track without a detection is deleted after this long; what returns later gets a new id"] = 1500.0
+    remember_face_s: Annotated[float, Bounds(0, 3600),
+        "a face out of sight for longer is known again for this time if it is where it was, within gate_m"] = 20.0
     # fmt: on

@@ -129,7 +129,8 @@ class Tracker:
         """Associate the detections of one frame with the tracks; return the tracks in sight."""
         par = self._params
         for track in self._tracks:
-            track.filter.predict(t_s - track.at_s, seen=track.seen_s == track.at_s)
+            if not self._remembered(track):
+                track.filter.predict(t_s - track.at_s, seen=track.seen_s == track.at_s)
             track.at_s = t_s
         pairs = assign(
             [
@@ -143,8 +144,18 @@ class Tracker:
         for j, detection in enumerate(detections):
             if j not in taken:
                 self._tracks.append(self._begin(detection, p_world_camera_m, t_s))
-        self._tracks = [t for t in self._tracks if t_s - t.seen_s <= par.forget_ms / 1e3]
+        self._tracks = [t for t in self._tracks if t_s - t.seen_s <= self._kept_s(t)]
         return tuple(t for t in self._tracks if t_s - t.seen_s <= par.coast_ms / 1e3)
+
+    def _kept_s(self, track: Track) -> float:
+        """Return how long a track is kept without a detection."""
+        par = self._params
+        is_face = track.R_world_face is not None
+        return max(par.forget_ms / 1e3, par.remember_face_s if is_face else 0.0)
+
+    def _remembered(self, track: Track) -> bool:
+        """Return whether a track is so long out of sight that it is taken to stay where it was."""
+        return track.at_s - track.seen_s > self._params.forget_ms / 1e3
 
     def _cost(self, track: Track, detection: LocalisedDetection, p_camera: Vec3) -> float:
         """Return how unlikely it is that a track is seen so: minus twice the log likelihood.
@@ -160,7 +171,8 @@ class Tracker:
         view = sub(place, p_camera)
         wide = self._gate_m(track, detection, norm(view))
         unseen_s = track.at_s - track.seen_s
-        if norm(cross(unit(view), off)) > wide + par.gate_speed_m_s * unseen_s:
+        moved = 0.0 if self._remembered(track) else par.gate_speed_m_s * unseen_s
+        if norm(cross(unit(view), off)) > wide + moved:
             return FORBIDDEN
         # What people do that no filter expects: a lunge, a jump of the detector.
         surprise = wide / par.gate_sigma

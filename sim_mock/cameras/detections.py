@@ -183,7 +183,7 @@ class SceneCamera:
         if not self._inside(x, y, 0.0):
             return ()
         place = scale(point, 1.0 + noise / norm(point))
-        return (MovingBlob(thing.id, thing.kind, place, thing.radius_m),)
+        return (MovingBlob(thing.id, thing.kind, place, thing.radius_m, thing.spin_rad_s),)
 
     def _inside(self, x: float, y: float, margin: float) -> bool:
         par = self._params

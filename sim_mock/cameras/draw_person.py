@@ -7,7 +7,7 @@ drawn: arms, expression, blinks; the eyes look straight ahead.
 """
 
 from functools import lru_cache
-from math import pi
+from math import cos, pi, sin
 from typing import NamedTuple
 
 import cv2
@@ -93,7 +93,8 @@ def draw_thing(canvas: Canvas, thing: Thing) -> None:
     aside = np.cross(way, (0.0, 0.0, 1.0))
     aside /= max(1e-6, float(np.linalg.norm(aside)))
     up = np.cross(aside, way / max(1e-6, float(np.linalg.norm(way))))
-    r = thing.radius_m
+    turned, r = thing.turned_rad, thing.radius_m
+    aside, up = cos(turned) * aside - sin(turned) * up, cos(turned) * up + sin(turned) * aside
     corner = np.array(thing.p_world_m) - r * aside + r * up
     texture = _ball(thing.kind == "hand", thing.id)
     canvas.sheet(TexturedQuad(_vec(corner), _vec(2 * r * aside), _vec(-2 * r * up), texture))

@@ -30,12 +30,16 @@ class Thing(NamedTuple):
 
     id:   the same for as long as the scene lasts
     kind: "hand", "attack_target", ...
+    spin_rad_s: rotation about the line of sight, clockwise as the robot sees it above 0
+    turned_rad: how far it has turned so
     """
 
     id: int
     kind: str
     p_world_m: Vec3
     radius_m: float
+    spin_rad_s: float = 0.0
+    turned_rad: float = 0.0
 
 
 class Event(NamedTuple):

@@ -21,6 +21,12 @@ MUTANTS = (
     # ---- gaze: attention
     Mutant("gaze/bottom_up.py", "        total += self.rotation\n", "",
            "eq 1 without its third term, spin", ("attention", "attention_choice")),
+    Mutant("gaze/bottom_up.py", "            spin / par.rotation_reference_rad_s,\n", "            0.0,\n",
+           "eq 1 of few bodies without its third term", ("group_scenes", "attention")),
+    Mutant("robot/perception/perception.py", "spin) if spin else (0.0, 0.0, 0.0)", "0.0)",
+           "what spins is not perceived to", ("group_scenes",)),
+    Mutant("sim_mock/cameras/detections.py", "thing.radius_m, thing.spin_rad_s),)", "thing.radius_m),)",
+           "the camera of a scene does not see a spin", ("group_scenes",)),
     Mutant("gaze/bottom_up.py", "raw.looming / (distance * par", "raw.looming / (par",
            "far things that come nearer draw as much as near ones", ("attention", "attention_choice")),
     Mutant("gaze/bottom_up.py", "np.exp((entered_s - t_s) / self._params.onset_s)",
@@ -74,8 +80,8 @@ MUTANTS = (
     Mutant("gaze/scanpath_models.py", "return self._longest_s * (1.0 - self._rng.random())",
            "return self._longest_s", "random looks have one length", ("scanpath_models",)),
     # ---- perception
-    Mutant("robot/perception/perception.py", "self._mount.pose(*poses.head_pose(t_s))",
-           "self._mount.pose(*poses.head_pose(1e9))", "frames are placed by the newest pose of the head",
+    Mutant("robot/perception/perception.py", "self._p_head = poses.head_pose(t_s)",
+           "self._p_head = poses.head_pose(1e9)", "frames are placed by the newest pose of the head",
            ("perception", "camera_poses")),
     Mutant("robot/perception/tracker.py", "if track.detection.kind != detection.kind:", "if False:",
            "a hand becomes a face", ("tracks", "perception")),

@@ -1,0 +1,118 @@
+"""Scenes of several people, and a pinwheel that spins: what they hold, and what the gaze does."""
+
+from collections import Counter
+from dataclasses import replace
+from math import cos, degrees, dist, pi
+
+import numpy as np
+import pytest
+from test_behaviours import Lived, made_for
+
+from gazerig.config.schema import load_rig
+from gazerig.gaze.angles import angle_between, direction, sub
+from gazerig.gaze.types import Vec3
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.sim_mock.scenes.group import HEAD_M
+from gazerig.sim_mock.scenes.registry import scenes
+from gazerig.sim_mock.scenes.scene import Scene, ScenePerson
+from gazerig.sim_mock.scenes.three_people import ARRIVES_S, LEAVES_S
+from gazerig.sim_mock.scenes.two_people import PINWHEEL, SPINS_S
+
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
+GROUPS = ("two-people", "three-people")
+
+
+def off_deg(person: ScenePerson, place: Vec3) -> float:
+    """Return the angle between a face and the direction from it to a place."""
+    way = sub(place, person.p_world_face_m)
+    return degrees(angle_between(direction(person.face_yaw_pitch_rad), way))
+
+
+@pytest.mark.parametrize("name", GROUPS)
+def test_people_turn_to_each_other_and_to_the_robot_and_stay_in_sight_of_it(name: str) -> None:
+    scene = scenes()[name]
+    to_robot: Counter[int] = Counter()
+    to_others: Counter[int] = Counter()
+    times = np.arange(0.0, scene.round_s, 0.1).tolist()
+    for t_s in times:
+        people = [p for p in scene.people(t_s) if p.p_world_face_m[0] > 0.5]
+        for number, person in enumerate(people):
+            off = off_deg(person, HEAD_M)
+            assert off < 55.0  # what a detector of faces still finds
+            to_robot[number] += off < 3.0
+            others = [one for one in people if one is not person]
+            nearer = min(off_deg(person, one.p_world_face_m) for one in others)
+            to_others[number] += off > 15.0 and nearer < 35.0
+    for number in to_robot:
+        assert to_robot[number] > 0.25 * len(times)
+        assert to_others[number] > 0.1 * len(times)
+    waves = [sum(p.hand is not None for p in scene.people(t)) for t in times]
+    assert max(waves) == 1 and 0.03 < np.mean(waves) < 0.1
+    nearest = [min(dist(p.p_world_face_m, HEAD_M) for p in scene.people(t)) for t in times]
+    assert min(nearest) < 0.8 and np.median(nearest) > 0.95
+
+
+def test_the_third_comes_and_goes() -> None:
+    third = [scenes()["three-people"].people(t)[2].p_world_face_m for t in (0.0, 30.0, 60.0)]
+    assert third[0][0] < 0.0 < 1.0 < third[1][0] and third[2][0] < 0.0
+
+
+def watched(scene: Scene, lived: Lived, start_s: float, end_s: float) -> dict[str, float]:
+    """Return the share of time for which each person and kind of thing is looked at."""
+    found: Counter[str] = Counter()
+    for t_s, tick in zip(lived.scene_s, lived.ticks, strict=True):
+        if start_s <= t_s < end_s:
+            name, people = tick.target.kind, scene.people(t_s)
+            if name == "face":
+                away = [dist(p.p_world_face_m, tick.target.p_world_m) for p in people]
+                name = f"person {int(np.argmin(away))}"
+            found[name] += 1
+    total = sum(found.values())
+    return {name: count / total for name, count in found.items()}
+
+
+def test_e79_among_three_people_all_are_looked_at_and_keep_their_identities() -> None:
+    scene = scenes()["three-people"]
+    lived = Lived(made_for("three-people", 0, 50.0), scene, 45.0)
+    shares = watched(scene, lived, ARRIVES_S, min(45.0, LEAVES_S))
+    assert min(shares[f"person {k}"] for k in range(3)) > 0.12
+    assert sum(shares[f"person {k}"] for k in range(3)) > 0.8
+    ids = {face.id for tick in lived.ticks if tick.percept for face in tick.percept.faces}
+    assert len(ids) <= 4
+
+
+def test_of_two_people_neither_is_stared_at() -> None:
+    scene = scenes()["two-people"]
+    lived = Lived(made_for("two-people", 1, 50.0), scene, 32.0)
+    shares = watched(scene, lived, 8.0, 32.0)
+    assert min(shares["person 0"], shares["person 1"]) > 0.2
+
+
+def test_the_pinwheel_turns_as_fast_as_it_says() -> None:
+    scene, start = scenes()["two-people"], SPINS_S[0][0]
+    angles = [scene.things(start + t)[0].turned_rad for t in np.arange(0.0, 3.0, 0.001)]
+    speeds = [scene.things(start + t)[0].spin_rad_s for t in np.arange(0.0, 3.0, 0.001)]
+    assert np.gradient(angles, 0.001)[1:-1] == pytest.approx(speeds[1:-1], abs=0.02)
+    assert max(speeds) == pytest.approx(11.0) and scene.things(0.0)[0].spin_rad_s == 0.0
+    assert cos(angles[-1]) == pytest.approx(cos(11.0 * 1.5), abs=1e-3) and angles[-1] > pi
+
+
+@pytest.mark.parametrize(("reference", "looks"), [(3.0, True), (100.0, False)])
+def test_e80_what_spins_draws_the_gaze_by_its_spin_alone(reference: float, looks: bool) -> None:
+    rig = load_rig("desk")
+    bottom_up = replace(rig.gaze.bottom_up, rotation_reference_rad_s=reference)
+    gaze = replace(rig.gaze, bottom_up=bottom_up)
+    rig = replace(rig, gaze=gaze, loop=replace(rig.loop, rate_hz=50.0))
+    scene, (start_s, end_s) = scenes()["two-people"], SPINS_S[0]
+    made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="two-people"))
+    lived = Lived(made, scene, end_s)
+    on = [tick for tick in lived.within(start_s, end_s) if tick.target.kind == "pinwheel"]
+    assert bool(on) is looks
+    if looks:
+        assert len(on) / 50.0 > 1.0
+        first = on[0].target
+        assert first.p_world_m == pytest.approx(PINWHEEL, abs=0.03)
+        salience = first.saliences[0]
+        assert salience.rotation > 0.5 > 0.1 > salience.translation + salience.looming
