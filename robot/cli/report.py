@@ -11,7 +11,6 @@ import typer
 
 from gazerig.config.faults import ConfigError
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_output import refuse_existing
 from gazerig.robot.cli.progress_bar import Steps, progress_bar
 from gazerig.robot.cli.rig_command import DEFAULT_RIG, RigCommand
 from gazerig.robot.cli.terminal import ForceOption, clear_errors, say, signals
@@ -68,12 +67,12 @@ def report(
         if file is not None and bus is not None:
             raise SetupError("--bus needs --scene: a recording was made on the bus it names")
         # Drawing and models are heavy; `--help` does without them.
-        from gazerig.robot.report.files import numbers_file
+        from gazerig.robot.report.files import files_of, refuse_foreign
         from gazerig.robot.report.page import banner
-        from gazerig.robot.report.report import report_of
+        from gazerig.robot.report.report import FIGURE_KEYS, report_of
 
         target = page_file(out or _beside(file, scene))
-        refuse_existing(target, numbers_file(target), force=force)
+        refuse_foreign(files_of(target, FIGURE_KEYS), force)
         with progress_bar() as tell:
             if file is not None:
                 about, run = _recorded(file, file.stem, tell)
@@ -107,10 +106,11 @@ def compare(
         from gazerig.robot.recording.read import RunRecording, used
         from gazerig.robot.report.compare import LEVEL
         from gazerig.robot.report.compare import compare as comparing
-        from gazerig.robot.report.files import numbers_file
+        from gazerig.robot.report.files import files_of, refuse_foreign
+        from gazerig.robot.report.report import FIGURE_KEYS
 
         target = page_file(out)
-        refuse_existing(target, numbers_file(target), force=force)
+        refuse_foreign(files_of(target, FIGURE_KEYS), force)
         recordings = RunRecording(first), RunRecording(second)
         names = _names(first, second)
         abouts = _about(recordings[0], names[0]), _about(recordings[1], names[1])

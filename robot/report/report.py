@@ -37,6 +37,8 @@ DRAWINGS: tuple[Drawing, ...] = (
     *figures_lids.DRAWINGS,
 )
 
+FIGURE_KEYS = tuple(drawing.key for drawing in DRAWINGS)
+
 _TOLD_EVERY, _LEAST_TICKS = 400, 20
 READING, DRAWING = "reading the run", "drawing figures"
 
