@@ -24,7 +24,10 @@ import argparse
 import gc
 import json
 import os
+import platform
 import subprocess
+import sys
+import sysconfig
 import tempfile
 import threading
 import time
@@ -186,6 +189,7 @@ def measure(args: argparse.Namespace, folder: Path) -> dict[str, Any]:
     figures["peers"] = {name: quantiles(spent) for name, spent in beside.items()}
     figures["about"] = {
         "rig": args.rig, "scene": args.scene, "seconds": args.seconds, "rate_hz": rate_hz,
+        "python": python_used(),
         "page": who or None, "record": bool(args.record), "load": os.getloadavg()[0],
         "timer_ns": [round(x) for x in own_ns], "absent": timers.absent,
     }  # fmt: skip
@@ -232,6 +236,13 @@ def jitter(starts_s: Sequence[float], rate_hz: float) -> dict[str, float]:
     }
 
 
+def python_used() -> str:
+    """Return which Python this is: one built without optimisations takes a fifth longer."""
+    optimised = "--enable-optimizations" in (sysconfig.get_config_var("CONFIG_ARGS") or "")
+    built = ", built with optimisations" if optimised else ""
+    return f"{platform.python_version()} in {sys.base_prefix}{built}"
+
+
 def simulated(args: argparse.Namespace, folder: Path) -> dict[str, Any]:
     """Return simulated seconds a second, of wall and processor, of three runs."""
     wall, cpu = [], []
@@ -252,7 +263,7 @@ def simulated(args: argparse.Namespace, folder: Path) -> dict[str, Any]:
             file.unlink()
     return {
         "about": {"rig": args.rig, "scene": args.scene, "seconds": args.seconds, "bus": args.bus,
-                  "record": bool(args.record), "load": os.getloadavg()[0]},
+                  "python": python_used(), "record": bool(args.record), "load": os.getloadavg()[0]},
         "simulated seconds a second": {
             "of the wall, best": max(wall), "of the wall, median": float(np.median(wall)),
             "of processor, best": max(cpu), "of processor, median": float(np.median(cpu)),
