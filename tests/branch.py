@@ -7,17 +7,24 @@ Tests of the start itself (test_cli_start.py, command_line.gazerig) have process
 
 import atexit
 import gc
+import importlib
 import inspect
 import os
+import runpy
 import signal
 import subprocess
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Iterable
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any, NoReturn
 
 import child_processes
+import pytest
+
+from gazerig.drivers import child_process
 
 _GIVEN = inspect.signature(subprocess.Popen._execute_child)  # type: ignore[attr-defined]
 _SIGNALS = (
@@ -43,8 +50,13 @@ class Branch(subprocess.Popen[Any]):
         a = _GIVEN.bind(self, *given).arguments
         standard = a["p2cread"], a["c2pwrite"], a["errwrite"]
         ends = a["p2cwrite"], a["c2pread"], a["errread"]
+        main = threading.current_thread() is threading.main_thread()
         self.pid = os.fork()
         if self.pid == 0:
+            if main:  # a thread ends before what it has started
+                child_processes.end_with_parent()
+            if a["start_new_session"]:
+                os.setsid()
             become(self._work, standard, ends, a["cwd"], a["env"], a["preexec_fn"])
         self._child_created = True
         self._close_pipe_fds(  # type: ignore[attr-defined]
@@ -73,7 +85,6 @@ def become(
     """
     code = 1
     try:
-        child_processes.end_with_parent()
         for fd in ends:
             if fd != -1:
                 os.close(fd)
@@ -149,5 +160,55 @@ def gazerig(*words: str) -> Callable[[], None]:
         atexit.register(terminal._writer.flush, 1.0)
         sys.argv = ["gazerig", *words]
         main()
+
+    return work
+
+
+@contextmanager
+def branched_children() -> Iterator[None]:
+    """Have the program start its own processes as branches too.
+
+    A module that such a process runs is imported here before, once for all of them.
+    """
+
+    def start(
+        module: str,
+        *arguments: str,
+        stdin: int = subprocess.DEVNULL,
+        stdout: int = subprocess.DEVNULL,
+        stderr: int | None = None,
+        pass_fds: Sequence[int] = (),
+        variables: Mapping[str, str] = child_process._NO_VARIABLES,
+        bufsize: int = -1,
+    ) -> Branch:
+        return Branch(
+            _module(module, arguments), stdin=stdin, stdout=stdout, stderr=stderr, bufsize=bufsize,
+            env=child_process._environment(variables), start_new_session=True,
+        )  # fmt: skip
+
+    def run(module: str, given: bytes, timeout_s: float) -> subprocess.CompletedProcess[bytes]:
+        pipe = subprocess.PIPE
+        with start(module, stdin=pipe, stdout=pipe, stderr=pipe) as branch:
+            try:
+                out, err = branch.communicate(given, timeout_s)
+            except subprocess.TimeoutExpired:
+                branch.kill()
+                raise
+        return subprocess.CompletedProcess(branch.args, branch.returncode, out, err)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(child_process, "start", start)
+        patch.setattr(child_process, "run", run)
+        yield
+
+
+def _module(name: str, arguments: Sequence[str]) -> Callable[[], None]:
+    """Return what ``python -m`` does."""
+    importlib.import_module(name)
+
+    def work() -> None:
+        sys.argv = [name, *arguments]
+        warnings.simplefilter("ignore")  # that it has been imported already
+        runpy.run_module(name, run_name="__main__", alter_sys=True)
 
     return work

@@ -136,6 +136,15 @@ def ideal_servos() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="module")
+def branched_children() -> Iterator[None]:
+    """Have the program's own processes start as branches of this one; see branch.py."""
+    from branch import branched_children
+
+    with branched_children():
+        yield
+
+
 @pytest.fixture
 def unlaid_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw figures without finding room for their labels, in less than half the time.

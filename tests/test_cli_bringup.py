@@ -23,7 +23,7 @@ from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
 from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
-pytestmark = pytest.mark.usefixtures("simulated_wires")
+pytestmark = pytest.mark.usefixtures("branched_children", "simulated_wires")
 
 SMALL = [ServoSpec(1, "xl330-m077", 2048), ServoSpec(7, "xc330-m288", 2048)]
 LINE = {"desk": DynamixelLine, "feetech": FeetechLine}

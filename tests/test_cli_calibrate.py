@@ -18,7 +18,7 @@ from gazerig.config.schema import load_rig
 from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
-pytestmark = pytest.mark.usefixtures("simulated_wires")
+pytestmark = pytest.mark.usefixtures("branched_children", "simulated_wires")
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ from served_rigs import Served, rig_files, served
 from gazerig.config.schema import load_rig
 from gazerig.robot.cli.manual_session import holding, left_alone
 
-pytestmark = pytest.mark.usefixtures("simulated_wires")
+pytestmark = pytest.mark.usefixtures("branched_children", "simulated_wires")
 
 
 @pytest.fixture

@@ -3,15 +3,23 @@
 import os
 import signal
 import sys
+from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 
 import pytest
+from branch import branched_children
 
 from gazerig.config.load import ConfigError
 from gazerig.config.save import copy_shipped, save_rig
 from gazerig.config.schema import load_rig
 from gazerig.config.subprocess_call import in_subprocess
+
+
+@pytest.fixture
+def branched() -> Iterator[None]:
+    with branched_children():
+        yield
 
 
 def test_a_rig_comes_over_whole(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -22,6 +30,7 @@ def test_a_rig_comes_over_whole(monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
     )
 
 
+@pytest.mark.usefixtures("branched")
 def test_all_faults_come_over_with_their_lines(tmp_path: Path) -> None:
     file = copy_shipped("desk", tmp_path / "my.yaml")
     text = file.read_text(encoding="utf-8")
@@ -34,6 +43,7 @@ def test_all_faults_come_over_with_their_lines(tmp_path: Path) -> None:
     assert str(there.value) == str(here.value)
 
 
+@pytest.mark.usefixtures("branched")
 def test_saving_works_there(tmp_path: Path) -> None:
     file = copy_shipped("desk", tmp_path / "my.yaml")
     now = datetime(2026, 1, 31, 23, 59, 59)

@@ -21,6 +21,8 @@ from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.testing.rows import rows
 
+pytestmark = pytest.mark.usefixtures("branched_children")
+
 TWINS = ("in-process", pytest.param("pty", marks=pytest.mark.own_timeouts))
 """A terminal's driver has time-outs in real time."""
 

@@ -4,6 +4,8 @@ import itertools
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
 from gazerig.config.schema import load_rig, load_rules
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
@@ -14,6 +16,8 @@ from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Play
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
+
+pytestmark = pytest.mark.usefixtures("branched_children")
 
 PLAYS = {300: Play("mine"), 380: Play("shake", 1.3), 450: Play(""), 500: Play("nod", times=2)}
 

@@ -18,7 +18,7 @@ from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.in_process_port import InProcessPort
 from gazerig.sim_mock.pty.client import PtyBus
 
-pytestmark = pytest.mark.own_timeouts
+pytestmark = [pytest.mark.usefixtures("branched_children"), pytest.mark.own_timeouts]
 
 
 ROOT = Path(__file__).parents[1]

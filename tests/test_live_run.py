@@ -20,7 +20,7 @@ from gazerig.robot.remote.socket_io import folder, sockets
 RATE = "loop.rate_hz"
 ROOT = Path(__file__).parents[1]
 
-pytestmark = pytest.mark.own_timeouts
+pytestmark = [pytest.mark.usefixtures("branched_children"), pytest.mark.own_timeouts]
 """A client waits for its answer, and the park for the servos, only for a bounded time."""
 
 

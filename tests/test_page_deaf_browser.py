@@ -22,6 +22,8 @@ from gazerig.robot.dashboard.page_process import PageProcess
 from gazerig.robot.model.command_json import as_json
 from gazerig.robot.model.commands import Stop
 
+pytestmark = pytest.mark.usefixtures("branched_children")
+
 OWED_BYTES = 16_000_000
 """More than Linux keeps for one connection on its way through the door."""
 

@@ -21,7 +21,7 @@ from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo, versions
 from gazerig.robot.recording.snapshot_index import SnapshotIndex
 
-pytestmark = pytest.mark.usefixtures("ideal_servos")
+pytestmark = pytest.mark.usefixtures("branched_children", "ideal_servos")
 
 
 # --- the commands

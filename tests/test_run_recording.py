@@ -44,6 +44,8 @@ from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text, end_of, i
 from gazerig.robot.recording.viewer_messages import quaternion
 from gazerig.robot.recording.writer_process import PIECE_BYTES
 
+pytestmark = pytest.mark.usefixtures("branched_children")
+
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:

@@ -16,6 +16,8 @@ from gazerig.robot.model import stop_latch
 from gazerig.robot.recording.read import BadRecording, RunRecording
 from gazerig.robot.recording.recorder import Recorder
 
+pytestmark = pytest.mark.usefixtures("branched_children")
+
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:

@@ -3,43 +3,40 @@
 import os
 import signal
 import subprocess
-import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
+from branch import Branch
 
-from gazerig.robot.recording.read import RunRecording
-
-ROOT = Path(__file__).parents[1]
-
-RIG = """
-import sys
-from pathlib import Path
 from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.clock import RealClock
+from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo
 
-info = RunInfo("desk", "robot", "a: 1", 0, 200.0, "2026-01-31T00:00:00+00:00")
-recorder = Recorder(Path(sys.argv[1]), info)
-recorder.open()
-print(recorder._link._process.pid, flush=True)
-options = RunOptions(mock=True, fast=True, seed=0, scene="visitor")
-made = assemble(load_rig("desk"), options, Substitutes(body=recorder.recorded))
-made.robot.start(made.clock)
-wall = RealClock()
-start_s = wall.now_s()
-for number in range(1, 100000):
-    t_s = 0.005 * number
-    wall.sleep_until(start_s + t_s)
-    made.clock.sleep_until(t_s)
-    recorder.record(made.robot.tick(t_s, 0.005))
-    print(wall.now_s(), t_s, flush=True)
-"""
-"""A rig that goes on until it is killed, and says when each tick was handed over."""
+
+def rig(path: Path) -> None:
+    """Record a rig that goes on until it is killed, and say when each tick was handed over."""
+    info = RunInfo("desk", "robot", "a: 1", 0, 200.0, "2026-01-31T00:00:00+00:00")
+    recorder = Recorder(path, info)
+    recorder.open()
+    assert recorder._link is not None and recorder._link._process is not None
+    print(recorder._link._process.pid, flush=True)
+    options = RunOptions(mock=True, fast=True, seed=0, scene="visitor")
+    made = assemble(load_rig("desk"), options, Substitutes(body=recorder.recorded))
+    made.robot.start(made.clock)
+    wall = RealClock()
+    start_s = wall.now_s()
+    for number in range(1, 100000):
+        t_s = 0.005 * number
+        wall.sleep_until(start_s + t_s)
+        made.clock.sleep_until(t_s)
+        recorder.record(made.robot.tick(t_s, 0.005))
+        print(wall.now_s(), t_s, flush=True)
 
 
 class Killed:
@@ -49,25 +46,20 @@ class Killed:
     """
 
     def __init__(self, path: Path, both: bool) -> None:
-        rig = subprocess.Popen(
-            [sys.executable, "-c", RIG, str(path)],
-            stdout=subprocess.PIPE,
-            text=True,
-            cwd=ROOT,
-        )
-        assert rig.stdout is not None
-        writer = int(rig.stdout.readline())
+        process = Branch(partial(rig, path), stdout=subprocess.PIPE, text=True)
+        assert process.stdout is not None
+        writer = int(process.stdout.readline())
         lines = []
-        for line in rig.stdout:
+        for line in process.stdout:
             lines.append(line)
             if float(line.split()[1]) >= 2.5:
                 break
         if both:
             os.kill(writer, signal.SIGKILL)
-        rig.kill()
+        process.kill()
         self.killed_s = time.monotonic()
-        lines += rig.stdout.readlines()
-        rig.wait()
+        lines += process.stdout.readlines()
+        process.wait()
         self.handed = [tuple(map(float, line.split())) for line in lines if line.endswith("\n")]
         deadline_s = time.monotonic() + 30.0
         while alive(writer):

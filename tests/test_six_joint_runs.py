@@ -46,7 +46,7 @@ from gazerig.robot.report.gaze_trace import GazeTrace, GazeTraceBuilder
 from gazerig.robot.report.joint_basis import JointBasis
 from gazerig.robot.report.run_header import RunHeader
 
-pytestmark = pytest.mark.usefixtures("ideal_servos")
+pytestmark = pytest.mark.usefixtures("branched_children", "ideal_servos")
 
 STARTED = "2026-01-31T12:00:00+00:00"
 NO_MORE = {

@@ -12,6 +12,8 @@ from test_cli_calibrate_face import sitting_at
 from gazerig.drivers.errors import DriverError
 from gazerig.robot.remote.client import RequestRejected, RobotClient
 
+pytestmark = pytest.mark.usefixtures("branched_children")
+
 
 def goes_on(running: RobotClient) -> None:
     """Resume as soon as the stop has held as long as stops do."""

@@ -7,11 +7,13 @@ import signal
 import subprocess
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from branch import Branch, gazerig
 from child_processes import running
 from command_line import GAZERIG, Invoked, invoked
 
@@ -29,6 +31,8 @@ from gazerig.robot.sweep.run_store import RUNS, run_store
 from gazerig.robot.sweep.table import rows_of, write_tables
 from gazerig.robot.sweep.worker import Job, figures_at
 from gazerig.robot.sweep.worker_pool import SweepInterrupted, WorkerPool
+
+pytestmark = pytest.mark.usefixtures("branched_children")
 
 RIG, DESK = load_rig("desk"), shipped("rigs", "desk")
 COMFORT = "gaze.head.comfort_deg"
@@ -199,19 +203,25 @@ def test_a_process_that_dies_costs_its_run_alone_and_the_end_comes_when_asked() 
 # ---- the end from outside
 
 
-@pytest.fixture
-def begun(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], Path]]:
-    """Start a sweep in a process of its own and wait for its first run."""
-    out = tmp_path / "out"
+@contextmanager
+def begun(out: Path, real: bool = False) -> Iterator[subprocess.Popen[str]]:
+    """Start a sweep, really or in a branch of this process, and wait for its first run."""
     words = ("sweep", "--out", str(out), *QUICK, "--set", f"{COMFORT}=1:80:80", "--seeds", "50")
-    process = subprocess.Popen([*GAZERIG, *words], stderr=subprocess.PIPE, text=True)
+    pipe = subprocess.PIPE
+    process = (
+        subprocess.Popen([*GAZERIG, *words], stderr=pipe, text=True)
+        if real
+        else Branch(gazerig(*words), stderr=pipe, text=True)
+    )
     file = out / RUNS
-    wait_for(lambda: file.exists() and file.read_bytes().count(b"\n") > 0)
-    yield process, out
-    process.kill()
-    process.wait()
-    assert process.stderr is not None
-    process.stderr.close()
+    try:
+        wait_for(lambda: file.exists() and file.read_bytes().count(b"\n") > 0)
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+        assert process.stderr is not None
+        process.stderr.close()
 
 
 def wait_for(ready: object) -> None:
@@ -228,14 +238,13 @@ def children(pid: int) -> list[int]:
 
 
 @pytest.mark.slow
-def test_ctrl_c_keeps_what_is_finished_and_leaves_no_process(
-    begun: tuple[subprocess.Popen[str], Path],
-) -> None:
-    process, out = begun
-    workers = children(process.pid)
-    assert len(workers) == 1
-    process.send_signal(signal.SIGINT)
-    _, text = process.communicate(timeout=PATIENCE_S)
+def test_ctrl_c_keeps_what_is_finished_and_leaves_no_process(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    with begun(out, real=True) as process:
+        workers = children(process.pid)
+        assert len(workers) == 1
+        process.send_signal(signal.SIGINT)
+        _, text = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 130
     assert f"runs are kept in {out}: the same command goes on" in text and "interrupted" in text
     assert not alive(workers)
@@ -245,13 +254,13 @@ def test_ctrl_c_keeps_what_is_finished_and_leaves_no_process(
 
 
 @pytest.mark.slow
-def test_a_killed_sweep_leaves_no_process(begun: tuple[subprocess.Popen[str], Path]) -> None:
-    process, _ = begun
-    workers = children(process.pid)
-    assert len(workers) == 1
-    process.kill()
-    process.wait()
-    wait_for(lambda: not alive(workers))
+def test_a_killed_sweep_leaves_no_process(tmp_path: Path) -> None:
+    with begun(tmp_path / "out") as process:
+        workers = children(process.pid)
+        assert len(workers) == 1
+        process.kill()
+        process.wait()
+        wait_for(lambda: not alive(workers))
 
 
 # ---- figures

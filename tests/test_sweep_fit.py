@@ -18,6 +18,8 @@ from gazerig.robot.sweep.outcome import Outcome
 from gazerig.robot.sweep.search import search
 from gazerig.robot.sweep.snippet import snippet_of
 
+pytestmark = pytest.mark.usefixtures("branched_children")
+
 AXES = (
     Axis("gaze.lids.blinks_per_min", (), 1.0, 60.0),
     Axis("gaze.lids.close_ms", (), 30.0, 300.0),
