@@ -22,6 +22,7 @@ from gazerig.gaze.face_memory import FaceMemory
 from gazerig.gaze.field_of_view import FieldOfView, line_of_sight
 from gazerig.gaze.habituation import Habituation, HabituationParams
 from gazerig.gaze.idle import Idle
+from gazerig.gaze.persons import Persons
 from gazerig.gaze.reaction import Reaction, ReactionParams
 from gazerig.gaze.top_down import RuleTarget, TopDown
 from gazerig.gaze.types import Bodies, Floats, GazeState, Percept, Salience, Target, Vec3
@@ -29,6 +30,7 @@ from gazerig.params import Bounds
 
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _POINT = ("point", -1)
+_NO_ONE: frozenset[int] = frozenset()
 _LISTED = 4
 _FEW = 24
 """So many bodies are computed one by one, which costs less than arrays do."""
@@ -103,6 +105,7 @@ class Attention:
         self._habituation = Habituation(params.habituation)
         self._reaction = Reaction(params.reaction, rng)
         self._memory = FaceMemory()
+        self._persons = Persons()
         self.reset(0.0)
 
     def retune(self, params: AttentionParams) -> None:
@@ -117,6 +120,7 @@ class Attention:
             model.reset(t_s)
         self._reaction.reset(t_s)
         self._memory.reset()
+        self._persons.reset()
         self._seen_s = -inf
         self._target: Target | None = None
         self._shift = 0
@@ -171,6 +175,9 @@ class Attention:
         attended = self._identity[1] if self._identity is not None else -1
         lasts_s = self._params.face_memory_s
         bodies = self._memory.step(percept.bodies, attended, percept.captured_s, lasts_s)
+        self._persons.update(percept, state.p_world_head_m)
+        trait = self.top_down.rule.person
+        self.top_down.named_ids = self._persons.named(trait) if trait is not None else _NO_ONE
         compare = self._compare_few if len(bodies) <= _FEW else self._compare
         ratio = self._params.looks_elsewhere_ratio
         elsewhere = [face.id for face in percept.faces if face.looks_at_head is False]

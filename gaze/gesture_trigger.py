@@ -17,7 +17,14 @@ class GestureTrigger:
         self._named_by: str | None = None
         self._played_s: dict[str, float] = {}
 
-    def step(self, behaviour: str, rule: Rule, target: Target, t_s: float) -> str:
+    def step(
+        self,
+        behaviour: str,
+        rule: Rule,
+        target: Target,
+        t_s: float,
+        named_ids: frozenset[int] = frozenset(),
+    ) -> str:
         """Return the gesture to play now, "" for none.
 
         Args:
@@ -25,11 +32,12 @@ class GestureTrigger:
             rule: of this behaviour.
             target: what the gaze goes to.
             t_s: now.
+            named_ids: the people who do what the rule names, where it names persons.
         """
         if not rule.gesture:
             return ""
         before = self._named_by
-        named = _is_named(rule, target)
+        named = _is_named(rule, target, named_ids)
         self._named_by = behaviour if named else None
         if not named or before == behaviour:
             return ""
@@ -40,10 +48,12 @@ class GestureTrigger:
         return rule.gesture
 
 
-def _is_named(rule: Rule, target: Target) -> bool:
+def _is_named(rule: Rule, target: Target, named_ids: frozenset[int]) -> bool:
     """Return whether a target is what makes the rule's gesture."""
     if rule.gesture_at:
         return target.kind == rule.gesture_at
+    if rule.person is not None:
+        return target.id in named_ids
     if rule.body_id is not None:
         return target.id == rule.body_id
     if rule.point_world_m is not None:

@@ -2,8 +2,9 @@
 
 The paper's rules are attack -> attack target, guard -> guard target, wait -> the
 opponent's face, each with a constant amount of attention whose value it does not give.
-Here a rule may point at a kind of body, at one body by its id, or at a place. Where
-several bodies are of the wanted kind, each is wanted, the nearer the more.
+Here a rule may point at a kind of body, at persons by what they do (gazerig.gaze.persons), at one
+body by its id, or at a place. Where several bodies are of the wanted kind, each is wanted, the
+nearer the more. Where no person does what a rule names, it points at all faces.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,11 +16,14 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.gaze.persons import TRAITS
 from gazerig.gaze.types import Bodies, BodyRows, Floats, Vec3
 from gazerig.params import Bounds
 
 _BY_ID = "id:"
+_PERSON = "person:"
 _POINT = "point"
+_NO_ONE: frozenset[int] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -28,7 +32,8 @@ class Rule:
 
     # fmt: off
     look_at: Annotated[str,
-        'kind of body to look at, e.g. "face" or "hand"; "id:7" for the body with that id; "point" for the position point_world_m']
+        'kind of body to look at, e.g. "face" or "hand"; "person:nearest", "person:waving", "person:looking" (at the head) or '
+        '"person:newest" (who came last); "id:7" for the body with that id; "point" for the position point_world_m']
     salience: Annotated[float, Bounds(0, 10), "salience of the rule's target (A_attack, A_guard, A_face)"]
     point_world_m: Annotated[tuple[float, float, float] | None, Bounds(-100, 100),
         "position to look at: ahead, left and above of the neck base"] = None
@@ -42,12 +47,43 @@ class Rule:
         """Check that the fields fit each other.
 
         Raises:
-            ValueError: an id that is no number; a point without a place, or a place without one.
+            ValueError: an id that is no number; a person by a word that is no trait; a point
+                without a place, or a place without one.
         """
+        self._check_person()
         if self.look_at.startswith(_BY_ID) and not self.look_at[len(_BY_ID) :].isdecimal():
             raise ValueError(f'look_at {self.look_at!r} names no id; write e.g. "id:7"')
         if (self.look_at == _POINT) != (self.point_world_m is not None):
             raise ValueError("look_at: point and point_world_m go together; give both or neither")
+
+    def _check_person(self) -> None:
+        """Check that a rule names persons by what they may do.
+
+        Raises:
+            ValueError: it does not; the message lists what can be written.
+        """
+        prefix, colon, word = self.look_at.partition(":")
+        traits = ", ".join(f'"{_PERSON}{trait}"' for trait in TRAITS)
+        if self.look_at in TRAITS:
+            raise ValueError(f'look_at {self.look_at!r}: write "{_PERSON}{self.look_at}"')
+        if colon and f"{prefix}:" not in (_BY_ID, _PERSON):
+            raise ValueError(
+                f'look_at {self.look_at!r}: before ":" stands "id" or "person"; write e.g. "id:7" '
+                f"or one of {traits}"
+            )
+        if f"{prefix}:" == _PERSON and word not in TRAITS:
+            raise ValueError(f"look_at {self.look_at!r} names no person; write one of {traits}")
+
+    @property
+    def person(self) -> str | None:
+        """Return what the persons do whom it names, None where it names none."""
+        named = self.look_at.startswith(_PERSON)
+        return self.look_at[len(_PERSON) :] if named else None
+
+    @property
+    def kind(self) -> str:
+        """Return the kind of body it names."""
+        return "face" if self.person is not None else self.look_at
 
     @property
     def body_id(self) -> int | None:
@@ -104,7 +140,11 @@ class RuleTarget(NamedTuple):
 
 
 class TopDown:
-    """The rules, and the behaviour in force."""
+    """The rules, and the behaviour in force.
+
+    named_ids: the people who do what the rule in force names, where it names persons; set by who
+        knows them before each step
+    """
 
     def __init__(self, params: TopDownParams) -> None:
         self._params = params
@@ -133,6 +173,7 @@ class TopDown:
     def reset(self, t_s: float) -> None:
         """Return to the behaviour of the start."""
         self.behaviour = self._params.behaviour
+        self.named_ids = _NO_ONE
         self._named: tuple[str, tuple[str, ...]] = ("", ())
         self._rows_named = np.zeros(0, dtype=np.intp)
 
@@ -163,23 +204,33 @@ class TopDown:
         rule = self._params.rules[self.behaviour]
         rows = self._rows(bodies, rule)
         rows = rows[seen[rows]]
+        if self.named_ids:
+            named = np.isin(np.array(bodies.ids, dtype=np.int64)[rows], list(self.named_ids))
+            some = rows[named]
+            rows = some if len(some) else rows
         if len(rows) == 0 and rule.point_world_m is None:
             return None
         near = self._nearness(bodies, rows, p_world_eye_m, favoured_id)
         return RuleTarget(rows, near, rule.point_world_m, rule.salience, self.behaviour)
 
     def step_rows(
-        self, bodies: BodyRows, seen: list[bool], p_world_eye_m: Vec3, favoured_id: int = -1
+        self,
+        bodies: BodyRows,
+        seen: list[bool],
+        p_world_eye_m: Vec3,
+        favoured_id: int = -1,
     ) -> RuleTarget | None:
         """Return what ``step`` does, for few bodies."""
         rule = self._params.rules[self.behaviour]
         if rule.point_world_m is not None:
             return RuleTarget([], [], rule.point_world_m, rule.salience, self.behaviour)
         named: Sequence[object] = bodies.kinds if rule.body_id is None else bodies.ids
-        wanted = rule.look_at if rule.body_id is None else rule.body_id
+        wanted = rule.kind if rule.body_id is None else rule.body_id
         rows = [i for i, one in enumerate(named) if one == wanted and seen[i]]
         if not rows:
             return None
+        if self.named_ids:
+            rows = [i for i in rows if bodies.ids[i] in self.named_ids] or rows
         near = [1.0]
         if len(rows) > 1:
             stay = self._params.stay_with_person
@@ -213,8 +264,8 @@ class TopDown:
             return np.array(rows, dtype=np.intp)
         # The same kinds in the same order come again and again; comparing tuples of the
         # same strings is many times faster than looking through them.
-        if (rule.look_at, bodies.kinds) != self._named:
-            same = [kind == rule.look_at for kind in bodies.kinds]
-            self._named = rule.look_at, bodies.kinds
+        if (rule.kind, bodies.kinds) != self._named:
+            same = [kind == rule.kind for kind in bodies.kinds]
+            self._named = rule.kind, bodies.kinds
             self._rows_named = np.array(list(compress(range(len(same)), same)), dtype=np.intp)
         return self._rows_named

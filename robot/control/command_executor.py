@@ -179,7 +179,9 @@ class CommandExecutor:
             t_s: now.
         """
         top_down = self._attention.top_down
-        name = self._trigger.step(top_down.behaviour, top_down.rule, target, t_s)
+        name = self._trigger.step(
+            top_down.behaviour, top_down.rule, target, t_s, top_down.named_ids
+        )
         if name and not self._stop.why and not self._lead.active:
             reply = self._play(Play(name, who=f"rule {top_down.behaviour}"), t_s)
             if reply.refused:

@@ -1,0 +1,207 @@
+"""Rules name persons by what they do: in the YAML, from frame to frame, and in a scene of three."""
+
+from math import pi, sin
+from pathlib import Path
+
+import numpy as np
+import pytest
+from attention_scene import looking
+
+from gazerig.config.faults import ConfigError
+from gazerig.config.schema import load_rules
+from gazerig.gaze.angles import rotation
+from gazerig.gaze.attention import Attention, AttentionParams
+from gazerig.gaze.bottom_up import BottomUp, BottomUpParams
+from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
+from gazerig.gaze.gesture_trigger import GestureTrigger
+from gazerig.gaze.idle import Idle, IdleParams
+from gazerig.gaze.persons import Persons
+from gazerig.gaze.top_down import Rule, TopDown, TopDownParams
+from gazerig.gaze.types import Bodies, Face, Percept, Target, Vec3
+from gazerig.sim_mock.scenes.group import HEAD_M
+from gazerig.sim_mock.scenes.scene import Scene
+from gazerig.sim_mock.scenes.three_people import ThreePeople
+
+EYE: Vec3 = (0.0, 0.0, 0.0)
+LEFT, RIGHT, FAR = (1.0, 0.4, 0.0), (1.1, -0.4, 0.0), (2.0, 0.0, 0.0)
+
+
+def percept(
+    t_s: float, faces: dict[int, Vec3], looks: tuple[int, ...] = (), hand: Vec3 | None = None,
+    hand_y_m_s: float = 0.0,
+) -> Percept:  # fmt: skip
+    n = len(faces) + (hand is not None)
+    places = np.array([*faces.values(), *([hand] if hand is not None else [])]).reshape(-1, 3)
+    v = np.zeros((n, 3))
+    if hand is not None:
+        v[-1, 1] = hand_y_m_s
+    ids = (*faces, *((99,) if hand is not None else ()))
+    kinds = ("face",) * len(faces) + ("hand",) * (hand is not None)
+    R = rotation((pi, 0.0, 0.0))
+    seen = tuple(
+        Face(id, p, EYE, R, (p,) * 8, 0.9, looks_at_head=id in looks) for id, p in faces.items()
+    )
+    return Percept(t_s, Bodies(ids, kinds, places, v, np.zeros((n, 3)), np.full(n, 0.1)), seen)
+
+
+def test_the_nearest_is_the_nearest_until_another_is_clearly_so() -> None:
+    persons = Persons()
+    for away, nearest in [(1.2, 5), (1.0, 5), (0.95, 5), (0.8, 7), (0.95, 7), (1.2, 5)]:
+        persons.update(percept(away, {5: (1.0, 0.0, 0.0), 7: (away, 0.01, 0.0)}), EYE)
+        assert persons.named("nearest") == {nearest}, away
+    persons.update(percept(2.0, {}), EYE)
+    assert persons.named("nearest") == frozenset()
+
+
+def test_the_newest_came_last_and_who_came_together_is_named_together() -> None:
+    persons = Persons()
+    assert persons.named("newest") == frozenset()
+    persons.update(percept(0.0, {5: LEFT}), EYE)
+    persons.update(percept(0.3, {5: LEFT, 2: RIGHT}), EYE)
+    assert persons.named("newest") == {5, 2}
+    for t_s in (4.0, 9.0):
+        persons.update(percept(t_s, {5: LEFT, 1: FAR, 2: RIGHT}), EYE)
+        assert persons.named("newest") == {1}
+    # Out of view for a while, they did not come anew.
+    persons.update(percept(12.0, {1: FAR}), EYE)
+    persons.update(percept(15.0, {5: LEFT, 1: FAR, 2: RIGHT}), EYE)
+    assert persons.named("newest") == {1}
+
+
+def test_who_looks_is_told_by_the_faces_of_the_frame() -> None:
+    persons = Persons()
+    persons.update(percept(0.0, {5: LEFT, 2: RIGHT}, looks=(2,)), EYE)
+    assert persons.named("looking") == {2}
+
+
+@pytest.mark.parametrize(
+    ("hz", "swing_m", "beside", "waves"),
+    [(1.5, 0.11, RIGHT, True), (2.5, 0.06, RIGHT, True), (0.4, 0.11, RIGHT, False),
+     (1.5, 0.02, RIGHT, False), (1.5, 0.11, (1.0, 1.9, 0.0), False)],
+)  # fmt: skip
+def test_a_hand_that_swings_to_both_sides_waves_for_the_nearest_face(
+    hz: float, swing_m: float, beside: Vec3, waves: bool
+) -> None:
+    persons, named = Persons(), []
+    for k in range(90):
+        t_s = k / 30
+        phase = 2 * pi * hz * t_s
+        hand = (beside[0] - 0.1, beside[1] - 0.25 + swing_m * sin(phase), beside[2])
+        v = 2 * pi * hz * swing_m * np.cos(phase)
+        persons.update(percept(t_s, {5: LEFT, 2: RIGHT}, (), hand, v), EYE)
+        named.append(persons.named("waving"))
+    assert (named[-1] == {2}) is waves and (named[-1] == frozenset()) is not waves
+    assert named[5] == frozenset()
+    for k in range(90, 150):
+        persons.update(percept(k / 30, {5: LEFT, 2: RIGHT}), EYE)
+    assert persons.named("waving") == frozenset()
+
+
+def test_a_hand_that_moves_to_one_side_does_not_wave() -> None:
+    persons = Persons()
+    for k in range(60):
+        y = -0.8 + 0.5 * k / 30
+        persons.update(percept(k / 30, {2: RIGHT}, (), (1.0, y, 0.0), 0.5), EYE)
+    assert persons.named("waving") == frozenset()
+
+
+@pytest.mark.parametrize(
+    ("look_at", "says"),
+    [("person:wawing", 'write one of "person:nearest", "person:waving", "person:looking", "person:newest"'),
+     ("person:", "names no person"), ("persons:nearest", 'stands "id" or "person"'),
+     ("nearest", 'write "person:nearest"'), ("waving", 'write "person:waving"')],
+)  # fmt: skip
+def test_a_wrong_word_is_refused_with_the_right_ones(
+    look_at: str, says: str, tmp_path: Path
+) -> None:
+    with pytest.raises(ValueError, match=says):
+        Rule(look_at, 0.5)
+    file = tmp_path / "mine.yaml"
+    file.write_text(f'behaviour: a\nrules:\n  a:\n    look_at: "{look_at}"\n    salience: 0.5\n')
+    with pytest.raises(ConfigError, match=r"mine\.yaml") as refused:
+        load_rules(str(file))
+    assert says in str(refused.value)
+
+
+def seen_by_truth(scene: Scene, t_s: float, numbers: tuple[int, ...]) -> Percept:
+    """Return what a perfect camera and tracker show of a scene, people having these ids."""
+    people = {
+        id: one for id, one in zip(numbers, scene.people(t_s), strict=True)
+        if one.p_world_face_m[0] > 0.4
+    }  # fmt: skip
+    before = dict(zip(numbers, scene.people(t_s - 0.01), strict=True))
+    rows = [
+        (id, "face", one.p_world_face_m, before[id].p_world_face_m) for id, one in people.items()
+    ]
+    for id, one in people.items():
+        if one.hand is not None:
+            rows.append((100 + id, "hand", one.hand, before[id].hand or one.hand))
+    p, old = (np.array([row[k] for row in rows]).reshape(-1, 3) for k in (2, 3))
+    n = len(rows)
+    faces = tuple(
+        Face(
+            id, one.p_world_face_m, EYE, rotation((*one.face_yaw_pitch_rad, 0.0)),
+            (one.p_world_face_m,) * 8, 0.9, looks_at_head=looks(one.face_yaw_pitch_rad[0], one),
+        )
+        for id, one in people.items()
+    )  # fmt: skip
+    ids, kinds = tuple(row[0] for row in rows), tuple(row[1] for row in rows)
+    bodies = Bodies(ids, kinds, p, (p - old) / 0.01, np.zeros((n, 3)), np.full(n, 0.1))
+    return Percept(t_s, bodies, faces)
+
+
+def looks(yaw: float, one: object) -> bool:
+    x, y, _ = one.p_world_face_m  # type: ignore[attr-defined]
+    off = yaw - np.arctan2(HEAD_M[1] - y, HEAD_M[0] - x)
+    return bool(np.cos(off) > np.cos(0.17))
+
+
+def shares(look_at: str, numbers: tuple[int, ...], start_s: float, end_s: float) -> list[float]:
+    """Return how much of a time each of three people is looked at by a rule."""
+    rules = {"wait": Rule(look_at, 2.5)}
+    model = Attention(
+        AttentionParams(), FieldOfView(FieldOfViewParams()), BottomUp(BottomUpParams()),
+        TopDown(TopDownParams(rules=rules)), Idle(IdleParams()), np.random.default_rng(0),
+    )  # fmt: skip
+    state = looking()._replace(p_world_head_m=HEAD_M)
+    found = []
+    for k in range(round(30 * end_s)):
+        t_s = k / 30
+        target = model.choose(seen_by_truth(ThreePeople(), t_s, numbers), state, t_s + 0.05)
+        if t_s >= start_s:
+            found.append(target.id)
+    return [found.count(id) / len(found) for id in numbers]
+
+
+@pytest.mark.parametrize("numbers", [(4, 9, 2), (31, 5, 17)])
+@pytest.mark.parametrize(
+    ("look_at", "start_s", "end_s", "person"),
+    [("person:newest", 6.5, 20.0, 2), ("person:waving", 23.5, 26.0, 2),
+     ("person:nearest", 32.0, 36.0, 1), ("person:looking", 12.5, 13.8, 2)],
+)  # fmt: skip
+def test_e78_a_rule_finds_its_person_whatever_their_number(
+    look_at: str, start_s: float, end_s: float, person: int, numbers: tuple[int, ...]
+) -> None:
+    got = shares(look_at, numbers, start_s, end_s)
+    if look_at == "person:looking":  # the middle one does not look then, the others do
+        assert got[1] == 0.0 and sum(got) > 0.95
+    else:
+        assert got[person] > 0.9
+
+
+def test_e78_where_nobody_does_it_all_are_looked_at() -> None:
+    got = shares("person:waving", (4, 9, 2), 6.5, 21.0)
+    assert min(got) > 0.15
+
+
+def test_a_gesture_of_such_a_rule_is_for_the_named_alone() -> None:
+    trigger, rule = GestureTrigger(), Rule("person:waving", 0.9, gesture="nod")
+    face = Target(LEFT, EYE, 0.0, "face", 5, 0.9, True, None, 0, "")
+    assert trigger.step("greet", rule, face, 0.0) == ""
+    assert trigger.step("greet", rule, face, 0.1, frozenset((2,))) == ""
+    assert trigger.step("greet", rule, face, 0.2, frozenset((5,))) == "nod"
+
+
+def test_the_shipped_rules_of_a_group_are_read() -> None:
+    rules = load_rules("group").rules
+    assert {rule.person for rule in rules.values()} == {"nearest", "waving", "looking", "newest"}
