@@ -6,21 +6,25 @@ exactly (the vestibulo-ocular reflex), and vergence comes from each eye's own ge
 """
 
 from dataclasses import dataclass
-from math import sqrt
 from typing import Annotated, NamedTuple, Protocol
 
 import numpy as np
 
-from gazerig.gaze.angles import add, angle_between, no_nearer, norm, sub, unit
+from gazerig.gaze.angles import (
+    add,
+    angle_between,
+    norm,
+    sub,
+    unit,
+)
 from gazerig.gaze.animation import NO_OFFSET, PoseOffset
 from gazerig.gaze.binocular import HeadView
 from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.gaze_point import MOVING_M_S, GazePoint, GazePointParams
 from gazerig.gaze.head import HeadModel
 from gazerig.gaze.lids import Lids
-from gazerig.gaze.pursuit import Pursuit, sight
+from gazerig.gaze.pursuit import Pursuit
 from gazerig.gaze.saccade import SaccadeModel
-from gazerig.gaze.saccade_trajectory import SaccadeTrajectory, scattered_endpoint
-from gazerig.gaze.saccade_trigger import SaccadeTrigger, SaccadeTriggerParams
 from gazerig.gaze.target_prediction import PredictionModel, TargetPrediction
 from gazerig.gaze.types import (
     Angles2,
@@ -37,13 +41,11 @@ from gazerig.gaze.types import (
 from gazerig.params import Bounds
 
 _AT_END = "at the end of its range"
-_MOVING_M_S = 0.05
-"""A target slower than this is fixated, not pursued."""
 
 
 @dataclass(frozen=True)
-class OculomotorParams(SaccadeTriggerParams):
-    """Saccade trigger, prediction horizon and endpoint scatter."""
+class OculomotorParams(GazePointParams):
+    """The gaze point's parameters, and the prediction of target and head."""
 
     # fmt: off
     prediction_horizon_ms: Annotated[float, Bounds(0, 2000),
@@ -53,11 +55,6 @@ class OculomotorParams(SaccadeTriggerParams):
         "where a target is expected: where its frame showed it, moved on with its velocity, or along its curve and its swing, "
         "which is recognised after one to two cycles"] = "periodic"
     eye_lag_ms: Annotated[float, Bounds(0, 200), "delay from command to motion of an eye; the head's motion during it is predicted"] = 15.0
-    nearest_m: Annotated[float, Bounds(0.05, 2), "nearest distance on which the eyes converge (0.2 m is 17.6 deg of vergence)"] = 0.2
-    endpoint_scatter_along: Annotated[float, Bounds(0, 0.2),
-        "scatter of saccade endpoints along the path, standard deviation as a share of the amplitude; people .03-.05"] = 0.0
-    endpoint_scatter_across: Annotated[float, Bounds(0, 0.2),
-        "scatter of saccade endpoints across the path, standard deviation as a share of the amplitude; people .02"] = 0.0
     # fmt: on
 
 
@@ -107,7 +104,7 @@ class Oculomotor:
         head: the model of head movements.
         lids: the model of lids and blinks.
         breathing: sways the head; None: it does not.
-        rng: random generator of the endpoint scatter.
+        rng: random generator of endpoints and re-fixations; None: without re-fixations.
 
     Raises:
         ValueError: endpoints are to scatter and there is no rng.
@@ -125,12 +122,10 @@ class Oculomotor:
         breathing: Sway | None = None,
         rng: np.random.Generator | None = None,
     ) -> None:
-        self._rng = rng
-        self._trigger = SaccadeTrigger(params, False)
         self._prediction = TargetPrediction("none", 0.0, 1.0)
+        self._gaze = GazePoint(params, saccade, pursuit, self._prediction, rng)
         self.retune(params, eye_limits)
         self._geometry = geometry
-        self._saccade = saccade
         self._pursuit = pursuit
         self._head = head
         self._lids = lids
@@ -148,17 +143,11 @@ class Oculomotor:
         Raises:
             ValueError: endpoints are to scatter and there is no rng.
         """
-        scatter = (params.endpoint_scatter_along, params.endpoint_scatter_across)
-        if any(scatter) and self._rng is None:
-            raise ValueError(
-                "endpoint_scatter_along and endpoint_scatter_across need a random generator: give rng"
-            )
-        self._params, self._scatter, self._eye_limits = params, scatter, eye_limits
-        self._lag_s, self._nearest_m = params.eye_lag_ms / 1e3, params.nearest_m
+        self._gaze.retune(params)
+        self._eye_limits, self._lag_s = eye_limits, params.eye_lag_ms / 1e3
         self._prediction.retune(
             params.target_prediction, params.prediction_horizon_ms / 1e3, params.fade_ms / 1e3
         )
-        self._trigger.retune(params, any(scatter))
 
     def reset(self, t_s: float, state: GazeState) -> None:
         """Start from the present angles of head and eyes."""
@@ -166,12 +155,9 @@ class Oculomotor:
         self._lids.reset(t_s)
         if self._breathing is not None:
             self._breathing.reset(t_s)
-        self._trigger.reset(t_s)
         self._prediction.reset()
         self._pursuit.binocular.reset()
-        self._gaze = _meeting_point(state)
-        self._trajectory: SaccadeTrajectory | None = None
-        self.saccades = self.fixations = 0
+        self._gaze.reset(t_s, _meeting_point(state))
         self._started = True
 
     def step(
@@ -199,19 +185,18 @@ class Oculomotor:
             centre = self._geometry.facing(centre_point, base)
         ahead = R_world_head[0][0], R_world_head[1][0], R_world_head[2][0]
         aside_rad = angle_between(ahead, toward)
-        trigger = self._trigger
-        if target.shift != trigger.shift:
-            free_s = self._trajectory.ends_s if self._trajectory else t_s
-            trigger.record_shift(target.shift, self._head.leads_s(target, aside_rad), free_s, t_s)
-        jumps = self._trajectory is not None
-        shift_rad = self._move_gaze(seen, p_head, t_s, dt_s)
-        head = self._head.step(target, centre, facing, aside_rad, t_s - trigger.onset_s, t_s)
-        wanted = self._geometry.eyes_on(self._gaze, R_world_head, p_head)
+        place = self._gaze
+        if target.shift != place.shift:
+            place.record_shift(target.shift, self._head.leads_s(target, aside_rad), t_s)
+        jumps = place.jumps
+        shift_rad = place.move(point, velocity, p_head, t_s, dt_s)
+        head = self._head.step(target, centre, facing, aside_rad, t_s - place.onset_s, t_s)
+        wanted = self._geometry.eyes_on(place.point_m, R_world_head, p_head)
         if self._pursuit.is_binocular:
             jumps = jumps or shift_rad is not None
-            view = HeadView(R_world_head, p_head, self._geometry.eyes_on, self._nearest_m)
-            wanted, self._gaze = self._pursuit.binocular.fixate(
-                target, self._gaze, wanted if jumps else None, trigger, view, t_s, dt_s
+            view = HeadView(R_world_head, p_head, self._geometry.eyes_on, place.nearest_m)
+            wanted, place.point_m = self._pursuit.binocular.fixate(
+                target, place.point_m, wanted if jumps else None, place, view, t_s, dt_s
             )
         if offset.eyes_rad != NO_OFFSET.eyes_rad:
             wanted = _turned(wanted[0], offset.eyes_rad), _turned(wanted[1], offset.eyes_rad)
@@ -222,16 +207,16 @@ class Oculomotor:
             lids = lids.scaled(offset.lids)
         head = self._swayed(head, offset.head_rad, t_s)
         phase: Phase = (
-            "saccade" if self._trajectory
-            else "pursue" if norm(velocity) > _MOVING_M_S
+            "saccade" if place.jumps
+            else "pursue" if norm(velocity) > MOVING_M_S
             else "fixate"
         )  # fmt: skip
         # Without the call of a function written in Python that the class itself would cost.
         return tuple.__new__(
             GazeCommand,
             (
-                head, left, right, lids.left, lids.right, phase, lids.blink, self._gaze,
-                self.saccades, self.fixations, self._lids.blinks, lids.lower_left,
+                head, left, right, lids.left, lids.right, phase, lids.blink, place.point_m,
+                place.saccades, place.fixations, self._lids.blinks, lids.lower_left,
                 lids.lower_right, limited,
             ),
         )  # fmt: skip
@@ -242,11 +227,16 @@ class Oculomotor:
         head = self._head.destination_rad(target, facing)
         R_world_head, p_head = self._geometry.head_pose(head, self._base_rad)
         exact = self._geometry.eyes_on(target.p_world_m, R_world_head, p_head)
-        point = self._clear(target.p_world_m, p_head)
+        point = self._gaze.clear(target.p_world_m, p_head)
         left, right = self._in_range(self._geometry.eyes_on(point, R_world_head, p_head))
         return ReachableGaze(
             (*facing, 0.0), head, exact, (left, right), point != target.p_world_m, self._base_rad
         )
+
+    @property
+    def settled(self) -> bool:
+        """Return whether the gaze has arrived: no saccade to a new target is due or in flight."""
+        return self._gaze.settled
 
     @property
     def ranges_rad(self) -> tuple[tuple[Angles2, Angles2], ...]:
@@ -308,65 +298,15 @@ class Oculomotor:
         prediction.see(target, p_head, self._pursuit.fastest_swing_rad_s)
         moved, velocity = prediction.displacement(t_s), prediction.velocity(t_s)
         p, centre = target.p_world_m, target.centre_world_m
-        point = self._clear(add(p, moved), p_head)
+        point = self._gaze.clear(add(p, moved), p_head)
         middle = prediction.to_middle
         if middle is not None:
-            head_point = self._clear(add(p if centre is None else centre, middle), p_head)
+            head_point = self._gaze.clear(add(p if centre is None else centre, middle), p_head)
         elif centre is None:
             head_point = point
         else:
-            head_point = self._clear(add(centre, moved), p_head)
+            head_point = self._gaze.clear(add(centre, moved), p_head)
         return point, velocity, head_point, sub(point, p_head)
-
-    def _clear(self, point: Vec3, p_head: Vec3) -> Vec3:
-        """Return a point moved away to ``nearest_m`` where it is nearer."""
-        return no_nearer(point, p_head, self._nearest_m)
-
-    def _move_gaze(self, seen: _Seen, p_head: Vec3, t_s: float, dt_s: float) -> float | None:
-        """Move the gaze point along a saccade, or after the target.
-
-        Returns:
-            The amplitude of the saccade that starts now, radians; None where none does.
-        """
-        shift_rad = None
-        if self._trajectory is None:
-            point, velocity, _, _ = seen
-            gaze, there = sight(self._gaze, p_head), sight(point, p_head)
-            x, y, z = there[0] - gaze[0], there[1] - gaze[1], there[2] - gaze[2]
-            trigger = self._trigger
-            if not trigger.rests(sqrt(x * x + y * y + z * z)):
-                slip = self._pursuit.slip(self._gaze, point, velocity, p_head)
-                if trigger.due(slip, t_s):
-                    shift_rad = self._jump(seen, p_head, t_s)
-            if shift_rad is None:
-                if not trigger.waits and dt_s > 0.0 and not self._pursuit.is_binocular:
-                    closing = not trigger.corrects
-                    self._gaze = self._pursuit.follow(
-                        gaze, there, point, velocity, p_head, dt_s, closing
-                    )
-                return None
-        trajectory = self._trajectory
-        assert trajectory is not None
-        self._gaze = trajectory.at(p_head, t_s)
-        if trajectory.landed(t_s):
-            self._trajectory = None
-            self._trigger.record_landing(t_s)
-            self.fixations += 1
-        return shift_rad
-
-    def _jump(self, seen: _Seen, p_head: Vec3, t_s: float) -> float:
-        """Start a saccade; return its amplitude in radians."""
-        point = seen[0]
-        error = angle_between(sub(self._gaze, p_head), sub(point, p_head))
-        after_s = t_s + self._saccade.duration_s(error)
-        moved, until = self._prediction.displacement(t_s), self._prediction.displacement(after_s)
-        end = add(point, sub(until, moved))
-        end = self._clear(end, p_head)
-        if self._rng is not None and any(self._scatter):
-            end = scattered_endpoint(end, self._gaze, p_head, *self._scatter, self._rng)
-        self._trajectory = SaccadeTrajectory(self._saccade, self._gaze, end, p_head, t_s)
-        self.saccades += 1
-        return error
 
 
 def _clip(eye: Angles2, limits: tuple[Angles2, Angles2]) -> Angles2:

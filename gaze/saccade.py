@@ -220,7 +220,10 @@ class LiteralFrameProfile:
 
 
 class SaccadeModel:
-    """Displacement of the eye along the great circle as a function of time."""
+    """Displacement of the eye along the great circle as a function of time.
+
+    max_speed_rad_s, max_acceleration_rad_s2: what a saccade keeps that is bent in flight
+    """
 
     def __init__(self, params: SaccadeParams) -> None:
         self.retune(params)
@@ -228,6 +231,8 @@ class SaccadeModel:
     def retune(self, params: SaccadeParams) -> None:
         """Change the profile or its constants, from the next saccade on."""
         self._profile = _profile(params)
+        self.max_speed_rad_s = radians(params.max_speed_deg_s)
+        self.max_acceleration_rad_s2 = radians(params.max_acceleration_deg_s2)
 
     @property
     def profile(self) -> SaccadeProfile:

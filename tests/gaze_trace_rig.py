@@ -1,6 +1,7 @@
 """Eyes and head that follow targets, and a trace of them."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import degrees, radians
 from typing import Any, NamedTuple
 
@@ -40,7 +41,13 @@ NO_RELIEF = HeadParams(goal_model="attention", recentre_after_ms=60_000.0)
 """The paper's head: eq 7, and nothing after it."""
 
 
-AT_ONCE = OculomotorParams(eye_lag_ms=DT * 1e3)
+EXACT = OculomotorParams(
+    undershoot=0.0, endpoint_scatter_along=0.0, endpoint_scatter_across=0.0, refixation_deg=0.0
+)
+"""Saccades land on their targets, and nothing moves between them."""
+
+
+AT_ONCE = replace(EXACT, eye_lag_ms=DT * 1e3)
 
 
 SACCADE = SaccadeParams(profile="min_jerk")

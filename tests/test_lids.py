@@ -6,11 +6,12 @@ from math import radians
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS, LIDS
+from gaze_trace_rig import EXACT
 
 from gazerig.gaze.blink_statistics import blink_pause_s
 from gazerig.gaze.head import HeadModel, HeadParams
 from gazerig.gaze.lids import LidMode, LidParams, Lids, Side
-from gazerig.gaze.oculomotor import Oculomotor, OculomotorParams
+from gazerig.gaze.oculomotor import Oculomotor
 from gazerig.gaze.pursuit import Pursuit
 from gazerig.gaze.pursuit_params import PursuitParams
 from gazerig.gaze.saccade import SaccadeModel, SaccadeParams
@@ -141,7 +142,7 @@ def test_e53_no_blink_storm_with_the_head_held_aside(literal: bool) -> None:
     kinematics = Kinematics(GeometryParams(0.0, 0.0, 0.0), GAZE_JOINTS, LIDS)
     span = (-radians(55.0), radians(55.0))
     model = Oculomotor(
-        OculomotorParams(),
+        EXACT,
         kinematics,
         ((span, span), (span, span)),
         SaccadeModel(SaccadeParams()),

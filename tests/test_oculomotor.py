@@ -4,11 +4,12 @@ Numbered checks are listed in docs/checks.md. The head's centre of rotation is p
 between the eyes, as in the sources of those numbers, unless a test says otherwise.
 """
 
+from dataclasses import replace
 from math import degrees, radians
 
 import numpy as np
 import pytest
-from gaze_trace_rig import DESK, DT, HUMAN, SACCADE, Rig, still
+from gaze_trace_rig import DESK, DT, EXACT, HUMAN, SACCADE, Rig, still
 
 from gazerig.gaze.angles import (
     add,
@@ -25,7 +26,6 @@ from gazerig.gaze.angles import (
 from gazerig.gaze.breathing import Breathing, BreathingParams
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.head import HeadParams
-from gazerig.gaze.oculomotor import OculomotorParams
 from gazerig.gaze.saccade import SaccadeParams
 from gazerig.gaze.types import Angles2, GazeState, Target, Vec3
 from gazerig.robot.model.types import JointState
@@ -75,7 +75,7 @@ def test_e8_oblique_saccade_keeps_to_the_great_circle(profile: SaccadeParams) ->
 
 
 def test_latency_delays_the_saccade_and_the_gaze_waits_where_it_is() -> None:
-    late = OculomotorParams(eye_lag_ms=5.0, latency_ms=200.0)
+    late = replace(EXACT, eye_lag_ms=5.0, latency_ms=200.0)
     trace = Rig(params=late).run(lambda t: still(1.5)(t - 0.4), 1.0)
     assert np.abs(trace.eye[trace.t < 0.7 - 1e-9]).max() < 1e-6
     assert trace.t[np.argmax(np.abs(trace.eye) > 1e-6)] == pytest.approx(0.705, abs=DT + 1e-9)
@@ -98,8 +98,8 @@ def test_the_head_goes_first_only_where_it_is_wanted(top_down: bool) -> None:
 
 
 def test_scattered_landings_are_corrected_by_small_saccades() -> None:
-    noisy = OculomotorParams(
-        eye_lag_ms=5.0, endpoint_scatter_along=0.05, endpoint_scatter_across=0.02
+    noisy = replace(
+        EXACT, eye_lag_ms=5.0, endpoint_scatter_along=0.05, endpoint_scatter_across=0.02
     )
     after, misses = [], []
     for seed in range(12):
@@ -110,18 +110,18 @@ def test_scattered_landings_are_corrected_by_small_saccades() -> None:
         ends = first + phases[first:].index(False)
         misses.append(trace.error[ends + 1])
         count = trace.commands[-1].saccades
-        assert count == (2 if misses[-1] > 1.0 else 1)
+        assert count == (2 if misses[-1] > 1.2 else 1)
         if count == 2:
             start = ends + phases[ends:].index(True)
             after.append((start - ends) * DT)
         assert trace.error[-1] < 0.1 and landed < len(phases) - 1
     assert 0.4 < np.mean(misses) < 2.2
-    assert after and min(after) >= 0.15 and max(after) <= 0.25
+    assert after and min(after) >= 0.1 and max(after) <= 0.205
 
 
 def test_scatter_without_dice_is_refused() -> None:
     with pytest.raises(ValueError, match="need a random generator"):
-        Rig(params=OculomotorParams(endpoint_scatter_along=0.04))
+        Rig(params=replace(EXACT, endpoint_scatter_along=0.04))
 
 
 def test_breathing_moves_the_head_and_not_the_gaze() -> None:
@@ -151,7 +151,7 @@ def test_the_head_faces_the_centre_while_the_gaze_wanders_over_parts() -> None:
 
 
 def test_e58_a_lost_target_is_followed_for_a_moment_and_then_no_more() -> None:
-    rig = Rig(params=OculomotorParams(eye_lag_ms=5.0))
+    rig = Rig(params=replace(EXACT, eye_lag_ms=5.0))
     v = radians(20.0)
 
     def where(t: float) -> Target:

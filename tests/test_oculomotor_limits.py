@@ -1,9 +1,10 @@
 """Eyes and head keep their limits and reach any target. Checks: docs/checks.md."""
 
+from dataclasses import replace
 from math import degrees, radians
 
 import numpy as np
-from gaze_trace_rig import CENTRED, DESK, DT, HUMAN, SACCADE, Rig, still
+from gaze_trace_rig import CENTRED, DESK, DT, EXACT, HUMAN, SACCADE, Rig, still
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -15,7 +16,6 @@ from gazerig.gaze.angles import (
     sub,
 )
 from gazerig.gaze.head import HeadParams
-from gazerig.gaze.oculomotor import OculomotorParams
 from gazerig.gaze.saccade import SaccadeParams
 from gazerig.gaze.types import Target
 from gazerig.robot.model.kinematics import GeometryParams
@@ -38,7 +38,7 @@ def test_no_eye_beyond_its_limit_nothing_infinite_and_no_gaze_above_the_cap(
         eye,
         geometry,
         HeadParams(lead_ms=float(rng.choice((0.0, 80.0)))),
-        params=OculomotorParams(eye_lag_ms=0.0, latency_ms=float(rng.choice((0.0, 120.0)))),
+        params=replace(EXACT, eye_lag_ms=0.0, latency_ms=float(rng.choice((0.0, 120.0)))),
         saccade=profile,
     )
     t, shift, before = 0.0, 0, None

@@ -15,7 +15,7 @@ def slip(error_deg: float, slip_deg_s: float = 0.0) -> Slip:
 def settled(params: SaccadeTriggerParams | None = None, scatters: bool = False) -> SaccadeTrigger:
     """Return a rule that has answered its first event and landed at 0."""
     rule = SaccadeTrigger(params or SaccadeTriggerParams(), scatters)
-    rule.record_shift(1, 0.0, -1.0, -1.0)
+    rule.record_shift(1, 0.0, None, -1.0)
     assert not rule.due(slip(0.0), 0.0)
     assert not rule.waits
     rule.record_landing(0.0)
@@ -46,17 +46,17 @@ def test_a_target_that_slips_away_is_caught_up_with() -> None:
 
 def test_new_target_jumps_at_once_unless_it_is_nearly_there() -> None:
     rule = settled()
-    rule.record_shift(2, 0.0, 0.05, 0.05)
-    assert rule.due(slip(1.0), 0.05)
-    rule.record_shift(3, 0.0, 0.06, 0.06)
-    assert not rule.due(slip(0.2), 0.06)
+    rule.record_shift(2, 0.0, None, 0.15)
+    assert rule.due(slip(1.0), 0.15)
+    rule.record_shift(3, 0.0, None, 0.16)
+    assert not rule.due(slip(0.2), 0.16)
     assert not rule.waits
 
 
 def test_latency_counts_from_the_first_unanswered_event() -> None:
     rule = settled(SaccadeTriggerParams(latency_ms=200.0))
-    rule.record_shift(2, 0.0, 0.1, 0.1)
-    rule.record_shift(3, 0.0, 0.25, 0.25)
+    rule.record_shift(2, 0.0, None, 0.1)
+    rule.record_shift(3, 0.0, None, 0.25)
     assert rule.waits
     assert rule.onset_s == pytest.approx(0.3)
     assert not rule.due(slip(5.0), 0.299)
@@ -64,20 +64,35 @@ def test_latency_counts_from_the_first_unanswered_event() -> None:
     assert rule.onset_s == pytest.approx(0.3)
 
 
-def test_an_event_in_flight_is_due_at_the_landing() -> None:
+def test_nothing_jumps_sooner_than_100_ms_after_a_landing() -> None:
     rule = settled()
-    rule.record_shift(2, 0.0, 0.14, 0.1)
-    assert rule.onset_s == pytest.approx(0.14)
-    rule.record_landing(0.14)
-    assert rule.due(slip(5.0), 0.14)
+    rule.record_shift(2, 0.0, None, 0.03)
+    assert rule.onset_s == pytest.approx(0.1)
+    assert first_s(rule, slip(5.0)) == pytest.approx(0.1, abs=0.001)
 
 
-def test_scattered_landings_are_corrected_after_200_ms_and_exact_ones_are_not() -> None:
+def test_an_event_early_in_flight_redirects_and_a_late_one_waits_after_the_landing() -> None:
+    early = settled()
+    early.record_shift(2, 0.0, 0.29, 0.2)
+    assert early.onset_s == pytest.approx(0.2)
+    assert early.redirects(0.2)
+    assert not early.redirects(0.205) and not early.waits
+    late = settled()
+    late.record_shift(2, 0.0, 0.26, 0.2)
+    assert late.onset_s == pytest.approx(0.36)
+    assert not any(late.redirects(t) for t in (0.2, 0.23, 0.255))
+    late.record_landing(0.26)
+    assert not late.due(slip(5.0), 0.355)
+    assert late.due(slip(5.0), 0.36)
+
+
+def test_landings_that_err_are_corrected_and_exact_ones_are_not() -> None:
     scattered = settled(scatters=True)
+    scattered.record_landing(0.0, 0.17)
     assert not scattered.due(slip(1.5), 0.01)
     assert scattered.corrects
-    assert first_s(scattered, slip(1.5)) == pytest.approx(0.2, abs=0.001)
+    assert first_s(scattered, slip(1.5)) == pytest.approx(0.17, abs=0.001)
     assert first_s(settled(), slip(1.5)) is None
     small = settled(scatters=True)
-    assert not small.due(slip(0.9), 0.01)
+    assert not small.due(slip(1.1), 0.01)
     assert not small.corrects

@@ -238,7 +238,7 @@ class Robot:
         )
         offset = self._animation.step(t_s)
         gaze = self._oculomotor.step(target, pose, t_s, dt_s, offset)
-        self._settled, self._gaze_m = gaze.phase != "saccade", gaze.gaze_point_world_m
+        self._settled, self._gaze_m = self._oculomotor.settled, gaze.gaze_point_world_m
         desired = self._lead.pose_rad or self._kinematics.inverse(gaze, offset.joints_rad)
         if stopped := self._stop.why:
             self._stop.keep_released(self.body, joints, t_s)

@@ -1,0 +1,84 @@
+"""Re-fixations: small saccades within what is looked at, while it is looked at for long.
+
+People's eyes never rest for seconds: they make one to two small saccades a second, most of them
+below 1 deg (Otero-Millan et al. 2013). A servo shows those that are larger than its steps and its
+play, so the gaze goes from one point near the middle of a target to another, and holds in between.
+"""
+
+from dataclasses import dataclass
+from math import cos, hypot, inf, pi, radians, sin, sqrt
+from typing import Annotated
+
+import numpy as np
+
+from gazerig.gaze.types import Angles2
+from gazerig.params import Bounds
+
+_TRIES = 12
+
+
+@dataclass(frozen=True)
+class RefixationParams:
+    """Sizes and intervals of re-fixations."""
+
+    # fmt: off
+    refixation_deg: Annotated[float, Bounds(0, 5),
+        "largest re-fixation, a small saccade within what is looked at; 0: none"] = 1.5
+    refixation_least_deg: Annotated[float, Bounds(0.1, 5), "smallest one; three steps of the servos and their play show"] = 0.8
+    refixation_after_ms: Annotated[float, Bounds(50, 60_000), "shortest rest of the gaze before a re-fixation"] = 400.0
+    refixation_spread_ms: Annotated[float, Bounds(0, 60_000), "that rest is drawn from so long to so much longer"] = 700.0
+    # fmt: on
+
+
+class Refixations:
+    """Points beside the middle of a target that are looked at one after the other.
+
+    offset_rad: of the present one, to the left and up; (0, 0): the middle itself
+    """
+
+    def __init__(self, params: RefixationParams, rng: np.random.Generator | None) -> None:
+        self._rng = rng
+        self.retune(params)
+        self.reset()
+
+    def retune(self, params: RefixationParams) -> None:
+        """Change sizes and intervals, from the next rest on."""
+        self._least_rad = radians(params.refixation_least_deg)
+        self._most_rad = radians(params.refixation_deg)
+        self._after_s = params.refixation_after_ms / 1e3
+        self._spread_s = params.refixation_spread_ms / 1e3
+
+    def reset(self) -> None:
+        """Look at the middle of a new target."""
+        self.offset_rad: Angles2 = (0.0, 0.0)
+        self._due_s = inf
+
+    def interrupt(self) -> None:
+        """Start the next rest anew, as the gaze has moved."""
+        self._due_s = inf
+
+    def due(self, t_s: float, still: bool = True) -> bool:
+        """Return whether another point is chosen now; to be asked in every tick of a rest.
+
+        still: whether the target does not move; one that does is followed only
+        """
+        if t_s < self._due_s:
+            if self._due_s == inf and self._rng is not None and self._most_rad > 0.0:
+                self._due_s = t_s + self._after_s + self._spread_s * float(self._rng.random())
+            return False
+        self._due_s = inf
+        return still and self._choose()
+
+    def _choose(self) -> bool:
+        """Draw a point near the middle, one step away from the last."""
+        if self._rng is None:
+            return False
+        across, up = self.offset_rad
+        radius = 0.6 * self._most_rad
+        for _ in range(_TRIES):
+            r, angle = radius * sqrt(self._rng.random()), 2.0 * pi * self._rng.random()
+            x, y = r * cos(angle), r * sin(angle)
+            if self._least_rad <= hypot(x - across, y - up) <= self._most_rad:
+                self.offset_rad = (x, y)
+                return True
+        return False

@@ -1,0 +1,154 @@
+"""Saccades of the gaze point: bent in flight, falling short, corrected; re-fixations."""
+
+from dataclasses import replace
+from itertools import pairwise
+from math import degrees, hypot, radians
+
+import numpy as np
+import pytest
+from gaze_trace_rig import AT_ONCE, EXACT, HUMAN, Rig, still
+
+from gazerig.gaze.angles import angle_between, direction, norm, scale, sub, unit
+from gazerig.gaze.oculomotor import OculomotorParams
+from gazerig.gaze.refixation import RefixationParams, Refixations
+from gazerig.gaze.saccade import SaccadeModel, SaccadeParams
+from gazerig.gaze.saccade_endpoint import EndpointParams, endpoint
+from gazerig.gaze.saccade_trajectory import RedirectedTrajectory, SaccadeTrajectory
+from gazerig.gaze.types import Target, Vec3
+
+EYE = (0.0, 0.0, 0.0)
+MODEL = SaccadeModel(SaccadeParams())
+
+
+def at(yaw_deg: float, pitch_deg: float = 0.0, distance_m: float = 1.0) -> Vec3:
+    return scale(direction((radians(yaw_deg), radians(pitch_deg))), distance_m)
+
+
+def path(first: Vec3, then: Vec3, jump_s: float, h_s: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return times and points of a saccade that is redirected to another end."""
+    before = SaccadeTrajectory(MODEL, at(0.0), first, EYE, 0.0)
+    after = RedirectedTrajectory(before, MODEL, then, EYE, jump_s)
+    times = np.arange(0.0, after.ends_s + 0.02, h_s)
+    return times, np.array([(before if t < jump_s else after).at(EYE, t) for t in times])
+
+
+@pytest.mark.parametrize(
+    ("first", "then", "jump_ms"),
+    [
+        (at(20.0), at(28.0), 15.0),
+        (at(20.0), at(14.0), 5.0),
+        (at(30.0), at(30.0, 9.0), 30.0),
+        (at(20.0), at(-10.0, 5.0), 8.0),
+        (at(25.0), at(20.0, 0.0, 0.4), 10.0),
+        (at(20.0), at(20.0), 10.0),
+    ],
+)
+def test_a_bent_saccade_has_no_step_of_speed_and_ends_on_the_new_target(
+    first: Vec3, then: Vec3, jump_ms: float
+) -> None:
+    h = 0.00025
+    _, points = path(first, then, jump_ms / 1e3, h)
+    ways = np.array([unit(tuple(p)) for p in points])
+    steps = np.linalg.norm(np.diff(ways, 2, axis=0), axis=1) / h
+    # 38 000 deg/s2 and the turn of the path itself.
+    assert steps.max() <= radians(40_000.0) * h
+    nearness = 1.0 / np.linalg.norm(points, axis=1)
+    assert np.abs(np.diff(nearness, 2)).max() / h <= 3.0  # 1/m/s; a step would be some 60
+    assert norm(sub(tuple(points[-1]), then)) < 1e-6
+    fastest = max(angle_between(tuple(a), tuple(b)) for a, b in pairwise(points)) / h
+    assert degrees(fastest) <= MAX_SPEED_DEG_S * 1.02
+
+
+MAX_SPEED_DEG_S = SaccadeParams().max_speed_deg_s
+
+
+def double_step(jump_s: float, first_deg: float = 28.0, then_deg: float = 34.0) -> Rig:
+    rig = Rig(params=AT_ONCE, saccade=HUMAN)
+
+    def where(t: float) -> Target:
+        late = t >= jump_s
+        place = at(then_deg if late else first_deg)
+        return Target(place, (0, 0, 0), t, "thing", 1, 0.2, False, None, 1 + late, "")
+
+    rig.trace = rig.run(where, 0.6)  # type: ignore[attr-defined]
+    return rig
+
+
+def test_a_target_that_jumps_early_bends_the_saccade_and_a_late_jump_waits_100_ms() -> None:
+    early = double_step(0.010).trace  # type: ignore[attr-defined]
+    assert early.commands[-1].saccades == 1
+    assert early.eye[-1] + early.head[-1] == pytest.approx(34.0, abs=0.1)
+    late = double_step(0.040).trace  # type: ignore[attr-defined]
+    assert late.commands[-1].saccades == 2
+    phases = [c.phase == "saccade" for c in late.commands]
+    landed = phases.index(False, phases.index(True))
+    assert phases.index(True, landed) - landed == pytest.approx(20, abs=1)
+    assert late.eye[-1] + late.head[-1] == pytest.approx(34.0, abs=0.1)
+
+
+def test_a_saccade_falls_short_from_10_deg_on_and_scatters_with_its_size() -> None:
+    exact = EndpointParams(0.07, 0.0, 0.0)
+    for size, short in ((4.0, 0.0), (7.5, 0.2625), (10.0, 0.7), (20.0, 1.4)):
+        landing = endpoint(at(size), at(0.0), EYE, exact, None)
+        assert size - degrees(angle_between(at(0.0), landing)) == pytest.approx(short, abs=1e-6)
+    rng = np.random.default_rng(0)
+    ends = [endpoint(at(20.0), at(0.0), EYE, EndpointParams(), rng) for _ in range(2000)]
+    yaw = np.degrees([np.arctan2(y, x) for x, y, _ in ends])
+    pitch = np.degrees([np.arcsin(unit(e)[2]) for e in ends])
+    assert np.mean(yaw) == pytest.approx(18.6, abs=0.06) and np.std(yaw) == pytest.approx(
+        0.8, rel=0.06
+    )
+    assert np.mean(pitch) == pytest.approx(0.0, abs=0.03) and np.std(pitch) == pytest.approx(
+        0.4, rel=0.06
+    )
+
+
+def test_about_a_third_of_large_saccades_are_corrected_100_to_200_ms_later() -> None:
+    corrected, after_ms = 0, []
+    sizes = np.linspace(10.5, 16.0, 60)
+    for n, size in enumerate(sizes):
+        rig = Rig(params=replace(OculomotorParams(), refixation_deg=0.0), saccade=HUMAN, dice=n)
+        trace = rig.run(still(float(size)), 0.5)
+        phases = [c.phase == "saccade" for c in trace.commands]
+        if trace.commands[-1].saccades > 1:
+            landed = phases.index(False, phases.index(True))
+            after_ms.append((phases.index(True, landed) - landed) * 5.0)
+            corrected += 1
+    assert 0.2 < corrected / len(sizes) < 0.5
+    assert min(after_ms) >= 100.0 and max(after_ms) <= 205.0
+
+
+def test_refixations_stay_near_the_middle_and_come_one_to_two_a_second() -> None:
+    rig = Rig(params=replace(EXACT, refixation_deg=1.5), saccade=HUMAN, dice=3)
+    trace = rig.run(still(2.0), 60.0)
+    jumps = trace.commands[-1].saccades - 1
+    assert 1.0 < jumps / 60.0 < 2.0
+    assert trace.error.max() < 2.1 and 0.2 < np.median(trace.error[200:]) < 0.9
+    phases = np.array([c.phase == "saccade" for c in trace.commands])
+    on = np.flatnonzero(phases[1:] & ~phases[:-1])[1:]
+    off = np.flatnonzero(~phases[1:] & phases[:-1])[1:] + 1
+    points = np.array([c.gaze_point_world_m for c in trace.commands])
+    sizes = [
+        degrees(angle_between(tuple(points[a]), tuple(points[b])))
+        for a, b in zip(on, off, strict=False)
+    ]
+    assert min(sizes) > 0.45 and max(sizes) < 1.55
+
+
+def test_a_new_target_is_looked_at_in_its_middle_and_a_moving_one_is_only_followed() -> None:
+    points = Refixations(RefixationParams(), np.random.default_rng(0))
+    times = np.arange(0.0, 20.0, 0.005)
+    assert not any(points.due(t, still=False) for t in times)
+    assert any(points.due(20.0 + t) for t in times)
+    assert 0.0 < degrees(hypot(*points.offset_rad)) <= 0.91
+    points.reset()
+    assert points.offset_rad == (0.0, 0.0)
+
+
+def test_without_sizes_or_a_generator_nothing_is_fixated_again() -> None:
+    for params, rng in (
+        (RefixationParams(refixation_deg=0.0), np.random.default_rng(0)),
+        (RefixationParams(), None),
+    ):
+        points = Refixations(params, rng)
+        assert not any(points.due(t) for t in np.arange(0.0, 10.0, 0.005))
