@@ -1,0 +1,126 @@
+"""Reaction: from a hand that appears beside a face to the measured start of the gaze towards it."""
+
+from collections.abc import Sequence
+from math import pi, sin
+from typing import NamedTuple
+
+import numpy as np
+from human.measured_run import MeasuredRun, Runner
+
+from gazerig.gaze.types import Vec3
+from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing, min_jerk
+
+_FIRST_S, _EVERY_S, _SHOWN_S = 5.0, 3.4, 1.3
+_LATEST_S, _STILL_DEG_S, _EXPRESS_MS = 0.7, 35.0, 120.0
+
+WANTED = {
+    "appears: answered, %": (95.0, 100.0),
+    "appears: median, ms": (150.0, 250.0),
+    "appears: between 150 and 250 ms, %": (60.0, 100.0),
+    "appears: logarithms' standard deviation": (0.08, 0.35),
+    "comes nearer fast: answered, %": (95.0, 100.0),
+    "comes nearer fast: median, ms": (100.0, 200.0),
+    "express (below 120 ms), %": (0.0, 5.0),
+}
+
+
+class Appearance(NamedTuple):
+    """A hand that is there from ``start_s`` on; near: it rushes at the robot."""
+
+    start_s: float
+    side: float
+    near: bool
+
+    def place(self, t_s: float) -> Vec3:
+        """Return where the hand is."""
+        since_s = t_s - self.start_s
+        y = self.side * (0.22 + 0.01 * sin(2 * pi * 1.0 * since_s))
+        if not self.near:
+            return (0.75, y, 0.05)
+        return (0.95 - 0.5 * min_jerk(min(1.0, since_s / 0.45 + 0.25)), 0.8 * y, 0.08)
+
+
+def appearances(until_s: float) -> list[Appearance]:
+    """Return when and where hands appear; their times have no common period with the frames."""
+    out, k = [], 0
+    while (start_s := _FIRST_S + _EVERY_S * k + 0.4 * (0.618034 * k % 1.0)) + _SHOWN_S < until_s:
+        out.append(Appearance(start_s, 1.0 if k % 2 else -1.0, k % 3 == 2))
+        k += 1
+    return out
+
+
+class Appearing:
+    """A person who stands before the robot, and hands that appear out of nothing."""
+
+    name = "appearing-hands"
+    round_s = 3600.0
+    behaviours: tuple[str, ...] = ()
+
+    def __init__(self) -> None:
+        self._hands = appearances(self.round_s)
+
+    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
+        """Return the person."""
+        face = (0.95, 0.008 * sin(2 * pi * 0.17 * t_s), 0.22)
+        return (ScenePerson(face, (pi, -0.08), None),)
+
+    def things(self, t_s: float) -> tuple[Thing, ...]:
+        """Return the hand that is shown now."""
+        for number, hand in enumerate(self._hands):
+            if hand.start_s <= t_s < hand.start_s + _SHOWN_S:
+                return (Thing(number, "hand", hand.place(t_s), 0.06),)
+        return ()
+
+    def behaviour(self, t_s: float) -> str | None:
+        """Leave the behaviour to the rig."""
+        return None
+
+    def events(self) -> tuple[Event, ...]:
+        """Return none."""
+        return ()
+
+
+def reaction_ms(run: MeasuredRun, hand: int, start_s: float) -> float | None:
+    """Return the time from a hand's appearance to the start of the gaze towards it; None: never."""
+    there = run.truth_deg(f"thing {hand}")
+    shown = np.flatnonzero(np.isfinite(there[:, 0]))
+    if not len(shown):
+        return None
+    first = shown[0]
+    off = np.linalg.norm(run.gaze_deg - there, axis=1)
+    window = slice(first, first + np.searchsorted(run.t_s[first:], run.t_s[first] + _LATEST_S))
+    near = np.flatnonzero(off[window] < max(3.0, 0.3 * off[first]))
+    if not len(near) or near[0] == 0:
+        return None
+    speed = np.linalg.norm(np.gradient(run.gaze_deg[window], run.t_s[window], axis=0), axis=1)
+    rests = np.flatnonzero(speed[: near[0]] < _STILL_DEG_S)
+    onset = rests[-1] + 1 if len(rests) else 0
+    return 1e3 * float(run.t_s[first + onset] - run.t_s[first])
+
+
+def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+    """Return medians and shares over all hands and seeds."""
+    found: dict[bool, list[float]] = {False: [], True: []}
+    count = {False: 0, True: 0}
+    for seed in seeds:
+        made = run(Appearing(), seed=seed, seconds=seconds)
+        for number, hand in enumerate(appearances(seconds - 0.5)):
+            count[hand.near] += 1
+            each = reaction_ms(made, number, hand.start_s)
+            if each is not None:
+                found[hand.near].append(each)
+    still, near = np.array(found[False]), np.array(found[True])
+    both = np.concatenate((still, near))
+    return {
+        "appears: answered, %": 100.0 * len(still) / max(1, count[False]),
+        "appears: median, ms": float(np.median(still)),
+        "appears: 10th percentile, ms": float(np.percentile(still, 10)),
+        "appears: 90th percentile, ms": float(np.percentile(still, 90)),
+        "appears: between 150 and 250 ms, %": 100.0
+        * float(((still >= 150) & (still <= 250)).mean()),
+        "appears: logarithms' standard deviation": float(np.log(still).std()),
+        "comes nearer fast: answered, %": 100.0 * len(near) / max(1, count[True]),
+        "comes nearer fast: median, ms": float(np.median(near)),
+        "express (below 120 ms), %": 100.0 * float((both < _EXPRESS_MS).mean()),
+        "hands": float(len(both)),
+    }
