@@ -2,7 +2,7 @@
 
 Mitake et al. eq 1 sums three stimuli to which cells of the areas MT and MST respond:
 translation across the line of view (slide), motion along it (loom) and rotation about
-it (spin). Two forms of it are here:
+it (spin). Two forms of it are here, and one can do without:
 
 literal   As printed: one gaze direction e for all bodies, no distance, metres and radians
           added as they are. Printed with e/|e| on a projection that is only right for
@@ -10,6 +10,7 @@ literal   As printed: one gaze direction e for all bodies, no distance, metres a
 retinal   What the paper's reason, the image on the retina, demands: e from the eye to each
           body, speeds relative to the moving eye and divided by the distance, each term
           measured by the motion that counts as 1.
+none      No motion attracts: all that is looked at is what a rule names.
 
 What has just come into view has a further, decaying term: the paper's behaviour
 (e), a hand that reaches in from outside the field, is not in eq 1.
@@ -45,8 +46,8 @@ class BottomUpParams:
     """Form and reference motions of eq 1, and the salience of a new body."""
 
     # fmt: off
-    form: Annotated[Literal["retinal", "literal"],
-        "retinal: motion as angles seen by the eye; literal: eq 1 as printed, without weights"] = "retinal"
+    form: Annotated[Literal["retinal", "literal", "none"],
+        "retinal: motion as angles seen by the eye; literal: eq 1 as printed, without weights; none: neither motion nor onset attracts"] = "retinal"
     translation_reference_rad_s: Annotated[float, Bounds(0.01, 20), "angular speed across the line of sight that gives salience 1"] = 0.5
     looming_reference_1_s: Annotated[float, Bounds(0.01, 20),
         "speed along the line of sight divided by distance that gives salience 1"] = 0.5
@@ -202,6 +203,8 @@ class BottomUp:
         gaze_world: where the eyes look, any length; only the literal form needs it
         seen: (n,) which bodies are in view; None: all
         """
+        if self._params.form == "none":
+            return SalienceTerms(*np.zeros((4, len(bodies))))
         if seen is None:
             seen = np.ones(len(bodies), dtype=np.bool_)
         now = self._terms(bodies, p_world_eye_m, v_world_eye_m_s, gaze_world)
@@ -220,6 +223,8 @@ class BottomUp:
         seen: list[bool],
     ) -> list[SalienceRow]:
         """Return what ``step`` does for few bodies, one row a body."""
+        if self._params.form == "none":
+            return [_UNSEEN] * len(rows.ids)
         self._pause(t_s)
         if rows.ids != self._ids:
             self._remember(rows.ids, t_s)

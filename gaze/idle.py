@@ -34,6 +34,7 @@ class IdleParams:
     rest_distance_m: Annotated[float, Bounds(0.3, 20), "distance of the resting point"] = 1.5
     rest_height_m: Annotated[float, Bounds(-1, 3), "height of the resting point above the neck base"] = 0.2
     rest_salience: Annotated[float, Bounds(0, 10), "salience of the resting point"] = 0.2
+    explores: Annotated[bool, "glance around while nothing is there; without it the gaze rests straight ahead"] = True
     coast_ms: Annotated[float, Bounds(0, 2000), "longest time for which a lost target is assumed to move on with its last velocity"] = 200.0
     search_ms: Annotated[float, Bounds(0, 60000), "duration of the search for a lost target after that; 0: no search"] = 3000.0
     search_fixation_ms: Annotated[float, Bounds(100, 10000), "mean duration of one fixation of the search"] = 600.0
@@ -97,6 +98,9 @@ class Idle:
             # A lost target is waited for.
             left_s += (params.hold_ms - before.hold_ms) / 1e3
             self._search_until_s = since_s + left_s + params.search_ms / 1e3
+        if params.explores != before.explores and self._now.kind in ("rest", "glance"):
+            self._rest_now(self._t_s)
+            left_s = self._until_s - since_s
         if self._lost:  # else the time of the phase before this target is over
             self._until_s = max(since_s + left_s, self._t_s)
 
@@ -155,7 +159,7 @@ class Idle:
         self._gone = None
         self._now = self._resting(t_s)
         self._until_s = float("inf")
-        if self._rng is not None:
+        if self._rng is not None and self._params.explores:
             self._until_s = t_s + self._time_s(self._params.rest_ms, self._rng)
 
     def _search(self, gone: Target, t_s: float, rng: np.random.Generator) -> None:

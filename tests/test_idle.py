@@ -175,3 +175,13 @@ def test_same_dice_same_looks() -> None:
 def test_glances_that_contradict_are_refused() -> None:
     with pytest.raises(ValueError, match="glance_least_deg"):
         IdleParams(glance_least_deg=40.0, glance_yaw_deg=20.0)
+
+
+def test_who_does_not_explore_rests_straight_ahead_until_told_to() -> None:
+    still = IdleParams(search_ms=0.0, explores=False)
+    idle = Idle(still, np.random.default_rng(0))
+    assert {idle.step(0.1 * k).kind for k in range(1200)} == {"rest"}
+    idle.retune(replace(still, explores=True))
+    assert "glance" in {idle.step(120.0 + 0.1 * k).kind for k in range(600)}
+    idle.retune(still)
+    assert {idle.step(180.0 + 0.1 * k).kind for k in range(1200)} == {"rest"}
