@@ -56,17 +56,19 @@ class Version(NamedTuple):
     vergence_rad: float
 
 
-class HeadView(NamedTuple):
+class EyeGeometry(NamedTuple):
     """The head at the time when commands of now take effect, and what its eyes can do.
 
     eyes_on: returns the eye angles that fixate a point from a pose of the head
     nearest_m: nearest distance on which the eyes converge
+    in_range: returns eye angles clipped to their ranges
     """
 
     R_world_head: Mat3
     p_head: Vec3
     eyes_on: Callable[[Vec3, Mat3, Vec3], Eyes]
     nearest_m: float
+    in_range: Callable[[Eyes], Eyes]
 
     def eyes_to(self, point: Vec3) -> Eyes:
         """Return the eye angles that fixate a point."""
@@ -166,7 +168,7 @@ class BinocularController:
         gaze: Vec3,
         prescribed: Eyes | None,
         saccades: SaccadeState,
-        view: HeadView,
+        view: EyeGeometry,
         t_s: float,
         dt_s: float,
     ) -> tuple[Eyes, Vec3]:

@@ -47,7 +47,8 @@ class BottomUpParams:
 
     # fmt: off
     form: Annotated[Literal["retinal", "literal", "none"],
-        "retinal: motion as angles seen by the eye; literal: eq 1 as printed, without weights; none: neither motion nor onset attracts"] = "retinal"
+        "retinal: motion as angles seen by the eye; literal: eq 1 as printed, without weights; none: neither motion nor onset "
+        "attracts"] = "retinal"
     translation_reference_rad_s: Annotated[float, Bounds(0.01, 20), "angular speed across the line of sight that gives salience 1"] = 0.5
     looming_reference_1_s: Annotated[float, Bounds(0.01, 20),
         "speed along the line of sight divided by distance that gives salience 1"] = 0.5

@@ -168,7 +168,7 @@ class GazePoint:
             elif self._refixations.due(t_s, norm(velocity) <= MOVING_M_S):
                 trigger.refixate(t_s)
             if shift_rad is None:
-                if dt_s > 0.0 and not self._pursuit.is_binocular:
+                if dt_s > 0.0 and self._pursuit.controller is None:
                     closing = not (trigger.corrects or trigger.waits)
                     self.point_m = self._pursuit.follow(
                         gaze, there, point, velocity, p_head, dt_s, closing

@@ -18,7 +18,7 @@ from gazerig.gaze.angles import (
     unit,
 )
 from gazerig.gaze.animation import NO_OFFSET, PoseOffset
-from gazerig.gaze.binocular import HeadView
+from gazerig.gaze.binocular import EyeGeometry
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.gaze_point import MOVING_M_S, GazePoint, GazePointParams
 from gazerig.gaze.head import HeadModel
@@ -156,7 +156,7 @@ class Oculomotor:
         if self._breathing is not None:
             self._breathing.reset(t_s)
         self._prediction.reset()
-        self._pursuit.binocular.reset()
+        self._pursuit.reset()
         self._gaze.reset(t_s, _meeting_point(state))
         self._started = True
 
@@ -192,10 +192,12 @@ class Oculomotor:
         shift_rad = place.move(point, velocity, p_head, t_s, dt_s)
         head = self._head.step(target, centre, facing, aside_rad, t_s - place.onset_s, t_s)
         wanted = self._geometry.eyes_on(place.point_m, R_world_head, p_head)
-        if self._pursuit.is_binocular:
+        if (controller := self._pursuit.controller) is not None:
             jumps = jumps or shift_rad is not None
-            view = HeadView(R_world_head, p_head, self._geometry.eyes_on, place.nearest_m)
-            wanted, place.point_m = self._pursuit.binocular.fixate(
+            view = EyeGeometry(
+                R_world_head, p_head, self._geometry.eyes_on, place.nearest_m, self._in_range
+            )
+            wanted, place.point_m = controller.fixate(
                 target, place.point_m, wanted if jumps else None, place, view, t_s, dt_s
             )
         if offset.eyes_rad != NO_OFFSET.eyes_rad:

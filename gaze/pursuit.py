@@ -11,12 +11,13 @@ at Kd, or at the slower Kdiv where it recedes. Larger errors of direction are sa
 """
 
 from math import exp, radians, sqrt
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 from gazerig.gaze.angles import scale, sub
-from gazerig.gaze.binocular import BinocularController
+from gazerig.gaze.binocular import BinocularController, EyeGeometry, Eyes, SaccadeState
+from gazerig.gaze.opposite_angles import OppositeAngles
 from gazerig.gaze.pursuit_params import PursuitParams
-from gazerig.gaze.types import Vec3
+from gazerig.gaze.types import Target, Vec3
 
 Sight = tuple[float, float, float, float]
 """A point as seen from the eyes: its direction x, y, z, and its nearness, 1 / distance in 1/m."""
@@ -42,18 +43,54 @@ class Slip(NamedTuple):
     slip_rad_s: Vec3
 
 
+class EyeController(Protocol):
+    """What moves both eyes between saccades in place of pursuit by the gaze point."""
+
+    def reset(self) -> None:
+        """Forget target, eyes and head."""
+        ...
+
+    def fixate(
+        self,
+        target: Target,
+        gaze: Vec3,
+        prescribed: Eyes | None,
+        saccades: SaccadeState,
+        view: EyeGeometry,
+        t_s: float,
+        dt_s: float,
+    ) -> tuple[Eyes, Vec3]:
+        """Return the eye angles for the next period, and the point that they fixate."""
+        ...
+
+
 class Pursuit:
-    """Smooth pursuit of a target point by the gaze point."""
+    """Smooth pursuit of a target point by the gaze point.
+
+    controller: what moves the eyes in its place; None: nothing does
+    """
 
     def __init__(self, params: PursuitParams) -> None:
         self.binocular = BinocularController(params)
+        self._opposite = OppositeAngles()
+        self._params = params
         self.retune(params)
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin with eyes that have seen nothing."""
+        self.binocular.reset()
+        self._opposite.reset()
 
     def retune(self, params: PursuitParams) -> None:
         """Change gains and limits."""
+        if params.model != self._params.model:
+            self.reset()
         self._params = params
-        self.is_binocular = params.model == "binocular"
         self.binocular.retune(params)
+        self.controller: EyeController | None = None
+        if params.model != "gaze_space":
+            self.controller = self.binocular if params.model == "binocular" else self._opposite
         self._max_rad_s = radians(params.max_speed_deg_s)
         self._reject_rad_s = radians(params.reject_deg_s)
         self._max_error_rad = radians(params.max_error_deg)

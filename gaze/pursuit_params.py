@@ -15,8 +15,9 @@ class PursuitParams:
     """
 
     # fmt: off
-    model: Annotated[Literal["gaze_space", "binocular"],
-        "the gaze point follows the predicted target, or the binocular controller of Zhang & Wakamatsu moves the eyes"] = "gaze_space"
+    model: Annotated[Literal["gaze_space", "binocular", "opposite_angles"],
+        "the gaze point follows the predicted target; or the binocular controller of Zhang & Wakamatsu moves the eyes; or they stand "
+        "between shifts and turn by the opposite of the head's angles (Nakamoto & Tsuruno 3.4)"] = "gaze_space"
     gain_1_s: Annotated[float, Bounds(0, 50), "rate Kc at which the position error is closed"] = 8.0
     velocity_gain: Annotated[float, Bounds(0, 1), "gain Gp: share of the target's velocity that the eye follows at once; people .95"] = 0.95
     vergence_gain_1_s: Annotated[float, Bounds(0, 50), "rate Kd at which the error in depth is closed"] = 4.0

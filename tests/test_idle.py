@@ -1,7 +1,9 @@
 """What the gaze does with no one in sight."""
 
+from dataclasses import replace
 from itertools import pairwise
 from math import degrees
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +20,7 @@ def seen(p: Vec3 = (1.0, 0.2, 0.2), v: Vec3 = (0.0, 0.0, 0.0), at_s: float = 0.0
     return Target(p, v, at_s, "face", 3, 0.5, True, None, 7, "face 3")
 
 
-def idle(seed: int | None = 0, **params: float) -> Idle:
+def idle(seed: int | None = 0, **params: Any) -> Idle:
     return Idle(IdleParams(**params), None if seed is None else np.random.default_rng(seed))
 
 
@@ -179,9 +181,9 @@ def test_glances_that_contradict_are_refused() -> None:
 
 def test_who_does_not_explore_rests_straight_ahead_until_told_to() -> None:
     still = IdleParams(search_ms=0.0, explores=False)
-    idle = Idle(still, np.random.default_rng(0))
-    assert {idle.step(0.1 * k).kind for k in range(1200)} == {"rest"}
-    idle.retune(replace(still, explores=True))
-    assert "glance" in {idle.step(120.0 + 0.1 * k).kind for k in range(600)}
-    idle.retune(still)
-    assert {idle.step(180.0 + 0.1 * k).kind for k in range(1200)} == {"rest"}
+    model = Idle(still, np.random.default_rng(0))
+    assert {model.step(0.1 * k).kind for k in range(1200)} == {"rest"}
+    model.retune(replace(still, explores=True))
+    assert "glance" in {model.step(120.0 + 0.1 * k).kind for k in range(600)}
+    model.retune(still)
+    assert {model.step(180.0 + 0.1 * k).kind for k in range(1200)} == {"rest"}

@@ -1,0 +1,132 @@
+"""Which functions of the gaze models run in a profile, and what docs/profiles.md says of it."""
+
+import re
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from functools import cache
+from math import atan2, pi
+from pathlib import Path
+from types import CodeType, FrameType
+from typing import Any, NamedTuple
+
+from gazerig.config.parameters import changed, value_of
+from gazerig.config.schema import Rig, load_rig
+from gazerig.robot.app import assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.simulated_run import simulate
+from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
+
+PAGE = Path(__file__).parents[2] / "docs" / "profiles.md"
+PROFILES = ("robot", "mitake", "nakamoto")
+SECONDS = 17.0
+_ROW = re.compile(
+    r"^\| (?P<paper>[^|]+) \| (?P<what>[^|]+) \| `(?P<name>[^`|]+)` \| (?P<cells>.+) \|$"
+)
+
+
+class EverythingOnce:
+    """A person who comes, walks 37 deg aside, waves and goes."""
+
+    name = "everything-once"
+    round_s = SECONDS
+    behaviours: tuple[str, ...] = ()
+
+    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
+        """Return the person, who goes at 10 s."""
+        if t_s > 10.0:
+            return ()
+        aside = min(1.0, max(0.0, t_s - 5.0))
+        face = (1.0 - 0.2 * aside, 0.6 * aside, 0.24 + 0.1 * aside)
+        swing = 0.12 * (1.0 if int(t_s * 3.0) % 2 else -1.0)
+        hand = (face[0] - 0.12, face[1] - 0.3 + swing, face[2]) if 7.0 < t_s < 9.0 else None
+        return (ScenePerson(face, (pi + atan2(face[1], face[0]), 0.0), hand),)
+
+    def things(self, t_s: float) -> tuple[Thing, ...]:
+        """Return nothing."""
+        return ()
+
+    def behaviour(self, t_s: float) -> str | None:
+        """Leave the behaviour to the rig."""
+        return None
+
+    def events(self) -> tuple[Event, ...]:
+        """Return none."""
+        return ()
+
+
+class Claim(NamedTuple):
+    """A row of the page: paper and item, function or key, and what it is in each profile.
+
+    Keys are told of the papers' profiles, functions of all three.
+    """
+
+    paper: str
+    what: str
+    name: str
+    cells: tuple[str, ...]
+
+    @property
+    def is_key(self) -> bool:
+        """Return whether the row tells a parameter's value."""
+        return self.name.startswith(("gaze.", "ranges."))
+
+
+def claims() -> Iterator[Claim]:
+    """Yield the rows of the page's tables."""
+    for line in PAGE.read_text(encoding="utf-8").splitlines():
+        if found := _ROW.match(line):
+            cells = tuple(cell.strip() for cell in found["cells"].split("|"))
+            yield Claim(found["paper"], found["what"], found["name"], cells)
+
+
+@cache
+def ran(profile: str, scanpath: str | None = None, seconds: float = SECONDS) -> Counter[str]:
+    """Return how often each function of gaze/ ran in a profile, by qualified name."""
+    calls: Counter[CodeType] = Counter()
+
+    def count(frame: FrameType, event: str, arg: Any) -> None:
+        if event == "call":
+            calls[frame.f_code] += 1
+
+    scene = EverythingOnce()
+    shipped = assemble.scenes
+    options = RunOptions(
+        True, True, 0, scene.name, profile=profile, scanpath=scanpath, seconds=seconds, bus="ideal"
+    )
+    assemble.scenes = lambda: {**shipped(), scene.name: scene}
+    before = sys.getprofile()
+    sys.setprofile(count)
+    try:
+        simulate(changed(load_rig("desk", profile=profile), {"loop.rate_hz": 100.0}), options)
+    finally:
+        sys.setprofile(before)
+        assemble.scenes = shipped
+    named: Counter[str] = Counter()
+    for code, times in calls.items():
+        if Path(code.co_filename).parent.name == "gaze":
+            named[code.co_qualname] += times
+    return named
+
+
+def as_told(claim: Claim) -> list[str]:
+    """Return the profiles of which a row of the page is not true."""
+    return [
+        profile
+        for profile, cell in zip(PROFILES[-len(claim.cells) :], claim.cells, strict=True)
+        if cell != (_value(claim.name, profile) if claim.is_key else _runs(claim.name, profile))
+    ]
+
+
+def _runs(name: str, profile: str) -> str:
+    return "runs" if ran(profile)[name] else "-"
+
+
+def _value(key: str, profile: str) -> str:
+    value = value_of(_rig(profile), key)
+    return f"{value:g}" if isinstance(value, float) else str(value).lower()
+
+
+@cache
+def _rig(profile: str) -> Rig:
+    return load_rig("desk", profile=profile)

@@ -1,0 +1,51 @@
+"""Each paper's profile is its paper and nothing else: what runs, walks, blinks and looks away."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from human.measured_run import MeasuredRun, Runner
+from human.profile_trace import as_told, claims
+from human.row_03_rests import visits
+
+WANTED = {
+    "rows of docs/profiles.md that are not true": (0.0, 0.0),
+    "nakamoto: shifts on the face, 1/s": (3.4, 3.95),
+    "nakamoto: largest eye angle, deg": (10.0, 20.5),
+    "nakamoto: targets other than faces, %": (0.0, 0.0),
+    "nakamoto: blinks a minute": (12.0, 24.0),
+    "mitake: blinks a minute": (0.0, 0.0),
+    "mitake: looks away and around, %": (0.0, 0.0),
+}
+NO_FACE = ("away", "glance", "search", "hand", "thing")
+
+
+def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+    """Return the figures over all seeds, and the rows of the page that a run contradicts."""
+    nakamoto, mitake = (
+        [run("face-to-face", profile, seed=seed, seconds=seconds) for seed in seeds]
+        for profile in ("nakamoto", "mitake")
+    )
+    lasting = [visit.seconds for one in nakamoto for visit in visits(one)]
+    return {
+        "rows of docs/profiles.md that are not true": float(
+            sum(bool(as_told(claim)) for claim in claims())
+        ),
+        "nakamoto: shifts on the face, 1/s": 1.0 / float(np.mean(lasting)),
+        "nakamoto: largest eye angle, deg": float(
+            max(np.abs(one.eyes_goal_deg).max() for one in nakamoto)
+        ),
+        "nakamoto: targets other than faces, %": _elsewhere(nakamoto),
+        "nakamoto: blinks a minute": _blinks(nakamoto),
+        "mitake: blinks a minute": _blinks(mitake),
+        "mitake: looks away and around, %": _elsewhere(mitake),
+    }
+
+
+def _blinks(runs: Sequence[MeasuredRun]) -> float:
+    minutes = [(one.t_s[-1] - one.t_s[0]) / 60.0 for one in runs]
+    return float(sum(one.blinks[-1] - one.blinks[0] for one in runs) / sum(minutes))
+
+
+def _elsewhere(runs: Sequence[MeasuredRun]) -> float:
+    names = np.concatenate([one.target_name for one in runs])
+    return 100.0 * float(np.mean([name.split()[0] in NO_FACE for name in names]))

@@ -1,0 +1,97 @@
+"""Each paper's profile is its paper and nothing else, proved by running it (docs/profiles.md)."""
+
+import re
+
+import numpy as np
+import pytest
+from human.measured_run import MeasuredRun, measured_run
+from human.profile_trace import PAGE, PROFILES, as_told, claims, ran
+from human.row_03_rests import visits
+
+from gazerig.config.parameters import changed
+from gazerig.config.schema import load_rig
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.simulated_run import simulate
+
+CLAIMS = list(claims())
+
+
+@pytest.mark.parametrize("claim", CLAIMS, ids=lambda claim: claim.name)
+def test_e68_what_the_page_says_runs_where_it_says(claim: object) -> None:
+    assert as_told(claim) == []  # type: ignore[arg-type]
+
+
+def test_every_row_of_the_page_is_read() -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    rows = [line for line in text.splitlines() if line.startswith("| ") and "`" in line]
+    assert len(CLAIMS) == len(rows) > 50
+    assert all(len(claim.cells) == (2 if claim.is_key else 3) for claim in CLAIMS)
+    # Every function of it runs somewhere: none is a name that has gone.
+    assert all(
+        claim.is_key or any(ran(profile)[claim.name] for profile in PROFILES) for claim in CLAIMS
+    )
+
+
+@pytest.mark.parametrize(
+    ("scanpath", "function"),
+    [("simple", "SimpleCycle.step"), ("face_tracking", "FaceTracking.step"),
+     ("random", "RandomAngles.step")],
+)  # fmt: skip
+def test_e68_the_baselines_of_the_paper_run_in_its_profile(scanpath: str, function: str) -> None:
+    calls = ran("nakamoto", scanpath, 6.0)
+    assert calls[function] > 200 and calls["MarkovWalk.step"] == 0
+    assert calls["OppositeAngles.fixate"] > 200
+
+
+@pytest.fixture(scope="module")
+def nakamoto() -> MeasuredRun:
+    return measured_run("face-to-face", "nakamoto", seconds=40.0, bus="ideal")
+
+
+def test_e68_nakamoto_walks_as_its_table_with_no_look_away(nakamoto: MeasuredRun) -> None:
+    found = visits(nakamoto)
+    assert 1.0 / np.mean([visit.seconds for visit in found]) == pytest.approx(3.69, rel=0.12)
+    assert min(visit.rest_s for visit in found) < 0.06  # no floor
+    assert all(name.startswith("face") for name in nakamoto.target_name)
+    assert np.abs(nakamoto.eyes_goal_deg).max() <= 20.0 + 1e-6
+
+
+def test_e68_nakamoto_turns_the_head_beyond_20_deg_only(nakamoto: MeasuredRun) -> None:
+    moves = np.abs(np.diff(nakamoto.head_goal_deg[:, 0])) > 0.02
+    begins = np.flatnonzero(moves[1:] & ~moves[:-1]) + 1
+    begins = begins[np.diff(begins, prepend=-400) > 300]  # a movement may be planned again
+    aside = np.hypot(*(nakamoto.target_deg - nakamoto.head_deg[:, :2])[begins].T)
+    assert len(begins) >= 2 and aside.min() > 19.0
+
+
+def test_e68_mitake_never_blinks_nor_leaves_a_face_that_stands() -> None:
+    run = measured_run("face-to-face", "mitake", seconds=20.0, bus="ideal")
+    assert not run.blink.any() and np.ptp(run.lids_goal) == 0.0
+    assert set(run.part) <= {"N", ""} and (run.part == "N").mean() > 0.8
+    assert not any("away" in name for name in run.target_name)
+
+
+def test_profiles_name_the_section_of_each_value() -> None:
+    for profile in ("mitake", "nakamoto"):
+        text = (PAGE.parents[1] / "config" / "profiles" / f"{profile}.yaml").read_text("utf-8")
+        values = [line for line in text.splitlines() if re.match(r"^ +\w+: [^ #]", line)]
+        bare = [line for line in values if "#" not in line and "explores" not in line]
+        assert not bare, bare
+
+
+@pytest.mark.parametrize("conversation", ["talk", "listen", "think", None])
+def test_a_conversation_changes_the_rate_of_blinks_of_a_running_head(
+    conversation: str | None,
+) -> None:
+    rates = {
+        "gaze.lids.blinks_per_min": 0.0,
+        "gaze.lids.conversation_per_min": 60.0,
+        "gaze.lids.gaze_evoked_blink_least_deg": 180.0,
+    }
+    options = RunOptions(
+        True, True, 0, "face-to-face", seconds=8.0, bus="ideal", conversation=conversation
+    )
+    figures = simulate(changed(load_rig("desk"), rates), options).figures
+    blinks = figures["blinks"]
+    assert isinstance(blinks, int)
+    assert blinks >= 3 if conversation else blinks == 0
