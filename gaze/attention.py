@@ -46,6 +46,8 @@ class AttentionParams:
     # fmt: off
     hysteresis_ratio: Annotated[float, Bounds(1, 10),
         "another body becomes the target if its salience exceeds the present target's by this factor"] = 1.2
+    least_salience: Annotated[float, Bounds(0, 10),
+        "a thing less salient than this is no target of its own: glanced at like anything in view, as if nobody were there"] = 0.05
     min_dwell_ms: Annotated[float, Bounds(0, 10000), "shortest time on one target"] = 300.0
     stale_ms: Annotated[float, Bounds(20, 10000), "a frame older than this is not used"] = 400.0
     looks_elsewhere_ratio: Annotated[float, Bounds(0, 1),
@@ -183,8 +185,11 @@ class Attention:
         elsewhere = [face.id for face in percept.faces if face.looks_at_head is False]
         worth = [ratio if id in elsewhere else 1.0 for id in bodies.ids]
         made = compare(bodies, worth, state, t_s)
-        if made.total[made.best] == -inf:
+        if self._unnoticed(made):
             self._reaction.drop()
+            seen = [row for row in range(len(made.bodies)) if made.total[row] > -inf]
+            places = [_vec(made.bodies.p_world_m[row]) for row in seen]
+            self._idle.see([made.bodies.ids[row] for row in seen], places, t_s)
             return None
         changed = self._behaviour != self.top_down.behaviour
         if changed:
@@ -202,6 +207,13 @@ class Attention:
         dwelt_s = -inf if present is None else self._since_s + self._params.min_dwell_ms / 1e3
         self._reaction.wait(winner, dwelt_s)
         return self._target if present is None else _target(made, present, percept.captured_s)
+
+    def _unnoticed(self, made: _Choice) -> bool:
+        """Return whether there is nothing, or only things that are explored as anything else is."""
+        best, most = made.best, made.total[made.best]
+        if most == -inf or most >= self._params.least_salience:
+            return bool(most == -inf)
+        return best < len(made.bodies) and made.bodies.kinds[best] != "face"
 
     def _compare_few(
         self, bodies: Bodies, worth: list[float], state: GazeState, t_s: float

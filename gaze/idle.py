@@ -1,9 +1,14 @@
-"""Idle gaze when there is no target: wait, search, then rest and glance around.
+"""Idle gaze when there is no target: wait, search, then explore what is in view.
 
 A person who steps out of the frame often comes back at once, and a detector blinks;
 so the gaze first stays where it was. Then it searches: towards the side the person left
-to, and around the place of the loss. With no person found it rests straight ahead
-and glances around the room at irregular intervals, coming back to rest between glances.
+to, and around the place of the loss. With no person found it explores: one to two shifts of
+gaze a second, as people make in front of a scene, with a rest straight ahead now and then.
+
+A glance goes to something in view, or to where something was a moment ago, or else to a
+plausible point: shifts are mostly small (Malinov 2000: half below 5 deg, 83 % below 15) and
+more sideways than up or down, and people look more at the middle of what is before them than
+at its edges, so a shift is drawn from the present point and kept by the odds of where it leads.
 
 Search points and glances all have kind "search" or "glance" and each has an id of its
 own, -2 - n for the n-th since the reset, counted through both kinds: a shift is counted
@@ -11,17 +16,24 @@ where kind or id changes, so every glance is a shift of gaze. The resting point 
 with id -1. Directions are seen from a point above the neck base at the resting height.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import exp, hypot, log, radians, sqrt
+from math import cos, degrees, exp, hypot, log, pi, radians, sin, sqrt
 from typing import Annotated
 
 import numpy as np
 
-from gazerig.gaze.angles import add, direction, norm, scale, sub, wrap, yaw_pitch
+from gazerig.gaze.angles import add, angle_between, direction, norm, scale, sub, wrap, yaw_pitch
 from gazerig.gaze.types import Angles2, Target, Vec3
 from gazerig.params import Bounds
 
 _STILL: Vec3 = (0.0, 0.0, 0.0)
+_AHEAD: Angles2 = (0.0, 0.0)
+_TRIES = 12
+_PLACES = 16
+"""So many things are remembered."""
+_UPRIGHT = 0.5
+"""Shifts up or down are this share of those to the side."""
 _SHORTEST_S = 0.25  # a shift of gaze with its fixation; people make no more than 3 to 4 a second
 
 
@@ -42,13 +54,16 @@ class IdleParams:
     search_spread_deg: Annotated[float, Bounds(0, 45), "standard deviation of the search points, horizontally"] = 8.0
     leaving_deg_s: Annotated[float, Bounds(0.1, 100), "a target slower than this is not considered to have left to a side"] = 4.0
     reach_deg: Annotated[float, Bounds(5, 180), "farthest search direction to the side, unless the target was farther"] = 70.0
-    rest_ms: Annotated[float, Bounds(200, 600_000), "mean time at rest between glances around"] = 3000.0
-    glance_ms: Annotated[float, Bounds(200, 60000), "mean time of a glance"] = 1200.0
+    rest_ms: Annotated[float, Bounds(200, 600_000), "mean time of a rest straight ahead between bouts of glances"] = 1500.0
+    glance_ms: Annotated[float, Bounds(200, 60000), "mean time of a glance"] = 600.0
     spread: Annotated[float, Bounds(0, 3), "standard deviation over mean of all these durations"] = 0.6
-    again_share: Annotated[float, Bounds(0, 0.95), "share of glances that are followed by another one without a rest"] = 0.35
-    glance_least_deg: Annotated[float, Bounds(0, 90), "smallest angle of a glance to the side"] = 8.0
-    glance_yaw_deg: Annotated[float, Bounds(0, 90), "largest angle of a glance to the side"] = 35.0
+    again_share: Annotated[float, Bounds(0, 0.98), "share of glances that are followed by another one without a rest"] = 0.9
+    glance_step_deg: Annotated[float, Bounds(0.5, 90), "mean size of the shift of gaze to a glance"] = 11.0
+    glance_least_deg: Annotated[float, Bounds(0, 90), "smallest size of such a shift"] = 2.0
+    glance_yaw_deg: Annotated[float, Bounds(0, 90), "largest angle of a glance to the side; the middle is looked at more"] = 30.0
     glance_pitch_deg: Annotated[float, Bounds(0, 60), "largest angle of a glance up or down"] = 12.0
+    thing_share: Annotated[float, Bounds(0, 1), "share of glances at something in view or seen lately, where there is any"] = 0.5
+    thing_memory_s: Annotated[float, Bounds(0, 3600), "how long a place where something was seen is glanced at"] = 20.0
     # fmt: on
 
     def __post_init__(self) -> None:
@@ -83,6 +98,8 @@ class Idle:
         self._until_s = self._search_until_s = t_s
         self._count = 0
         self._gone: Target | None = None
+        self._seen: dict[int, tuple[Vec3, float]] = {}
+        self._in_view: frozenset[int] = frozenset()
 
     def retune(self, params: IdleParams) -> None:
         """Change durations and ranges; the phase under way goes on, its duration scaled."""
@@ -107,6 +124,20 @@ class Idle:
     def remember(self, target: Target) -> None:
         """Record a target that is in sight."""
         self._last, self._lost = target, False
+        if target.id >= 0:
+            self._keep(target.id, target.p_world_m, target.at_s)
+
+    def see(self, ids: Sequence[int], p_world_m: Sequence[Vec3], t_s: float) -> None:
+        """Record what is in view, salient or not."""
+        self._in_view = frozenset(ids)
+        for id, place in zip(ids, p_world_m, strict=True):
+            self._keep(id, place, t_s)
+
+    def _keep(self, id: int, place: Vec3, t_s: float) -> None:
+        self._seen.pop(id, None)
+        self._seen[id] = place, t_s
+        if len(self._seen) > _PLACES:
+            del self._seen[next(iter(self._seen))]
 
     def step(self, t_s: float) -> Target:
         """Return where to look with nothing in sight: wait, search, rest, glance."""
@@ -123,7 +154,7 @@ class Idle:
         gone, par = self._last, self._params
         self._gone, self._last = gone, None
         self._until_s = self._search_until_s = t_s
-        if gone is None:
+        if gone is None or gone.id in self._in_view:  # what lies still in view is not lost
             self._rest_now(t_s)
             return
         coast_s = min(max(0.0, t_s - gone.at_s), par.coast_ms / 1e3)
@@ -196,15 +227,54 @@ class Idle:
         )
 
     def _glance(self, t_s: float, rng: np.random.Generator) -> None:
-        """Start a glance at a random point of the room."""
+        """Start a glance at something in view, or at a plausible point of the room."""
         par = self._params
-        side = 1.0 if rng.random() < 0.5 else -1.0
-        place = (
-            side * radians(float(rng.uniform(par.glance_least_deg, par.glance_yaw_deg))),
-            radians(float(rng.uniform(-par.glance_pitch_deg, par.glance_pitch_deg))),
-        )
-        self._look("glance", place, par.rest_distance_m, t_s, "glancing around, no one in sight")
         self._until_s = t_s + self._time_s(par.glance_ms, rng)
+        here = yaw_pitch(sub(self._now.p_world_m, self._eye))
+        things = self._elsewhere(here, t_s) if rng.random() < par.thing_share else []
+        if things:
+            rel = sub(things[int(rng.integers(len(things)))], self._eye)
+            self._look("glance", yaw_pitch(rel), norm(rel), t_s, "looking at what is in view")
+            return
+        place = self._plausible(here, rng)
+        self._look("glance", place, par.rest_distance_m, t_s, "glancing around, no one in sight")
+
+    def _elsewhere(self, here: Angles2, t_s: float) -> list[Vec3]:
+        """Return the places of things within reach that are not being looked at."""
+        par, way = self._params, direction(here)
+        self._seen = {
+            id: (place, at_s)
+            for id, (place, at_s) in self._seen.items()
+            if t_s - at_s <= par.thing_memory_s
+        }
+        most, least = radians(par.reach_deg), radians(par.glance_least_deg)
+        return [
+            place
+            for place, _ in self._seen.values()
+            if abs(yaw_pitch(sub(place, self._eye))[0]) <= most
+            and angle_between(sub(place, self._eye), way) > least
+        ]
+
+    def _plausible(self, here: Angles2, rng: np.random.Generator) -> Angles2:
+        """Draw the next point, by the size of shifts and by how much the middle is looked at."""
+        par = self._params
+        wide, high = max(par.glance_yaw_deg, 1e-3), max(par.glance_pitch_deg, 1e-3)
+        yaw, pitch = degrees(here[0]), degrees(here[1])
+        far = _off_middle(yaw / wide, pitch / high)
+        for _ in range(_TRIES):
+            more = max(0.0, par.glance_step_deg - par.glance_least_deg)
+            size = par.glance_least_deg + more * float(rng.standard_exponential())
+            turn = 2.0 * pi * float(rng.random())
+            to_yaw = yaw + size * cos(turn)
+            to_pitch = pitch + _UPRIGHT * size * sin(turn)
+            if abs(to_yaw) > wide or abs(to_pitch) > high:
+                continue
+            odds = exp(min(0.0, far - _off_middle(to_yaw / wide, to_pitch / high)))
+            if rng.random() < odds and hypot(to_yaw - yaw, to_pitch - pitch) >= min(
+                par.glance_least_deg, wide
+            ):
+                return radians(to_yaw), radians(to_pitch)
+        return _AHEAD
 
     def _look(self, kind: str, place: Angles2, distance_m: float, t_s: float, why: str) -> None:
         """Set the target of a search or glance, with an id of its own."""
@@ -224,3 +294,8 @@ class Idle:
         sigma2 = log(1.0 + self._params.spread**2)
         drawn = mean_ms / 1e3 * exp(sqrt(sigma2) * float(rng.standard_normal()) - 0.5 * sigma2)
         return max(drawn, _SHORTEST_S)
+
+
+def _off_middle(yaw_share: float, pitch_share: float) -> float:
+    """Return the negative logarithm of how much a point is looked at, 0 in the middle."""
+    return 2.0 * (yaw_share * yaw_share + pitch_share * pitch_share)

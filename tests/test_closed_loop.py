@@ -22,8 +22,11 @@ from gazerig.sim_mock.scenes.steps_aside import STEP_AT_S, STEP_S
 from gazerig.sim_mock.scenes.walks_past import HALF_WAY_M, WALK_M_S
 from gazerig.sim_mock.true_gaze import angles_of_place, gaze_angles, gaze_off_rad, true_part
 
-RIG = changed(load_rig("desk"), {"gaze.aversion.silent_mutual_s": 0.0})
-"""The gaze stays on the face, on which it is measured."""
+RIG = changed(
+    load_rig("desk"),
+    {"gaze.aversion.silent_mutual_s": 0.0, "gaze.head.goal_model": "attention"},
+)
+"""The gaze stays on the face, on which it is measured; the head turns nearly all the way."""
 ARRIVED_S = STEP_AT_S + STEP_S
 Column = NDArray[np.float64]
 PlacedBy = Literal["capture", "newest"]

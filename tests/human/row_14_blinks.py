@@ -1,0 +1,73 @@
+"""Blinks: at the published rates, about the onset of gaze shifts, half of them incomplete.
+
+People blink 17 times a minute at rest and 26 times in conversation (Bentivoglio 1997), gaze-evoked
+blinks included; those begin with eyes and head, not in one tick with them (Evinger 1994). Bands of
+the rates: three standard deviations of a count in three minutes.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from human.measured_run import MeasuredRun, Runner
+
+_FULL = 0.95
+_SMALL_DEG = (2.0, 4.5)
+_NEAR_S = 0.1
+
+WANTED = {
+    "at rest, 1/min": (12.0, 21.0),
+    "in conversation, 1/min": (20.0, 32.0),
+    "in the tick of a saccade, %": (0.0, 5.0),
+    "begin within 100 ms of a saccade of 2-4.5 deg, over chance": (0.0, 1.5),
+    "incomplete, %": (35.0, 65.0),
+}
+
+
+def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+    """Return the figures of a person who sits still (at rest) and of one who talks."""
+    rest = [run("visitor", seed=seed, seconds=seconds) for seed in seeds]
+    talk = [
+        run("face-to-face", seed=seed, seconds=seconds, conversation="listen") for seed in seeds
+    ]
+    every = [*rest, *talk]
+    onsets = [onset for one in every for onset in _planned(one.blinks)]
+    together = sum(
+        len(np.intersect1d(_planned(one.blinks), _planned(one.saccades))) for one in every
+    )
+    depths = np.array([blink.depth for one in every for blink in one.trace.blinks])
+    return {
+        "at rest, 1/min": _per_min(rest),
+        "in conversation, 1/min": _per_min(talk),
+        "in the tick of a saccade, %": 100.0 * together / max(1, len(onsets)),
+        "begin within 100 ms of a saccade of 2-4.5 deg, over chance": _with_small(every),
+        "incomplete, %": 100.0 * float((depths < _FULL).mean()),
+    }
+
+
+def _planned(counts: np.ndarray) -> np.ndarray:
+    """Return the ticks in which a count rises."""
+    return np.flatnonzero(np.diff(counts) > 0) + 1
+
+
+def _per_min(runs: Sequence[MeasuredRun]) -> float:
+    seen = sum(len(one.trace.blinks) for one in runs)
+    return 60.0 * seen / sum(one.trace.seconds for one in runs)
+
+
+def _with_small(runs: Sequence[MeasuredRun]) -> float:
+    """Return how much more often blinks begin after small saccades than at other times."""
+    after, covered, blinks, whole = 0, 0.0, 0, 0.0
+    for one in runs:
+        onsets = np.array([blink.onset_s for blink in one.trace.blinks])
+        starts = np.array(
+            [
+                s.onset_s
+                for s in one.trace.saccades
+                if _SMALL_DEG[0] <= s.amplitude_deg <= _SMALL_DEG[1]
+            ]
+        )
+        since = onsets[:, None] - starts[None, :]
+        after += int(((since >= 0.0) & (since < _NEAR_S)).any(axis=1).sum())
+        covered += _NEAR_S * len(starts)
+        blinks, whole = blinks + len(onsets), whole + one.trace.seconds
+    return (after / covered) / (blinks / whole) if covered and blinks else float("nan")
