@@ -165,6 +165,8 @@ class HeadModel:
             self._target = target.kind, target.id
             self._aside_since_s = t_s
             self._start = self._facing(t_s) if moving else self._goal_direction
+            # What brought the eyes back from the target before it ends.
+            self._follows, self._relieves = moving, False
         elif (
             not moving
             and self._start is not self._goal_direction

@@ -121,6 +121,19 @@ def test_e65_a_head_in_flight_stops_where_it_can_and_not_behind_a_nearer_target(
     assert np.diff(yaws[50:]).min() > -0.02, "it does not swing back"
 
 
+def test_e65_eyes_that_are_being_brought_back_do_not_take_the_head_to_the_next_target() -> None:
+    model = HeadModel(HeadParams(recentre_after_ms=300.0), radians(35.0), NECK, ROLL)
+    yaws = [0.0]
+    for k in range(400):
+        t, first = k * 0.005, k < 260
+        facing = (radians(50.0 if first else 20.0), 0.0)
+        target = Target((1, 0, 0), (0, 0, 0), t, "face", int(first), 0.5, False, None, 0, "")
+        yaws.append(model.step(target, facing, facing, abs(facing[0] - yaws[-1]), 1.0, t)[0])
+        if k > 265 and t < 1.3 + 0.3 - 1e-9:
+            assert degrees(yaws[-1]) >= degrees(yaws[261]) - 0.5, "14 deg: the eyes go alone"
+    assert 28.0 < degrees(yaws[261]) < 40.0
+
+
 def test_parts_of_a_face_do_not_pull_the_head_further_each_time() -> None:
     """The same person all the while: the law counts from where the head was at first."""
     head = HeadModel(HeadParams(recentre_after_ms=NO_RELIEF), radians(50.0), NECK, ROLL)

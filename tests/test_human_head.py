@@ -17,7 +17,7 @@ def outside(wanted: dict[str, tuple[float, float]], figures: dict[str, float]) -
 
 
 def test_e65_the_measured_head_stops_short_of_a_nearer_target() -> None:
-    figures = row_05_homeward_head.measure(measured_run, 11.5, (0,))
+    figures = row_05_homeward_head.measure(measured_run, 12.5, (0,))
     assert outside(row_05_homeward_head.WANTED, figures) == {}
     turned = [figures[f"turned at interest {i} deg"] for i in ("0.2,", "0.5,", "1,")]
     assert turned[0] < turned[1] < turned[2]

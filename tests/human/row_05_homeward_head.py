@@ -16,8 +16,8 @@ from human.measured_run import MeasuredRun, Runner
 from gazerig.gaze.types import Vec3
 from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 
-_STAGES = ((0.0, 30.0), (6.0, 60.0), (9.5, 25.0))
-"""From when on the thing is at which yaw; 60 deg is out of the camera's view from 0."""
+_STAGES = ((0.0, 60.0), (4.0, 25.0))
+"""From when on the thing is at which yaw."""
 
 _TURNED_S = 0.75
 _INTERESTS = (0.2, 0.5, 1.0)
@@ -31,10 +31,10 @@ WANTED = {
 
 
 class ThereAndBack:
-    """A thing 30, then 60 deg to the left, then one at 25 deg."""
+    """A thing 60 deg to the left, then one at 25 deg."""
 
     name = "there-and-back"
-    round_s = 12.0
+    round_s = 7.0
     behaviours: tuple[str, ...] = ()
 
     def people(self, t_s: float) -> tuple[ScenePerson, ...]:
@@ -93,6 +93,7 @@ def _of(run: Runner, seed: int, seconds: float, interest: float, model: str) -> 
             "gaze.top_down.rules.wait.look_at": "ball",
             "gaze.top_down.rules.wait.salience": interest,
             "gaze.bottom_up.onset_salience": 0.0,
+            "camera.horizontal_field_deg": 140.0,  # so that both are seen from anywhere
         },
     )
 
