@@ -13,6 +13,8 @@ from papers import ROOT
 
 import gazerig
 
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
 EXAMPLES = ROOT / "examples"
 Shown = Callable[..., list[str]]
 
