@@ -36,7 +36,7 @@ def test_a_photo_is_looked_at_and_gives_the_same_bytes_twice(tmp_path: Path) -> 
     picture = photo(tmp_path / "photo.png")
     runs = [figures("--video", str(picture), "--seconds", "2") for _ in range(2)]
     assert runs[0]["faces_seen"] == runs[0]["pictures"] >= 17
-    assert runs[0]["target_share"]["face"] > 0.9
+    assert runs[0]["target_share"]["face"] > 0.8  # after a reaction time
     assert runs[0]["bus"] == runs[1]["bus"]
 
 
