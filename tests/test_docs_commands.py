@@ -6,6 +6,7 @@ import inspect
 import re
 import shlex
 from pathlib import Path
+from textwrap import dedent
 from types import ModuleType
 from typing import Any
 
@@ -225,9 +226,10 @@ def test_python_that_needs_no_rig_runs(capfd: pytest.CaptureFixture[str]) -> Non
 
 def test_the_tick_is_told_as_it_is() -> None:
     [block] = [b for b in blocks("python") if b.paper.name == "one-tick.md"]
-    source = "".join(inspect.getsource(Robot.tick).split())
+    source = "".join(ast.unparse(ast.parse(dedent(inspect.getsource(Robot.tick)))).split())
     place = 0
-    for line in block.text.splitlines():
+    for statement in ast.parse(block.text).body:
+        line = ast.unparse(statement)
         done = "".join(line.rpartition(" = ")[2].split())
         place = source.find(done, place)
         assert place >= 0, f"{line}: not there, or not in this order"
