@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from html import unescape
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import cv2
 import numpy as np
@@ -14,15 +16,17 @@ from typer.testing import CliRunner
 
 from gazerig.config.schema import Rig, load_rig, load_walk
 from gazerig.drivers.errors import SetupError
-from gazerig.gaze.types import PARTS
+from gazerig.gaze.types import PARTS, Bodies, Percept
 from gazerig.robot.analysis import human_norms as human
 from gazerig.robot.analysis.blink_finder import BlinkEvent
 from gazerig.robot.analysis.event_detector import Commanded, FixationEvent, SaccadeEvent
+from gazerig.robot.analysis.reaction_finder import ReactionFinder
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.report import app, page_file
 from gazerig.robot.control.loop import run
-from gazerig.robot.report import face
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.report import face, landing, rests
 from gazerig.robot.report import norm_bands as bands
 from gazerig.robot.report import report as build
 from gazerig.robot.report.compare import differences_of
@@ -74,8 +78,9 @@ def test_a_gaze_that_wanders_as_people_do_passes_on_the_face(walking: GazeTrace)
         assert seen[key].low95 <= seen[key].value <= seen[key].high95
 
 
-def test_what_the_paper_makes_other_than_people_is_outside(walking: GazeTrace) -> None:
-    seen = verdicts(walking)
+@pytest.mark.slow
+def test_what_the_paper_makes_other_than_people_is_outside() -> None:
+    seen = verdicts(looked("face-to-face", 30.0, SLOWER, saccade="min_jerk"))
     assert seen["duration_small"].verdict == "outside"
     assert seen["duration_small"].measured.asked < 0.3  # and so it was asked for
     assert seen["skew"].value > 0.05  # minimum jerk is symmetric, people rise faster
@@ -302,3 +307,85 @@ def test_the_command_takes_a_file_or_a_scene() -> None:
     assert done.exit_code == 2 and "unknown; scenes" in done.output
     done = runner.invoke(app, ["report", "nothing.mcap"])
     assert done.exit_code == 2 and len(done.output.strip().splitlines()) == 1
+
+
+# --- landings, rests, reactions
+
+
+def flown(
+    jumps: list[tuple[float, float, float]], goal: float = 12.0, over: float = 0.0
+) -> GazeTrace:
+    """Make a run of planned saccades to a goal, onset in s, and from and to in deg of yaw.
+
+    over: how far the gaze swings beyond in flight, in deg
+    """
+    t = np.arange(0.0, 3.0, 0.005)
+    rows = np.zeros((len(t), len(TraceRow._fields)))
+    column = {name: at for at, name in enumerate(TraceRow._fields)}
+    rows[:, column["t"]], rows[:, column["target_yaw"]] = t, goal
+    gaze, events = np.full(len(t), jumps[0][1]), []
+    for onset, start, end in jumps:
+        s = np.clip((t - onset) / 0.05, 0.0, 1.0)
+        gaze += (end - start) * s * s * (3.0 - 2.0 * s)
+        gaze += over * np.exp(-(((t - onset - 0.06) / 0.008) ** 2))
+        rows[(t >= onset) & (t < onset + 0.05), column["phase"]] = 1.0
+        size = abs(end - start)
+        events.append(
+            SaccadeEvent(onset, 0.05, size, 300.0, 0.4, Commanded(onset, 0.05, size, 300.0))
+        )
+    rows[:, column["gaze_yaw"]] = gaze
+    return GazeTrace(rows, tuple(events), (), ())
+
+
+def test_a_landing_is_short_and_corrected_or_beyond() -> None:
+    short = landing.landings(flown([(0.5, 0.0, 11.0), (0.7, 11.0, 12.0)]))
+    assert short[0] == pytest.approx((11.0 / 12.0, 1.0), abs=0.01) and len(short) == 1
+    late = landing.landings(flown([(0.5, 0.0, 11.0), (1.1, 11.0, 12.0)]))
+    assert late[0, 1] == 0.0
+    assert landing.overshoots(flown([(0.5, 0.0, 12.0)])) == pytest.approx([0.0], abs=0.01)
+    assert landing.overshoots(flown([(0.5, 0.0, 12.0)], over=1.8)) == pytest.approx(
+        [0.15], abs=0.03
+    )
+
+
+def test_a_floor_under_rests_is_a_spike_and_a_smooth_law_is_none() -> None:
+    dice = np.random.default_rng(2)
+    smooth = dice.lognormal(-1.4, 0.45, 1500)
+    assert rests.spike(smooth) < 0.03
+    assert rests.spike(np.maximum(smooth, 0.2)) > 0.2
+
+
+def test_blinks_that_begin_with_saccades_are_told_from_others() -> None:
+    run = run_of([(5.0, 40.0, 200.0, 0.45)] * 40)
+    for late_s, share in ((0.0, 1.0), (0.05, 0.0)):
+        shuts = tuple(
+            BlinkEvent(0.4 * n + late_s, 0.08, 0.04, 0.19, 0.9, 20.0, 10.0) for n in range(20)
+        )
+        seen = verdicts(replace(run, blinks=shuts))
+        assert seen["blink_tied"].value == share
+        assert seen["blink_partial"].value == 1.0 and seen["blink_partial"].verdict == "outside"
+
+
+def test_reactions_begin_with_the_first_frame_and_are_told_from_choices() -> None:
+    def tick(t_s: float, ids: tuple[int, ...], on: int, saccades: int) -> Tick:
+        n = len(ids)
+        zero = np.zeros((n, 3))
+        seen = Bodies(ids, ("hand",) * n, zero, zero, zero, np.zeros(n))
+        return cast(
+            Tick,
+            SimpleNamespace(
+                t_s=t_s, percept=Percept(t_s - 0.06, seen), stopped="",
+                target=SimpleNamespace(kind="hand", id=on),
+                gaze=SimpleNamespace(saccades=saccades),
+            ),
+        )  # fmt: skip
+
+    finder = ReactionFinder()
+    assert finder.update(tick(1.0, (1,), 1, 0)) is None
+    assert finder.update(tick(1.1, (1,), 1, 1)) is None  # was there from the beginning
+    assert finder.update(tick(2.0, (1, 2), 1, 1)) is None
+    found = finder.update(tick(2.2, (1, 2), 2, 2))
+    assert found is not None and found.latency_s == pytest.approx(0.26)
+    assert finder.update(tick(2.5, (1, 2), 2, 3)) is None  # no longer new
+    assert finder.update(tick(3.0, (1, 2, 3), 2, 3)) is None
+    assert finder.update(tick(4.5, (1, 2, 3), 3, 4)) is None  # a choice

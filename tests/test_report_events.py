@@ -18,6 +18,7 @@ from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.report.gaze_trace import GazeTrace, GazeTraceBuilder
+from gazerig.robot.report.landing import planned_saccades
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -155,7 +156,12 @@ def test_a_wink_a_droop_and_a_glance_down_are_no_blinks() -> None:
 def test_the_run_is_told_as_the_models_know_it(ticks: list[Tick], gathered: GazeTrace) -> None:
     asked = ticks[-1].gaze
     found = [s for s in gathered.saccades if s.commanded is not None]
-    assert len(found) == pytest.approx(asked.saccades, rel=0.04)
+    # Corrections and small shifts within a part are hardly faster than what is no saccade.
+    assert len(found) == pytest.approx(asked.saccades, rel=0.15)
+    large = np.count_nonzero(planned_saccades(gathered)[:, 2] >= 1.0)
+    assert np.count_nonzero([s.amplitude_deg >= 1.0 for s in found]) == pytest.approx(
+        large, rel=0.04
+    )
     assert len(gathered.fixations) == pytest.approx(asked.fixations, rel=0.06)
     assert abs(len(gathered.blinks) - asked.blinks) <= 2
     late_s = [s.onset_s - s.commanded.onset_s for s in found if s.commanded]

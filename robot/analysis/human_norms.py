@@ -95,8 +95,13 @@ def shortest_ms(amplitude_deg: ArrayLike) -> Floats:
 
 
 def longest_ms(amplitude_deg: ArrayLike) -> Floats:
-    """Return the upper edge, 25 ms + 2.4 ms a degree (Lee, Badler & Badler 2002) and a quarter."""
-    out: Floats = 1.25 * (25.0 + 2.4 * np.asarray(amplitude_deg, dtype=float))
+    """Return the upper edge of human durations.
+
+    The higher of 25 ms + 2.4 ms a degree (Lee, Badler & Badler 2002) and a quarter, and the mean of
+    Baloh et al. 1975, 37 ms + 2.7 ms a degree.
+    """
+    a = np.asarray(amplitude_deg, dtype=float)
+    out: Floats = np.maximum(1.25 * (25.0 + 2.4 * a), 37.0 + 2.7 * a)
     return out
 
 

@@ -14,6 +14,9 @@ _DOUBLE_S = 0.6
 _EVOKING_DEG = 33.0
 _WITH_BEFORE_S, _WITH_AFTER_S = 0.12, 0.2
 _PART_S = 10.0
+_TIED_S = 0.01
+_SHUT = 0.96
+"""A blink that goes so far has shut the eye; of lids in steps of a servo."""
 
 
 def intervals(run: GazeTrace) -> Floats:
@@ -45,11 +48,21 @@ def evoked(run: GazeTrace) -> Floats:
     return np.array(rows).reshape(-1, 2)
 
 
+def tied(run: GazeTrace) -> Floats:
+    """Return (n,) whether each blink begins in the very moment of a saccade."""
+    onsets = np.array([saccade.onset_s for saccade in run.saccades])
+    if not len(onsets):
+        return np.zeros(len(run.blinks))
+    apart = [np.abs(onsets - blink.onset_s).min() for blink in run.blinks]
+    return (np.array(apart) <= _TIED_S).astype(float)
+
+
 def measures(run: GazeTrace) -> list[MeasuredValue]:
     """Return what there is to say about lids."""
     seen, asked = shapes(run.blinks), shapes(run.asked_blinks)
     large = evoked(run)
     large = large[large[:, 0] >= _EVOKING_DEG]
+    partial = np.array([float(blink.depth < _SHUT) for blink in run.blinks])
     shape = [
         MeasuredValue(key, seen[:, column], median, figure(median, asked[:, column]))
         for column, key in enumerate(("blink_close", "blink_hold", "blink_open", "blink_ratio"))
@@ -61,6 +74,8 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
         MeasuredValue("blink_cv", intervals(run), spread_over_mean),
         *shape,
         MeasuredValue("evoked", large[:, 1], mean),
+        MeasuredValue("blink_partial", partial, mean),
+        MeasuredValue("blink_tied", tied(run), mean),
     ]
 
 

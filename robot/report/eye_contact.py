@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
 from gazerig.robot.report.gaze_trace import GazeTrace
-from gazerig.robot.report.statistics import MeasuredValue, longest, mean
+from gazerig.robot.report.statistics import MeasuredValue, longest, mean, median
 
 _HALF_WIDE_M, _HALF_HIGH_M = 0.085, 0.125
 """The oval of a face, a little larger than an adult's."""
@@ -60,6 +60,7 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
     away = seen[1:, 0] - seen[:-1, 1]
     pairs = np.column_stack([_lengths(seen)[:-1], away])
     return [
+        MeasuredValue("bout_none", whole, median),
         MeasuredValue("bout_talk", whole, mean),
         MeasuredValue("share_talk", pairs, _share),
         MeasuredValue("bout_listen", whole, mean),

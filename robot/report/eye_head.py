@@ -25,12 +25,13 @@ _MOVES_DEG = 5.0
 _LARGE_DEG = 20.0
 _HEAD_DEG_S, _STILL_TARGET_DEG_S = 6.0, 3.0
 _STRETCH_S = 0.08
+_ASIDE_DEG = 10.0
 
 
 class Shift(NamedTuple):
     """One gaze shift with what the head did in it; sideways angles, along the shift.
 
-    aside_deg: where the gaze went, seen from where the head pointed before
+    aside_deg: the target, seen from where the head pointed before; also of a shift homeward
     head_deg: how far the head turned until the next shift, 0.9 s at most
     head_after_s: from the eyes' start to the head's, nan where it did not go with them
     head_peak_deg_s: its highest speed
@@ -53,7 +54,7 @@ def rate(t_s: Floats, x: Floats, half: int = 4) -> Floats:
 
 def gaze_shifts(run: GazeTrace) -> list[Shift]:
     """Return the shifts that began with the head at rest."""
-    t, head, gaze = run.column("t"), run.column("head_yaw"), run.column("gaze_yaw")
+    t, head, goal = run.column("t"), run.column("head_yaw"), run.column("target_yaw")
     speed, moves = rate(t, head), np.abs(run.column("target_yaw_rate"))
     large = [s for s in run.saccades if s.amplitude_deg >= LEAST_DEG and s.commanded is not None]
     out = []
@@ -69,7 +70,8 @@ def gaze_shifts(run: GazeTrace) -> list[Shift]:
             or float(np.median(moves[window])) > _STILL_DEG_S
         ):
             continue
-        aside = float(np.median(gaze[landing]) - head[window.start])
+        # Where the gaze was to go: an eye at the end of its range is there only with the head.
+        aside = float(np.median(goal[landing]) - head[window.start])
         sign = 1.0 if aside >= 0.0 else -1.0
         turned = sign * float(head[window.stop - 1] - head[window.start])
         out.append(_shift(run, saccade.onset_s, sign, abs(aside), turned, sign * speed))
@@ -129,6 +131,15 @@ def vor(run: GazeTrace) -> Floats:
     return np.array(rows).reshape(-1, 2)
 
 
+def rolls(run: GazeTrace) -> Floats:
+    """Return (n,) how far the head is rolled in each fixation of something aside, in deg."""
+    roll, aside = np.abs(run.column("head_roll")), np.abs(run.column("target_yaw"))
+    parts = [run.between(f.start_s, f.end_s) for f in run.fixations]
+    return np.array(
+        [np.median(roll[p]) for p in parts if p.stop > p.start and aside[p].mean() > _ASIDE_DEG]
+    )
+
+
 def measures(run: GazeTrace) -> list[MeasuredValue]:
     """Return what there is to say about eyes and head."""
     shifts = gaze_shifts(run)
@@ -144,6 +155,7 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
         MeasuredValue("head_share", large[:, 1] - human.head_deg(large[:, 0]), median),
         MeasuredValue("head_after", after[np.isfinite(after)], median),
         MeasuredValue("head_peak", turns[:, 1] / usual, median),
+        MeasuredValue("head_roll", rolls(run), median),
         MeasuredValue("vor", vor(run)[:, 0], median),
     ]
 

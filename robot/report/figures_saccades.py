@@ -121,7 +121,7 @@ DRAWINGS = (
     Drawing("main_sequence", SACCADES, "Main sequence",
             "Each dot is a saccade of the gaze in space, {measured}; grey is where people's lie: "
             "between Baloh's and the higher of Bahill's and Collewijn's curves, 15 % between "
-            "people; durations 21 + 2.2 A to 25 + 2.4 A ms, +- 25 %.", _main_sequence),
+            "people; durations 21 + 2.2 A less 25 % to 25 + 2.4 A ms and 25 %, or 37 + 2.7 A ms.", _main_sequence),
     Drawing("saccade_shape", SACCADES, "Skew and sizes",
             "When in a saccade the eye is fastest, .5 is the middle; and how large saccades are.",
             _shape),

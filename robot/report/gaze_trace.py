@@ -22,6 +22,7 @@ from gazerig.robot.analysis.event_detector import (
 )
 from gazerig.robot.analysis.gaze_on_face import on_face
 from gazerig.robot.analysis.lid_opening import LOWER, UPPER, openings
+from gazerig.robot.analysis.reaction_finder import Reaction, ReactionFinder
 from gazerig.robot.analysis.summary import cyclopean
 from gazerig.robot.control.feedback_basis import estimated_joints
 from gazerig.robot.control.tick import Tick
@@ -32,6 +33,10 @@ PLANE_M = -0.028
 """The plane between the tip of the nose and eyes and mouth, along the face's own x axis."""
 
 MODES = ("none", "talk", "listen", "think")
+PHASES = ("fixate", "saccade", "pursue")
+"""What the eyes do, as ``phase`` counts it."""
+
+_IDLE = frozenset(("search", "glance", "rest"))
 _LONGEST_FORESEEN_S = 0.3
 
 
@@ -39,6 +44,7 @@ class TraceRow(NamedTuple):
     """One tick; degrees, seconds, metres where the name says no other; nan where unknown.
 
     gaze_*: mean line of sight in space; head_*, eye_*: neck, and mean eye in the head
+    idle: whether the target is one of those with no one there
     target_*: direction of the point in force from the head, now; target_*_rate: its speed
     vergence, vergence_due: as it is, and as the point's place asks for
     off_left, off_right: angle of each line of sight off the point
@@ -54,6 +60,7 @@ class TraceRow(NamedTuple):
     gaze_pitch: float
     head_yaw: float
     head_pitch: float
+    head_roll: float
     eye_yaw: float
     eye_pitch: float
     target_yaw: float
@@ -77,6 +84,7 @@ class TraceRow(NamedTuple):
     lower_lid: float
     phase: float
     is_face: float
+    idle: float
     shift: float
     mode: float
 
@@ -87,6 +95,7 @@ class GazeTrace:
 
     asked_blinks: as the models commanded them; kinds: seconds per kind of target
     joints: of the rig, and which of them are estimated
+    reactions: to what came into view
     """
 
     rows: Floats
@@ -96,6 +105,7 @@ class GazeTrace:
     asked_blinks: tuple[BlinkEvent, ...] = ()
     kinds: dict[str, float] = field(default_factory=dict)
     joints: JointBasis = JointBasis()
+    reactions: tuple[Reaction, ...] = ()
 
     def column(self, name: str) -> Floats:
         """Return a column of Row by its name."""
@@ -143,6 +153,7 @@ class GazeTraceBuilder:
         self._fixations: list[FixationEvent] = []
         self._blinks: list[BlinkEvent] = []
         self._asked_blinks: list[BlinkEvent] = []
+        self._new, self._reactions = ReactionFinder(), list[Reaction]()
         self._kinds: defaultdict[str, float] = defaultdict(float)
         self._mode = 0
         self._last_s: float | None = None
@@ -165,6 +176,9 @@ class GazeTraceBuilder:
                 self._fixations.append(event)
             else:
                 self._blinks.append(event)
+        reaction = self._new.update(tick)
+        if reaction is not None:
+            self._reactions.append(reaction)
         self._names = tick.guard_result.joints
         self._estimated.update(dict.fromkeys(estimated_joints(tick)))
         lids = openings(tick.gaze.lid_left, tick.gaze.lid_right, self._names, UPPER)
@@ -188,6 +202,7 @@ class GazeTraceBuilder:
             tuple(self._asked_blinks),
             dict(self._kinds),
             joints_of(self._names, self._estimated),
+            tuple(self._reactions),
         )
 
 
@@ -220,7 +235,7 @@ def row_of(tick: Tick, mode: int) -> TraceRow:
     turned = head_in_space(pose)
     return TraceRow(
         tick.t_s, degrees(yaw), degrees(pitch),
-        degrees(turned[0]), degrees(turned[1]),
+        degrees(turned[0]), degrees(turned[1]), degrees(turned[2]),
         degrees(0.5 * (eye_left[0] + eye_right[0])), degrees(0.5 * (eye_left[1] + eye_right[1])),
         degrees(at_yaw), degrees(at_pitch), degrees(yaw_rate), degrees(pitch_rate), norm(rel),
         degrees(eye_right[0] - eye_left[0]), degrees(atan2(y + half, x) - atan2(y - half, x)),
@@ -230,12 +245,9 @@ def row_of(tick: Tick, mode: int) -> TraceRow:
         gaze_at[0], gaze_at[1], off_deg, float(seen),
         max(openings(pose.lid_left, pose.lid_right, names, UPPER) or (nan,)),
         max(openings(pose.lower_left, pose.lower_right, names, LOWER) or (nan,)),
-        _PHASES.index(tick.gaze.phase),
-        float(target.kind == "face"), target.shift, mode,
+        PHASES.index(tick.gaze.phase),
+        float(target.kind == "face"), float(target.kind in _IDLE), target.shift, mode,
     )  # fmt: skip
-
-
-_PHASES = ("fixate", "saccade", "pursue")
 
 
 def _rates(rel: Vec3, v: Vec3) -> tuple[float, float]:

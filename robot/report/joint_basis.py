@@ -57,7 +57,7 @@ class JointBasis:
 _HEAD_PART = ("head_slope", "head_share", "head_after", "head_peak", "head_part")
 _BLINKS = (
     "blink_rate", "blink_rate_talk", "blink_cv", "blink_close", "blink_hold", "blink_open",
-    "blink_ratio", "evoked", "blink_shape", "blink_when",
+    "blink_ratio", "evoked", "blink_partial", "blink_tied", "blink_shape", "blink_when",
 )  # fmt: skip
 
 
@@ -72,11 +72,20 @@ def _eyes_estimated(joints: JointBasis) -> bool:
 
 
 _RULES: tuple[tuple[Sequence[str], Callable[[JointBasis], bool], str], ...] = (
-    ((*_HEAD_PART, "vor"), _no_neck, "This rig has no neck: there is no head movement to look at."),
+    (
+        (*_HEAD_PART, "head_roll", "vor"),
+        _no_neck,
+        "This rig has no neck: there is no head movement to look at.",
+    ),
     (
         _HEAD_PART,
         lambda joints: not joints.has("neck_yaw"),
         "No joint turns the head sideways: its part in shifts of the gaze is left out.",
+    ),
+    (
+        ("head_roll",),
+        lambda joints: not joints.has("neck_roll"),
+        "No joint rolls the head.",
     ),
     (
         ("vor",),

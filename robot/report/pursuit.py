@@ -4,8 +4,8 @@ import numpy as np
 
 from gazerig.gaze.types import Floats
 from gazerig.robot.report.eye_head import rate, stretches
-from gazerig.robot.report.gaze_trace import GazeTrace
-from gazerig.robot.report.statistics import MeasuredValue, median
+from gazerig.robot.report.gaze_trace import PHASES, GazeTrace
+from gazerig.robot.report.statistics import MeasuredValue, longest, median
 
 SLOWEST_DEG_S, FASTEST_DEG_S = 5.0, 40.0
 _STRETCH_S = 0.15
@@ -61,10 +61,23 @@ def response(run: GazeTrace) -> Floats:
     return np.column_stack([f[here], np.abs(transfer), np.degrees(np.angle(transfer))])
 
 
+def smooth_speeds(run: GazeTrace) -> Floats:
+    """Return (n,) how fast the gaze was at the most in each stretch of smooth following."""
+    t = run.column("t")
+    if len(t) < 20:
+        return np.zeros(0)
+    speed = np.hypot(rate(t, run.column("gaze_yaw")), rate(t, run.column("gaze_pitch")))
+    mask = run.slow(0.03, 0.08) & (run.column("phase") == PHASES.index("pursue"))
+    parts = stretches(mask, t, run.column("shift"), _STRETCH_S)
+    return np.array([speed[part].max() for part in parts])
+
+
 def measures(run: GazeTrace) -> list[MeasuredValue]:
     """Return what there is to say about following."""
-    rows = followed(run)
+    rows, smooth = followed(run), smooth_speeds(run)
     return [
         MeasuredValue("pursuit_gain", rows[:, 1], median),
         MeasuredValue("pursuit_lag", rows[:, 2], median),
+        MeasuredValue("pursuit_most", response(run)[:, 1], longest),
+        MeasuredValue("smooth_peak", smooth, longest),
     ]

@@ -16,7 +16,10 @@ from gazerig.robot.report import (
     figures_head,
     figures_lids,
     figures_saccades,
+    landing,
     pursuit,
+    reactions,
+    rests,
     saccades,
 )
 from gazerig.robot.report.files import write_all
@@ -104,8 +107,9 @@ def read(ticks: Iterable[Tick], about: RunHeader, progress: Progress) -> GazeTra
 def measured(run: GazeTrace) -> tuple[MeasuredValue, ...]:
     """Measure all that applies to the rig's joints and in the run's mode of conversation."""
     each = (
-        saccades.measures(run), face.measures(run), eye_head.measures(run),
-        pursuit.measures(run), blinks.measures(run), eye_contact.measures(run),
+        saccades.measures(run), landing.measures(run), rests.measures(run), face.measures(run),
+        eye_head.measures(run), pursuit.measures(run), blinks.measures(run),
+        eye_contact.measures(run), reactions.measures(run),
     )  # fmt: skip
     return tuple(
         m

@@ -20,9 +20,9 @@ from gazerig.robot.recording.gaze_labels import labels_of, stretches_of
 NOISE_DEG = 0.02
 """Standard deviation of each sample, as of a tower-mounted tracker (0.01 to 0.05)."""
 
-THRESHOLD_DEG_S = 35.0
+THRESHOLD_DEG_S = 30.0
 """Of Engbert & Kliegl's ellipse. They take six times the noise of a recording at rest, which here
-would be less than a person's walk; this is six times that of a head-worn tracker (0.08 deg)."""
+would be less than a person's walk; this is the usual one of velocity-based detection (I-VT)."""
 
 FAST_DEG_S, _AROUND_S = 25.0, 0.1
 """What is followed faster than this, and what is that near to it in time, is no judge's case: both
