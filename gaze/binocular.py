@@ -278,7 +278,8 @@ class BinocularController:
     def _follow(self, seen: Vec3, dt_s: float) -> None:
         """Low-pass the direction of the target and differentiate it."""
         before = self._seen
-        if before is None or not self._known or norm(sub(seen, before)) > self._reject_rad_s * dt_s:
+        most = self._reject_rad_s * dt_s
+        if before is None or not self._known or norm(sub(seen, before)) > most:
             self._shift(seen)
         self._seen = seen
         kept = exp(-dt_s / self._smooth_s)

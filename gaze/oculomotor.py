@@ -146,7 +146,10 @@ class Oculomotor:
         self._gaze.retune(params)
         self._eye_limits, self._lag_s = eye_limits, params.eye_lag_ms / 1e3
         self._prediction.retune(
-            params.target_prediction, params.prediction_horizon_ms / 1e3, params.fade_ms / 1e3
+            params.target_prediction,
+            params.prediction_horizon_ms / 1e3,
+            params.fade_ms / 1e3,
+            self._lag_s,
         )
 
     def reset(self, t_s: float, state: GazeState) -> None:

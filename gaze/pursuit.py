@@ -26,7 +26,7 @@ _FARTHEST_1_M = 0.01
 """Nearness below which the lines of sight are as good as parallel (100 m)."""
 _NEAREST_1_M = 20.0
 """Nearness of a point at the eyes themselves (0.05 m); nothing nearer has a direction."""
-_PEAK_SHARE = 1.15
+_PEAK_SHARE = 1.2
 """Peak speed of a swing that is followed, over the fastest pursuit: what is cut off at its middle
 is made up for at its ends."""
 _NEAREST_M = 1.0 / _NEAREST_1_M

@@ -25,10 +25,10 @@ _SLOPE_FRAMES = 4
 """Frames over which a change of velocity is measured."""
 _BENDS_S = 0.12
 """Longest time over which a change of velocity is believed to go on."""
-_WINDOWS_S = (0.8, 1.4, 2.4, 4.0)
+_WINDOWS_S = (0.7, 1.2, 2.2, 4.0)
 """Stretches of the past in which a period is looked for, the shortest first."""
-_IN_TURN_S = (0.8, 1.4, 0.8, 2.4, 0.8, 4.0)
-_CYCLES = (1.0, 2.3)
+_IN_TURN_S = (0.7, 1.2, 0.7, 2.2, 0.7, 4.0)
+_CYCLES = (0.95, 2.3)
 """So many cycles must a stretch contain for its period to count."""
 _LEAST_M = 0.015
 """A smaller swing is not worth a prediction."""
@@ -73,24 +73,30 @@ class TargetPrediction:
             velocity, "periodic" bends the path with the change of velocity and recognises swings.
         horizon_s: longest time over which motion is extrapolated.
         fade_s: time constant with which the motion decays after that.
+        lag_s: delay of the eyes, by which a swing is led: its future is known.
 
     sine: the swing that is recognised, None where there is none
     """
 
-    def __init__(self, model: PredictionModel, horizon_s: float, fade_s: float) -> None:
-        self.retune(model, horizon_s, fade_s)
+    def __init__(
+        self, model: PredictionModel, horizon_s: float, fade_s: float, lag_s: float = 0.0
+    ) -> None:
+        self.retune(model, horizon_s, fade_s, lag_s)
         self.reset()
 
-    def retune(self, model: PredictionModel, horizon_s: float, fade_s: float) -> None:
+    def retune(
+        self, model: PredictionModel, horizon_s: float, fade_s: float, lag_s: float = 0.0
+    ) -> None:
         """Use other parameters; what was seen is kept."""
         self._model, self._horizon_s, self._fade_s = model, horizon_s, fade_s
+        self._lag_s = lag_s
 
     def reset(self) -> None:
         """Forget what was seen."""
         self._id = ("", -1)
         self._at_s, self._p, self._v = 0.0, _STILL, _STILL
         self._past: deque[tuple[float, Vec3, Vec3]] = deque()
-        self._bend, self._share = _STILL, 1.0
+        self._bend, self._share, self._fastest_m_s = _STILL, 1.0, 0.0
         self.sine: Sine | None = None
         self._left: dict[tuple[str, int], Sine] = {}
         self._turn = 0
@@ -108,7 +114,8 @@ class TargetPrediction:
         """Take the target in; what its frame has already shown changes nothing.
 
         eye: from where it is looked at
-        fastest_rad_s: a swing that is faster there is followed with less than its amplitude
+        fastest_rad_s: a swing that is faster there is followed with less than its amplitude, and
+            no motion is extrapolated faster
         """
         at_s, centre = target.at_s, target.centre_world_m
         if at_s == self._at_s and (target.kind, target.id) == self._id:
@@ -119,6 +126,7 @@ class TargetPrediction:
             self._begin((target.kind, target.id), at_s)
         self._at_s, self._p, self._v = at_s, p, v
         self._share = 1.0
+        self._fastest_m_s = fastest_rad_s * norm(sub(p, eye))
         if self._model != "periodic" or target.id < 0:
             self._bend, self.sine = _STILL, None
             return
@@ -134,9 +142,9 @@ class TargetPrediction:
 
     def displacement(self, t_s: float) -> Vec3:
         """Return by how much the target has moved since its frame."""
-        age_s = t_s - self._at_s
-        if age_s <= 0.0 or self._model == "none":
+        if self._model == "none":
             return _STILL
+        age_s = max(0.0, t_s - self._at_s)
         known_s = min(age_s, self._horizon_s)
         moved = self._moved(known_s)
         if age_s > known_s:
@@ -146,9 +154,9 @@ class TargetPrediction:
 
     def velocity(self, t_s: float) -> Vec3:
         """Return the target's velocity."""
-        age_s = t_s - self._at_s
-        if age_s <= 0.0 or self._model == "none":
+        if self._model == "none":
             return self._v
+        age_s = max(0.0, t_s - self._at_s)
         known_s = min(age_s, self._horizon_s)
         left = exp(-(age_s - known_s) / self._fade_s) if age_s > known_s else 1.0
         return scale(self._speed(known_s), left)
@@ -163,20 +171,26 @@ class TargetPrediction:
         sine = self.sine
         if sine is not None:
             at_s = self._at_s
-            there = scale(sine.offset(at_s + age_s), self._share)
+            there = scale(sine.offset(at_s + age_s + self._lag_s), self._share)
             return sub(there, sine.offset(at_s))
         bent = min(age_s, _BENDS_S)
         more = bent * (age_s - 0.5 * bent)
         (x, y, z), (a, b, c) = self._v, self._bend
-        return x * age_s + a * more, y * age_s + b * more, z * age_s + c * more
+        moved = x * age_s + a * more, y * age_s + b * more, z * age_s + c * more
+        far, most = norm(moved), self._fastest_m_s * age_s
+        return moved if far <= most else scale(moved, most / far)
 
     def _speed(self, age_s: float) -> Vec3:
         """Return the velocity an age after the frame."""
         if self.sine is not None:
-            return scale(self.sine.velocity(self._at_s + age_s), self._share)
+            ahead_s = self._at_s + age_s + self._lag_s
+            return scale(self.sine.velocity(ahead_s), self._share)
         bent = min(age_s, _BENDS_S)
         (x, y, z), (a, b, c) = self._v, self._bend
-        return x + a * bent, y + b * bent, z + c * bent
+        speed = x + a * bent, y + b * bent, z + c * bent
+        # A change of speed makes nothing faster than it is, or than the eyes can be.
+        fast, most = norm(speed), max(norm(self._v), self._fastest_m_s)
+        return speed if fast <= most else scale(speed, most / fast)
 
     def _slope(self) -> Vec3:
         """Return the rate at which the velocity has changed over the last frames."""

@@ -6,6 +6,7 @@ holds from the end of that period on.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from math import atan, cos, degrees, pi, radians, sin, tan
 from typing import NamedTuple
 
@@ -16,7 +17,6 @@ from gaze_trace_rig import CENTRED, DESK, Rig
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import add, angle_between, direction, scale
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.oculomotor import OculomotorParams
 from gazerig.gaze.pursuit_params import PursuitParams
 from gazerig.gaze.types import GazeState, Target, Vec3
 from gazerig.robot.model.kinematics import GeometryParams
@@ -25,9 +25,8 @@ from gazerig.robot.model.types import JointState
 DT = 0.005
 HALF_M = CENTRED.interocular_mm / 2e3
 MITAKE = load_rig("desk", profile="mitake").gaze
-NO_SACCADES = OculomotorParams(
-    eye_lag_ms=0.0, target_prediction=MITAKE.oculomotor.target_prediction, saccade_deg=30.0
-)
+AT_ONCE = replace(MITAKE.oculomotor, eye_lag_ms=0.0)
+NO_SACCADES = replace(AT_ONCE, saccade_deg=30.0)
 FAR_M = 10.0
 
 
@@ -134,6 +133,14 @@ def test_e24_independence_of_the_control_rate() -> None:
         gain, phase = sine_numbers(0.5, dt)
         assert gain == pytest.approx(sine[0], rel=0.05)
         assert abs(phase - sine[1]) / 360.0 / 0.5 <= 0.010
+
+
+def test_a_step_of_the_target_is_no_velocity() -> None:
+    begin = aim(0.0, t=-4.0)
+    trace = eyes(lambda t: aim(1.5, 1e-6, t=t), 1.5, begin=begin)
+    for share, time in ((0.05, 0.110), (0.63, 0.220), (0.90, 0.380)):
+        assert trace.t[np.argmax(trace.version >= share * 1.5)] == pytest.approx(time, abs=0.02)
+    assert trace.version.max() <= 1.5 + 1e-3
 
 
 def converging(vergence_deg: float) -> float:
@@ -270,8 +277,7 @@ def test_e58_a_lost_target_fades() -> None:
 
 
 def test_a_saccade_prescribes_the_angles_and_pursuit_goes_on_after_it() -> None:
-    rig = Rig(params=OculomotorParams(eye_lag_ms=0.0, target_prediction="none"),
-              pursuit=MITAKE.pursuit)  # fmt: skip
+    rig = Rig(params=AT_ONCE, pursuit=MITAKE.pursuit)
     yaws, phases = [], []
     for k in range(400):
         t = k * DT

@@ -1,0 +1,101 @@
+"""A swinging face is followed with a person's gain, at no frequency with more than 1.03.
+
+From picture to joints: tracker, prediction, pursuit, byte-true servos. The gaze stays on one point
+of the face, so that its following and not its wandering is measured; saccades are left out.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from human.measured_run import MeasuredRun, Runner
+from human.swinging_face import SwingingFace
+
+from gazerig.robot.model.commands import Value
+
+WANTED = {
+    "gain at .1 Hz": (0.98, 1.03),
+    "gain at .5 Hz": (0.95, 1.03),
+    "gain at .7 Hz": (0.92, 1.03),
+    "gain at 1 Hz": (0.85, 1.0),
+    "largest gain, .1 to 2 Hz": (0.0, 1.03),
+    "fastest smooth gaze, deg/s": (0.0, 63.0),
+}
+
+ON_ONE_POINT: dict[str, Value] = {
+    "gaze.scanpath.model": "face_tracking",
+    "gaze.aversion.silent_mutual_s": 0.0,
+}
+_NAMED = {0.1: ".1", 0.5: ".5", 0.7: ".7", 1.0: "1", 1.5: "1.5"}
+_BETWEEN = (0.2, 0.3, 0.4, 0.6, 0.85, 1.25, 2.0)
+_SETTLED_S = 6.0
+_AROUND_S = (0.02, 0.08)
+_SPEED_OVER_S = 0.03
+
+
+class Following(NamedTuple):
+    """Gain and phase of the smooth gaze against the face, and its highest speed."""
+
+    gain: float
+    phase_deg: float
+    fastest_deg_s: float
+    saccades_1_s: float
+
+
+def smooth(run: MeasuredRun) -> np.ndarray:
+    """Return which ticks are neither in a saccade nor just before or after one, (n,)."""
+    jumps = run.phase == "saccade"
+    rate_hz = 1.0 / float(np.median(np.diff(run.t_s)))
+    before, after = (round(s * rate_hz) for s in _AROUND_S)
+    near = np.convolve(jumps, np.ones(before + after + 1))[before : before + len(jumps)]
+    return np.asarray(near < 0.5)
+
+
+def following(
+    run: Runner,
+    hz: float,
+    seconds: float,
+    seed: int,
+    overrides: Mapping[str, Value] = ON_ONE_POINT,
+) -> Following:
+    """Return how a face that swings at a frequency is followed."""
+    lasts_s = min(seconds, max(_SETTLED_S + 8.0 / hz, 16.0) if hz > 0.15 else 26.0)
+    seen = run(SwingingFace(hz), seed=seed, seconds=lasts_s, overrides=overrides)
+    t, kept = seen.t_s, smooth(seen) & (seen.t_s > _SETTLED_S)
+    gaze, face = seen.gaze_deg[:, 0], seen.truth_deg("face 0")[:, 0]
+    response = _phasor(t, np.gradient(gaze, t), hz, kept) / _phasor(
+        t, np.gradient(face, t), hz, kept
+    )
+    step = round(_SPEED_OVER_S / float(np.median(np.diff(t))))
+    speed = np.abs(gaze[step:] - gaze[:-step]) / (t[step:] - t[:-step])
+    calm = np.convolve(~kept, np.ones(step + 1))[step : len(kept)] < 0.5
+    return Following(
+        abs(response),
+        float(np.degrees(np.angle(response))),
+        float(speed[calm].max()),
+        float(np.ptp(seen.saccades[t > _SETTLED_S]) / (t[-1] - _SETTLED_S)),
+    )
+
+
+def measure(run: Runner, seconds: float, seeds: Sequence[int]) -> dict[str, float]:
+    """Return gains by frequency, the mean over all seeds, and the highest speed."""
+    rows = {hz: [following(run, hz, seconds, seed) for seed in seeds] for hz in _NAMED}
+    out = {
+        f"gain at {name} Hz": float(np.mean([row.gain for row in rows[hz]]))
+        for hz, name in _NAMED.items()
+    }
+    every = [row for each in rows.values() for row in each]
+    every += [following(run, hz, seconds, seeds[0]) for hz in _BETWEEN]
+    out["largest gain, .1 to 2 Hz"] = max(row.gain for row in every)
+    out["fastest smooth gaze, deg/s"] = max(row.fastest_deg_s for row in every)
+    out["phase at 1 Hz, deg"] = float(np.mean([row.phase_deg for row in rows[1.0]]))
+    out["saccades while it swings, 1/s"] = float(np.mean([row.saccades_1_s for row in every]))
+    return out
+
+
+def _phasor(t: np.ndarray, x: np.ndarray, hz: float, kept: np.ndarray) -> complex:
+    """Return the sine of a frequency in a signal, as a complex amplitude."""
+    w = 2.0 * np.pi * hz
+    base = np.column_stack([np.sin(w * t), np.cos(w * t), np.ones_like(t)])[kept]
+    s, c, _ = np.linalg.lstsq(base, x[kept], rcond=None)[0]
+    return complex(s, c)
