@@ -51,7 +51,7 @@ _RIGHT_ONE = Member(
         Look(52.5, ROBOT),
     ),
     (Wave(21.5, 25.5),),
-    side=-1.0,
+    side=1.0,
     sway=2.6,
 )  # fmt: skip
 

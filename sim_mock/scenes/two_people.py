@@ -10,15 +10,15 @@ from gazerig.gaze.types import Vec3
 from gazerig.sim_mock.scenes.group import ROBOT, Look, Member, Wave, people_of
 from gazerig.sim_mock.scenes.scene import Event, Key, ScenePerson, Thing
 
-PINWHEEL: Vec3 = (0.70, 0.02, -0.03)
+PINWHEEL: Vec3 = (0.75, 0.0, 0.06)
 SPINS_S = ((4.0, 7.0), (34.0, 37.0))
 """When the wind turns the pinwheel."""
 
 _ROUND_S = 48.0
 _PINWHEEL_M = 0.06
 _SPIN_RAD_S = 11.0
-_LEFT: Vec3 = (1.05, 0.34, 0.20)
-_RIGHT: Vec3 = (1.10, -0.36, 0.26)
+_LEFT: Vec3 = (1.20, 0.33, 0.20)
+_RIGHT: Vec3 = (1.25, -0.35, 0.26)
 _NEAR: Vec3 = (0.72, 0.18, 0.20)
 _LEFT_ONE = Member(
     (
@@ -40,7 +40,7 @@ _RIGHT_ONE = Member(
         Look(29.5, 0), Look(38.0, ROBOT), Look(40.5, 0), Look(44.0, ROBOT),
     ),
     (Wave(16.0, 19.5),),
-    side=-1.0,
+    side=1.0,
     sway=1.9,
 )  # fmt: skip
 
