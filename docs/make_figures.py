@@ -208,7 +208,8 @@ def scanpath() -> None:
         for j in range(8):
             if matrix[i, j] > 0.0:
                 left.text(j, i, f"{matrix[i, j]:.2f}", ha="center", va="center", fontsize=7)
-    model = markov_walk(ScanpathParams(min_dwell_ms=0.0), walk, np.random.default_rng(0))
+    printed = ScanpathParams(min_dwell_ms=0.0, diagonal="refixation")
+    model = markov_walk(printed, walk, np.random.default_rng(0))
     drawn = [np.array([model.dwell_s(i) for _ in range(4000)]) for i in range(8)]
     right.boxplot(drawn, showfliers=False, medianprops={"color": INK})
     right.errorbar(
