@@ -74,14 +74,17 @@ def saved(name: str, figure: plt.Figure) -> None:
 def main_sequence() -> None:
     """Duration and peak speed over amplitude, beside human fits."""
     sizes = np.linspace(0.5, 60.0, 120)
-    saccade = SaccadeModel(SaccadeParams())
+    saccade, human = SaccadeModel(SaccadeParams(profile="min_jerk")), SaccadeModel(SaccadeParams())
     figure, (left, right) = plt.subplots(1, 2, figsize=(9.0, 3.6))
     left.plot(sizes, [1e3 * saccade.duration_s(radians(a)) for a in sizes], INK, label="eqs 2-6")
+    left.plot(sizes, [1e3 * human.duration_s(radians(a)) for a in sizes], "tab:red", label="human")
     left.plot(sizes, 21.0 + 2.2 * sizes, HUMAN, ls="--", label="human, 21 + 2.2 A")
     left.plot(sizes, 25.0 + 2.4 * sizes, HUMAN, ls=":", label="human, 25 + 2.4 A (Eyes Alive)")
     left.set(xlabel="amplitude, deg", ylabel="duration, ms", title="duration")
     peaks = [degrees(saccade.peak_speed_rad_s(radians(a))) for a in sizes]
     right.plot(sizes, peaks, INK, label="eqs 2-6")
+    peaks = [degrees(human.peak_speed_rad_s(radians(a))) for a in sizes]
+    right.plot(sizes, peaks, "tab:red", label="human")
     right.plot(
         sizes, 551 * (1 - np.exp(-sizes / 14)), HUMAN, ls="--", label="human, 551 (1 - exp(-A/14))"
     )

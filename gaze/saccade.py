@@ -114,9 +114,9 @@ class HumanProfile:
 
     The speed rises like the first half of a minimum-jerk movement, stays at its peak
     for a while, and falls like the second half. Rise and fall share their time .38 to .62
-    up to 10 deg and .14 to .86 from 50 deg on; the time at the peak follows from the ratio
-    of peak to mean speed. Its middle is then at .43 of the duration of small saccades and at
-    .25 of large ones, as Collewijn et al. (1988) measured, less what servos delay it by.
+    up to 10 deg and .14 to .86 from 38 deg on; the time at the peak follows from the ratio
+    of peak to mean speed. Its middle is then at .42 of the duration of small saccades and at
+    .25 of large ones: what Collewijn et al. (1988) measured, less what servos delay it by.
     """
 
     def __init__(self, params: SaccadeParams) -> None:
@@ -167,7 +167,7 @@ class HumanProfile:
 
     def _rise_share(self, amplitude_rad: float) -> float:
         """Return the share of the rise in the time of rise and fall."""
-        over = (degrees(amplitude_rad) - 10.0) / 40.0
+        over = (degrees(amplitude_rad) - 10.0) / 28.0
         return 0.38 - 0.24 * min(1.0, max(0.0, over))
 
     def _peak_rad_s(self, amplitude_rad: float, duration_s: float) -> float:

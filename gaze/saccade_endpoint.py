@@ -20,7 +20,7 @@ class EndpointParams:
 
     # fmt: off
     undershoot: Annotated[float, Bounds(0, 0.3),
-        "share of its amplitude by which a saccade of 10 deg or more falls short, none up to 5 deg; people .05-.10"] = 0.07
+        "share of its amplitude by which a saccade of 10 deg or more falls short, none up to 5 deg; people .05-.10"] = 0.08
     endpoint_scatter_along: Annotated[float, Bounds(0, 0.2),
         "scatter of saccade endpoints along the path, standard deviation as a share of the amplitude; people .03-.05"] = 0.04
     endpoint_scatter_across: Annotated[float, Bounds(0, 0.2),

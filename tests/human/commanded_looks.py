@@ -1,0 +1,82 @@
+"""Looks commanded one after the other, through the whole product, to measured joints."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import radians
+
+import numpy as np
+from true_shafts import looked_at
+
+from gazerig.config.schema import load_rig
+from gazerig.gaze.angles import add, direction, scale, sub, yaw_pitch
+from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.types import GazeState, Vec3
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.model.commands import LookAt
+
+STARTS_S = 3.0
+"""The head straightens up slowly before the first look."""
+DISTANCE_M = 1.0
+_HEAD_M = (0.04, 0.0, 0.13)
+
+
+@dataclass(frozen=True)
+class Looks:
+    """Columns of n ticks; degrees, yaw + left, pitch + up, seen from the head.
+
+    t_s: (n,); gaze_deg, plan_deg: (n, 2) measured gaze in space; the planned gaze point
+    eyes_deg: (n, 2, 2) left and right eye in the head, measured
+    target_deg: (n, 2) of the point to look at; look: (n,) its number
+    flight: (n,) whether a saccade is planned in this tick; saccades: (n,) how many so far
+    """
+
+    t_s: np.ndarray
+    gaze_deg: np.ndarray
+    plan_deg: np.ndarray
+    eyes_deg: np.ndarray
+    target_deg: np.ndarray
+    look: np.ndarray
+    flight: np.ndarray
+    saccades: np.ndarray
+
+
+def point(yaw_deg: float, pitch_deg: float = 0.0) -> Vec3:
+    """Return a point 1 m from the head."""
+    way = direction((radians(yaw_deg), radians(pitch_deg)))
+    return add(_HEAD_M, scale(way, DISTANCE_M))
+
+
+def commanded(times_s: Sequence[float], points: Sequence[Vec3], rig_name: str, seed: int) -> Looks:
+    """Return what a rig does that is told to look at points at times after ``STARTS_S``."""
+    options = RunOptions(rig=rig_name, mock=True, fast=True, seed=seed, scene="sits-still")
+    rows, number = [], -1
+    with looked_at(load_rig(rig_name), options) as (made, clock):
+        clock.looking = False
+        made.robot.start(clock)
+        begin_s = last_s = clock.now_s()
+        period_s = 1.0 / made.loop.rate_hz
+        due = [begin_s + STARTS_S + t for t in times_s]
+        for k in range(1, round((STARTS_S + times_s[-1] + 1.5) / period_s)):
+            clock.sleep_until(begin_s + k * period_s)
+            t_s = clock.now_s()
+            while number + 1 < len(due) and t_s >= due[number + 1] - 1e-9:
+                number += 1
+                made.robot.command(LookAt(points[number], "a bench", stay=True))
+            tick = made.robot.tick(t_s, t_s - last_s)
+            last_s = t_s
+            if number >= 0:
+                rows.append((t_s, *_angles(tick.pose, tick.gaze.gaze_point_world_m, points[number]),
+                             number, tick.gaze.phase == "saccade", tick.gaze.saccades))  # fmt: skip
+    table = np.array(rows, dtype=float)
+    return Looks(
+        table[:, 0], table[:, 1:3], table[:, 3:5], table[:, 7:11].reshape(-1, 2, 2),
+        table[:, 5:7], table[:, 11].astype(int), table[:, 12] > 0.0, table[:, 13].astype(int),
+    )  # fmt: skip
+
+
+def _angles(pose: GazeState, plan: Vec3, target: Vec3) -> list[float]:
+    head = pose.p_world_head_m
+    sight = add(line_of_sight(pose, left=True), line_of_sight(pose, left=False))
+    ways = sight, sub(plan, head), sub(target, head)
+    eyes = (*pose.eye_left_rad, *pose.eye_right_rad)
+    return np.degrees([angle for way in ways for angle in yaw_pitch(way)] + list(eyes)).tolist()
