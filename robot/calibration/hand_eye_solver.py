@@ -238,12 +238,13 @@ def start(sights: Sights, camera: Pose, board: Pose) -> Guess:
 
 def refined(sights: Sights, guess: Guess) -> Fit:
     """Move camera and board until the corners fit best."""
-    errors, damping = sights.errors(guess), 1e-3
+    errors, damping, system = sights.errors(guess), 1e-3, None
     for _ in range(_MOST_STEPS):
         if not np.isfinite(errors).all():
             break
         bound = _bound(errors)
-        step = _solved(*sights.system(guess, errors), damping)
+        system = system or sights.system(guess, errors)
+        step = _solved(*system, damping)
         if step is None or damping > 1e9:
             break
         moved = guess.moved(step)
@@ -251,7 +252,7 @@ def refined(sights: Sights, guess: Guess) -> Fit:
         if not sights.cost(moved, found, bound) < sights.cost(guess, errors, bound):
             damping *= 10.0
             continue
-        guess, errors, damping = moved, found, max(damping / 10.0, 1e-12)
+        guess, errors, damping, system = moved, found, max(damping / 10.0, 1e-12), None
         if float(np.abs(step[:12]).max()) < _SETTLED:
             break
     return _ended(sights, guess, errors)
