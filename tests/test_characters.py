@@ -106,7 +106,7 @@ def test_the_bold_look_at_a_face_more_than_the_shy() -> None:
 
 def test_shipped_rule_sets_load() -> None:
     sets = {name: load(shipped("rules", name), TopDownParams) for name in shipped_names("rules")}
-    assert set(sets) == {"boxing", "conversation", "greeting"}
+    assert set(sets) == {"boxing", "conversation", "greeting", "group"}
     boxing, talk = sets["boxing"], sets["conversation"]
     assert boxing.rules == TopDownParams().rules and boxing.behaviour == "wait"
     assert set(talk.rules) >= {"wait", "listen", "talk", "think"}
