@@ -1,6 +1,6 @@
 """Random parts of blinking: intervals, gaze-evoked blinks, depth, double blinks."""
 
-from math import exp, inf, log, sqrt
+from math import exp, hypot, inf, log, pi, sqrt
 
 import numpy as np
 
@@ -56,13 +56,14 @@ def _logistic(params: LidParams, shift_deg: float) -> float:
 def evoked_delay_s(params: LidParams, rng: np.random.Generator) -> float:
     """Draw the time from the onset of a gaze shift to that of its blink.
 
-    Blinks set off with eyes and head, some before them (Evinger 1994). A shift is known when
-    it starts, so what would have come before it comes as long after it.
+    Blinks set off with eyes and head (Evinger 1994), hardly any in the same moment. A shift is
+    known when it starts, so its blink comes after it: by a Rayleigh distribution, cut off.
     """
-    spread_s = params.gaze_evoked_blink_jitter_ms / 1e3
-    if spread_s == 0.0:
+    mean_s = params.gaze_evoked_blink_jitter_ms / 1e3
+    if mean_s == 0.0:
         return 0.0
-    return min(abs(spread_s * float(rng.standard_normal())), 2.0 * spread_s)
+    drawn = mean_s * sqrt(2.0 / pi) * hypot(rng.standard_normal(), rng.standard_normal())
+    return min(drawn, 2.0 * mean_s)
 
 
 def blink_depth(params: LidParams, rng: np.random.Generator) -> float:

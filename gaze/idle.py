@@ -55,10 +55,10 @@ class IdleParams:
     leaving_deg_s: Annotated[float, Bounds(0.1, 100), "a target slower than this is not considered to have left to a side"] = 4.0
     reach_deg: Annotated[float, Bounds(5, 180), "farthest search direction to the side, unless the target was farther"] = 70.0
     rest_ms: Annotated[float, Bounds(200, 600_000), "mean time of a rest straight ahead between bouts of glances"] = 1500.0
-    glance_ms: Annotated[float, Bounds(200, 60000), "mean time of a glance"] = 600.0
+    glance_ms: Annotated[float, Bounds(200, 60000), "mean time of a glance"] = 700.0
     spread: Annotated[float, Bounds(0, 3), "standard deviation over mean of all these durations"] = 0.6
     again_share: Annotated[float, Bounds(0, 0.98), "share of glances that are followed by another one without a rest"] = 0.9
-    glance_step_deg: Annotated[float, Bounds(0.5, 90), "mean size of the shift of gaze to a glance"] = 11.0
+    glance_step_deg: Annotated[float, Bounds(0.5, 90), "mean size of the shift of gaze to a glance"] = 13.0
     glance_least_deg: Annotated[float, Bounds(0, 90), "smallest size of such a shift"] = 2.0
     glance_yaw_deg: Annotated[float, Bounds(0, 90), "largest angle of a glance to the side; the middle is looked at more"] = 30.0
     glance_pitch_deg: Annotated[float, Bounds(0, 60), "largest angle of a glance up or down"] = 12.0
