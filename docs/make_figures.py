@@ -14,6 +14,7 @@ import numpy as np
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402  # the backend must be chosen before
+import trace_figure  # noqa: E402
 
 from gazerig.config.schema import load_rig, load_walk  # noqa: E402
 from gazerig.gaze.angles import rotation  # noqa: E402
@@ -59,6 +60,7 @@ def main() -> None:
         scanpath,
         capture_time,
         sweep,
+        traces,
     ):
         draw()
         print(f"docs/figures/{draw.__name__}.png")
@@ -68,6 +70,13 @@ def saved(name: str, figure: plt.Figure) -> None:
     """Write one figure."""
     figure.tight_layout()
     figure.savefig(HERE / f"{name}.png", dpi=110)
+    plt.close(figure)
+
+
+def traces() -> None:
+    """Twenty seconds of a person by published numbers, of the default and of both papers."""
+    figure = trace_figure.figure_of(trace_figure.all_traces())
+    figure.savefig(HERE / "traces.png", dpi=110, bbox_inches="tight")
     plt.close(figure)
 
 
