@@ -10,6 +10,7 @@ World frame, metres, seconds; everything a function of the frames given and of t
 """
 
 from collections import deque
+from itertools import islice
 from math import cos, exp, pi, sin, sqrt
 from typing import Literal, NamedTuple
 
@@ -34,6 +35,10 @@ _LEAST_M = 0.015
 """A smaller swing is not worth a prediction."""
 _FITS, _STILL_FITS = 0.2, 0.35
 """Largest deviation from the sine, as a share of its effective value, to begin and to go on."""
+_FITTED_FOR_S = 0.09
+"""A swing is fitted anew after so long, which is every third frame."""
+_SPARSE = 4
+"""One frame in so many tells how far a target has been."""
 _GAP_S = 0.2
 """Frames farther apart are not one motion."""
 _REMEMBERED_S = 2.0
@@ -96,7 +101,8 @@ class TargetPrediction:
         self._id = ("", -1)
         self._at_s, self._p, self._v = 0.0, _STILL, _STILL
         self._past: deque[tuple[float, Vec3, Vec3]] = deque()
-        self._bend, self._share, self._fastest_m_s = _STILL, 1.0, 0.0
+        self._bend, self._share = _STILL, 1.0
+        self._fastest_m_s = self._most_m_s = 0.0
         self.sine: Sine | None = None
         self._left: dict[tuple[str, int], Sine] = {}
         self._turn = 0
@@ -127,6 +133,7 @@ class TargetPrediction:
         self._at_s, self._p, self._v = at_s, p, v
         self._share = 1.0
         self._fastest_m_s = fastest_rad_s * norm(sub(p, eye))
+        self._most_m_s = max(norm(v), self._fastest_m_s)
         if self._model != "periodic" or target.id < 0:
             self._bend, self.sine = _STILL, None
             return
@@ -177,8 +184,7 @@ class TargetPrediction:
         more = bent * (age_s - 0.5 * bent)
         (x, y, z), (a, b, c) = self._v, self._bend
         moved = x * age_s + a * more, y * age_s + b * more, z * age_s + c * more
-        far, most = norm(moved), self._fastest_m_s * age_s
-        return moved if far <= most else scale(moved, most / far)
+        return _no_longer(moved, self._fastest_m_s * age_s)
 
     def _speed(self, age_s: float) -> Vec3:
         """Return the velocity an age after the frame."""
@@ -189,8 +195,7 @@ class TargetPrediction:
         (x, y, z), (a, b, c) = self._v, self._bend
         speed = x + a * bent, y + b * bent, z + c * bent
         # A change of speed makes nothing faster than it is, or than the eyes can be.
-        fast, most = norm(speed), max(norm(self._v), self._fastest_m_s)
-        return speed if fast <= most else scale(speed, most / fast)
+        return _no_longer(speed, self._most_m_s)
 
     def _slope(self) -> Vec3:
         """Return the rate at which the velocity has changed over the last frames."""
@@ -218,6 +223,8 @@ class TargetPrediction:
         else:
             if norm(sub(p, add(sine.middle, sine.offset(at_s)))) > 0.5 * sine.size_m:
                 return None  # it has stopped, or turned elsewhere
+            if at_s - sine.at_s < _FITTED_FOR_S:
+                return sine
             period_s = 2.0 * pi / sine.w_rad_s
             window_s = next((w for w in _WINDOWS_S if w >= period_s), _WINDOWS_S[-1])
         if at_s - self._past[0][0] < 0.95 * window_s:
@@ -227,8 +234,16 @@ class TargetPrediction:
 
     def _past_m(self) -> float:
         """Return how far apart the target's places have been, along the axis of most."""
-        axes = [[p[i] for _, p, _ in self._past] for i in range(3)]
+        some = [p for _, p, _ in islice(self._past, 0, None, _SPARSE)]
+        axes = [[p[i] for p in some] for i in range(3)]
         return max([max(axis) - min(axis) for axis in axes])
+
+
+def _no_longer(v: Vec3, most: float) -> Vec3:
+    """Return a vector, shortened where it is longer than that."""
+    x, y, z = v
+    squares = x * x + y * y + z * z
+    return v if squares <= most * most else scale(v, most / sqrt(squares))
 
 
 def fitted(past: Floats, at_s: float, limit: float) -> Sine | None:
