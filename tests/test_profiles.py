@@ -28,7 +28,8 @@ def test_every_row_of_the_page_is_read() -> None:
     assert all(len(claim.cells) == (2 if claim.is_key else 3) for claim in CLAIMS)
     # Every function of it runs somewhere: none is a name that has gone.
     assert all(
-        claim.is_key or any(ran(profile)[claim.name] for profile in PROFILES) for claim in CLAIMS
+        claim.is_key or any(ran(profile).calls[claim.name] for profile in PROFILES)
+        for claim in CLAIMS
     )
 
 
@@ -38,9 +39,15 @@ def test_every_row_of_the_page_is_read() -> None:
      ("random", "RandomAngles.step")],
 )  # fmt: skip
 def test_e68_the_baselines_of_the_paper_run_in_its_profile(scanpath: str, function: str) -> None:
-    calls = ran("nakamoto", scanpath, 6.0)
+    calls = ran("nakamoto", scanpath, 6.0).calls
     assert calls[function] > 200 and calls["MarkovWalk.step"] == 0
     assert calls["OppositeAngles.fixate"] > 200
+
+
+def test_e68_each_profile_looks_at_what_its_paper_has() -> None:
+    assert ran("nakamoto").kinds == {"face", "rest"}
+    assert ran("mitake").kinds == {"face", "hand", "rest"}
+    assert ran("robot").kinds >= {"face", "hand", "away", "search"}
 
 
 @pytest.fixture(scope="module")

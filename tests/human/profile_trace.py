@@ -19,14 +19,14 @@ from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 
 PAGE = Path(__file__).parents[2] / "docs" / "profiles.md"
 PROFILES = ("robot", "mitake", "nakamoto")
-SECONDS = 17.0
+SECONDS = 20.0
 _ROW = re.compile(
     r"^\| (?P<paper>[^|]+) \| (?P<what>[^|]+) \| `(?P<name>[^`|]+)` \| (?P<cells>.+) \|$"
 )
 
 
 class EverythingOnce:
-    """A person who comes, walks 37 deg aside, waves and goes."""
+    """A person who comes, walks 37 deg aside, waves and goes; then a hand that moves past."""
 
     name = "everything-once"
     round_s = SECONDS
@@ -43,8 +43,10 @@ class EverythingOnce:
         return (ScenePerson(face, (pi + atan2(face[1], face[0]), 0.0), hand),)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Return nothing."""
-        return ()
+        """Return a hand that comes in when the person has gone."""
+        if not 10.5 < t_s < 11.5:
+            return ()
+        return (Thing(9, "hand", (0.9, 0.5 - 0.2 * (t_s - 10.5), 0.2), 0.05),)
 
     def behaviour(self, t_s: float) -> str | None:
         """Leave the behaviour to the rig."""
@@ -80,10 +82,18 @@ def claims() -> Iterator[Claim]:
             yield Claim(found["paper"], found["what"], found["name"], cells)
 
 
+class Trace(NamedTuple):
+    """What a run showed: calls of functions of gaze/ by qualified name, kinds of its targets."""
+
+    calls: Counter[str]
+    kinds: frozenset[str]
+
+
 @cache
-def ran(profile: str, scanpath: str | None = None, seconds: float = SECONDS) -> Counter[str]:
-    """Return how often each function of gaze/ ran in a profile, by qualified name."""
+def ran(profile: str, scanpath: str | None = None, seconds: float = SECONDS) -> Trace:
+    """Return what runs in a profile, and what it looks at."""
     calls: Counter[CodeType] = Counter()
+    kinds: set[str] = set()
 
     def count(frame: FrameType, event: str, arg: Any) -> None:
         if event == "call":
@@ -94,11 +104,12 @@ def ran(profile: str, scanpath: str | None = None, seconds: float = SECONDS) -> 
     options = RunOptions(
         True, True, 0, scene.name, profile=profile, scanpath=scanpath, seconds=seconds, bus="ideal"
     )
+    rig = changed(load_rig("desk", profile=profile), {"loop.rate_hz": 100.0})
     assemble.scenes = lambda: {**shipped(), scene.name: scene}
     before = sys.getprofile()
     sys.setprofile(count)
     try:
-        simulate(changed(load_rig("desk", profile=profile), {"loop.rate_hz": 100.0}), options)
+        simulate(rig, options, watch=lambda tick: kinds.add(tick.target.kind))
     finally:
         sys.setprofile(before)
         assemble.scenes = shipped
@@ -106,7 +117,7 @@ def ran(profile: str, scanpath: str | None = None, seconds: float = SECONDS) -> 
     for code, times in calls.items():
         if Path(code.co_filename).parent.name == "gaze":
             named[code.co_qualname] += times
-    return named
+    return Trace(named, frozenset(kinds))
 
 
 def as_told(claim: Claim) -> list[str]:
@@ -119,7 +130,7 @@ def as_told(claim: Claim) -> list[str]:
 
 
 def _runs(name: str, profile: str) -> str:
-    return "runs" if ran(profile)[name] else "-"
+    return "runs" if ran(profile).calls[name] else "-"
 
 
 def _value(key: str, profile: str) -> str:
