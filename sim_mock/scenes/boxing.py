@@ -195,7 +195,7 @@ def _reaching(reach: _ArmMotion, phase_s: float) -> Vec3:
     beckon = 0.03 * sin(2 * pi * 2.0 * since_s) * into
     return _towards(
         _plus(HEAD_M, (0.46, reach.side * 0.95, -0.05)),
-        _plus(HEAD_M, (0.46, reach.side * 0.23, -0.03 + beckon)),
+        _plus(HEAD_M, (0.46, reach.side * 0.20, -0.03 + beckon)),
         into,
     )
 
