@@ -30,6 +30,8 @@ from gazerig.params import Bounds
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _AHEAD: Angles2 = (0.0, 0.0)
 _TRIES = 12
+_THING_HOLDS = 1.6
+"""A thing is looked at this many times as long as a point of the room."""
 _PLACES = 16
 """So many things are remembered."""
 _UPRIGHT = 0.5
@@ -55,7 +57,7 @@ class IdleParams:
     leaving_deg_s: Annotated[float, Bounds(0.1, 100), "a target slower than this is not considered to have left to a side"] = 4.0
     reach_deg: Annotated[float, Bounds(5, 180), "farthest search direction to the side, unless the target was farther"] = 70.0
     rest_ms: Annotated[float, Bounds(200, 600_000), "mean time of a rest straight ahead between bouts of glances"] = 1500.0
-    glance_ms: Annotated[float, Bounds(200, 60000), "mean time of a glance"] = 700.0
+    glance_ms: Annotated[float, Bounds(200, 60000), "mean time of a glance"] = 750.0
     spread: Annotated[float, Bounds(0, 3), "standard deviation over mean of all these durations"] = 0.6
     again_share: Annotated[float, Bounds(0, 0.98), "share of glances that are followed by another one without a rest"] = 0.9
     glance_step_deg: Annotated[float, Bounds(0.5, 90), "mean size of the shift of gaze to a glance"] = 13.0
@@ -235,6 +237,7 @@ class Idle:
         if things:
             rel = sub(things[int(rng.integers(len(things)))], self._eye)
             self._look("glance", yaw_pitch(rel), norm(rel), t_s, "looking at what is in view")
+            self._until_s = t_s + _THING_HOLDS * (self._until_s - t_s)
             return
         place = self._plausible(here, rng)
         self._look("glance", place, par.rest_distance_m, t_s, "glancing around, no one in sight")

@@ -129,7 +129,7 @@ def test_e76_glances_are_human_in_length_size_place_and_number() -> None:
     rests = [s for t, s in found if t.kind == "rest"]
     assert {t.kind for t, _ in found} == {"glance", "rest"}
     assert 1.0 <= len(found) / 900.0 <= 2.0
-    assert np.mean([s for _, s in glances]) == pytest.approx(0.7, rel=0.1)
+    assert np.mean([s for _, s in glances]) == pytest.approx(0.75, rel=0.1)
     assert np.mean(rests) == pytest.approx(1.5, rel=0.2)
     assert min(s for _, s in found) >= 0.25 - DT
     yaws, pitches = np.degrees([yaw_pitch(sub(t.p_world_m, EYE)) for t, _ in glances]).T
@@ -170,7 +170,7 @@ def test_e76_glances_go_to_what_is_in_view_and_to_what_was_there_lately() -> Non
         remembered = any(norm(sub(now.p_world_m, place)) < 1e-6 for place in THINGS.values())
         assert k < 22_100 or not remembered, "forgotten after 20 s"
     shares = np.array(list(on.values())) / 20_000
-    assert 0.2 <= shares.sum() <= 0.6 and shares.min() >= 0.05
+    assert 0.2 <= shares.sum() <= 0.7 and shares.min() >= 0.05
     never = idle(3, thing_share=0.0)
     never.see(list(THINGS), list(THINGS.values()), 0.0)
     assert {t.why for t in run(never, 0.0, 30.0)} == {
