@@ -28,8 +28,8 @@ ACCEL = 1.1
 """Of the limit, over 10 ms: goals are whole steps, a neck's limit 2 of them in (10 ms)^2."""
 DRAWN = (Phase.explicit, Phase.generate)
 """Every example takes a second: none is made simpler."""
-GENTLE = 1.1
-"""Of the gentle speed: a goal moves by whole steps, 3 or 4 in a tick of 5 ms."""
+GENTLE = 1.15
+"""Of the gentle speed: a goal moves by whole steps, 3 or 4 in a tick of 5 ms; geared up, 2 or 3."""
 
 
 @pytest.fixture(scope="module")
