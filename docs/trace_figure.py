@@ -89,7 +89,7 @@ def of_person(seed: int = 4) -> Trace:
             gaze[k:end] = offset + face[k:end]
             looked_s += rest_s
             k = end
-        rare = evoked_blink(size) if size > 10.0 else 0.06
+        rare = evoked_blink(size) if size > 10.0 else 0.1
         if rng.random() < rare and (not blinks or t[min(k, len(t) - 1)] - blinks[-1] > 2.0):
             blinks.append(t[min(k, len(t) - 1)] - rest_s + float(rng.normal(0.0, 0.04)))
         base = face[min(k, len(t) - 1)]

@@ -14,7 +14,7 @@ _DOUBLE_S = 0.6
 _EVOKING_DEG = 33.0
 _WITH_BEFORE_S, _WITH_AFTER_S = 0.12, 0.2
 _PART_S = 10.0
-_TIED_S = 0.01
+_TIED_S = 0.006
 _SHUT = 0.96
 """A blink that goes so far has shut the eye; of lids in steps of a servo."""
 

@@ -111,7 +111,8 @@ BANDS: tuple[NormBand, ...] = (
     NormBand("short_rests", SACCADES, "rests on a face below 150 ms", "share", 0.0, 0.08, 100,
          "Lee, Badler & Badler 2002: 150 ms between saccades; 2 to 3 fixations a second"),
     NormBand("rest_spike", SACCADES, "rests of one length beyond a smooth law, in 10 ms", "share",
-         0.0, 0.03, 400, "lengths of fixations have a smooth distribution"),
+         0.0, 0.04, 400, "lengths of fixations have a smooth distribution; 3 %, and one that chance "
+         "makes of 1000"),
     NormBand("refixations", SACCADES, "shifts of .4 to 1.5 deg on a face", "1/s", 0.1, 2.0, 30,
          "Otero-Millan et al. 2013: small saccades go on in looking about; 1 to 2 a second at rest, "
          "most of them below what servos can do"),
@@ -189,7 +190,7 @@ BANDS: tuple[NormBand, ...] = (
     NormBand("blink_partial", LIDS, "blinks that do not shut the eye", "share", 0.3, 0.7, 15,
          "half of natural blinks (Trutoiu et al. 2011 and others)"),
     NormBand("blink_tied", LIDS, "blinks that begin in the very moment of a saccade", "share",
-         0.0, 0.2, 15, "Evinger et al. 1994: with gaze shifts, some 40 ms before or after; 6 % by chance"),
+         0.0, 0.15, 15, "Evinger et al. 1994: with gaze shifts, some 40 ms before or after; 4 % by chance"),
     NormBand("bout_none", SOCIAL, "median look at a face without a conversation", "s", 1.5, 6.0, 10,
          "Binetti et al. 2016: 3.3 s is what people like; Rogers et al. 2018: 2.2 s", "none"),
     NormBand("bout_talk", SOCIAL, "mean look at the face while talking", "s", 2.3, 3.9, 15,

@@ -68,6 +68,10 @@ def smooth_speeds(run: GazeTrace) -> Floats:
         return np.zeros(0)
     speed = np.hypot(rate(t, run.column("gaze_yaw")), rate(t, run.column("gaze_pitch")))
     mask = run.slow(0.03, 0.08) & (run.column("phase") == PHASES.index("pursue"))
+    flying = np.flatnonzero(run.column("phase") == PHASES.index("saccade"))
+    since = np.searchsorted(flying, np.arange(len(t)), side="right") - 1
+    # What is planned arrives later at the joints, and small saccades are not found by their speed.
+    mask &= (since < 0) | (t - t[flying[np.maximum(since, 0)]] > 0.08) if len(flying) else True
     parts = stretches(mask, t, run.column("shift"), _STRETCH_S)
     return np.array([speed[part].max() for part in parts])
 
