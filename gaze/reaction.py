@@ -27,7 +27,7 @@ class ReactionParams:
 
     # fmt: off
     median_ms: Annotated[float, Bounds(0, 1000),
-        "median time from the frame in which something else wins attention to the change of target; 0: at once; people 150 to 250"] = 175.0
+        "median time from the frame in which something else wins attention to the change of target; 0: at once; people 150 to 250"] = 150.0
     spread: Annotated[float, Bounds(0, 1), "standard deviation of the logarithm of that time"] = 0.15
     looming_ratio: Annotated[float, Bounds(0, 1), "share of that time for what comes nearer fast"] = 0.65
     return_ratio: Annotated[float, Bounds(0, 1), "share of that time for a face that was looked at within return_s"] = 0.8

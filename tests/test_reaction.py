@@ -22,7 +22,9 @@ NEARS = body(2, "hand", (0.8, 0.0, -0.1), (-1.0, 0.0, 0.1))
 
 def attention(seed: int | None = 0, dwell_ms: float = 0.0, **reaction: Any) -> Attention:
     return Attention(
-        AttentionParams(min_dwell_ms=dwell_ms, reaction=ReactionParams(**reaction)),
+        AttentionParams(
+            min_dwell_ms=dwell_ms, reaction=ReactionParams(**{"median_ms": 175.0, **reaction})
+        ),
         FieldOfView(FieldOfViewParams()),
         BottomUp(BottomUpParams(smoothing_s=0.0)),
         TopDown(TopDownParams()),

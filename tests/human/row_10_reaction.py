@@ -87,9 +87,10 @@ def reaction_ms(run: MeasuredRun, hand: int, start_s: float) -> float | None:
     if not len(shown):
         return None
     first = shown[0]
-    off = np.linalg.norm(run.gaze_deg - there, axis=1)
     window = slice(first, first + np.searchsorted(run.t_s[first:], run.t_s[first] + _LATEST_S))
-    near = np.flatnonzero(off[window] < max(3.0, 0.3 * off[first]))
+    # Half of the way to where the hand is by then: a corrective saccade is no reaction.
+    way, done = there[window] - run.gaze_deg[first], run.gaze_deg[window] - run.gaze_deg[first]
+    near = np.flatnonzero((done * way).sum(axis=1) > 0.5 * (way * way).sum(axis=1))
     if not len(near) or near[0] == 0:
         return None
     speed = np.linalg.norm(np.gradient(run.gaze_deg[window], run.t_s[window], axis=0), axis=1)
