@@ -73,6 +73,7 @@ class GazePoint:
         self._trigger = SaccadeTrigger(params, False)
         self._refixations = Refixations(params, rng)
         self.retune(params)
+        self._exact = False
         self.reset(0.0, (1.0, 0.0, 0.0))
 
     def retune(self, params: GazePointParams) -> None:
@@ -132,8 +133,16 @@ class GazePoint:
         """Return when the last saccade started, or the next one is to."""
         return self._trigger.onset_s
 
-    def record_shift(self, shift: int, wait_s: float, t_s: float) -> None:
-        """Record a new target; ``wait_s``: what the eyes wait because the head goes first."""
+    def record_shift(self, shift: int, wait_s: float, t_s: float, exact: bool = False) -> None:
+        """Record a new target.
+
+        Args:
+            shift: its count of gaze shifts.
+            wait_s: what the eyes wait because the head goes first.
+            t_s: now.
+            exact: land on it without undershoot and scatter, and rest there without re-fixations.
+        """
+        self._exact = exact
         lands_s = self._trajectory.ends_s if self._trajectory else None
         self._trigger.record_shift(shift, wait_s, lands_s, t_s)
         self._refixations.reset()
@@ -165,7 +174,7 @@ class GazePoint:
                 slip = self._pursuit.slip(self.point_m, point, velocity, p_head)
                 if trigger.due(slip, t_s):
                     shift_rad = self._jump(point, velocity, p_head, t_s)
-            elif self._refixations.due(t_s, norm(velocity) <= MOVING_M_S):
+            elif not self._exact and self._refixations.due(t_s, norm(velocity) <= MOVING_M_S):
                 trigger.refixate(t_s)
             if shift_rad is None:
                 if dt_s > 0.0 and self._pursuit.controller is None:
@@ -192,7 +201,7 @@ class GazePoint:
         moved, until = self._prediction.displacement(t_s), self._prediction.displacement(after_s)
         end = add(point, sub(until, moved))
         end = self.clear(end, p_head)
-        if self._params.errs:
+        if self._params.errs and not self._exact:
             end = endpoint(end, self.point_m, p_head, self._params, self._rng)
         self._trajectory = SaccadeTrajectory(self._saccade, self.point_m, end, p_head, t_s)
         self.saccades += 1

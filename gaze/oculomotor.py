@@ -27,6 +27,7 @@ from gazerig.gaze.pursuit import Pursuit
 from gazerig.gaze.saccade import SaccadeModel
 from gazerig.gaze.target_prediction import PredictionModel, TargetPrediction
 from gazerig.gaze.types import (
+    ORDERED,
     Angles2,
     Angles3,
     GazeCommand,
@@ -190,7 +191,8 @@ class Oculomotor:
         aside_rad = angle_between(ahead, toward)
         place = self._gaze
         if target.shift != place.shift:
-            place.record_shift(target.shift, self._head.leads_s(target, aside_rad), t_s)
+            wait_s = self._head.leads_s(target, aside_rad)
+            place.record_shift(target.shift, wait_s, t_s, target.kind == ORDERED)
         jumps = place.jumps
         shift_rad = place.move(point, velocity, p_head, t_s, dt_s)
         head = self._head.step(target, centre, facing, aside_rad, t_s - place.onset_s, t_s)

@@ -126,6 +126,10 @@ class Percept:
         return t_s - self.captured_s
 
 
+ORDERED = "puppet"
+"""Kind of a target that a person or a program ordered: the gaze rests on that very point."""
+
+
 class Salience(NamedTuple):
     """Salience of one body, term by term (Mitake et al., eq 1 and the rules).
 

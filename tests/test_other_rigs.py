@@ -66,7 +66,8 @@ def test_two_eyes_need_neither_lids_nor_a_parking_pose(tmp_path: Path) -> None:
     )
     made, ticks, _ = ran(load_rig(str(file)), 4.0)
     assert made.park_rad == (0.0, 0.0)
-    assert {t.target.kind for t in ticks[400:]} == {"face"}
+    kinds = [t.target.kind for t in ticks[400:]]
+    assert set(kinds) <= {"face", "away"} and kinds.count("face") > 0.7 * len(kinds)
     assert ticks[-1].pose.lid_left == 1.0
     made.close()
 

@@ -48,9 +48,10 @@ def test_the_head_looks_at_the_visitor(visitor: dict[str, Any]) -> None:
     assert share["face"] > 0.6 and share["hand"] > 0.02 and nobody > 0.02
     assert len(visitor["part_share"]) == 8
     assert visitor["gaze_error_deg"]["median"] < 0.3
-    assert visitor["gaze_error_deg"]["p95"] < 2.0
+    # A new target waits a reaction time and the gap after a saccade.
+    assert visitor["gaze_error_deg"]["p95"] < 5.0
     assert visitor["bus"]["errors"] == {}
-    assert 1.5 < visitor["saccades"] / visitor["seconds"] < 4.5
+    assert 1.5 < visitor["saccades"] / visitor["seconds"] < 5.5
     assert 5 <= visitor["blinks"] <= 40
 
 
@@ -89,7 +90,8 @@ def test_a_heat_map_of_a_face_is_a_picture(half: str, tmp_path: Path) -> None:
     with ideal_buses():
         run = figures(half, "--scene", "face-to-face", "--seconds", "10", "--heatmap", str(out))
     picture = cv2.imread(str(out))
-    assert run["target_share"]["face"] > 0.9
+    share = run["target_share"]
+    assert share["face"] > 0.75 and share["face"] + share["away"] > 0.95
     assert picture is not None and picture.shape[0] > 400 and picture.std() > 10.0
 
 

@@ -45,10 +45,11 @@ def watched(room: Room, patch: pytest.MonkeyPatch, seconds: float) -> list[Tick]
     patch.setattr(assembling, "scenes", lambda: {room.name: room})
     rig = load_rig("desk")
     idle = replace(rig.gaze.idle, rest_ms=400.0, glance_ms=500.0, rest_salience=1.0)
+    head = replace(rig.gaze.head, eye_only_range_deg=6.0, head_slope=1.0)
     rig = replace(
         rig,
         loop=replace(rig.loop, rate_hz=100.0),
-        gaze=replace(rig.gaze, idle=idle),
+        gaze=replace(rig.gaze, idle=idle, head=head),
         detector=replace(rig.detector, work_width_px=128),
     )
     made = assemble(rig, RunOptions(mock=True, fast=True, seed=1, scene=room.name, pixels=True))

@@ -4,7 +4,7 @@ from math import degrees
 
 from gazerig.drivers.types import BusHealth
 from gazerig.gaze.angles import norm, sub
-from gazerig.gaze.types import PART_NAMES, Target
+from gazerig.gaze.types import ORDERED, PART_NAMES, Target
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.gaze_error import gaze_error
 from gazerig.robot.model.types import GuardResult
@@ -49,7 +49,7 @@ def lead_text(tick: Tick) -> str:
     if not tick.led:
         return ""
     text, limited = tick.led, tick.gaze.limited
-    if tick.target.kind != "puppet" or not limited or ": jog " in tick.led:
+    if tick.target.kind != ORDERED or not limited or ": jog " in tick.led:
         return text
     error = degrees(gaze_error(tick.target.p_world_m, tick.pose).whole)
     ends = (

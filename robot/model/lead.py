@@ -8,7 +8,7 @@ from math import degrees, radians
 from typing import NamedTuple
 
 from gazerig.gaze.angles import add, scale
-from gazerig.gaze.types import Face, GazeState, Percept, Target, Vec3
+from gazerig.gaze.types import ORDERED, Face, GazeState, Percept, Target, Vec3
 from gazerig.robot.model.commands import (
     HEARTBEAT_S,
     Jog,
@@ -180,7 +180,7 @@ class Lead:
         if self.point is None:
             return None
         return Target(
-            self.point, (0.0, 0.0, 0.0), t_s, "puppet", -1, 1.0, True, None,
+            self.point, (0.0, 0.0, 0.0), t_s, ORDERED, -1, 1.0, True, None,
             self._shifts, "a user chose this point",
         )  # fmt: skip
 
