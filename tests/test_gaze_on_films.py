@@ -41,6 +41,9 @@ class Fixation:
     on: list[bool]
 
 
+CORRECTED_S = 0.25
+
+
 @pytest.fixture(scope="module")
 def ticks() -> tuple[Assembly, list[Tick]]:
     """Run the rig in simulated time; half its rate, and no search for faces of few pixels."""
@@ -144,9 +147,12 @@ def test_the_mask_is_no_easy_target(masks: list[NDArray[np.uint8]]) -> None:
 
 
 def test_the_gaze_lies_on_what_moves(fixations: list[Fixation]) -> None:
-    shown = [fixation for fixation in fixations if fixation.on]
+    """A saccade that falls short is corrected after 100 to 200 ms: shorter rests may lie beside."""
+    pictures = [on for fixation in fixations for on in fixation.on]
+    assert np.mean(pictures) >= 0.8, f"{sum(pictures)} of {len(pictures)} pictures"
+    shown = [fixation for fixation in fixations if fixation.on and fixation.seconds > CORRECTED_S]
     good = [2 * sum(fixation.on) >= len(fixation.on) for fixation in shown]
-    assert len(good) >= 30
+    assert len(good) >= 20
     assert np.mean(good) >= 0.9, f"{sum(good)} of {len(good)} fixations"
 
 

@@ -119,6 +119,8 @@ def run_of_someone_aside() -> tuple[Rig, list[Tick]]:
         return watched(BackAndForth(), patch)
 
 
+LAST_LOOK_S = 0.4
+"""What is looked at when the search is over is looked at to its end."""
 RUNS = pytest.mark.parametrize("name", ["run_of_passer", "run_of_someone_aside"])
 
 
@@ -149,14 +151,17 @@ def test_hold_then_search_then_rest(name: str, request: pytest.FixtureRequest) -
     before = between(ticks, GONE_S, stale_s - slack)
     assert {tick.target.kind for tick in before} == {"face"}
     assert all("lost" not in tick.target.why for tick in before)
-    held = between(ticks, stale_s + slack, search_s - slack)
+    # A look away from a face may fall into the wait.
+    waits = between(ticks, stale_s + slack, search_s - slack)
+    held = [tick for tick in waits if tick.target.kind != "away"]
+    assert len(held) > 0.6 * len(waits)
     assert all(tick.target.why.endswith("lost, waiting") for tick in held)
     assert len({tick.target.centre_world_m for tick in held}) == 1  # its parts are looked at
     assert {tick.target.v_world_m_s for tick in held} == {(0.0, 0.0, 0.0)}
     searching = between(ticks, search_s + slack, over_s - slack)
     assert {tick.target.kind for tick in searching} == {"search"}
     assert len({tick.target.id for tick in searching}) >= 3
-    after = between(ticks, over_s + slack, BACK_S)
+    after = between(ticks, over_s + LAST_LOOK_S, BACK_S)
     assert after[0].target.kind == "rest"
     assert {tick.target.kind for tick in after} <= {"rest", "glance"}
 
