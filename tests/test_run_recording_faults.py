@@ -4,6 +4,7 @@ import resource
 from collections.abc import Iterator
 from pathlib import Path
 
+import branch
 import pytest
 from mcap.writer import Writer
 from recorded_run import Recorded, assembly, exact, info_for, ordered, record
@@ -17,6 +18,16 @@ from gazerig.robot.recording.read import BadRecording, RunRecording
 from gazerig.robot.recording.recorder import Recorder
 
 pytestmark = pytest.mark.usefixtures("branched_children")
+
+
+@pytest.fixture
+def branched_children(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Start writers as branches, but not on a small disk: output of the tests may exceed it."""
+    if "small_disk" in request.fixturenames:
+        yield
+        return
+    with branch.branched_children():
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -82,7 +82,11 @@ def lag_of(trace: GazeAngles) -> float:
     near = (since >= 0.0) & (since <= LONGEST_LAG_S) & np.isfinite(seen)
     if np.count_nonzero(near) < 3 or np.ptp(seen[near]) == 0.0:
         return 0.0
-    fits = [np.corrcoef(np.interp(t[near] - lag, t, planned), seen[near])[0, 1] for lag in _LAGS_S]
+    fits = []
+    for lag in _LAGS_S:
+        moved = np.interp(t[near] - lag, t, planned)
+        # A plan that stands still in all samples has no correlation.
+        fits.append(np.corrcoef(moved, seen[near])[0, 1] if np.ptp(moved) > 0.0 else -1.0)
     return float(_LAGS_S[int(np.argmax(fits))])
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import radians
+from typing import Any
 
 import numpy as np
 from true_shafts import looked_at
@@ -10,7 +11,7 @@ from true_shafts import looked_at
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import add, direction, scale, sub, yaw_pitch
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.types import GazeState, Vec3
+from gazerig.gaze.types import GazeState, Percept, Target, Vec3
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.commands import LookAt
 
@@ -52,6 +53,7 @@ def commanded(times_s: Sequence[float], points: Sequence[Vec3], rig_name: str, s
     rows, number = [], -1
     with looked_at(load_rig(rig_name), options) as (made, clock):
         clock.looking = False
+        _seen_and_not_ordered(made.robot)
         made.robot.start(clock)
         begin_s = last_s = clock.now_s()
         period_s = 1.0 / made.loop.rate_hz
@@ -72,6 +74,17 @@ def commanded(times_s: Sequence[float], points: Sequence[Vec3], rig_name: str, s
         table[:, 0], table[:, 1:3], table[:, 3:5], table[:, 7:11].reshape(-1, 2, 2),
         table[:, 5:7], table[:, 11].astype(int), table[:, 12] > 0.0, table[:, 13].astype(int),
     )  # fmt: skip
+
+
+def _seen_and_not_ordered(robot: Any) -> None:
+    """Have points taken for things that were seen: what is ordered is looked at exactly."""
+    chosen = robot._lead.chosen
+
+    def seen(percept: Percept | None, t_s: float) -> Target | None:
+        target: Target | None = chosen(percept, t_s)
+        return None if target is None else target._replace(kind="thing")
+
+    robot._lead.chosen = seen
 
 
 def _angles(pose: GazeState, plan: Vec3, target: Vec3) -> list[float]:

@@ -1,0 +1,33 @@
+"""The report of the default profile has at most two measures outside, in either scene.
+
+A measure with too few events is neither inside nor outside.
+"""
+
+from collections.abc import Callable, Sequence
+
+from human.measured_run import MeasuredRun
+
+from gazerig.robot.report.report import found
+
+SCENES = ("visitor", "face-to-face")
+WANTED = {f"{scene}, outside, most of all seeds": (0.0, 2.0) for scene in SCENES}
+
+
+def measure(
+    run: Callable[..., MeasuredRun], seconds: float, seeds: Sequence[int]
+) -> dict[str, float]:
+    """Return how many measures are outside, and in how many runs each of them is."""
+    figures: dict[str, float] = {}
+    for scene in SCENES:
+        verdicts: dict[str, list[float]] = {"outside": [], "pass": []}
+        for seed in seeds:
+            measures = found(run(scene, seed=seed, seconds=seconds).trace)
+            for verdict, counts in verdicts.items():
+                counts.append(sum(one.verdict == verdict for one in measures))
+            for one in measures:
+                if one.verdict == "outside":
+                    name = f"{scene}, runs with {one.band.key} outside"
+                    figures[name] = figures.get(name, 0.0) + 1.0
+        figures[f"{scene}, outside, most of all seeds"] = max(verdicts["outside"])
+        figures[f"{scene}, inside, fewest of all seeds"] = min(verdicts["pass"])
+    return figures
