@@ -74,7 +74,7 @@ class Refixations:
         if self._rng is None:
             return False
         across, up = self.offset_rad
-        radius = 0.6 * self._most_rad
+        radius = 0.75 * self._most_rad
         for _ in range(_TRIES):
             r, angle = radius * sqrt(self._rng.random()), 2.0 * pi * self._rng.random()
             x, y = r * cos(angle), r * sin(angle)
