@@ -181,27 +181,24 @@ class Oculomotor:
         if not self._started:
             self.reset(t_s, state)
         R_world_head, p_head = self._foreseen_head(state)
-        seen = self._now(target, p_head, t_s)
-        point, velocity, centre_point, toward = seen
+        point, velocity, centre_point, toward = self._now(target, p_head, t_s)
         self._base_rad = base = state.base_rad
         facing = centre = self._geometry.facing(point, base)
         if centre_point is not point:
             centre = self._geometry.facing(centre_point, base)
         ahead = R_world_head[0][0], R_world_head[1][0], R_world_head[2][0]
         aside_rad = angle_between(ahead, toward)
-        place = self._gaze
+        place, eyes_on = self._gaze, self._geometry.eyes_on
         if target.shift != place.shift:
             wait_s = self._head.leads_s(target, aside_rad)
             place.record_shift(target.shift, wait_s, t_s, target.kind == ORDERED)
         jumps = place.jumps
         shift_rad = place.move(point, velocity, p_head, t_s, dt_s)
         head = self._head.step(target, centre, facing, aside_rad, t_s - place.onset_s, t_s)
-        wanted = self._geometry.eyes_on(place.point_m, R_world_head, p_head)
+        wanted = eyes_on(place.point_m, R_world_head, p_head)
         if (controller := self._pursuit.controller) is not None:
             jumps = jumps or shift_rad is not None
-            view = EyeGeometry(
-                R_world_head, p_head, self._geometry.eyes_on, place.nearest_m, self._in_range
-            )
+            view = EyeGeometry(R_world_head, p_head, eyes_on, place.nearest_m, self._in_range)
             wanted, place.point_m = controller.fixate(
                 target, place.point_m, wanted if jumps else None, place, view, t_s, dt_s
             )

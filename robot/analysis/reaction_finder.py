@@ -9,7 +9,7 @@ _LONGEST_S = 1.0
 """What is looked at later was there before it was chosen: that is a choice, no reaction."""
 
 
-class Reaction(NamedTuple):
+class MeasuredReaction(NamedTuple):
     """A saccade to something that had just come into view.
 
     seen_s: exposure of the first frame with it; onset_s: the saccade's command; kind: of the thing
@@ -33,7 +33,7 @@ class ReactionFinder:
         self._captured_s: float | None = None
         self._saccades = -1
 
-    def update(self, tick: Tick) -> Reaction | None:
+    def update(self, tick: Tick) -> MeasuredReaction | None:
         """Add a tick; return the reaction that begins in it, if any."""
         percept = tick.percept
         if percept is not None and percept.captured_s != self._captured_s:
@@ -49,4 +49,4 @@ class ReactionFinder:
             return None
         seen_s, self._seen[name] = self._seen[name], -inf
         late = tick.t_s - seen_s > _LONGEST_S
-        return None if late else Reaction(seen_s, tick.t_s, tick.target.kind)
+        return None if late else MeasuredReaction(seen_s, tick.t_s, tick.target.kind)

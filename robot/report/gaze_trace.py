@@ -22,7 +22,7 @@ from gazerig.robot.analysis.event_detector import (
 )
 from gazerig.robot.analysis.gaze_on_face import on_face
 from gazerig.robot.analysis.lid_opening import LOWER, UPPER, openings
-from gazerig.robot.analysis.reaction_finder import Reaction, ReactionFinder
+from gazerig.robot.analysis.reaction_finder import MeasuredReaction, ReactionFinder
 from gazerig.robot.analysis.summary import cyclopean
 from gazerig.robot.control.feedback_basis import estimated_joints
 from gazerig.robot.control.tick import Tick
@@ -105,7 +105,7 @@ class GazeTrace:
     asked_blinks: tuple[BlinkEvent, ...] = ()
     kinds: dict[str, float] = field(default_factory=dict)
     joints: JointBasis = JointBasis()
-    reactions: tuple[Reaction, ...] = ()
+    reactions: tuple[MeasuredReaction, ...] = ()
 
     def column(self, name: str) -> Floats:
         """Return a column of Row by its name."""
@@ -153,7 +153,7 @@ class GazeTraceBuilder:
         self._fixations: list[FixationEvent] = []
         self._blinks: list[BlinkEvent] = []
         self._asked_blinks: list[BlinkEvent] = []
-        self._new, self._reactions = ReactionFinder(), list[Reaction]()
+        self._new, self._reactions = ReactionFinder(), list[MeasuredReaction]()
         self._kinds: defaultdict[str, float] = defaultdict(float)
         self._mode = 0
         self._last_s: float | None = None
