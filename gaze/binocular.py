@@ -192,7 +192,7 @@ class BinocularController:
         return eyes, add(p_head, scale(ahead, max(distance, view.nearest_m)))
 
     def hold(self, eyes: Eyes, target: Eyes | None, R_world_head: Mat3, t_s: float) -> None:
-        """Take over the angles that a saccade prescribes; the target's velocity is kept.
+        """Adopt the angles that a saccade prescribes; the target's velocity is kept.
 
         target: eye angles that fixate the target as seen, from the present pose of the head
         """
@@ -270,7 +270,7 @@ class BinocularController:
         return demands[0][1] if demands[0][0] <= due_s else None
 
     def _shift(self, seen: Vec3) -> None:
-        """Take a jump of the target over, which is no velocity."""
+        """Adopt a jump of the target, which is no velocity."""
         moved = _NONE if self._seen is None else sub(seen, self._seen)
         self._smoothed = seen if self._seen is None else add(self._smoothed, moved)
         self._seen, self._known = seen, True

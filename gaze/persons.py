@@ -71,19 +71,11 @@ class Persons:
             self._seen_s[id] = self._at_s
         self._looking = frozenset(face.id for face in percept.faces if face.looks_at_head)
         self._update_nearest(faces, p_world_eye_m)
-        if faces and len(faces) < len(rows):
-            for row, id in enumerate(bodies.ids):
-                if id not in faces:
-                    x, y, z = rows[row]
-                    vx, vy, _ = bodies.v_world_m_s[row].tolist()
-                    # Sideways as seen from the eye: level, and across the direction to the hand.
-                    ahead, aside = x - p_world_eye_m[0], y - p_world_eye_m[1]
-                    away = max((ahead * ahead + aside * aside) ** 0.5, 1e-6)
-                    across = (vy * ahead - vx * aside) / away
-                    if self._turns(id, across):
-                        owner = min(faces, key=lambda face: dist(faces[face], (x, y, z)))  # noqa: B023
-                        if dist(faces[owner], (x, y, z)) < _ARM_M:
-                            self._waved_s[owner] = self._at_s
+        for row, id in enumerate(bodies.ids):
+            if faces and id not in faces:
+                x, y, z = rows[row]
+                vx, vy, _ = bodies.v_world_m_s[row].tolist()
+                self._update_hand(id, (x, y, z), (vx, vy), faces, p_world_eye_m)
         self._drop_old()
 
     def named(self, trait: str) -> frozenset[int]:
@@ -110,6 +102,23 @@ class Persons:
         id = min(away, key=lambda one: away[one])
         if away.get(self._nearest, inf) > _CLEARLY_NEARER * away[id]:
             self._nearest = id
+
+    def _update_hand(
+        self,
+        id: int,
+        place: Vec3,
+        velocity_m_s: tuple[float, float],
+        faces: Mapping[int, Vec3],
+        p_eye: Vec3,
+    ) -> None:
+        """Update a hand, and who waves with it: the person with the nearest face."""
+        # Sideways as seen from the eye: level, and across the direction to the hand.
+        ahead, aside = place[0] - p_eye[0], place[1] - p_eye[1]
+        away = max((ahead * ahead + aside * aside) ** 0.5, 1e-6)
+        if self._turns(id, (velocity_m_s[1] * ahead - velocity_m_s[0] * aside) / away):
+            owner = min(faces, key=lambda face: dist(faces[face], place))
+            if dist(faces[owner], place) < _ARM_M:
+                self._waved_s[owner] = self._at_s
 
     def _turns(self, id: int, across_m_s: float) -> bool:
         """Return whether a hand has just changed sides in a wave."""

@@ -117,7 +117,7 @@ class TargetPrediction:
         self._bend = _STILL
 
     def see(self, target: Target, eye: Vec3, fastest_rad_s: float) -> None:
-        """Take the target in; what its frame has already shown changes nothing.
+        """Record the target; what its frame has already shown changes nothing.
 
         eye: from where it is looked at
         fastest_rad_s: a swing that is faster there is followed with less than its amplitude, and
