@@ -45,8 +45,8 @@ def test_a_run_is_made_once_and_its_parameters_count(run: MeasuredRun) -> None:
 
 def test_every_row_measures_what_it_wants(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(BENCH))
-    bench = importlib.import_module("bench_human")
-    for number, row in bench.rows().items():
+    bench = importlib.import_module("measured_rows")
+    for number, row in [*bench.rows("human").items(), *bench.rows("seeing").items()]:
         assert row.__doc__ and callable(row.measure), number
         assert all(low <= high for low, high in row.WANTED.values()), number
 
@@ -66,7 +66,7 @@ def test_the_script_tells_inside_from_outside(
         def measure(run: object, seconds: float, seeds: object) -> dict[str, float]:
             return {"low": 0.5, "high": 2.0, "lost": float("nan"), "beside": 7.0}
 
-    monkeypatch.setattr(bench, "rows", lambda: {99: Row})
+    monkeypatch.setattr(importlib.import_module("measured_rows"), "rows", lambda folder: {99: Row})
     saved = tmp_path / "saved.json"
     monkeypatch.setattr(sys, "argv", ["bench_human", "--save", str(saved)])
     bench.main()

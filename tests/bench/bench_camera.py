@@ -18,6 +18,7 @@ from types import SimpleNamespace
 
 import cv2
 import numpy as np
+from all_processors import on_all_processors
 
 from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.recorder import CameraRecorder
@@ -27,7 +28,6 @@ from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.camera.worker import CameraParts
-from gazerig.drivers.types import FaceDetector
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.motion.params import MotionParams
@@ -126,12 +126,6 @@ def jitter(film: Path) -> None:
             f"p99 of the turns: best {min(each):5.2f} median {np.median(each):5.2f}   "
             f"{rate:5.1f} pictures/s"
         )
-
-
-def on_all_processors(params: FaceDetectorParams) -> FaceDetector:
-    """Make a detector, and let OpenCV in its process use every processor."""
-    cv2.setNumThreads(os.cpu_count() or 1)
-    return face_detector(params)
 
 
 def recording(pictures: list[np.ndarray], folder: Path) -> None:
