@@ -149,6 +149,8 @@ def options_of(args: argparse.Namespace, folder: Path) -> RunOptions:
         given["bus"] = args.bus
     if args.page and not args.fast:
         given["page"] = "127.0.0.1:8790"
+    if args.fast:
+        given["seconds"] = args.seconds + 1.0  # a simulated run has an end of its own, not before
     if args.record:
         given["record"] = folder / "run.mcap"
     return RunOptions(**given)
