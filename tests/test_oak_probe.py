@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from oak_packets import calibrated, face_archive
 
 from gazerig.drivers.camera.oak.discovery import UDEV_RULE, find_oak
 from gazerig.drivers.camera.oak.params import OakParams
@@ -98,12 +99,32 @@ class Device:
 
     def __init__(self, speed) -> None:
         self.speed = speed
+        sockets = real().CameraBoardSocket
+        self.sockets = [sockets.CAM_A, sockets.CAM_B, sockets.CAM_C]
+        self.imu = "BMI270"
+        self.platform = real().Platform.RVC2
+        self.calibration = calibrated(real())
         self.closed = 0
         self.reconnections: int | None = None
         self.dots = 0.0
 
     def getUsbSpeed(self):  # noqa: N802
         return self.speed
+
+    def getConnectedCameras(self):  # noqa: N802
+        return self.sockets
+
+    def getDeviceName(self):  # noqa: N802
+        return "OAK-D"
+
+    def getConnectedIMU(self):  # noqa: N802
+        return self.imu
+
+    def getPlatform(self):  # noqa: N802
+        return self.platform
+
+    def readCalibration(self):  # noqa: N802
+        return self.calibration
 
     def setMaxReconnectionAttempts(self, count):  # noqa: N802
         self.reconnections = count
@@ -145,6 +166,8 @@ class Queue:
 
     def __init__(self) -> None:
         self.fed: list = []
+        self.lying = False  # one message is there whenever it is asked for anew
+        self.taken = False
 
     def get(self, timeout):
         item = self.fed.pop(0) if self.fed else None
@@ -153,7 +176,8 @@ class Queue:
         return Group(colour=item) if item is not None else None
 
     def tryGet(self):  # noqa: N802
-        return None
+        self.taken = self.lying and not self.taken
+        return self.get(None) if self.taken else None
 
 
 class Rig:
@@ -197,6 +221,8 @@ class Rig:
         self.dai = SimpleNamespace(
             **vars(sdk([info()])),
             UsbSpeed=real().UsbSpeed,
+            CameraBoardSocket=real().CameraBoardSocket,
+            NNArchive=real().NNArchive,
             Pipeline=Pipeline,
             MessageQueue=real().MessageQueue,
             CameraExposureOffset=real().CameraExposureOffset,
@@ -212,21 +238,164 @@ class Rig:
 
     def source(self, **wanted) -> OakSource:
         colour = SimpleNamespace(link=lambda where: None)
-        return OakSource(
-            OakParams(**wanted),
-            lambda dai, pipeline, params: Outputs(colour),
-            True,
-            lambda: self.dai,
-        )
+
+        def nodes(dai, pipeline, params) -> Outputs:
+            self.asked = params
+            return Outputs(colour)
+
+        return OakSource(OakParams(**wanted), nodes, True, lambda: self.dai)
 
 
-def test_usb_2_is_told():
+def test_usb_2_that_carries_what_is_asked_is_told_so():
+    rig = Rig("HIGH")
+    source = rig.source()  # 640 x 400 at 30 Hz with depth: 26.9 MB/s
+    source.open()
+    (reported,) = source.events()
+    assert "USB 2 speed (HIGH)" in reported and "enough for what is asked" in reported
+    assert source.events() == ()
+
+
+def test_usb_2_that_cannot_carry_it_says_what_it_can():
+    rig = Rig("HIGH")
+    source = rig.source(width_px=1280, height_px=720)
+    source.open()
+    (reported,) = source.events()
+    assert "97 are asked for" in reported and "USB 3 cable" in reported
+    assert "set oak.rate_hz 9 or oak.depth: false" in reported
+
+
+@pytest.mark.parametrize(
+    ("speed", "rate_hz", "told"), [("HIGH", 11.0, 1), ("HIGH", 30.0, 0), ("SUPER", 11.0, 0)]
+)
+def test_usb_2_line_that_is_full_is_told_once(speed, rate_hz, told):
+    rig = Rig(speed)
+    source = rig.source()
+    source.open()
+    source.events()
+    times = [5.0 + k / rate_hz for k in range(60)]
+    now = iter([t for at in times for t in (95.0 + at, 95.03 + at)])
+    take(rig, source, lambda: next(now), *(Message(t, 95.01 + t) for t in times))
+    found = source.events()
+    assert len(found) == told
+    if told:
+        assert "USB 2 line is full: 11.0 of 30 frames" in found[0]
+        assert "set oak.rate_hz 11" in found[0]
+
+
+def test_frames_that_a_late_reader_left_lying_do_not_fill_the_line():
     rig = Rig("HIGH")
     source = rig.source()
     source.open()
-    (reported,) = source.events()
-    assert "USB 2 speed (HIGH)" in reported and "USB 3 cable" in reported
+    source.events()
+    rig.queue.lying = True
+    times = [5.0 + k / 11.0 for k in range(60)]
+    now = iter([t for at in times for t in (95.0 + at, 95.03 + at)])
+    take(rig, source, lambda: next(now), *(Message(t, 95.01 + t) for t in times))
     assert source.events() == ()
+
+
+def test_camera_without_stereo_goes_on_without_depth():
+    rig = Rig()
+    rig.device.sockets = rig.device.sockets[:1]
+    source = rig.source()
+    source.open()
+    (reported,) = source.events()
+    assert "no stereo pair (nothing at CAM_B and CAM_C)" in reported
+    assert "oak.depth: false" in reported and not rig.asked.depth
+    source.close()
+    plain = rig.source(depth=False)
+    plain.open()
+    assert plain.events() == ()
+
+
+def test_stereo_that_is_not_calibrated_goes_on_without_depth():
+    rig = Rig()
+    rig.device.calibration = calibrated(real(), stereo=False)
+    source = rig.source()
+    source.open()
+    (reported,) = source.events()
+    assert "stereo pair is not calibrated" in reported and not rig.asked.depth
+
+
+def test_camera_without_colour_is_refused():
+    rig = Rig()
+    rig.device.sockets = rig.device.sockets[1:]
+    with pytest.raises(CameraError, match=r"OAK-D has no camera at socket CAM_A.*use a model"):
+        rig.source().open()
+    assert rig.device.closed
+
+
+@pytest.mark.parametrize(
+    ("imu", "extrinsics", "told"),
+    [
+        ("BMI270", True, ""),
+        ("NONE", True, "no IMU; oak.gyro: false"),
+        ("", True, "no IMU; oak.gyro: false"),
+        ("BMI270", False, "does not say how the IMU sits: give oak.imu_rotation_deg"),
+    ],
+)
+def test_camera_without_a_usable_gyro_goes_on_without(imu, extrinsics, told):
+    rig = Rig()
+    rig.device.imu, rig.device.calibration = imu, calibrated(real(), imu=extrinsics)
+    source = rig.source()
+    source.open()
+    reported = source.events()
+    assert rig.asked.gyro == (not told)
+    assert len(reported) == bool(told) and told in " ".join(reported)
+    source.close()
+    without = rig.source(gyro=False)
+    without.open()
+    assert without.events() == () and not rig.asked.gyro
+
+
+def test_rotation_of_the_imu_in_the_rig_stands_for_the_cameras_own():
+    rig = Rig()
+    rig.device.calibration = calibrated(real(), imu=False)
+    source = rig.source(imu_rotation_deg=(0.0, 0.0, 90.0))
+    source.open()
+    assert source.events() == () and rig.asked.gyro
+
+
+@pytest.mark.parametrize(
+    ("archive", "told"),
+    [
+        ({}, ""),
+        ({"parser": "YOLO", "points": 5}, ""),
+        ({"network": "onnx"}, "not converted for the chip of an OAK camera"),
+        ({"platform": "RVC2"}, "it is made for RVC4, this is RVC2"),
+        ({"parser": "YOLO", "points": 17}, "it finds 17 key points, wanted 5"),
+        ({"parser": "YOLO", "points": None}, "it finds 0 key points, wanted 5"),
+        ({"parser": "SCRFDParser"}, "read by SCRFDParser, wanted YuNet or YOLO"),
+        ({"heads": 0}, "has 0 heads, wanted 1"),
+    ],
+)
+def test_face_model_of_another_kind_is_told_and_left_out(tmp_path, archive, told):
+    rig = Rig()
+    rig.device.platform = getattr(real().Platform, archive.pop("platform", "RVC4"))
+    file = face_archive(tmp_path / "faces.tar.xz", **archive)
+    source = rig.source(face_model=str(file))
+    source.open()
+    reported = source.events()
+    assert len(reported) == bool(told)
+    assert bool(rig.asked.face_model) == (not told)
+    for line in reported:
+        assert told in line and "faces are found on the host" in line
+        assert f"converted for {rig.device.platform.name}" in line and "\n" not in line
+
+
+def test_face_model_that_is_no_archive_is_told_and_left_out(tmp_path):
+    file = tmp_path / "face.onnx"
+    file.write_bytes(b"nothing")
+    rig = Rig()
+    source = rig.source(face_model=str(file))
+    source.open()
+    (reported,) = source.events()
+    assert "is no NNArchive" in reported and not rig.asked.face_model
+
+
+def test_face_model_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(CameraError, match="no face model at"):
+        Rig().source(face_model=str(tmp_path / "nope.tar.xz")).open()
 
 
 def test_usb_2_is_refused_where_that_is_wanted():
@@ -241,14 +410,35 @@ def test_usb_3_is_no_matter_and_the_dots_are_lit():
     source = rig.source(dot_projector=0.4)
     source.open()
     assert source.events() == ()
+    assert rig.asked == OakParams(dot_projector=0.4)
     assert (rig.device.dots, rig.device.reconnections) == (0.4, 0)
     source.close()
     assert rig.device.closed == 1
 
 
+@pytest.mark.parametrize(
+    ("error", "cure"),
+    [
+        ("Failed to connect to device, error message: X_LINK_DEVICE_ALREADY_IN_USE", "end that"),
+        (
+            "Failed to find device after booting, error message: X_LINK_DEVICE_NOT_FOUND",
+            "not a hub",
+        ),
+        ("Insufficient permissions (X_LINK_INSUFFICIENT_PERMISSIONS)", "udev rule"),
+        ("NeuralNetwork(4): Out of memory", "smaller frames"),
+        ("Camera(0): no sensor mode for 4056x3040 at 60 fps", "640 x 400"),
+        ("something else", "unplug it, wait a second"),
+    ],
+)
+def test_error_at_the_start_comes_with_its_own_cure(error, cure):
+    with pytest.raises(CameraError) as caught:
+        Rig(start_fault=RuntimeError(error)).source().open()
+    assert error in str(caught.value) and cure in str(caught.value)
+
+
 def test_camera_that_does_not_start_is_freed_and_named():
     rig = Rig(start_fault=RuntimeError("X_LINK_DEVICE_ALREADY_IN_USE\nsomewhere"))
-    with pytest.raises(CameraError, match="X_LINK_DEVICE_ALREADY_IN_USE somewhere.*unplug") as it:
+    with pytest.raises(CameraError, match="X_LINK_DEVICE_ALREADY_IN_USE somewhere.*another") as it:
         rig.source().open()
     assert "\n" not in str(it.value)
     assert rig.waited and rig.device.closed == 1  # type: ignore[attr-defined]

@@ -21,13 +21,41 @@ class OakParams:
     extended_disparity: Annotated[bool, "halve the shortest measurable distance, to 35 cm on an OAK-D"] = True
     subpixel: Annotated[bool, "finer resolution of distances, noticeable beyond 2 m"] = True
     left_right_check: Annotated[bool, "discard distances on which the two stereo cameras disagree"] = True
+    undistort: Annotated[bool, "the camera straightens its frames; without, they come through its lens as it is"] = True
+    exposure_limit_ms: Annotated[float | None, Bounds(0.1, 33),
+        "longest exposure: short ones blur less while the head turns, and need more light; null: as long as the camera likes"] = None
+    anti_flicker: Annotated[Literal["default", "off", "50hz", "60hz", "auto"],
+        "exposures of whole periods of the mains, against stripes under lamps; default: as the camera does by itself"] = "default"
+    focus: Annotated[int | None, Bounds(0, 255), "position of the lens, held fixed, larger for nearer things; null: autofocus"] = None
+    gyro: Annotated[bool, "use the camera's gyro to know how it turned"] = True
+    imu_rotation_deg: Annotated[tuple[float, float, float] | None, Bounds(-180, 180),
+        "rotation vector that takes directions from the gyro's axes to the camera's (x right, y down, z forward); "
+        "null: as the camera's own calibration says"] = None
     dot_projector: Annotated[float, Bounds(0, 1),
         "brightness of the infrared dot projector of Pro models (helps on bare walls), as a share of its maximum"] = 0.0
     face_model: Annotated[str,
-        "path of an NNArchive of a face detector with five landmarks that runs on the camera; empty: faces are detected on the host"] = ""
+        "path of an NNArchive of a face detector that runs on the camera: YuNet, or YOLO with five key points; empty: faces are "
+        "detected on the host"] = ""
     min_confidence: Annotated[float, Bounds(0.05, 1), "faces detected on the camera with a lower confidence are discarded"] = 0.7
     usb2: Annotated[Literal["warn", "refuse"], "reaction to a USB 2 cable or port, which cannot carry the full frame rate"] = "warn"
     silence_ms: Annotated[float, Bounds(100, 60000), "a camera that delivers no frame for longer is considered lost"] = 2000.0
     latency_ms: Annotated[float, Bounds(0, 1000),
         "shortest delay from exposure to arrival; used only if the camera's clock is not synchronised with the host's"] = 20.0
     # fmt: on
+
+    def __post_init__(self) -> None:
+        """Check that the camera can do all of it together.
+
+        Raises:
+            ValueError: a size that frames cannot have, or an exposure longer than a frame lasts.
+        """
+        if self.width_px % 16 or self.height_px % 2:
+            raise ValueError(
+                f"frames of {self.width_px} x {self.height_px} px cannot be: width_px is a multiple "
+                f"of 16 and height_px of 2, such as {self.width_px // 16 * 16} x {self.height_px // 2 * 2}"
+            )
+        if self.exposure_limit_ms is not None and self.exposure_limit_ms * self.rate_hz > 1e3:
+            raise ValueError(
+                f"exposure_limit_ms {self.exposure_limit_ms:g} is longer than a frame lasts at "
+                f"rate_hz {self.rate_hz:g}: at most {1e3 / self.rate_hz:.1f}"
+            )

@@ -6,11 +6,11 @@ serves as well: depthai's replay and host nodes do, without a camera.
 
 from collections.abc import Callable
 from datetime import timedelta
-from pathlib import Path
 from typing import Any, NamedTuple
 
+from gazerig.drivers.camera.oak.controls import set_controls
+from gazerig.drivers.camera.oak.face_archive import read_archive
 from gazerig.drivers.camera.oak.params import OakParams
-from gazerig.drivers.errors import CameraError
 
 COLOUR, DEPTH, FACES = "colour", "depth", "faces"
 """Names of the messages in a group."""
@@ -41,37 +41,28 @@ def device_nodes(dai: Any, pipeline: Any, params: OakParams) -> Outputs:
     """
     socket = dai.CameraBoardSocket
     camera = pipeline.create(dai.node.Camera).build(socket.CAM_A)
+    set_controls(dai, camera.initialControl, params)
     size = params.width_px, params.height_px
     colour = camera.requestOutput(
-        size, type=dai.ImgFrame.Type.NV12, fps=params.rate_hz, enableUndistortion=True
+        size,
+        type=dai.ImgFrame.Type.NV12,
+        fps=params.rate_hz,
+        enableUndistortion=params.undistort,
     )
-    depth = _stereo(dai, pipeline, params, colour) if params.depth else None
-    faces = None
-    if params.face_model:
-        archive = read_archive(dai, params.face_model)
-        network = pipeline.create(dai.node.DetectionNetwork)
-        network = network.build(camera, archive, fps=params.rate_hz)
-        network.setConfidenceThreshold(params.min_confidence)
-        faces = network.out
-    return Outputs(colour, depth, faces)
+    return Outputs(
+        colour,
+        _stereo(dai, pipeline, params, colour) if params.depth else None,
+        _faces(dai, pipeline, params, camera) if params.face_model else None,
+    )
 
 
-def read_archive(dai: Any, path: str) -> Any:
-    """Read a network for the camera from a local NNArchive.
-
-    Raises:
-        CameraError: there is no such file, or it is no archive.
-    """
-    file = Path(path).expanduser()
-    if not file.is_file():
-        raise CameraError(f"no face model at {file}: give the path of an NNArchive (.tar.xz)")
-    try:
-        return dai.NNArchive(str(file))
-    except RuntimeError as error:
-        raise CameraError(
-            f"{file} is no NNArchive ({' '.join(str(error).split())}): "
-            "take one made for this camera's chip"
-        ) from error
+def _faces(dai: Any, pipeline: Any, params: OakParams, camera: Any) -> Any:
+    """Make the network that finds faces on the camera."""
+    archive = read_archive(dai, params.face_model)
+    network = pipeline.create(dai.node.DetectionNetwork)
+    network = network.build(camera, archive, fps=params.rate_hz)
+    network.setConfidenceThreshold(params.min_confidence)
+    return network.out
 
 
 def joined(dai: Any, pipeline: Any, outputs: Outputs, rate_hz: float) -> Any:

@@ -3,14 +3,18 @@
 import threading
 from collections.abc import Callable
 from datetime import timedelta
+from math import inf
 from typing import Any
 
 from gazerig.drivers.camera.clock_sync import ClockSync
+from gazerig.drivers.camera.frame_rate import FrameRateMonitor
+from gazerig.drivers.camera.oak.abilities import full_line_text, possible, usb2_text
 from gazerig.drivers.camera.oak.discovery import find_oak
 from gazerig.drivers.camera.oak.messages import depth_of, faces_of, image_of, lens_of
 from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.oak.pipeline import COLOUR, MakeNodes, device_nodes, joined
 from gazerig.drivers.camera.oak.sdk import load_depthai
+from gazerig.drivers.camera.oak.start_faults import start_cure
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
 
@@ -36,7 +40,7 @@ class OakSource:
         on_device: bool = True,
         load: Callable[[], Any] = load_depthai,
     ) -> None:
-        self._params = params
+        self._params = self._asked = params
         self._nodes = nodes
         self._on_device = on_device
         self._load = load
@@ -48,6 +52,8 @@ class OakSource:
         self._in_step = True
         self._number = 0
         self._events: list[str] = []
+        self._slow_line: FrameRateMonitor | None = None
+        self._waited = False  # the newest frame was waited for: none had come since the last
 
     def open(self) -> None:
         """Find the camera, start it, and make sure of its rate.
@@ -58,20 +64,22 @@ class OakSource:
         """
         self.close()
         self._dai = self._load()
+        self._asked, self._slow_line = self._params, None
         try:
             if self._on_device:
                 self._device = self._connect()
+                self._prepare()
                 self._pipeline = self._dai.Pipeline(self._device)
             else:
                 self._pipeline = self._dai.Pipeline(createImplicitDevice=False)
-            outputs = self._nodes(self._dai, self._pipeline, self._params)
-            self._queue = joined(self._dai, self._pipeline, outputs, self._params.rate_hz)
+            outputs = self._nodes(self._dai, self._pipeline, self._asked)
+            self._queue = joined(self._dai, self._pipeline, outputs, self._asked.rate_hz)
             self._pipeline.start()
         except RuntimeError as error:
             self.close()
+            text = _line(error)
             raise CameraError(
-                f"the OAK camera cannot be started ({_line(error)}): unplug it, wait a second, "
-                "plug it in again; if another program uses it, end that"
+                f"the OAK camera cannot be started ({text}): {start_cure(text)}"
             ) from error
         except BaseException:
             self.close()
@@ -121,30 +129,39 @@ class OakSource:
         self.close()
 
     def _connect(self) -> Any:
-        """Open the device, and see how fast its USB is."""
+        """Open the device."""
         info = find_oak(self._dai, self._params.device)
         device = self._dai.Device(info)
         # It is this program that opens a lost camera again, and tells.
         device.setMaxReconnectionAttempts(0)
-        speed = device.getUsbSpeed()
+        return device
+
+    def _prepare(self) -> None:
+        """See what the device can do and how fast its USB is; light its dots.
+
+        Raises:
+            CameraError: it has no colour camera, or hangs on USB 2 where that is refused.
+        """
+        self._asked, left_out = possible(self._dai, self._device, self._params)
+        self._events.extend(left_out)
+        speed = self._device.getUsbSpeed()
         slow = (self._dai.UsbSpeed.LOW, self._dai.UsbSpeed.FULL, self._dai.UsbSpeed.HIGH)
         if speed in slow:
-            text = (
-                f"the OAK camera runs at USB 2 speed ({speed.name}): use a USB 3 cable (its plug "
-                "is often blue) and port, or set a smaller rate_hz and size"
-            )
+            text = usb2_text(self._asked, speed.name)
             if self._params.usb2 == "refuse":
-                device.close()
                 raise CameraError(text)
             self._events.append(text)
+            self._slow_line = FrameRateMonitor("the OAK camera", self._asked.rate_hz)
         if self._params.dot_projector > 0.0:
-            device.setIrLaserDotProjectorIntensity(self._params.dot_projector)
-        return device
+            self._device.setIrLaserDotProjectorIntensity(self._params.dot_projector)
 
     def _next_group(self) -> Any:
         """Return the newest group of messages, None after a short wait without any."""
         try:
-            group = self._queue.get(_SLICE)
+            group = self._queue.tryGet()
+            self._waited = group is None
+            if group is None:
+                group = self._queue.get(_SLICE)
             while group is not None and (newer := self._queue.tryGet()) is not None:
                 group = newer
         except (RuntimeError, self._dai.MessageQueue.QueueException) as error:
@@ -160,14 +177,29 @@ class OakSource:
             return None
         self._number += 1
         height, width = image.shape[:2]
+        captured_s = self._captured_s(group[COLOUR], arrived_s)
+        self._watch_line(captured_s)
         return Shot(
-            self._captured_s(group[COLOUR], arrived_s),
+            captured_s,
             self._number,
             image,
             depth_of(group, width, height),
             lens_of(group),
             faces_of(group, width, height, self._params.min_confidence),
         )
+
+    def _watch_line(self, captured_s: float) -> None:
+        """Tell of a USB 2 line that does not carry the frames asked for."""
+        if self._slow_line is None:
+            return
+        # A frame that lay waiting may have had others before it, which its reader was late for.
+        line = self._slow_line.update(captured_s, 0.0 if self._waited else inf)
+        measured_hz = self._slow_line.measured_hz
+        if not line or measured_hz is None:
+            return
+        if measured_hz < self._asked.rate_hz and "again" not in line:
+            line = full_line_text(self._asked, measured_hz)
+        self._events.append(line)
 
     def _captured_s(self, frame: Any, arrived_s: float) -> float:
         """Translate the device's own stamp by the bridge.

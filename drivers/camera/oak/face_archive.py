@@ -1,0 +1,82 @@
+"""Face networks for the camera's chip: archives, and whether one will do on a camera."""
+
+from pathlib import Path
+from typing import Any, Literal
+
+from gazerig.drivers.errors import CameraError
+
+FaceNet = Literal["yunet", "yolo"]
+
+LANDMARKS = 5
+_CURE = (
+    "take an archive of YuNet, or of a YOLO with five key points, that was converted for {chip} "
+    "(Luxonis' model hub has them), or leave oak.face_model empty"
+)
+
+
+class UnusableModel(CameraError):
+    """An archive that this camera cannot find faces with; the message says why and the cure."""
+
+
+def read_archive(dai: Any, path: str) -> Any:
+    """Read a network for the camera from a local NNArchive.
+
+    Raises:
+        CameraError: there is no such file.
+        UnusableModel: it is no archive.
+    """
+    file = Path(path).expanduser()
+    if not file.is_file():
+        raise CameraError(f"no face model at {file}: give the path of an NNArchive (.tar.xz)")
+    try:
+        return dai.NNArchive(str(file))
+    except (RuntimeError, ValueError) as error:
+        raise UnusableModel(
+            f"{file} is no NNArchive ({' '.join(str(error).split())}): "
+            + _CURE.format(chip="this camera's chip")
+        ) from error
+
+
+def kind_of(archive: Any, platform: Any, file: str) -> FaceNet:
+    """Return what network an archive holds.
+
+    Args:
+        archive: as read.
+        platform: the camera's chip, a dai.Platform.
+        file: the archive's path, for messages.
+
+    Raises:
+        UnusableModel: it is made for another chip, or finds no faces with five landmarks.
+    """
+    wrong = _made_for_another(archive, platform)
+    heads = archive.getConfig().model.heads or []
+    parsers = [str(head.parser) for head in heads]
+    kind: FaceNet | None = None
+    if not wrong:
+        if len(heads) != 1:
+            wrong = f"its description has {len(heads)} heads, wanted 1"
+        elif "yunet" in parsers[0].lower():
+            kind = "yunet"
+        elif "yolo" in parsers[0].lower():
+            points = heads[0].metadata.nKeypoints or 0
+            if points == LANDMARKS:
+                kind = "yolo"
+            else:
+                wrong = f"it finds {points} key points, wanted {LANDMARKS}"
+        else:
+            wrong = f"its outputs are read by {parsers[0]}, wanted YuNet or YOLO"
+    if kind is None:
+        raise UnusableModel(
+            f"the face model {file} cannot be used: {wrong}; {_CURE.format(chip=platform.name)}"
+        )
+    return kind
+
+
+def _made_for_another(archive: Any, platform: Any) -> str:
+    """Return why an archive does not run on a chip, "" where it does."""
+    chips = list(archive.getSupportedPlatforms())
+    if not chips:
+        return "its network is not converted for the chip of an OAK camera"
+    if platform not in chips:
+        return f"it is made for {', '.join(chip.name for chip in chips)}, this is {platform.name}"
+    return ""
