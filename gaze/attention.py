@@ -223,7 +223,7 @@ class Attention:
         seen = self._field_of_view.visible_rows(bodies, rows, state)
         v_eye = self._eye_velocity(eye, t_s)
         motion = self._bottom_up.step_rows(rows, eye, t_s, v_eye, self._gaze(state), seen)
-        rule_target = self.top_down.step_rows(rows, seen, eye, self._favoured_id)
+        rule_target = self.top_down.step_rows(rows, seen, eye)
         attended = self._identity[1] if self._identity is not None else -1
         left = self._habituation.step_rows(rows, eye, attended, t_s)
         habituation = [*map(mul, left, worth), 1.0]
@@ -236,13 +236,9 @@ class Attention:
                 rule[row] = rule_target.salience
                 amount[row] = max(amount[row], rule_target.salience)
             if not point:
-                share = [
-                    self._habituation.for_rule(left[row]) * near * worth[row]
-                    for row, near in zip(wanted, rule_target.nearness, strict=True)
-                ]
-                most = max(*share, 1e-9)
-                for row, one in zip(wanted, share, strict=True):
-                    habituation[row] = one / most
+                shares = self._shares(rule_target, bodies.ids, worth, attended, t_s)
+                for row, one in zip(wanted, shares, strict=True):
+                    habituation[row] = one
         total = [
             one * factor if there else -inf
             for one, factor, there in zip(amount, habituation, (*seen, point), strict=True)
@@ -259,7 +255,7 @@ class Attention:
         seen = self._field_of_view.visible(bodies, state)
         v_eye = self._eye_velocity(eye, t_s)
         motion = self._bottom_up.step(bodies, eye, t_s, v_eye, self._gaze(state), seen)
-        rule_target = self.top_down.step(bodies, seen, eye, self._favoured_id)
+        rule_target = self.top_down.step(bodies, seen, eye)
         attended = self._identity[1] if self._identity is not None else -1
         habituation, rule = np.ones(n + 1), np.zeros(n + 1)
         left = self._habituation.step(bodies.ids, bodies.p_world_m, eye, attended, t_s)
@@ -270,15 +266,34 @@ class Attention:
             rule[rows] = rule_target.salience
             amount[rows] = np.maximum(amount[rows], rule_target.salience)
         if rule_target is not None and rule_target.point_world_m is None:
-            share = self._habituation.for_rule(left[rows]) * rule_target.nearness
-            share *= np.array(worth)[rows]
-            habituation[rows] = share / max(float(share.max()), 1e-9)
+            habituation[rows] = self._shares(rule_target, bodies.ids, worth, attended, t_s)
         total = amount * habituation
         total[:n][~seen] = -inf
         if rule_target is None or rule_target.point_world_m is None:
             total[n] = -inf
         best = int(total.argmax())
         return _Choice(bodies, motion.row, rule_target, rule, habituation, total, best)
+
+    def _shares(
+        self,
+        rule_target: RuleTarget,
+        ids: tuple[int, ...],
+        worth: list[float],
+        attended: int,
+        t_s: float,
+    ) -> list[float]:
+        """Return the factor 0..1 of each body that a rule points at, 1 for the strongest."""
+        named = [ids[row] for row in rule_target.rows]
+        mine = [worth[row] for row in rule_target.rows]
+        weights = [float(near) * one for near, one in zip(rule_target.nearness, mine, strict=True)]
+        shares = [
+            factor * one * (rule_target.stay if id == self._favoured_id else 1.0)
+            for id, factor, one in zip(
+                named, self._habituation.share(named, weights, attended, t_s), mine, strict=True
+            )
+        ]
+        most = max(*shares, 1e-9)
+        return [one / most for one in shares]
 
     def _gaze(self, state: GazeState) -> Vec3:
         """Return where both eyes look, of any length, where the salience goes by it."""

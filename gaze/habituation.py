@@ -3,23 +3,24 @@
 Habituation, as in Pan et al. 2020 ("Realistic and interactive robot gaze"): a factor h of
 what is attended falls, that of everything else recovers, and what is compared is h times
 the salience. Without it the gaze stares. It belongs to an identity and outlives its
-absence: a person who comes back at once is not new.
+absence: a person who comes back at once is not new. Several bodies that one rule points at share
+the gaze instead (gazerig.gaze.shared_attention).
 
 Inhibition of return: for a moment the gaze avoids the place it has just left, as in
 Ruesch et al. 2008 (a Gaussian about that place that decays).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import acos, exp, radians
-from typing import Annotated, NamedTuple, TypeVar
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from gazerig.gaze.angles import dot, sub, unit
+from gazerig.gaze.shared_attention import SharedAttention
 from gazerig.gaze.types import BodyRows, Floats, Vec3
 from gazerig.params import Bounds
-
-F = TypeVar("F", float, Floats)
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ class HabituationParams:
         "rate at which the salience factor of the present target decreases from 1; 0: never"] = 0.2
     recovery_rate_1_s: Annotated[float, Bounds(0.01, 10), "rate at which the salience factors of everything else recover to 1"] = 1.0
     rule_floor: Annotated[float, Bounds(0, 1),
-        "lowest salience factor of the target of a rule; lower: the gaze changes sooner between several people"] = 0.5
+        "lowest salience factor of one of several targets of a rule; lower: the gaze changes sooner between people"] = 0.0
     inhibition_of_return_strength: Annotated[float, Bounds(0, 1),
         "how strongly the point that the gaze has just left is avoided; 0: not at all"] = 0.5
     inhibition_of_return_sigma_deg: Annotated[float, Bounds(0.1, 45), "standard deviation of that inhibition around the point"] = 4.0
@@ -51,6 +52,7 @@ class Habituation:
 
     def __init__(self, params: HabituationParams) -> None:
         self._params = params
+        self._shared = SharedAttention()
         self.reset(0.0)
 
     def retune(self, params: HabituationParams) -> None:
@@ -63,6 +65,7 @@ class Habituation:
         # seconds, a handful however many bodies there are.
         self._habituation: dict[int, float] = {}
         self._left: list[_Left] = []
+        self._shared.reset(t_s)
         self._at_s = t_s
 
     def leave(self, p_world_m: Vec3, t_s: float) -> None:
@@ -105,10 +108,24 @@ class Habituation:
             for id, p in zip(rows.ids, rows.p_world_m, strict=True)
         ]
 
-    def for_rule(self, habituation: F) -> F:
-        """Return the factors of what a rule points at: they do not go below the floor."""
-        floor = self._params.rule_floor
-        return floor + (1.0 - floor) * habituation
+    def share(
+        self, ids: Sequence[int], weights: Sequence[float], attended_id: int, t_s: float
+    ) -> list[float]:
+        """Return the factor 0..1 of each of several bodies that a rule points at.
+
+        One alone keeps 1: what a rule names is not left for habituation.
+
+        Args:
+            ids: the bodies that share the gaze.
+            weights: of each; they are looked at for times as their weights.
+            attended_id: what has been looked at since the step before; -1 for nothing.
+            t_s: now.
+        """
+        floor, rate = self._params.rule_floor, self._params.decay_rate_1_s
+        if rate == 0.0 or floor == 1.0:
+            return [1.0] * len(ids)
+        leads = self._shared.step(ids, weights, attended_id, t_s)
+        return [floor + (1.0 - floor) * exp(-rate * lead) for lead in leads]
 
     def _go_on(self, attended_id: int, t_s: float) -> None:
         """Bring all factors and the points left to the present."""

@@ -127,13 +127,15 @@ class RuleTarget(NamedTuple):
     """What the rule in force points at.
 
     rows:     (k,) rows of the bodies wanted; none for a place
-    nearness: (k,) factor of each, 1 for the nearest
+    nearness: (k,) weight of each, 1 for the nearest
+    stay:     factor by which the body that was looked at last is preferred
     point_world_m: the place wanted, None for bodies
     salience, behaviour: the rule's constant and name
     """
 
     rows: NDArray[np.intp] | list[int]
     nearness: Floats | list[float]
+    stay: float
     point_world_m: Vec3 | None
     salience: float
     behaviour: str
@@ -193,13 +195,10 @@ class TopDown:
         bodies: Bodies,
         seen: NDArray[np.bool_],
         p_world_eye_m: Vec3,
-        favoured_id: int = -1,
     ) -> RuleTarget | None:
         """Return what the rule points at among the bodies in view, None where nothing.
 
         seen: (n,) which bodies are in view
-        favoured_id: the body that was looked at last for a rule's sake; it counts as
-            somewhat nearer than it is, so that equals do not flicker; -1 for none
         """
         rule = self._params.rules[self.behaviour]
         rows = self._rows(bodies, rule)
@@ -210,20 +209,20 @@ class TopDown:
             rows = some if len(some) else rows
         if len(rows) == 0 and rule.point_world_m is None:
             return None
-        near = self._nearness(bodies, rows, p_world_eye_m, favoured_id)
-        return RuleTarget(rows, near, rule.point_world_m, rule.salience, self.behaviour)
+        near = self._nearness(bodies, rows, p_world_eye_m)
+        return RuleTarget(rows, near, self._stay, rule.point_world_m, rule.salience, self.behaviour)
 
     def step_rows(
         self,
         bodies: BodyRows,
         seen: list[bool],
         p_world_eye_m: Vec3,
-        favoured_id: int = -1,
     ) -> RuleTarget | None:
         """Return what ``step`` does, for few bodies."""
         rule = self._params.rules[self.behaviour]
         if rule.point_world_m is not None:
-            return RuleTarget([], [], rule.point_world_m, rule.salience, self.behaviour)
+            point = rule.point_world_m
+            return RuleTarget([], [], self._stay, point, rule.salience, self.behaviour)
         named: Sequence[object] = bodies.kinds if rule.body_id is None else bodies.ids
         wanted = rule.kind if rule.body_id is None else rule.body_id
         rows = [i for i, one in enumerate(named) if one == wanted and seen[i]]
@@ -233,25 +232,22 @@ class TopDown:
             rows = [i for i in rows if bodies.ids[i] in self.named_ids] or rows
         near = [1.0]
         if len(rows) > 1:
-            stay = self._params.stay_with_person
-            away = [
-                max(dist(bodies.p_world_m[i], p_world_eye_m), 1e-3)
-                / (stay if bodies.ids[i] == favoured_id else 1.0)
-                for i in rows
-            ]
-            near = [(min(away) / one) ** self._params.nearness for one in away]
-        return RuleTarget(rows, near, None, rule.salience, self.behaviour)
+            away = [max(dist(bodies.p_world_m[i], p_world_eye_m), 1e-3) for i in rows]
+            nearest, power = min(away), self._params.nearness
+            near = [(nearest / one) ** power for one in away]
+        return RuleTarget(rows, near, self._stay, None, rule.salience, self.behaviour)
 
-    def _nearness(
-        self, bodies: Bodies, rows: NDArray[np.intp], p_eye: Vec3, favoured_id: int
-    ) -> Floats:
+    @property
+    def _stay(self) -> float:
+        """Return the factor by which the present person is preferred: as if nearer."""
+        return float(self._params.stay_with_person**self._params.nearness)
+
+    def _nearness(self, bodies: Bodies, rows: NDArray[np.intp], p_eye: Vec3) -> Floats:
         """Return the factor of each wanted row: (nearest distance / its distance)^nearness."""
         if len(rows) <= 1:
             return np.ones(len(rows))
         rel = bodies.p_world_m[rows] - np.asarray(p_eye)
         distance = np.maximum(np.sqrt((rel * rel).sum(axis=1)), 1e-3)
-        if favoured_id in bodies.ids:
-            distance[rows == bodies.ids.index(favoured_id)] /= self._params.stay_with_person
         factor: Floats = (distance.min() / distance) ** self._params.nearness
         return factor
 

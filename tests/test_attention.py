@@ -55,10 +55,12 @@ def test_what_spins_about_the_line_of_view_is_attended_to_and_what_spins_across_
 def test_the_person_looked_at_last_counts_as_nearer() -> None:
     faces = percept(0.0, body(1, "face", (1.0, 0, 0)), body(2, "face", (1.5, 0, 0))).bodies
     params = TopDownParams(stay_with_person=2.0, nearness=1.0)
-    seen, eye = np.ones(2, bool), (0.0, 0.0, 0.0)
-    for favoured, expected in ((-1, [1.0, 1.0 / 1.5]), (2, [0.75, 1.0]), (1, [1.0, 1.0 / 3.0])):
-        found = TopDown(params).step(faces, seen, eye, favoured)
-        assert found is not None and found.nearness == pytest.approx(expected)
+    found = TopDown(params).step(faces, np.ones(2, bool), (0.0, 0.0, 0.0))
+    assert found is not None and found.nearness == pytest.approx([1.0, 1.0 / 1.5])
+    assert found.stay == 2.0
+    assert TopDown(replace(params, nearness=0.5)).step_rows(
+        faces.rows(), [True, True], (0.0, 0.0, 0.0)
+    ).stay == pytest.approx(2.0**0.5)  # type: ignore[union-attr]
 
 
 def test_what_is_behind_the_eye_hides_nothing_before_it() -> None:

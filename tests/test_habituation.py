@@ -1,7 +1,7 @@
 """Interest that wears off, the place just left, and several people who share the gaze."""
 
 from itertools import groupby
-from math import radians
+from math import exp, radians
 
 import numpy as np
 import pytest
@@ -32,8 +32,20 @@ def bodies(kinds: str, *places: Vec3, speed: float = 0.0) -> Bodies:
     )  # fmt: skip
 
 
-def watch(seen: Bodies, seconds: float, **params: float) -> list[Target]:
-    """Let attention look at a scene that stays as it is, 30 pictures a second."""
+def arc(*away_m: float) -> Bodies:
+    """Return faces at these distances, from the left to the right."""
+    aside = np.radians(np.linspace(22.0, -22.0, len(away_m)))
+    places = [(d * np.cos(a), d * np.sin(a), 0.0) for d, a in zip(away_m, aside, strict=True)]
+    return bodies(" ".join(["face"] * len(away_m)), *places)
+
+
+def watch(
+    seen: Bodies, seconds: float, later: Bodies | None = None, **params: float
+) -> list[Target]:
+    """Let attention look at a scene that stays as it is, 30 pictures a second.
+
+    later: the scene for as long again
+    """
     model = Attention(
         AttentionParams(habituation=HabituationParams(**params)),
         FieldOfView(FieldOfViewParams()),
@@ -41,8 +53,16 @@ def watch(seen: Bodies, seconds: float, **params: float) -> list[Target]:
         TopDown(TopDownParams()),
         Idle(IdleParams()),
     )
-    times = [k / 30 for k in range(round(30 * seconds))]
-    return [model.choose(Percept(t, seen), AHEAD, t) for t in times]
+    scenes = [seen, later] if later is not None else [seen]
+    times = [k / 30 for k in range(round(30 * seconds * len(scenes)))]
+    return [model.choose(Percept(t, scenes[int(t / seconds)]), AHEAD, t) for t in times]
+
+
+def waits_s(targets: list[Target], n: int) -> list[float]:
+    """Return for how long each of n bodies was not looked at, at most."""
+    ids = np.array([target.id for target in targets])
+    on = [np.flatnonzero(np.concatenate(([True], ids == k, [True]))) for k in range(1, n + 1)]
+    return [float(np.diff(one).max()) / 30 for one in on]
 
 
 def shares(targets: list[Target]) -> dict[int, float]:
@@ -81,8 +101,14 @@ def test_interest_outlives_an_absence() -> None:
 
 
 def test_a_rule_keeps_its_floor_of_interest() -> None:
-    model = Habituation(HabituationParams(rule_floor=0.6))
-    assert model.for_rule(np.array([0.0, 0.5, 1.0])).tolist() == pytest.approx([0.6, 0.8, 1.0])
+    """A second of looking, at a body of half the weight, is a lead of two."""
+    model = Habituation(HabituationParams(rule_floor=0.6, decay_rate_1_s=0.3))
+    assert model.share([1, 2], [1.0, 0.5], 1, 0.0) == pytest.approx([1.0, 1.0], abs=0.01)
+    assert model.share([1, 2], [1.0, 0.5], 2, 1.0)[0] == 1.0
+    assert model.share([1, 2], [1.0, 0.5], -1, 1.0)[1] == pytest.approx(
+        0.6 + 0.4 * exp(-0.6), abs=0.01
+    )
+    assert model.share([2], [0.5], 2, 9.0) == [1.0]  # one alone is not left for habituation
 
 
 @pytest.mark.parametrize(("aside_deg", "age_s"), [(0.0, 0.0), (4.0, 0.0), (4.0, 1.5), (20.0, 0.0)])
@@ -137,18 +163,36 @@ def test_without_habituation_two_faces_do_not_share() -> None:
     assert share == {1: 1.0}
 
 
-def test_the_nearer_of_two_people_gets_more_of_the_gaze_and_the_other_some() -> None:
-    share = shares(watch(bodies("face face", (1.5, 0.4, 0), (1, -0.3, 0)), 120.0))
-    assert 0.05 < share[1] < 0.4 and share[2] > 0.6
+@pytest.mark.parametrize(
+    "away_m", [(1.5, 1.0), (0.8, 3.0, 3.0, 3.0), (1.0, 1.0, 2.0, 2.0, 3.0, 4.0)]
+)
+def test_people_are_looked_at_for_times_as_their_nearness(away_m: tuple[float, ...]) -> None:
+    share = shares(watch(arc(*away_m), 200.0))
+    weights = np.array(away_m) ** -0.5
+    measured = [share[id] for id in range(1, len(away_m) + 1)]
+    assert measured == pytest.approx(weights / weights.sum(), abs=0.03)
 
 
 def test_nobody_of_three_is_left_out() -> None:
     three = bodies("face face face", (1, 0.4, 0), (1.1, 0, 0), (1, -0.4, 0))
-    targets = watch(three, 120.0)
-    assert min(shares(targets).values()) > 0.25 and min(stays_s(targets)) > 1.0
-    assert 2 not in shares(
-        watch(three, 120.0, inhibition_of_return_strength=0.0)
-    )  # what the default is for
+    for strength in (0.0, 0.5):
+        targets = watch(three, 120.0, inhibition_of_return_strength=strength)
+        assert min(shares(targets).values()) > 0.25 and min(stays_s(targets)) > 1.0
+
+
+@pytest.mark.parametrize("n", [4, 6, 8])
+def test_nobody_of_many_waits_for_long_and_no_look_is_a_glance(n: int) -> None:
+    targets = watch(arc(*[1.5] * n), 90.0)
+    assert max(waits_s(targets, n)) < 15.0
+    assert min(stays_s(targets)) > 1.0
+
+
+def test_who_comes_later_gets_as_much_and_who_was_alone_is_not_forgotten() -> None:
+    """The second minute counts: three have been there for one, three more come."""
+    targets = watch(arc(*[1.5] * 3), 60.0, arc(*[1.5] * 6))
+    after = targets[30 * 60 :]
+    assert shares(after) == pytest.approx(dict.fromkeys(range(1, 7), 1 / 6), abs=0.04)
+    assert max(waits_s(after, 6)) < 15.0
 
 
 def test_the_gaze_leaves_a_hand_that_waves_on_and_on_but_not_before_the_face_is_stronger() -> None:

@@ -1,0 +1,52 @@
+"""Several people who stand still, seen by the whole robot: nobody is left out."""
+
+import pytest
+from seeing import row_08_several_people as row
+
+from gazerig.gaze.shared_attention import SharedAttention
+
+
+@pytest.mark.usefixtures("ideal_servos")
+def test_e88_everybody_of_six_is_looked_at_again_and_again() -> None:
+    figures = row.figures("six alike", [1.6] * 6, seconds=32.0, seeds=1)
+    for name, value in figures.items():
+        if name in row.WANTED:
+            low, high = row.WANTED[name]
+            assert low <= value <= high, name
+
+
+@pytest.mark.usefixtures("ideal_servos")
+def test_e88_of_people_unlike_the_nearer_get_more_and_nobody_nothing() -> None:
+    figures = row.figures("six unlike", row.UNLIKE_M, seconds=32.0, seeds=1)
+    assert figures["six unlike: longest time without a look, s"] < 15.0
+    assert figures["six unlike: correlation of share and salience"] > 0.7
+
+
+def test_leads_grow_with_the_looks_and_are_those_over_the_one_looked_at_least() -> None:
+    shared = SharedAttention()
+    assert shared.step([1, 2, 3], [1.0, 1.0, 1.0], -1, 0.0) == [0.0, 0.0, 0.0]
+    assert shared.step([1, 2, 3], [1.0, 1.0, 1.0], 2, 0.5) == pytest.approx([0.0, 0.5, 0.0])
+    # Who joins is behind nobody; the heaviest of those who are alike comes first.
+    assert shared.step([2, 4], [0.5, 1.0], 4, 0.5)[1] == 0.0
+    leads = shared.step([1, 2, 4], [1.0, 0.5, 1.0], 1, 0.9)
+    assert leads[2] == 0.0 and leads[0] == pytest.approx(0.4) and 0.45 < leads[1] < 0.5
+
+
+def test_a_look_at_a_body_of_half_the_weight_counts_twice() -> None:
+    shared = SharedAttention()
+    shared.step([1, 2], [1.0, 0.5], -1, 0.0)
+    shared.step([1, 2], [1.0, 0.5], 1, 1.0)
+    assert shared.step([1, 2], [1.0, 0.5], 2, 1.5)[0] == pytest.approx(0.0, abs=0.1)
+
+
+def test_leads_are_bounded_fade_and_are_forgotten() -> None:
+    shared = SharedAttention()
+    for k in range(100):
+        leads = shared.step([1, 2, 3], [1.0, 1.0, 1.0], 1, 0.5 * k)
+    assert leads == [5.0, 0.0, 0.0]
+    assert shared.step([1, 2, 3], [1.0, 1.0, 1.0], -1, 60.0)[0] < 2.0
+    for t_s in (130.0, 131.0):
+        shared.step([5, 6], [1.0, 1.0], -1, t_s)
+    assert sorted(shared._leads) == [5, 6]
+    shared.reset(0.0)
+    assert shared._leads == {}
