@@ -1,15 +1,108 @@
 """Data association: the pairing of tracks and detections that is likeliest as a whole.
 
-Taking the nearest pair first gives each of two people who pass each other the other's
-detection whenever one of them happens to be nearer to both places.
+A pair is judged by the distance between where the track is expected and where the detection is,
+in standard deviations of their difference, all pairs in one expression of arrays. Taking the
+nearest pair first gives each of two people who pass each other the other's detection whenever
+one of them happens to be nearer to both places.
 """
 
 from collections.abc import Sequence
 from math import inf
-from typing import Final
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from gazerig.gaze.types import Floats
+from gazerig.robot.model.track_params import TrackParams
 
 FORBIDDEN: Final = 1e6
 """Cost of a pair that cannot be; larger than that of all pairs that can."""
+NO_MARK = -1
+"""Stands for the number of a detection to which its detector gives none."""
+# Two numbers of the detector for one thing, as a cost: 4 standard deviations.
+_OTHER_MARK = 16.0
+# Within so many radii of its middle is about where something is.
+_OUTLINE = 1.5
+
+
+class TrackRow(NamedTuple):
+    """What counts of a track in data association, as plain numbers.
+
+    kind, mark: numbers of its kind and of the detector
+    x, y, z, range_m: unit vector from the camera to where it is expected, and the distance
+    across_m2, along_m2: variances of its position
+    radius_m: half its size
+    size: by which distances from the size of a face are multiplied
+    moved_m: how much farther off it may be for each time it was not seen
+    """
+
+    kind: int
+    mark: int
+    x: float
+    y: float
+    z: float
+    range_m: float
+    across_m2: float
+    along_m2: float
+    radius_m: float
+    size: float
+    moved_m: float
+
+
+class DetectionRow(NamedTuple):
+    """What counts of a detection in data association, as plain numbers.
+
+    kind, mark, x, y, z, range_m, radius_m: as of a track
+    across_sd_m, along_sd_m: standard deviations of its position
+    by_size: 1 where its distance is from the size of a face, else 0
+    """
+
+    kind: int
+    mark: int
+    x: float
+    y: float
+    z: float
+    range_m: float
+    across_sd_m: float
+    along_sd_m: float
+    radius_m: float
+    by_size: int
+
+
+def pair_costs(
+    tracks: Sequence[TrackRow], detections: Sequence[DetectionRow], par: TrackParams
+) -> list[list[float]]:
+    """Return how unlikely it is that tracks are seen so: minus twice the log likelihoods.
+
+    A track long unseen could be anywhere; without the logarithm that would make it the best match
+    of everything. A detector that tells things apart in the image has already judged; what it gave
+    another number is the same only about where the track's own outline is.
+
+    Returns:
+        n rows of m, FORBIDDEN where a pair cannot be.
+    """
+    if not (tracks and detections):
+        return [[] for _ in tracks]
+    t, d = np.array(tracks).T[:, :, None], np.array(detections).T
+    far_m = d[5] * (1.0 + d[9] * (t[9] - 1.0))
+    widest_m = par.gate_m * np.maximum(1.0, far_m)
+    outline_m = _OUTLINE * np.maximum(t[8], d[8])
+    other = (t[1] != d[1]) & (t[1] != NO_MARK) & (d[1] != NO_MARK)
+    wide_m = np.where(other, np.minimum(widest_m, outline_m), widest_m)
+    # What people do that no filter expects: a lunge, a jump of the detector.
+    surprise = (wide_m / par.gate_sigma) ** 2
+    ratio = (t[5] / far_m) ** 2
+    across, along = ratio * (d[6] * d[6] + surprise), ratio * (d[7] * d[7] + surprise)
+    across_sum, along_sum = t[6] + across, t[7] + along
+    aside = t[5] * t[5] * ((t[2] - d[2]) ** 2 + (t[3] - d[3]) ** 2 + (t[4] - d[4]) ** 2)
+    deep_m = 2.0 * t[5] * (far_m - t[5]) / (far_m + t[5])  # the logarithm of their ratio, nearly
+    far = aside / across_sum + deep_m * deep_m / along_sum
+    known: Floats = np.log(across_sum * across_sum * along_sum / (across * across * along))
+    costs = far + known + _OTHER_MARK * other
+    reach = wide_m + t[10]
+    costs[(t[0] != d[0]) | (aside > reach * reach) | (far > par.gate_sigma**2)] = FORBIDDEN
+    rows: list[list[float]] = costs.tolist()
+    return rows
 
 
 def assign(costs: Sequence[Sequence[float]]) -> list[tuple[int, int]]:
@@ -36,16 +129,24 @@ def assign(costs: Sequence[Sequence[float]]) -> list[tuple[int, int]]:
 def _shortest_paths(costs: list[list[float]]) -> list[int]:
     """Return the column of each row in the cheapest pairing; no fewer columns than rows.
 
-    Each row in turn is paired along the path of least reduced cost to a free column, which
-    moves the rows on that path to their next columns. Column 0 stands for the row to be paired.
+    Rows whose cheapest columns differ have them. Each other row in turn is paired along the path of
+    least reduced cost to a free column, which moves the rows on that path to their next columns.
+    Column 0 stands for the row to be paired.
 
     Source: Jonker and Volgenant, "A shortest augmenting path algorithm for dense and sparse
     linear assignment problems" (1987).
     """
     n, m = len(costs), len(costs[0])
-    row_price, column_price = [0.0] * (n + 1), [0.0] * (m + 1)
+    row_price, column_price = [0.0, *map(min, costs)], [0.0] * (m + 1)
     row_of = [0] * (m + 1)  # rows count from 1, and 0 is a free column
+    waits = []
     for row in range(1, n + 1):
+        cheapest = costs[row - 1].index(row_price[row]) + 1
+        if row_of[cheapest]:
+            waits.append(row)
+        else:
+            row_of[cheapest] = row
+    for row in waits:
         row_of[0] = row
         column, before = 0, [0] * (m + 1)
         length, waiting = [inf] * (m + 1), set(range(1, m + 1))

@@ -1,32 +1,27 @@
-"""One thing's position and velocity through time: a constant-velocity Kalman filter.
+"""One thing's position and velocity through time: a Kalman filter of direction and log range.
 
-World frame, metres, seconds. What moves changes its
-velocity at random: little most of the time, and much at once when a person starts or
-stops. One noise for both is either nervous or late, so there are two, and an innovation
-too large for the quiet one brings the lively one in (Bar-Shalom, Li & Kirubarajan,
-"Estimation with Applications to Tracking and Navigation", 11.6).
+A camera knows where something is across its view to millimetres, and along it often to no better
+than a metre. In x, y, z that is a long thin ellipsoid, and two of them that point a little apart
+meet nearer to the camera than either of their middles: a linear filter would take every jump of the
+direction for an approach. Direction and logarithm of the range keep the two apart, and nothing gets
+behind the camera (modified spherical coordinates: Aidala and Hammel, "Utilization of modified
+polar coordinates for bearings-only tracking", 1983).
 
-The covariance is kept as its blocks: of the position, of the velocity, and between them. A
-position or a velocity is measured whole, so that both corrections are the same three products.
+Position and velocity are kept in the world, in metres and seconds; variances are kept across the
+view, the same for all directions there, and along it. They turn with the direction and grow with
+the range.
+
+What moves changes its velocity at random: little most of the time, and much at once when a person
+starts or stops. One noise for both is either nervous or late, so there are two, and an innovation
+too large for the quiet one brings the lively one in (Bar-Shalom, Li & Kirubarajan, "Estimation with
+Applications to Tracking and Navigation", 11.6).
 """
 
-from math import exp, sqrt
+from math import atan2, cos, exp, log, sin, sqrt
 from typing import NamedTuple
 
-from gazerig.gaze.angles import sub
+from gazerig.gaze.angles import add, dot, norm, scale, sub
 from gazerig.gaze.types import Vec3
-from gazerig.robot.perception.symmetric import (
-    Flat9,
-    Sym3,
-    applied,
-    full,
-    inverse,
-    less_product,
-    plus,
-    squared_length,
-    times,
-    transposed,
-)
 
 # Accelerations are taken to last this long, which makes the noise one of the time and not
 # of the rate of frames.
@@ -39,8 +34,11 @@ _EXPECTED = 4.0
 _CHANGES_FOR_S = 0.5
 # What is not seen moves on, but less and less surely: people stop.
 _STOPS_WITHIN_S = 1.0
-
-_NONE: Flat9 = (0.0,) * 9
+NEAREST_M = 0.05
+"""Nothing is believed nearer to the camera."""
+# Range changes in one step by no larger factor than e to this.
+_LARGEST_LOG_STEP = 3.0
+_TINY_RAD = 1e-12
 
 
 class ProcessNoise(NamedTuple):
@@ -50,87 +48,148 @@ class ProcessNoise(NamedTuple):
     lively_m_s2: float
 
 
+class Variances(NamedTuple):
+    """Covariance of position and velocity along one axis: m2, m2/s, m2/s2."""
+
+    p: float
+    pv: float
+    v: float
+
+
+class Offset(NamedTuple):
+    """How far a place is from where a track is expected, as seen from the camera.
+
+    across_m: from the one line of view to the other, tangent to the sphere about the camera
+    along_m: logarithm of the ratio of the ranges, times the range of the track
+    ratio: range of the track over that of the place: how many metres at the track one is there
+    """
+
+    across_m: Vec3
+    along_m: float
+    ratio: float
+
+
 class TrackFilter:
     """The filter of one track. Numbers given to it must be finite.
 
     Args:
         p_m: first position.
-        cov_m2: its covariance.
+        p_camera_m: where it was seen from.
+        sds_m: its standard deviations across and along the view.
         speed_sd_m_s: standard deviation of the velocity, which begins at 0.
         noise: of the process.
 
     p_m, v_m_s: position and velocity
-    p_cov, v_cov: their covariances; pv_cov: the covariance of position (rows) and velocity
+    view, range_m: unit vector from the camera to it, and its distance
+    across, along: covariances across the view (each direction) and along it
     """
 
-    def __init__(self, p_m: Vec3, cov_m2: Sym3, speed_sd_m_s: float, noise: ProcessNoise) -> None:
+    __slots__ = (
+        "_accel_m_s2", "_camera", "_noise", "_unseen_s", "across", "along", "p_m", "range_m",
+        "v_m_s", "view",
+    )  # fmt: skip
+
+    def __init__(
+        self,
+        p_m: Vec3,
+        p_camera_m: Vec3,
+        sds_m: tuple[float, float],
+        speed_sd_m_s: float,
+        noise: ProcessNoise,
+    ) -> None:
         self._noise = noise
         self._unseen_s = self._accel_m_s2 = 0.0
-        var = speed_sd_m_s * speed_sd_m_s
+        self._camera = p_camera_m
         self.p_m: Vec3 = p_m
         self.v_m_s: Vec3 = (0.0, 0.0, 0.0)
-        self.p_cov = cov_m2
-        self.pv_cov = _NONE
-        self.v_cov: Sym3 = (var, 0.0, 0.0, var, 0.0, var)
+        self.view, self.range_m = sight(p_m, p_camera_m)
+        var = speed_sd_m_s * speed_sd_m_s
+        self.across = Variances(sds_m[0] * sds_m[0], 0.0, var)
+        self.along = Variances(sds_m[1] * sds_m[1], 0.0, var)
 
     def retune(self, noise: ProcessNoise) -> None:
         """Use another process noise; position and velocity stay."""
         self._noise = noise
 
-    def predict(self, dt_s: float, seen: bool = True) -> None:
-        """Go on by a time; what is not seen slows down."""
+    def predict(self, dt_s: float, seen: bool = True, range_known: bool = True) -> None:
+        """Go on by a time; what is not seen slows down.
+
+        Args:
+            dt_s: the time.
+            seen: whether it was seen in the last frame.
+            range_known: False where its range is only assumed: what crosses the view then
+                stays as far away, as neither a straight line nor its speed is known.
+        """
         if dt_s <= 0.0:
             return
+        v = self.v_m_s
+        if range_known:
+            self._place(add(self.p_m, scale(v, dt_s)))
+        else:
+            along = dot(v, self.view)
+            self._move(scale(sub(v, scale(self.view, along)), dt_s), along * dt_s)
         kept = 1.0 if seen else exp(-dt_s / _STOPS_WITHIN_S)
+        self.v_m_s = scale(self.v_m_s, kept)
         self._unseen_s += dt_s
-        (x, y, z), (vx, vy, vz) = self.p_m, self.v_m_s
-        self.p_m = (x + dt_s * vx, y + dt_s * vy, z + dt_s * vz)
-        self.v_m_s = (kept * vx, kept * vy, kept * vz)
-        V, C, P = self.v_cov, self.pv_cov, self.p_cov
-        a, b, c, d, e, f = V
-        # Position and velocity after the move, then both with the position before it.
-        D = (
-            C[0] + dt_s * a, C[1] + dt_s * b, C[2] + dt_s * c,
-            C[3] + dt_s * b, C[4] + dt_s * d, C[5] + dt_s * e,
-            C[6] + dt_s * c, C[7] + dt_s * e, C[8] + dt_s * f,
-        )  # fmt: skip
-        self.p_cov = (
-            P[0] + dt_s * (C[0] + D[0]),
-            P[1] + dt_s * (C[3] + D[1]),
-            P[2] + dt_s * (C[6] + D[2]),
-            P[3] + dt_s * (C[4] + D[4]),
-            P[4] + dt_s * (C[7] + D[5]),
-            P[5] + dt_s * (C[8] + D[8]),
-        )
-        if not seen:
-            k2 = kept * kept
-            D = tuple([kept * one for one in D])  # type: ignore[assignment]
-            self.v_cov = (k2 * a, k2 * b, k2 * c, k2 * d, k2 * e, k2 * f)
-        self.pv_cov = D
         self._accel_m_s2 *= exp(-dt_s / _CHANGES_FOR_S)
-        self._wander(max(self._noise.quiet_m_s2, self._accel_m_s2), dt_s)
+        accel = max(self._noise.quiet_m_s2, self._accel_m_s2)
+        self.across = _wandered(_gone_on(self.across, dt_s, kept), accel, dt_s)
+        self.along = _wandered(_gone_on(self.along, dt_s, kept), accel, dt_s)
 
-    def correct(self, p_m: Vec3, cov_m2: Sym3) -> None:
-        """Update with a measured position and its covariance."""
-        off = sub(p_m, self.p_m)
-        information, _ = inverse(plus(self.p_cov, cov_m2))
-        if squared_length(off, information) > _SURPRISING:
-            information = self._adapted(off, cov_m2)
+    def look_from(self, p_camera_m: Vec3) -> None:
+        """See it from another place: what was along the view is partly across it now."""
+        if p_camera_m == self._camera:
+            return
+        before, self._camera = self.view, p_camera_m
+        self._place(self.p_m)
+        ahead = dot(before, self.view)
+        turned = 1.0 - ahead * ahead
+        if turned > 0.0:
+            a, b = self.across, self.along
+            self.across = _mixed(a, b, 0.5 * turned)
+            self.along = _mixed(b, a, turned)
+
+    def offset(self, p_m: Vec3) -> Offset:
+        """Return how far a place is from where this is expected."""
+        view, range_m = sight(p_m, self._camera)
+        ahead = dot(view, self.view)
+        aside = sub(view, scale(self.view, ahead))
+        away = norm(aside)
+        ratio = self.range_m / range_m
+        arc = atan2(away, ahead) / away if away > _TINY_RAD else 1.0
+        across = scale(aside, self.range_m * arc)
+        return Offset(across, -self.range_m * log(ratio), ratio)
+
+    def correct(self, p_m: Vec3, across_sd_m: float, along_sd_m: float) -> None:
+        """Update with a measured position and its standard deviations."""
+        off = self.offset(p_m)
+        at = off.ratio
+        across, along = (at * across_sd_m) ** 2, (at * along_sd_m) ** 2
+        e, l_ = off.across_m, off.along_m
+        aside, deep = dot(e, e), l_ * l_
+        A, B = self.across, self.along
+        if aside / (A.p + across) + deep / (B.p + along) > _SURPRISING:
+            self._adapt(aside, deep, across, along)
+            A, B = self.across, self.along
         self._unseen_s = 0.0
-        step = applied(information, off)
-        P, C = full(self.p_cov), self.pv_cov
-        self.p_m = _moved(self.p_m, P, step)
-        self.v_m_s = _moved(self.v_m_s, C, step)
-        N = times(information, C)
-        self.v_cov = less_product(self.v_cov, C, N)
-        self.pv_cov = _less(C, P, N)
-        self.p_cov = less_product(self.p_cov, P, times(information, P))
+        of_p, of_v = A.p / (A.p + across), A.pv / (A.p + across)
+        along_p, along_v = B.p / (B.p + along), B.pv / (B.p + along)
+        self.across = Variances(A.p - of_p * A.p, A.pv - of_p * A.pv, A.v - of_v * A.pv)
+        self.along = Variances(B.p - along_p * B.p, B.pv - along_p * B.pv, B.v - along_v * B.pv)
+        self.v_m_s = add(self.v_m_s, add(scale(e, of_v), scale(self.view, along_v * l_)))
+        self._move(scale(e, of_p), along_p * l_)
 
-    def _adapted(self, off: Vec3, cov_m2: Sym3) -> Sym3:
-        """Raise the noise until an innovation is no surprise; return the information matrix.
+    def _adapt(self, aside: float, deep: float, across: float, along: float) -> None:
+        """Raise the noise until an innovation is no surprise.
 
         No higher than that: the largest noise at once would take a small change of speed for a
         large one, and the velocity would overshoot by as much as it had lagged behind.
+
+        Args:
+            aside: the innovation across the view, squared.
+            deep: the same along it.
+            across: variance of what was measured across the view.
+            along: the same along it.
         """
         # Whatever happened may have happened at any time since the last look: a place
         # that was long unseen and is off tells less of the velocity of now.
@@ -138,67 +197,106 @@ class TrackFilter:
         while True:
             before, accel = accel, min(2.0 * accel, most)
             if accel > before:
-                self._wander(sqrt(accel * accel - before * before), self._unseen_s)
-            information, _ = inverse(plus(self.p_cov, cov_m2))
-            if accel >= most or squared_length(off, information) < _EXPECTED:
+                more = sqrt(accel * accel - before * before)
+                self.across = _wandered(self.across, more, self._unseen_s)
+                self.along = _wandered(self.along, more, self._unseen_s)
+            far = aside / (self.across.p + across) + deep / (self.along.p + along)
+            if accel >= most or far < _EXPECTED:
                 self._accel_m_s2 = accel
-                return information
+                return
 
-    def correct_velocity(self, v_m_s: Vec3, cov_m2_s2: Sym3) -> None:
-        """Update with a measured velocity and its covariance."""
-        information, _ = inverse(plus(self.v_cov, cov_m2_s2))
-        step = applied(information, sub(v_m_s, self.v_m_s))
-        V, C = full(self.v_cov), transposed(self.pv_cov)
-        self.p_m = _moved(self.p_m, C, step)
-        self.v_m_s = _moved(self.v_m_s, V, step)
-        N = times(information, C)
-        self.p_cov = less_product(self.p_cov, C, N)
-        self.pv_cov = transposed(_less(C, V, N))
-        self.v_cov = less_product(self.v_cov, V, times(information, V))
+    def correct_velocity(
+        self, p_m: Vec3, v_m_s: Vec3, across_sd_m_s: float, along_sd_m_s: float
+    ) -> None:
+        """Update with a velocity that was measured at a place, and its standard deviations.
 
-    def cov_rows(self) -> tuple[float, ...]:
-        """Return the covariance of position and velocity: 6 x 6 numbers, row by row."""
-        a, b, c, d, e, f = self.p_cov
-        g, h, i, j, k, l_, m, n, o = self.pv_cov
-        p, q, r, s, t, u = self.v_cov
-        return (
-            a, b, c, g, h, i,
-            b, d, e, j, k, l_,
-            c, e, f, m, n, o,
-            g, j, m, p, q, r,
-            h, k, n, q, s, t,
-            i, l_, o, r, t, u,
-        )  # fmt: skip
+        What a camera sees is an angle and a share of the size a second: farther away or nearer
+        than where it was measured, that is another speed.
+        """
+        view, range_m = sight(p_m, self._camera)
+        at = self.range_m / range_m
+        along = dot(v_m_s, view)
+        v, here = scale(sub(v_m_s, scale(view, along)), at), self.view
+        other = sub(v, self.v_m_s)
+        off = sub(other, scale(here, dot(other, here)))
+        deep = at * along - dot(self.v_m_s, here)
+        A, B = self.across, self.along
+        sa, sb = A.v + (at * across_sd_m_s) ** 2, B.v + (at * along_sd_m_s) ** 2
+        of_p, of_v, along_p, along_v = A.pv / sa, A.v / sa, B.pv / sb, B.v / sb
+        self.across = Variances(A.p - of_p * A.pv, A.pv - of_p * A.v, A.v - of_v * A.v)
+        self.along = Variances(B.p - along_p * B.pv, B.pv - along_p * B.v, B.v - along_v * B.v)
+        self.v_m_s = add(self.v_m_s, add(scale(off, of_v), scale(here, along_v * deep)))
+        self._move(scale(off, of_p), along_p * deep)
 
-    def _wander(self, accel_m_s2: float, dt_s: float) -> None:
-        """Add the covariance that random acceleration makes in a time."""
-        v = accel_m_s2 * accel_m_s2 * _ACCELERATION_LASTS_S * dt_s
-        pv = v * dt_s / 2.0
-        p = v * dt_s * dt_s / 3.0
-        a, b, c, d, e, f = self.p_cov
-        self.p_cov = (a + p, b, c, d + p, e, f + p)
-        g, h, i, j, k, l_, m, n, o = self.pv_cov
-        self.pv_cov = (g + pv, h, i, j, k + pv, l_, m, n, o + pv)
-        a, b, c, d, e, f = self.v_cov
-        self.v_cov = (a + v, b, c, d + v, e, f + v)
+    def _place(self, p_m: Vec3) -> None:
+        """Put it at a place, which is no nearer than things are believed."""
+        way = sub(p_m, self._camera)
+        ahead = dot(way, self.view)
+        if ahead < NEAREST_M and norm(sub(way, scale(self.view, ahead))) < NEAREST_M:
+            p_m = add(self._camera, scale(self.view, NEAREST_M))  # not through the camera
+        self.p_m = p_m
+        self.view, self.range_m = sight(p_m, self._camera)
+
+    def _move(self, across_m: Vec3, along_m: float) -> None:
+        """Move it on the sphere about the camera and along its view; all it has turns along.
+
+        A velocity across the view stays an angle a second and one along it a share of the range.
+        """
+        here, range_m = self.view, self.range_m
+        aside = norm(across_m)
+        angle = aside / range_m
+        if angle > _TINY_RAD:
+            way = scale(across_m, 1.0 / aside)
+            there, onward = _turned(here, way, angle)
+            v = self.v_m_s
+            seen, gone = dot(v, here), dot(v, way)
+            self.v_m_s = add(v, add(scale(sub(there, here), seen), scale(sub(onward, way), gone)))
+            self.view = here = there
+        if along_m != 0.0:
+            step = min(max(along_m / range_m, -_LARGEST_LOG_STEP), _LARGEST_LOG_STEP)
+            range_m = max(NEAREST_M, range_m * exp(step))
+            grown = range_m / self.range_m
+            self.v_m_s = scale(self.v_m_s, grown)
+            self.across = _scaled(self.across, grown * grown)
+            self.along = _scaled(self.along, grown * grown)
+            self.range_m = range_m
+        self.p_m = add(self._camera, scale(here, range_m))
 
 
-def _moved(at: Vec3, M: Flat9, step: Vec3) -> Vec3:
-    """Return a + M^T s."""
-    x, y, z = step
-    return (
-        at[0] + M[0] * x + M[3] * y + M[6] * z,
-        at[1] + M[1] * x + M[4] * y + M[7] * z,
-        at[2] + M[2] * x + M[5] * y + M[8] * z,
-    )
+def sight(p_m: Vec3, p_camera_m: Vec3) -> tuple[Vec3, float]:
+    """Return the direction in which a place is seen, and its distance, never below the nearest."""
+    x, y, z = p_m[0] - p_camera_m[0], p_m[1] - p_camera_m[1], p_m[2] - p_camera_m[2]
+    far = sqrt(x * x + y * y + z * z)
+    if far == 0.0:
+        return (1.0, 0.0, 0.0), NEAREST_M
+    return (x / far, y / far, z / far), max(far, NEAREST_M)
 
 
-def _less(A: Flat9, M: Flat9, N: Flat9) -> Flat9:
-    """Return A - M N, M being symmetric."""
-    a, b, c, _, e, f, _, _, i = M
-    p, q, r, s, t, u, v, w, x = N
-    return (
-        A[0] - a * p - b * s - c * v, A[1] - a * q - b * t - c * w, A[2] - a * r - b * u - c * x,
-        A[3] - b * p - e * s - f * v, A[4] - b * q - e * t - f * w, A[5] - b * r - e * u - f * x,
-        A[6] - c * p - f * s - i * v, A[7] - c * q - f * t - i * w, A[8] - c * r - f * u - i * x,
-    )  # fmt: skip
+def _gone_on(C: Variances, dt_s: float, kept: float) -> Variances:
+    """Return a covariance after a time in which a share of the velocity is kept."""
+    p, pv, v = C
+    both = pv + dt_s * v
+    return Variances(p + dt_s * (pv + both), kept * both, kept * kept * v)
+
+
+def _wandered(C: Variances, accel_m_s2: float, dt_s: float) -> Variances:
+    """Return a covariance with what random acceleration makes in a time."""
+    v = accel_m_s2 * accel_m_s2 * _ACCELERATION_LASTS_S * dt_s
+    return Variances(C.p + v * dt_s * dt_s / 3.0, C.pv + v * dt_s / 2.0, C.v + v)
+
+
+def _mixed(C: Variances, D: Variances, share: float) -> Variances:
+    """Return a covariance a share of the way to another."""
+    kept = 1.0 - share
+    return Variances(kept * C.p + share * D.p, kept * C.pv + share * D.pv, kept * C.v + share * D.v)
+
+
+def _scaled(C: Variances, factor: float) -> Variances:
+    """Return a covariance in larger or smaller units."""
+    return Variances(factor * C.p, factor * C.pv, factor * C.v)
+
+
+def _turned(view: Vec3, way: Vec3, angle_rad: float) -> tuple[Vec3, Vec3]:
+    """Return two unit vectors at right angles, the first turned towards the second."""
+    c, s = cos(angle_rad), sin(angle_rad)
+    return add(scale(view, c), scale(way, s)), sub(scale(way, c), scale(view, s))

@@ -11,8 +11,8 @@ from math import hypot, radians, sqrt
 import numpy as np
 
 from gazerig.drivers.types import Detections, LocatedFrame
-from gazerig.gaze.angles import add, norm, rotate, scale, sub, unit
-from gazerig.gaze.types import PARTS, Bodies, Face, Mat3, Percept, Vec3
+from gazerig.gaze.angles import add, rotate, scale, sub
+from gazerig.gaze.types import PARTS, Bodies, Face, Floats, Mat3, Percept, Vec3
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, LensParams, PoseHistory
 from gazerig.robot.perception.egomotion_residual import (
@@ -26,11 +26,11 @@ from gazerig.robot.perception.frame_locator import SIZE_SPREAD, DepthAt, FrameLo
 from gazerig.robot.perception.gaze_at_head import angle_off_head_rad, looks_at_head
 from gazerig.robot.perception.hand_ownership import Known, without_own_motion
 from gazerig.robot.perception.localisation import placed
-from gazerig.robot.perception.symmetric import squared_length
 from gazerig.robot.perception.tracker import Track, Tracker
 
 # The head's turn at a capture is taken over so long before and after it.
 _HALF_TURN_S = 0.015
+_AXES = np.eye(3)
 
 
 class Perception:
@@ -99,7 +99,7 @@ class Perception:
         self._note_residual(t_s, poses)
         self._percept = Percept(
             t_s,
-            _bodies(tracks, p),
+            _bodies(tracks),
             tuple(self._face(track) for track in tracks if track.detection.kind == "face"),
         )
         return self._percept
@@ -153,7 +153,7 @@ class Perception:
         R = track.R_world_face
         assert R is not None  # faces are tracked with their pose
         p = track.p_world_m
-        across_sd, along_sd = _deviations(track, self._p_camera)
+        across_sd, along_sd = _deviations(track)
         found = track.detection
         off_rad = angle_off_head_rad(R, found.gaze_world, sub(self._p_head, p))
         if track.seen_s == track.at_s:
@@ -202,48 +202,61 @@ class Perception:
         return tuple(parts)
 
 
-def _deviations(track: Track, p_camera: Vec3) -> tuple[float, float]:
+def _deviations(track: Track) -> tuple[float, float]:
     """Return how well a face's position is known, across and along the view.
 
     The filter knows of what changes from frame to frame; that this person's face is
     not of the usual size is the same in all of them.
     """
-    way = sub(track.p_world_m, p_camera)
-    cov = track.filter.p_cov
-    along = squared_length(unit(way), cov)
-    across = 0.5 * max(0.0, cov[0] + cov[3] + cov[5] - along)
-    unknown_size = 0.0 if track.depth_s is not None else SIZE_SPREAD * norm(way)
-    return sqrt(across), hypot(sqrt(max(0.0, along)), unknown_size)
+    across, along = track.filter.across.p, track.filter.along.p
+    unknown_size = 0.0 if track.depth_s is not None else SIZE_SPREAD * track.filter.range_m
+    return sqrt(across), hypot(sqrt(along), unknown_size)
 
 
-def _bodies(tracks: tuple[Track, ...], p_camera: Vec3) -> Bodies:
+def _bodies(tracks: tuple[Track, ...]) -> Bodies:
     """List faces and moving things alike; a spin seen in the image is about the view line."""
     if not tracks:
         return Bodies(pv_cov=np.zeros((0, 6, 6)))
+    filters = [track.filter for track in tracks]
     table = np.array(
         [
             (
-                *track.filter.p_m,
-                *track.filter.v_m_s,
-                *_spin(track, p_camera),
-                track.detection.radius_m,
-                *track.filter.cov_rows(),
+                *f.p_m,
+                *f.v_m_s,
+                *f.view,
+                t.detection.spin_rad_s,
+                t.detection.radius_m,
+                *f.across,
+                *f.along,
             )
-            for track in tracks
+            for t, f in zip(tracks, filters, strict=True)
         ]
     )
+    view = table[:, 6:9]
     return Bodies(
         tuple([track.id for track in tracks]),
         tuple([track.detection.kind for track in tracks]),
         table[:, 0:3],
         table[:, 3:6],
-        table[:, 6:9],
-        table[:, 9],
-        table[:, 10:].reshape(-1, 6, 6),
+        view * table[:, 9:10],
+        table[:, 10],
+        covariances(view, table[:, 11:14], table[:, 14:17]),
     )
 
 
-def _spin(track: Track, p_camera: Vec3) -> Vec3:
-    """Return the angular velocity of what spins about the line of view."""
-    spin = track.detection.spin_rad_s
-    return scale(unit(sub(track.p_world_m, p_camera)), spin) if spin else (0.0, 0.0, 0.0)
+def covariances(view: Floats, across: Floats, along: Floats) -> Floats:
+    """Return covariances of position and velocity in the world, (n, 6, 6).
+
+    Args:
+        view: (n, 3) unit vectors from the camera to the things.
+        across: (n, 3) of each the covariances of position, of position and velocity, and of
+            velocity, across the view.
+        along: (n, 3) the same along it.
+    """
+    blocks = across[:, :, None, None] * _AXES
+    blocks += (along - across)[:, :, None, None] * (view[:, None, :, None] * view[:, None, None])
+    cov = np.empty((len(view), 6, 6))
+    cov[:, :3, :3] = blocks[:, 0]
+    cov[:, :3, 3:] = cov[:, 3:, :3] = blocks[:, 1]
+    cov[:, 3:, 3:] = blocks[:, 2]
+    return cov

@@ -3,24 +3,22 @@
 World frame, metres. Every detection brings its own uncertainty, which along the line of
 view may be many times that across it; a pair of track and detection is judged by the
 distance in these terms, all pairs together (data_association), and the track is updated with
-the detection by a Kalman filter (kalman).
+the detection by a Kalman filter of direction and range (kalman).
 """
 
 from dataclasses import dataclass
-from math import hypot, log
 
-from gazerig.gaze.angles import add, cross, norm, scale, sub, unit
+from gazerig.gaze.angles import add, cross, scale, sub, unit
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.track_params import TrackParams
-from gazerig.robot.perception.data_association import FORBIDDEN, assign
-from gazerig.robot.perception.kalman import ProcessNoise, TrackFilter
-from gazerig.robot.perception.symmetric import inverse, plus, sight_cov, squared_length
-
-# Two numbers of the detector for one thing, as a cost: 4 standard deviations.
-_OTHER_MARK = 16.0
-# Within so many radii of its middle is about where something is.
-_OUTLINE = 1.5
-_NEAREST_M = 0.05
+from gazerig.robot.perception.data_association import (
+    NO_MARK,
+    DetectionRow,
+    TrackRow,
+    assign,
+    pair_costs,
+)
+from gazerig.robot.perception.kalman import ProcessNoise, TrackFilter, sight
 
 
 @dataclass(slots=True)
@@ -127,17 +125,14 @@ class Tracker:
         self, detections: list[LocalisedDetection], p_world_camera_m: Vec3, t_s: float
     ) -> tuple[Track, ...]:
         """Associate the detections of one frame with the tracks; return the tracks in sight."""
-        par = self._params
         for track in self._tracks:
             if not self._remembered(track):
-                track.filter.predict(t_s - track.at_s, seen=track.seen_s == track.at_s)
+                track.filter.predict(
+                    t_s - track.at_s, track.seen_s == track.at_s, track.depth_from != "assumed"
+                )
+            track.filter.look_from(p_world_camera_m)
             track.at_s = t_s
-        pairs = assign(
-            [
-                [self._cost(track, detection, p_world_camera_m) for detection in detections]
-                for track in self._tracks
-            ]
-        )
+        pairs = assign(self._costs(detections, p_world_camera_m))
         for i, j in pairs:
             self._update(self._tracks[i], detections[j], p_world_camera_m)
         taken = {j for _, j in pairs}
@@ -145,7 +140,8 @@ class Tracker:
             if j not in taken:
                 self._tracks.append(self._begin(detection, p_world_camera_m, t_s))
         self._tracks = [t for t in self._tracks if t_s - t.seen_s <= self._kept_s(t)]
-        return tuple(t for t in self._tracks if t_s - t.seen_s <= par.coast_ms / 1e3)
+        coast_s = self._params.coast_ms / 1e3
+        return tuple([t for t in self._tracks if t_s - t.seen_s <= coast_s])
 
     def _kept_s(self, track: Track) -> float:
         """Return how long a track is kept without a detection."""
@@ -157,57 +153,51 @@ class Tracker:
         """Return whether a track is so long out of sight that it is taken to stay where it was."""
         return track.at_s - track.seen_s > self._params.forget_ms / 1e3
 
-    def _cost(self, track: Track, detection: LocalisedDetection, p_camera: Vec3) -> float:
-        """Return how unlikely it is that a track is seen so: minus twice the log likelihood.
+    def _costs(self, detections: list[LocalisedDetection], p_camera: Vec3) -> list[list[float]]:
+        """Return the cost of every pair of track and detection."""
+        kinds: dict[str, int] = {}
+        rows = [
+            DetectionRow(
+                kinds.setdefault(found.kind, len(kinds)),
+                _mark(found),
+                *_sight(found.p_world_m, p_camera),
+                found.across_sd_m,
+                found.along_sd_m,
+                found.radius_m,
+                not found.depth_measured,
+            )
+            for found in detections
+        ]
+        tracks = [
+            TrackRow(
+                kinds.get(track.detection.kind, -1),
+                _mark(track.detection),
+                *track.filter.view,
+                track.filter.range_m,
+                track.filter.across.p,
+                track.filter.along.p,
+                track.detection.radius_m,
+                1.0 if track.depth_s is None else track.face_size,
+                self._moved_m(track),
+            )
+            for track in self._tracks
+        ]
+        return pair_costs(tracks, rows, self._params)
 
-        A track long unseen could be anywhere; without the logarithm that would make it
-        the best match of everything.
-        """
-        par = self._params
-        if track.detection.kind != detection.kind:
-            return FORBIDDEN
-        place = sized(track, detection, p_camera)
-        off = sub(place, track.p_world_m)
-        view = sub(place, p_camera)
-        wide = self._gate_m(track, detection, norm(view))
-        unseen_s = track.at_s - track.seen_s
-        moved = 0.0 if self._remembered(track) else par.gate_speed_m_s * unseen_s
-        if norm(cross(unit(view), off)) > wide + moved:
-            return FORBIDDEN
-        # What people do that no filter expects: a lunge, a jump of the detector.
-        surprise = wide / par.gate_sigma
-        across, along = (
-            hypot(detection.across_sd_m, surprise),
-            hypot(detection.along_sd_m, surprise),
-        )
-        information, det = inverse(
-            plus(track.filter.p_cov, sight_cov(place, p_camera, across, along))
-        )
-        far = squared_length(off, information)
-        if far > par.gate_sigma**2:
-            return FORBIDDEN
-        known = log(det / (across**4 * along**2))
-        return far + known + (0.0 if _same_mark(track, detection) else _OTHER_MARK)
-
-    def _gate_m(self, track: Track, detection: LocalisedDetection, far_m: float) -> float:
-        """Return the farthest from its expected place that something is taken for the same.
-
-        A detector that tells things apart in the image has already judged; what it gave
-        another number is the same only about where the track's own outline is.
-        """
-        widest = self._params.gate_m * max(1.0, far_m)
-        if _same_mark(track, detection):
-            return widest
-        return min(widest, _OUTLINE * max(track.detection.radius_m, detection.radius_m))
+    def _moved_m(self, track: Track) -> float:
+        """Return how much farther a track may be from its expected place for every time unseen."""
+        if self._remembered(track):
+            return 0.0
+        return self._params.gate_speed_m_s * (track.at_s - track.seen_s)
 
     def _begin(self, detection: LocalisedDetection, p_camera: Vec3, t_s: float) -> Track:
-        place = detection.p_world_m
         track = Track(
             self._next_id,
             detection,
             TrackFilter(
-                place,
-                sight_cov(place, p_camera, detection.across_sd_m, detection.along_sd_m),
+                detection.p_world_m,
+                p_camera,
+                (detection.across_sd_m, detection.along_sd_m),
                 self._params.first_speed_m_s,
                 self._of_faces if detection.R_world_face is not None else self._of_things,
             ),
@@ -218,16 +208,14 @@ class Tracker:
         )
         self._next_id += 1
         self._learn_size(track, detection, 1.0)
-        self._velocity(track, detection, p_camera)
+        _correct_velocity(track, detection)
         return track
 
     def _update(self, track: Track, detection: LocalisedDetection, p_camera: Vec3) -> None:
         """Update a track with a detection."""
         place = sized(track, detection, p_camera)
-        track.filter.correct(
-            place, sight_cov(place, p_camera, detection.across_sd_m, detection.along_sd_m)
-        )
-        self._velocity(track, detection, p_camera)
+        track.filter.correct(place, detection.across_sd_m, detection.along_sd_m)
+        _correct_velocity(track, detection)
         gain = self._params.shape_gain
         if track.R_world_face is not None and detection.R_world_face is not None:
             track.R_world_face = blended(
@@ -236,19 +224,6 @@ class Tracker:
             track.face_length += gain * (detection.face_length - track.face_length)
         self._learn_size(track, detection, gain)
         track.detection, track.seen_s = detection, track.at_s
-
-    def _velocity(self, track: Track, detection: LocalisedDetection, p_camera: Vec3) -> None:
-        """Update with a velocity that was measured in the image."""
-        if detection.v_world_m_s is None:
-            return
-        share = 1.0
-        if not detection.depth_measured:
-            # What was seen is an angle a second; at another distance that is another speed.
-            away = norm(sub(track.p_world_m, p_camera))
-            share = away / max(norm(sub(detection.p_world_m, p_camera)), _NEAREST_M)
-        sds = share * detection.across_sd_m_s, share * detection.along_sd_m_s
-        cov = sight_cov(detection.p_world_m, p_camera, *sds)
-        track.filter.correct_velocity(scale(detection.v_world_m_s, share), cov)
 
     def _learn_size(self, track: Track, detection: LocalisedDetection, gain: float) -> None:
         """Learn how large a face is where its distance is known otherwise."""
@@ -259,10 +234,20 @@ class Tracker:
         track.depth_s = track.at_s
 
 
-def _same_mark(track: Track, detection: LocalisedDetection) -> bool:
-    """Return whether the detector gave both one number, or numbers nothing."""
-    marks = track.detection.mark, detection.mark
-    return None in marks or marks[0] == marks[1]
+def _correct_velocity(track: Track, found: LocalisedDetection) -> None:
+    """Update a track with a velocity that was measured in the image."""
+    if found.v_world_m_s is not None:
+        sds = found.across_sd_m_s, found.along_sd_m_s
+        track.filter.correct_velocity(found.p_world_m, found.v_world_m_s, *sds)
+
+
+def _mark(found: LocalisedDetection) -> int:
+    return NO_MARK if found.mark is None else found.mark
+
+
+def _sight(p_m: Vec3, p_camera: Vec3) -> tuple[float, float, float, float]:
+    (x, y, z), range_m = sight(p_m, p_camera)
+    return x, y, z, range_m
 
 
 def sized(track: Track, detection: LocalisedDetection, p_camera: Vec3) -> Vec3:
