@@ -63,7 +63,7 @@ class Robot:
         attention: chooses the target.
         scanpath: which part of a face.
         aversion: looking away in a conversation.
-        oculomotor: target to eyes, head and lids.
+        oculomotor: target to eyes, head and lids; says whether the gaze has arrived.
         lids: their blinks can be asked for.
         animation: gestures and expressions laid over gaze.
         gestures: those that can be played.
@@ -105,7 +105,6 @@ class Robot:
         self._animation = animation
         self._gestures = gestures
         self._guard = guard
-        self._settled = True
         self._gaze_m: Vec3 | None = None
         self._commands = CommandQueue()
         self._lead = Lead()
@@ -234,11 +233,11 @@ class Robot:
         target = self._lead.target(chosen, percept, t_s)
         target = self._aversion.step(target, pose.p_world_head_m, t_s, self._lead.active)
         target = self._scanpath.wander(
-            target, percept, t_s, self._settled, pose.p_world_head_m, self._gaze_m
+            target, percept, t_s, self._oculomotor.settled, pose.p_world_head_m, self._gaze_m
         )
         offset = self._animation.step(t_s)
         gaze = self._oculomotor.step(target, pose, t_s, dt_s, offset)
-        self._settled, self._gaze_m = self._oculomotor.settled, gaze.gaze_point_world_m
+        self._gaze_m = gaze.gaze_point_world_m
         desired = self._lead.pose_rad or self._kinematics.inverse(gaze, offset.joints_rad)
         if stopped := self._stop.why:
             self._stop.keep_released(self.body, joints, t_s)
