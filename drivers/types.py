@@ -279,6 +279,30 @@ class DetectionInCamera(NamedTuple):
     gaze_camera: tuple[float, float, float] | None = None
 
 
+class CameraTurn(NamedTuple):
+    """How a camera was turned when an image was exposed, by its own gyro.
+
+    epoch: orientations of one epoch can be compared; a gap in the readings begins another
+    R_start_camera: takes directions from the camera's axes (x right, y down, z forward) to those
+        it had as the epoch began; drifts slowly
+    """
+
+    epoch: int
+    R_start_camera: tuple[_Row, _Row, _Row]
+
+    @property
+    def is_rotation(self) -> bool:
+        """Return whether its rows are those of a rotation; False of NaN too."""
+        R = np.array(self.R_start_camera, dtype=np.float64)
+        return R.shape == (3, 3) and bool(np.abs(R @ R.T - np.eye(3)).max() < 1e-3)
+
+    def since(self, before: "CameraTurn | None") -> NDArray[np.float64] | None:
+        """Return R_now_before (3, 3), which turns directions in camera axes; None where unknown."""
+        if before is None or before.epoch != self.epoch:
+            return None
+        return np.array(self.R_start_camera).T @ np.array(before.R_start_camera)
+
+
 class LocatedFrame(NamedTuple):
     """What one image shows, located in the camera's axes by one calibration.
 
@@ -300,6 +324,7 @@ class Detections:
         them: (height_px, width_px), NaN where unknown
     lens: the lens if the camera reports it; such images are without distortion
     located: faces and things in the camera's axes; None: whoever needs them computes them
+    turn: how the camera was turned by its own gyro, None where it has none
     """
 
     captured_s: float
@@ -312,6 +337,7 @@ class Detections:
     depth_m: Depth | None = None
     lens: Intrinsics | None = None
     located: LocatedFrame | None = None
+    turn: CameraTurn | None = None
 
     def located_by(self, locate: "Callable[[Detections], LocatedFrame] | None") -> "Detections":
         """Return the same with what it shows located in the camera's axes; None: as it is."""
@@ -328,6 +354,7 @@ class Detections:
             self.depth_m,
             self.lens,
             locate(self),
+            self.turn,
         )
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 COLOUR_FX = 3080.0  # px of a frame of 3840 x 2160
 DISTORTION = (8.1, -61.0, 0.0004, -0.0003, 152.0, 7.95, -60.2, 150.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -66,3 +67,44 @@ def face_archive(
             entry.size = len(content)
             archive.addfile(entry, io.BytesIO(content))
     return path
+
+
+def packet(dai: Any, device_s: float, rates_rad_s: tuple[float, float, float]) -> Any:
+    """Return one reading of the gyro."""
+    found, stamp = dai.IMUPacket(), dai.Timestamp()
+    stamp.sec, stamp.nsec = divmod(round(device_s * 1e9), 1_000_000_000)
+    gyro = found.gyroscope
+    gyro.x, gyro.y, gyro.z = rates_rad_s
+    gyro.tsDevice = stamp
+    found.gyroscope = gyro
+    return found
+
+
+def imu_message(dai: Any, packets: list[Any]) -> Any:
+    """Return some readings as they come together."""
+    message = dai.IMUData()
+    message.packets = packets
+    return message
+
+
+def at_rest(
+    rng: np.random.Generator, seconds: float, bias_deg_s: tuple[float, float, float] = (0, 0, 0)
+) -> list[tuple[float, tuple[float, float, float]]]:
+    """Return readings of a BMI270 at rest: (time, rates about its own axes), 200 a second."""
+    return readings(rng, np.zeros((round(200 * seconds), 3)), bias_deg_s)
+
+
+def readings(
+    rng: np.random.Generator,
+    rates_rad_s: NDArray[np.float64],
+    bias_deg_s: tuple[float, float, float] = (0, 0, 0),
+    start_s: float = 0.0,
+) -> list[tuple[float, tuple[float, float, float]]]:
+    """Return readings of rates about the camera's axes, with noise, bias and steps of 1/16 deg/s.
+
+    rates_rad_s: (n, 3), 200 a second
+    """
+    rates = np.degrees(rates_rad_s @ np.array(R_CAMERA_IMU)) + bias_deg_s
+    rates = np.round((rates + rng.normal(0.0, 0.1, rates.shape)) * 16.0) / 16.0
+    found = np.radians(rates)
+    return [(start_s + k / 200.0, (x, y, z)) for k, (x, y, z) in enumerate(found.tolist())]

@@ -18,6 +18,7 @@ from gazerig.drivers.plugins import (
     load,
     made,
 )
+from gazerig.drivers.types import CameraTurn
 
 
 def _webcam(params: WebcamParams) -> FrameSource:
@@ -104,6 +105,8 @@ class CheckedSource:
             raise CameraError(f"{self._label} returned a frame that is no image of 8 or 16 bits")
         if not shot.captured_s <= now_s() + 1.0:  # nor a NaN
             raise CameraError(f"{self._label} returned a frame of the time {shot.captured_s!r}")
+        if shot.turn is not None and not _is_turn(shot.turn):
+            raise CameraError(f"{self._label} returned a turn of the camera that is no rotation")
         return shot._replace(image=image)
 
     def events(self) -> tuple[str, ...]:
@@ -113,3 +116,11 @@ class CheckedSource:
     def close(self) -> None:
         """Free the device; safe to call twice."""
         self._source.close()
+
+
+def _is_turn(turn: object) -> bool:
+    """Return whether a package's turn of the camera is one."""
+    try:
+        return isinstance(turn, CameraTurn) and turn.is_rotation
+    except Exception:  # its parts may be anything
+        return False

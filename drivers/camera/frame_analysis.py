@@ -40,6 +40,7 @@ class FrameAnalyzer:
             shot.image,
             shot.depth_m,
             shot.lens,
+            turn=shot.turn,
         )
         return found.located_by(self._locate)
 

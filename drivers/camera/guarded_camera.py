@@ -134,6 +134,8 @@ def _fault(found: Any) -> str:
         return f"captured_s {found.captured_s!r} and number {found.number!r}"
     if not (_whole(found.width_px) and _whole(found.height_px)):
         return f"a frame of {found.width_px!r} x {found.height_px!r}"
+    if found.turn is not None and not found.turn.is_rotation:
+        return "a turn of the camera that is no rotation"
     for face in found.faces:
         if wrong := fault_of_face(face):
             return wrong

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.types import Depth, DetectedFace, ImageArray
+from gazerig.drivers.types import CameraTurn, Depth, DetectedFace, ImageArray
 
 
 class Shot(NamedTuple):
@@ -21,6 +21,7 @@ class Shot(NamedTuple):
     depth_m: distances, aligned with the frame and of its size, NaN where unknown
     lens: the lens of this frame, which is then without distortion
     faces: those that the camera itself has found; no detector runs then
+    turn: how the camera was turned, by its own gyro
     """
 
     captured_s: float
@@ -29,6 +30,7 @@ class Shot(NamedTuple):
     depth_m: Depth | None = None
     lens: Intrinsics | None = None
     faces: tuple[DetectedFace, ...] | None = None
+    turn: CameraTurn | None = None
 
 
 class FrameSource(Protocol):

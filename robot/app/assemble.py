@@ -162,6 +162,7 @@ def assemble(rig: Rig, options: RunOptions, substitutes: Substitutes = RIGS_OWN)
     note = row_sums_note(walk)
     sight = _sight(kinematics, camera, options, scene is None)
     wires = run_bus(rig, options, clock)
+    messages: list[str] = []
     try:
         seen = (
             scene_camera(
@@ -172,13 +173,21 @@ def assemble(rig: Rig, options: RunOptions, substitutes: Substitutes = RIGS_OWN)
             else real_camera(rig, options, clock, camera, sight.turns, substitutes.program)
         )  # fmt: skip
         parts = _components(
-            rig, _body(rig, wires), kinematics, seen, sight.mount, camera, walk, random
+            rig,
+            _body(rig, wires),
+            kinematics,
+            seen,
+            sight.mount,
+            camera,
+            walk,
+            random,
+            messages.append,
         )
         placement = CameraPlacement(
             lambda rig: _camera_params(rig, options, kinematics)[0], camera.mount
         )
         live = LiveParams(parts, rig, placement)
-        robot = _robot(parts, sight.poses, live, substitutes, rig, options.fast)
+        robot = _robot(parts, sight.poses, live, substitutes, rig, options.fast, messages)
     except BaseException:
         wires.close()
         raise
@@ -224,6 +233,7 @@ def _components(
     placed: CameraParams,
     walk: Walk,
     random: _Generators,
+    report: Callable[[str], None],
 ) -> Components:
     """Build all components that have parameters."""
     lids = Lids(rig.gaze.lids, random.lids)
@@ -238,7 +248,13 @@ def _components(
         camera=seen,
         mount=mount,
         perception=Perception(
-            mount, placed.horizontal_field_deg, tracker, own_parts(rig), placed.lens, depth_at
+            mount,
+            placed.horizontal_field_deg,
+            tracker,
+            own_parts(rig),
+            placed.lens,
+            depth_at,
+            report,
         ),
         tracker=tracker,
         attention=Attention(rig.gaze.attention, *decides, random.reaction),
@@ -281,8 +297,8 @@ def _robot(
     substitutes: Substitutes,
     rig: Rig,
     simulated: bool,
+    messages: list[str],
 ) -> Robot:
-    messages: list[str] = []
     chooser = chooser_of(rig, parts.attention, messages.append, simulated)
     chooser = substitutes.program.choose(chooser, messages.append, simulated)
     return Robot(

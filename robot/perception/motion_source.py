@@ -5,7 +5,7 @@ import numpy as np
 from gazerig.drivers.camera.frame_analysis import Motion
 from gazerig.drivers.camera.pose_buffer import PoseBuffer
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.types import MovingBlob
+from gazerig.drivers.types import CameraTurn, MovingBlob
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.gaze.types import Floats
 from gazerig.robot.model.frames import LensParams
@@ -34,6 +34,7 @@ class MotionSource:
 
         self._enabled, self._lens, self._field_rad = params.enabled, lens, field_rad
         self._turns = turns
+        self._before_turn: CameraTurn | None = None
         self._detector = MotionDetector(params)
 
     def retune(self, params: MotionParams, lens: LensParams | None, field_rad: float) -> None:
@@ -49,11 +50,20 @@ class MotionSource:
             return ()
         height, width = shot.image.shape[:2]
         lens = intrinsics_of_lens(self._lens, self._field_rad, width, height, shot.lens)
-        before_s = self._detector.before_s
-        turned: Floats | None = np.eye(3)
-        if self._turns is not None:
-            turned = None if before_s is None else self._turns.turned(shot.captured_s, before_s)
+        turned = self._turned(shot)
         return self._detector.find(shot.image, shot.captured_s, lens, turned, shot.depth_m)
+
+    def _turned(self, shot: Shot) -> Floats | None:
+        """Return R_now_before by the camera's gyro, else by the joints; None where unknown."""
+        before, self._before_turn = self._before_turn, shot.turn
+        before_s = self._detector.before_s
+        if before_s is None:
+            return None
+        if shot.turn is not None and (by_gyro := shot.turn.since(before)) is not None:
+            return by_gyro
+        if self._turns is None:
+            return np.eye(3)
+        return self._turns.turned(shot.captured_s, before_s)
 
 
 def motion_finder(

@@ -5,7 +5,7 @@ taken, not by its present one (localisation); motion of a person's own body is s
 that of other things (hand_ownership); a tracker gives all of them identities and velocities.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from math import hypot, radians, sqrt
 
 import numpy as np
@@ -24,6 +24,7 @@ from gazerig.robot.perception.egomotion_residual import (
 )
 from gazerig.robot.perception.frame_locator import SIZE_SPREAD, DepthAt, FrameLocator
 from gazerig.robot.perception.gaze_at_head import angle_off_head_rad, looks_at_head
+from gazerig.robot.perception.gyro_fusion import GyroFusion
 from gazerig.robot.perception.hand_ownership import Known, without_own_motion
 from gazerig.robot.perception.localisation import placed
 from gazerig.robot.perception.tracker import Track, Tracker
@@ -44,6 +45,7 @@ class Perception:
             the average ones (Nakamoto & Tsuruno 3.7).
         lens: as calibrated, used for frames of the aspect ratio at which it was calibrated.
         depth_at: reads depth images; without it, distances come from the size of faces.
+        report: called with each event as one line.
     """
 
     def __init__(
@@ -54,6 +56,7 @@ class Perception:
         parts_face_m: Mapping[str, Vec3] | None = None,
         lens: LensParams | None = None,
         depth_at: DepthAt | None = None,
+        report: Callable[[str], None] = lambda line: None,
     ) -> None:
         self._mount = mount
         self._depth_at = depth_at
@@ -62,6 +65,7 @@ class Perception:
         self._tracks: tuple[Track, ...] = ()
         self._p_camera: Vec3 = (0.0, 0.0, 0.0)
         self._p_head: Vec3 = (0.0, 0.0, 0.0)
+        self._gyro = GyroFusion(report)
         self._residual = EgomotionResidual()
         self._percept: Percept | None = None
         self._number = 0
@@ -89,6 +93,7 @@ class Perception:
         t_s = detections.captured_s
         R_head, self._p_head = poses.head_pose(t_s)
         R, p = self._mount.pose(R_head, self._p_head)
+        R = self._gyro.orientation(t_s, R, detections.turn)
         located = self._located(detections)
         faces = [placed(face, R, p) for face in located.faces]
         things = [placed(thing, R, p) for thing in located.things]

@@ -16,17 +16,20 @@ COLOUR, DEPTH, FACES = "colour", "depth", "faces"
 """Names of the messages in a group."""
 # Two groups may wait: one that is read and the newest.
 _QUEUE = 2
+_GYRO_HZ, _GYRO_BATCH = 200, 2
+_READINGS = 100  # messages that may wait: a second
 
 
 class Outputs(NamedTuple):
-    """Outputs of nodes: frames, depth in millimetres (RAW16) and found faces.
+    """Outputs of nodes: frames, depth in millimetres (RAW16), found faces, and the gyro's readings.
 
-    depth and faces are None where they are not wanted
+    depth, faces and imu are None where they are not wanted
     """
 
     colour: Any
     depth: Any | None = None
     faces: Any | None = None
+    imu: Any | None = None
 
 
 MakeNodes = Callable[[Any, Any, OakParams], Outputs]
@@ -53,7 +56,17 @@ def device_nodes(dai: Any, pipeline: Any, params: OakParams) -> Outputs:
         colour,
         _stereo(dai, pipeline, params, colour) if params.depth else None,
         _faces(dai, pipeline, params, camera) if params.face_model else None,
+        _imu(dai, pipeline) if params.gyro else None,
     )
+
+
+def _imu(dai: Any, pipeline: Any) -> Any:
+    """Make the gyro's readings."""
+    imu = pipeline.create(dai.node.IMU)
+    imu.enableIMUSensor(dai.IMUSensor.GYROSCOPE_RAW, _GYRO_HZ)
+    imu.setBatchReportThreshold(_GYRO_BATCH)
+    imu.setMaxBatchReports(10 * _GYRO_BATCH)
+    return imu.out
 
 
 def _faces(dai: Any, pipeline: Any, params: OakParams, camera: Any) -> Any:
@@ -70,10 +83,20 @@ def joined(dai: Any, pipeline: Any, outputs: Outputs, rate_hz: float) -> Any:
     sync = pipeline.create(dai.node.Sync)
     sync.setRunOnHost(True)
     sync.setSyncThreshold(timedelta(seconds=0.5 / rate_hz))
-    for name, output in zip((COLOUR, DEPTH, FACES), outputs, strict=True):
+    for name, output in zip((COLOUR, DEPTH, FACES), outputs[:3], strict=True):
         if output is not None:
             output.link(sync.inputs[name])
     return sync.out.createOutputQueue(maxSize=_QUEUE, blocking=False)
+
+
+def readings(outputs: Outputs) -> Any | None:
+    """Return the queue of the gyro's readings, None where there is none.
+
+    They are not joined to frames: there are many of them to each, in messages of their own.
+    """
+    if outputs.imu is None:
+        return None
+    return outputs.imu.createOutputQueue(maxSize=_READINGS, blocking=False)
 
 
 def _stereo(dai: Any, pipeline: Any, params: OakParams, colour: Any) -> Any:

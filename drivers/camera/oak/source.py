@@ -6,21 +6,29 @@ from datetime import timedelta
 from math import inf
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from gazerig.drivers.camera.clock_sync import ClockSync
 from gazerig.drivers.camera.frame_rate import FrameRateMonitor
 from gazerig.drivers.camera.oak.abilities import full_line_text, possible, usb2_text
+from gazerig.drivers.camera.oak.calibration import imu_to_camera, rotation_of
 from gazerig.drivers.camera.oak.discovery import find_oak
+from gazerig.drivers.camera.oak.gyro import Gyro
 from gazerig.drivers.camera.oak.messages import depth_of, faces_of, image_of, lens_of
 from gazerig.drivers.camera.oak.params import OakParams
-from gazerig.drivers.camera.oak.pipeline import COLOUR, MakeNodes, device_nodes, joined
+from gazerig.drivers.camera.oak.pipeline import COLOUR, MakeNodes, device_nodes, joined, readings
 from gazerig.drivers.camera.oak.sdk import load_depthai
 from gazerig.drivers.camera.oak.start_faults import start_cure
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
+from gazerig.drivers.types import CameraTurn
 
 _SLICE = timedelta(milliseconds=100)  # so long may a request to stop wait
 # The camera's stamp in host time is believed if it is no older than this, nor of the future.
 _OLDEST_STAMP_S = 1.0
+# The gyro needs 1.5 s at rest; it is waited for a little longer.
+_SETTLING, _SETTLING_S = 100, 0.02
 
 
 class OakSource:
@@ -52,6 +60,8 @@ class OakSource:
         self._in_step = True
         self._number = 0
         self._events: list[str] = []
+        self._gyro_queue: Any = None
+        self._gyro: Gyro | None = None
         self._slow_line: FrameRateMonitor | None = None
         self._waited = False  # the newest frame was waited for: none had come since the last
 
@@ -74,7 +84,9 @@ class OakSource:
                 self._pipeline = self._dai.Pipeline(createImplicitDevice=False)
             outputs = self._nodes(self._dai, self._pipeline, self._asked)
             self._queue = joined(self._dai, self._pipeline, outputs, self._asked.rate_hz)
+            self._gyro_queue = readings(outputs)
             self._pipeline.start()
+            self._settle_gyro()
         except RuntimeError as error:
             self.close()
             text = _line(error)
@@ -85,6 +97,39 @@ class OakSource:
             self.close()
             raise
         self._bridge, self._in_step, self._number = ClockSync(), True, 0
+
+    def _settle_gyro(self) -> None:
+        """Let the gyro find its bias before the head moves."""
+        if self._gyro_queue is None:
+            return
+        R = self._R_camera_imu()
+        self._gyro = Gyro(R)
+        pause = threading.Event()
+        for _ in range(_SETTLING):
+            self._read_gyro()
+            if self._gyro.settled:
+                break
+            pause.wait(_SETTLING_S)
+
+    def _R_camera_imu(self) -> NDArray[np.float64]:
+        """Return how the gyro sits: as the rig says, else the camera's calibration."""
+        if self._asked.imu_rotation_deg is not None:
+            return rotation_of(self._asked.imu_rotation_deg)
+        found = None
+        if self._device is not None:
+            found = imu_to_camera(self._dai, self._device.readCalibration())
+        return np.eye(3) if found is None else found
+
+    def _read_gyro(self) -> None:
+        """Hand over the readings that have come, and what is to be told of them."""
+        if self._gyro_queue is None or self._gyro is None:
+            return
+        while (message := self._gyro_queue.tryGet()) is not None:
+            for packet in message.packets:
+                found = packet.gyroscope
+                stamp_s = found.getTimestampDevice().total_seconds()
+                self._gyro.add(stamp_s, (found.x, found.y, found.z))
+        self._events.extend(self._gyro.events())
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
         """Wait for the next frame; its time is the middle of its exposure.
@@ -115,7 +160,7 @@ class OakSource:
     def close(self) -> None:
         """Stop and free the camera; safe to call twice."""
         pipeline, device = self._pipeline, self._device
-        self._pipeline = self._device = self._queue = None
+        self._pipeline = self._device = self._queue = self._gyro_queue = self._gyro = None
         # A camera that was unplugged throws from whatever it is asked; it is gone already.
         for end in (_ended(pipeline), device.close if device is not None else None):
             if end is not None:
@@ -186,7 +231,18 @@ class OakSource:
             depth_of(group, width, height),
             lens_of(group),
             faces_of(group, width, height, self._params.min_confidence),
+            self._turn(group[COLOUR]),
         )
+
+    def _turn(self, frame: Any) -> CameraTurn | None:
+        """Return how the camera was turned in the middle of a frame's exposure."""
+        if self._gyro is None:
+            return None
+        self._read_gyro()
+        middle = self._dai.CameraExposureOffset.MIDDLE
+        turn = self._gyro.at(frame.getTimestampDevice(middle).total_seconds())
+        self._events.extend(self._gyro.events())
+        return turn
 
     def _watch_line(self, captured_s: float) -> None:
         """Tell of a USB 2 line that does not carry the frames asked for."""

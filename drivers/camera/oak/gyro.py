@@ -1,0 +1,181 @@
+"""How an OAK camera turned, by its gyro: readings summed up in the device's own time.
+
+Pure. Frames and readings carry stamps of one clock, the device's, so a frame's orientation needs
+no translation of times. What the gyro shows while it is at rest, its bias, is subtracted.
+"""
+
+from bisect import bisect_left
+from collections import deque
+from math import cos, degrees, hypot, isfinite, radians, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.drivers.camera.oak.gyro_bias import GyroBias
+from gazerig.drivers.types import CameraTurn
+
+Rates = tuple[float, float, float]
+_Quaternion = tuple[float, float, float, float]
+
+_KEPT = 400  # readings: 2 s at 200 Hz
+_MOST_RAD_S = radians(2100.0)  # IMUs of OAK cameras measure up to 2000 deg/s
+# Readings farther apart than this do not tell what was between them.
+_GAP_S = 0.1
+# A frame may be so much younger than the newest reading.
+_AHEAD_S = 0.03
+_STUCK_S = 0.5
+_NEVER_AT_REST_S = 20.0
+_WITHOUT = "the joints alone say how the camera turns; oak.gyro: false keeps it out"
+
+
+class Gyro:
+    """The camera's orientation at any instant of the last two seconds.
+
+    Args:
+        R_camera_imu: (3, 3) takes directions from the gyro's axes to the camera's (x right,
+            y down, z forward).
+
+    fault: why it is not used, "" while it is
+    """
+
+    def __init__(self, R_camera_imu: NDArray[np.float64]) -> None:
+        self._R_camera_imu = R_camera_imu
+        self._bias = GyroBias()
+        self._times: deque[float] = deque(maxlen=_KEPT)
+        self._turned: deque[_Quaternion] = deque(maxlen=_KEPT)
+        self._rates: deque[Rates] = deque(maxlen=_KEPT)
+        self._epoch = 0
+        self._last: Rates | None = None  # as the gyro gave it
+        self._first_s: float | None = None
+        self._same_since_s: float | None = None
+        self._absurd_since_s: float | None = None
+        self._asked_since_s: float | None = None
+        self._restless_told = False
+        self._events: list[str] = []
+        self.fault = ""
+
+    @property
+    def settled(self) -> bool:
+        """Return whether its bias is known, or it is known to be of no use."""
+        return bool(self.fault) or self._bias.rad_s is not None
+
+    def events(self) -> tuple[str, ...]:
+        """Return what happened since the last call, one line each."""
+        found, self._events = tuple(self._events), []
+        return found
+
+    def add(self, device_s: float, rates_rad_s: Rates) -> None:
+        """Add a reading; those not later than the last are left out.
+
+        Args:
+            device_s: its time by the device's clock.
+            rates_rad_s: about the gyro's own axes.
+        """
+        if self.fault or (self._times and device_s <= self._times[-1]):
+            return
+        if not all(map(isfinite, rates_rad_s)) or hypot(*rates_rad_s) > _MOST_RAD_S:
+            self._absurd(device_s, rates_rad_s)
+            return
+        self._absurd_since_s = None
+        if self._is_stuck(device_s, rates_rad_s):
+            return
+        x, y, z = (self._R_camera_imu @ rates_rad_s).tolist()
+        self._bias.add(device_s, (x, y, z))
+        self._sum_up(device_s, (x, y, z))
+        if self._first_s is None:
+            self._first_s = device_s
+        if self._bias.rad_s is None and not self._restless_told:
+            self._restless_told = device_s - self._first_s > _NEVER_AT_REST_S
+            if self._restless_told:
+                self._events.append(
+                    f"the OAK camera's gyro has not been at rest for {_NEVER_AT_REST_S:g} s, which "
+                    "it needs once for 1.5 s: until then the joints say how the camera turns"
+                )
+
+    def at(self, device_s: float) -> CameraTurn | None:
+        """Return the orientation at a time of the device's clock, None where it is not known."""
+        if self.fault:
+            return None
+        if self._asked_since_s is None:
+            self._asked_since_s = device_s
+        newest_s = self._times[-1] if self._times else self._asked_since_s
+        if device_s - max(newest_s, self._asked_since_s) > _STUCK_S:
+            self._fail("gives no readings")
+            return None
+        bias = self._bias.rad_s
+        if bias is None or not self._times or not self._times[0] <= device_s <= newest_s + _AHEAD_S:
+            return None
+        after = bisect_left(self._times, device_s)
+        at = min(after, len(self._times) - 1)
+        # On from the reading before, or from the newest with the rate that it had.
+        base = max(0, after - 1)
+        rates, since_s = _mean(self._rates[base], self._rates[at]), device_s - self._times[base]
+        w, x, y, z = _multiplied(self._turned[base], _small_turn(rates, bias, since_s))
+        return CameraTurn(
+            self._epoch,
+            (
+                (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+                (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
+                (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+            ),
+        )
+
+    def _sum_up(self, device_s: float, rates: Rates) -> None:
+        """Turn on by the mean of this reading and the last."""
+        if not self._times or device_s - self._times[-1] > _GAP_S:
+            self._epoch += 1
+            for column in (self._times, self._turned, self._rates):
+                column.clear()
+            turned: _Quaternion = (1.0, 0.0, 0.0, 0.0)
+        else:
+            bias, since_s = self._bias.rad_s or (0.0, 0.0, 0.0), device_s - self._times[-1]
+            step = _small_turn(_mean(self._rates[-1], rates), bias, since_s)
+            turned = _multiplied(self._turned[-1], step)
+        self._times.append(device_s)
+        self._turned.append(turned)
+        self._rates.append(rates)
+
+    def _is_stuck(self, device_s: float, rates: Rates) -> bool:
+        """Return whether readings have not changed at all for too long: noise always does."""
+        if rates != self._last or self._same_since_s is None:
+            self._last, self._same_since_s = rates, device_s
+        elif device_s - self._same_since_s > _STUCK_S:
+            x, y, z = map(degrees, rates)
+            self._fail(f"is stuck: one and the same reading ({x:.2f}, {y:.2f}, {z:.2f} deg/s)")
+        return bool(self.fault)
+
+    def _absurd(self, device_s: float, rates: Rates) -> None:
+        """Leave out a reading that cannot be; one alone may be a disturbance."""
+        if self._absurd_since_s is None:
+            self._absurd_since_s = device_s
+        if device_s - self._absurd_since_s > _STUCK_S:
+            x, y, z = map(degrees, rates)
+            self._fail(f"gives readings that cannot be ({x:g}, {y:g}, {z:g} deg/s)")
+
+    def _fail(self, why: str) -> None:
+        self.fault = why
+        self._events.append(f"the OAK camera's gyro {why}: {_WITHOUT}")
+
+
+def _mean(a: Rates, b: Rates) -> Rates:
+    return 0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])
+
+
+def _small_turn(rates: Rates, bias: Rates, dt_s: float) -> _Quaternion:
+    """Return the turn by rates, less the bias, in a time."""
+    x, y, z = ((rate - off) * dt_s for rate, off in zip(rates, bias, strict=True))
+    angle = hypot(x, y, z)
+    share = 0.5 if angle < 1e-9 else sin(0.5 * angle) / angle
+    return cos(0.5 * angle), share * x, share * y, share * z
+
+
+def _multiplied(a: _Quaternion, b: _Quaternion) -> _Quaternion:
+    """Return the turn a followed by b, b about the axes that a led to."""
+    aw, ax, ay, az = a
+    bw, bx, by, bz = b
+    w = aw * bw - ax * bx - ay * by - az * bz
+    x = aw * bx + ax * bw + ay * bz - az * by
+    y = aw * by - ax * bz + ay * bw + az * bx
+    z = aw * bz + ax * by - ay * bx + az * bw
+    length = (w * w + x * x + y * y + z * z) ** 0.5
+    return w / length, x / length, y / length, z / length

@@ -1,0 +1,71 @@
+"""The bias of a gyro: what it shows while it is at rest.
+
+At rest, averages of .3 s hardly differ, however much single readings shake; in
+motion they do, even if it is as slow as breathing.
+"""
+
+from math import radians
+
+import numpy as np
+
+Rates = tuple[float, float, float]
+
+_BLOCK_S, _BLOCKS = 0.3, 5
+_FEWEST = 8  # readings in a block
+# How far blocks at rest lie from their mean, and how large a bias may be.
+_SPREAD_RAD_S, _MOST_RAD_S = radians(0.06), radians(3.0)
+# A bias wanders with the temperature by no more than this from one rest to the next; a larger
+# change is a slow and even motion, unless it lasts.
+_STEP_RAD_S, _LASTING = radians(0.3), 10
+_SHARE = 0.3
+
+
+class GyroBias:
+    """Finds the bias in readings, of 1.5 s at rest each.
+
+    rad_s: the bias, None before the first rest
+    """
+
+    def __init__(self) -> None:
+        self.rad_s: Rates | None = None
+        self._block: list[Rates] = []
+        self._means: list[np.ndarray[tuple[int], np.dtype[np.float64]]] = []
+        self._began_s: float | None = None
+        self._elsewhere = 0
+
+    def add(self, t_s: float, rates_rad_s: Rates) -> None:
+        """Add a reading; times rise."""
+        if self._began_s is None or t_s - self._began_s > 2.0 * _BLOCK_S:  # the first, or a gap
+            self._block, self._means, self._began_s = [], [], t_s
+        self._block.append(rates_rad_s)
+        if t_s - self._began_s < _BLOCK_S:
+            return
+        if len(self._block) >= _FEWEST:
+            self._means.append(np.mean(self._block, axis=0))
+        self._block, self._began_s = [], t_s
+        if len(self._means) == _BLOCKS:
+            self._judge(np.array(self._means))
+            self._means.clear()
+
+    def _judge(self, means: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> None:
+        """Take averages over if they are those of a rest."""
+        mean = means.mean(axis=0)
+        if np.abs(means - mean).max() > _SPREAD_RAD_S or np.abs(mean).max() > _MOST_RAD_S:
+            self._elsewhere = 0
+            return
+        if self.rad_s is None:
+            self._take(mean)
+            return
+        off = mean - self.rad_s
+        if np.abs(off).max() <= _STEP_RAD_S:
+            self._elsewhere = 0
+            self._take(np.asarray(self.rad_s) + _SHARE * off)
+            return
+        self._elsewhere += 1
+        if self._elsewhere == _LASTING:
+            self._elsewhere = 0
+            self._take(mean)
+
+    def _take(self, bias: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
+        x, y, z = bias.tolist()
+        self.rad_s = x, y, z

@@ -1,0 +1,103 @@
+"""The camera's orientation by the joints and by its own gyro, each where it is right.
+
+The joints know where the camera looks, but not that the table was bumped, nor what happens within
+play and between their readings; the gyro knows every turn, but drifts. A complementary filter
+takes quick turns from the gyro and, over about a second, leans on the joints. Pure.
+"""
+
+from collections.abc import Callable
+from math import acos, cos, exp, radians, sin
+
+from gazerig.drivers.types import CameraTurn
+from gazerig.gaze.angles import compose, norm, scale
+from gazerig.gaze.types import Mat3, Vec3
+
+_SETTLE_S = 1.0
+"""In this time a difference between gyro and joints falls to a third."""
+# Frames farther apart than this are placed by the joints anew.
+_GAP_S = 0.5
+# A larger difference is no bump: the joints count, and if it comes back, the gyro is wrong.
+_MOST_RAD = radians(15.0)
+_MOST_TIMES, _WITHIN_S = 3, 30.0
+
+
+class GyroFusion:
+    """Corrects the orientation by the joints, frame by frame.
+
+    Args:
+        report: called with a line once the gyro is found wrong.
+    """
+
+    def __init__(self, report: Callable[[str], None]) -> None:
+        self._report = report
+        self._before: tuple[float, CameraTurn, Mat3] | None = None
+        self._too_far_s: list[float] = []
+        self._wrong = False
+
+    def orientation(self, t_s: float, R_world_camera: Mat3, turn: CameraTurn | None) -> Mat3:
+        """Return R_world_camera at the exposure of a frame.
+
+        Args:
+            t_s: time of the exposure.
+            R_world_camera: by the joints at that time.
+            turn: by the gyro, None where there is none.
+        """
+        if turn is None or self._wrong:
+            self._before = None
+            return R_world_camera
+        before, R = self._before, R_world_camera
+        if before is not None and before[1].epoch == turn.epoch and 0.0 < t_s - before[0] < _GAP_S:
+            R = self._turned_on(t_s, before, R_world_camera, turn)
+        self._before = t_s, turn, R
+        return R
+
+    def _turned_on(
+        self, t_s: float, before: tuple[float, CameraTurn, Mat3], R_joints: Mat3, turn: CameraTurn
+    ) -> Mat3:
+        """Return the last orientation turned on by the gyro and drawn to the joints'."""
+        before_s, before_turn, R_before = before
+        step = compose(_transposed(before_turn.R_start_camera), turn.R_start_camera)
+        R = compose(R_before, step)
+        off = rotation_vector(compose(_transposed(R), R_joints))
+        if norm(off) > _MOST_RAD:
+            self._disagree(t_s)
+            return R_joints
+        return compose(R, turned_by(scale(off, 1.0 - exp((before_s - t_s) / _SETTLE_S))))
+
+    def _disagree(self, t_s: float) -> None:
+        """Count how often gyro and joints part; if again and again, the gyro is given up."""
+        self._too_far_s = [s for s in self._too_far_s if t_s - s < _WITHIN_S] + [t_s]
+        if len(self._too_far_s) >= _MOST_TIMES:
+            self._wrong = True
+            self._report(
+                "the camera's gyro does not turn with the joints: gaze goes on by the joints alone; "
+                "check oak.imu_rotation_deg and camera.mount, or set oak.gyro: false"
+            )
+
+
+def rotation_vector(R: Mat3) -> Vec3:
+    """Return the axis of a rotation times its angle, which is below pi."""
+    (a, b, c), (d, e, f), (g, h, i) = R
+    angle = acos(min(1.0, max(-1.0, 0.5 * (a + e + i - 1.0))))
+    share = 0.5 if angle < 1e-6 else 0.5 * angle / sin(angle) if sin(angle) > 1e-6 else 0.0
+    return share * (h - f), share * (c - g), share * (d - b)
+
+
+def turned_by(vector: Vec3) -> Mat3:
+    """Return the rotation about a vector by its length (Rodrigues' formula)."""
+    angle = norm(vector)
+    if angle < 1e-12:
+        return ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    x, y, z = scale(vector, 1.0 / angle)
+    s, v = sin(angle), 1.0 - cos(angle)
+    c = cos(angle)
+    return (
+        (c + x * x * v, x * y * v - z * s, x * z * v + y * s),
+        (y * x * v + z * s, c + y * y * v, y * z * v - x * s),
+        (z * x * v - y * s, z * y * v + x * s, c + z * z * v),
+    )
+
+
+def _transposed(R: Mat3) -> Mat3:
+    (a, b, c), (d, e, f), (g, h, i) = R
+    return ((a, d, g), (b, e, h), (c, f, i))

@@ -1,0 +1,294 @@
+"""The gyro of an OAK camera: turns, bias, axes, and what is said of one that is of no use."""
+
+import threading
+import time
+from datetime import timedelta
+from math import nan, radians
+
+import cv2
+import numpy as np
+import pytest
+from oak_packets import R_CAMERA_IMU, at_rest, calibrated, imu_message, packet, readings
+
+from gazerig.drivers.camera.oak.calibration import imu_to_camera, rotation_of
+from gazerig.drivers.camera.oak.gyro import Gyro
+from gazerig.drivers.camera.oak.params import OakParams
+from gazerig.drivers.camera.oak.pipeline import Outputs
+from gazerig.drivers.camera.oak.sdk import load_depthai
+from gazerig.drivers.camera.oak.source import OakSource
+from gazerig.drivers.types import CameraTurn
+
+R_IMU = np.array(R_CAMERA_IMU)
+BIAS_DEG_S = (0.7, -0.4, 0.2)
+
+
+@pytest.fixture(scope="module")
+def dai():
+    return load_depthai()
+
+
+def fed(found, gyro=None):
+    """Return a gyro that has got readings."""
+    gyro = gyro or Gyro(R_IMU)
+    for t_s, rates in found:
+        gyro.add(t_s, rates)
+    return gyro
+
+
+def vector_deg(R):
+    """Return axis times angle of a rotation, degrees."""
+    return np.degrees(cv2.Rodrigues(np.array(R))[0].ravel())
+
+
+def moved(turn: CameraTurn, before: CameraTurn):
+    found = turn.since(before)
+    assert found is not None
+    return vector_deg(found.T)
+
+
+def swaying(seconds, seed=0):
+    """Return a gyro after a rest of 2 s and a sway, and the true angles at times after it."""
+    rng = np.random.default_rng(seed)
+    k = np.arange(round(seconds * 200))
+    yaw = radians(20.0) * np.sin(2 * np.pi * 0.9 * k / 200.0)  # up to 113 deg/s
+    rates = np.zeros((len(k), 3))
+    rates[:, 1] = np.gradient(yaw, 1 / 200.0)
+    gyro = fed(at_rest(rng, 2.0, BIAS_DEG_S))
+    return fed(readings(rng, rates, BIAS_DEG_S, 2.0), gyro), np.degrees(yaw)
+
+
+def test_turn_is_measured_between_any_two_frames():
+    for seed in range(5):
+        gyro, yaw = swaying(3.0, seed)
+        for a, b in ((210.3, 300.7), (400.5, 407.1), (420.0, 598.9)):
+            times = 2.0 + np.array((a, b)) / 200.0
+            before, now = (gyro.at(t) for t in times)
+            true = np.interp((times - 2.0) * 200.0, np.arange(len(yaw)), yaw)
+            off = moved(now, before) - (0.0, true[1] - true[0], 0.0)
+            assert np.abs(off).max() < 0.04
+
+
+def test_bias_is_that_of_the_rest_and_follows_the_temperature():
+    rng = np.random.default_rng(1)
+    gyro = Gyro(np.eye(3))
+    assert not gyro.settled
+    for hundredth in range(60):  # a minute at rest; half a degree a second warmer at its end
+        warmer = 0.3 + hundredth / 120.0
+        for t_s, rates in readings(rng, np.zeros((200, 3)), (warmer, 0, 0), float(hundredth)):
+            gyro.add(t_s, rates)
+    assert gyro.settled
+    before, now = gyro.at(58.5), gyro.at(59.9)
+    assert np.abs(moved(now, before)).max() < 0.1
+    assert gyro.events() == ()
+
+
+@pytest.mark.parametrize("hz", [0.2, 0.5, 2.0])
+def test_slow_breathing_is_no_rest(hz):
+    t = np.arange(200 * 30) / 200.0
+    rates = np.zeros((len(t), 3))
+    rates[:, 0] = radians(0.5) * 2 * np.pi * hz * np.cos(2 * np.pi * hz * t)  # half a degree
+    gyro = fed(readings(np.random.default_rng(2), rates))
+    assert not gyro.settled and gyro.at(29.9) is None
+    (told,) = gyro.events()
+    assert "has not been at rest for 20 s" in told
+
+
+def test_axes_are_those_of_the_calibration(dai):
+    found = imu_to_camera(dai, calibrated(dai))
+    assert found is not None
+    np.testing.assert_allclose(found, R_IMU, atol=1e-6)
+    np.testing.assert_allclose(rotation_of((0.0, 0.0, 90.0)), R_IMU, atol=1e-9)
+    vector = (12.0, -30.0, 140.0)
+    np.testing.assert_allclose(rotation_of(vector), cv2.Rodrigues(np.radians(vector))[0], atol=1e-9)
+    np.testing.assert_allclose(rotation_of((0.0, 0.0, 0.0)), np.eye(3), atol=1e-12)
+    assert imu_to_camera(dai, calibrated(dai, imu=False)) is None
+
+
+def test_gap_begins_another_epoch():
+    rng = np.random.default_rng(3)
+    gyro = fed(at_rest(rng, 2.0))
+    first = gyro.at(1.99)
+    fed([(t + 2.5, rates) for t, rates in at_rest(rng, 1.0)], gyro)
+    second = gyro.at(3.4)
+    assert first is not None and second is not None
+    assert second.epoch == first.epoch + 1 and second.since(first) is None
+    assert gyro.at(2.2) is None and gyro.events() == ()
+
+
+def test_frame_a_little_younger_than_the_readings_is_known_an_older_one_not():
+    gyro, _ = swaying(1.0)
+    assert gyro.at(3.01) is not None
+    assert gyro.at(3.06) is None
+    assert gyro.at(0.1) is None  # more than two seconds before
+    assert gyro.events() == ()
+
+
+def test_readings_that_come_twice_or_late_count_once():
+    rng = np.random.default_rng(4)
+    found = at_rest(rng, 2.0)
+    once, twice = fed(found), fed([one for pair in zip(found, found, strict=True) for one in pair])
+    assert once.at(1.9) == twice.at(1.9)
+    fed(found[:100], twice)
+    assert once.at(1.9) == twice.at(1.9)
+
+
+@pytest.mark.parametrize("value", [0.0, 0.02])
+def test_stuck_gyro_is_told_once(value):
+    gyro = fed(at_rest(np.random.default_rng(5), 2.0))
+    fed([(2.0 + k / 200.0, (value, 0.0, 0.0)) for k in range(400)], gyro)
+    (told,) = gyro.events()
+    assert "gyro is stuck: one and the same reading" in told and "oak.gyro: false" in told
+    assert gyro.at(3.9) is None and gyro.settled
+    fed([(t + 4.0, rates) for t, rates in at_rest(np.random.default_rng(5), 2.0)], gyro)
+    assert gyro.events() == () and gyro.at(5.9) is None
+
+
+@pytest.mark.parametrize("rates", [(nan, 0.0, 0.0), (0.0, 70.0, 0.0), (float("inf"), 0.0, 0.0)])
+def test_absurd_gyro_is_told_once(rates):
+    gyro = fed(at_rest(np.random.default_rng(6), 2.0))
+    fed([(2.0 + k / 200.0, rates) for k in range(400)], gyro)
+    (told,) = gyro.events()
+    assert "gyro gives readings that cannot be" in told
+    assert gyro.at(3.9) is None
+
+
+def test_one_absurd_reading_is_left_out():
+    found = at_rest(np.random.default_rng(7), 3.0)
+    found[500] = found[500][0], (nan, 1e6, 0.0)
+    gyro = fed(found)
+    assert gyro.events() == () and gyro.at(2.9) is not None
+    assert np.abs(moved(gyro.at(2.9), gyro.at(2.3))).max() < 0.1
+
+
+def test_gyro_that_falls_silent_or_never_speaks_is_told_once():
+    gyro = fed(at_rest(np.random.default_rng(8), 2.0))
+    for k in range(90):
+        gyro.at(1.9 + k / 30.0)
+    (told,) = gyro.events()
+    assert "gives no readings" in told and gyro.at(2.0) is None
+    mute = Gyro(R_IMU)
+    for k in range(60):
+        assert mute.at(100.0 + k / 30.0) is None
+    assert len(mute.events()) == 1
+
+
+def frames_and_readings(dai, film, rates_of, bias_deg_s=BIAS_DEG_S, imu=True, made=readings):
+    """Make what stands for device_nodes: a film, and readings about its frames' device times."""
+    rng = np.random.default_rng(9)
+
+    def nodes(dai_, pipeline, params) -> Outputs:
+        replay = pipeline.create(dai.node.ReplayVideo)
+        replay.setReplayVideoFile(film)
+        replay.setOutFrameType(dai.ImgFrame.Type.NV12)
+        replay.setFps(params.rate_hz)
+        replay.setLoop(True)
+
+        class Stamped(dai.node.ThreadedHostNode):
+            """Gives frames device times from 10 s on, and the readings until a little later."""
+
+            def __init__(self) -> None:
+                super().__init__()
+                self.input = self.createInput()
+                self.out = self.createOutput()
+                self.imu = self.createOutput()
+
+            def run(self) -> None:
+                sent = 0
+                rates = rates_of(np.arange(200 * 60) / 200.0)
+                found = made(rng, rates, bias_deg_s, 8.0)
+                if imu:
+                    sent = 440  # 2.2 s before the first frame
+                    first = [packet(dai, t, r) for t, r in found[:sent]]
+                    self.imu.send(imu_message(dai, first))
+                number = 0
+                while self.isRunning():
+                    frame = self.input.get()
+                    until = round((2.02 + number / params.rate_hz) * 200)
+                    number += 1
+                    if imu and until > sent:
+                        some = [packet(dai, t, r) for t, r in found[sent:until]]
+                        sent = until
+                        self.imu.send(imu_message(dai, some))
+                    frame.setTimestampDevice(
+                        timedelta(seconds=10.0 + (number - 1) / params.rate_hz)
+                    )
+                    self.out.send(frame)
+
+        node = pipeline.create(Stamped)
+        replay.out.link(node.input)
+        return Outputs(node.out, imu=node.imu)
+
+    return nodes
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory):
+    path = tmp_path_factory.mktemp("gyro") / "film.mp4"
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 60.0, (128, 96))
+    for k in range(20):
+        writer.write(np.full((96, 128, 3), 8 * k, np.uint8))
+    writer.release()
+    return path
+
+
+PARAMS = OakParams(width_px=128, height_px=96, rate_hz=60.0, imu_rotation_deg=(0.0, 0.0, 90.0))
+
+
+def shots(nodes, count):
+    source = OakSource(PARAMS, nodes, on_device=False)
+    source.open()
+    go_on = threading.Event()
+    found = [source.take(time.monotonic, go_on) for _ in range(count)]
+    told = source.events()
+    source.close()
+    return found, told
+
+
+def turning(t):
+    """Turn to the right at 30 deg/s from 2 s on, about the camera's y axis (down)."""
+    rates = np.zeros((len(t), 3))
+    rates[t >= 2.0, 1] = radians(30.0)
+    return rates
+
+
+def test_frames_of_the_host_pipeline_carry_the_turn(dai, film):
+    found, told = shots(frames_and_readings(dai, film, turning), 20)
+    assert told == () and all(shot.turn is not None for shot in found)
+    first, last = found[0], found[-1]
+    # Frames may have been skipped, so the stamps, not the numbers, tell what lies between.
+    angle = moved(last.turn, first.turn)
+    seconds = angle[1] / 30.0
+    assert abs(seconds * 60.0 - round(seconds * 60.0)) < 0.15 and round(seconds * 60.0) >= 19
+    assert np.abs(angle[[0, 2]]).max() < 0.1
+
+
+def test_silent_gyro_of_the_host_pipeline_costs_no_frames(dai, film):
+    found, told = shots(frames_and_readings(dai, film, turning, imu=False), 60)
+    assert len(found) == 60 and all(shot.turn is None for shot in found)
+    assert sum("gyro gives no readings" in line for line in told) == 1
+
+
+def test_stuck_gyro_of_the_host_pipeline_costs_no_frames(dai, film):
+    found, told = shots(frames_and_readings(dai, film, turning, made=stuck), 5)
+    assert len(found) == 5 and all(shot.turn is None for shot in found)
+    assert sum("gyro is stuck" in line for line in told) == 1
+
+
+def stuck(rng, rates, bias_deg_s, start_s):
+    return [(start_s + k / 200.0, (0.01, 0.0, 0.0)) for k in range(len(rates))]
+
+
+def test_sine_of_a_shake_of_the_table_is_seen_in_full():
+    t = np.arange(200 * 4) / 200.0
+    rates = np.zeros((len(t), 3))
+    angle = 0.6 * np.sin(2 * np.pi * 8.0 * t)  # .6 deg at 8 Hz
+    rates[:, 0] = radians(0.6) * 2 * np.pi * 8.0 * np.cos(2 * np.pi * 8.0 * t)
+    rates[t < 2.0] = 0.0
+    gyro = fed(readings(np.random.default_rng(10), rates, BIAS_DEG_S))
+    start = gyro.at(2.0)
+    errors = []
+    for k in range(50):
+        at = 2.0 + k / 30.0
+        true = np.interp(at, t, angle)
+        errors.append(moved(gyro.at(at), start)[0] - true)
+    assert np.abs(errors).max() < 0.06
