@@ -300,7 +300,7 @@ class CameraTurn(NamedTuple):
         """Return R_now_before (3, 3), which turns directions in camera axes; None where unknown."""
         if before is None or before.epoch != self.epoch:
             return None
-        return np.array(self.R_start_camera).T @ np.array(before.R_start_camera)
+        return np.asarray(np.array(self.R_start_camera).T @ np.array(before.R_start_camera))
 
 
 class LocatedFrame(NamedTuple):
