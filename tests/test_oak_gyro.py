@@ -172,11 +172,11 @@ def test_gyro_that_falls_silent_or_never_speaks_is_told_once():
     assert len(mute.events()) == 1
 
 
-def frames_and_readings(dai, film, rates_of, bias_deg_s=BIAS_DEG_S, imu=True, made=readings):
+def frames_and_readings(film, rates_of, bias_deg_s=BIAS_DEG_S, imu=True, made=readings):
     """Make what stands for device_nodes: a film, and readings about its frames' device times."""
     rng = np.random.default_rng(9)
 
-    def nodes(dai_, pipeline, params) -> Outputs:
+    def nodes(dai, pipeline, params) -> Outputs:
         replay = pipeline.create(dai.node.ReplayVideo)
         replay.setReplayVideoFile(film)
         replay.setOutFrameType(dai.ImgFrame.Type.NV12)
@@ -252,7 +252,7 @@ def turning(t):
 
 
 def test_frames_of_the_host_pipeline_carry_the_turn(dai, film):
-    found, told = shots(frames_and_readings(dai, film, turning), 20)
+    found, told = shots(frames_and_readings(film, turning), 20)
     assert told == () and all(shot.turn is not None for shot in found)
     first, last = found[0], found[-1]
     # Frames may have been skipped, so the stamps, not the numbers, tell what lies between.
@@ -263,13 +263,13 @@ def test_frames_of_the_host_pipeline_carry_the_turn(dai, film):
 
 
 def test_silent_gyro_of_the_host_pipeline_costs_no_frames(dai, film):
-    found, told = shots(frames_and_readings(dai, film, turning, imu=False), 60)
+    found, told = shots(frames_and_readings(film, turning, imu=False), 60)
     assert len(found) == 60 and all(shot.turn is None for shot in found)
     assert sum("gyro gives no readings" in line for line in told) == 1
 
 
 def test_stuck_gyro_of_the_host_pipeline_costs_no_frames(dai, film):
-    found, told = shots(frames_and_readings(dai, film, turning, made=stuck), 5)
+    found, told = shots(frames_and_readings(film, turning, made=stuck), 5)
     assert len(found) == 5 and all(shot.turn is None for shot in found)
     assert sum("gyro is stuck" in line for line in told) == 1
 
