@@ -45,13 +45,15 @@ def face_archive(
     points: int | None = 5,
     network: str = "dlc",
     heads: int = 1,
+    height_px: int = 256,
+    outputs: tuple[str, ...] = ("cls", "obj", "bbox", "kps"),
 ) -> Path:
     """Write an NNArchive of a face network, without weights that would run."""
-    names = [f"{kind}_{stride}" for kind in ("cls", "obj", "bbox", "kps") for stride in (8, 16, 32)]
+    names = [f"{kind}_{stride}" for kind in outputs for stride in (8, 16, 32)]
     about = {"n_classes": 1, "classes": ["face"], "iou_threshold": 0.3, "conf_threshold": 0.5}
     head = {"parser": parser, "outputs": [], "metadata": {**about, "n_keypoints": points}}
     grey = {"mean": [0.0, 0.0, 0.0], "scale": [1.0, 1.0, 1.0]}
-    shape = {"shape": [1, 3, 240, 320], "layout": "NCHW", "preprocessing": grey}
+    shape = {"shape": [1, 3, height_px, 320], "layout": "NCHW", "preprocessing": grey}
     inputs = {"name": "input", "dtype": "float32", "input_type": "image", **shape}
     model = {
         "metadata": {"name": "faces", "path": f"faces.{network}"},

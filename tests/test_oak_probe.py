@@ -367,6 +367,8 @@ def test_rotation_of_the_imu_in_the_rig_stands_for_the_cameras_own():
         ({"parser": "YOLO", "points": None}, "it finds 0 key points, wanted 5"),
         ({"parser": "SCRFDParser"}, "read by SCRFDParser, wanted YuNet or YOLO"),
         ({"heads": 0}, "has 0 heads, wanted 1"),
+        ({"height_px": 240}, "its frames of (320, 240) are no multiples of 32 px"),
+        ({"outputs": ("cls", "obj", "bbox")}, "it has no outputs kps_8, kps_16, kps_32"),
     ],
 )
 def test_face_model_of_another_kind_is_told_and_left_out(tmp_path, archive, told):

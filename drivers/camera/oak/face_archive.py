@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Any, Literal
 
+from gazerig.drivers.camera.oak.yunet_decoder import STRIDES, fault_of_names
 from gazerig.drivers.errors import CameraError
 
 FaceNet = Literal["yunet", "yolo"]
@@ -56,7 +57,8 @@ def kind_of(archive: Any, platform: Any, file: str) -> FaceNet:
         if len(heads) != 1:
             wrong = f"its description has {len(heads)} heads, wanted 1"
         elif "yunet" in parsers[0].lower():
-            kind = "yunet"
+            wrong = _yunet_fault(archive)
+            kind = None if wrong else "yunet"
         elif "yolo" in parsers[0].lower():
             points = heads[0].metadata.nKeypoints or 0
             if points == LANDMARKS:
@@ -70,6 +72,17 @@ def kind_of(archive: Any, platform: Any, file: str) -> FaceNet:
             f"the face model {file} cannot be used: {wrong}; {_CURE.format(chip=platform.name)}"
         )
     return kind
+
+
+def _yunet_fault(archive: Any) -> str:
+    """Return why the network of an archive is no YuNet, "" where it is."""
+    names = [str(output.name) for output in archive.getConfig().model.outputs]
+    if wrong := fault_of_names(names):
+        return wrong
+    size = archive.getInputSize()
+    if size is None or size[0] % STRIDES[-1] or size[1] % STRIDES[-1]:
+        return f"its frames of {size} are no multiples of {STRIDES[-1]} px"
+    return ""
 
 
 def _made_for_another(archive: Any, platform: Any) -> str:

@@ -9,8 +9,9 @@ from datetime import timedelta
 from typing import Any, NamedTuple
 
 from gazerig.drivers.camera.oak.controls import set_controls
-from gazerig.drivers.camera.oak.face_archive import read_archive
+from gazerig.drivers.camera.oak.face_archive import kind_of, read_archive
 from gazerig.drivers.camera.oak.params import OakParams
+from gazerig.drivers.camera.oak.yunet_node import FoundFaces, yunet_faces
 
 COLOUR, DEPTH, FACES = "colour", "depth", "faces"
 """Names of the messages in a group."""
@@ -24,12 +25,14 @@ class Outputs(NamedTuple):
     """Outputs of nodes: frames, depth in millimetres (RAW16), found faces, and the gyro's readings.
 
     depth, faces and imu are None where they are not wanted
+    face_fault: returns why no faces can be found there, "" while they can
     """
 
     colour: Any
     depth: Any | None = None
     faces: Any | None = None
     imu: Any | None = None
+    face_fault: Callable[[], str] = str
 
 
 MakeNodes = Callable[[Any, Any, OakParams], Outputs]
@@ -52,12 +55,15 @@ def device_nodes(dai: Any, pipeline: Any, params: OakParams) -> Outputs:
         fps=params.rate_hz,
         enableUndistortion=params.undistort,
     )
-    return Outputs(
+    outputs = Outputs(
         colour,
         _stereo(dai, pipeline, params, colour) if params.depth else None,
-        _faces(dai, pipeline, params, camera) if params.face_model else None,
-        _imu(dai, pipeline) if params.gyro else None,
+        imu=_imu(dai, pipeline) if params.gyro else None,
     )
+    if not params.face_model:
+        return outputs
+    found = _faces(dai, pipeline, params, camera)
+    return outputs._replace(faces=found.out, face_fault=found.fault)
 
 
 def _imu(dai: Any, pipeline: Any) -> Any:
@@ -69,13 +75,21 @@ def _imu(dai: Any, pipeline: Any) -> Any:
     return imu.out
 
 
-def _faces(dai: Any, pipeline: Any, params: OakParams, camera: Any) -> Any:
-    """Make the network that finds faces on the camera."""
+def _faces(dai: Any, pipeline: Any, params: OakParams, camera: Any) -> FoundFaces:
+    """Make the network that finds faces on the camera; a YuNet is decoded on the host."""
     archive = read_archive(dai, params.face_model)
+    platform = pipeline.getDefaultDevice().getPlatform()
+    if kind_of(archive, platform, params.face_model) == "yunet":
+        network = pipeline.create(dai.node.NeuralNetwork)
+        # Fitted in whole: cut to the network's shape, the sides would not be looked at.
+        whole = dai.ImgResizeMode.LETTERBOX
+        network = network.build(camera, archive, fps=params.rate_hz, resizeMode=whole)
+        size = archive.getInputSize()
+        return yunet_faces(dai, pipeline, network.out, size, params.min_confidence)
     network = pipeline.create(dai.node.DetectionNetwork)
     network = network.build(camera, archive, fps=params.rate_hz)
     network.setConfidenceThreshold(params.min_confidence)
-    return network.out
+    return FoundFaces(network.out)
 
 
 def joined(dai: Any, pipeline: Any, outputs: Outputs, rate_hz: float) -> Any:

@@ -22,7 +22,7 @@ from gazerig.drivers.camera.oak.sdk import load_depthai
 from gazerig.drivers.camera.oak.start_faults import start_cure
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
-from gazerig.drivers.types import CameraTurn
+from gazerig.drivers.types import CameraTurn, DetectedFace
 
 _SLICE = timedelta(milliseconds=100)  # so long may a request to stop wait
 # The camera's stamp in host time is believed if it is no older than this, nor of the future.
@@ -61,6 +61,8 @@ class OakSource:
         self._number = 0
         self._events: list[str] = []
         self._gyro_queue: Any = None
+        self._face_fault: Callable[[], str] = str
+        self._face_fault_told = False
         self._gyro: Gyro | None = None
         self._slow_line: FrameRateMonitor | None = None
         self._waited = False  # the newest frame was waited for: none had come since the last
@@ -74,7 +76,7 @@ class OakSource:
         """
         self.close()
         self._dai = self._load()
-        self._asked, self._slow_line = self._params, None
+        self._asked, self._slow_line, self._face_fault_told = self._params, None, False
         try:
             if self._on_device:
                 self._device = self._connect()
@@ -84,7 +86,7 @@ class OakSource:
                 self._pipeline = self._dai.Pipeline(createImplicitDevice=False)
             outputs = self._nodes(self._dai, self._pipeline, self._asked)
             self._queue = joined(self._dai, self._pipeline, outputs, self._asked.rate_hz)
-            self._gyro_queue = readings(outputs)
+            self._gyro_queue, self._face_fault = readings(outputs), outputs.face_fault
             self._pipeline.start()
             self._settle_gyro()
         except RuntimeError as error:
@@ -230,9 +232,22 @@ class OakSource:
             image,
             depth_of(group, width, height),
             lens_of(group),
-            faces_of(group, width, height, self._params.min_confidence),
+            self._faces(group, width, height),
             self._turn(group[COLOUR]),
         )
+
+    def _faces(self, group: Any, width_px: int, height_px: int) -> tuple[DetectedFace, ...] | None:
+        """Return the faces that the camera found; None where it did not look, or cannot."""
+        why = self._face_fault()
+        if not why:
+            return faces_of(group, width_px, height_px, self._params.min_confidence)
+        if not self._face_fault_told:
+            self._face_fault_told = True
+            self._events.append(
+                f"the face model {self._params.face_model} gives what cannot be read ({why}): faces "
+                "are found on the host; take another archive, or leave oak.face_model empty"
+            )
+        return None
 
     def _turn(self, frame: Any) -> CameraTurn | None:
         """Return how the camera was turned in the middle of a frame's exposure."""

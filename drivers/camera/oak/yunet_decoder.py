@@ -1,0 +1,161 @@
+"""The outputs of a YuNet that runs on the camera, turned into faces on the host. Pure.
+
+Two generations of the network are about. The later one (OpenCV zoo, 2023 and after) gives scores,
+boxes and landmarks a cell for strides of 8, 16 and 32 px; the earlier one (Luxonis' model hub)
+gives them for boxes of fixed sizes, in the manner of SSD. Wu, Peng, Yu, "YuNet: a tiny
+millisecond-level face detector", 2023; Liu et al., "SSD: single shot multibox detector", 2016.
+"""
+
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+STRIDES = (8, 16, 32)
+_WIDTHS = {"cls": 1, "obj": 1, "bbox": 4, "kps": 10}  # numbers a cell
+_EARLIER = {"loc": 14, "conf": 2, "iou": 1}  # numbers a fixed box
+_SIZES_PX = ((8, (10, 16, 24)), (16, (32, 48)), (32, (64, 96)), (64, (128, 192, 256)))
+_VARIANCES = 0.1, 0.2
+# Boxes that share more than this part of their union are one face: the zoo's own value.
+_SAME = 0.3
+_MOST = 50
+
+
+class DecodedFaces(NamedTuple):
+    """Faces in shares of the network's image, the surest first.
+
+    boxes: (n, 4) left, top, right, bottom; points: (n, 5, 2) in the order of DetectedFace;
+    scores: (n,) 0..1
+    """
+
+    boxes: Floats
+    points: Floats
+    scores: Floats
+
+
+class UnreadableOutputs(ValueError):
+    """The network gave something else than a YuNet; the message says what."""
+
+
+def fault_of_names(names: Sequence[str]) -> str:
+    """Return what outputs of a YuNet are missing among these, "" where none is."""
+    if all(any(kind in name for name in names) for kind in _EARLIER):
+        return ""
+    missing = [n for kind in _WIDTHS for s in STRIDES if (n := f"{kind}_{s}") not in names]
+    return f"it has no outputs {', '.join(missing)}" if missing else ""
+
+
+def decode(
+    tensors: Mapping[str, NDArray[np.float32]], width_px: int, height_px: int, least: float
+) -> DecodedFaces:
+    """Return the faces in the outputs of one image.
+
+    Args:
+        tensors: by the names of the outputs.
+        width_px: of the network's image.
+        height_px: of the network's image.
+        least: smallest score of a face.
+
+    Raises:
+        UnreadableOutputs: an output is missing, or of another size.
+    """
+    if wrong := fault_of_names(list(tensors)):
+        raise UnreadableOutputs(wrong)
+    size = width_px, height_px
+    later = f"cls_{STRIDES[0]}" in tensors
+    scores, centres, extents, points = (_later if later else _earlier)(tensors, size, least)
+    good = np.isfinite(np.column_stack((scores, centres, extents, points))).all(axis=1)
+    scores, centres, extents, points = scores[good], centres[good], extents[good], points[good]
+    corners = np.column_stack((centres - 0.5 * extents, extents))
+    keep = np.asarray(
+        cv2.dnn.NMSBoxes(corners.tolist(), scores.tolist(), least, _SAME), int
+    ).ravel()
+    keep = keep[:_MOST]
+    top_left, bottom_right = (
+        corners[keep, :2] / size,
+        (corners[keep, :2] + corners[keep, 2:]) / size,
+    )
+    return DecodedFaces(
+        np.hstack((top_left, bottom_right)), points[keep].reshape(-1, 5, 2) / size, scores[keep]
+    )
+
+
+_Found = tuple[Floats, Floats, Floats, Floats]
+"""Scores (n,), centres (n, 2), widths and heights (n, 2), landmarks (n, 10), pixels."""
+
+
+def _later(
+    tensors: Mapping[str, NDArray[np.float32]], size: tuple[int, int], least: float
+) -> _Found:
+    """Decode cells: offsets and logarithms of sizes in strides."""
+    found = []
+    for stride in STRIDES:
+        columns, lines = size[0] // stride, size[1] // stride
+        cls, obj, bbox, kps = (
+            _table(tensors, f"{kind}_{stride}", width, columns * lines)
+            for kind, width in _WIDTHS.items()
+        )
+        scores = np.sqrt(np.clip(cls, 0.0, 1.0) * np.clip(obj, 0.0, 1.0))[:, 0]
+        at = np.nonzero(scores >= least)[0]
+        cells = np.column_stack((at % columns, at // columns)).astype(np.float64)
+        with np.errstate(over="ignore"):
+            extents = np.exp(bbox[at, 2:]) * stride
+        points = (kps[at] + np.tile(cells, 5)) * stride
+        found.append((scores[at], (cells + bbox[at, :2]) * stride, extents, points))
+    a, b, c, d = (np.concatenate(one) for one in zip(*found, strict=True))
+    return a, b, c, d
+
+
+def _earlier(
+    tensors: Mapping[str, NDArray[np.float32]], size: tuple[int, int], least: float
+) -> _Found:
+    """Decode fixed boxes: offsets in shares of the box, logarithms of its size."""
+    boxes = _fixed_boxes(*size)
+    names = {kind: next(name for name in tensors if kind in name) for kind in _EARLIER}
+    loc, conf, iou = (
+        _table(tensors, names[kind], width, len(boxes)) for kind, width in _EARLIER.items()
+    )
+    scores = np.sqrt(np.clip(conf[:, 1], 0.0, 1.0) * np.clip(iou[:, 0], 0.0, 1.0))
+    at = np.nonzero(scores >= least)[0]
+    centres, sides = boxes[at, :2], boxes[at, 2:]
+    with np.errstate(over="ignore"):
+        extents = sides * np.exp(loc[at, 2:4] * _VARIANCES[1])
+    shifts = loc[at, 4:] * _VARIANCES[0] * np.tile(sides, 5)
+    return (
+        scores[at],
+        centres + loc[at, :2] * _VARIANCES[0] * sides,
+        extents,
+        np.tile(centres, 5) + shifts,
+    )
+
+
+@cache
+def _fixed_boxes(width_px: int, height_px: int) -> Floats:
+    """Return centre, width and height of all fixed boxes, (n, 4) pixels, in the network's order."""
+    lines, columns = (height_px + 1) // 2 // 2 // 2, (width_px + 1) // 2 // 2 // 2
+    found = []
+    for stride, sizes in _SIZES_PX:
+        y, x, side = np.meshgrid(np.arange(lines), np.arange(columns), sizes, indexing="ij")
+        centres = (x.ravel() + 0.5) * stride, (y.ravel() + 0.5) * stride
+        found.append(np.column_stack((*centres, side.ravel(), side.ravel())))
+        lines, columns = lines // 2, columns // 2
+    boxes = np.concatenate(found).astype(np.float64)
+    boxes.setflags(write=False)
+    return boxes
+
+
+def _table(tensors: Mapping[str, NDArray[np.float32]], name: str, width: int, count: int) -> Floats:
+    """Return an output as (count, width), whichever way its axes are."""
+    found = np.asarray(tensors[name], dtype=np.float64)
+    if found.size != count * width:
+        raise UnreadableOutputs(
+            f"its output {name} has the shape {found.shape}, wanted {count} times {width} numbers"
+        )
+    if found.ndim == 4 and found.shape[1] == width and found.shape[3] != width:
+        found = np.moveaxis(found, 1, 3)  # channels first
+    return found.reshape(count, width)
