@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from present import present
 
 from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.oak.pipeline import Outputs
@@ -124,12 +125,12 @@ def test_outputs_of_another_network_are_named():
 @pytest.mark.skipif(not MODEL.is_file(), reason=f"no {MODEL}: a user's own file")
 @pytest.mark.parametrize("size", [(320, 320), (320, 256), (640, 384)])
 def test_real_network_is_decoded_as_opencv_does(size):
-    image = cv2.resize(cv2.imread(str(SHARED / "media/astronaut.png")), size)
+    image = cv2.resize(present(cv2.imread(str(SHARED / "media/astronaut.png"))), size)
     network = cv2.dnn.readNetFromONNX(str(MODEL))
     names = network.getUnconnectedOutLayersNames()
     network.setInput(cv2.dnn.blobFromImage(image))
-    outputs = dict(zip(names, network.forward(names), strict=True))
-    found = decode(outputs, *size, 0.5)
+    values = [np.asarray(one, np.float32) for one in network.forward(names)]
+    found = decode(dict(zip(names, values, strict=True)), size[0], size[1], 0.5)
     (row,) = cv2.FaceDetectorYN.create(str(MODEL), "", size, 0.5, 0.3).detect(image)[1]
     assert (found.points[0] * size).ravel() == pytest.approx(row[4:14], abs=1e-3)
     assert found.scores[0] == pytest.approx(row[14], abs=1e-5)
