@@ -325,6 +325,7 @@ class Detections:
     lens: the lens if the camera reports it; such images are without distortion
     located: faces and things in the camera's axes; None: whoever needs them computes them
     turn: how the camera was turned by its own gyro, None where it has none
+    scene: counts the scenes that were shown: another one than before, and there was a cut
     """
 
     captured_s: float
@@ -338,6 +339,7 @@ class Detections:
     lens: Intrinsics | None = None
     located: LocatedFrame | None = None
     turn: CameraTurn | None = None
+    scene: int = 0
 
     def located_by(self, locate: "Callable[[Detections], LocatedFrame] | None") -> "Detections":
         """Return the same with what it shows located in the camera's axes; None: as it is."""
@@ -355,6 +357,7 @@ class Detections:
             self.lens,
             locate(self),
             self.turn,
+            self.scene,
         )
 
 

@@ -24,6 +24,10 @@ class FrameAnalyzer:
         self, detector: FaceDetector, motion: Motion | None = None, locate: Locate | None = None
     ) -> None:
         self._detector, self._motion, self._locate = detector, motion, locate
+        # Here because the process of the loop imports this module too, and needs no OpenCV.
+        from gazerig.drivers.vision.cut_detector import CutDetector
+
+        self._cuts = CutDetector()
 
     def look(self, shot: Shot) -> Detections:
         """Find and locate the faces of a frame, unless the camera itself has, and what moves."""
@@ -41,6 +45,7 @@ class FrameAnalyzer:
             shot.depth_m,
             shot.lens,
             turn=shot.turn,
+            scene=self._cuts.scene(shot.image),
         )
         return found.located_by(self._locate)
 

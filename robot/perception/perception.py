@@ -6,12 +6,12 @@ that of other things (hand_ownership); a tracker gives all of them identities an
 """
 
 from collections.abc import Callable, Mapping
-from math import hypot, radians, sqrt
+from math import cos, hypot, radians, sqrt
 
 import numpy as np
 
 from gazerig.drivers.types import Detections, LocatedFrame
-from gazerig.gaze.angles import add, rotate, scale, sub
+from gazerig.gaze.angles import add, dot, rotate, scale, sub
 from gazerig.gaze.types import PARTS, Bodies, Face, Floats, Mat3, Percept, Vec3
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, LensParams, PoseHistory
@@ -32,6 +32,8 @@ from gazerig.robot.perception.tracker import Track, Tracker
 # The head's turn at a capture is taken over so long before and after it.
 _HALF_TURN_S = 0.015
 _AXES = np.eye(3)
+# A camera that turned farther between two frames shows another part of the same room.
+_COS_SAME_VIEW = cos(radians(5.0))
 
 
 class Perception:
@@ -69,6 +71,7 @@ class Perception:
         self._residual = EgomotionResidual()
         self._percept: Percept | None = None
         self._number = 0
+        self._scene: tuple[int, Vec3] | None = None
         self.frames = 0
         self.frames_with_face = 0
 
@@ -94,6 +97,9 @@ class Perception:
         R_head, self._p_head = poses.head_pose(t_s)
         R, p = self._mount.pose(R_head, self._p_head)
         R = self._gyro.orientation(t_s, R, detections.turn)
+        if self._is_cut(detections.scene, (R[0][2], R[1][2], R[2][2])):
+            self._tracker.forget()
+            self._tracks = ()
         located = self._located(detections)
         faces = [placed(face, R, p) for face in located.faces]
         things = [placed(thing, R, p) for thing in located.things]
@@ -126,6 +132,18 @@ class Perception:
         ):
             return located
         return self._locator.locate(found, intrinsics)
+
+    def _is_cut(self, scene: int, axis: Vec3) -> bool:
+        """Return whether a frame shows another scene although the camera was hardly turned.
+
+        Args:
+            scene: as counted from the images.
+            axis: where the camera looks, in the world.
+        """
+        before, self._scene = self._scene, (scene, axis)
+        if before is None or before[0] == scene:
+            return False
+        return dot(before[1], axis) > _COS_SAME_VIEW
 
     def _known(self, t_s: float) -> list[Known]:
         """Return where the faces of the last frame are expected now."""

@@ -116,6 +116,10 @@ class Tracker:
             is_face = track.detection.R_world_face is not None
             track.filter.retune(self._of_faces if is_face else self._of_things)
 
+    def forget(self) -> None:
+        """End all identities: another scene is shown. Numbers are not used again."""
+        self._tracks = []
+
     @property
     def params(self) -> TrackParams:
         """Return the parameters in force."""

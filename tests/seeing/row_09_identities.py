@@ -1,0 +1,287 @@
+"""Identities: a cut ends them, and people who cross keep theirs."""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from math import radians
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+from seeing.material import at_hand
+
+from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
+from gazerig.drivers.camera.pinhole import intrinsics_of_view
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.types import DetectedFace, Detections
+from gazerig.drivers.vision.cut_detector import CutDetector
+from gazerig.gaze.types import Vec3
+from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
+from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
+from gazerig.robot.model.intrinsics import project
+from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.perception.perception import Perception
+from gazerig.robot.perception.tracker import Tracker
+
+SIZE = 640, 400
+FIELD_DEG = 69.0
+LENS = intrinsics_of_view(radians(FIELD_DEG), *SIZE)
+RATE_HZ = 30.0
+Image = NDArray[np.uint8]
+Way = Callable[[float], tuple[float, float]]
+"""Where a person is at a time: to the right of the camera's axis, and before it, m."""
+
+_FRONTAL = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
+_HIDDEN_M = 0.16  # a face nearer than this to the view of a nearer one is not found
+_MISSED, _MARKS_PX = 0.05, 0.8
+_SAME_DEG = 3.0
+
+WANTED = {
+    "two cross: IDF1": (0.95, 1.0),
+    "two cross at one distance: IDF1": (0.95, 1.0),
+    "two meet and turn back: IDF1": (0.95, 1.0),
+    "three cross: IDF1": (0.95, 1.0),
+    "six walk about: IDF1": (0.95, 1.0),
+    "identities that go on after a cut, %": (0.0, 0.0),
+    "cuts found, %": (100.0, 100.0),
+    "cuts where there is none, of 1000 pictures": (0.0, 0.0),
+}
+
+
+def walk(start_m: float, speed_m_s: float, away_m: float, turns_s: float = 1e9) -> Way:
+    """Return a straight way, or one that is gone back from a time on."""
+    return lambda t: (start_m + speed_m_s * (t if t < turns_s else 2.0 * turns_s - t), away_m)
+
+
+def stroll(rng: np.random.Generator, away_m: float) -> Way:
+    """Return a way to and fro that never repeats."""
+    pace, phase = rng.uniform(0.25, 0.6, 2), rng.uniform(0.0, 6.28, 3)
+    wide = 0.45 * away_m
+    return lambda t: (
+        0.6 * wide * np.sin(pace[0] * t + phase[0]) + 0.4 * wide * np.sin(pace[1] * t + phase[1]),
+        away_m + 0.1 * np.sin(0.5 * t + phase[2]),
+    )
+
+
+def crossings(rng: np.random.Generator) -> dict[str, tuple[list[Way], float]]:
+    """Return who walks how, and for how many seconds; every call other speeds and distances."""
+    v, w, far = rng.uniform(0.5, 1.2), rng.uniform(0.5, 1.2), rng.uniform(1.6, 2.2)
+    return {
+        "two cross": ([walk(-1.0, v, far), walk(1.0, -w, far + 0.6)], 2.0),
+        "two cross at one distance": ([walk(-1.0, v, far), walk(1.0, -w, far)], 2.0),
+        "two meet and turn back": (
+            [walk(-0.9, 0.5, far, 1.4), walk(0.9, -0.5, far + 0.2, 1.4)],
+            2.8,
+        ),
+        "three cross": (
+            [walk(-1.0, v, far), walk(1.0, -w, far + 0.5), walk(0.3, 0.2, far + 1.0)],
+            2.0,
+        ),
+        "six walk about": ([stroll(rng, 1.2 + 0.5 * k) for k in range(6)], 10.0),
+    }
+
+
+def pictures(ways: list[Way], seconds: float, rng: np.random.Generator) -> Iterator[
+    tuple[Detections, dict[int, NDArray[np.float64]], set[int]]
+]:  # fmt: skip
+    """Yield what a detector finds, where people are by number, and who of them can be found."""
+    for k in range(1, int(seconds * RATE_HZ) + 1):
+        places = {
+            i: np.array([x, 0.0, z])
+            for i, (x, z) in ((i, way(k / RATE_HZ)) for i, way in enumerate(ways))
+        }
+        seen = {i: p for i, p in places.items() if _in_view(p) and not _hidden(p, places.values())}
+        faces = [detected(p, rng) for p in seen.values() if rng.random() >= _MISSED]
+        order = rng.permutation(len(faces))
+        yield (
+            Detections(k / RATE_HZ, k, *SIZE, faces=tuple(faces[n] for n in order)),
+            places,
+            set(seen),
+        )
+
+
+def _in_view(p: NDArray[np.float64]) -> bool:
+    x, y = project(p[None], LENS)[0]
+    return bool(20.0 < x < SIZE[0] - 20.0)
+
+
+def _hidden(p: NDArray[np.float64], others: Iterable[NDArray[np.float64]]) -> bool:
+    """Return whether a nearer face lies before this one; of two as near, the left one does."""
+    for q in others:
+        nearer = q[2] < p[2] or (q[2] == p[2] and q[0] < p[0])
+        if nearer and abs(p[0] / p[2] - q[0] / q[2]) < _HIDDEN_M / q[2]:
+            return True
+    return False
+
+
+def detected(p: NDArray[np.float64], rng: np.random.Generator) -> DetectedFace:
+    """Return a face at a place in the camera's axes, turned to it, as a detector finds it."""
+    points = project(LANDMARKS_FACE_M @ _FRONTAL.T + p, LENS) + rng.normal(0.0, _MARKS_PX, (5, 2))
+    (x, y), (right, bottom) = points.min(axis=0).tolist(), points.max(axis=0).tolist()
+    return DetectedFace((x, y, right - x, bottom - y), points, 0.9)
+
+
+def perception() -> tuple[Perception, PoseHistory]:
+    """Return what sees through a camera that stands still at the origin."""
+    poses = PoseHistory(None)  # type: ignore[arg-type]
+    poses.head_pose = lambda t_s: (tuple(map(tuple, np.eye(3).tolist())), (0.0, 0.0, 0.0))  # type: ignore
+    mount = CameraMount(CameraParams(mount="base", position_mm=(0.0, 0.0, 0.0)))
+    return Perception(mount, FIELD_DEG, Tracker(TrackParams())), poses
+
+
+def idf1(ways: list[Way], seconds: float, rng: np.random.Generator) -> float:
+    """Return IDF1: pairs of truth and track that agree in the best pairing of whole identities.
+
+    Source: Ristani et al., "Performance measures and a data set for multi-target, multi-camera
+    tracking" (2016): 2 IDTP / (2 IDTP + IDFP + IDFN). Somebody behind another is no miss, and a
+    track that goes on for them is no false one.
+    """
+    see, poses = perception()
+    hits: Counter[tuple[int, int]] = Counter()
+    true: Counter[int] = Counter()
+    believed: Counter[int] = Counter()
+    for found, there, seen in pictures(ways, seconds, rng):
+        percept = see.see(found, poses)
+        assert percept is not None
+        for i, number in _matched(there, [(face.id, face.p_world_m) for face in percept.faces]):
+            if i in seen:
+                hits[i, number] += 1
+            if i is None or i in seen:
+                believed[number] += 1
+        true.update(list(seen))
+    people, numbers = sorted(true), sorted(believed)
+    table = np.array([[hits[i, n] for n in numbers] for i in people])
+    rows, columns = linear_sum_assignment(-table)
+    return float(2.0 * table[rows, columns].sum() / (true.total() + believed.total()))
+
+
+def _matched(
+    people: dict[int, NDArray[np.float64]], tracks: list[tuple[int, Vec3]]
+) -> Iterator[tuple[int | None, int]]:
+    """Yield who each track is in one picture, None for nobody, and its number."""
+    p = np.array(list(people.values()))
+    q = np.array([(-y, -z, x) for _, (x, y, z) in tracks]).reshape(-1, 3)
+    far, believed = np.linalg.norm(p, axis=1), np.linalg.norm(q, axis=1)
+    cos = np.clip((p / far[:, None]) @ (q / believed[:, None]).T, -1.0, 1.0)
+    apart_deg = np.degrees(np.arccos(cos))
+    # Of two in one direction it is the one as far away.
+    cost = apart_deg + _SAME_DEG * np.abs(np.log(far[:, None] / believed))
+    cost[apart_deg > _SAME_DEG] = 1e6
+    names = list(people)
+    who = {
+        j: names[i] for i, j in zip(*linear_sum_assignment(cost), strict=True) if cost[i, j] < 1e6
+    }
+    for j, (number, _) in enumerate(tracks):
+        yield who.get(j), number
+
+
+class Film(NamedTuple):
+    """Drawn pictures, and the numbers of those before which there is a cut."""
+
+    images: list[Image]
+    cuts: list[int]
+
+
+def room(rng: np.random.Generator, width: int = 1000, height: int = 600) -> Image:
+    """Return a drawn room: large and small patches of grey on a gradient."""
+    image = (
+        np.linspace(60, 150, width)[None] + np.linspace(0, rng.uniform(-50, 50), height)[:, None]
+    )
+    for _ in range(60):
+        x, y = rng.integers(0, width), rng.integers(0, height)
+        w, h = rng.integers(15, 260), rng.integers(15, 200)
+        image[y : y + h, x : x + w] = rng.uniform(10, 245)
+    return np.repeat(np.clip(image, 0, 255).astype(np.uint8)[:, :, None], 3, axis=2)
+
+
+def cut_film(rng: np.random.Generator, scenes: int = 4) -> Film:
+    """Return rooms one after the other, with the trouble that is no cut in each.
+
+    A pan of 11 deg a picture, light that is switched, noise, and a hand before the lens.
+    """
+    images: list[Image] = []
+    cuts: list[int] = []
+    noise = [rng.normal(0.0, 3.0, (*SIZE[::-1], 1)) for _ in range(4)]
+    for scene in range(scenes):
+        if scene:
+            cuts.append(len(images))
+        view = room(rng)
+        for k in range(24):
+            x = 100 + 100 * (0, 1, 2, 1)[k % 4] if k < 9 else 100  # 100 px are 11 deg
+            image = view[100 : 100 + SIZE[1], x : x + SIZE[0]].astype(float)
+            if 10 <= k < 13:
+                image = 0.4 * image + 8.0
+            if 14 <= k < 16:
+                image = 0.0 * image + 12.0
+            if 18 <= k < 21:
+                image[60 * (k - 18) :, 200:380] = 170.0
+            images.append(np.clip(image + noise[k % 4], 0, 255).astype(np.uint8))
+    return Film(images, cuts)
+
+
+def cuts_in(images: Iterable[Image]) -> list[int]:
+    """Return the numbers of the pictures before which a cut is found."""
+    cuts = CutDetector()
+    scenes = [cuts.scene(image) for image in images]
+    return [k for k in range(1, len(scenes)) if scenes[k] != scenes[k - 1]]
+
+
+class _Found:
+    """A detector of a drawn face that is in every picture at about the same place."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        self._rng = rng
+
+    def find(self, image: Image) -> tuple[DetectedFace, ...]:
+        """Return the face."""
+        return (detected(np.array([0.1, 0.0, 1.5]), self._rng),)
+
+
+def went_on(film: Film, rng: np.random.Generator) -> tuple[int, int]:
+    """Return how many identities went on after a cut, and how many ended where there was none."""
+    see, poses = perception()
+    frames, ids = FrameAnalyzer(_Found(rng)), []
+    for k, image in enumerate(film.images):
+        percept = see.see(frames.look(Shot(k / RATE_HZ, k + 1, image)), poses)
+        assert percept is not None
+        (face,) = percept.faces
+        ids.append(face.id)
+    ended = [k for k in range(1, len(ids)) if ids[k] != ids[k - 1]]
+    return sum(k not in ended for k in film.cuts), sum(k not in film.cuts for k in ended)
+
+
+def measure(full: bool) -> dict[str, float]:
+    """Return the figures; full: more seeds, and the films at hand."""
+    figures: dict[str, list[float]] = {}
+    for seed in range(20 if full else 3):
+        rng = np.random.default_rng(seed)
+        for name, (ways, seconds) in crossings(rng).items():
+            figures.setdefault(f"{name}: IDF1", []).append(idf1(ways, seconds, rng))
+    rng, on, ended, found, false, cuts, images = np.random.default_rng(0), 0, 0, 0, 0, 0, 0
+    for _ in range(10 if full else 2):
+        film = cut_film(rng)
+        on, ended = (a + b for a, b in zip((on, ended), went_on(film, rng), strict=True))
+        there = cuts_in(film.images)
+        found += len(set(there) & set(film.cuts))
+        false += len(set(there) - set(film.cuts))
+        cuts, images = cuts + len(film.cuts), images + len(film.images)
+    out = {name: float(np.mean(values)) for name, values in figures.items()}
+    out |= {f"{name}, worst": float(np.min(values)) for name, values in figures.items()}
+    out["identities that go on after a cut, %"] = 100.0 * on / cuts
+    out["identities that end without a cut"] = float(ended)
+    out["cuts found, %"] = 100.0 * found / cuts
+    out["cuts where there is none, of 1000 pictures"] = 1e3 * false / images
+    for name, wanted in (("Megamind.avi", {98, 154, 200}), ("vtest.avi", set[int]())):
+        if full and (file := at_hand(name)):
+            there = cuts_in(_read(cv2.VideoCapture(str(file)), 400))
+            out[f"{name}: cuts missed or wrong"] = float(len(set(there) ^ wanted))
+    return out
+
+
+def _read(film: cv2.VideoCapture, most: int) -> Iterator[Image]:
+    for _ in range(most):
+        good, image = film.read()
+        if not good:
+            return
+        yield image

@@ -1,0 +1,89 @@
+"""A cut of a film ends identities; a pan, a switch, a hand before the lens and a saccade do not."""
+
+import pickle
+from math import radians
+
+import numpy as np
+import pytest
+from seeing import row_09_identities as row
+from test_perception import Neck, face_at
+
+from gazerig.drivers.types import Detections
+from gazerig.drivers.vision.cut_detector import CutDetector
+from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
+from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.perception.frame_locator import FrameLocator
+from gazerig.robot.perception.perception import Perception
+from gazerig.robot.perception.tracker import Tracker
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_cuts_are_found_and_nothing_else_is_one(seed: int) -> None:
+    """Among pans, light that is switched off and on, noise and a hand before the lens."""
+    film = row.cut_film(np.random.default_rng(seed))
+    assert len(film.cuts) == 3 and row.cuts_in(film.images) == film.cuts
+
+
+def test_e89_identities_end_at_a_cut_and_at_nothing_else() -> None:
+    rng = np.random.default_rng(5)
+    assert row.went_on(row.cut_film(rng), rng) == (0, 0)
+
+
+@pytest.mark.parametrize(
+    "shape", [(32, 48, 3), (400, 640, 3), (1080, 1920, 3), (400, 640), (5, 7, 3)]
+)
+def test_any_size_of_picture_will_do_and_may_change(shape: tuple[int, ...]) -> None:
+    rng, cuts = np.random.default_rng(0), CutDetector()
+    cuts.scene(row.room(rng)[:400, :640])
+    image = rng.integers(0, 255, shape).astype(np.uint8)
+    first = cuts.scene(image)
+    assert cuts.scene(image) == first <= 1
+
+
+def test_a_covered_lens_shows_the_same_scene_afterwards() -> None:
+    rng, cuts = np.random.default_rng(1), CutDetector()
+    room, black = row.room(rng), np.zeros((400, 640, 3), np.uint8)
+    assert [cuts.scene(image) for image in (room, black, black, room)] == [0, 0, 0, 0]
+    assert [cuts.scene(image) for image in (black, row.room(rng))] == [0, 1]
+
+
+@pytest.mark.parametrize(("turned_deg", "ends"), [(0.0, True), (2.0, True), (30.0, False)])
+def test_a_head_that_turned_sees_another_part_of_the_same_room(
+    turned_deg: float, ends: bool
+) -> None:
+    """Pictures of a saccade are as unlike as those about a cut; the joints tell which it was."""
+    mount = CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0)))
+    perception, poses = Perception(mount, 69.0, Tracker(TrackParams())), PoseHistory(Neck())
+    ids = []
+    for number, (yaw_deg, scene) in enumerate(((0.0, 0), (0.0, 0), (turned_deg, 1)), start=1):
+        yaw = radians(yaw_deg)
+        poses.remember(number / 30, (yaw, 0.0, 0.0))
+        face = face_at((np.sin(yaw), 0.0, np.cos(yaw)))
+        found = Detections(number / 30, number, 640, 400, (face,), scene=scene)
+        percept = perception.see(found, poses)
+        assert percept is not None
+        ids.append([face.id for face in percept.faces])
+    assert ids[0] == ids[1] and len(ids[2]) == 1
+    assert (ids[2] != ids[1]) is ends
+
+
+def test_a_camera_without_the_count_of_scenes_goes_on_as_ever() -> None:
+    perception, poses = (
+        Perception(CameraMount(CameraParams(mount="base")), 69.0, Tracker(TrackParams())),
+        PoseHistory(Neck()),
+    )
+    poses.remember(0.0, (0.0, 0.0, 0.0))
+    ids = set()
+    for number in range(1, 5):
+        percept = perception.see(
+            Detections(number / 30, number, 640, 400, (face_at((0.0, 0.0, 1.0)),)), poses
+        )
+        assert percept is not None
+        ids |= set(percept.bodies.ids)
+    assert len(ids) == 1
+
+
+def test_the_scene_comes_through_the_pipe_and_the_locator() -> None:
+    found = Detections(0.0, 1, 640, 400, scene=3)
+    assert pickle.loads(pickle.dumps(found)).scene == 3
+    assert found.located_by(FrameLocator(None, radians(69.0))).scene == 3
