@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from seeing.material import at_hand
+from stand_in import StandIn
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
@@ -57,7 +58,7 @@ WANTED = {
 """Of films beside the project the same is wanted; they are measured where they are at hand."""
 
 
-class _Neck:
+class _Neck(StandIn):
     """A head that turns about a point 10 cm behind and below its camera."""
 
     def head_pose(

@@ -284,4 +284,4 @@ def _read(film: cv2.VideoCapture, most: int) -> Iterator[Image]:
         good, image = film.read()
         if not good:
             return
-        yield image
+        yield np.asarray(image, np.uint8)
