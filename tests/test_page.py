@@ -4,34 +4,24 @@ As a script it photographs a page: ``python tests/test_page.py OUT.png [URL]``; 
 URL it feeds a page of its own with the snapshots made here.
 """
 
-import base64
 import itertools
-import json
 import math
-import os
-import shutil
-import signal
-import subprocess
 import sys
-import tempfile
 import threading
 import time
-import urllib.request
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
 import cv2
 import numpy as np
-import pytest
+from browser import Browser, browsing
 from desk import GAZE_JOINTS
-from page_visitor import PATIENCE_S
 from present import present
 from shown_page import running_page, wait_for
 from six_joints import of_six
-from websockets.sync.client import connect
 
 from gazerig.gaze.types import PART_NAMES, PARTS
 from gazerig.robot.dashboard.camera_overlay import encode
@@ -39,27 +29,8 @@ from gazerig.robot.dashboard.page_process import PageProcess, pack, unpack
 from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
 
 T = TypeVar("T")
-REPOSITORY = Path(__file__).parents[1]
-WINDOW_PX = (1280, 800)
 WINDOW_SMALL_PX = (900, 500)  # a processor that does a graphics card's work has less to do
 PANEL_PX = 370
-# A processor that does a graphics card's work draws few pictures a second, not sixty ...
-SLOW_DRAWING = """(() => {
-  const soon = window.requestAnimationFrame.bind(window)
-  window.requestAnimationFrame = draw => setTimeout(() => soon(draw), 100)
-  window.cancelAnimationFrame = clearTimeout
-})()
-"""
-# ... and of the scene only what a test asks for with drawScene: each picture costs it 0.2 s.
-RARE_DRAWING = f"""{SLOW_DRAWING};
-for (const draw of ['drawArrays', 'drawElements', 'drawRangeElements',
-                    'drawArraysInstanced', 'drawElementsInstanced']) {{
-  const drawn = WebGL2RenderingContext.prototype[draw]
-  WebGL2RenderingContext.prototype[draw] = function (...what) {{
-    if (window.drawScene) drawn.apply(this, what)
-  }}
-}}
-"""
 CLOSE_TO_THE_RIG = "&initialCameraPosition=0.45,-0.3,0.2&initialCameraLookAt=0,0,0.12"
 
 # A person's face in its own frame (x out of the face, y to the owner's left, z up), in the
@@ -144,112 +115,6 @@ def life(t_s: float) -> Snapshot:
     part = (2, 6, 4, 3)[int(t_s / 0.7) % 4]
     hand = SeenBody(7, "hand", (0.6, 0.35, 0.1), 0.04)
     return looking(t_s, face, part, (opening, opening), (hand,))
-
-
-# --- a browser --------------------------------------------------------------------------
-
-
-def chromium() -> str | None:
-    names = ("chromium", "chromium-browser", "google-chrome")
-    return next((path for name in names if (path := shutil.which(name))), None)
-
-
-class Browser:
-    """One tab of a headless Chromium, driven through its debugging port."""
-
-    def __init__(
-        self, debugging_port: int, window_px: tuple[int, int], drawing: str = SLOW_DRAWING
-    ) -> None:
-        self.width_px, height_px = window_px
-        self._ids = itertools.count(1)
-        self.asked_for: list[str] = []
-        with urllib.request.urlopen(f"http://127.0.0.1:{debugging_port}/json/list") as answer:
-            tab = next(t for t in json.load(answer) if t["type"] == "page")
-        self._socket = connect(
-            tab["webSocketDebuggerUrl"],
-            max_size=None,
-            ping_interval=None,
-            close_timeout=0.5,  # the browser is killed in any case
-        )
-        self._ask("Network.enable")
-        self._ask("Page.enable")
-        self._ask("Page.addScriptToEvaluateOnNewDocument", source=drawing)
-        shape = {"width": self.width_px, "height": height_px, "deviceScaleFactor": 1}
-        self._ask("Emulation.setDeviceMetricsOverride", **shape, mobile=False)
-
-    def _ask(self, method: str, **params: object) -> dict:
-        number = next(self._ids)
-        self._socket.send(json.dumps({"id": number, "method": method, "params": params}))
-        while True:
-            answer = json.loads(self._socket.recv(timeout=PATIENCE_S))
-            if answer.get("method") == "Network.requestWillBeSent":
-                self.asked_for.append(answer["params"]["request"]["url"])
-            if answer.get("id") == number:
-                return answer["result"]
-
-    def go(self, url: str) -> None:
-        self._ask("Page.navigate", url=url)
-
-    def words(self) -> str:
-        """Everything there is to read on the page."""
-        answer = self._ask("Runtime.evaluate", expression="document.body.innerText")
-        return answer["result"].get("value", "")
-
-    def run(self, script: str) -> None:
-        """Do what a script says."""
-        self._ask("Runtime.evaluate", expression=script)
-
-    def photograph(self) -> bytes:
-        """A PNG of the page, without the notice that this browser has no graphics card."""
-        hide = (
-            "document.querySelectorAll('.mantine-Notifications-root')"
-            ".forEach(notice => { notice.style.display = 'none' })"
-        )
-        self._ask("Runtime.evaluate", expression=hide)
-        return base64.b64decode(self._ask("Page.captureScreenshot", format="png")["data"])
-
-    def close(self) -> None:
-        self._socket.close()
-
-
-CHROMIUM_FLAGS = (
-    *("--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"),
-    *("--disable-sync", "--disable-background-networking", "--disable-component-update"),
-    *("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--hide-scrollbars"),
-    # No name resolves: a page that needed anything from elsewhere would stay empty.
-    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1, EXCLUDE 127.0.0.2",
-    "--remote-debugging-port=0",
-)
-
-
-@contextmanager
-def browsing(
-    window_px: tuple[int, int] = WINDOW_PX, drawing: str = SLOW_DRAWING
-) -> Iterator[Browser]:
-    """Open a browser that first runs a script about drawing on every page."""
-    program = chromium()
-    if program is None:
-        pytest.skip("no chromium, chromium-browser or google-chrome in the path")
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        process = subprocess.Popen(
-            [program, *CHROMIUM_FLAGS, f"--user-data-dir={folder}", "about:blank"],
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            start_new_session=True,
-        )
-        try:
-            with closing(Browser(debugging_port(Path(folder)), window_px, drawing)) as browser:
-                yield browser
-        finally:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
-
-
-def debugging_port(folder: Path) -> int:
-    """The port that Chromium writes into its folder once it listens."""
-    file = folder / "DevToolsActivePort"
-    wait_for(lambda: file.exists() and "\n" in file.read_text(), "the browser")
-    return int(file.read_text().splitlines()[0])
 
 
 @contextmanager

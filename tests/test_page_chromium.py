@@ -4,233 +4,43 @@ The rig ticks in simulated time, slower than real, so that it leaves the process
 browser.
 """
 
-import importlib.util
-import json
-import sys
-import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
-from math import degrees
 from pathlib import Path
-from types import ModuleType
 from typing import Any, cast
 
-import numpy as np
 import pytest
-from desk import GAZE_JOINTS
+from browser import RARE_DRAWING, Browser, browsing
+from page_person import (
+    PACE_S,
+    STOP,
+    UNHURRIED_FRAMES,
+    Person,
+    Rig,
+    beside,
+    running,
+    saying,
+    seen_at,
+)
 from present import present
-from shown_page import free_port, wait_for
+from shown_page import wait_for
 
 from gazerig.config.allowed_folder import AllowedFolder
 from gazerig.config.load import shipped
 from gazerig.config.schema import load_rig
-from gazerig.gaze.types import Vec3
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.param_store import ParamStore
-from gazerig.robot.app.run_observers import RunObservers
-from gazerig.robot.control.loop import LoopCount, Tick
-from gazerig.robot.dashboard.page_view import _HALF_WIDTH as HALF_WIDTH
-from gazerig.robot.dashboard.page_view import VIEWS
-from gazerig.robot.model.commands import Ask, LookAt, Renew, Stop
+from gazerig.robot.model.commands import Ask, LookAt, Stop
 
 pytestmark = pytest.mark.own_timeouts
 
 
-def load_browser() -> ModuleType:
-    """The browser's driver, which stands in another test file."""
-    spec = importlib.util.spec_from_file_location(
-        "browser_of_the_page", Path(__file__).with_name("test_page.py")
-    )
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-browser_of_the_page = load_browser()
-
-
-YAW = GAZE_JOINTS.index("neck_yaw")
-TICK_S = 0.01
-PACE_S = 0.04  # real seconds a tick
-
-
-class Rig:
-    """A simulated rig with a page, ticked by a thread."""
-
-    def __init__(self, host: str = "127.0.0.1") -> None:
-        made = assemble(load_rig("desk"), RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
-        self.made, self.robot = made, made.robot
-        self.tuning = ParamStore(made.live, self.robot.command, "desk")
-        self.said: list[str] = []
-        # Not fast: the page is for real time, of which these ticks are a slow imitation.
-        options = RunOptions(page=f"{host}:{free_port()}")
-        say = self.said.append
-        self.audience = RunObservers(made, options, say, say, self.tuning)
-        self.newest: Tick | None = None
-        self.pace_s = PACE_S
-        self.orders: list[Any] = []
-        self._over = threading.Event()
-        self._thread = threading.Thread(target=self._tick_on)
-
-    def open(self) -> str:
-        self.robot.start(self.made.clock)
-        self.audience.open()
-        self._thread.start()
-        words = wait_for(lambda: self.saying("the page is at "), "the page's address")
-        return str(words).rpartition(" ")[2]
-
-    def saying(self, part: str) -> str | None:
-        return next((line for line in self.said if part in line), None)
-
-    def _tick_on(self) -> None:
-        clock = self.made.clock
-        while not self._over.wait(self.pace_s):
-            clock.sleep_until(clock.now_s() + TICK_S)
-            tick = self.robot.tick(clock.now_s(), TICK_S)
-            self.newest = tick
-            self.orders += [o for o in tick.commands if not isinstance(o, Renew)]
-            self.audience.update(tick)
-
-    def desired_deg(self) -> float:
-        assert self.newest is not None
-        return degrees(self.newest.desired_rad[YAW])
-
-    def close(self) -> None:
-        self._over.set()
-        self._thread.join()
-        self.robot.stop()
-        self.audience.close(LoopCount(0, 0, "the end of the test"))
-        self.made.close()
-
-
-class Person:
-    """Who sits at the browser: looks for things by what they say, clicks and types."""
-
-    def __init__(self, tab: object) -> None:
-        self.tab = tab
-
-    def run(self, script: str) -> object:
-        answer = self.tab._ask(  # type: ignore[attr-defined]
-            "Runtime.evaluate", expression=script, returnByValue=True
-        )
-        assert "exceptionDetails" not in answer, answer["exceptionDetails"]
-        return answer["result"].get("value")
-
-    def reads(self, *words: str) -> bool:
-        said = self.tab.words()  # type: ignore[attr-defined]
-        return all(word in said for word in words)
-
-    def place(self, element: str, across: float = 0.5) -> tuple[float, float] | None:
-        """Where an element is, once it stays there; brought into view where it is not."""
-        found = self.run(
-            f"(() => {{ const e = {element}; if (!e || !e.getClientRects().length) return null;"
-            "let r = e.getBoundingClientRect();"
-            "if (r.top < 0 || r.bottom > innerHeight) { e.scrollIntoView({block: 'center'});"
-            "r = e.getBoundingClientRect(); }"
-            f"return [r.x + r.width * {across}, r.y + r.height / 2]; }})()"
-        )
-        return None if found is None else (found[0], found[1])  # type: ignore[index]
-
-    def click(self, element: str, across: float = 0.5) -> None:
-        def steady() -> tuple[float, float] | None:
-            first = self.place(element, across)
-            return first if first is not None and first == self.place(element, across) else None
-
-        x, y = wait_for(steady, f"a place to click: {element}")
-        for kind, button in (("mouseMoved", "none"), ("mousePressed", "left")):
-            self._mouse(kind, x, y, button)
-        self._mouse("mouseReleased", x, y, "left")
-
-    def _mouse(self, kind: str, x: float, y: float, button: str) -> None:
-        self.tab._ask(  # type: ignore[attr-defined]
-            "Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, clickCount=1
-        )
-
-    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
-        """Move the mouse as a hand does: there first, then with the button down, step by step."""
-        (x, y), (to_x, to_y) = start, end
-        self._mouse("mouseMoved", x - 3.0, y, "none")
-        self._mouse("mouseMoved", x, y, "none")
-        self.wait_for_frames(3)
-        self._mouse("mousePressed", x, y, "left")
-        for step in range(1, 6):
-            share = step / 5.0
-            self._mouse("mouseMoved", x + share * (to_x - x), y + share * (to_y - y), "left")
-        self._mouse("mouseReleased", to_x, to_y, "left")
-
-    def wait_for_frames(self, count: int) -> None:
-        """Wait until the browser has drawn so often: what was sent to it is then to be seen."""
-        self.run(
-            "window.framesDrawn = 0; (function more() { window.framesDrawn += 1;"
-            f"if (window.framesDrawn < {count}) requestAnimationFrame(more); }})()"
-        )
-        wait_for(lambda: self.run("window.framesDrawn") == count, f"{count} frames")
-
-    def press(self, key: str, code: str, number: int) -> None:
-        for kind in ("keyDown", "keyUp"):
-            self.tab._ask(  # type: ignore[attr-defined]
-                "Input.dispatchKeyEvent",
-                type=kind, key=key, code=code, windowsVirtualKeyCode=number, text=key,
-            )  # fmt: skip
-
-    def space(self) -> None:
-        self.press(" ", "Space", 32)
-
-    def type(self, text: str) -> None:
-        self.tab._ask("Input.insertText", text=text)  # type: ignore[attr-defined]
-
-
-def saying(words: str, kind: str = "button, [role=tab], label") -> str:
-    """The element that says so, whatever is written smaller beside it."""
-    return (
-        f"[...document.querySelectorAll({json.dumps(kind)})].find("
-        f"e => e.textContent.trim() === {json.dumps(words)} && e.getClientRects().length)"
-    )
-
-
-def beside(words: str, kind: str) -> str:
-    """The control of a kind that a label names."""
-    return f"({saying(words, 'label')})?.closest('.mantine-Flex-root').querySelector('{kind}')"
-
-
-def seen_at(p_world_m: Vec3, canvas: tuple[float, float, float, float]) -> tuple[float, float]:
-    """Where in the window a point of the first view is; canvas: left, top, width, height in px."""
-    eye, look_at = (np.array(place) for place in VIEWS["both"])
-    ahead = (look_at - eye) / np.linalg.norm(look_at - eye)
-    right = np.cross(ahead, (0.0, 0.0, 1.0))
-    right /= np.linalg.norm(right)
-    away = np.array(p_world_m) - eye
-    left, top, width, height = canvas
-    scale_px = 0.5 * width / HALF_WIDTH / (away @ ahead)
-    x, y = away @ right * scale_px, away @ np.cross(right, ahead) * scale_px
-    return left + 0.5 * width + x, top + 0.5 * height - y
-
-
-STOP = "document.querySelector('#rig-stop')"
-
-
-@contextmanager
-def running(host: str = "127.0.0.1") -> Iterator[tuple[Rig, str]]:
-    rig = Rig(host)
-    try:
-        yield rig, rig.open()
-    finally:
-        rig.close()
-
-
 @pytest.fixture(scope="module")
-def tab() -> Iterator[object]:
+def tab() -> Iterator[Browser]:
     # Nothing is judged by the scene's pixels here, and only one test reaches into it.
-    rare = browser_of_the_page.RARE_DRAWING
-    with browser_of_the_page.browsing((1100, 760), rare) as tab:
+    with browsing((1100, 760), RARE_DRAWING) as tab:
         yield tab
 
 
 @pytest.fixture(scope="module")
-def at_the_rig(tab: Any) -> Iterator[tuple[Rig, Person]]:
+def at_the_rig(tab: Browser) -> Iterator[tuple[Rig, Person]]:
     with running() as (rig, url):
         tab.go(url)
         person = Person(tab)
@@ -330,27 +140,34 @@ def test_a_target_is_dragged_through_the_scene(at_the_rig: tuple[Rig, Person]) -
     rig, person = at_the_rig
     person.click(saying("lead"))
     person.run("window.drawScene = true")
-    there = (0.7, 0.1, 0.3)
+    # The page is behind the rig: what it says must be of this target, not of one before.
+    chosen = "a user chose this point"
+    wait_for(lambda: not person.reads(chosen), "the page knowing of no target")
+    there = (0.5, -0.25, 0.2)  # no label before it
     rig.robot.command(LookAt(there, stay=True))
     wait_for(lambda: present(rig.newest).target.p_world_m == there, "the head being led")
-    wait_for(lambda: person.reads("a user chose this point"), "the page knowing of it")
+    wait_for(lambda: person.reads(chosen), "the page knowing of it")
     person.click(beside("drag a target", "input"))
     rect = "(() => { const r = document.querySelector('canvas').getBoundingClientRect();"
     bounds: Any = person.run(rect + "return [r.x, r.y, r.width, r.height]; })()")
     x, y, width, height = bounds
     canvas = (x, y, width, height)
-    arrow, farther = ((0.7, 0.1, 0.3 + up) for up in (0.08, 0.2))
+    arrow, farther = ((*there[:2], there[2] + up) for up in (0.08, 0.2))
     before = len(rig.orders)
 
-    # A drag that begins beside a gizmo not yet drawn would turn the view for good.
-    person.wait_for_frames(20)
-
+    # A drag that began beside a gizmo not yet drawn would turn the view for good.
     def dragged() -> bool:
-        person.drag(seen_at(arrow, canvas), seen_at(farther, canvas))
-        return any(isinstance(order, LookAt) for order in rig.orders[before:])
+        if any(isinstance(order, LookAt) for order in rig.orders[before:]):
+            return True
+        start, end = seen_at(arrow, canvas), seen_at(farther, canvas)
+        if person.lights_up(*start):
+            person.drag(start, end)
+        return False
 
     wait_for(dragged, "the target being dragged")
-    wait_for(lambda: present(rig.newest).target.p_world_m[2] > 0.38, "the head following")
+    wait_for(
+        lambda: present(rig.newest).target.p_world_m[2] > there[2] + 0.08, "the head following"
+    )
     # Along the arrow and nowhere else.
     assert present(rig.newest).target.p_world_m[:2] == pytest.approx(there[:2], abs=1e-3)
     person.click(saying("look freely again"))
@@ -365,14 +182,16 @@ def test_a_parameter_is_found_changed_marked_and_put_back(
     key = "ranges.neck_yaw_deg"
     (label,) = (k.key for k in rig.tuning.parameters() if k.key == key)
     person.click(saying("tuning"))
-    person.run(f"{beside('find', 'input')}.select()")
-    person.click(beside("find", "input"))
-    person.run(f"{beside('find', 'input')}.select()")
-    person.type(key)
+    person.fill(beside("find", "input"), key)
     name = f"{label} (deg)"
     before = rig.tuning.values()[key]
-    person.click(beside(name, ".mantine-Slider-track"), 0.25)
-    wait_for(lambda: rig.tuning.values()[key] != before, "the value in force")
+
+    def moved() -> bool:  # again, if the list was still being built and the slider went aside
+        person.click(beside(name, ".mantine-Slider-track"), 0.25)
+        person.wait_for_frames(UNHURRIED_FRAMES)
+        return rig.tuning.values()[key] != before
+
+    wait_for(moved, "the value in force")
     wait_for(lambda: person.reads(f"● {name}", "not saved"), "the mark")
     # Another program changes it: the control shows that.
     rig.tuning.set({key: 44.0})
@@ -388,15 +207,11 @@ def test_what_breaks_a_rule_is_refused_in_words_and_goes_back(
 ) -> None:
     rig, person = at_the_rig
     person.click(saying("tuning"))
-    person.click(beside("find", "input"))
-    person.run(f"{beside('find', 'input')}.select()")
-    person.type("joints.neck_yaw.gains")
+    person.fill(beside("find", "input"), "joints.neck_yaw.gains")
     name = "neck_yaw.gains"
     field = beside(name, "input")
     before = wait_for(lambda: person.run(f"({field})?.value"), "the field")
-    person.click(field)
-    person.run(f"{field}.select()")
-    person.type("[99999, 0, 0]")
+    person.fill(field, "[99999, 0, 0]")
     person.press("\r", "Enter", 13)
     wait_for(lambda: person.reads("refused", "16383"), "the rule")
     wait_for(lambda: person.run(f"{field}.value") == before, "the control going back")
@@ -414,8 +229,7 @@ def test_what_is_in_force_is_saved_in_a_new_file_with_its_comments(
     cast(Any, present(rig.audience._page)._on_request)._handler._paths = AllowedFolder(
         tmp_path
     )  # as if the rig's file lay there
-    person.click(beside("save as", "input"))
-    person.type(str(file))
+    person.fill(beside("save as", "input"), str(file))
     person.press("\r", "Enter", 13)
     wait_for(lambda: person.reads(f"saved in {file}", "all saved"), "the words")
     assert load_rig(str(file)).park_deg["neck_pitch"] == -3.0
@@ -445,7 +259,7 @@ def test_on_a_phone_stop_is_at_the_top_and_nothing_covers_it(
 ) -> None:
     rig, person = at_the_rig
     phone = {"width": 360, "height": 640, "deviceScaleFactor": 1, "mobile": True}
-    person.tab._ask("Emulation.setDeviceMetricsOverride", **phone)  # type: ignore[attr-defined]
+    person.tab.ask("Emulation.setDeviceMetricsOverride", **phone)
     try:
         wait_for(lambda: person.run("innerWidth") == 360, "the phone")
         test_stop_stays_in_sight_when_the_panels_are_shut(at_the_rig)
@@ -456,7 +270,7 @@ def test_on_a_phone_stop_is_at_the_top_and_nothing_covers_it(
         resumed(rig, person)
     finally:
         desk = {"width": 1100, "height": 760, "deviceScaleFactor": 1, "mobile": False}
-        person.tab._ask("Emulation.setDeviceMetricsOverride", **desk)  # type: ignore[attr-defined]
+        person.tab.ask("Emulation.setDeviceMetricsOverride", **desk)
 
 
 def test_names_are_words_and_never_run(at_the_rig: tuple[Rig, Person]) -> None:
@@ -493,7 +307,7 @@ def test_a_stop_that_gets_lost_is_sent_again(at_the_rig: tuple[Rig, Person]) -> 
 
 # The last: the browser leaves the rig of the others.
 @pytest.mark.slow
-def test_without_the_token_there_is_one_line_and_with_it_the_page(tab: Any) -> None:
+def test_without_the_token_there_is_one_line_and_with_it_the_page(tab: Browser) -> None:
     with running("127.0.0.2") as (rig, url):
         person = Person(tab)
         with_token, url = url, url.partition("?")[0]

@@ -1,0 +1,223 @@
+"""A person at a browser, and the simulated rig whose page it shows.
+
+The rig ticks in simulated time, slower than real, so that it leaves the processor to the
+browser.
+"""
+
+import json
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import degrees
+from typing import Any
+
+import cv2
+import numpy as np
+from browser import Browser
+from desk import GAZE_JOINTS
+from present import present
+from shown_page import free_port, wait_for
+
+from gazerig.config.schema import load_rig
+from gazerig.gaze.types import Vec3
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.param_store import ParamStore
+from gazerig.robot.app.run_observers import RunObservers
+from gazerig.robot.control.loop import LoopCount, Tick
+from gazerig.robot.dashboard.page_view import _HALF_WIDTH as HALF_WIDTH
+from gazerig.robot.dashboard.page_view import VIEWS
+from gazerig.robot.model.commands import Renew
+
+YAW = GAZE_JOINTS.index("neck_yaw")
+TICK_S = 0.01
+PACE_S = 0.04  # real seconds a tick
+UNHURRIED_FRAMES = 2
+"""Each is drawn 0.1 s after it is asked for; so many later the browser has sent what it had."""
+
+
+class Rig:
+    """A simulated rig with a page, ticked by a thread."""
+
+    def __init__(self, host: str = "127.0.0.1") -> None:
+        made = assemble(load_rig("desk"), RunOptions(mock=True, fast=True, seed=0, scene="visitor"))
+        self.made, self.robot = made, made.robot
+        self.tuning = ParamStore(made.live, self.robot.command, "desk")
+        self.said: list[str] = []
+        # Not fast: the page is for real time, of which these ticks are a slow imitation.
+        options = RunOptions(page=f"{host}:{free_port()}")
+        say = self.said.append
+        self.audience = RunObservers(made, options, say, say, self.tuning)
+        self.newest: Tick | None = None
+        self.pace_s = PACE_S
+        self.orders: list[Any] = []
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._tick_on)
+
+    def open(self) -> str:
+        self.robot.start(self.made.clock)
+        self.audience.open()
+        self._thread.start()
+        words = wait_for(lambda: self.saying("the page is at "), "the page's address")
+        return str(words).rpartition(" ")[2]
+
+    def saying(self, part: str) -> str | None:
+        return next((line for line in self.said if part in line), None)
+
+    def _tick_on(self) -> None:
+        clock = self.made.clock
+        while not self._over.wait(self.pace_s):
+            clock.sleep_until(clock.now_s() + TICK_S)
+            tick = self.robot.tick(clock.now_s(), TICK_S)
+            self.newest = tick
+            self.orders += [o for o in tick.commands if not isinstance(o, Renew)]
+            self.audience.update(tick)
+
+    def desired_deg(self) -> float:
+        assert self.newest is not None
+        return degrees(self.newest.desired_rad[YAW])
+
+    def close(self) -> None:
+        self._over.set()
+        self._thread.join()
+        self.robot.stop()
+        self.audience.close(LoopCount(0, 0, "the end of the test"))
+        self.made.close()
+
+
+class Person:
+    """Who sits at the browser: looks for things by what they say, clicks and types."""
+
+    def __init__(self, tab: Browser) -> None:
+        self.tab = tab
+
+    def run(self, script: str) -> object:
+        answer = self.tab.ask("Runtime.evaluate", expression=script, returnByValue=True)
+        assert "exceptionDetails" not in answer, answer["exceptionDetails"]
+        return answer["result"].get("value")
+
+    def reads(self, *words: str) -> bool:
+        said = self.tab.words()
+        return all(word in said for word in words)
+
+    def place(self, element: str, across: float = 0.5) -> tuple[float, float] | None:
+        """Where an element is; None: not there, or something lies over it and it is scrolled."""
+        found = self.run(
+            f"(() => {{ const e = {element}; if (!e || !e.getClientRects().length) return null;"
+            f"const r = e.getBoundingClientRect(), x = r.x + r.width * {across};"
+            "const y = r.y + r.height / 2, hit = document.elementFromPoint(x, y);"
+            "if (e.contains(hit)) return [x, y];"
+            "e.scrollIntoView({block: 'center'}); return null; })()"
+        )
+        return None if found is None else (found[0], found[1])  # type: ignore[index]
+
+    def click(self, element: str, across: float = 0.5) -> None:
+        """Click on an element once it can be seen and stays where it is."""
+
+        def steady() -> tuple[float, float] | None:
+            first = self.place(element, across)
+            return first if first is not None and first == self.place(element, across) else None
+
+        x, y = wait_for(steady, f"a place to click: {element}")
+        for kind, button in (("mouseMoved", "none"), ("mousePressed", "left")):
+            self._mouse(kind, x, y, button)
+        self._mouse("mouseReleased", x, y, "left")
+
+    def fill(self, field: str, text: str) -> None:
+        """Put a text in the place of what stands in a field; again, if the field moved away.
+
+        The page sends one message every 50 ms, the newest: who goes on sooner takes the place of
+        what was typed.
+        """
+
+        def filled() -> bool:
+            self.click(field)
+            if self.run(f"{field}?.select(); document.activeElement === {field}") is not True:
+                return False
+            self.wait_for_frames(UNHURRIED_FRAMES)
+            self.type(text)
+            self.wait_for_frames(UNHURRIED_FRAMES)
+            return self.run(f"{field}?.value") == text
+
+        wait_for(filled, f"{text!r} in {field}")
+
+    def _mouse(self, kind: str, x: float, y: float, button: str) -> None:
+        self.tab.ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, clickCount=1)
+
+    def lights_up(self, x: float, y: float) -> bool:
+        """Point at a place: does an arrow there light up, so that it can be taken hold of?"""
+        self._mouse("mouseMoved", x - 3.0, y, "none")
+        self._mouse("mouseMoved", x, y, "none")
+        self.wait_for_frames(3)
+        png = self.tab.photograph_part(x - 8.0, y - 8.0, 16.0, 16.0)
+        seen = present(cv2.imdecode(np.frombuffer(png, np.uint8), cv2.IMREAD_COLOR)).astype(int)
+        blue, green, red = seen[..., 0], seen[..., 1], seen[..., 2]
+        return bool(np.count_nonzero((red > 190) & (green > 170) & (blue < 180)) > 10)
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """Move what the mouse is on as a hand does: button down, then step by step."""
+        (x, y), (to_x, to_y) = start, end
+        self._mouse("mousePressed", x, y, "left")
+        for step in range(1, 6):
+            share = step / 5.0
+            self._mouse("mouseMoved", x + share * (to_x - x), y + share * (to_y - y), "left")
+        self._mouse("mouseReleased", to_x, to_y, "left")
+
+    def wait_for_frames(self, count: int) -> None:
+        """Wait until the browser has drawn so often: what was sent to it is then to be seen."""
+        self.run(
+            "window.framesDrawn = 0; (function more() { window.framesDrawn += 1;"
+            f"if (window.framesDrawn < {count}) requestAnimationFrame(more); }})()"
+        )
+        wait_for(lambda: self.run("window.framesDrawn") == count, f"{count} frames")
+
+    def press(self, key: str, code: str, number: int) -> None:
+        for kind in ("keyDown", "keyUp"):
+            self.tab.ask(
+                "Input.dispatchKeyEvent",
+                type=kind, key=key, code=code, windowsVirtualKeyCode=number, text=key,
+            )  # fmt: skip
+
+    def space(self) -> None:
+        self.press(" ", "Space", 32)
+
+    def type(self, text: str) -> None:
+        self.tab.ask("Input.insertText", text=text)
+
+
+def saying(words: str, kind: str = "button, [role=tab], label") -> str:
+    """The element that says so, whatever is written smaller beside it."""
+    return (
+        f"[...document.querySelectorAll({json.dumps(kind)})].find("
+        f"e => e.textContent.trim() === {json.dumps(words)} && e.getClientRects().length)"
+    )
+
+
+def beside(words: str, kind: str) -> str:
+    """The control of a kind that a label names."""
+    return f"({saying(words, 'label')})?.closest('.mantine-Flex-root').querySelector('{kind}')"
+
+
+def seen_at(p_world_m: Vec3, canvas: tuple[float, float, float, float]) -> tuple[float, float]:
+    """Where in the window a point of the first view is; canvas: left, top, width, height in px."""
+    eye, look_at = (np.array(place) for place in VIEWS["both"])
+    ahead = (look_at - eye) / np.linalg.norm(look_at - eye)
+    right = np.cross(ahead, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
+    away = np.array(p_world_m) - eye
+    left, top, width, height = canvas
+    scale_px = 0.5 * width / HALF_WIDTH / (away @ ahead)
+    x, y = away @ right * scale_px, away @ np.cross(right, ahead) * scale_px
+    return left + 0.5 * width + x, top + 0.5 * height - y
+
+
+STOP = "document.querySelector('#rig-stop')"
+
+
+@contextmanager
+def running(host: str = "127.0.0.1") -> Iterator[tuple[Rig, str]]:
+    rig = Rig(host)
+    try:
+        yield rig, rig.open()
+    finally:
+        rig.close()
