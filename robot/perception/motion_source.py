@@ -1,7 +1,5 @@
 """What moves in an image, the camera's own turn taken out by where the head was."""
 
-import numpy as np
-
 from gazerig.drivers.camera.frame_analysis import Motion
 from gazerig.drivers.camera.pose_buffer import PoseBuffer
 from gazerig.drivers.camera.source import Shot
@@ -19,7 +17,8 @@ class MotionSource:
         params: of the detection.
         lens: for frames that do not bring their own lens.
         field_rad: horizontal field of view, likewise.
-        turns: rotation of a camera that turns with the head; None: it stands still.
+        turns: rotation of a camera that turns with the head; None: it is not measured, and the
+            image alone tells whether the camera stands.
     """
 
     def __init__(
@@ -61,9 +60,7 @@ class MotionSource:
             return None
         if shot.turn is not None and (by_gyro := shot.turn.since(before)) is not None:
             return by_gyro
-        if self._turns is None:
-            return np.eye(3)
-        return self._turns.turned(shot.captured_s, before_s)
+        return None if self._turns is None else self._turns.turned(shot.captured_s, before_s)
 
 
 def motion_finder(

@@ -37,6 +37,7 @@ from gazerig.drivers.vision.motion.image import (
 from gazerig.drivers.vision.motion.lucas_kanade import Blurred, Room, blurred, refined
 from gazerig.drivers.vision.motion.optical_flow import (
     Compared,
+    Flow,
     FlowSearch,
     searchable,
     turn_homography,
@@ -47,6 +48,9 @@ from gazerig.drivers.vision.motion.segmentation import what_moves
 from gazerig.drivers.vision.motion.tracking import MotionTracks, PatchTrack
 
 _KIND = "thing"
+# Flow is searched again where the camera moved the image by more than was foreseen: what is seen
+# through a shift is blurred, and at the edges lost.
+_SEARCH_AGAIN_PX = 1.5
 # With less of the older image in view, too little is left to tell motions apart.
 _LEAST_KNOWN = 0.4
 # Points enough for an affine fit.
@@ -80,6 +84,7 @@ class MotionDetector:
         self._search = FlowSearch(params.preset, params.finest_level)
         self._tracks = MotionTracks(params)
         self._before: SmallImage | None = None
+        self._moved = False  # the image alone told of a motion of the camera
         self.report = MotionReport()
 
     def retune(self, params: MotionParams) -> None:
@@ -124,7 +129,7 @@ class MotionDetector:
 
     def forget(self) -> None:
         """Forget the last image: the next one is the first of another scene."""
-        self._before = None
+        self._before, self._moved = None, False
         self._tracks.forget()
 
     def _look(
@@ -144,11 +149,9 @@ class MotionDetector:
         dt_s = now.captured_s - before.captured_s
         if not 0.0 < dt_s <= self._params.max_gap_ms / 1e3:
             return MotionReport(silent="no frame shortly before")
-        H = turn_homography(R_now_before, now, before)
-        pair = self._search.compare(now, before, H)
         depth = small_depth(depth_m, now.grey.shape)
-        pair = pair._replace(shift=parallax(depth, now.K, t_now_before_m))
-        ego = own_motion(pair, now.K, R_now_before is not None)
+        shift = parallax(depth, now.K, t_now_before_m)
+        pair, ego = self._compared(now, before, R_now_before, shift)
         turn = float(np.degrees(turn_rad(ego, now.grey, now.K))) / dt_s
         why = self._cannot_tell(pair, ego, turn)
         if why:
@@ -158,6 +161,20 @@ class MotionDetector:
         groups = gathered(things, self._params)
         blobs = self._blobs(groups, now, pair, ego, depth, dt_s)
         return MotionReport(blobs, "", turn, ego.share, ego.noise_px, things.threshold_px)
+
+    def _compared(
+        self, now: SmallImage, before: SmallImage, R_now_before: Floats | None, shift: Flow | None
+    ) -> tuple[Compared, Ego]:
+        """Find the flow and the camera's own motion; a large unforeseen one is taken out first."""
+        H = turn_homography(R_now_before, now, before)
+        pair = self._search.compare(now, before, H)._replace(shift=shift)
+        moved_before, self._moved = self._moved, False
+        ego = own_motion(pair, now.K, R_now_before is not None, moved_before)
+        self._moved = ego.unforeseen_px > 0.0
+        if ego.share < self._params.min_background_share or ego.unforeseen_px < _SEARCH_AGAIN_PX:
+            return pair, ego
+        again = self._search.compare(now, before, ego.total)._replace(shift=shift)
+        return again, own_motion(again, now.K, True)
 
     def _cannot_tell(self, pair: Compared, ego: Ego, turn_deg_s: float) -> str:
         """Return why ego-motion cannot be separated from the motion of objects, "" if it can."""

@@ -6,6 +6,10 @@ for one plane, eight numbers for the rest), by iteratively reweighted least squa
 Tukey's weights. The fit starts from the guess and from the scale of its usual error, so
 that a body which fills the image cannot pass for the room while the joints say that
 the camera stands.
+
+Where too little agrees with the guess, or there is none, the whole image may have moved: the
+table was bumped, a hand holds the camera. Without a guess the camera is taken to stand as long as
+a good part of the image does.
 """
 
 from typing import NamedTuple
@@ -26,6 +30,8 @@ _LEAST_CORNER = 2e-4
 _LEAST_POINTS = 30
 # A room is around us: what fills fewer of the image's 48 cells is a thing.
 _CELLS, _LEAST_CELLS = (8, 6), 12
+# Of the points with texture, those that must agree with what was predicted.
+_LEAST_SHARE = 0.35
 _STEPS = 8
 # A step that moves the image by less is the last.
 _SMALL_PX = 0.01
@@ -39,6 +45,35 @@ _PLAIN = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 _POINT_NOISE = 1e-3
 
 
+class _Need(NamedTuple):
+    """What the image must show to be believed that all of it moved.
+
+    share: of the points with texture that moved as one; cells: of the image that they lie in
+    kept: of the points, fewer than this may have stayed where they were
+    """
+
+    share: float
+    cells: int
+    kept: float
+
+
+# Somebody close to the lens fills most of the image; a strip of wall that keeps its place tells.
+# A camera that moves follows somebody now and then, who keeps their place.
+_AGAINST_JOINTS, _STOOD, _MOVES = _Need(0.6, 24, 0.015), _Need(0.35, 24, 0.03), _Need(0.35, 12, 0.2)
+
+
+class Fit(NamedTuple):
+    """Homography (3, 3), share of the points that agree on it, and their noise in pixels.
+
+    free: found without regard to what was predicted
+    """
+
+    B: Floats
+    share: float
+    noise_px: float
+    free: bool
+
+
 class Ego(NamedTuple):
     """The camera's own motion between two images.
 
@@ -48,6 +83,7 @@ class Ego(NamedTuple):
         nothing better than noise
     noise_px: how far the flow there is from it, standard deviation along one axis
     way_px: how far the camera's motion moved the image, median
+    unforeseen_px: the same where the image alone told of it, else 0
     fitted: the image had enough texture to be asked
     """
 
@@ -56,33 +92,36 @@ class Ego(NamedTuple):
     share: float
     noise_px: float
     way_px: float
+    unforeseen_px: float
     fitted: bool
 
 
-def own_motion(pair: Compared, K: Floats, predicted: bool) -> Ego:
+def own_motion(pair: Compared, K: Floats, predicted: bool, moved_before: bool = False) -> Ego:
     """Find the camera's own motion.
 
     K: (3, 3) camera matrix
     predicted: ``pair`` was turned by what the joints said; else nothing is known of the
         camera, and any motion that most agree on is taken for its
+    moved_before: the image alone told of a motion of the camera a frame before
     """
     points = _textured(pair)
-    B, share, noise, fitted = np.eye(3), 1.0, _LEAST_NOISE_PX, False
+    B, share, noise, fitted, free = np.eye(3), 1.0, _LEAST_NOISE_PX, False, False
     if len(points) >= _LEAST_POINTS:
         at = points[:, 1].astype(np.intp), points[:, 0].astype(np.intp)
         there = points + pair.flow[at]
         if pair.shift is not None:
             there -= pair.shift[at]
-        turn = _way(_inverse(pair.H), points)
-        reach = _STANDING_REACH_PX + turn if predicted else np.inf
-        found = _fitted(points, there, K, pair.now.shape, reach)
+        reach = _STANDING_REACH_PX + (_way(_inverse(pair.H), points) if predicted else 0.0)
+        need = _AGAINST_JOINTS if predicted else _MOVES if moved_before else _STOOD
+        found = _room(points, there, K, pair.now.shape, reach, need)
         if found is not None:
-            B, share, noise = found
+            B, share, noise, free = found
             share, fitted = (share if noise <= _MOST_NOISE_PX else 0.0), True
     back = _inverse(pair.H) @ B
     way = _way(back, points) if len(points) else 0.0
+    unforeseen = _way(B, points) if free else 0.0
     total = _inverse(back)
-    return Ego(B, total / total[2, 2], share, noise, way, fitted)
+    return Ego(B, total / total[2, 2], share, noise, way, unforeseen, fitted)
 
 
 def _textured(pair: Compared) -> Floats:
@@ -98,9 +137,39 @@ def _textured(pair: Compared) -> Floats:
     return np.column_stack((x[good], y[good])).astype(np.float64)
 
 
+def _room(
+    points: Floats,
+    there: Floats,
+    K: Floats,
+    shape: tuple[int, ...],
+    reach_px: float,
+    need: _Need,
+) -> Fit | None:
+    """Fit the motion of the room: as predicted, or standing; else as all of the image moves."""
+    off = np.hypot(*(there - points).T)
+    near = off < reach_px
+    stands = bool(near.mean() >= _LEAST_SHARE) and _cells(points[near], shape) >= _LEAST_CELLS
+    asked = stands or need is _AGAINST_JOINTS
+    found = _fitted(points, there, K, shape, reach_px) if asked else None
+    if found is not None and found.share >= _LEAST_SHARE:
+        return found
+    free = _fitted(points, there, K, shape, np.inf, need.cells)
+    if free is None or free.share < need.share:
+        return found
+    # What has kept its place although all is said to have moved.
+    parted = np.hypot(*(moved(free.B, points) - points).T) > 2 * _STANDING_REACH_PX
+    kept = float(((off < _STANDING_REACH_PX) & parted).mean())
+    return free if kept < need.kept else found
+
+
 def _fitted(
-    points: Floats, there: Floats, K: Floats, shape: tuple[int, ...], reach_px: float
-) -> tuple[Floats, float, float] | None:
+    points: Floats,
+    there: Floats,
+    K: Floats,
+    shape: tuple[int, ...],
+    reach_px: float,
+    least_cells: int = _LEAST_CELLS,
+) -> Fit | None:
     """Fit the homography that most points agree on: it, their share, and the noise.
 
     None where they are too few, or all in one place: that would be a thing.
@@ -125,11 +194,11 @@ def _fitted(
         if done:
             break
     near = errors < _TUKEY * scale
-    if not _spread(points[near], shape):
+    if _cells(points[near], shape) < least_cells:
         return None
     square = np.array([[focal, 0.0, centre[0]], [0.0, focal, centre[1]], [0.0, 0.0, 1.0]])
     B = square @ np.append(h, 1.0).reshape(3, 3) @ np.linalg.inv(square)
-    return B / B[2, 2], float(near.mean()), _noise(errors, near)
+    return Fit(B / B[2, 2], float(near.mean()), _noise(errors, near), reach_px == np.inf)
 
 
 def _rows(a: Floats, b: Floats) -> Floats:
@@ -166,10 +235,10 @@ def _noise(errors: Floats, mask: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> 
     return max(_LEAST_NOISE_PX, middle(errors[mask]) / 1.177)
 
 
-def _spread(points: Floats, shape: tuple[int, ...]) -> bool:
-    """Return whether points lie all over a image of (height, width)."""
+def _cells(points: Floats, shape: tuple[int, ...]) -> int:
+    """Return how many cells of an image of (height, width) points lie in."""
     cells = np.floor(points / (shape[1], shape[0]) * _CELLS)
-    return len(np.unique(cells[:, 0] * _CELLS[1] + cells[:, 1])) >= _LEAST_CELLS
+    return len(np.unique(cells[:, 0] * _CELLS[1] + cells[:, 1]))
 
 
 def _inverse(H: Floats) -> Floats:

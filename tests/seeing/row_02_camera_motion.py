@@ -1,0 +1,167 @@
+"""A camera whose motion is not known: shaken, bumped, panned.
+
+Figures: false things a picture; of what is reported, the share that really moves (precision); of
+what moves, the share on which a thing is reported (recall); processor milliseconds a picture.
+"knock": a camera on a head whose joints are measured and at rest while the table is bumped.
+"""
+
+import time
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from seeing.material import at_hand
+from seeing.moving_room import (
+    BEFORE_PLAIN,
+    CLOSE,
+    FIELD_RAD,
+    MOTIONS,
+    PEOPLE,
+    PLAIN,
+    ROOM,
+    Board,
+    Mask,
+    Motion,
+    Seen,
+    bump,
+    frames,
+    pan,
+    shake,
+    shaken,
+    still,
+    street,
+)
+
+from gazerig.drivers.camera.pose_buffer import PoseBuffer
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.types import MovingBlob
+from gazerig.drivers.vision.motion.params import MotionParams
+from gazerig.robot.perception.motion_source import MotionSource
+
+_BAND = {"false things a picture": (0.0, 0.1), "precision": (0.9, 1.0)}
+FILMS: dict[str, tuple[Motion, tuple[Board, ...], tuple[Board, ...], bool, float]] = {
+    "still": (still, PEOPLE, ROOM, False, 0.95),
+    "still, somebody close": (still, CLOSE, ROOM, False, 0.95),
+    "still, a plain wall": (still, BEFORE_PLAIN, PLAIN, False, 0.95),
+    "shake": (shake, PEOPLE, ROOM, False, 0.9),
+    "bump": (bump, PEOPLE, ROOM, False, 0.9),
+    "pan": (pan, PEOPLE, ROOM, False, 0.9),
+    "knock": (bump, PEOPLE, ROOM, True, 0.9),
+    "knock, somebody close": (bump, CLOSE, ROOM, True, 0.9),
+    "shake, nobody": (shake, (), ROOM, False, 0.0),
+    "bump, nobody": (bump, (), ROOM, False, 0.0),
+    "pan, nobody": (pan, (), ROOM, False, 0.0),
+}
+"""Motion of the camera, people, room, whether joints at rest are measured, and least recall."""
+WANTED = {
+    f"{name}: {figure}": band
+    for name, (_, people, *_, least) in FILMS.items()
+    for figure, band in {**_BAND, "recall": (least, 1.0)}.items()
+    if people or figure == "false things a picture"
+}
+_LEARN = 3  # frames in which nothing can be confirmed yet
+_NEAR_PX = 9
+
+
+class Score(NamedTuple):
+    """What was found in a film.
+
+    false: things where nothing moves; right: things where something does
+    moving: what moves, counted in each picture; noticed: what of it had a thing on it
+    """
+
+    pictures: int
+    false: int
+    right: int
+    moving: int
+    noticed: int
+    processor_ms: float
+
+    def figures(self, name: str) -> dict[str, float]:
+        """Return the row's figures of one film."""
+        reported = self.right + self.false
+        return {
+            f"{name}: false things a picture": self.false / self.pictures,
+            f"{name}: precision": self.right / reported if reported else 1.0,
+            f"{name}: recall": self.noticed / self.moving if self.moving else float("nan"),
+            f"{name}: processor ms a picture": self.processor_ms,
+        }
+
+
+def resting_head() -> PoseBuffer:
+    """Return what a head at rest has told of its camera."""
+    poses = PoseBuffer()
+    for k in range(400):
+        poses.record(0.05 * k - 1.0, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+    return poses
+
+
+def judged(
+    seen: Iterable[Seen], turns: PoseBuffer | None = None, field: float = FIELD_RAD
+) -> Score:
+    """Let the detector look, as the program uses it, and compare with the truth."""
+    source = MotionSource(MotionParams(), None, field, turns)
+    pictures = false = right = moving = noticed = 0
+    costs = []
+    for k, one in enumerate(seen):
+        began_s = time.thread_time()
+        blobs = source(Shot(one.t_s, k + 1, one.image))
+        costs.append(time.thread_time() - began_s)
+        if k < _LEARN:
+            continue
+        pictures += 1
+        near = np.ones((2 * _NEAR_PX + 1,) * 2, np.uint8)
+        wide = [cv2.dilate(mask.astype(np.uint8), near) > 0 for mask in one.movers]
+        unsure = [cv2.dilate(mask.astype(np.uint8), near) > 0 for mask in one.resting]
+        on = [[_on(blob, mask) for mask in wide] for blob in blobs]
+        right += sum(any(row) for row in on)
+        false += sum(
+            not any(row) and not any(_on(blob, mask) for mask in unsure)
+            for row, blob in zip(on, blobs, strict=True)
+        )
+        large = [j for j, mask in enumerate(one.movers) if mask.mean() > 0.003]
+        moving += len(large)
+        noticed += sum(any(row[j] for row in on) for j in large)
+    return Score(pictures, false, right, moving, noticed, 1e3 * float(np.median(costs)))
+
+
+def _on(blob: MovingBlob, mask: Mask) -> bool:
+    """Return whether the point of a thing that is looked at lies there."""
+    assert blob.centre_px is not None
+    x, y = (round(v) for v in blob.centre_px)
+    height, width = mask.shape
+    return 0 <= x < width and 0 <= y < height and bool(mask[y, x])
+
+
+def rendered(name: str, seconds: float) -> dict[str, float]:
+    """Return the figures of one of FILMS."""
+    motion, people, room, measured, _ = FILMS[name]
+    seen = frames(motion, seconds, people, room)
+    figures = judged(seen, resting_head() if measured else None).figures(name)
+    return {key: value for key, value in figures.items() if people or "false" in key}
+
+
+def measure(full: bool) -> dict[str, float]:
+    """Measure in the rendered room; with ``full`` on the street and the photo as well."""
+    cv2.setNumThreads(1)
+    out: dict[str, float] = {}
+    for name in FILMS:
+        out |= rendered(name, 6.0 if full else 1.5)
+    return out | (_real() if full else {})
+
+
+def _real() -> dict[str, float]:
+    """Measure on the street and on a photo, where they are at hand."""
+    out: dict[str, float] = {}
+    film, photo = at_hand("vtest.avi"), at_hand("astronaut.png")
+    view = 2 * np.arctan(np.tan(0.5 * FIELD_RAD) * 0.72)
+    for name, motion in MOTIONS.items():
+        if film is not None:
+            out |= judged(street(film, motion, 210, 120), field=view).figures(f"street, {name}")
+        if photo is not None:
+            picture = cv2.imread(str(photo))
+            taken = (Seen(k / 30, shaken(picture, motion(k / 30)), ()) for k in range(60))
+            score = judged(taken, field=view)
+            out[f"photo, {name}: false things a picture"] = score.false / score.pictures
+    return out
