@@ -273,8 +273,8 @@ def street(
         moving = cv2.dilate(cv2.morphologyEx(moving, cv2.MORPH_OPEN, speck), near)
         t_s = (k - first) / rate_hz
         H, size = looked_through(picture.shape, motion(t_s))
-        moving = cv2.warpPerspective(moving, H, size, flags=cv2.INTER_NEAREST)
-        movers, resting = _parts(moving)
+        seen = cv2.warpPerspective(moving, H, size, flags=cv2.INTER_NEAREST)
+        movers, resting = _parts(np.asarray(seen, np.uint8))
         yield Seen(t_s, shaken(np.asarray(picture, np.uint8), motion(t_s)), movers, resting)
     taken.release()
 

@@ -160,7 +160,7 @@ def _real() -> dict[str, float]:
         if film is not None:
             out |= judged(street(film, motion, 210, 120), field=view).figures(f"street, {name}")
         if photo is not None:
-            picture = cv2.imread(str(photo))
+            picture = np.asarray(cv2.imread(str(photo)), np.uint8)
             taken = (Seen(k / 30, shaken(picture, motion(k / 30)), ()) for k in range(60))
             score = judged(taken, field=view)
             out[f"photo, {name}: false things a picture"] = score.false / score.pictures
