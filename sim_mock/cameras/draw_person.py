@@ -2,8 +2,8 @@
 
 The face is that of gazerig.robot.perception.face_pose: its eyes, nose and mouth lie where the
 landmarks are, in three dimensions, so that a face detector that was made for people finds them
-there. Not
-drawn: arms, expression, blinks; the eyes look straight ahead.
+there. Arms are drawn where their hands are raised. Not drawn: arms that hang, expression, blinks;
+the eyes look straight ahead.
 """
 
 from functools import lru_cache
@@ -16,6 +16,7 @@ import numpy as np
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Vec3
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
+from gazerig.sim_mock.cameras.draw_arm import draw_arm
 from gazerig.sim_mock.cameras.canvas import Bytes, Canvas, Colour, Floats, TexturedQuad
 from gazerig.sim_mock.scenes.scene import ScenePerson, Thing
 
@@ -51,6 +52,12 @@ def draw_person(canvas: Canvas, person: ScenePerson, number: int) -> None:
     R = np.array(rotation((yaw, pitch, 0.0)))
     draw_body(canvas, person.p_world_face_m, looks, number)
     draw_head(canvas, person.p_world_face_m, R, looks)
+
+
+def draw_arm_of(canvas: Canvas, person: ScenePerson, number: int, p_world_hand_m: Vec3) -> None:
+    """Draw the arm of a person that ends at a hand."""
+    looks = PERSON_COLOURS[number % len(PERSON_COLOURS)]
+    draw_arm(canvas, person.p_world_face_m, p_world_hand_m, looks.shirt, looks.skin)
 
 
 def draw_head(

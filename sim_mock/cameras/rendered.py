@@ -1,7 +1,7 @@
 """A camera that renders the view from the emulated head and runs the real detectors on it.
 
 gazerig.sim_mock.cameras.detections simulates what a detector would find; here the real
-detectors work on pixels: a room with texture, people with faces, things, distances.
+detectors work on pixels: a room with texture, people with faces and arms, things, distances.
 Frames come late, at their own rate, noisy, and smeared by the camera's turn during the
 exposure; a depth frame has the noise of stereo and holes at edges. Not modelled: lens
 distortion, rolling shutter, light, the smear of things that move themselves.
@@ -20,17 +20,19 @@ from numpy.typing import NDArray
 from gazerig.drivers.camera.frame_analysis import Locate
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.drivers.types import Detections, FaceDetector, ImageArray, MovingBlob
-from gazerig.gaze.angles import norm, sub
+from gazerig.gaze.angles import norm, rotate_back, sub
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.model.frames import CameraMount
 from gazerig.sim_mock.cameras.canvas import Canvas
-from gazerig.sim_mock.cameras.draw_person import draw_person, draw_thing
+from gazerig.sim_mock.cameras.draw_person import draw_arm_of, draw_person, draw_thing
 from gazerig.sim_mock.cameras.draw_room import draw_room
-from gazerig.sim_mock.scenes.scene import Scene, Thing
+from gazerig.sim_mock.scenes.scene import PLANNED_KINDS, Scene, Thing
 
 _HAND_RADIUS_M = 0.07
 _FIRST_THING_ID = 1000  # hands have the numbers of their people, from 0
+_FIRST_PLANNED_ID = 1_000_000  # beyond the numbers of the motion detector
+_BEHIND_HAND_M = 1e-3  # an arm is drawn right before its hand
 # A second of noise would cost more than the drawing; a piece of one stock is as good.
 _NOISE_STOCK = 1 << 21
 # Stereo is blind beside edges: over so many pixels, where the distance jumps by this share.
@@ -170,6 +172,7 @@ class PixelCamera:
     def _looked_at(self, shot: Exposure) -> Detections:
         """Return the detections in a frame."""
         blobs = self._find_motion(shot, self.lens) if self._find_motion is not None else ()
+        blobs = (*blobs, *self._planned(shot))
         height, width = shot.image.shape[:2]
         found = Detections(
             shot.captured_s,
@@ -182,6 +185,28 @@ class PixelCamera:
             depth_m=shot.depth_m,
         )
         return found.located_by(self._locate)
+
+    def _planned(self, shot: Exposure) -> tuple[MovingBlob, ...]:
+        """Return the places that the scene's planner names, where they are in the frame.
+
+        The planner is the robot's own: what it means is known to it, not seen.
+        """
+        assert self._start_s is not None
+        height, width = shot.image.shape[:2]
+        found = []
+        for thing in self._scene.things(shot.captured_s - self._start_s):
+            if thing.kind not in PLANNED_KINDS:
+                continue
+            x, y, z = rotate_back(shot.R_world_camera, sub(thing.p_world_m, shot.p_world_camera_m))
+            lens = self.lens
+            inside = z > 0.1 and (
+                0.0 <= x / z * lens.fx_px + lens.cx_px <= width
+                and 0.0 <= y / z * lens.fy_px + lens.cy_px <= height
+            )
+            if inside:
+                number = _FIRST_PLANNED_ID + thing.id
+                found.append(MovingBlob(number, thing.kind, (x, y, z), thing.radius_m))
+        return tuple(found)
 
     def _expose(self, t_s: float, R: Mat3, p: Vec3) -> Exposure:
         """Render one frame from the camera's pose; its time is the middle of the exposure."""
@@ -237,15 +262,23 @@ def draw_scene(canvas: Canvas, scene: Scene, scene_s: float, room_seed: int = 0)
     draw_room(canvas, room_seed)
     eye = (float(canvas.p_m[0]), float(canvas.p_m[1]), float(canvas.p_m[2]))
     drawn: list[tuple[float, Callable[[], None]]] = []
-    for number, person in enumerate(scene.people(scene_s)):
+    people = scene.people(scene_s)
+    things = [
+        thing._replace(id=_FIRST_THING_ID + thing.id)
+        for thing in scene.things(scene_s)
+        if thing.kind not in PLANNED_KINDS
+    ]
+    for number, person in enumerate(people):
         away = norm(sub(person.p_world_face_m, eye))
         drawn.append((away, _later(draw_person, canvas, person, number)))
         if person.hand is not None:
-            hand = Thing(number, "hand", person.hand, _HAND_RADIUS_M)
-            drawn.append((norm(sub(person.hand, eye)), _later(draw_thing, canvas, hand)))
-    for thing in scene.things(scene_s):
-        other = thing._replace(id=_FIRST_THING_ID + thing.id)
-        drawn.append((norm(sub(thing.p_world_m, eye)), _later(draw_thing, canvas, other)))
+            things.append(Thing(number, "hand", person.hand, _HAND_RADIUS_M, person=number))
+    for thing in things:
+        away = norm(sub(thing.p_world_m, eye))
+        if thing.person is not None:
+            draw = _later(draw_arm_of, canvas, people[thing.person], thing.person, thing.p_world_m)
+            drawn.append((away + _BEHIND_HAND_M, draw))
+        drawn.append((away, _later(draw_thing, canvas, thing)))
     for _, draw in sorted(drawn, key=lambda item: -item[0]):
         draw()
 

@@ -104,7 +104,7 @@ class Boxing:
         phase_s = t_s % _ROUND_S
         face, _ = _opponent(t_s)
         fists = (_fist(_RIGHT, face, phase_s), _fist(_LEFT, face, phase_s))
-        things = [Thing(i, "hand", fist, _FIST_M) for i, fist in enumerate(fists)]
+        things = [Thing(i, "hand", fist, _FIST_M, person=0) for i, fist in enumerate(fists)]
         for reach in _REACHES:
             if reach.start_s <= phase_s < reach.start_s + _REACH_S:
                 things.append(Thing(2, "hand", _reaching(reach, phase_s), _FIST_M))

@@ -32,6 +32,7 @@ class Thing(NamedTuple):
     kind: "hand", "attack_target", ...
     spin_rad_s: rotation about the line of sight, clockwise as the robot sees it above 0
     turned_rad: how far it has turned so
+    person: number of the person whose hand it is, None where it is nobody's
     """
 
     id: int
@@ -40,6 +41,11 @@ class Thing(NamedTuple):
     radius_m: float
     spin_rad_s: float = 0.0
     turned_rad: float = 0.0
+    person: int | None = None
+
+
+PLANNED_KINDS = ("attack_target", "guard_target")
+"""Kinds of places that the robot's own planner names; there is nothing to be seen at them."""
 
 
 class Event(NamedTuple):
