@@ -218,6 +218,8 @@ class MovingBlob:
     depth_sd_m, spin_sd_rad_s, loom_sd_1_s: standard deviations
     box_px: x, y, width, height; centre_px: a point on it; area_px: how much of the image
         it covers; flow_px_s: its mean motion, the camera's own taken out
+    fastest_m, fastest_m_s: place and velocity of the quarter of it that moves fastest, as
+        ``p_camera_m`` and ``v_camera_m_s``: of an arm, the hand
     """
 
     id: int
@@ -235,6 +237,8 @@ class MovingBlob:
     centre_px: tuple[float, float] | None = None
     area_px: float = 0.0
     flow_px_s: tuple[float, float] = (0.0, 0.0)
+    fastest_m: tuple[float, float, float] | None = None
+    fastest_m_s: tuple[float, float, float] | None = None
 
 
 _Row = tuple[float, float, float]
@@ -258,6 +262,8 @@ class DetectionInCamera(NamedTuple):
     mark: the detector's own number of it, None where it gives none
     turn_sd_rad: of a face, standard deviation of its turn
     gaze_camera: of a face, unit vector along which the eyes look, None where it is unknown
+    fastest_m, fastest_m_s: of what moves, place and velocity of its fastest part, None where
+        they are not known
     """
 
     kind: str
@@ -277,6 +283,8 @@ class DetectionInCamera(NamedTuple):
     mark: int | None
     turn_sd_rad: float = 0.0
     gaze_camera: tuple[float, float, float] | None = None
+    fastest_m: tuple[float, float, float] | None = None
+    fastest_m_s: tuple[float, float, float] | None = None
 
 
 class CameraTurn(NamedTuple):

@@ -173,4 +173,11 @@ def thing_in_camera(blob: MovingBlob) -> DetectionInCamera | None:
         far * (min(hypot(loom_sd, shape), 10.0) if isfinite(loom_sd) else 10.0),
         None,
         blob.id,
+        fastest_m=_finite(blob.fastest_m),
+        fastest_m_s=_finite(blob.fastest_m_s),
     )
+
+
+def _finite(vector: tuple[float, float, float] | None) -> tuple[float, float, float] | None:
+    """Return a vector, None if it is none or no number."""
+    return vector if vector is not None and isfinite(norm(vector)) else None

@@ -3,7 +3,8 @@
 A person who walks is detected twice, as a face and as a patch of optical flow. The patch would
 compete with the face, and would often win because it is larger. A patch therefore belongs to the
 person if it is on the head, or is below it and moves along with it. A waving arm moves
-otherwise and remains a thing of its own, so that a wave draws the gaze.
+otherwise and remains a body of its own (gazerig.robot.perception.hands), so that a wave draws the
+gaze.
 """
 
 from collections.abc import Iterable
@@ -12,17 +13,13 @@ from math import hypot
 
 from gazerig.gaze.angles import add, dot, norm, scale, sub, unit
 from gazerig.gaze.types import Vec3
+from gazerig.robot.perception.hands import UNNAMED, Known
 from gazerig.robot.perception.tracker import LocalisedDetection
 
-# What a moving patch is called whose kind is not known; a named one is always itself.
-_UNNAMED = "thing"
 _HEAD_M, _HALF_WIDTH_M, _BELOW_M, _ABOVE_M = 0.25, 0.35, 1.7, 0.25
 # Beside that in depth, and two standard deviations of it.
 _DEEP_M = 0.5
 _ALONG_WITH_M_S, _ALONG_WITH_SHARE = 0.3, 0.5
-
-Known = tuple[Vec3, Vec3 | None]
-"""Place of a face in the world, and its velocity where it is known."""
 
 
 def without_own_motion(
@@ -33,15 +30,13 @@ def without_own_motion(
 ) -> tuple[list[LocalisedDetection], list[LocalisedDetection]]:
     """Return the faces with the spin of their own motion, and the things that are not theirs.
 
-    before: tracked faces, where they are expected now; one that the detector has just missed
-        still owns its body
+    before: tracked faces, where they are expected now
     """
     spins = [0.0] * len(faces)
-    tracked = list(before)
-    known = [(face.p_world_m, _velocity(face, tracked)) for face in faces]
+    known = known_faces(faces, before)
     others: list[LocalisedDetection] = []
     for thing in things:
-        owner = _owner(thing, [*known, *tracked], p_camera)
+        owner = _owner(thing, known, p_camera)
         if owner is None:
             others.append(thing)
         elif owner < len(faces) and _on_head(thing, known[owner][0], p_camera):
@@ -53,6 +48,15 @@ def without_own_motion(
     return turned, others
 
 
+def known_faces(faces: list[LocalisedDetection], before: Iterable[Known]) -> list[Known]:
+    """Return the faces of a frame with the velocities of their tracks, and those tracks.
+
+    A face that the detector has just missed still owns its body.
+    """
+    tracked = list(before)
+    return [*[(face.p_world_m, _velocity(face, tracked)) for face in faces], *tracked]
+
+
 def _velocity(face: LocalisedDetection, tracked: list[Known]) -> Vec3 | None:
     """Return the velocity of the tracked face at a detection's place, None where there is none."""
     near = [(norm(sub(p, face.p_world_m)), v) for p, v in tracked]
@@ -62,7 +66,7 @@ def _velocity(face: LocalisedDetection, tracked: list[Known]) -> Vec3 | None:
 
 def _owner(thing: LocalisedDetection, faces: list[Known], p_camera: Vec3) -> int | None:
     """Return the index of the face to which a patch belongs, None where it belongs to none."""
-    if thing.kind != _UNNAMED:
+    if thing.kind != UNNAMED:
         return None
     for k, (p_face, v_face) in enumerate(faces):
         if _on_head(thing, p_face, p_camera):

@@ -9,6 +9,7 @@ from gazerig.robot.perception.tracker import LocalisedDetection
 def placed(found: DetectionInCamera, R_world_camera: Mat3, p_world_m: Vec3) -> LocalisedDetection:
     """Return a detection placed in the world by the camera's pose at the exposure."""
     R, v, gaze = found.R_camera_face, found.v_camera_m_s, found.gaze_camera
+    fastest, faster = found.fastest_m, found.fastest_m_s
     return LocalisedDetection(
         found.kind,
         add(p_world_m, rotate(R_world_camera, found.p_camera_m)),
@@ -27,4 +28,6 @@ def placed(found: DetectionInCamera, R_world_camera: Mat3, p_world_m: Vec3) -> L
         found.mark,
         found.turn_sd_rad,
         None if gaze is None else rotate(R_world_camera, gaze),
+        None if fastest is None else add(p_world_m, rotate(R_world_camera, fastest)),
+        None if faster is None else rotate(R_world_camera, faster),
     )

@@ -25,7 +25,8 @@ from gazerig.robot.perception.egomotion_residual import (
 from gazerig.robot.perception.frame_locator import SIZE_SPREAD, DepthAt, FrameLocator
 from gazerig.robot.perception.gaze_at_head import angle_off_head_rad, looks_at_head
 from gazerig.robot.perception.gyro_fusion import GyroFusion
-from gazerig.robot.perception.hand_ownership import Known, without_own_motion
+from gazerig.robot.perception.hand_ownership import known_faces, without_own_motion
+from gazerig.robot.perception.hands import Hands, Known
 from gazerig.robot.perception.localisation import placed
 from gazerig.robot.perception.tracker import Track, Tracker
 
@@ -64,6 +65,7 @@ class Perception:
         self._depth_at = depth_at
         self.retune(horizontal_field_deg, parts_face_m, lens)
         self._tracker = tracker
+        self._hands = Hands()
         self._tracks: tuple[Track, ...] = ()
         self._p_camera: Vec3 = (0.0, 0.0, 0.0)
         self._p_head: Vec3 = (0.0, 0.0, 0.0)
@@ -104,7 +106,9 @@ class Perception:
         faces = [placed(face, R, p) for face in located.faces]
         things = [placed(thing, R, p) for thing in located.things]
         if things:
-            faces, things = without_own_motion(faces, things, self._known(t_s), p)
+            known = self._known(t_s)
+            things = self._hands.named(things, known_faces(faces, known), p, t_s)
+            faces, things = without_own_motion(faces, things, known, p)
         self._tracks = tracks = self._tracker.step([*faces, *things], p, t_s)
         self._p_camera = p
         self._note_residual(t_s, poses)

@@ -37,6 +37,7 @@ class LocalisedDetection:
     mark: the detector's own number of it, None where it gives none
     turn_sd_rad: of a face, standard deviation of its turn
     gaze_world: of a face, direction of the gaze of the eyes, None where it is unknown
+    fastest_m, fastest_m_s: of what moves, place and velocity of its fastest part
     """
 
     kind: str
@@ -56,6 +57,8 @@ class LocalisedDetection:
     mark: int | None = None
     turn_sd_rad: float = 0.0
     gaze_world: Vec3 | None = None
+    fastest_m: Vec3 | None = None
+    fastest_m_s: Vec3 | None = None
 
 
 @dataclass(slots=True)

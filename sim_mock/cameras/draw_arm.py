@@ -1,4 +1,4 @@
-"""A person's arm as a camera sees it: a sleeve from the shoulder to the elbow, a forearm to the hand.
+"""A person's arm as a camera sees it: a sleeve from shoulder to elbow, a forearm to the hand.
 
 Two links of true lengths, the elbow hanging; a hand farther away than they reach stretches them.
 Not drawn: arms that hang down, fingers.

@@ -16,8 +16,8 @@ import numpy as np
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Vec3
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
-from gazerig.sim_mock.cameras.draw_arm import draw_arm
 from gazerig.sim_mock.cameras.canvas import Bytes, Canvas, Colour, Floats, TexturedQuad
+from gazerig.sim_mock.cameras.draw_arm import draw_arm
 from gazerig.sim_mock.scenes.scene import ScenePerson, Thing
 
 

@@ -25,7 +25,7 @@ from gazerig.drivers.vision.motion.backprojection import (
     small_depth,
     velocity,
 )
-from gazerig.drivers.vision.motion.clustering import Group, gathered
+from gazerig.drivers.vision.motion.clustering import Group, fastest, gathered
 from gazerig.drivers.vision.motion.ego_motion import Ego, own_motion, turn_rad
 from gazerig.drivers.vision.motion.image import (
     Floats,
@@ -228,6 +228,9 @@ class MotionDetector:
         p = place(point, far.z_m, now.K)
         flow_px_s = motion.slide_px[0] / dt_s, motion.slide_px[1] / dt_s
         loom = _believed(motion.growth, motion.growth_sd) / dt_s
+        fastest_px, fastest_flow = fastest(group)
+        at = place(fastest_px, far.z_m, now.K)
+        fx, fy = (fastest_flow / dt_s).tolist()
         (sx, sy), (x, y, width, height) = now.scale, group.box
         left, top = to_given((x - 0.5, y - 0.5), now.scale)
         return MovingBlob(
@@ -246,6 +249,8 @@ class MotionDetector:
             centre_px=to_given((float(point[0]), float(point[1])), now.scale),
             area_px=len(group.x) / (sx * sy),
             flow_px_s=(flow_px_s[0] / sx, flow_px_s[1] / sy),
+            fastest_m=at,
+            fastest_m_s=velocity(at, (fx, fy), loom, now.K),
         )
 
 

@@ -1,0 +1,125 @@
+"""Hands from pixels: what moves otherwise than a person, within reach; and whose hand waves."""
+
+from dataclasses import replace
+from math import dist
+
+import numpy as np
+import pytest
+from seeing.drawn_scene import frames, off_deg
+
+from gazerig.gaze.persons import Persons
+from gazerig.gaze.types import Vec3
+from gazerig.robot.perception.hands import HAND, Hands, Known
+from gazerig.robot.perception.tracker import LocalisedDetection
+from gazerig.sim_mock.scenes.group import HEAD_M
+from gazerig.sim_mock.scenes.registry import scenes
+
+EYE: Vec3 = (0.0, 0.0, 0.0)
+FACE: Known = ((1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+OTHER: Known = ((1.6, 0.75, 0.0), (0.0, 0.0, 0.0))
+BESIDE: Vec3 = (2.0, 0.7, -0.2)
+"""Where a patch beside the face of FACE is believed, its distance being assumed."""
+
+
+def patch(p: Vec3 = BESIDE, v: Vec3 = (0.0, 1.2, 0.0), radius_m: float = 0.25, mark: int = 7,
+          **more: object) -> LocalisedDetection:  # fmt: skip
+    made = LocalisedDetection("thing", p, None, radius_m, 0.0, 1.0, v_world_m_s=v, mark=mark)
+    return replace(made, **{"fastest_m": p, "fastest_m_s": v, **more})  # type: ignore[arg-type]
+
+
+def level(p: Vec3) -> float:
+    """Return how far away a place is, its height apart."""
+    return dist(p[:2], EYE[:2])
+
+
+def kinds(hands: Hands, *seen: LocalisedDetection, faces: tuple[Known, ...] = (FACE,)) -> list[str]:
+    """Return what the patches of successive frames are called."""
+    return [hands.named([one], list(faces), EYE, k / 30)[0].kind for k, one in enumerate(seen)]
+
+
+def test_what_moves_within_reach_is_a_hand_from_the_second_frame_on() -> None:
+    assert kinds(Hands(), *[patch()] * 3) == ["thing", HAND, HAND]
+
+
+@pytest.mark.parametrize(
+    "seen",
+    [patch(v=(0.0, 0.6, 0.0)), patch(p=(2.0, 2.4, 0.0)), patch(p=(2.0, 0.5, -1.9)),
+     patch(radius_m=0.6), patch(mark=3, kind="ball"), patch(p=(2.0, 0.1, 0.1)),
+     patch(p=(3.4, 0.7, -0.2), depth_measured=True, along_sd_m=0.02)],
+    ids=["hardly moves", "out of reach", "a leg", "a person who passes", "something known",
+         "a head that turns", "measured far behind"],
+)  # fmt: skip
+def test_what_is_no_hand_is_none(seen: LocalisedDetection) -> None:
+    assert HAND not in kinds(Hands(), *[seen] * 5)
+    assert HAND not in kinds(Hands(), *[replace(patch(), mark=None)] * 5)
+    assert HAND not in kinds(Hands(), *[patch()] * 5, faces=())
+
+
+def test_the_legs_of_somebody_who_walks_are_no_hands_and_a_wave_while_walking_is() -> None:
+    walks: Known = (FACE[0], (0.0, 1.0, 0.0))
+    assert HAND not in kinds(Hands(), *[patch(v=(0.0, 0.4, 0.0))] * 4, faces=(walks,))
+    assert HAND in kinds(Hands(), *[patch(v=(0.0, -1.6, 0.0))] * 4, faces=(walks,))
+
+
+def test_a_hand_remains_one_where_it_turns_or_passes_before_the_face_and_not_for_long() -> None:
+    before, rests = patch(p=(2.0, 0.1, 0.1)), patch(v=(0.0, 0.05, 0.0))
+    seen = [patch()] * 3 + [rests] * 6 + [before] * 3 + [rests] * 30
+    assert set(kinds(Hands(), *seen)[1:12]) == {HAND}
+    assert kinds(Hands(), *seen)[-1] == "thing"
+
+
+def test_a_hand_is_as_far_as_the_person_unless_its_distance_is_measured() -> None:
+    for measured, far in ((False, 1.0), (True, 0.62)):
+        p: Vec3 = (0.6, 0.15, -0.05) if measured else (2.0, 0.5, -0.2)
+        hands, seen = Hands(), patch(p=p, depth_measured=measured, along_sd_m=0.02)
+        for k in range(3):
+            (found,) = hands.named([seen], [FACE], EYE, k / 30)
+        assert level(found.p_world_m) == pytest.approx(far, abs=0.01)
+        assert found.v_world_m_s is not None
+        assert found.v_world_m_s[1] == pytest.approx(
+            1.2 * dist(found.p_world_m, EYE) / dist(p, EYE)
+        )
+
+
+def test_between_two_people_the_arm_tells_whose_hand_it_is_and_it_stays_theirs() -> None:
+    """The fastest part is in the middle between both; the patch goes on to the one or the other."""
+    tip = (2.0, 0.62, -0.3)
+    for side, face in ((0.2, OTHER), (-0.2, FACE)):
+        hands = Hands()
+        seen = patch(p=(2.0, 0.62 + side, -0.4), fastest_m=tip)
+        for k in range(3):
+            (found,) = hands.named([seen], [FACE, OTHER], EYE, k / 30)
+        assert level(found.p_world_m) == pytest.approx(level(face[0]))
+        (found,) = hands.named([patch(p=tip)], [FACE, OTHER], EYE, 0.1)
+        assert level(found.p_world_m) == pytest.approx(level(face[0]))
+
+
+def test_e91_a_waving_hand_is_found_from_pixels_and_whose_it_is() -> None:
+    """The one on the right of three waves from 21.5 s on, the hand before the one in the middle."""
+    persons, named, off, faces = Persons(), [], [], {}
+    for frame in frames(scenes()["three-people"], 21.0, 24.5):
+        persons.update(frame.percept, HEAD_M)
+        hands = frame.seen(HAND)
+        if frame.t_s > 22.2:
+            named.append(persons.named("waving"))
+            off.append(min([off_deg(p, frame.hands[0]) for _, p in hands], default=90.0))
+            faces = dict(frame.seen("face"))
+    assert np.median(off) < 5.0 and np.percentile(off, 90) < 9.0
+    right = min(faces, key=lambda id: faces[id][1])
+    assert set(named) == {frozenset((right,))}
+
+
+def test_e91_a_punch_is_a_hand_before_it_lands() -> None:
+    """The second punch of the scene sets out at 4.2 s and is back at 4.8 s."""
+    first = next(
+        frame.t_s
+        for frame in frames(scenes()["boxing"], 3.6, 4.8)
+        if frame.t_s > 4.2 and any(off_deg(p, frame.hands[1]) < 15.0 for _, p in frame.seen(HAND))
+    )
+    assert first < 4.45
+
+
+@pytest.mark.parametrize(("scene", "start_s"), [("walks-past", 5.2), ("sits-still", 0.0)])
+def test_e92_who_walks_by_or_sits_still_has_no_hands(scene: str, start_s: float) -> None:
+    for frame in frames(scenes()[scene], start_s, start_s + 3.0):
+        assert frame.seen(HAND) == []
