@@ -28,6 +28,7 @@ RIG = changed(
 )
 """The gaze stays on the face, on which it is measured; the head turns nearly all the way."""
 ARRIVED_S = STEP_AT_S + STEP_S
+CORRECTED_S = 0.2
 Column = NDArray[np.float64]
 PlacedBy = Literal["capture", "newest"]
 
@@ -128,8 +129,9 @@ def test_eyes_are_on_the_face_a_quarter_second_after_the_picture_of_its_arrival(
     shown_s = step.t_s[step.captured_s >= ARRIVED_S][0]
     there_s = step.t_s[(step.t_s >= ARRIVED_S) & (step.off_deg < 1.0)][0]
     assert there_s - shown_s <= 0.25 + RIG.gaze.oculomotor.latency_ms / 1e3
-    # and not by chance in passing: they stay, but for the saccades between its parts
-    later = (step.t_s > shown_s + 0.25) & (step.jumps == 0.0)
+    # and not by chance in passing: they stay, but for the saccades between its parts; a landing
+    # that was planned while the face still moved is corrected by one more, with some seeds
+    later = (step.t_s > shown_s + 0.25 + CORRECTED_S) & (step.jumps == 0.0)
     assert np.percentile(step.off_deg[later], 95) < 1.5
 
 
@@ -149,7 +151,7 @@ def test_the_gaze_rests_on_the_true_face_part_after_a_second(step: Seen) -> None
 def test_by_the_newest_pose_head_and_eyes_overshoot(step: Seen, step_by_newest: Seen) -> None:
     # By how much depends on the parts of the face that the gaze is on while the head turns.
     assert overshoot_deg(step_by_newest) > max(0.0, overshoot_deg(step) + 0.8)
-    settled = ARRIVED_S + 0.25
+    settled = ARRIVED_S + 0.25 + CORRECTED_S
     off = [np.median(seen.off_deg[seen.t_s > settled][:100]) for seen in (step, step_by_newest)]
     assert off[1] > 2.0 * off[0]
 

@@ -81,11 +81,18 @@ def pose_of(landmarks_px: np.ndarray) -> tuple[FacePose, np.ndarray, np.ndarray]
 def test_noiseless_pose_comes_back(yaw, pitch, roll, x, y, z_m):
     R, p = turned(radians(yaw), radians(pitch), radians(roll)), np.array([x, y, 1.0]) * z_m
     pose, found_R, found_p = pose_of(image_of(R, p))
-    # What is left is the belief that faces look here; it weighs more the smaller the face.
+    # What is left is the belief that faces look here; it weighs more the smaller the face and the
+    # farther it is turned, and a mouth's height, which smiles change, hardly speaks against it.
     far = z_m > 1.0
-    assert degrees(angle_between(R, found_R)) < (9.0 if far else 4.0)
-    assert np.linalg.norm(found_p - p) < (0.03 if far else 0.008) * np.linalg.norm(p)
-    assert reprojection_px(pose, image_of(R, p)) < 1.0
+    facing = degrees(np.arccos(-R[:, 0] @ p / np.linalg.norm(p))) < 25.0
+    if facing:
+        most_deg, most_part = (9.0, 0.014) if far else (5.0, 0.01)
+    else:
+        most_deg, most_part = (19.0, 0.042) if far else (15.0, 0.03)
+    assert degrees(angle_between(R, found_R)) < most_deg
+    assert np.linalg.norm(found_p - p) < most_part * np.linalg.norm(p)
+    if facing:
+        assert reprojection_px(pose, image_of(R, p)) < 2.2
     assert np.allclose(found_R @ found_R.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(found_R) == pytest.approx(1.0)
 
@@ -114,7 +121,7 @@ def test_one_pixel_of_noise_on_a_near_face():
     assert np.abs(yaw_deg).max() < 10.0
     assert np.abs(distance_percent).max() < 8.0
     assert yaw_deg.std() < 3.0
-    assert distance_percent.std() < 2.0
+    assert distance_percent.std() < 2.2
     assert abs(distance_percent.mean()) < 0.5
 
 
@@ -125,7 +132,8 @@ def test_longer_or_shorter_face_is_seen_as_such_and_not_as_a_nod(length):
     pose, found_R, found_p = pose_of(seen)
     assert degrees(angle_between(R, found_R)) < 5.0
     assert np.linalg.norm(found_p) == pytest.approx(np.linalg.norm(p), rel=0.04)
-    assert pose.length == pytest.approx(length, abs=0.05)
+    # A mouth that lies higher is a shorter face in part only: the rest is left to the mouth.
+    assert 0.4 < (pose.length - 1.0) / (length - 1.0) < 1.0
     parts_px = project(face_parts(pose), CAMERA)
     assert np.linalg.norm(parts_px[PARTS.index("LE")] - seen[1]) < 1.0
 
@@ -205,25 +213,45 @@ def most_probable(seen: np.ndarray, noise: float) -> np.ndarray:
     """Rotation vector, place and length less 1 of the most probable face: (7,)."""
     eyes = float(np.linalg.norm(seen[1] - seen[0]))
     height = float(np.linalg.norm(seen[3:].mean(axis=0) - seen[:2].mean(axis=0)))
-    weight = 1.0 / hypot(noise, 0.04 * eyes)
+    sd = hypot(noise, 0.04 * eyes)
+    weight = np.full((5, 2), 1.0 / sd)
+    weight[3:, 1] = 1.0 / hypot(sd, 0.2 * eyes)
+    width = float(np.linalg.norm(seen[4] - seen[3])) / eyes
+    usual = 0.051 / 0.0619
+    of_width = 0.18**2 / (0.18**2 + 2.0 * (sd / eyes) ** 2 * (usual**-2 + (width / usual) ** 2))
+    wider = 0.0
     face = np.array([0, 0, 0, 0, 0, 1.0 / max(eyes / 0.0619, height / 0.071), 0.0])
-    spreads, believed = np.array([radians(20.0), radians(30.0), 0.1]), [0, 1, 6]
+    spreads, believed = np.array([radians(22.0), radians(30.0), 0.1]), [0, 1, 6]
     slopes, errors = np.zeros((13, 7)), np.zeros(13)
     slopes[[10, 11, 12], believed] = 1.0 / spreads
-    for _ in range(100):
-        stretched = FRONTAL_M * (1.0, 1.0 + face[6], 1.0)
+    for _ in range(200):
+        frontal = smiling(wider)
+        stretched = frontal * (1.0, 1.0 + face[6], 1.0)
         points, jacobian = cv2.projectPoints(stretched, face[:3], face[3:6], np.eye(3), None)
         upright = cv2.Rodrigues(face[:3])[0][:, 1]
         slopes[:10, :6] = jacobian[:, :6]
-        slopes[:10, 6] = ((slopes[:10, 3:6] @ upright).reshape(5, 2) * FRONTAL_M[:, 1:2]).ravel()
-        slopes[:10] *= weight
-        errors[:10] = (seen - points[:, 0]).ravel() * weight
+        slopes[:10, 6] = ((slopes[:10, 3:6] @ upright).reshape(5, 2) * frontal[:, 1:2]).ravel()
+        slopes[:10] *= weight.reshape(10, 1)
+        errors[:10] = ((seen - points[:, 0]) * weight).ravel()
         errors[10:] = -face[believed] / spreads
         step = np.linalg.lstsq(slopes, errors, rcond=None)[0]
         face += step
-        if np.abs(step).max() < 1e-10:
+        now = cv2.projectPoints(
+            frontal * (1.0, 1.0 + face[6], 1.0), face[:3], face[3:6], np.eye(3), None
+        )[0][:, 0]
+        ratio = float(np.linalg.norm(now[4] - now[3]) / np.linalg.norm(now[1] - now[0]))
+        last = wider
+        wider = of_width * min(max((1.0 + wider) * width / ratio - 1.0, -0.3), 0.5)
+        if max(np.abs(step).max(), abs(wider - last)) < 1e-9:
             return face
     raise AssertionError("no fit")
+
+
+def smiling(wider: float) -> np.ndarray:
+    """The five points of a frontal face whose mouth is wider by a part of itself: a smile."""
+    face_m = FRONTAL_M.copy()
+    face_m[3:] += 0.0255 * wider * np.array([(-1.0, -1.0, 0.87), (1.0, -1.0, 0.87)])
+    return face_m
 
 
 def test_the_fit_is_the_most_probable_face():
@@ -232,7 +260,7 @@ def test_the_fit_is_the_most_probable_face():
     for _ in range(150):
         turn = rng.normal(0.0, (0.2, 0.3, 0.05))
         p = np.array([*rng.uniform(-0.1, 0.1, 2), rng.uniform(0.4, 2.5)])
-        face_m = FRONTAL_M * (1.0, 1.0 + rng.normal(0.0, 0.06), 1.0)
+        face_m = smiling(rng.normal(0.0, 0.15)) * (1.0, 1.0 + rng.normal(0.0, 0.06), 1.0)
         points = face_m @ cv2.Rodrigues(turn)[0].T + p
         seen = points[:, :2] / points[:, 2:] + rng.normal(0.0, 0.001, (5, 2))
         wanted = most_probable(seen, 0.002)
@@ -244,6 +272,14 @@ def test_the_fit_is_the_most_probable_face():
         off_part.append(np.abs(away).max())
     assert np.median(off_deg) < 0.03 and max(off_deg) < 0.3
     assert np.median(off_part) < 3e-4 and max(off_part) < 3e-3
+
+
+def test_without_noise_a_smile_is_no_nod():
+    for wider in (-0.15, 0.15, 0.3):
+        points = smiling(wider) + (0.0, 0.0, 0.5)
+        found = fitted_face(tuple(map(tuple, (points[:, :2] / points[:, 2:]).tolist())), 0.0005)
+        assert found is not None
+        assert abs(degrees(angle_between(np.eye(3), np.array(found.R)))) < 3.5
 
 
 @pytest.mark.parametrize("turn", [(0, 0, 0), (1e-5, 2e-5, -1e-5), (0.3, -0.5, 0.1), (0, 3.0, 0)])

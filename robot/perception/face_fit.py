@@ -1,8 +1,10 @@
 """The most probable pose of a face from five points, by Gauss-Newton steps in plain arithmetic.
 
-Seven numbers are fitted: a rotation, a position and the length of the face. NumPy and OpenCV
-spend most of their time on calls where matrices are so small, and round otherwise on other
-processors.
+Seven numbers are fitted: a rotation, a position and the length of the face. The width of the
+mouth over the distance of the eyes, which no turn of the face changes much, tells how much it
+smiles, and so where its corners are; how high they lie is free within wide bounds beside. NumPy
+and OpenCV spend most of their time on calls where matrices are so small, and round otherwise on
+other processors.
 
 Frame: of a camera that looks at the face with its eyes level; x right, y down, z forward. Points
 are seen on the plane z = 1.
@@ -22,8 +24,15 @@ Five = tuple[float, float, float, float, float]
 _NOISE_OF_EYES = 0.04
 # Spread of the belief that a face found is turned to the camera, pitch and yaw, and spread of
 # face lengths at a given distance between the eyes: as information, 1 / spread^2.
-_PITCH_INFO, _YAW_INFO = radians(20.0) ** -2, radians(30.0) ** -2
+_PITCH_INFO, _YAW_INFO = radians(22.0) ** -2, radians(30.0) ** -2
 _LENGTH_INFO = 0.1**-2
+# A smile: spread of mouth widths over the usual one; and how far a corner goes up and back on its
+# way out, as a dense mesh shows it on a laughing and a calm face (7.6 mm out, 7.6 up, 6.6 back).
+# The narrowest and the widest mouths that are believed: parts of the usual width beyond it.
+_WIDTH_SPREAD, _UP_OF_OUT, _BACK_OF_OUT = 0.18, 1.0, 0.87
+_NARROWEST, _WIDEST = -0.3, 0.5
+# Spread of how high corners of the mouth lie beside that, as a part of the distance of the eyes.
+_MOUTH_HEIGHT_OF_EYES = 0.2
 # Each step is a part of the one before, so what remains after the last is known: it may be a
 # thousandth (0.06 deg, 1 mm at 1 m). 2 steps are usual. Where the noise is a tenth of the face,
 # one try in a hundred is not done after 20.
@@ -37,6 +46,8 @@ _OF_FIVE = 1.25
 _LANDMARKS_M: tuple[Vec3, ...] = tuple((x, y, z) for x, y, z in LANDMARKS_FACE_M.tolist())
 _NOSE_OUT_M = -sum(x for x, _, _ in _LANDMARKS_M) / 4.0
 _FRONTAL_M = tuple((y, -z, -x) for i, (x, y, z) in enumerate(_LANDMARKS_M) if i != 2)
+_HALF_MOUTH_M = _FRONTAL_M[3][0]
+_USUAL_WIDTH = 2.0 * _HALF_MOUTH_M / PUPIL_DISTANCE_M
 
 
 class FittedFace(NamedTuple):
@@ -55,12 +66,13 @@ class FittedFace(NamedTuple):
 class _Sums(NamedTuple):
     """Weighted sums over the points: the normal equations of one step.
 
-    n: of the weights; to_x, to_y: of the coefficients in the rows of x and of y
+    n_x, n_y: of the weights in the rows of x and of y; to_x, to_y: of the coefficients there
     products: of the coefficients with each other: the upper triangle, row by row
     errors: of the coefficients with the errors; errors_x, errors_y: of the errors
     """
 
-    n: float
+    n_x: float
+    n_y: float
     to_x: Five
     to_y: Five
     products: tuple[float, ...]
@@ -91,30 +103,78 @@ def fitted_face(seen: Points, noise: float) -> FittedFace | None:
         -aside[0] * per_rad / (per_rad * per_rad + _OF_FIVE * variance * _YAW_INFO),
         0.0,
     )
+    width = hypot(ex - cx, ey - cy) / eyes
+    believed = _width_believed(width, variance / (eyes * eyes))
+    wider, frontal = 0.0, _FRONTAL_M
+    height_weight = variance / (variance + (_MOUTH_HEIGHT_OF_EYES * eyes) ** 2)
     R = rotation_by(turn)
     z = away_m - _NOSE_OUT_M
     x, y, length, before = nose[0] * z, nose[1] * z, 1.0, 0.1
     for _ in range(_MOST_STEPS):
-        sums = _sums(nose, others, R, (x, y, z), length)
+        sums = _sums(nose, others, frontal, height_weight, R, (x, y, z), length)
         step = _step(sums, turn, length, variance)
         if step is None:
             return None
         w0, w1, w2, dz, dl = step
         sx0, sx1, sx2, sx3, sx4 = sums.to_x
         sy0, sy1, sy2, sy3, sy4 = sums.to_y
-        dx = (sums.errors_x - (sx0 * w0 + sx1 * w1 + sx2 * w2 + sx3 * dz + sx4 * dl)) / sums.n
-        dy = (sums.errors_y - (sy0 * w0 + sy1 * w1 + sy2 * w2 + sy3 * dz + sy4 * dl)) / sums.n
+        dx = (sums.errors_x - (sx0 * w0 + sx1 * w1 + sx2 * w2 + sx3 * dz + sx4 * dl)) / sums.n_x
+        dy = (sums.errors_y - (sy0 * w0 + sy1 * w1 + sy2 * w2 + sy3 * dz + sy4 * dl)) / sums.n_y
         turn = _turned_on(turn, (w0, w1, w2))
         R = rotation_by(turn)
         x, y, z, length = x + dx, y + dy, z + dz, length + dl
         if not z > 0.0:  # behind the camera, or no number
             return None
         shift = max(abs(dx), abs(dy), abs(dz)) / away_m
-        moved = max(abs(w0), abs(w1), abs(w2), shift, abs(dl))
+        # As wide as the mouth is seen, at this pose.
+        last, wider = (
+            wider,
+            (1.0 + wider) * width / _mouth_width(frontal, R, (x, y, z), length) - 1.0,
+        )
+        wider = believed * min(max(wider, _NARROWEST), _WIDEST)
+        frontal = _smiling(wider)
+        moved = max(abs(w0), abs(w1), abs(w2), shift, abs(dl), abs(wider - last))
         if moved * moved < _REMAINS * before:
             return FittedFace(R, (x, y, z), length)
         before = moved
     return None
+
+
+def _width_believed(width: float, variance: float) -> float:
+    """Return the share of a mouth's width beyond the usual one that is believed.
+
+    Args:
+        width: seen, over the distance of the eyes.
+        variance: of a coordinate of a point, over that distance squared.
+    """
+    ratio = width / _USUAL_WIDTH
+    unsure = 2.0 * variance * (1.0 / _USUAL_WIDTH**2 + ratio * ratio)
+    return _WIDTH_SPREAD**2 / (_WIDTH_SPREAD**2 + unsure)
+
+
+def _smiling(wider: float) -> tuple[Vec3, ...]:
+    """Return eyes and mouth corners of a frontal face whose mouth is wider by a part of itself."""
+    right_eye, left_eye, (_, y, z), _ = _FRONTAL_M
+    out = wider * _HALF_MOUTH_M
+    aside, y, z = _HALF_MOUTH_M + out, y - _UP_OF_OUT * out, z + _BACK_OF_OUT * out
+    return right_eye, left_eye, (-aside, y, z), (aside, y, z)
+
+
+def _mouth_width(frontal: tuple[Vec3, ...], R: Mat3, p_m: Vec3, length: float) -> float:
+    """Return the width of a mouth as seen, over the distance of the eyes as seen."""
+    (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = R
+    seen = []
+    for x, y, z in frontal:
+        y *= length
+        q = 1.0 / (p_m[2] + r20 * x + r21 * y + r22 * z)
+        seen.append(
+            (
+                (p_m[0] + r00 * x + r01 * y + r02 * z) * q,
+                (p_m[1] + r10 * x + r11 * y + r12 * z) * q,
+            )
+        )
+    (ax, ay), (bx, by), (cx, cy), (dx, dy) = seen
+    return hypot(dx - cx, dy - cy) / hypot(bx - ax, by - ay)
 
 
 def turn_sd_rad(away_m: float, noise: float) -> float:
@@ -168,22 +228,41 @@ def _turned_on(turn: Vec3, w: Vec3) -> Vec3:
     )
 
 
-def _sums(nose: tuple[float, float], others: Points, R: Mat3, p_m: Vec3, length: float) -> _Sums:
+def _sums(
+    nose: tuple[float, float],
+    others: Points,
+    frontal: tuple[Vec3, ...],
+    height_weight: float,
+    R: Mat3,
+    p_m: Vec3,
+    length: float,
+) -> _Sums:
     """Return the normal equations at a pose.
 
     A point P turned by a small w moves by w x P; a row of the equations is how its picture moves.
+
+    Args:
+        nose: as seen.
+        others: eyes and corners of the mouth as seen.
+        frontal: the others, on the face.
+        height_weight: weight of the rows of y of the mouth's corners.
+        R: rotation of the face.
+        p_m: its position.
+        length: its length.
     """
     (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = R
     px, py, pz = p_m
     q = 1.0 / pz
-    n, u, v = q * q, px * q, py * q
+    nx, u, v = q * q, px * q, py * q
+    ny = nx
     ex, ey = (nose[0] - u) * q, (nose[1] - v) * q
-    x3, y3 = -n * u, -n * v
-    a33, b3 = n * (u * u + v * v), -u * ex - v * ey
+    x3, y3 = -nx * u, -nx * v
+    a33, b3 = nx * (u * u + v * v), -u * ex - v * ey
     x0 = x1 = x2 = x4 = y0 = y1 = y2 = y4 = 0.0
     a00 = a01 = a02 = a03 = a04 = a11 = a12 = a13 = a14 = 0.0
     a22 = a23 = a24 = a34 = a44 = b0 = b1 = b2 = b4 = 0.0
-    for (fx, fy, fz), (seen_u, seen_v) in zip(_FRONTAL_M, others, strict=True):
+    weights = 1.0, 1.0, height_weight, height_weight
+    for (fx, fy, fz), (seen_u, seen_v), weight in zip(frontal, others, weights, strict=True):
         tall = fy * length
         x = r00 * fx + r01 * tall + r02 * fz
         y = r10 * fx + r11 * tall + r12 * fz
@@ -192,10 +271,11 @@ def _sums(nose: tuple[float, float], others: Points, R: Mat3, p_m: Vec3, length:
         k, u, v = q * q, (px + x) * q, (py + y) * q
         c0, c1, c4 = -u * y, z + u * x, fy * (r01 - u * r21)
         d0, d1, d4 = -z - v * y, v * x, fy * (r11 - v * r21)
-        eu, ev = (seen_u - u) * q, (seen_v - v) * q
+        h = weight * k
+        eu, ev = (seen_u - u) * q, weight * (seen_v - v) * q
         kc0, kc1, kc2, kc3, kc4 = k * c0, k * c1, -k * y, -k * u, k * c4
-        kd0, kd1, kd2, kd3, kd4 = k * d0, k * d1, k * x, -k * v, k * d4
-        n, ex, ey = n + k, ex + eu, ey + ev
+        kd0, kd1, kd2, kd3, kd4 = h * d0, h * d1, h * x, -h * v, h * d4
+        nx, ny, ex, ey = nx + k, ny + h, ex + eu, ey + ev
         x0, x1, x2, x3, x4 = x0 + kc0, x1 + kc1, x2 + kc2, x3 + kc3, x4 + kc4
         y0, y1, y2, y3, y4 = y0 + kd0, y1 + kd1, y2 + kd2, y3 + kd3, y4 + kd4
         a00 += kc0 * c0 + kd0 * d0
@@ -219,9 +299,8 @@ def _sums(nose: tuple[float, float], others: Points, R: Mat3, p_m: Vec3, length:
         b3 -= u * eu + v * ev
         b4 += c4 * eu + d4 * ev
     products = a00, a01, a02, a03, a04, a11, a12, a13, a14, a22, a23, a24, a33, a34, a44
-    return _Sums(
-        n, (x0, x1, x2, x3, x4), (y0, y1, y2, y3, y4), products, (b0, b1, b2, b3, b4), ex, ey
-    )
+    to_x, to_y = (x0, x1, x2, x3, x4), (y0, y1, y2, y3, y4)
+    return _Sums(nx, ny, to_x, to_y, products, (b0, b1, b2, b3, b4), ex, ey)
 
 
 def _step(sums: _Sums, turn: Vec3, length: float, variance: float) -> Five | None:
@@ -234,10 +313,10 @@ def _step(sums: _Sums, turn: Vec3, length: float, variance: float) -> Five | Non
     b0, b1, b2, b3, b4 = sums.errors
     x0, x1, x2, x3, x4 = sums.to_x
     y0, y1, y2, y3, y4 = sums.to_y
-    ex, ey, over_n = sums.errors_x, sums.errors_y, 1.0 / sums.n
+    ex, ey, over_x, over_y = sums.errors_x, sums.errors_y, 1.0 / sums.n_x, 1.0 / sums.n_y
     pitch, yaw, long = variance * _PITCH_INFO, variance * _YAW_INFO, variance * _LENGTH_INFO
     # Row by row: without x and y, with beliefs, and less the rows that are solved already (LDL^T).
-    fx, fy = x0 * over_n, y0 * over_n
+    fx, fy = x0 * over_x, y0 * over_y
     d0 = a00 + pitch - fx * x0 - fy * y0
     a01, a02 = a01 - fx * x1 - fy * y1, a02 - fx * x2 - fy * y2
     a03, a04 = a03 - fx * x3 - fy * y3, a04 - fx * x4 - fy * y4
@@ -248,7 +327,7 @@ def _step(sums: _Sums, turn: Vec3, length: float, variance: float) -> Five | Non
     if not d0 > 0.0:
         return None
     l1, l2, l3, l4 = a01 / d0, a02 / d0, a03 / d0, a04 / d0
-    fx, fy = x1 * over_n, y1 * over_n
+    fx, fy = x1 * over_x, y1 * over_y
     d1 = a11 + yaw - fx * x1 - fy * y1 - l1 * a01
     a12 = a12 - fx * x2 - fy * y2 - l1 * a02
     a13, a14 = a13 - fx * x3 - fy * y3 - l1 * a03, a14 - fx * x4 - fy * y4 - l1 * a04
@@ -256,7 +335,7 @@ def _step(sums: _Sums, turn: Vec3, length: float, variance: float) -> Five | Non
     if not d1 > 0.0:
         return None
     m2, m3, m4 = a12 / d1, a13 / d1, a14 / d1
-    fx, fy = x2 * over_n, y2 * over_n
+    fx, fy = x2 * over_x, y2 * over_y
     d2 = a22 - fx * x2 - fy * y2 - l2 * a02 - m2 * a12
     a23 = a23 - fx * x3 - fy * y3 - l2 * a03 - m2 * a13
     a24 = a24 - fx * x4 - fy * y4 - l2 * a04 - m2 * a14
@@ -264,14 +343,14 @@ def _step(sums: _Sums, turn: Vec3, length: float, variance: float) -> Five | Non
     if not d2 > 0.0:
         return None
     n3, n4 = a23 / d2, a24 / d2
-    fx, fy = x3 * over_n, y3 * over_n
+    fx, fy = x3 * over_x, y3 * over_y
     d3 = a33 - fx * x3 - fy * y3 - l3 * a03 - m3 * a13 - n3 * a23
     a34 = a34 - fx * x4 - fy * y4 - l3 * a04 - m3 * a14 - n3 * a24
     b3 = b3 - fx * ex - fy * ey - l3 * b0 - m3 * b1 - n3 * b2
     if not d3 > 0.0:
         return None
     o4 = a34 / d3
-    fx, fy = x4 * over_n, y4 * over_n
+    fx, fy = x4 * over_x, y4 * over_y
     d4 = a44 + long - fx * x4 - fy * y4 - l4 * a04 - m4 * a14 - n4 * a24 - o4 * a34
     b4 = b4 - long * (length - 1.0) - fx * ex - fy * ey - l4 * b0 - m4 * b1 - n4 * b2 - o4 * b3
     if not d4 > 0.0:

@@ -5,12 +5,13 @@ Camera frame: optical, x right, y down, z forward. Metres; pixels have their cen
 whole numbers.
 
 Five points that lie nearly in one plane say much about place and roll, and little about
-yaw and pitch; and faces differ, in length most of all (a smile alone takes a tenth off
-it), which a fixed face would have to explain by a nod. The pose is therefore the most
-probable one: reprojection errors weighted by what landmarks are usually off by, a face
-length that is free within what is usual, and a weak belief that a face which a camera
-finds is turned towards it. The search starts from a face that looks into the camera, so
-it ends at the nearer of the two mirror poses of a flat set of points.
+yaw and pitch; and faces differ, in length and about the mouth most of all: a smile widens it,
+raises its corners and draws them back, which a fixed face would have to explain by a nod of ten
+degrees and more. The pose is therefore the most probable one: reprojection errors weighted by
+what landmarks are usually off by, a mouth as wide as it is seen with corners where a smile so
+wide puts them, their height and the face's length free within what is usual, and a weak belief
+that a face which a camera finds is turned towards it. The search starts from a face that looks
+into the camera, so it ends at the nearer of the two mirror poses of a flat set of points.
 """
 
 from math import cos, isfinite, radians, sqrt
