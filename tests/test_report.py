@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 
 from gazerig.config.schema import Rig, load_rig, load_walk
 from gazerig.drivers.errors import SetupError
+from gazerig.gaze.lids import LidParams, Lids
 from gazerig.gaze.types import PARTS, Bodies, Percept
 from gazerig.robot.analysis import human_norms as human
 from gazerig.robot.analysis.blink_finder import BlinkEvent
@@ -26,18 +27,26 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.report import app, page_file
 from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.report import face, landing, rests
+from gazerig.robot.report import blinks, face, landing, rests
 from gazerig.robot.report import norm_bands as bands
 from gazerig.robot.report import report as build
 from gazerig.robot.report.compare import differences_of
 from gazerig.robot.report.compare_page import compare_page
 from gazerig.robot.report.gaze_trace import GazeTrace, GazeTraceBuilder, TraceRow
+from gazerig.robot.report.lid_closure import blinks_of
 from gazerig.robot.report.page import band_text, gauge, number, report_page
 from gazerig.robot.report.plotting import COLOURS, Shown, png
 from gazerig.robot.report.reference_walk import own, published
 from gazerig.robot.report.report import DRAWINGS, found, measured, report_of
 from gazerig.robot.report.run_header import RunHeader
-from gazerig.robot.report.statistics import MeasuredValue, MeasureResult, judged, mean, median
+from gazerig.robot.report.statistics import (
+    MeasuredValue,
+    MeasureResult,
+    judged,
+    longest,
+    mean,
+    median,
+)
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -89,8 +98,9 @@ def test_what_the_paper_makes_other_than_people_is_outside() -> None:
 
 def test_random_angles_are_outside() -> None:
     seen = verdicts(looked("face-to-face", 60.0, SLOWER, scanpath="random"))
-    for key in ("on_parts", "rate", "below_15", "heat"):
+    for key in ("on_parts", "below_15", "heat"):
         assert seen[key].verdict == "outside", seen[key]
+    assert seen["rate"].verdict == "uncertain" and seen["rate"].value < 1.5  # of 90 events
 
 
 def test_jumps_of_two_frames_are_outside() -> None:
@@ -160,6 +170,19 @@ def test_a_verdict_rests_on_the_band_alone() -> None:
         assert (
             judged(MeasuredValue("vergence", np.full(40, value), median), band).verdict == verdict
         )
+
+
+def test_a_figure_outside_by_what_chance_may_do_is_uncertain() -> None:
+    """Express reactions may be 5 %: 1 of 14 is no proof of more, 100 of 1400 is."""
+    band = bands.BY_KEY["express"]
+    for times, verdict in ((1, "uncertain"), (100, "outside")):
+        rows = np.array([1.0] * times + [0.0] * 13 * times)
+        assert judged(MeasuredValue("express", rows, mean), band).verdict == verdict
+    inside = judged(MeasuredValue("express", np.zeros(14), mean), band)
+    assert inside.verdict == "pass" and inside.high95 > band.high  # as wide as 14 events are
+    one_look = MeasuredValue("longest_look", np.array([3.0, 15.4]), longest)
+    look = judged(one_look, bands.BY_KEY["longest_look"])
+    assert look.verdict == "outside" and np.isnan(look.high95)  # it has happened
 
 
 def test_every_measure_has_its_band_and_every_band_its_source(walking: GazeTrace) -> None:
@@ -348,11 +371,64 @@ def test_a_landing_is_short_and_corrected_or_beyond() -> None:
     )
 
 
+def test_an_eye_at_the_end_of_its_range_has_not_landed() -> None:
+    run = flown([(0.5, 0.0, 11.0), (1.1, 11.0, 12.0)])
+    rows = run.rows.copy()
+    rows[80:200, TraceRow._fields.index("eye_limited")] = 1.0
+    assert len(landing.landings(run)) == 1
+    assert len(landing.landings(replace(run, rows=rows))) == 0
+
+
 def test_a_floor_under_rests_is_a_spike_and_a_smooth_law_is_none() -> None:
     dice = np.random.default_rng(2)
-    smooth = dice.lognormal(-1.4, 0.45, 1500)
-    assert rests.spike(smooth) < 0.03
-    assert rests.spike(np.maximum(smooth, 0.2)) > 0.2
+    smooth = [dice.lognormal(-1.4, 0.45, 600) for _ in range(40)]
+    found = [rests.spike(each) for each in smooth]
+    assert abs(np.mean(found)) < 0.005 and max(found) < 0.04  # chance makes none
+    assert all(rests.spike(np.maximum(each, 0.2)) > 0.2 for each in smooth)
+
+
+@pytest.mark.parametrize(("gain", "verdict"), [(0.97, "pass"), (1.2, "outside")])
+def test_the_highest_gain_knows_how_uncertain_it_is(gain: float, verdict: str) -> None:
+    """A face sways at all frequencies below 1 Hz; what the gaze adds is noise."""
+    dice = np.random.default_rng(5)
+    t = np.arange(0.0, 300.0, 0.02)
+    f = dice.uniform(0.05, 1.0, 40)
+    phases = dice.uniform(0.0, 2.0 * np.pi, 40)
+    target = np.sin(2.0 * np.pi * np.outer(t, f) + phases).sum(axis=1)
+    speed = (2.0 * np.pi * f * np.cos(2.0 * np.pi * np.outer(t, f) + phases)).sum(axis=1)
+    rows = np.zeros((len(t), len(TraceRow._fields)))
+    noise = np.convolve(dice.standard_normal(len(t)), np.ones(50) / 4.0, "same")
+    for name, values in (("t", t), ("target_yaw", target), ("target_yaw_rate", speed),
+                         ("gaze_yaw", gain * target + noise)):  # fmt: skip
+        rows[:, TraceRow._fields.index(name)] = values
+    most = verdicts(GazeTrace(rows, (), (), ()))["pursuit_most"]
+    assert most.value > gain + 0.01  # the largest of many is beyond the truth
+    assert most.low95 < gain + 0.02 and most.high95 - most.low95 > 0.03
+    assert most.verdict == verdict
+
+
+def test_a_blink_that_comes_with_a_glance_begins_when_it_does() -> None:
+    """The lids go down with the eyes at 1.0 s, and shut .1 s later; they stay low."""
+    t = np.arange(0.0, 20.0, 0.005)
+    lids = Lids(LidParams(), np.random.default_rng(0))
+    pitch = np.where(t % 4.0 < 1.0, 10.0, -10.0)
+    pitch = np.convolve(np.pad(pitch, 5, "edge"), np.ones(11) / 11.0, "valid")
+    rest = 0.55 + 0.025 * pitch
+    shut = np.array([lids.closure(s % 4.0 - 1.1) for s in t])
+    found = blinks_of(t, rest * (1.0 - shut), pitch)
+    assert [b.onset_s % 4.0 for b in found] == pytest.approx([1.1] * 5, abs=0.01)
+    assert all(b.depth > 0.95 for b in found)
+    assert blinks_of(t, rest, pitch) == ()  # a glance down is none
+    assert blinks_of(t, np.full(len(t), np.nan), pitch) == ()
+
+
+def test_a_shift_of_eyes_that_are_shut_brings_no_blink() -> None:
+    run = run_of([(40.0, 120.0, 400.0, 0.3)] * 40)
+    with_each = tuple(BlinkEvent(0.4 * n + 0.03, 0.08, 0.04, 0.19, 1.0, 20.0, 10.0)
+                      for n in range(0, 40, 4))  # fmt: skip
+    trials = blinks.evoked(replace(run, blinks=with_each))
+    # The next shift comes .4 s later, .07 s after the lids are open again: no trial.
+    assert len(trials) == 30 and trials[:, 1].sum() == 10
 
 
 def test_blinks_that_begin_with_saccades_are_told_from_others() -> None:

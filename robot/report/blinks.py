@@ -13,6 +13,9 @@ from gazerig.robot.report.statistics import MeasuredValue, figure, mean, median,
 _DOUBLE_S = 0.6
 _EVOKING_DEG = 33.0
 _WITH_BEFORE_S, _WITH_AFTER_S = 0.12, 0.2
+_AGAIN_S = 0.3
+"""So soon after a blink even one that a shift asks for would be a double one."""
+
 _PART_S = 10.0
 _TIED_S = 0.006
 _SHUT = 0.96
@@ -36,11 +39,17 @@ def shapes(blinks: Sequence[BlinkEvent]) -> Floats:
 
 
 def evoked(run: GazeTrace) -> Floats:
-    """Return (n, 2) amplitude of each saccade in deg and whether a blink went with it."""
+    """Return (n, 2) amplitude of each saccade in deg and whether a blink went with it.
+
+    Shifts during a blink that began before them are left out: eyes that are shut cannot shut.
+    """
     onsets = np.array([blink.onset_s for blink in run.blinks])
+    opened = onsets + np.array([blink.duration_s for blink in run.blinks])
     rows = []
     for saccade in run.saccades:
         since = onsets - saccade.onset_s
+        if ((since <= -_WITH_BEFORE_S) & (opened + _AGAIN_S > saccade.onset_s)).any():
+            continue
         near = ((since > -_WITH_BEFORE_S) & (since < _WITH_AFTER_S)).any()
         asked = saccade.commanded.amplitude_deg if saccade.commanded is not None else nan
         if not np.isnan(asked):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gazerig.gaze.angles import add, angle_between, dot, norm, rotate_back, scale, sub, yaw_pitch
 from gazerig.gaze.field_of_view import head_in_space, line_of_sight
 from gazerig.gaze.types import Face, Floats, Vec3
-from gazerig.robot.analysis.blink_finder import BlinkEvent, BlinkFinder
+from gazerig.robot.analysis.blink_finder import BlinkEvent
 from gazerig.robot.analysis.event_detector import (
     NEAR_FACE_M,
     EventDetector,
@@ -28,6 +28,7 @@ from gazerig.robot.control.feedback_basis import estimated_joints
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Ask
 from gazerig.robot.report.joint_basis import JointBasis, joints_of
+from gazerig.robot.report.lid_closure import blinks_of
 
 PLANE_M = -0.028
 """The plane between the tip of the nose and eyes and mouth, along the face's own x axis."""
@@ -45,6 +46,7 @@ class TraceRow(NamedTuple):
 
     gaze_*: mean line of sight in space; head_*, eye_*: neck, and mean eye in the head
     idle: whether the target is one of those with no one there
+    eye_limited: whether an eye is at the end of its range, short of where it should point
     target_*: direction of the point in force from the head, now; target_*_rate: its speed
     vergence, vergence_due: as it is, and as the point's place asks for
     off_left, off_right: angle of each line of sight off the point
@@ -85,6 +87,7 @@ class TraceRow(NamedTuple):
     phase: float
     is_face: float
     idle: float
+    eye_limited: float
     shift: float
     mode: float
 
@@ -147,12 +150,11 @@ class GazeTraceBuilder:
     """Builds the gaze trace of a run from its ticks."""
 
     def __init__(self) -> None:
-        self._events, self._asked_lids = EventDetector(), BlinkFinder()
+        self._events = EventDetector()
         self._flat = array("d")
         self._saccades: list[SaccadeEvent] = []
         self._fixations: list[FixationEvent] = []
-        self._blinks: list[BlinkEvent] = []
-        self._asked_blinks: list[BlinkEvent] = []
+        self._asked_lids = array("d")
         self._new, self._reactions = ReactionFinder(), list[MeasuredReaction]()
         self._kinds: defaultdict[str, float] = defaultdict(float)
         self._mode = 0
@@ -174,32 +176,33 @@ class GazeTraceBuilder:
                 self._saccades.append(event)
             elif isinstance(event, FixationEvent):
                 self._fixations.append(event)
-            else:
-                self._blinks.append(event)
         reaction = self._new.update(tick)
         if reaction is not None:
             self._reactions.append(reaction)
         self._names = tick.guard_result.joints
         self._estimated.update(dict.fromkeys(estimated_joints(tick)))
-        lids = openings(tick.gaze.lid_left, tick.gaze.lid_right, self._names, UPPER)
-        asked = self._asked_lids.update(tick.t_s, *lids) if lids is not None else None
-        if asked is not None:
-            self._asked_blinks.append(asked)
         if self._last_s is not None:
             self._kinds[tick.target.kind] += tick.t_s - self._last_s
         self._last_s = tick.t_s
         if not tick.stopped:
             self._flat.extend(row_of(tick, self._mode))
+            gaze = tick.gaze
+            lids = openings(gaze.lid_left, gaze.lid_right, self._names, UPPER)
+            pitch = 0.5 * (gaze.eye_left_rad[1] + gaze.eye_right_rad[1])
+            self._asked_lids.extend((max(lids or (nan,)), degrees(pitch)))
 
     def gathered(self) -> GazeTrace:
         """Return all of it as it is now."""
         rows = np.array(self._flat).reshape(-1, len(TraceRow._fields))
+        t_s, lid, pitch = (
+            rows[:, TraceRow._fields.index(name)] for name in ("t", "lid", "eye_pitch")
+        )
         return GazeTrace(
             rows,
             tuple(self._saccades),
             tuple(self._fixations),
-            tuple(self._blinks),
-            tuple(self._asked_blinks),
+            blinks_of(t_s, lid, pitch),
+            blinks_of(t_s, *np.array(self._asked_lids).reshape(-1, 2).T),
             dict(self._kinds),
             joints_of(self._names, self._estimated),
             tuple(self._reactions),
@@ -246,7 +249,8 @@ def row_of(tick: Tick, mode: int) -> TraceRow:
         max(openings(pose.lid_left, pose.lid_right, names, UPPER) or (nan,)),
         max(openings(pose.lower_left, pose.lower_right, names, LOWER) or (nan,)),
         PHASES.index(tick.gaze.phase),
-        float(target.kind == "face"), float(target.kind in _IDLE), target.shift, mode,
+        float(target.kind == "face"), float(target.kind in _IDLE),
+        float(any("eye" in limited.axis for limited in tick.gaze.limited)), target.shift, mode,
     )  # fmt: skip
 
 

@@ -58,16 +58,20 @@ def overshoots(run: GazeTrace) -> Floats:
 def landings(run: GazeTrace) -> Floats:
     """Return (n, 2) of saccades to targets 10 deg away and more: share of the way, and corrected.
 
+    An eye that stops at the end of its range is brought on by the head, and no landing of its own.
+
     corrected: 1 where another saccade to the same target follows within .35 s
     """
     t, shift = run.column("t"), run.column("shift")
     at = np.column_stack([run.column("target_yaw"), run.column("target_pitch")])
-    jumps = planned_saccades(run)
+    jumps, limited = planned_saccades(run), run.column("eye_limited")
     rows = []
     for number, (onset_s, end_s, _, _) in enumerate(jumps):
         first = run.between(onset_s, end_s).start
         landed = run.between(end_s + _LANDED_S[0], end_s + _LANDED_S[1])
         if landed.stop <= landed.start or shift[first] != shift[landed.start]:
+            continue
+        if limited[first : landed.stop].any():
             continue
         gaze, goal = _gaze(run, landed), at[landed].mean(axis=0)
         start = _gaze(run, slice(first, first + 1))[0]

@@ -111,8 +111,7 @@ BANDS: tuple[NormBand, ...] = (
     NormBand("short_rests", SACCADES, "rests on a face below 150 ms", "share", 0.0, 0.08, 100,
          "Lee, Badler & Badler 2002: 150 ms between saccades; 2 to 3 fixations a second"),
     NormBand("rest_spike", SACCADES, "rests of one length beyond a smooth law, in 10 ms", "share",
-         0.0, 0.04, 400, "lengths of fixations have a smooth distribution; 3 %, and one that chance "
-         "makes of 1000"),
+         0.0, 0.03, 400, "lengths of fixations have a smooth distribution"),
     NormBand("refixations", SACCADES, "shifts of .4 to 1.5 deg on a face", "1/s", 0.1, 2.0, 30,
          "Otero-Millan et al. 2013: small saccades go on in looking about; 1 to 2 a second at rest, "
          "most of them below what servos can do"),

@@ -17,7 +17,9 @@ from gazerig.robot.report.plotting import Drawing
 from gazerig.robot.report.run_header import RunHeader
 from gazerig.robot.report.statistics import MeasureResult
 
-_CLASSES = {"pass": "pass", "outside": "outside", "too few events": "few"}
+_CLASSES = {
+    "pass": "pass", "uncertain": "uncertain", "outside": "outside", "too few events": "few",
+}  # fmt: skip
 
 
 class Figure(NamedTuple):
@@ -92,6 +94,7 @@ def report_page(
     return rendered(
         "report.html", about=about, facts=facts, sections=sections, counts=counts,
         outside=[f.band.title for f in findings if f.verdict == "outside"],
+        uncertain=[f.band.title for f in findings if f.verdict == "uncertain"],
         basis=run.joints.whole_basis, banner=banner(run.joints),
     )  # fmt: skip
 
@@ -146,7 +149,7 @@ def line_of(finding: MeasureResult, styles: frozenset[str]) -> TextLine:
         finding.verdict,
         _CLASSES[finding.verdict],
         band.source,
-        notes if finding.verdict == "outside" else (),
+        notes if finding.verdict in ("outside", "uncertain") else (),
         gauge(finding) if known else None,
     )
 

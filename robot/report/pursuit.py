@@ -1,6 +1,9 @@
 """How smoothly the gaze follows what moves: gain and lag between saccades."""
 
+from math import nan
+
 import numpy as np
+from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
 from gazerig.robot.report.eye_head import rate, stretches
@@ -37,28 +40,59 @@ def followed(run: GazeTrace) -> Floats:
     return np.array(rows).reshape(-1, 3)
 
 
-def response(run: GazeTrace) -> Floats:
-    """Return (n, 3) frequency in Hz, gain, and phase in deg of the slow gaze against its target.
+def spectra(run: GazeTrace) -> tuple[Floats, Floats]:
+    """Return frequencies (k,) in Hz, and (n, 4 k) spectra of both sideways speeds, by window.
 
-    By cross spectra of both speeds, sideways; what saccades did is bridged. Only where the
-    two go together: a frequency that the target does not have tells nothing.
+    Columns: cross spectrum of target and slow gaze, real and imaginary, power of the target, power
+    of the gaze; what saccades did is bridged. Windows of 10 s overlap by half.
     """
-    from scipy import signal  # nearly a second of processor, which other commands need not wait for
-
     t, clear = run.column("t"), run.slow()
     rate_hz = run.rate_hz
     window = int(_WINDOW_S * rate_hz)
     if len(t) < max(20, 2 * window) or clear.sum() < window:
-        return np.zeros((0, 3))
+        return np.zeros(0), np.zeros((0, 0))
     even = np.arange(t[0], t[-1], 1.0 / rate_hz)
     gaze = np.interp(even, t[clear], rate(t, run.column("gaze_yaw"))[clear])
     target = np.interp(even, t, run.column("target_yaw_rate"))
-    f, cross = signal.csd(target, gaze, rate_hz, nperseg=window)
-    _, power = signal.welch(target, rate_hz, nperseg=window)
-    _, coherent = signal.coherence(target, gaze, rate_hz, nperseg=window)
-    here = (f >= _LOWEST_HZ) & (f <= _HIGHEST_HZ) & (coherent > _COHERENT)
-    transfer = cross[here] / power[here]
-    return np.column_stack([f[here], np.abs(transfer), np.degrees(np.angle(transfer))])
+    f = np.fft.rfftfreq(window, 1.0 / rate_hz)
+    here = (f >= _LOWEST_HZ) & (f <= _HIGHEST_HZ)
+    bell = np.hanning(window)
+    rows = []
+    for first in range(0, len(even) - window + 1, window // 2):
+        part = slice(first, first + window)
+        x, y = (np.fft.rfft(bell * (v[part] - v[part].mean()))[here] for v in (target, gaze))
+        cross = np.conj(x) * y
+        rows.append(np.concatenate([cross.real, cross.imag, np.abs(x) ** 2, np.abs(y) ** 2]))
+    every = np.array(rows)
+    return f[here], every[np.isfinite(every).all(axis=1)]
+
+
+def response(run: GazeTrace) -> Floats:
+    """Return (n, 3) frequency in Hz, gain, and phase in deg of the slow gaze against its target.
+
+    Only where the two go together: a frequency that the target does not have tells nothing.
+    """
+    f, rows = spectra(run)
+    if not len(rows):
+        return np.zeros((0, 3))
+    transfer, coherent = _transfer(rows)
+    here = coherent > _COHERENT
+    return np.column_stack([f, np.abs(transfer), np.degrees(np.angle(transfer))])[here]
+
+
+def highest_gain(rows: Floats) -> float:
+    """Return the largest gain at any frequency of (n, 4 k) spectra, nan where none is coherent."""
+    transfer, coherent = _transfer(rows)
+    gains = np.abs(transfer[coherent > _COHERENT])
+    return float(gains.max()) if len(gains) else nan
+
+
+def _transfer(rows: Floats) -> tuple[NDArray[np.complex128], Floats]:
+    """Return the transfer function (k,) and the coherence (k,) of the windows together."""
+    real, imaginary, target, gaze = rows.sum(axis=0).reshape(4, -1)
+    cross = real + 1j * imaginary
+    most = np.maximum(target * gaze, 1e-30)
+    return cross / np.maximum(target, 1e-15), np.abs(cross) ** 2 / most
 
 
 def smooth_speeds(run: GazeTrace) -> Floats:
@@ -82,6 +116,6 @@ def measures(run: GazeTrace) -> list[MeasuredValue]:
     return [
         MeasuredValue("pursuit_gain", rows[:, 1], median),
         MeasuredValue("pursuit_lag", rows[:, 2], median),
-        MeasuredValue("pursuit_most", response(run)[:, 1], longest),
+        MeasuredValue("pursuit_most", spectra(run)[1], highest_gain, count=len(response(run))),
         MeasuredValue("smooth_peak", smooth, longest),
     ]

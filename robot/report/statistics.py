@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import islice
-from math import isfinite, nan
+from math import isfinite, nan, sqrt
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -12,13 +12,16 @@ from numpy.typing import NDArray
 from gazerig.gaze.types import Floats
 from gazerig.robot.report.norm_bands import NormBand
 
-VerdictWord = Literal["pass", "outside", "too few events"]
+VerdictWord = Literal["pass", "uncertain", "outside", "too few events"]
+"""uncertain: the figure is outside, but what it may be by chance reaches into the band"""
+
 Indices = NDArray[np.int64]
 Statistic = Callable[[Floats], float]
 """Rows (n,) or (n, k), one an event -> the figure."""
 
 _DRAWS = 300
 _SEED = 20060301
+_Z95 = 1.96
 _AT_ONCE = 250_000
 """Rows of samples whose figures are made at once: 2 MB."""
 
@@ -47,7 +50,7 @@ class MeasuredValue:
 class MeasureResult(NamedTuple):
     """A measure with its verdict.
 
-    value, low95, high95: the figure and its bootstrap interval, nan where there is none
+    value, low95, high95: the figure and its 95 % interval, nan where there is none
     """
 
     band: NormBand
@@ -59,15 +62,43 @@ class MeasureResult(NamedTuple):
 
 
 def judged(measured: MeasuredValue, band: NormBand) -> MeasureResult:
-    """Compare a figure with its pass band, and draw its bootstrap interval."""
+    """Compare a figure with its pass band, given what it may be by chance.
+
+    A figure outside whose interval reaches into the band is uncertain: a run of a person could have
+    shown it. One inside passes, however wide its interval is.
+    """
     result = compared(measured, band)
     if result.verdict == "too few events":
         return result
+    low, high = interval(measured)
+    reaches = low <= band.high and high >= band.low
+    verdict = "uncertain" if result.verdict == "outside" and reaches else result.verdict
+    return result._replace(low95=low, high95=high, verdict=verdict)
+
+
+def interval(measured: MeasuredValue) -> tuple[float, float]:
+    """Return the 95 % interval of a figure, (nan, nan) of an extreme, which has happened.
+
+    Shares have the score interval of Wilson (1927), which holds for few events too; all others
+    that of the bootstrap (Efron 1979).
+    """
+    rows, of = measured.rows, measured.of
+    if of is longest:
+        return nan, nan
+    if of is mean and rows.ndim == 1 and np.isin(rows, (0.0, 1.0)).all():
+        return _wilson(float(rows.mean()), len(rows))
     spread = drawn(measured, np.random.default_rng(_SEED))
     # Figures that cannot be below 0 are larger in samples drawn again: that much is taken off.
-    bias = float(spread.mean()) - result.value
-    low, high = (float(x) - bias for x in np.percentile(spread, (2.5, 97.5)))
-    return result._replace(low95=low, high95=high)
+    bias = float(spread.mean()) - figure(of, rows)
+    low, high = np.percentile(spread, (2.5, 97.5))
+    return float(low) - bias, float(high) - bias
+
+
+def _wilson(share: float, n: int) -> tuple[float, float]:
+    z2 = _Z95 * _Z95
+    middle = (share + 0.5 * z2 / n) / (1.0 + z2 / n)
+    half = _Z95 * sqrt(share * (1.0 - share) / n + 0.25 * z2 / n**2) / (1.0 + z2 / n)
+    return max(0.0, middle - half), min(1.0, middle + half)
 
 
 def compared(measured: MeasuredValue, band: NormBand) -> MeasureResult:

@@ -1,0 +1,63 @@
+"""Blinks of a whole run: what lids do beyond following the gaze.
+
+Upper lids go up and down with the eyes. A gaze shift that brings a blink also moves the lids to
+another opening, so a blink found in the opening itself would begin with the shift rather than when
+it does, or never end because the lid does not come back to where it was. In the opening over that
+of lids at rest with such a gaze it is found as it is.
+"""
+
+import numpy as np
+
+from gazerig.gaze.types import Floats
+from gazerig.robot.analysis.blink_finder import BlinkEvent, BlinkFinder
+
+_BIN_DEG = 2.0
+_LEAST_SHARE = 0.002
+"""A gaze that is held for less of the run does not tell where lids rest with it."""
+
+_LEAST_OPEN = 0.15
+_GAP_S = 0.1
+
+
+def resting_opening(opening: Floats, pitch_deg: Floats) -> Floats:
+    """Return (n,) how far the lids would be open without blinks, from how the run shows them.
+
+    Args:
+        opening: (n,) of the upper lids, 0 shut .. 1 open.
+        pitch_deg: (n,) of the eyes in the head, + up.
+    """
+    bins = np.floor(pitch_deg / _BIN_DEG).astype(int)
+    bins -= bins.min()
+    counts = np.bincount(bins)
+    often = np.flatnonzero(counts >= max(1.0, _LEAST_SHARE * len(opening)))
+    order = np.argsort(bins, kind="stable")
+    pieces = np.split(order, np.cumsum(counts)[:-1])
+    # Lids are shut for less than half of the time, whatever the gaze.
+    rest = [float(np.median(opening[pieces[at]])) for at in often]
+    middle = [float(np.median(pitch_deg[pieces[at]])) for at in often]
+    out: Floats = np.interp(pitch_deg, middle, rest)
+    return out
+
+
+def blinks_of(t_s: Floats, opening: Floats, pitch_deg: Floats) -> tuple[BlinkEvent, ...]:
+    """Return the blinks of a run; depths and speeds are shares of the opening at rest.
+
+    Args:
+        t_s: (n,) times.
+        opening: (n,) the wider one of both upper lids, 0 shut .. 1 open; nan without lids.
+        pitch_deg: (n,) of the eyes in the head, + up.
+    """
+    known = np.isfinite(opening) & np.isfinite(pitch_deg)
+    if not known.any():
+        return ()
+    t_s, opening, pitch_deg = t_s[known], opening[known], pitch_deg[known]
+    share = opening / np.maximum(resting_opening(opening, pitch_deg), _LEAST_OPEN)
+    finder, found, last_s = BlinkFinder(), [], float(t_s[0])
+    for now_s, one in zip(t_s.tolist(), share.tolist(), strict=True):
+        if now_s - last_s > _GAP_S:
+            finder.clear()
+        last_s = now_s
+        blink = finder.update(now_s, one, one)
+        if blink is not None:
+            found.append(blink)
+    return tuple(found)
