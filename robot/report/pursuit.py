@@ -54,8 +54,8 @@ def spectra(run: GazeTrace) -> tuple[Floats, Floats]:
     even = np.arange(t[0], t[-1], 1.0 / rate_hz)
     gaze = np.interp(even, t[clear], rate(t, run.column("gaze_yaw"))[clear])
     target = np.interp(even, t, run.column("target_yaw_rate"))
-    f = np.fft.rfftfreq(window, 1.0 / rate_hz)
-    here = (f >= _LOWEST_HZ) & (f <= _HIGHEST_HZ)
+    every_hz = np.arange(window // 2 + 1, dtype=np.float64) * (rate_hz / window)
+    here = (every_hz >= _LOWEST_HZ) & (every_hz <= _HIGHEST_HZ)
     bell = np.hanning(window)
     rows = []
     for first in range(0, len(even) - window + 1, window // 2):
@@ -64,7 +64,8 @@ def spectra(run: GazeTrace) -> tuple[Floats, Floats]:
         cross = np.conj(x) * y
         rows.append(np.concatenate([cross.real, cross.imag, np.abs(x) ** 2, np.abs(y) ** 2]))
     every = np.array(rows)
-    return f[here], every[np.isfinite(every).all(axis=1)]
+    whole: Floats = every[np.isfinite(every).all(axis=1)]
+    return every_hz[here], whole
 
 
 def response(run: GazeTrace) -> Floats:
