@@ -330,7 +330,7 @@ class Detections:
     image: the BGR image itself where there is one (never written to after this)
     depth_m: distances seen from where the image was taken, where the camera measures
         them: (height_px, width_px), NaN where unknown
-    lens: the lens if the camera reports it; such images are without distortion
+    lens: the lens if the camera reports it
     located: faces and things in the camera's axes; None: whoever needs them computes them
     turn: how the camera was turned by its own gyro, None where it has none
     scene: counts the scenes that were shown: another one than before, and there was a cut

@@ -2,49 +2,18 @@
 
 import gc
 import threading
-from datetime import timedelta
-from types import SimpleNamespace
 
-import numpy as np
 import pytest
 from oak_packets import calibrated, face_archive
+from oak_stand_in import Message, Rig, info, real, sdk
 
 from gazerig.drivers.camera.oak.discovery import UDEV_RULE, find_oak
 from gazerig.drivers.camera.oak.params import OakParams
-from gazerig.drivers.camera.oak.pipeline import Outputs
-from gazerig.drivers.camera.oak.sdk import load_depthai
-from gazerig.drivers.camera.oak.source import OakSource
 from gazerig.drivers.errors import CameraError
-
-
-def real():
-    """Return depthai; it takes a second to import, which only who runs these tests waits for."""
-    return load_depthai()
-
-
-def info(device_id="14442C10", name="1.2", status=None):
-    return SimpleNamespace(
-        deviceId=device_id, name=name, status=status or real().XLinkError_t.X_LINK_SUCCESS
-    )
 
 
 def no_rights():
     return real().XLinkError_t.X_LINK_INSUFFICIENT_PERMISSIONS
-
-
-def sdk(free=(), connected=()):
-    """Stand in for what depthai says of the devices there are."""
-
-    def everything(state, skipInvalidDevices):  # noqa: N803
-        assert skipInvalidDevices is False
-        return list(connected)
-
-    return SimpleNamespace(
-        Device=SimpleNamespace(getAllAvailableDevices=lambda: list(free)),
-        XLinkConnection=SimpleNamespace(getAllConnectedDevices=everything),
-        XLinkDeviceState=real().XLinkDeviceState,
-        XLinkError_t=real().XLinkError_t,
-    )
 
 
 def test_first_free_camera_is_taken(tmp_path):
@@ -92,158 +61,6 @@ def test_camera_in_use_is_named(tmp_path):
 def test_wrong_name_lists_what_there_is(tmp_path):
     with pytest.raises(CameraError, match="no OAK camera 'CC' .there is: AA, BB."):
         find_oak(sdk([info("AA")], [info("BB")]), "CC", tmp_path)
-
-
-class Device:
-    """The part of a device that is asked before a pipeline is made."""
-
-    def __init__(self, speed) -> None:
-        self.speed = speed
-        sockets = real().CameraBoardSocket
-        self.sockets = [sockets.CAM_A, sockets.CAM_B, sockets.CAM_C]
-        self.imu = "BMI270"
-        self.platform = real().Platform.RVC2
-        self.calibration = calibrated(real())
-        self.closed = 0
-        self.reconnections: int | None = None
-        self.dots = 0.0
-
-    def getUsbSpeed(self):  # noqa: N802
-        return self.speed
-
-    def getConnectedCameras(self):  # noqa: N802
-        return self.sockets
-
-    def getDeviceName(self):  # noqa: N802
-        return "OAK-D"
-
-    def getConnectedIMU(self):  # noqa: N802
-        return self.imu
-
-    def getPlatform(self):  # noqa: N802
-        return self.platform
-
-    def readCalibration(self):  # noqa: N802
-        return self.calibration
-
-    def setMaxReconnectionAttempts(self, count):  # noqa: N802
-        self.reconnections = count
-
-    def setIrLaserDotProjectorIntensity(self, share):  # noqa: N802
-        self.dots = share
-
-    def close(self):
-        self.closed += 1
-
-
-class Message:
-    """A colour frame with its stamps."""
-
-    def __init__(self, device_s, host_s) -> None:
-        self.device_s, self.host_s = device_s, host_s
-
-    def getCvFrame(self):  # noqa: N802
-        return np.zeros((4, 6, 3), np.uint8)
-
-    def getTransformation(self):  # noqa: N802
-        return SimpleNamespace(getIntrinsicMatrix=lambda: np.eye(3))
-
-    def getTimestampDevice(self, offset):  # noqa: N802
-        assert offset == real().CameraExposureOffset.MIDDLE
-        return timedelta(seconds=self.device_s)
-
-    def getTimestamp(self, offset):  # noqa: N802
-        return timedelta(seconds=self.host_s)
-
-
-class Group(dict):
-    def getMessageNames(self):  # noqa: N802
-        return list(self)
-
-
-class Queue:
-    """A queue of given messages; an exception among them is raised."""
-
-    def __init__(self) -> None:
-        self.fed: list = []
-        self.lying = False  # one message is there whenever it is asked for anew
-        self.taken = False
-
-    def get(self, timeout):
-        item = self.fed.pop(0) if self.fed else None
-        if isinstance(item, Exception):
-            raise item
-        return Group(colour=item) if item is not None else None
-
-    def tryGet(self):  # noqa: N802
-        self.taken = self.lying and not self.taken
-        return self.get(None) if self.taken else None
-
-
-class Rig:
-    """A whole stand-in for depthai with one device."""
-
-    def __init__(self, speed="SUPER", start_fault=None) -> None:
-        self.device = Device(getattr(real().UsbSpeed, speed))
-        self.queue = Queue()
-        rig = self
-
-        class Sync:
-            def __init__(self) -> None:
-                self.inputs = {"colour": None}
-                self.out = SimpleNamespace(createOutputQueue=lambda maxSize, blocking: rig.queue)
-
-            def setRunOnHost(self, wanted):  # noqa: N802
-                assert wanted
-
-            def setSyncThreshold(self, threshold):  # noqa: N802
-                assert threshold > timedelta(0)
-
-        rig.waited = False  # type: ignore[attr-defined]
-
-        class Pipeline:
-            def __init__(self, device) -> None:
-                assert device is rig.device
-
-            def create(self, node):
-                return node()
-
-            def start(self):
-                if start_fault is not None:
-                    raise start_fault
-
-            def isRunning(self):  # noqa: N802
-                return False
-
-            def wait(self):
-                rig.waited = True  # type: ignore[attr-defined]
-
-        self.dai = SimpleNamespace(
-            **vars(sdk([info()])),
-            UsbSpeed=real().UsbSpeed,
-            CameraBoardSocket=real().CameraBoardSocket,
-            NNArchive=real().NNArchive,
-            Pipeline=Pipeline,
-            MessageQueue=real().MessageQueue,
-            CameraExposureOffset=real().CameraExposureOffset,
-            node=SimpleNamespace(Sync=Sync),
-        )
-        del self.dai.Device
-
-        def device(found):
-            return self.device
-
-        device.getAllAvailableDevices = lambda: [info()]  # type: ignore[attr-defined]
-        self.dai.Device = device
-
-    def source(self, **wanted) -> OakSource:
-        colour = SimpleNamespace(link=lambda where: None)
-
-        def nodes(dai, pipeline, params) -> Outputs:
-            self.asked = params
-            return Outputs(colour)
-
-        return OakSource(OakParams(**wanted), nodes, True, lambda: self.dai)
 
 
 def test_usb_2_that_carries_what_is_asked_is_told_so():

@@ -147,7 +147,11 @@ def lens(data: bytes) -> Intrinsics:
     K = np.asarray(_load(data, "K"), dtype=np.float64)
     if K.shape != (9,) or not np.isfinite(K).all() or K[0] <= 0.0 or K[4] <= 0.0:
         raise BadMessage("no camera matrix in it")
-    return Intrinsics(float(K[0]), float(K[4]), float(K[2]), float(K[5]))
+    D = np.asarray(_load(data, "D"), dtype=np.float64)
+    if D.shape != (5,) or not np.isfinite(D).all():
+        raise BadMessage("no five numbers of distortion in it")
+    k1, k2, p1, p2, k3 = D.tolist()
+    return Intrinsics(float(K[0]), float(K[4]), float(K[2]), float(K[5]), (k1, k2, p1, p2, k3))
 
 
 def faces(data: bytes) -> tuple[DetectedFace, ...]:
@@ -178,7 +182,7 @@ def _lens(of: Intrinsics, shown: ImageArray, stamp: int) -> dict[str, Any]:
         "width": shown.shape[1],
         "height": shown.shape[0],
         "distortion_model": "plumb_bob",
-        "D": [0.0] * 5,
+        "D": list(of.distortion),
         "K": [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
         "R": [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
         "P": [fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],

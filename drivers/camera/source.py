@@ -19,7 +19,7 @@ class Shot(NamedTuple):
     What follows is None where the source does not give it:
 
     depth_m: distances, aligned with the frame and of its size, NaN where unknown
-    lens: the lens of this frame, which is then without distortion
+    lens: the lens of this frame
     faces: those that the camera itself has found; no detector runs then
     turn: how the camera was turned, by its own gyro
     """

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import timedelta
 from math import inf
 from typing import Any
@@ -12,7 +13,12 @@ from numpy.typing import NDArray
 from gazerig.drivers.camera.clock_sync import ClockSync
 from gazerig.drivers.camera.frame_rate import FrameRateMonitor
 from gazerig.drivers.camera.oak.abilities import full_line_text, possible, usb2_text
-from gazerig.drivers.camera.oak.calibration import imu_to_camera, rotation_of
+from gazerig.drivers.camera.oak.calibration import (
+    OakCalibration,
+    imu_to_camera,
+    read_calibration,
+    rotation_of,
+)
 from gazerig.drivers.camera.oak.discovery import find_oak
 from gazerig.drivers.camera.oak.gyro import Gyro
 from gazerig.drivers.camera.oak.messages import depth_of, faces_of, image_of, lens_of
@@ -20,6 +26,7 @@ from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.oak.pipeline import COLOUR, MakeNodes, device_nodes, joined, readings
 from gazerig.drivers.camera.oak.sdk import load_depthai
 from gazerig.drivers.camera.oak.start_faults import start_cure
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
 from gazerig.drivers.types import CameraTurn, DetectedFace
@@ -60,6 +67,7 @@ class OakSource:
         self._in_step = True
         self._number = 0
         self._events: list[str] = []
+        self._calibration: OakCalibration | CameraError | None = None
         self._gyro_queue: Any = None
         self._face_fault: Callable[[], str] = str
         self._face_fault_told = False
@@ -77,6 +85,7 @@ class OakSource:
         self.close()
         self._dai = self._load()
         self._asked, self._slow_line, self._face_fault_told = self._params, None, False
+        self._calibration = None
         try:
             if self._on_device:
                 self._device = self._connect()
@@ -154,6 +163,18 @@ class OakSource:
                 )
         return None
 
+    def calibration(self) -> OakCalibration:
+        """Return what the open camera's memory says of its colour camera.
+
+        Raises:
+            CameraError: it is not open, or its memory does not hold it.
+        """
+        if isinstance(self._calibration, CameraError):
+            raise self._calibration
+        if self._calibration is None:
+            raise CameraError("the OAK camera is not open: its calibration cannot be read")
+        return self._calibration
+
     def events(self) -> tuple[str, ...]:
         """Return new events, one line each: USB 2 instead of 3, a clock that jumped."""
         reported, self._events = tuple(self._events), []
@@ -189,6 +210,11 @@ class OakSource:
         Raises:
             CameraError: it has no colour camera, or hangs on USB 2 where that is refused.
         """
+        stored = self._device.readCalibration()
+        try:
+            self._calibration = read_calibration(self._dai, stored, self._params)
+        except CameraError as error:
+            self._calibration = error
         self._asked, left_out = possible(self._dai, self._device, self._params)
         self._events.extend(left_out)
         speed = self._device.getUsbSpeed()
@@ -231,10 +257,17 @@ class OakSource:
             self._number,
             image,
             depth_of(group, width, height),
-            lens_of(group),
+            self._lens(group),
             self._faces(group, width, height),
             self._turn(group[COLOUR]),
         )
+
+    def _lens(self, group: Any) -> Intrinsics | None:
+        """Return the lens of a frame; one that the camera has not straightened bends lines."""
+        lens, stored = lens_of(group), self._calibration
+        if lens is None or self._asked.undistort or not isinstance(stored, OakCalibration):
+            return lens
+        return replace(lens, distortion=stored.own_distortion)
 
     def _faces(self, group: Any, width_px: int, height_px: int) -> tuple[DetectedFace, ...] | None:
         """Return the faces that the camera found; None where it did not look, or cannot."""

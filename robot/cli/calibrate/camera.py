@@ -14,7 +14,9 @@ from rich.console import Console
 from rich.table import Table
 
 from gazerig.config.schema import Rig, load_rig
-from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.camera.oak.calibration import OakCalibration
+from gazerig.drivers.camera.oak.source import OakSource
+from gazerig.drivers.camera.source import FrameSource, Shot
 from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.camera.webcam import Webcam
 from gazerig.drivers.errors import SetupError
@@ -30,6 +32,13 @@ from gazerig.robot.calibration.camera_procedure import (
 )
 from gazerig.robot.calibration.charuco_page import RULER_MM, write_page
 from gazerig.robot.calibration.hand_eye import HandEye, HandEyeParams, camera_on_head
+from gazerig.robot.cli.calibrate.oak import (
+    as_seen,
+    calibration_of_file,
+    lens_params,
+    oak_changes,
+    say_calibration,
+)
 from gazerig.robot.cli.neck_motion import go_on, moving_neck
 from gazerig.robot.cli.prompts import Lines, TerminalPerson
 from gazerig.robot.cli.rig_writer import refuse_unwritable, write_found
@@ -84,7 +93,14 @@ def calibrate_camera(
     what: Annotated[
         What, typer.Option(help="The lens, its mount on the head, or all of it.")
     ] = What.all,
-    camera: Annotated[int, typer.Option(min=0, help="Webcam N.")] = 0,
+    camera: Annotated[int | None, typer.Option(min=0, help="Webcam N (default: 0).")] = None,
+    oak: Annotated[
+        bool, typer.Option("--oak", help="An OAK camera: the lens is read from its memory.")
+    ] = False,
+    oak_calibration: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="A file of depthai's instead of the memory of a camera."),
+    ] = None,
     ruler: Annotated[
         float, typer.Option(metavar="MM", help="Length of the printed 100 mm ruler as measured.")
     ] = float(RULER_MM),
@@ -102,6 +118,7 @@ def calibrate_camera(
 ) -> None:
     """Measure the lens and where the camera sits, with the printed board."""
     with clear_errors(rig, port, mock), signals() as stopped:
+        _refuse_contradictions(what, camera, oak, oak_calibration, mock)
         loaded = load_rig(rig)
         board = CharucoBoard(_board(columns, rows, square, ruler))
         if loaded.camera.mount != "head" and what is not What.lens:
@@ -112,16 +129,18 @@ def calibrate_camera(
         if not dry_run:
             refuse_unwritable(rig, out)
         job = _Job(loaded, board, stopped, _kinematics(loaded))
-        with _eye(job, camera, mock, seed) as eye:
-            found, changes, good = loaded.camera, dict[str, Any](), HandEyeParams()
-            if what is not What.mount:
-                lens = _lens(job, eye)
-                changes |= lens_changes(lens)
-                found, good = replace(found, lens=lens.params()), sure_as(lens)
-            if what is not What.lens:
-                with moving_neck(loaded, eye.mock, port, stopped, yes) as neck:
-                    changes |= mount_changes(_mount(job, eye, neck, found, good), found)
-        Console().print(_table(rig, loaded.camera, changes))
+        if oak_calibration is not None:
+            changes = _oak_lens(job, calibration_of_file(oak_calibration, loaded.oak)).changes
+        else:
+            source = OakSource(loaded.oak) if oak else Webcam(camera or 0)
+            with _eye(job, None if mock else source, seed) as eye:
+                lens = _known_lens(job, eye, source, what)
+                changes = lens.changes
+                if what is not What.lens:
+                    with moving_neck(loaded, eye.mock, port, stopped, yes) as neck:
+                        found = _mount(job, eye, neck, lens.camera, lens.good)
+                        changes |= mount_changes(found, lens.camera)
+        Console().print(_table(rig, loaded, changes))
         if not dry_run:
             write_found(rig, changes, out, TerminalPerson(Lines(None), stopped, yes))
 
@@ -175,6 +194,17 @@ class _Job(NamedTuple):
     kinematics: Kinematics
 
 
+class _KnownLens(NamedTuple):
+    """What is known of the lens.
+
+    camera: with it; changes: for the rig's file; good: what may be assumed of it
+    """
+
+    camera: CameraParams
+    changes: dict[str, Any]
+    good: HandEyeParams
+
+
 class _Eye(NamedTuple):
     """Where frames come from, and the simulated camera behind it where there is one."""
 
@@ -193,27 +223,58 @@ class _NoFaces:
 
 
 @contextlib.contextmanager
-def _eye(job: _Job, number: int, mock: bool, seed: int) -> Iterator[_Eye]:
+def _eye(job: _Job, source: FrameSource | None, seed: int) -> Iterator[_Eye]:
     """Open the camera, or a simulated one."""
     clock = RealClock()
-    if mock:
+    if source is None:
         rng = np.random.default_rng(seed)
         simulated = BoardScene(job.rig.camera, job.board, job.kinematics, rng)
         yield _Eye(lambda: simulated.look(clock.now_s()), clock.now_s, lambda _: None, simulated)
         return
-    thread = CameraThread(Webcam(number), _NoFaces(), clock.now_s)
+    thread = CameraThread(source, _NoFaces(), clock.now_s)
 
     def look() -> Shot | None:
         found = thread.latest(clock.now_s())
         if found is None or found.image is None:
             return None
-        return Shot(found.captured_s, found.number, found.image)
+        return Shot(found.captured_s, found.number, found.image, lens=found.lens)
 
     thread.open()
     try:
         yield _Eye(look, clock.now_s, lambda s: clock.sleep_until(clock.now_s() + s), None)
     finally:
         thread.close()
+
+
+def _refuse_contradictions(
+    what: What, camera: int | None, oak: bool, oak_calibration: Path | None, mock: bool
+) -> None:
+    """Refuse options that cannot be together."""
+    if oak and camera is not None:
+        raise SetupError("--oak and --camera name two cameras: leave one away")
+    if mock and (oak or oak_calibration is not None):
+        raise SetupError("--mock simulates a camera without a memory: leave --oak away")
+    if oak_calibration is not None and what is not What.lens:
+        raise SetupError("--oak-calibration tells of the lens alone: add --what lens")
+
+
+def _known_lens(job: _Job, eye: _Eye, source: FrameSource, what: What) -> _KnownLens:
+    """Return the lens as the rig has it, as an OAK camera has it in memory, or measure it."""
+    if what is What.mount:
+        return _KnownLens(job.rig.camera, {}, HandEyeParams())
+    if isinstance(source, OakSource):
+        frame_lens = _first(job, eye).lens
+        return _oak_lens(job, as_seen(source.calibration(), frame_lens))
+    lens = _lens(job, eye)
+    camera = replace(job.rig.camera, lens=lens.params())
+    return _KnownLens(camera, lens_changes(lens), sure_as(lens))
+
+
+def _oak_lens(job: _Job, found: OakCalibration) -> _KnownLens:
+    """Return the lens of an OAK camera, and say what its memory holds."""
+    say_calibration(found, job.rig.oak)
+    camera = replace(job.rig.camera, lens=lens_params(found))
+    return _KnownLens(camera, oak_changes(found), HandEyeParams())
 
 
 def _lens(job: _Job, eye: _Eye) -> LensCalibration:
@@ -317,14 +378,14 @@ def _board(columns: int, rows: int, square_mm: float, ruler_mm: float) -> BoardP
         raise SetupError(f"this board cannot be: {error}") from error
 
 
-def _table(rig: str, camera: CameraParams, changes: dict[str, Any]) -> Table:
+def _table(rig: str, loaded: Rig, changes: dict[str, Any]) -> Table:
     """Show what was found beside what the rig file says."""
     table = Table(caption=f"what was found, against {rig}")
     for name in ("key", "old", "new"):
         table.add_column(name, justify="left" if name == "key" else "right", no_wrap=True)
     for key, new in changes.items():
-        old: Any = camera
-        for step in key.split(".")[1:]:
+        old: Any = loaded
+        for step in key.split("."):
             old = getattr(old, step, "-")
         table.add_row(key, _number(old), _number(new))
     return table

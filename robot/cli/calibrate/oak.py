@@ -1,0 +1,122 @@
+"""Calibrating by what an OAK camera's own memory says: gazerig calibrate camera --oak."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from gazerig.drivers.camera.oak.calibration import OakCalibration, read_calibration
+from gazerig.drivers.camera.oak.params import OakParams
+from gazerig.drivers.camera.oak.sdk import load_depthai
+from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.errors import CameraError
+from gazerig.robot.cli.terminal import say
+from gazerig.robot.model.frames import LensParams
+
+# A frame's own lens that differs by less is the calibration's, rounded.
+_SAME_SHARE = 2e-3
+
+
+def calibration_of_file(file: Path, params: OakParams) -> OakCalibration:
+    """Read a calibration that depthai's eepromToJsonFile has written.
+
+    Raises:
+        CameraError: there is no such file, or it is none.
+    """
+    dai = load_depthai()
+    if not file.is_file():
+        raise CameraError(f"no calibration at {file}: give a file that depthai has written")
+    try:
+        stored = dai.CalibrationHandler(str(file))
+    except (RuntimeError, ValueError) as error:
+        raise CameraError(
+            f"{file} is no calibration of an OAK camera ({' '.join(str(error).split())}): "
+            "give a file that depthai's eepromToJsonFile has written"
+        ) from error
+    return read_calibration(dai, stored, params)
+
+
+def as_seen(found: OakCalibration, frame_lens: Intrinsics | None) -> OakCalibration:
+    """Return the calibration with the lens that a frame itself carries; a difference is said."""
+    if frame_lens is None:
+        return found
+    a, b = found.lens, frame_lens
+    width, height = found.width_px, found.height_px
+    off = max(
+        abs(a.fx_px / b.fx_px - 1.0),
+        abs(a.fy_px / b.fy_px - 1.0),
+        abs(a.cx_px - b.cx_px) / width,
+        abs(a.cy_px - b.cy_px) / height,
+    )
+    if off > _SAME_SHARE:
+        say(
+            f"its frames come through another lens: {b.fx_px:.1f}, {b.fy_px:.1f} px, axis at "
+            f"{b.cx_px:.1f}, {b.cy_px:.1f}; that one is taken"
+        )
+    return found._replace(lens=replace(b, distortion=a.distortion))
+
+
+def say_calibration(found: OakCalibration, params: OakParams) -> None:
+    """Say what the memory holds, also what is not for the rig's file."""
+    i = found.lens
+    say(
+        f"{found.label}: focal length {i.fx_px:.1f}, {i.fy_px:.1f} px, axis at {i.cx_px:.1f}, "
+        f"{i.cy_px:.1f} px of {found.width_px} x {found.height_px}"
+    )
+    numbers = " ".join(f"{value:.4g}" for value in found.own_distortion)
+    straightened = "the camera straightens its frames, so zeros are written"
+    say(
+        f"its lens itself: k1 k2 p1 p2 k3 {numbers} (fitted, {found.fit_px:.2f} px are left); "
+        + (straightened if params.undistort else "frames come so, as oak.undistort: false asks")
+    )
+    if found.left_m is not None and found.right_m is not None:
+        left, right = (
+            " ".join(f"{1e3 * v:.1f}" for v in at) for at in (found.left_m, found.right_m)
+        )
+        apart = sum((a - b) ** 2 for a, b in zip(found.left_m, found.right_m, strict=True)) ** 0.5
+        say(
+            f"stereo cameras at {left} and {right} mm from it (right, down, ahead), "
+            f"{1e3 * apart:.1f} mm apart"
+        )
+    else:
+        say("no stereo cameras: it measures no distances")
+    if found.imu_rotation_deg is None:
+        say("it does not say how its gyro sits: the gyro cannot be used (oak.imu_rotation_deg)")
+    if found.focus is not None and params.focus != found.focus:
+        say(
+            f"all this holds with the lens at position {found.focus}: oak.focus: {found.focus} "
+            "holds it there, if the lens can move"
+        )
+
+
+def oak_changes(found: OakCalibration) -> dict[str, Any]:
+    """Return a calibration as dotted keys of a rig file and values."""
+    lens = lens_params(found)
+    changes: dict[str, Any] = {
+        "camera.horizontal_field_deg": round(found.horizontal_field_deg, 2),
+        "camera.lens.width_px": lens.width_px,
+        "camera.lens.height_px": lens.height_px,
+        "camera.lens.fx_px": lens.fx_px,
+        "camera.lens.fy_px": lens.fy_px,
+        "camera.lens.cx_px": lens.cx_px,
+        "camera.lens.cy_px": lens.cy_px,
+        "camera.lens.distortion": lens.distortion,
+    }
+    if found.imu_rotation_deg is not None:
+        x, y, z = (round(value, 3) + 0.0 for value in found.imu_rotation_deg)
+        changes["oak.imu_rotation_deg"] = (x, y, z)
+    return changes
+
+
+def lens_params(found: OakCalibration) -> LensParams:
+    """Return the lens as the rig's file holds it."""
+    i = found.lens
+    a, b, c, d, e = (round(value, 6) + 0.0 for value in i.distortion)
+    return LensParams(
+        found.width_px,
+        found.height_px,
+        round(i.fx_px, 2),
+        round(i.fy_px, 2),
+        round(i.cx_px, 2),
+        round(i.cy_px, 2),
+        (a, b, c, d, e),
+    )
