@@ -43,6 +43,7 @@ SHIPPED: Mapping[str, Mapping[str, str]] = {
         "oak": "gazerig.drivers.camera.camera_plugins:OAK",
     },
     DETECTOR: {
+        "auto": "gazerig.drivers.vision.face.detector:AUTO",
         "mtcnn": "gazerig.drivers.vision.face.detector:MTCNN",
         "yunet": "gazerig.drivers.vision.face.detector:YUNET",
     },

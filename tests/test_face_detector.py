@@ -13,7 +13,7 @@ from gazerig.drivers.camera.video_file import VideoFile
 from gazerig.drivers.errors import ModelFileError, SetupError
 from gazerig.drivers.types import DetectedFace, FaceDetector, ImageArray, Pixels
 from gazerig.drivers.vision.face.detector import face_detector
-from gazerig.drivers.vision.face.mtcnn import package_folder, read_model
+from gazerig.drivers.vision.face.mtcnn_networks import package_folder, read_model
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.face.preprocess import prepare
 
@@ -36,7 +36,7 @@ ASTRONAUT_EYES_PX = float(np.linalg.norm(ASTRONAUT_PX[1] - ASTRONAUT_PX[0]))
 
 @pytest.fixture(scope="module")
 def mtcnn() -> FaceDetector:
-    return face_detector(FaceDetectorParams())
+    return face_detector(FaceDetectorParams(kind="mtcnn"))
 
 
 @pytest.fixture(scope="module")
@@ -128,7 +128,7 @@ def test_box_holds_the_landmarks(mtcnn, astronaut):
 def test_landmarks_are_in_the_picture_given_whatever_size_is_searched(astronaut):
     picture, truth = scene(astronaut, (1280, 960), 160)
     for width_px in (160, 320, 640):
-        detector = face_detector(FaceDetectorParams(work_width_px=width_px))
+        detector = face_detector(FaceDetectorParams(kind="mtcnn", work_width_px=width_px))
         assert error_of_eyes(detector.find(picture)[0], truth) < 0.06
 
 
@@ -171,13 +171,16 @@ def test_no_face_is_seen_where_there_is_none(mtcnn):
 
 def test_smallest_face_and_confidence_are_limits(astronaut):
     picture, _ = scene(astronaut, (320, 240), 15)  # a face about 40 pixels high
-    assert face_detector(FaceDetectorParams(min_face_px=90)).find(picture) == ()
-    assert face_detector(FaceDetectorParams(min_confidence=1.0)).find(picture) == ()
+    assert face_detector(FaceDetectorParams(kind="mtcnn", min_face_px=90)).find(picture) == ()
+    assert face_detector(FaceDetectorParams(kind="mtcnn", min_confidence=1.0)).find(picture) == ()
 
 
 def test_same_picture_same_numbers_whatever_came_before(astronaut):
     picture, _ = scene(astronaut, (320, 240), 40)
-    used, fresh = face_detector(FaceDetectorParams()), face_detector(FaceDetectorParams())
+    used, fresh = (
+        face_detector(FaceDetectorParams(kind="mtcnn")),
+        face_detector(FaceDetectorParams(kind="mtcnn")),
+    )
     for other in (astronaut, cartoon((160, 120), 40), np.zeros((100, 50, 3), np.uint8)):
         used.find(other)
     first, second, third = used.find(picture)[0], used.find(picture)[0], fresh.find(picture)[0]
@@ -249,7 +252,7 @@ def test_altered_or_missing_model_file_names_the_cure(tmp_path):
 
 
 def test_unknown_detector_is_refused():
-    with pytest.raises(SetupError, match="'other': there is mtcnn, yunet"):
+    with pytest.raises(SetupError, match="'other': there is auto, mtcnn, yunet"):
         face_detector(FaceDetectorParams(kind="other"))
 
 

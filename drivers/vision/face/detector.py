@@ -25,10 +25,16 @@ from gazerig.drivers.vision.face.params import FaceDetectorParams
 
 
 def mtcnn(params: FaceDetectorParams) -> FaceDetector:
-    """Make the detector that needs no file; OpenCV is imported with it."""
+    """Make the detector that takes over from others; OpenCV is imported with it."""
     from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 
     return MtcnnDetector(params)
+
+
+def _auto(params: FaceDetectorParams) -> FaceDetector:
+    from gazerig.drivers.vision.face.auto import AutoDetector
+
+    return AutoDetector(params)
 
 
 def _yunet(params: FaceDetectorParams) -> FaceDetector:
@@ -37,6 +43,9 @@ def _yunet(params: FaceDetectorParams) -> FaceDetector:
     return YunetDetector(params, params.model_file)
 
 
+AUTO = DetectorPlugin(
+    _auto, FaceDetectorParams, ("landmarks",), Evidence(tested="photographs and films")
+)
 MTCNN = DetectorPlugin(
     mtcnn, FaceDetectorParams, ("landmarks",), Evidence(tested="photographs and films")
 )

@@ -11,10 +11,15 @@ class FaceDetectorParams:
     """Which network looks for faces, and how small, how sure and how thorough it is."""
 
     # fmt: off
-    kind: Annotated[str, Choices("mtcnn", "yunet"),
-        "detection network: mtcnn is installed with the program, yunet needs model_file"] = "mtcnn"
-    model_file: Annotated[str, "path of the YuNet .onnx file; empty for mtcnn"] = ""
+    kind: Annotated[str, Choices("auto", "mtcnn", "yunet"),
+        "auto searches some frames and places known faces in all; mtcnn and yunet (needs model_file) search each"] = "auto"
+    model_file: Annotated[str, "path of the YuNet .onnx file; empty: auto looks for one in ~/.local/share/gazerig"] = ""
     work_width_px: Annotated[int, Bounds(64, 4096), "wider frames are scaled down to this width before detection"] = 320
     min_face_px: Annotated[int, Bounds(12, 1000), "smallest face height that is detected, in pixels of the scaled-down frame"] = 24
     min_confidence: Annotated[float, Bounds(0.1, 1), "faces detected with a lower confidence are discarded"] = 0.7
+    keep_confidence: Annotated[float, Bounds(0.05, 1), "auto: a known face is dropped when its confidence falls below this"] = 0.5
+    search_every: Annotated[int, Bounds(1, 100),
+        "auto: frames from search to search of the whole frame; half of it while no face is known"] = 4
+    far_width_px: Annotated[int, Bounds(0, 4096),
+        "auto: width of the frame in which far faces of 12 pixels are searched, tile by tile; 0: none"] = 768
     # fmt: on

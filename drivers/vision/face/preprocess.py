@@ -28,7 +28,7 @@ def prepare(image: ImageArray, work_width_px: int) -> Prepared | None:
     Raises:
         ValueError: the array is not a image of 8-bit numbers.
     """
-    full = _as_bgr(image)
+    full = as_bgr(image)
     height, width = full.shape[:2]
     if height == 0 or width == 0:
         return None
@@ -45,8 +45,12 @@ def largest_first(faces: list[DetectedFace]) -> tuple[DetectedFace, ...]:
     return tuple(sorted(faces, key=lambda f: (-f.box_px[2] * f.box_px[3], f.box_px)))
 
 
-def _as_bgr(image: ImageArray) -> ImageArray:
-    """Bring any of the usual pixel layouts to contiguous BGR."""
+def as_bgr(image: ImageArray) -> ImageArray:
+    """Bring any of the usual pixel layouts to contiguous BGR.
+
+    Raises:
+        ValueError: the array is not an image of 8-bit numbers.
+    """
     shape = image.shape
     if image.dtype != np.uint8 or len(shape) not in (2, 3) or shape[2:] not in _LAYOUTS:
         raise ValueError(

@@ -1,0 +1,263 @@
+"""Faces found in some frames and placed in all of them.
+
+In every frame the last network of MTCNN judges each known face where it was before and places its
+landmarks; a face that is not there any more is searched around its place. New faces come from two
+searches: of the whole frame, every few frames, by YuNet where its file is there, else by MTCNN;
+and, in the frames between, of one tile of the frame after another, in which far faces are found.
+So all frames cost about the same.
+"""
+
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.drivers.errors import ModelFileError
+from gazerig.drivers.event_log import EventLog
+from gazerig.drivers.types import DetectedFace, ImageArray
+from gazerig.drivers.vision.face.crops import cut_square
+from gazerig.drivers.vision.face.mtcnn import face_of, proposed
+from gazerig.drivers.vision.face.mtcnn_networks import (
+    WINDOW_PX,
+    Floats,
+    MtcnnNetworks,
+    shares,
+    squared,
+)
+from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.drivers.vision.face.preprocess import as_bgr, largest_first, prepare
+from gazerig.drivers.vision.face.search_plan import Tile, far_tiles
+from gazerig.drivers.vision.face.yunet_network import YunetNetwork, face_of_row, found_file
+
+# Confidence that passes MTCNN's first network in a tile. At 0.8 twice as many pass, and no face
+# is found more.
+_PROPOSE_AT = 0.9
+# A far face must be surer than a near one: a few pixels look like a face now and then.
+_FAR_CONFIDENCE = 0.9
+# Part of the smaller of two boxes above which they are the same face.
+_SAME = 0.5
+# A lost face is searched in a square so many times its own, in which it is as large as the first
+# network sees it best.
+_AROUND, _AROUND_PX = 2.6, 40
+# YuNet judges a face that only it sees in a square so many times its own.
+_YUNET_AROUND, _YUNET_PX = 2.0, 96
+# Half the side of the square that the last network wants, in root mean square distances of the five
+# landmarks from their middle, and how far above that middle it lies.
+_SQUARE, _ABOVE = 2.1, 0.13
+# What so many rows and columns of a frame show has changed by more grey levels: another shot.
+_CUT_GREY, _SAMPLES = 30.0, 24
+
+
+class _Known(NamedTuple):
+    """A face of the frame before.
+
+    box: (4,) square in which it is looked for next, in pixel edges
+    by_yunet: whether YuNet alone sees it
+    """
+
+    box: Floats
+    face: DetectedFace
+    by_yunet: bool
+
+
+class AutoDetector:
+    """Finds faces with five landmarks; remembers those of the frame before."""
+
+    def __init__(self, params: FaceDetectorParams) -> None:
+        """Load the networks; a YuNet file that is none is reported, and MTCNN searches.
+
+        Raises:
+            ModelFileError: MTCNN's package or one of its files is missing or altered.
+        """
+        self._params = params
+        self._log = EventLog()
+        self._networks = MtcnnNetworks()
+        self._yunet = self._optional_yunet()
+        self._known: list[_Known] = []
+        self._size: tuple[int, ...] = ()
+        self._samples = np.zeros(0)
+        self._since_search, self._next_tile = 0, 0
+
+    def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
+        """Find faces, the largest first, in pixels of the image given."""
+        frame = as_bgr(image)
+        if frame.size == 0:
+            return ()
+        first = frame.shape != self._size
+        self._size = frame.shape
+        if first:
+            self._known = []
+        known = self._placed_again(frame)
+        soon = len(known) < len(self._known) or self._is_cut(frame)
+        if first or self._search_due(soon, not known):
+            self._since_search = 0
+            known += self._near(frame, known)
+        else:
+            known += self._far(frame, known, self._tile(frame))
+        if first:
+            for tile in self._tiles(frame):
+                known += self._far(frame, known, tile)
+        self._known = known
+        return largest_first([one.face for one in known])
+
+    def events(self) -> tuple[str, ...]:
+        """Return what happened since the last call, one line each."""
+        return self._log.drain()
+
+    def _optional_yunet(self) -> YunetNetwork | None:
+        """Return YuNet where the user has its file."""
+        file = self._params.model_file or found_file()
+        if not file:
+            return None
+        try:
+            return YunetNetwork(file, self._params.min_confidence)
+        except ModelFileError as error:
+            self._log.add(f"{error}; until then mtcnn finds the faces")
+            return None
+
+    def _search_due(self, soon: bool, nothing_known: bool) -> bool:
+        """Whether the whole frame is searched now rather than a tile."""
+        self._since_search += 1
+        every = self._params.search_every
+        if nothing_known or soon:
+            every = (every + 1) // 2
+        return self._since_search >= every
+
+    def _is_cut(self, frame: ImageArray) -> bool:
+        """Whether a frame shows something else than the one before."""
+        height, width = frame.shape[:2]
+        rows, columns = max(1, height // _SAMPLES), max(1, width // _SAMPLES)
+        samples = frame[::rows, ::columns, 1].astype(np.float64)
+        before, self._samples = self._samples, samples
+        return before.shape == samples.shape and float(np.abs(samples - before).mean()) > _CUT_GREY
+
+    def _placed_again(self, frame: ImageArray) -> list[_Known]:
+        """Return the known faces that are still there, placed in this frame."""
+        if not self._known:
+            return []
+        boxes = np.array([one.box for one in self._known])
+        judged = self._judged(frame, boxes, self._params.keep_confidence)
+        for row, (one, now) in enumerate(zip(self._known, judged, strict=True)):
+            if now is None:
+                judged[row] = (
+                    self._by_yunet(frame, one) if one.by_yunet else self._around(frame, one)
+                )
+        return _distinct([one for one in judged if one is not None], [])
+
+    def _judged(self, frame: ImageArray, boxes: Floats, least: float) -> list[_Known | None]:
+        """Return the face in each square box, None where the last network sees none."""
+        placed = self._networks.place(frame, boxes)
+        again = squared(placed.tight)
+        return [
+            _Known(again[row], face_of(placed, row), False) if score >= least else None
+            for row, score in enumerate(placed.scores)
+        ]
+
+    def _around(self, frame: ImageArray, one: _Known) -> _Known | None:
+        """Search a face that has gone from its place around it."""
+        part, where = cut_square(frame, _widened(one.box, _AROUND), _AROUND_PX)
+        boxes, _ = self._networks.propose(part, _PROPOSE_AT)
+        boxes = boxes * ((where[2] - where[0]) / _AROUND_PX) + np.tile(where[:2], 2)
+        boxes = self._networks.refine(frame, squared(boxes))
+        found = [face for face in self._judged(frame, boxes, self._params.min_confidence) if face]
+        return max(found, key=lambda face: face.face.confidence, default=None)
+
+    def _by_yunet(self, frame: ImageArray, one: _Known) -> _Known | None:
+        """Place a face that YuNet alone sees."""
+        if self._yunet is None:
+            return None
+        part, where = cut_square(frame, _widened(one.box, _YUNET_AROUND), _YUNET_PX)
+        rows = self._yunet.search(part)
+        if not len(rows):
+            return None
+        row = rows[np.argmax(rows[:, 14])]
+        row[:14] *= (where[2] - where[0]) / _YUNET_PX
+        row[:2] += where[:2]
+        row[4:14] += np.tile(where[:2], 5)
+        return _Known(_square_of(row[4:14].reshape(5, 2)), face_of_row(row), True)
+
+    def _near(self, frame: ImageArray, known: list[_Known]) -> list[_Known]:
+        """Search the whole frame: return the faces that are new."""
+        prepared = prepare(frame, self._params.work_width_px)
+        assert prepared is not None
+        if self._yunet is None:
+            boxes = proposed(self._networks, prepared, self._params.min_face_px)
+            boxes = self._networks.refine(frame, boxes[_is_new(boxes, known)])
+            return self._accepted(frame, known, boxes, self._params.min_confidence)
+        rows = self._yunet.search(prepared.small)
+        rows[:, :14] *= np.tile(prepared.stretch, 7)
+        points = rows[:, 4:14].reshape(-1, 5, 2)
+        boxes = np.array([_square_of(five) for five in points]).reshape(-1, 4)
+        fresh = np.flatnonzero(_is_new(boxes, known))
+        judged = self._judged(frame, boxes[fresh], self._params.min_confidence)
+        found = [
+            now if now is not None else _Known(boxes[row], face_of_row(rows[row]), True)
+            for row, now in zip(fresh, judged, strict=True)
+        ]
+        return _distinct(found, known)
+
+    def _tiles(self, frame: ImageArray) -> tuple[Tile, ...]:
+        height, width = frame.shape[:2]
+        near = min(1.0, self._params.work_width_px / width) * WINDOW_PX / self._params.min_face_px
+        return far_tiles(width, height, self._params.far_width_px, near)
+
+    def _tile(self, frame: ImageArray) -> Tile | None:
+        """Return the tile whose turn it is."""
+        tiles = self._tiles(frame)
+        if not tiles:
+            return None
+        self._next_tile = (self._next_tile + 1) % len(tiles)
+        return tiles[self._next_tile]
+
+    def _far(self, frame: ImageArray, known: list[_Known], tile: Tile | None) -> list[_Known]:
+        """Search a tile for small faces: return those that are new."""
+        if tile is None:
+            return []
+        part = frame[tile.top : tile.bottom, tile.left : tile.right]
+        size = tile.width_px, tile.height_px
+        way = cv2.INTER_AREA if part.shape[1] > tile.width_px else cv2.INTER_LINEAR
+        scaled = np.asarray(cv2.resize(part, size, interpolation=way), np.uint8)
+        boxes, _ = self._networks.propose(scaled, _PROPOSE_AT)
+        stretch = part.shape[1] / tile.width_px, part.shape[0] / tile.height_px
+        boxes = boxes * np.tile(stretch, 2) + (tile.left, tile.top, tile.left, tile.top)
+        boxes = squared(boxes)
+        boxes = self._networks.refine(frame, boxes[_is_new(boxes, known)])
+        least = max(_FAR_CONFIDENCE, self._params.min_confidence)
+        return self._accepted(frame, known, boxes, least)
+
+    def _accepted(
+        self, frame: ImageArray, known: list[_Known], boxes: Floats, least: float
+    ) -> list[_Known]:
+        """Return the faces in square boxes that the last network is sure of and that are new."""
+        found = [one for one in self._judged(frame, boxes, least) if one is not None]
+        return _distinct(found, known)
+
+
+def _widened(box: Floats, times: float) -> Floats:
+    """Return a square about the same middle, so many times as wide."""
+    middle, half = (box[:2] + box[2:]) / 2.0, times * (box[2] - box[0]) / 2.0
+    return np.concatenate([middle - half, middle + half])
+
+
+def _square_of(points: Floats) -> Floats:
+    """Return the square in which the last network sees a face with these landmarks best."""
+    middle = points.mean(axis=0)
+    spread = float(np.sqrt(((points - middle) ** 2).sum(axis=1).mean()))
+    middle = middle - (0.0, _ABOVE * spread)
+    return np.concatenate([middle - _SQUARE * spread, middle + _SQUARE * spread])
+
+
+def _is_new(boxes: Floats, known: list[_Known]) -> NDArray[np.bool_]:
+    """Return which boxes are not those of known faces."""
+    others = np.array([one.box for one in known]).reshape(-1, 4)
+    return np.asarray(~(shares(boxes, others) > _SAME).any(axis=1))
+
+
+def _distinct(found: list[_Known], known: list[_Known]) -> list[_Known]:
+    """Return which of the found faces are neither known nor another one that is surer."""
+    kept: list[_Known] = []
+    for one in sorted(found, key=lambda face: (face.by_yunet, -face.face.confidence)):
+        if _is_new(one.box[np.newaxis], [*known, *kept])[0]:
+            kept.append(one)
+    return kept

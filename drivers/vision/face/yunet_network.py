@@ -1,0 +1,119 @@
+"""YuNet: a network file that the user has, run by OpenCV's own decoder."""
+
+import os
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.drivers.camera.quiet_opencv import quiet_opencv
+from gazerig.drivers.errors import ModelFileError
+from gazerig.drivers.types import DetectedFace, ImageArray
+
+_CURE = (
+    "get face_detection_yunet_2023mar.onnx or a later one from the OpenCV zoo"
+    " and give its path as model_file"
+)
+# Boxes that share more than this part of their union are the same face, and the most
+# boxes looked at: the values OpenCV's zoo runs the network with.
+_SAME, _MOST = 0.3, 5000
+# No frame is searched that is narrower: OpenCV reads beyond the memory of strips a few pixels wide.
+_LEAST_PX = 24
+# What other files begin with, and outputs that only YuNet has.
+_KINDS = (
+    (b"\x89PNG", "a PNG image"),
+    (b"\xff\xd8\xff", "a JPEG image"),
+    (b"PK\x03\x04", "a zip archive (an NNArchive or a PyTorch file)"),
+    (b"\x1f\x8b", "a gzip archive"),
+    (b"version https://git-lfs", "a Git LFS pointer and not the file itself: run git lfs pull"),
+    (b"<", "a web page or XML"),
+)
+
+
+class YunetNetwork:
+    """Finds faces in an image of any size."""
+
+    def __init__(self, model_file: str, min_confidence: float) -> None:
+        """Load the network and try it on an empty image.
+
+        Raises:
+            ModelFileError: the file is missing or is not YuNet.
+        """
+        self._net = _load(model_file, min_confidence)
+
+    def search(self, scaled: ImageArray) -> NDArray[np.float64]:
+        """Return a row a face: OpenCV's fifteen numbers, in pixel edges of the image given.
+
+        Box, right eye, left eye, nose, right and left mouth corner, confidence.
+        """
+        height, width = scaled.shape[:2]
+        if min(height, width) < _LEAST_PX:
+            return np.zeros((0, 15))
+        self._net.setInputSize((width, height))
+        rows = self._net.detect(np.ascontiguousarray(scaled))[1]
+        if rows is None:  # OpenCV's word for no face
+            return np.zeros((0, 15))
+        found = np.asarray(rows, dtype=np.float64)
+        return found[np.isfinite(found).all(axis=1)]
+
+
+def found_file() -> str:
+    """Return the newest YuNet file in the user's folder of models, "" where there is none."""
+    home = os.environ.get("XDG_DATA_HOME") or "~/.local/share"
+    folder = Path(home).expanduser() / "gazerig"
+    return max((str(file) for file in folder.glob("face_detection_yunet_*.onnx")), default="")
+
+
+def face_of_row(row: NDArray[np.float64]) -> DetectedFace:
+    """Return a face of OpenCV's fifteen numbers in pixels of an image.
+
+    The network counts from the outer edge of the first pixel, DetectedFace from its centre.
+    """
+    left, top, width, height = row[:4].tolist()
+    landmarks = row[4:14].reshape(5, 2) - 0.5
+    landmarks.setflags(write=False)
+    return DetectedFace((left - 0.5, top - 0.5, width, height), landmarks, float(row[14]))
+
+
+def _load(model_file: str, min_confidence: float) -> cv2.FaceDetectorYN:
+    """Make the network out of the file's bytes."""
+    if not model_file:
+        raise ModelFileError(f"the yunet detector needs a model file: {_CURE}")
+    try:
+        content = Path(model_file).expanduser().read_bytes()
+    except OSError as error:
+        raise ModelFileError(
+            f"cannot read model file {model_file} ({error.strerror}): {_CURE}"
+        ) from error
+    weights, nothing = np.frombuffer(content, dtype=np.uint8), np.zeros(0, np.uint8)
+    try:
+        # Any network loads; only YuNet's outputs can be decoded, so it is tried at once.
+        with quiet_opencv():
+            net = cv2.FaceDetectorYN.create(
+                "onnx", weights, nothing, (64, 64), min_confidence, _SAME, _MOST
+            )
+            net.detect(np.zeros((64, 64, 3), np.uint8))
+    except cv2.error as error:
+        raise ModelFileError(
+            f"{model_file} is not a YuNet network but {_kind(content)}: {_CURE}"
+        ) from error
+    return net
+
+
+def _kind(content: bytes) -> str:
+    """Return what a file is that is not YuNet."""
+    if not content:
+        return "empty"
+    if content[4:8] == b"TFL3":
+        return "a TensorFlow Lite network"
+    for beginning, kind in _KINDS:
+        if content.startswith(beginning):
+            return kind
+    try:
+        with quiet_opencv():
+            net = cv2.dnn.readNetFromONNX(np.frombuffer(content, dtype=np.uint8))
+            outputs = ", ".join(net.getUnconnectedOutLayersNames())
+    except cv2.error:
+        return "no ONNX file"
+    return f"another ONNX network (outputs {outputs})"
