@@ -1,0 +1,156 @@
+"""Faces are found now and then and placed in every frame: far ones too, and none is invented."""
+
+import cv2
+import numpy as np
+import pytest
+from seeing.material import background, carphone, eyes_at, noisy, paste, portrait
+
+from gazerig.drivers.types import DetectedFace, ImageArray, Pixels
+from gazerig.drivers.vision.face.auto import AutoDetector
+from gazerig.drivers.vision.face.detector import face_detector
+from gazerig.drivers.vision.face.mtcnn_networks import package_folder
+from gazerig.drivers.vision.face.params import FaceDetectorParams
+
+WIDTH_PX, HEIGHT_PX, FIELD_DEG = 640, 400, 69.0
+
+
+def auto(**changed: object) -> AutoDetector:
+    return AutoDetector(FaceDetectorParams(**changed))  # type: ignore[arg-type]
+
+
+def room(
+    *people: tuple[str, float, float, float], seed: int = 0
+) -> tuple[ImageArray, list[Pixels]]:
+    """Put people (portrait, distance, x and y of the face) into a room: frame and landmarks."""
+    frame = background(WIDTH_PX, HEIGHT_PX).copy()
+    truth = [
+        paste(frame, portrait(who), (x, y), eyes_at(far_m, WIDTH_PX, FIELD_DEG))
+        for who, far_m, x, y in people
+    ]
+    return noisy(frame, 2.0, np.random.default_rng(seed)), truth
+
+
+def error(face: DetectedFace, truth: Pixels) -> float:
+    """Mean landmark error as a part of the distance between the eyes."""
+    eyes = np.linalg.norm(truth[1] - truth[0])
+    return float(np.linalg.norm(face.landmarks_px - truth, axis=1).mean() / eyes)
+
+
+def test_it_is_the_default() -> None:
+    assert isinstance(face_detector(FaceDetectorParams()), AutoDetector)
+
+
+@pytest.mark.parametrize("far_m", [1.0, 2.5, 4.0, 5.5])
+def test_a_face_is_found_in_the_first_frame_near_and_far(far_m: float) -> None:
+    frame, (truth,) = room(("astronaut", far_m, 420.0, 150.0))
+    (face,) = auto().find(frame)
+    assert error(face, truth) < (0.06 if far_m < 4.0 else 0.15)
+
+
+def test_a_face_that_moves_is_placed_in_every_frame() -> None:
+    detector, errors = auto(), []
+    for step in range(20):
+        frame, (truth,) = room(("astronaut", 1.5, 200.0 + 6.0 * step, 180.0), seed=step)
+        (face,) = detector.find(frame)
+        errors.append(error(face, truth))
+    assert np.mean(errors) < 0.05
+
+
+def test_a_face_that_jumps_is_found_around_its_place_at_once() -> None:
+    detector = auto(search_every=100)
+    for seed, x in enumerate((300.0, 300.0, 324.0, 300.0)):
+        frame, (truth,) = room(("astronaut", 1.5, x, 180.0), seed=seed)
+        (face,) = detector.find(frame)
+        assert error(face, truth) < 0.08
+
+
+def test_who_comes_later_is_found_near_at_the_next_search_and_far_when_their_tile_is_due() -> None:
+    detector = auto()
+    empty, _ = room()
+    detector.find(empty)
+    near, _ = room(("astronaut", 1.2, 300.0, 180.0))
+    assert any(detector.find(near) for _ in range(2))
+    far, (_, truth) = room(("astronaut", 1.2, 300.0, 180.0), ("hopper", 5.0, 560.0, 120.0))
+    found = next(i for i in range(120) if len(detector.find(far)) == 2)
+    assert found > 0
+    assert error(detector.find(far)[1], truth) < 0.2
+
+
+def test_who_has_left_is_gone_with_the_frame() -> None:
+    detector = auto()
+    frame, _ = room(("astronaut", 1.2, 300.0, 180.0))
+    assert len(detector.find(frame)) == 1
+    assert detector.find(room()[0]) == ()
+
+
+def test_no_face_is_invented_in_an_empty_room() -> None:
+    detector = auto()
+    assert not any(detector.find(room(seed=seed % 7)[0]) for seed in range(60))
+
+
+def test_another_size_begins_anew() -> None:
+    detector = auto()
+    frame, _ = room(("astronaut", 1.2, 300.0, 180.0))
+    assert len(detector.find(frame)) == 1
+    half = cv2.resize(frame, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
+    (face,) = detector.find(half.astype(np.uint8))
+    assert abs(face.landmarks_px[:, 0].mean() - 150.0) < 3.0
+
+
+def test_same_frames_same_numbers() -> None:
+    frames = [room(("astronaut", 2.0, 300.0 + 4 * i, 180.0), seed=i)[0] for i in range(6)]
+    runs = [[detector.find(f) for f in frames] for detector in (auto(), auto())]
+    for one, other in zip(*runs, strict=True):
+        assert [f.landmarks_px.tobytes() for f in one] == [f.landmarks_px.tobytes() for f in other]
+
+
+@pytest.mark.parametrize(
+    ("content", "kind"),
+    [
+        (b"\x89PNG\r\n", "a PNG image"),
+        (b"PK\x03\x04..", "a zip archive"),
+        (b"abcdTFL3", "a TensorFlow Lite network"),
+        (b"", "empty"),
+        (b"some text", "no ONNX file"),
+        (None, "another ONNX network (outputs "),
+    ],
+)
+def test_a_model_file_of_another_kind_is_told_once_and_mtcnn_searches(
+    tmp_path, content: bytes | None, kind: str
+) -> None:
+    file = tmp_path / "model.onnx"
+    file.write_bytes((package_folder() / "onet.onnx").read_bytes() if content is None else content)
+    detector = auto(model_file=str(file))
+    frame, _ = room(("astronaut", 1.2, 300.0, 180.0))
+    assert len(detector.find(frame)) == 1
+    (line,) = detector.events()
+    assert f"{file} is not a YuNet network but {kind}" in line
+    assert "OpenCV zoo" in line and "mtcnn finds the faces" in line
+    detector.find(frame)
+    assert detector.events() == ()
+
+
+def test_a_missing_model_file_is_told_once_and_mtcnn_searches() -> None:
+    detector = auto(model_file="/no/such.onnx")
+    assert len(detector.find(room(("astronaut", 1.2, 300.0, 180.0))[0])) == 1
+    (line,) = detector.events()
+    assert line.startswith("cannot read model file /no/such.onnx")
+
+
+def test_a_model_in_the_users_folder_is_looked_at(tmp_path, monkeypatch) -> None:
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    assert auto().events() == ()
+    (tmp_path / "gazerig").mkdir()
+    (tmp_path / "gazerig" / "face_detection_yunet_2023mar.onnx").write_bytes(b"nothing")
+    (line,) = auto().events()
+    assert "face_detection_yunet_2023mar.onnx is not a YuNet network" in line
+
+
+def test_a_man_who_talks_in_a_shaking_car_is_found_in_every_frame_of_the_film() -> None:
+    film = cv2.VideoCapture(str(carphone()))
+    detector, found = auto(), []
+    for _ in range(120):
+        read, frame = film.read()
+        assert read
+        found.append(len(detector.find(np.asarray(frame, np.uint8))))
+    assert found.count(1) >= 119
