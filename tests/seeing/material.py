@@ -119,8 +119,8 @@ def paste(
     axes = round(1.55 * who.eyes_px), round(2.1 * who.eyes_px)
     at = round(float(middle[0])), round(float(middle[1] - 0.35 * who.eyes_px))
     cv2.ellipse(head, at, axes, 0.0, 0.0, 360.0, 1.0, -1)
-    head = cv2.GaussianBlur(head, (0, 0), 0.15 * who.eyes_px)
-    mask = cv2.warpAffine(head, M, size)[..., np.newaxis]
+    shape = cv2.GaussianBlur(head, (0, 0), 0.15 * who.eyes_px)
+    mask = cv2.warpAffine(shape, M, size)[..., np.newaxis]
     image[:] = np.rint(image * (1.0 - mask) + cv2.warpAffine(soft, M, size) * mask)
     return np.asarray(who.landmarks_px @ M[:, :2].T + M[:, 2])
 
