@@ -21,6 +21,8 @@ _TURNS, _TURNS_WITHIN_S = 2, 1.2
 _WAVED_S = 1.5
 """Time for which a person counts as waving after the hand has turned the last time."""
 _ARM_M = 0.9
+_OWN = "own"
+"""The robot's own body waves to nobody."""
 _TOGETHER_S = 0.5
 """Who comes within this time of another has come together with them."""
 _CLEARLY_NEARER = 1.1
@@ -72,7 +74,7 @@ class Persons:
         self._looking = frozenset(face.id for face in percept.faces if face.looks_at_head)
         self._update_nearest(faces, p_world_eye_m)
         for row, id in enumerate(bodies.ids):
-            if faces and id not in faces:
+            if faces and id not in faces and bodies.kinds[row] != _OWN:
                 x, y, z = rows[row]
                 vx, vy, _ = bodies.v_world_m_s[row].tolist()
                 self._update_hand(id, (x, y, z), (vx, vy), faces, p_world_eye_m)

@@ -255,6 +255,7 @@ def _components(
             placed.lens,
             depth_at,
             report,
+            kinematics.own_parts,
         ),
         tracker=tracker,
         attention=Attention(rig.gaze.attention, *decides, random.reaction),

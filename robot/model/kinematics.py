@@ -16,6 +16,7 @@ from typing import Annotated, Any
 from gazerig.gaze.angles import add, compose, rotate, rotate_back, rotation, sub
 from gazerig.gaze.types import Angles2, Angles3, GazeCommand, GazeState, Mat3, Vec3
 from gazerig.params import Bounds
+from gazerig.robot.model.capsule import Capsule
 from gazerig.robot.model.types import GAZE_JOINTS, JointAngles, JointState, in_order
 
 
@@ -107,6 +108,16 @@ class Kinematics:
     def _carried(self, R_world_base: Mat3, p_m: Vec3) -> Vec3:
         """Return where a lower neck carries a point, which is given for it upright."""
         return add(self._base, rotate(R_world_base, sub(p_m, self._base)))
+
+    def own_parts(self, R_world_head: Mat3, p_world_head_m: Vec3) -> tuple[Capsule, Capsule]:
+        """Return what head and neck fill in the world, as far as the measures tell.
+
+        The head: from the neck's pitch axis to between the eyes, as thick as the eyes are apart;
+        the neck: from its base to that axis, half as thick.
+        """
+        pivot = add(p_world_head_m, rotate(R_world_head, (-self._ahead_m, 0.0, -self._above_m)))
+        head = Capsule(pivot, p_world_head_m, 2.0 * self._half)
+        return head, Capsule(self._base, pivot, self._half)
 
     def facing(self, p_world_m: Vec3, base_rad: Angles2 = _UPRIGHT) -> Angles2:
         """Return the neck yaw and pitch that lead the head's x axis through a point.

@@ -12,12 +12,9 @@ from math import hypot
 
 from gazerig.gaze.angles import add, dot, norm, scale, sub, unit
 from gazerig.gaze.types import Vec3
-from gazerig.robot.perception.tracker import LocalisedDetection
+from gazerig.robot.perception.tracker import UNNAMED, LocalisedDetection
 
 HAND = "hand"
-UNNAMED = "thing"
-"""What a moving patch is called whose kind is not known; a named one is always itself."""
-
 Known = tuple[Vec3, Vec3 | None]
 """Place of a face in the world, and its velocity where it is known."""
 

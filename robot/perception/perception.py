@@ -28,6 +28,7 @@ from gazerig.robot.perception.gyro_fusion import GyroFusion
 from gazerig.robot.perception.hand_ownership import known_faces, without_own_motion
 from gazerig.robot.perception.hands import Hands, Known
 from gazerig.robot.perception.localisation import placed
+from gazerig.robot.perception.own_body import OwnParts, own_named
 from gazerig.robot.perception.tracker import Track, Tracker
 
 # The head's turn at a capture is taken over so long before and after it.
@@ -49,6 +50,7 @@ class Perception:
         lens: as calibrated, used for frames of the aspect ratio at which it was calibrated.
         depth_at: reads depth images; without it, distances come from the size of faces.
         report: called with each event as one line.
+        own_parts: where the robot's own head and neck are; None: they are things as others.
     """
 
     def __init__(
@@ -60,8 +62,10 @@ class Perception:
         lens: LensParams | None = None,
         depth_at: DepthAt | None = None,
         report: Callable[[str], None] = lambda line: None,
+        own_parts: OwnParts | None = None,
     ) -> None:
         self._mount = mount
+        self._own_parts = own_parts
         self._depth_at = depth_at
         self.retune(horizontal_field_deg, parts_face_m, lens)
         self._tracker = tracker
@@ -106,6 +110,8 @@ class Perception:
         faces = [placed(face, R, p) for face in located.faces]
         things = [placed(thing, R, p) for thing in located.things]
         if things:
+            if self._own_parts is not None:
+                things = own_named(things, self._own_parts(R_head, self._p_head), p)
             known = self._known(t_s)
             things = self._hands.named(things, known_faces(faces, known), p, t_s)
             faces, things = without_own_motion(faces, things, known, p)

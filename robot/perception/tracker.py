@@ -20,6 +20,9 @@ from gazerig.robot.perception.data_association import (
 )
 from gazerig.robot.perception.kalman import ProcessNoise, TrackFilter, sight
 
+UNNAMED = "thing"
+"""What a moving patch is called whose kind is not known; a named one is always itself."""
+
 
 @dataclass(slots=True)
 class LocalisedDetection:
@@ -146,7 +149,14 @@ class Tracker:
         for j, detection in enumerate(detections):
             if j not in taken:
                 self._tracks.append(self._begin(detection, p_world_camera_m, t_s))
-        self._tracks = [t for t in self._tracks if t_s - t.seen_s <= self._kept_s(t)]
+        renamed = {
+            found.mark for found in detections if found.mark is not None and found.kind != UNNAMED
+        }
+        self._tracks = [
+            t
+            for t in self._tracks
+            if t_s - t.seen_s <= self._kept_s(t) and not _became_another(t, renamed)
+        ]
         coast_s = self._params.coast_ms / 1e3
         return tuple([t for t in self._tracks if t_s - t.seen_s <= coast_s])
 
@@ -239,6 +249,11 @@ class Tracker:
         gain = 1.0 if track.depth_s is None else gain
         track.face_size += gain * (1.0 / detection.size_depth - track.face_size)
         track.depth_s = track.at_s
+
+
+def _became_another(track: Track, renamed: set[int]) -> bool:
+    """Return whether the detector's number of a thing is now that of something known."""
+    return track.detection.kind == UNNAMED and track.detection.mark in renamed
 
 
 def _correct_velocity(track: Track, found: LocalisedDetection) -> None:
