@@ -45,7 +45,7 @@ def test_frames_of_4_to_3_show_more_of_the_sensor_above_and_below():
     assert (lens.cx_px, lens.cy_px) == pytest.approx((1915.0 / 6.0, 1072.0 / 6.0 + 60.0), abs=0.51)
 
 
-def test_straightened_frames_have_no_distortion_others_that_of_the_lens():
+def test_e98_straightened_frames_have_no_distortion_others_that_of_the_lens():
     straight, bent = found(), found(OakParams(undistort=False))
     assert not straight.lens.distorts and bent.lens.distorts
     assert straight.own_distortion == bent.lens.distortion

@@ -133,7 +133,7 @@ def test_readings_that_come_twice_or_late_count_once():
 
 
 @pytest.mark.parametrize("value", [0.0, 0.02])
-def test_stuck_gyro_is_told_once(value):
+def test_e95_stuck_gyro_is_told_once(value):
     gyro = fed(at_rest(np.random.default_rng(5), 2.0))
     fed([(2.0 + k / 200.0, (value, 0.0, 0.0)) for k in range(400)], gyro)
     (told,) = gyro.events()

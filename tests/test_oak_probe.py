@@ -111,7 +111,7 @@ def test_frames_that_a_late_reader_left_lying_do_not_fill_the_line():
     assert source.events() == ()
 
 
-def test_camera_without_stereo_goes_on_without_depth():
+def test_e97_camera_without_stereo_goes_on_without_depth():
     rig = Rig()
     rig.device.sockets = rig.device.sockets[:1]
     source = rig.source()

@@ -200,7 +200,7 @@ def shots(film, outputs, count):
 
 
 @pytest.mark.parametrize("made", [later, earlier])
-def test_faces_of_the_network_are_in_pixels_of_the_frame(film, made):
+def test_e96_faces_of_the_network_are_in_pixels_of_the_frame(film, made):
     load_depthai()
     found, told = shots(film, made(), 3)
     assert told == ()

@@ -44,6 +44,10 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("calibrate joints my.yaml", "find zeros and ends of all joints"),
         ("calibrate board board.pdf", "print the board for the next one"),
         ("calibrate camera my.yaml", "the lens, and where the camera sits"),
+        (
+            "calibrate camera my.yaml --oak --what lens",
+            "the lens as an OAK camera has it in memory",
+        ),
         ("calibrate face my.yaml --oak", "steer the gaze onto your own eyes and mouth"),
     ),
     "record-gesture": (

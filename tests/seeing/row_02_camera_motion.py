@@ -6,7 +6,7 @@ what moves, the share on which a thing is reported (recall); processor milliseco
 """
 
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import cv2
@@ -35,7 +35,7 @@ from seeing.moving_room import (
 
 from gazerig.drivers.camera.pose_buffer import PoseBuffer
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.types import MovingBlob
+from gazerig.drivers.types import CameraTurn, MovingBlob
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.robot.perception.motion_source import MotionSource
 
@@ -98,15 +98,21 @@ def resting_head() -> PoseBuffer:
 
 
 def judged(
-    seen: Iterable[Seen], turns: PoseBuffer | None = None, field: float = FIELD_RAD
+    seen: Iterable[Seen],
+    turns: PoseBuffer | None = None,
+    field: float = FIELD_RAD,
+    turn_of: Callable[[float], CameraTurn | None] = lambda _: None,
 ) -> Score:
-    """Let the detector look, as the program uses it, and compare with the truth."""
+    """Let the detector look, as the program uses it, and compare with the truth.
+
+    turn_of: returns what the camera's own gyro says of a time
+    """
     source = MotionSource(MotionParams(), None, field, turns)
     pictures = false = right = moving = noticed = 0
     costs = []
     for k, one in enumerate(seen):
         began_s = time.thread_time()
-        blobs = source(Shot(one.t_s, k + 1, one.image))
+        blobs = source(Shot(one.t_s, k + 1, one.image, turn=turn_of(one.t_s)))
         costs.append(time.thread_time() - began_s)
         if k < _LEARN:
             continue
