@@ -73,3 +73,11 @@ def test_the_very_pairs_of_scipy_where_no_two_ways_cost_the_same() -> None:
 def test_a_cost_that_is_no_number_is_a_pair_that_cannot_be() -> None:
     assert assign(np.array([[np.nan, 1.0], [2.0, np.inf]]).tolist()) == [(0, 1), (1, 0)]
     assert assign(np.array([[np.nan]]).tolist()) == []
+
+
+def test_a_pair_too_many_is_not_made_at_the_cost_of_others() -> None:
+    """Somebody new beside one who is seen where expected, and another who is hidden."""
+    costs = [[0.0, 28.0], [28.0, FORBIDDEN]]
+    assert assign(costs) == [(0, 1), (1, 0)]
+    assert assign(costs, unpaired=30.0) == [(0, 0)]
+    assert assign([[28.0]], unpaired=30.0) == [(0, 0)]

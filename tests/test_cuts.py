@@ -1,4 +1,4 @@
-"""A cut of a film ends identities; a pan, a switch, a hand before the lens and a saccade do not."""
+"""Identities end at a cut of a film; pans, switched light, saccades and crossings end none."""
 
 import pickle
 from math import radians

@@ -110,7 +110,7 @@ class Textbook:
         F = np.block([[np.eye(3), dt_s * np.eye(3)], [np.zeros((3, 3)), kept * np.eye(3)]])
         self.v = kept * self.v
         self.accel *= np.exp(-dt_s / 0.5)
-        self.P = F @ self.P @ F.T + wander(max(quiet, self.accel), dt_s)
+        self.P = F @ self.P @ F.T + wander(max(quiet, self.accel, 0.0 if seen else 1.0), dt_s)
         self.unseen_s += dt_s
 
     def updated(self, H: np.ndarray, off: np.ndarray, R: np.ndarray) -> None:

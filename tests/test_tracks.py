@@ -135,6 +135,21 @@ def test_people_who_cross_keep_their_identities(apart_m: float) -> None:
     assert {"left": min(tracks, key=_y).id, "right": max(tracks, key=_y).id} == first
 
 
+def test_who_is_hidden_is_not_whoever_appears_nearby() -> None:
+    """A man walks behind a woman; a third person turns up half a metre beside them."""
+    tracker = Tracker(TrackParams())
+    near, far = across(0.0, 1.0), across(0.02, 2.0)
+    for k in range(30):
+        tracks = tracker.step([near, far], CAMERA, k / 30)
+    after = tracker.step([near, across(0.5, 2.0)], CAMERA, 1.0)
+    assert max(after, key=_y).id not in {track.id for track in tracks}
+    # Nobody before him, and the same jump is his own.
+    tracker = Tracker(TrackParams())
+    for k in range(30):
+        (alone,) = tracker.step([far], CAMERA, k / 30)
+    assert tracker.step([across(0.5, 2.0)], CAMERA, 1.0)[0].id == alone.id
+
+
 def _y(track: Track) -> float:
     return track.p_world_m[1]
 

@@ -11,6 +11,7 @@ from math import inf
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
 from gazerig.robot.model.track_params import TrackParams
@@ -19,6 +20,19 @@ FORBIDDEN: Final = 1e6
 """Cost of a pair that cannot be; larger than that of all pairs that can."""
 NO_MARK = -1
 """Stands for the number of a detection to which its detector gives none."""
+UNPAIRED: Final = 30.0
+"""Cost of a track that is not seen and a detection of somebody new; no possible pair costs more.
+Were every pair preferred, somebody new would push others on, each to the place of the next."""
+# Above this, costs approach that limit more and more slowly.
+_NEARLY_UNPAIRED = 25.0
+_SLOWLY = _NEARLY_UNPAIRED * (UNPAIRED - _NEARLY_UNPAIRED)
+# What people do that no filter expects, a lunge or a jump of the detector, happens in one frame of
+# twenty; as a cost: minus twice the logarithm.
+_SURPRISE = 6.0
+# Of two about as far away each may hide the other.
+_NEARER = 1.1
+# Nothing is measured better than this.
+_LEAST_SD_M = 1e-4
 # Two numbers of the detector for one thing, as a cost: 4 standard deviations.
 _OTHER_MARK = 16.0
 # Within so many radii of its middle is about where something is.
@@ -34,6 +48,7 @@ class TrackRow(NamedTuple):
     radius_m: half its size
     size: by which distances from the size of a face are multiplied
     moved_m: how much farther off it may be for each time it was not seen
+    in_sight: whether it was seen a short while ago
     """
 
     kind: int
@@ -47,6 +62,7 @@ class TrackRow(NamedTuple):
     radius_m: float
     size: float
     moved_m: float
+    in_sight: bool
 
 
 class DetectionRow(NamedTuple):
@@ -89,33 +105,61 @@ def pair_costs(
     outline_m = _OUTLINE * np.maximum(t[8], d[8])
     other = (t[1] != d[1]) & (t[1] != NO_MARK) & (d[1] != NO_MARK)
     wide_m = np.where(other, np.minimum(widest_m, outline_m), widest_m)
-    # What people do that no filter expects: a lunge, a jump of the detector.
-    surprise = (wide_m / par.gate_sigma) ** 2
     ratio = (t[5] / far_m) ** 2
-    across, along = ratio * (d[6] * d[6] + surprise), ratio * (d[7] * d[7] + surprise)
-    across_sum, along_sum = t[6] + across, t[7] + along
     aside = t[5] * t[5] * ((t[2] - d[2]) ** 2 + (t[3] - d[3]) ** 2 + (t[4] - d[4]) ** 2)
     deep_m = 2.0 * t[5] * (far_m - t[5]) / (far_m + t[5])  # the logarithm of their ratio, nearly
-    far = aside / across_sum + deep_m * deep_m / along_sum
-    known: Floats = np.log(across_sum * across_sum * along_sum / (across * across * along))
-    costs = far + known + _OTHER_MARK * other
+    deep = deep_m * deep_m
+    across_sd, along_sd = np.maximum(d[6], _LEAST_SD_M), np.maximum(d[7], _LEAST_SD_M)
+    across, along = ratio * across_sd * across_sd, ratio * along_sd * along_sd
+    across_sum, along_sum = t[6] + across, t[7] + along
+    exact = across * across * along
+    far = aside / across_sum + deep / along_sum
+    expected: Floats = far + np.log(across_sum * across_sum * along_sum / exact)
+    surprise = ratio * (wide_m / par.gate_sigma) ** 2
+    across_sum, along_sum = across_sum + surprise, along_sum + surprise
+    far = aside / across_sum + deep / along_sum
+    surprising = far + np.log(across_sum * across_sum * along_sum / exact) + _SURPRISE
+    hidden = _hidden(t[:, :, 0])[:, None]
+    costs = np.where(hidden, expected, np.minimum(expected, surprising)) + _OTHER_MARK * other
+    unlikely = hidden & (costs > UNPAIRED)
+    costs = np.minimum(costs, UNPAIRED - _SLOWLY / np.maximum(costs, _NEARLY_UNPAIRED))
     reach = wide_m + t[10]
-    costs[(t[0] != d[0]) | (aside > reach * reach) | (far > par.gate_sigma**2)] = FORBIDDEN
+    costs[unlikely | (t[0] != d[0]) | (aside > reach * reach) | (far > par.gate_sigma**2)] = (
+        FORBIDDEN
+    )
     rows: list[list[float]] = costs.tolist()
     return rows
 
 
-def assign(costs: Sequence[Sequence[float]]) -> list[tuple[int, int]]:
-    """Return the pairs (row, column) that cost least together; as many pairs as can be.
+def _hidden(t: Floats) -> NDArray[np.bool_]:
+    """Return which tracks are expected behind or just beside a nearer one.
+
+    Who is about to be hidden is not seen somewhere else all of a sudden: that is another person.
+
+    Args:
+        t: columns of the rows of tracks.
+    """
+    apart = (t[2][:, None] - t[2]) ** 2 + (t[3][:, None] - t[3]) ** 2 + (t[4][:, None] - t[4]) ** 2
+    covered = (t[8] + t[8][:, None]) / t[5]
+    before = (t[11] > 0.0) & (t[5] < _NEARER * t[5][:, None]) & (apart < covered * covered)
+    np.fill_diagonal(before, False)
+    hidden: NDArray[np.bool_] = before.any(axis=1)
+    return hidden
+
+
+def assign(costs: Sequence[Sequence[float]], unpaired: float = FORBIDDEN) -> list[tuple[int, int]]:
+    """Return the pairs (row, column) that cost least together.
 
     SciPy has this too, but loading it takes half a second of processor at every start.
 
     Args:
         costs: n rows of m, FORBIDDEN or not a number where a pair cannot be.
+        unpaired: what a row and a column cost that stay alone together; by default so much that
+            there are as many pairs as can be.
     """
     if not len(costs) or not len(costs[0]):
         return []
-    finite = [[c if c < FORBIDDEN else FORBIDDEN for c in row] for row in costs]
+    finite = [[c if c < FORBIDDEN else unpaired for c in row] for row in costs]
     if len(finite) == len(finite[0]) == 1:  # one person, most of the time
         pairs = [(0, 0)]
     elif len(finite) <= len(finite[0]):

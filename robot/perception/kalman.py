@@ -34,6 +34,8 @@ _EXPECTED = 4.0
 _CHANGES_FOR_S = 0.5
 # What is not seen moves on, but less and less surely: people stop.
 _STOPS_WITHIN_S = 1.0
+# And they turn and hurry, which is not seen either: noise of the acceleration.
+_UNSEEN_M_S2 = 1.0
 NEAREST_M = 0.05
 """Nothing is believed nearer to the camera."""
 # Range changes in one step by no larger factor than e to this.
@@ -132,7 +134,7 @@ class TrackFilter:
         self.v_m_s = scale(self.v_m_s, kept)
         self._unseen_s += dt_s
         self._accel_m_s2 *= exp(-dt_s / _CHANGES_FOR_S)
-        accel = max(self._noise.quiet_m_s2, self._accel_m_s2)
+        accel = max(self._noise.quiet_m_s2, self._accel_m_s2, 0.0 if seen else _UNSEEN_M_S2)
         self.across = _wandered(_gone_on(self.across, dt_s, kept), accel, dt_s)
         self.along = _wandered(_gone_on(self.along, dt_s, kept), accel, dt_s)
 

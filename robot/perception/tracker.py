@@ -13,6 +13,7 @@ from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.data_association import (
     NO_MARK,
+    UNPAIRED,
     DetectionRow,
     TrackRow,
     assign,
@@ -142,7 +143,7 @@ class Tracker:
                 )
             track.filter.look_from(p_world_camera_m)
             track.at_s = t_s
-        pairs = assign(self._costs(detections, p_world_camera_m))
+        pairs = assign(self._costs(detections, p_world_camera_m), UNPAIRED)
         for i, j in pairs:
             self._update(self._tracks[i], detections[j], p_world_camera_m)
         taken = {j for _, j in pairs}
@@ -185,6 +186,7 @@ class Tracker:
             )
             for found in detections
         ]
+        coast_s = self._params.coast_ms / 1e3
         tracks = [
             TrackRow(
                 kinds.get(track.detection.kind, -1),
@@ -196,6 +198,7 @@ class Tracker:
                 track.detection.radius_m,
                 1.0 if track.depth_s is None else track.face_size,
                 self._moved_m(track),
+                track.at_s - track.seen_s <= coast_s,
             )
             for track in self._tracks
         ]

@@ -29,8 +29,8 @@ FIELD_DEG = 69.0
 LENS = intrinsics_of_view(radians(FIELD_DEG), *SIZE)
 RATE_HZ = 30.0
 Image = NDArray[np.uint8]
-Way = Callable[[float], tuple[float, float]]
-"""Where a person is at a time: to the right of the camera's axis, and before it, m."""
+Way = Callable[[float], tuple[float, float, float]]
+"""Where a face is at a time: to the right of the camera's axis, below it and before it, m."""
 
 _FRONTAL = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
 _HIDDEN_M = 0.16  # a face nearer than this to the view of a nearer one is not found
@@ -42,7 +42,7 @@ WANTED = {
     "two cross at one distance: IDF1": (0.95, 1.0),
     "two meet and turn back: IDF1": (0.95, 1.0),
     "three cross: IDF1": (0.95, 1.0),
-    "six walk about: IDF1": (0.95, 1.0),
+    "six cross: IDF1": (0.95, 1.0),
     "identities that go on after a cut, %": (0.0, 0.0),
     "cuts found, %": (100.0, 100.0),
     "cuts where there is none, of 1000 pictures": (0.0, 0.0),
@@ -51,16 +51,28 @@ WANTED = {
 
 def walk(start_m: float, speed_m_s: float, away_m: float, turns_s: float = 1e9) -> Way:
     """Return a straight way, or one that is gone back from a time on."""
-    return lambda t: (start_m + speed_m_s * (t if t < turns_s else 2.0 * turns_s - t), away_m)
+    return lambda t: (start_m + speed_m_s * (t if t < turns_s else 2.0 * turns_s - t), 0.0, away_m)
 
 
 def stroll(rng: np.random.Generator, away_m: float) -> Way:
-    """Return a way to and fro that never repeats."""
+    """Return a slow way to and fro that never repeats, of somebody of any height."""
     pace, phase = rng.uniform(0.25, 0.6, 2), rng.uniform(0.0, 6.28, 3)
-    wide = 0.45 * away_m
+    wide, below = 0.45 * away_m, rng.normal(0.0, 0.08)
     return lambda t: (
         0.6 * wide * np.sin(pace[0] * t + phase[0]) + 0.4 * wide * np.sin(pace[1] * t + phase[1]),
+        below,
         away_m + 0.1 * np.sin(0.5 * t + phase[2]),
+    )
+
+
+def to_and_fro(rng: np.random.Generator, away_m: float) -> Way:
+    """Return a way from one side of the view to the other and back, of somebody of any height."""
+    wide, speed = 0.45 * away_m, rng.uniform(0.5, 1.2)
+    begun, below = rng.uniform(0.0, 4.0 * wide), rng.normal(0.0, 0.08)
+    return lambda t: (
+        abs((begun + speed * t) % (4.0 * wide) - 2.0 * wide) - wide,
+        below,
+        away_m,
     )
 
 
@@ -78,7 +90,25 @@ def crossings(rng: np.random.Generator) -> dict[str, tuple[list[Way], float]]:
             [walk(-1.0, v, far), walk(1.0, -w, far + 0.5), walk(0.3, 0.2, far + 1.0)],
             2.0,
         ),
-        "six walk about": ([stroll(rng, 1.2 + 0.5 * k) for k in range(6)], 10.0),
+        "six cross": (
+            [
+                walk(
+                    (-1) ** k * 0.5 * (1.2 + 0.4 * k),
+                    -((-1) ** k) * rng.uniform(0.5, 1.2),
+                    1.2 + 0.4 * k,
+                )
+                for k in range(6)
+            ],
+            2.5,
+        ),
+        "six walk to and fro, turning behind others": (
+            [to_and_fro(rng, 1.2 + 0.5 * k) for k in range(6)],
+            10.0,
+        ),
+        "six stroll, for seconds behind others": (
+            [stroll(rng, 1.2 + 0.5 * k) for k in range(6)],
+            10.0,
+        ),
     }
 
 
@@ -87,10 +117,7 @@ def pictures(ways: list[Way], seconds: float, rng: np.random.Generator) -> Itera
 ]:  # fmt: skip
     """Yield what a detector finds, where people are by number, and who of them can be found."""
     for k in range(1, int(seconds * RATE_HZ) + 1):
-        places = {
-            i: np.array([x, 0.0, z])
-            for i, (x, z) in ((i, way(k / RATE_HZ)) for i, way in enumerate(ways))
-        }
+        places = {i: np.array(way(k / RATE_HZ)) for i, way in enumerate(ways)}
         seen = {i: p for i, p in places.items() if _in_view(p) and not _hidden(p, places.values())}
         faces = [detected(p, rng) for p in seen.values() if rng.random() >= _MISSED]
         order = rng.permutation(len(faces))
@@ -110,7 +137,7 @@ def _hidden(p: NDArray[np.float64], others: Iterable[NDArray[np.float64]]) -> bo
     """Return whether a nearer face lies before this one; of two as near, the left one does."""
     for q in others:
         nearer = q[2] < p[2] or (q[2] == p[2] and q[0] < p[0])
-        if nearer and abs(p[0] / p[2] - q[0] / q[2]) < _HIDDEN_M / q[2]:
+        if nearer and np.hypot(*(p[:2] / p[2] - q[:2] / q[2])) < _HIDDEN_M / q[2]:
             return True
     return False
 
