@@ -46,6 +46,8 @@ _AT_START: dict[str, str] = {
     "joints.*.gains": "servos are set up while their torque is off; a stop and a resume will do",
     "joints.*.torque_limit": "servos are set up while their torque is off; a stop and a resume will do",
     "camera.mount": "who looks at the frames must know from the first whether they turn",
+    "camera.rotation": _AT_OPENING,
+    "camera.mirrored": _AT_OPENING,
     "gaze.chooser": _CHOOSER,
     "webcam.*": _AT_OPENING,
     "oak.*": _AT_OPENING,

@@ -24,7 +24,6 @@ from gazerig.robot.dashboard.page_process import URL, PageProcess
 from gazerig.robot.dashboard.publisher import Publisher
 from gazerig.robot.dashboard.snapshot import SnapshotBuilder, SnapshotTexts
 from gazerig.robot.model.commands import Tune
-from gazerig.robot.model.intrinsics import intrinsics_of_lens
 from gazerig.robot.model.types import Snapshot
 
 
@@ -155,9 +154,10 @@ def test_the_image_is_drawn_as_the_camera_gave_it(ran: Run, page: Page, depth: b
     news = drain(page.feed, page.live)
     assert news.image is not None
     shown = ran.made.shown()
-    lens = intrinsics_of_lens(None, shown.horizontal_rad, 640, 400, found.lens)
+    assert found.located is not None
+    lens = found.located.intrinsics
     for gaze_px in (None, page.live._gaze_px(tick, shown, found, lens)):
-        drawn = draw_detections(ground(found, depth), found, gaze_px, lens.fx_px)
+        drawn = draw_detections(ground(found, depth), found, gaze_px, lens)
         if np.array_equal(drawn, news.image):
             break
     else:

@@ -10,6 +10,7 @@ from desk import GAZE_JOINTS
 from present import present
 from six_joints import ESTIMATED_RAD, SIX, WISH_RAD, of_six
 
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.angles import rotation
 from gazerig.robot.dashboard.camera_overlay import (
@@ -37,6 +38,7 @@ from gazerig.robot.dashboard.status import drawn_together, status
 from gazerig.robot.model.types import GAZE_JOINTS as EVERY_JOINT
 from gazerig.robot.model.types import SeenFace, Snapshot, Trail
 
+LENS = Intrinsics(300.0, 300.0, 319.5, 239.5)
 AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -249,10 +251,10 @@ def test_lid_sweeps_upwards_from_its_edge() -> None:
 def test_detections_are_drawn_small_and_into_a_copy() -> None:
     picture, detections = camera_picture()
     before = picture.copy()
-    drawn = draw_detections(picture, detections, (500.0, 100.0), focal_px=300.0)
+    drawn = draw_detections(picture, detections, (500.0, 100.0), lens=LENS)
     assert drawn.shape == (240, IMAGE_WIDTH_PX, 3)
     assert np.array_equal(picture, before)
-    plain = draw_detections(picture, Detections(1.0, 1, 640, 480), None, focal_px=300.0)
+    plain = draw_detections(picture, Detections(1.0, 1, 640, 480), None, lens=LENS)
     changed = np.abs(drawn.astype(int) - plain).sum(axis=2) > 60
     # Face box, left edge; a landmark; the blob at 320 + 300 * 0.35 / 0.8; the gaze point.
     for x_px, y_px in ((129, 110), (150, 97), (226, 150), (250, 50)):
@@ -262,10 +264,10 @@ def test_detections_are_drawn_small_and_into_a_copy() -> None:
 
 def test_no_picture_is_a_dark_ground_and_what_is_behind_is_not_drawn() -> None:
     behind = Detections(1.0, 1, 320, 240, blobs=(MovingBlob(1, "thing", (0.0, 0.0, -1.0), 0.1),))
-    drawn = draw_detections(None, behind, None, focal_px=300.0)
+    drawn = draw_detections(None, behind, None, lens=LENS)
     assert drawn.shape == (240, 320, 3)
     assert len(np.unique(drawn)) == 1
-    far_out = draw_detections(None, Detections(1.0, 1, 320, 240), (1e12, -1e12), focal_px=300.0)
+    far_out = draw_detections(None, Detections(1.0, 1, 320, 240), (1e12, -1e12), lens=LENS)
     assert np.array_equal(far_out, drawn)
 
 

@@ -8,7 +8,11 @@ from gazerig.drivers.types import Detections, FaceDetector, LocatedFrame, Moving
 Motion = Callable[[Shot], tuple[MovingBlob, ...]]
 """Finds what moves, from one frame to the next."""
 Locate = Callable[[Detections], LocatedFrame]
-"""Locates what was found in the camera's axes; picklable."""
+"""Locates what was found in the camera's axes; picklable.
+
+Where it has a method ``fault``, that returns why its calibration is not used for a frame, as one
+line; "" where it is. Each line is reported once.
+"""
 
 
 class FrameAnalyzer:
@@ -24,6 +28,7 @@ class FrameAnalyzer:
         self, detector: FaceDetector, motion: Motion | None = None, locate: Locate | None = None
     ) -> None:
         self._detector, self._motion, self._locate = detector, motion, locate
+        self._faults: dict[str, bool] = {}  # and whether each has been reported
         # Here because the process of the loop imports this module too, and needs no OpenCV.
         from gazerig.drivers.vision.cut_detector import CutDetector
 
@@ -47,12 +52,16 @@ class FrameAnalyzer:
             turn=shot.turn,
             scene=self._cuts.scene(shot.image),
         )
+        if (fault := getattr(self._locate, "fault", None)) is not None and (line := fault(found)):
+            self._faults.setdefault(line, False)
         return found.located_by(self._locate)
 
     def events(self) -> tuple[str, ...]:
-        """Return what the detector has to tell since the last call, one line each."""
+        """Return what detector and calibration have to tell since the last call, one line each."""
+        faults = tuple(line for line, told in self._faults.items() if not told)
+        self._faults = dict.fromkeys(self._faults, True)
         events = getattr(self._detector, "events", None)
-        return events() if events is not None else ()
+        return (*faults, *(events() if events is not None else ()))
 
     def retune(
         self,
@@ -71,7 +80,7 @@ class FrameAnalyzer:
             SetupError: the detector cannot be made; the old one goes on.
         """
         if locate is not None:
-            self._locate = locate
+            self._locate, self._faults = locate, {}
         if motion is not None:
             self._motion = motion(self._motion)
         if detector is not None:

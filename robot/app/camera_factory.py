@@ -12,6 +12,7 @@ from gazerig.drivers.camera import sources
 from gazerig.drivers.camera.camera_plugins import camera_part, is_source, plugin_source
 from gazerig.drivers.camera.frame_analysis import Motion
 from gazerig.drivers.camera.guarded_camera import CLOSE_PROCESS_S, GuardedCamera
+from gazerig.drivers.camera.orientation import FrameOrientation, upright
 from gazerig.drivers.camera.pose_buffer import PoseBuffer
 from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.source import FrameSource
@@ -90,7 +91,8 @@ def real_camera(
         from gazerig.sim_mock.cameras.video import FilmCamera
 
         film, delay_s = _film(options), options.film_delay_s
-        return FilmCamera(film, own.find_faces(rig), delay_s, motion=motion(), locate=locate)
+        faces, turned = own.find_faces(rig), orientation_of(placed)
+        return FilmCamera(film, faces, delay_s, motion=motion(), locate=locate, orientation=turned)
     name = options.camera if isinstance(options.camera, str) else None
     if own.detector is not None and (name is None or is_ours(CAMERA, name)):
         return watched(rig, own, _source(rig, options)(), clock, motion, locate)
@@ -100,7 +102,8 @@ def real_camera(
     params, label = _section(rig, name), find(CAMERA, name).label
     camera = camera_part(name, params)
     if is_source(camera):
-        parts = CameraParts(partial(plugin_source, name, params), detector, motion, locate)
+        source = upright(partial(plugin_source, name, params), orientation_of(placed))
+        parts = CameraParts(source, detector, motion, locate)
         process = CameraProcess(parts, clock.now_s, rig.camera_recovery)
         return GuardedCamera(process, label, close_s=CLOSE_PROCESS_S)
     return GuardedCamera(cast(Camera, camera), label)
@@ -109,6 +112,11 @@ def real_camera(
 def locator_of(placed: CameraParams) -> FrameLocator:
     """Return what locates faces and things in the axes of a camera with this lens."""
     return FrameLocator(placed.lens, radians(placed.horizontal_field_deg))
+
+
+def orientation_of(camera: CameraParams) -> FrameOrientation:
+    """Return how the camera's frames are turned upright."""
+    return FrameOrientation(camera.rotation, camera.mirrored)
 
 
 def _section(rig: Rig, name: str) -> object:
@@ -192,7 +200,12 @@ def _film(options: RunOptions) -> "VideoFile | CameraReplay":
 
 
 def _source(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
-    """Return how to make the source, for the process that will use it."""
+    """Return how to make the source of upright frames, for the process that will use it."""
+    return upright(_delivered(rig, options), orientation_of(rig.camera))
+
+
+def _delivered(rig: Rig, options: RunOptions) -> Callable[[], FrameSource]:
+    """Return how to make the source of frames as the camera delivers them."""
     if options.replay is not None:
         return partial(sources.recording, options.replay)
     if options.video is not None:

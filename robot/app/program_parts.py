@@ -8,6 +8,7 @@ from gazerig.drivers.camera.camera_plugins import CheckedSource, is_source
 from gazerig.drivers.camera.frame_analysis import Locate, Motion
 from gazerig.drivers.camera.guarded_camera import LONGEST_S as LONGEST_CAMERA_S
 from gazerig.drivers.camera.guarded_camera import GuardedCamera
+from gazerig.drivers.camera.orientation import FrameOrientation, UprightSource
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.errors import SetupError
@@ -72,7 +73,8 @@ def program_camera(
     if fast:
         raise SetupError(f"{label} gives frames in real time: in simulated time give detections")
     source = CheckedSource(cast(FrameSource, camera), label)
-    return watched(rig, parts, source, clock, motion, locate)
+    turned = UprightSource(source, FrameOrientation(rig.camera.rotation, rig.camera.mirrored))
+    return watched(rig, parts, turned, clock, motion, locate)
 
 
 def watched(

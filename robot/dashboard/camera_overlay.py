@@ -5,7 +5,9 @@ from typing import cast
 import cv2
 import numpy as np
 
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import Depth, DetectedFace, Detections, ImageArray, MovingBlob
+from gazerig.robot.model.intrinsics import project
 
 IMAGE_WIDTH_PX = 320
 NEAREST_M, FARTHEST_M = 0.3, 6.0
@@ -26,13 +28,13 @@ def draw_detections(
     image: ImageArray | None,
     detections: Detections,
     gaze_px: tuple[float, float] | None,
-    focal_px: float,
+    lens: Intrinsics,
 ) -> ImageArray:
     """Draw faces, landmarks, moving blobs and the gaze point into a small copy.
 
     image: the camera's image, or None where the source has none: a dark ground
     gaze_px: where the rig looks, pixels of the full image; None draws none
-    focal_px: focal length that places the blobs (pinhole, principal point in the middle)
+    lens: of the full image; it places the blobs
     Returns an image of at most IMAGE_WIDTH_PX; the one given is left as it is.
     """
     scale = min(1.0, IMAGE_WIDTH_PX / detections.width_px)
@@ -40,7 +42,7 @@ def draw_detections(
     for face in detections.faces:
         _draw_face(drawn, face, scale)
     for blob in detections.blobs:
-        _draw_blob(drawn, blob, detections, focal_px, scale)
+        _draw_blob(drawn, blob, lens, scale)
     if gaze_px is not None:
         _draw_gaze(drawn, _pixel(gaze_px[0], gaze_px[1], scale))
     return drawn
@@ -119,15 +121,12 @@ def _draw_face(drawn: ImageArray, face: DetectedFace, scale: float) -> None:
         cv2.circle(drawn, _pixel(landmark_x, landmark_y, scale), 2, _LANDMARK, -1, cv2.LINE_AA)
 
 
-def _draw_blob(
-    drawn: ImageArray, blob: MovingBlob, detections: Detections, focal_px: float, scale: float
-) -> None:
-    x, y, z = blob.p_camera_m
+def _draw_blob(drawn: ImageArray, blob: MovingBlob, lens: Intrinsics, scale: float) -> None:
+    z = blob.p_camera_m[2]
     if z <= 0.0:  # behind the camera there is no pixel
         return
-    u = detections.width_px / 2 + focal_px * x / z
-    v = detections.height_px / 2 + focal_px * y / z
-    radius = max(2, _clipped(focal_px * blob.radius_m / z * scale))
+    u, v = project([blob.p_camera_m], lens)[0].tolist()
+    radius = max(2, _clipped(lens.fx_px * blob.radius_m / z * scale))
     centre = _pixel(u, v, scale)
     cv2.circle(drawn, centre, radius, _BLOB, 1, cv2.LINE_AA)
     _write(drawn, blob.kind, (centre[0] - radius, centre[1] - radius), _BLOB)

@@ -58,7 +58,8 @@ class FrameHead(NamedTuple):
     """What was found in a frame, as far as it is drawn, and what goes along with it.
 
     faces: box, landmarks and confidence; blobs: id, kind, position and radius
-    lens: as the camera reports it: fx, fy, cx, cy in pixels
+    lens: by which the frame was located, else as the camera reports it: fx, fy, cx, cy in pixels
+        and five numbers of distortion
     shape, dtype: of the array in the memory that goes along; None, "" without one
     depth: that is the depth image; wants_depth: depth is to be shown
     """
@@ -69,7 +70,7 @@ class FrameHead(NamedTuple):
     height_px: int
     faces: Sequence[tuple[Any, Any, float]]
     blobs: Sequence[tuple[int, str, Any, float]]
-    lens: tuple[float, float, float, float] | None
+    lens: tuple[float, ...] | None
     shape: tuple[int, ...] | None
     dtype: str
     depth: bool
@@ -90,7 +91,7 @@ def frame_message(
     found: Detections, image: PassedImage | None, depth: bool, wants_depth: bool
 ) -> bytes:
     """Return a message with what was found in a frame; see ``FrameHead``."""
-    lens = found.lens
+    lens = found.located.intrinsics if found.located is not None else found.lens
     head = FrameHead(
         found.captured_s,
         found.number,
@@ -98,7 +99,7 @@ def frame_message(
         found.height_px,
         [(face.box_px, face.landmarks_px, face.confidence) for face in found.faces],
         [(blob.id, blob.kind, blob.p_camera_m, blob.radius_m) for blob in found.blobs],
-        (lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px) if lens is not None else None,
+        (lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px, *lens.distortion) if lens else None,
         image.shape if image is not None else None,
         image.dtype if image is not None else "",
         depth,
@@ -163,7 +164,7 @@ class LiveFeed:
         # The page's process draws; the control loop's imports this module too, without OpenCV.
         from gazerig.robot.dashboard.camera_overlay import draw_detections, ground
 
-        return draw_detections(ground(found, self._wants_depth), found, gaze_px, lens.fx_px)
+        return draw_detections(ground(found, self._wants_depth), found, gaze_px, lens)
 
     def _take_rig(self, rig: LiveRig) -> None:
         if self._builder is None:
@@ -200,7 +201,7 @@ class LiveFeed:
             head.height_px,
             tuple([DetectedFace(box, np.array(marks), sure) for box, marks, sure in head.faces]),
             tuple([MovingBlob(*blob) for blob in head.blobs]),
-            lens=Intrinsics(*head.lens) if head.lens is not None else None,
+            lens=None if head.lens is None else _intrinsics(*head.lens),
         )
         if fd >= 0 and head.shape is not None:
             array = taken(PassedImage(fd, tuple(head.shape), head.dtype))
@@ -219,3 +220,11 @@ class LiveFeed:
             return None
         u, v = project(np.array([[x, y, z]]), lens)[0].tolist()
         return (u, v)
+
+
+def _intrinsics(
+    fx_px: float, fy_px: float, cx_px: float, cy_px: float, *distortion: float
+) -> Intrinsics:
+    """Return a lens from the numbers that came with a frame."""
+    k1, k2, p1, p2, k3 = distortion
+    return Intrinsics(fx_px, fy_px, cx_px, cy_px, (k1, k2, p1, p2, k3))

@@ -53,6 +53,9 @@ class CameraParams:
     pitch_deg: Annotated[float, Bounds(-90, 90), "rotation of the camera upwards"] = 0.0
     horizontal_field_deg: Annotated[float, Bounds(10, 150), "horizontal field of view of the lens"] = 69.0
     roll_deg: Annotated[float, Bounds(-180, 180), "rotation of the camera about its optical axis, right side down"] = 0.0
+    rotation: Annotated[Literal[0, 90, 180, 270],
+        "degrees clockwise by which the camera's frames are turned upright; everything else here counts in upright frames"] = 0
+    mirrored: Annotated[bool, "the camera delivers mirror images: left and right are exchanged before the rotation"] = False
     lens: Annotated[LensParams | None, "the lens as measured; left out, the field of view stands for it"] = None
     # fmt: on
 

@@ -19,6 +19,9 @@ Floats = NDArray[np.float64]
 _ROUNDS, _LEAST_STEP = 40, 1e-12
 # Two sizes of image show the same field if their shapes differ by no more than rounding.
 _SAME_SHAPE = 0.01
+# The optical axis of a camera that uses a part of its sensor may meet the image near an edge, or a
+# little outside: from the middle, in widths and heights.
+_FARTHEST_AXIS = 0.75
 
 
 @lru_cache(maxsize=64)
@@ -33,18 +36,18 @@ def intrinsics_of_lens(
 
     Images of another size but the same shape are taken for the measured ones scaled.
     Of another shape it is unknown which edges the camera cut off, so the field of view
-    has to do, as where nothing was measured.
+    has to do, as where nothing was measured (see ``lens_fault``).
 
     Args:
         lens: as measured.
         view_rad: horizontal field of view, from edge to edge.
         width_px: of the images.
         height_px: of the images.
-        own: as the camera says of this image; it counts where nothing was measured.
+        own: as the camera says of this image; it counts where nothing was measured that fits.
     """
-    if lens is None and own is not None:
-        return own
     if lens is None or not fits(lens, width_px, height_px):
+        if own is not None:
+            return own
         return intrinsics_of_view(view_rad, width_px, height_px)
     measured = Intrinsics(lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px, lens.distortion)
     return measured.scaled(width_px / lens.width_px, height_px / lens.height_px)
@@ -52,10 +55,24 @@ def intrinsics_of_lens(
 
 def fits(lens: LensParams, width_px: int, height_px: int) -> bool:
     """Return whether images of a size show the field that the lens was measured on."""
+    return not lens_fault(lens, width_px, height_px)
+
+
+def lens_fault(lens: LensParams, width_px: int, height_px: int) -> str:
+    """Return why a measured lens is not that of images of a size, "" if it is."""
     if width_px <= 0 or height_px <= 0:
-        return False
+        return f"images are {width_px} x {height_px}"
     shape = (width_px * lens.height_px) / (height_px * lens.width_px)
-    return abs(shape - 1.0) <= _SAME_SHAPE
+    if abs(shape - 1.0) > _SAME_SHAPE:
+        measured = f"{lens.width_px} x {lens.height_px}"
+        return f"it was measured on {measured}, images are {width_px} x {height_px}"
+    x, y = lens.cx_px / lens.width_px - 0.5, lens.cy_px / lens.height_px - 0.5
+    if max(abs(x), abs(y)) > _FARTHEST_AXIS:
+        return (
+            f"its axis at {lens.cx_px:g}, {lens.cy_px:g} px is far outside images of "
+            f"{lens.width_px} x {lens.height_px}"
+        )
+    return ""
 
 
 def project(points_camera_m: ArrayLike, intrinsics: Intrinsics) -> Floats:

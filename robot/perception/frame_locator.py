@@ -7,7 +7,7 @@ there, else as what is known of the size of faces.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import hypot, isfinite, sqrt
+from math import degrees, hypot, isfinite, sqrt
 from typing import Any
 
 import numpy as np
@@ -25,7 +25,7 @@ from gazerig.drivers.types import (
 from gazerig.gaze.angles import norm, scale
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PUPIL_DISTANCE_M
 from gazerig.robot.model.frames import LensParams
-from gazerig.robot.model.intrinsics import intrinsics_of_lens
+from gazerig.robot.model.intrinsics import intrinsics_of_lens, lens_fault
 from gazerig.robot.perception.face_pose import FacePose, face_pose
 
 Box = tuple[float, float, float, float]
@@ -77,6 +77,22 @@ class FrameLocator:
         """Return the calibration of a frame: as measured, as the camera says, or by its field."""
         size_px = found.width_px, found.height_px
         return intrinsics_of_lens(self.lens, self.field_rad, *size_px, found.lens)
+
+    def fault(self, found: Detections) -> str:
+        """Return why the measured lens is not used for a frame, as one line; "" where it is."""
+        if self.lens is None:
+            return ""
+        why = lens_fault(self.lens, found.width_px, found.height_px)
+        if not why:
+            return ""
+        instead = "what the camera reports" if found.lens is not None else self._field_text()
+        return (
+            f"camera.lens does not fit: {why}; {instead} is used instead: calibrate the lens at "
+            "this size (gazerig calibrate camera), or ask the camera for that one"
+        )
+
+    def _field_text(self) -> str:
+        return f"the field of view of {degrees(self.field_rad):.0f} deg"
 
     def locate(self, found: Detections, intrinsics: Intrinsics) -> LocatedFrame:
         """Return what a frame of known intrinsics shows in the camera's axes."""

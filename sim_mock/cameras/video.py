@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Protocol
 
 from gazerig.drivers.camera.frame_analysis import FrameAnalyzer, Locate, Motion
+from gazerig.drivers.camera.orientation import AS_DELIVERED, FrameOrientation
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import Detections, FaceDetector
 
@@ -48,6 +49,7 @@ class FilmCamera:
         start_s: simulated time of the first exposure.
         motion: finds motion, None for none.
         locate: locates what is found in the camera's axes, None for none.
+        orientation: how frames are turned upright.
 
     frames, frames_with_face: counts of frames looked at since open
     """
@@ -60,11 +62,13 @@ class FilmCamera:
         start_s: float = 0.0,
         motion: Motion | None = None,
         locate: Locate | None = None,
+        orientation: FrameOrientation = AS_DELIVERED,
     ) -> None:
         if not delay_s >= 0.0:
             raise ValueError(f"detections cannot come before their frame: delay {delay_s} s")
         self._video = video
         self._frames = FrameAnalyzer(detector, motion, locate)
+        self._orientation = orientation
         self._delay_s = delay_s
         self._start_s = start_s
         self._newest: Detections | None = None
@@ -102,8 +106,8 @@ class FilmCamera:
         return True
 
     def events(self) -> tuple[str, ...]:
-        """Return what had to be assumed about the film, one line each, once."""
-        return self._video.events()
+        """Return what had to be assumed about film and lens, one line each, once."""
+        return (*self._video.events(), *self._frames.events())
 
     def close(self) -> None:
         """Free the film; safe to call twice."""
@@ -115,7 +119,8 @@ class FilmCamera:
 
     def _look(self, number: int) -> None:
         """Find the faces of one frame, and what moves in it."""
-        shot = self._video.shot(number)._replace(captured_s=self._captured_s(number))
+        shot = self._orientation.upright(self._video.shot(number))
+        shot = shot._replace(captured_s=self._captured_s(number))
         found = self._frames.look(shot)
         self.frames += 1
         self.frames_with_face += bool(found.faces)

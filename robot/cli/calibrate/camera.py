@@ -16,11 +16,13 @@ from rich.table import Table
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.camera.oak.calibration import OakCalibration
 from gazerig.drivers.camera.oak.source import OakSource
+from gazerig.drivers.camera.orientation import UprightSource
 from gazerig.drivers.camera.source import FrameSource, Shot
 from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.camera.webcam import Webcam
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import DetectedFace, ImageArray
+from gazerig.robot.app.camera_factory import orientation_of
 from gazerig.robot.app.rig_limits import lid_ends, neck_span
 from gazerig.robot.calibration.camera_calibration import LensCalibration
 from gazerig.robot.calibration.camera_procedure import (
@@ -38,6 +40,7 @@ from gazerig.robot.cli.calibrate.oak import (
     lens_params,
     oak_changes,
     say_calibration,
+    upright_calibration,
 )
 from gazerig.robot.cli.neck_motion import go_on, moving_neck
 from gazerig.robot.cli.prompts import Lines, TerminalPerson
@@ -231,7 +234,8 @@ def _eye(job: _Job, source: FrameSource | None, seed: int) -> Iterator[_Eye]:
         simulated = BoardScene(job.rig.camera, job.board, job.kinematics, rng)
         yield _Eye(lambda: simulated.look(clock.now_s()), clock.now_s, lambda _: None, simulated)
         return
-    thread = CameraThread(source, _NoFaces(), clock.now_s)
+    turned = UprightSource(source, orientation_of(job.rig.camera))
+    thread = CameraThread(turned, _NoFaces(), clock.now_s)
 
     def look() -> Shot | None:
         found = thread.latest(clock.now_s())
@@ -263,15 +267,16 @@ def _known_lens(job: _Job, eye: _Eye, source: FrameSource, what: What) -> _Known
     if what is What.mount:
         return _KnownLens(job.rig.camera, {}, HandEyeParams())
     if isinstance(source, OakSource):
-        frame_lens = _first(job, eye).lens
-        return _oak_lens(job, as_seen(source.calibration(), frame_lens))
+        return _oak_lens(job, source.calibration(), _first(job, eye))
     lens = _lens(job, eye)
     camera = replace(job.rig.camera, lens=lens.params())
     return _KnownLens(camera, lens_changes(lens), sure_as(lens))
 
 
-def _oak_lens(job: _Job, found: OakCalibration) -> _KnownLens:
-    """Return the lens of an OAK camera, and say what its memory holds."""
+def _oak_lens(job: _Job, delivered: OakCalibration, shot: Shot | None = None) -> _KnownLens:
+    """Return the lens of an OAK camera for upright frames, and say what its memory holds."""
+    found = upright_calibration(delivered, orientation_of(job.rig.camera))
+    found = as_seen(found, shot.lens if shot is not None else None)
     say_calibration(found, job.rig.oak)
     camera = replace(job.rig.camera, lens=lens_params(found))
     return _KnownLens(camera, oak_changes(found), HandEyeParams())

@@ -7,6 +7,7 @@ from typing import Any
 from gazerig.drivers.camera.oak.calibration import OakCalibration, read_calibration
 from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.oak.sdk import load_depthai
+from gazerig.drivers.camera.orientation import FrameOrientation
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.errors import CameraError
 from gazerig.robot.cli.terminal import say
@@ -33,6 +34,14 @@ def calibration_of_file(file: Path, params: OakParams) -> OakCalibration:
             "give a file that depthai's eepromToJsonFile has written"
         ) from error
     return read_calibration(dai, stored, params)
+
+
+def upright_calibration(found: OakCalibration, orientation: FrameOrientation) -> OakCalibration:
+    """Return the calibration with the lens of frames turned upright."""
+    size_px = found.width_px, found.height_px
+    lens = orientation.lens(found.lens, *size_px)
+    width, height = size_px[::-1] if orientation.rotation in (90, 270) else size_px
+    return found._replace(lens=lens, width_px=width, height_px=height)
 
 
 def as_seen(found: OakCalibration, frame_lens: Intrinsics | None) -> OakCalibration:

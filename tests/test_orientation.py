@@ -1,0 +1,225 @@
+"""A camera upside down, on its side, mirrored, of any and of changing size: the same directions.
+
+Numbered checks are listed in docs/checks.md.
+"""
+
+import pickle
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+from math import radians
+
+import numpy as np
+import pytest
+
+from gazerig.config.schema import load_rig
+from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
+from gazerig.drivers.camera.oak.calibration import OakCalibration
+from gazerig.drivers.camera.orientation import (
+    AS_DELIVERED,
+    FrameOrientation,
+    UprightSource,
+    upright,
+)
+from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.camera.source import FrameSource, Shot
+from gazerig.drivers.types import CameraTurn, DetectedFace, ImageArray
+from gazerig.robot.app.camera_factory import orientation_of
+from gazerig.robot.cli.calibrate.oak import upright_calibration
+from gazerig.robot.model.frames import LensParams
+from gazerig.robot.model.intrinsics import intrinsics_of_lens, project, rays
+from gazerig.robot.perception.frame_locator import FrameLocator
+
+ALL = [FrameOrientation(r, m) for r in (0, 90, 180, 270) for m in (False, True)]
+NAMES = [f"{o.rotation}{' mirrored' if o.mirrored else ''}" for o in ALL]
+LENS = Intrinsics(500.0, 480.0, 310.0, 205.0, (0.1, -0.05, 0.004, -0.006, 0.01))
+WIDTH, HEIGHT = 640, 400
+Floats = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+
+
+def axes(orientation: FrameOrientation) -> Floats:
+    """Return what turns directions of the camera as mounted into those of upright frames."""
+    a = radians(orientation.rotation)
+    clockwise = np.array([(np.cos(a), -np.sin(a), 0), (np.sin(a), np.cos(a), 0), (0, 0, 1)])
+    return np.asarray(clockwise @ np.diag([-1.0 if orientation.mirrored else 1.0, 1.0, 1.0]))
+
+
+@pytest.mark.parametrize("orientation", ALL, ids=NAMES)
+def test_pixels_depth_and_lens_go_where_the_image_goes(orientation: FrameOrientation) -> None:
+    rng = np.random.default_rng(3)
+    image = rng.integers(0, 255, (HEIGHT, WIDTH, 3), np.uint8)
+    depth = rng.random((HEIGHT, WIDTH)).astype(np.float32)
+    shot = orientation.upright(Shot(1.0, 7, image, depth, LENS))
+    assert (shot.captured_s, shot.number) == (1.0, 7)
+    assert shot.depth_m is not None and shot.lens is not None
+    for x, y in ((0, 0), (639, 0), (0, 399), (200, 31)):
+        (u, v), *_ = orientation.points(np.array([[x, y]]), WIDTH, HEIGHT).round().astype(int)
+        assert np.array_equal(shot.image[v, u], image[y, x])
+        assert shot.depth_m[v, u] == depth[y, x]
+    # The same direction, seen through either lens, distortion and all.
+    pixels = np.array([(10.0, 20.0), (600.0, 30.0), (320.5, 390.0)])
+    there = orientation.points(pixels, WIDTH, HEIGHT)
+    assert rays(there, shot.lens) == pytest.approx(rays(pixels, LENS) @ axes(orientation).T)
+
+
+@pytest.mark.parametrize("orientation", ALL, ids=NAMES)
+def test_faces_and_gyro_of_the_camera_are_turned_along(orientation: FrameOrientation) -> None:
+    upright_marks = np.array([(300.0, 100.0), (340.0, 100.0), (320, 120), (305, 140), (335, 140)])
+    size = (HEIGHT, WIDTH) if orientation.rotation in (90, 270) else (WIDTH, HEIGHT)
+    # Where the upright face is in the frame as it comes: found by trying every pixel's inverse.
+    zero, right, down = orientation.points(
+        np.array([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]), WIDTH, HEIGHT
+    )
+    inverse = np.linalg.inv(np.column_stack((right - zero, down - zero)))
+    marks = (upright_marks - zero) @ inverse.T
+    if orientation.mirrored:  # who finds faces takes the eye on the left for the owner's right one
+        marks = marks[[1, 0, 2, 4, 3]]
+    low, high = marks.min(axis=0), marks.max(axis=0)
+    box = (float(low[0]), float(low[1]), *(high - low).tolist())
+    gaze = tuple((np.array([0.3, 0.1, -0.9]) @ axes(orientation)).tolist())
+    turned = np.array([(0.96, -0.28, 0.0), (0.28, 0.96, 0.0), (0.0, 0.0, 1.0)])
+    delivered = axes(orientation).T @ turned @ axes(orientation)
+    shot = orientation.upright(
+        Shot(
+            0.0,
+            1,
+            np.zeros((HEIGHT, WIDTH, 3), np.uint8),
+            faces=(DetectedFace(box, marks, 0.9, gaze),),
+            turn=CameraTurn(0, tuple(map(tuple, delivered.tolist()))),
+        )
+    )
+    assert shot.image.shape[1::-1] == size and shot.faces is not None and shot.turn is not None
+    face = shot.faces[0]
+    assert face.landmarks_px == pytest.approx(upright_marks)
+    assert face.box_px == pytest.approx((300.0, 100.0, 40.0, 40.0))
+    assert face.gaze_camera == pytest.approx((0.3, 0.1, -0.9))
+    assert np.array(shot.turn.R_start_camera) == pytest.approx(turned)
+    assert shot.turn.is_rotation
+
+
+def test_frames_that_are_upright_stay_the_very_same() -> None:
+    shot = Shot(0.0, 1, np.zeros((4, 6, 3), np.uint8))
+    assert AS_DELIVERED.upright(shot) is shot
+
+    def make() -> FrameSource:
+        raise AssertionError
+
+    assert upright(make, AS_DELIVERED) is make
+
+
+class Frames:
+    """A source of given images."""
+
+    def __init__(self, images: Iterator[ImageArray]) -> None:
+        self._images, self._number = images, 0
+
+    def open(self) -> None:
+        """Begin."""
+
+    def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
+        """Return the next."""
+        self._number += 1
+        return Shot(0.1 * self._number, self._number, next(self._images))
+
+    def events(self) -> tuple[str, ...]:
+        """Return nothing."""
+        return ()
+
+    def close(self) -> None:
+        """End."""
+
+
+class Spot:
+    """Finds a face whose nose is at the brightest pixel."""
+
+    def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
+        """Find it."""
+        y, x = np.unravel_index(int(image[..., 0].argmax()), image.shape[:2])
+        half = image.shape[1] / 16
+        marks = np.array([(-1, -1), (1, -1), (0, 0), (-0.8, 1), (0.8, 1)]) * half + (x, y)
+        box = (float(x) - half, float(y) - half, 2 * half, 2 * half)
+        return (DetectedFace(box, marks, 1.0),)
+
+
+def spot_at(direction: Floats, width: int, height: int, field_rad: float) -> ImageArray:
+    """Draw a spot in a direction."""
+    lens = intrinsics_of_lens(None, field_rad, width, height)
+    u, v = project(direction[None], lens)[0].round().astype(int)
+    image = np.zeros((height, width, 3), np.uint8)
+    image[v, u] = 255
+    return image
+
+
+@pytest.mark.parametrize("orientation", ALL, ids=NAMES)
+def test_e95_a_person_is_at_one_place_however_the_camera_is_mounted_and_whatever_its_size(
+    orientation: FrameOrientation,
+) -> None:
+    """Sizes change from frame to frame, as a camera's may that another program sets."""
+    direction, field_rad = np.array([0.2, -0.12, 1.0]), radians(69.0)
+    sizes = [(640, 480), (1280, 960), (320, 240), (1920, 1080), (640, 480)]
+
+    def images() -> Iterator[ImageArray]:
+        for width, height in sizes:
+            image = spot_at(direction, width, height, field_rad)
+            # As the camera delivers it: the way back.
+            image = np.rot90(image, orientation.rotation // 90)
+            yield np.ascontiguousarray(image[:, ::-1] if orientation.mirrored else image)
+
+    source = UprightSource(Frames(images()), orientation)
+    analyzer = FrameAnalyzer(Spot(), None, FrameLocator(None, field_rad))
+    source.open()
+    for width, height in sizes:
+        shot = source.take(lambda: 0.0, threading.Event())
+        assert shot is not None and shot.image.shape == (height, width, 3)
+        found = analyzer.look(shot)
+        assert found.located is not None and (found.width_px, found.height_px) == (width, height)
+        x, y, z = found.located.faces[0].p_camera_m
+        assert (x / z, y / z) == pytest.approx((0.2, -0.12), abs=4.0 / width)
+    source.close()
+    assert source.events() == ()
+
+
+def test_a_lens_of_another_shape_is_reported_once_and_the_gaze_goes_on() -> None:
+    lens = LensParams(640, 480, 460.0, 460.0, 320.0, 240.0)
+    analyzer = FrameAnalyzer(Spot(), None, FrameLocator(lens, radians(69.0)))
+
+    def look(width: int, height: int) -> None:
+        found = analyzer.look(Shot(0.0, 1, spot_at(np.array([0.1, 0.0, 1.0]), width, height, 1.2)))
+        assert found.located is not None and len(found.located.faces) == 1
+
+    look(1280, 960)  # the same field, finer
+    assert analyzer.events() == ()
+    look(640, 400)
+    (line,) = analyzer.events()
+    assert "640 x 480" in line and "640 x 400" in line and "69 deg" in line and "calibrate" in line
+    look(640, 400)
+    look(640, 480)
+    look(640, 400)
+    assert analyzer.events() == ()
+    look(1280, 720)  # another size that does not fit
+    assert len(analyzer.events()) == 1
+    analyzer.retune(None, None, FrameLocator(replace(lens, cx_px=9000.0), radians(69.0)))
+    look(640, 480)
+    (line,) = analyzer.events()
+    assert "9000" in line
+
+
+def test_the_rig_says_how_frames_are_turned() -> None:
+    rig = load_rig("desk")
+    assert orientation_of(rig.camera) == AS_DELIVERED
+    turned = orientation_of(replace(rig.camera, rotation=180, mirrored=True))
+    assert turned == FrameOrientation(180, True)
+    source = upright(partial(Frames, iter(())), turned)
+    assert isinstance(source(), UprightSource)
+    assert pickle.loads(pickle.dumps(turned)) == turned  # it goes to the camera's process
+
+
+def test_the_lens_in_an_oaks_memory_is_turned_for_the_rigs_file() -> None:
+    found = OakCalibration(
+        "OAK-D", LENS, WIDTH, HEIGHT, LENS.distortion, 0.0, None, None, None, None
+    )
+    turned = upright_calibration(found, FrameOrientation(90))
+    assert (turned.width_px, turned.height_px) == (HEIGHT, WIDTH)
+    assert (turned.lens.fx_px, turned.lens.fy_px) == (LENS.fy_px, LENS.fx_px)
+    assert (turned.lens.cx_px, turned.lens.cy_px) == (HEIGHT - 1 - LENS.cy_px, LENS.cx_px)
