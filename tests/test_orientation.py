@@ -80,13 +80,14 @@ def test_faces_and_gyro_of_the_camera_are_turned_along(orientation: FrameOrienta
     gaze = tuple((np.array([0.3, 0.1, -0.9]) @ axes(orientation)).tolist())
     turned = np.array([(0.96, -0.28, 0.0), (0.28, 0.96, 0.0), (0.0, 0.0, 1.0)])
     delivered = axes(orientation).T @ turned @ axes(orientation)
+    first, second, third = (tuple(row) for row in delivered.tolist())
     shot = orientation.upright(
         Shot(
             0.0,
             1,
             np.zeros((HEIGHT, WIDTH, 3), np.uint8),
             faces=(DetectedFace(box, marks, 0.9, gaze),),
-            turn=CameraTurn(0, tuple(map(tuple, delivered.tolist()))),
+            turn=CameraTurn(0, (first, second, third)),
         )
     )
     assert shot.image.shape[1::-1] == size and shot.faces is not None and shot.turn is not None
