@@ -136,6 +136,36 @@ def test_gyro_that_turns_while_the_joints_stand_is_told_once_and_left_out():
     assert max(apart_deg(R, OPTICAL) for R in found) <= 15.0
 
 
+def test_gyro_is_tried_again_after_a_minute_and_told_no_second_time():
+    told: list[str] = []
+    fusion = GyroFusion(told.append)
+    for k in range(round(200 * HZ)):
+        t = k / HZ
+        turning = t < 5.0 or t > 150.0  # carried about, at rest, carried again
+        turn = CameraTurn(1, rows(turned_by((0.0, 0.2 * k * turning, 0.0))))
+        R = fusion.orientation(t, OPTICAL, turn)
+        if 70.0 < t < 149.0:
+            assert R is not OPTICAL and apart_deg(R, OPTICAL) < 1.0
+    assert len(told) == 1
+
+
+def test_camera_that_is_placed_anew_is_there_at_once():
+    mount = CameraMount(CameraParams(position_mm=(20.0, 0.0, 45.0)))
+    perception, base = Perception(mount, 69.0, Tracker(TrackParams())), Base(shaken, 3.0)
+    poses = PoseHistory(KINEMATICS)
+    poses.remember(0.0, (0.0, 0.0, 0.0))
+    places = []
+    for k in range(1, 70):
+        if k == 60:
+            mount.retune(CameraParams(position_mm=(20.0, 0.0, 45.0), yaw_deg=10.0))
+            perception.retune(69.0, None, None)
+        t = k / HZ
+        found = Detections(t, k, WIDTH, HEIGHT, turn=base.turn(t))
+        perception.see(found, poses)
+        places.append(perception._gyro._before[2])  # type: ignore[index]
+    assert apart_deg(places[58], places[59]) == pytest.approx(10.0, abs=1.5)
+
+
 def test_without_a_gyro_nothing_changes():
     fusion = GyroFusion(lambda line: None)
     for k in range(3):

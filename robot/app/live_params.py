@@ -206,8 +206,7 @@ class LiveParams:
         placed, was_placed = self._placed.camera(new), self._placed.camera(old)
         if placed != was_placed:
             parts.mount.retune(replace(placed, mount=self._placed.mount))
-        sees = placed.horizontal_field_deg, placed.lens, new.face_parts_mm
-        if sees != (was_placed.horizontal_field_deg, was_placed.lens, old.face_parts_mm):
+        if (placed, new.face_parts_mm) != (was_placed, old.face_parts_mm):
             parts.perception.retune(placed.horizontal_field_deg, own_parts(new), placed.lens)
         camera = retune_camera(parts.camera, old, new, placed)
         return (*said, camera) if camera else said

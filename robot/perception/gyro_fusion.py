@@ -6,7 +6,7 @@ takes quick turns from the gyro and, over about a second, leans on the joints. P
 """
 
 from collections.abc import Callable
-from math import acos, cos, exp, radians, sin
+from math import acos, cos, exp, inf, radians, sin
 
 from gazerig.drivers.types import CameraTurn
 from gazerig.gaze.angles import compose, norm, scale
@@ -19,6 +19,7 @@ _GAP_S = 0.5
 # A larger difference is no bump: the joints count, and if it comes back, the gyro is wrong.
 _MOST_RAD = radians(15.0)
 _MOST_TIMES, _WITHIN_S = 3, 30.0
+_WITHOUT_S = 60.0
 
 
 class GyroFusion:
@@ -32,7 +33,12 @@ class GyroFusion:
         self._report = report
         self._before: tuple[float, CameraTurn, Mat3] | None = None
         self._too_far_s: list[float] = []
-        self._wrong = False
+        self._without_until_s = -inf
+        self._reported = False
+
+    def reset(self) -> None:
+        """Begin with the joints: the camera sits otherwise from now on."""
+        self._before = None
 
     def orientation(self, t_s: float, R_world_camera: Mat3, turn: CameraTurn | None) -> Mat3:
         """Return R_world_camera at the exposure of a frame.
@@ -42,7 +48,7 @@ class GyroFusion:
             R_world_camera: by the joints at that time.
             turn: by the gyro, None where there is none.
         """
-        if turn is None or self._wrong:
+        if turn is None or t_s < self._without_until_s:
             self._before = None
             return R_world_camera
         before, R = self._before, R_world_camera
@@ -65,13 +71,20 @@ class GyroFusion:
         return compose(R, turned_by(scale(off, 1.0 - exp((before_s - t_s) / _SETTLE_S))))
 
     def _disagree(self, t_s: float) -> None:
-        """Count how often gyro and joints part; if again and again, the gyro is given up."""
+        """Count how often gyro and joints part; if again and again, do without for a while.
+
+        A base that is carried about parts them too, so the gyro is tried again.
+        """
         self._too_far_s = [s for s in self._too_far_s if t_s - s < _WITHIN_S] + [t_s]
-        if len(self._too_far_s) >= _MOST_TIMES:
-            self._wrong = True
+        if len(self._too_far_s) < _MOST_TIMES:
+            return
+        self._too_far_s, self._without_until_s = [], t_s + _WITHOUT_S
+        if not self._reported:
+            self._reported = True
             self._report(
-                "the camera's gyro does not turn with the joints: gaze goes on by the joints alone; "
-                "check oak.imu_rotation_deg and camera.mount, or set oak.gyro: false"
+                "the camera's gyro does not turn with the joints: gaze goes on by the joints alone "
+                f"and tries it again every {_WITHOUT_S:g} s; unless the head was carried about, check "
+                "oak.imu_rotation_deg and camera.mount, or set oak.gyro: false"
             )
 
 

@@ -67,13 +67,13 @@ class Perception:
         self._mount = mount
         self._own_parts = own_parts
         self._depth_at = depth_at
+        self._gyro = GyroFusion(report)
         self.retune(horizontal_field_deg, parts_face_m, lens)
         self._tracker = tracker
         self._hands = Hands()
         self._tracks: tuple[Track, ...] = ()
         self._p_camera: Vec3 = (0.0, 0.0, 0.0)
         self._p_head: Vec3 = (0.0, 0.0, 0.0)
-        self._gyro = GyroFusion(report)
         self._residual = EgomotionResidual()
         self._percept: Percept | None = None
         self._number = 0
@@ -87,7 +87,8 @@ class Perception:
         parts_face_m: Mapping[str, Vec3] | None,
         lens: LensParams | None,
     ) -> None:
-        """Change field of view, parts and lens, from the next frame on."""
+        """Change field of view, parts and lens, from the next frame on; the camera may sit anew."""
+        self._gyro.reset()
         own = parts_face_m or {}
         self._parts = tuple((own.get(code, PARTS_FACE_M[code]), code in own) for code in PARTS)
         self._locator = FrameLocator(lens, radians(horizontal_field_deg), self._depth_at)

@@ -85,7 +85,7 @@ def _no_stereo(dai: Any, device: Any, sockets: set[Any]) -> str:
 def _no_gyro(dai: Any, device: Any, params: OakParams) -> str:
     """Return why there is no gyro, "" where there is."""
     imu = device.getConnectedIMU()
-    if not imu or imu == "NONE":
+    if not imu or imu.upper() == "NONE":
         return "it has no IMU; oak.gyro: false says so in the rig"
     if params.imu_rotation_deg is None and imu_to_camera(dai, device.readCalibration()) is None:
         return (
