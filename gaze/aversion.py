@@ -6,10 +6,13 @@ is what Lee, Badler & Badler 2002 (Eyes Alive) measured in talking and listening
 while thinking the gaze goes mostly up, for longer (Andrist et al. 2014). Without a conversation
 two people who face each other prefer bouts of mutual gaze of 3.3 s (Binetti et al. 2016, n = 498);
 no measurement of the looks away between them is known, they are as short as a listener's.
+
+A look away leaves when the rest on a part of the face is over, instead of the next shift between
+parts, and goes beside the outline of the face: a near face is wider than the published angles.
 """
 
 from dataclasses import dataclass
-from math import cos, exp, inf, log, radians, sin, sqrt
+from math import atan2, cos, degrees, exp, hypot, inf, log, radians, sin, sqrt
 from typing import Annotated, Literal
 
 import numpy as np
@@ -25,6 +28,9 @@ MODES: tuple[AversionMode, ...] = ("none", "talk", "listen", "think")
 DIRECTIONS_PERCENT = (15.54, 6.46, 17.69, 7.44, 16.80, 7.89, 20.38, 7.79)
 _UP = 2
 _MODE_TEXT = {"none": "no conversation"}
+
+_HALF_WIDE_M, _HALF_HIGH_M = 0.085, 0.125
+"""The oval of a face, a little larger than an adult's."""
 
 # A = -6.9 ln(P / 15.7) deg, P uniform in 0..15 % (Eyes Alive).
 _SCALE_DEG, _P_TOP, _P_MOST = 6.9, 15.7, 15.0
@@ -57,6 +63,8 @@ class AversionParams:
     least_deg: Annotated[float, Bounds(0, 20),
         "smallest angle of looking away; with 0, as in the published distribution, half of the looks away would still be on the "
         "face"] = 5.0
+    beside_deg: Annotated[float, Bounds(0, 20),
+        "smallest angle between a look away and the outline of the face, which a near face has farther out than least_deg"] = 2.0
     talk_most_deg: Annotated[float, Bounds(1, 60), "largest angle of looking away while talking or thinking"] = 27.5
     listen_most_deg: Annotated[float, Bounds(1, 60), "largest angle of looking away while listening or without a conversation"] = 22.7
     think_up_share: Annotated[float, Bounds(0, 1), "share of looks away that go up while thinking; the others go in any direction"] = 0.8
@@ -143,7 +151,12 @@ class Aversion:
             self._until_s = t_s if mode == "think" else t_s + self._mutual_s()
 
     def step(
-        self, target: Target, p_world_head_m: Vec3, t_s: float, ordered: bool = False
+        self,
+        target: Target,
+        p_world_head_m: Vec3,
+        t_s: float,
+        ordered: bool = False,
+        rests_until_s: float = -inf,
     ) -> Target:
         """Return the target itself, or a place beside the face while looking away.
 
@@ -153,6 +166,8 @@ class Aversion:
         earlier looks away have added to the count.
 
         ordered: a user has chosen the target, which is left in a conversation only
+        rests_until_s: until when the gaze rests on a part of the face, which it does not leave
+            sooner; inf while it is on its way there
         """
         kept = ordered and self._mode == "none"
         face = target.id if target.kind == "face" and not kept else None
@@ -160,7 +175,8 @@ class Aversion:
             self._attend(face, t_s)
         if self._until_s == inf and self._times[self._mode][0] > 0.0 and self._face is not None:
             self._until_s = t_s + self._mutual_s()  # told only now to look away
-        if self._face is not None and t_s >= self._until_s:
+        leaves = self._away is not None or t_s >= rests_until_s
+        if self._face is not None and t_s >= self._until_s and leaves:
             self._turn(target, p_world_head_m, t_s)
         if self._away is not None:
             return self._beside(target, self._away, t_s)
@@ -211,18 +227,20 @@ class Aversion:
         ahead = unit(rel)
         right = unit(cross(ahead, (0.0, 0.0, 1.0)))
         up = cross(right, ahead)
-        angle, way = radians(self._angle_deg()), radians(self._way_deg())
+        way = radians(self._way_deg())
+        angle = radians(self._angle_deg(_edge_deg(way, norm(rel))))
         aside = add(scale(right, cos(way)), scale(up, sin(way)))
         looking = add(scale(ahead, cos(angle)), scale(aside, sin(angle)))
         return add(p_world_head_m, scale(looking, norm(rel)))
 
-    def _angle_deg(self) -> float:
-        """Draw the amplitude of an aversion, in degrees."""
+    def _angle_deg(self, edge_deg: float) -> float:
+        """Draw the amplitude of an aversion past the edge of the face, in degrees."""
         par = self._params
         near = self._mode in ("listen", "none")
-        most = par.listen_most_deg if near else par.talk_most_deg
+        least = max(par.least_deg, edge_deg + par.beside_deg)
+        most = max(least, par.listen_most_deg if near else par.talk_most_deg)
         # The law's P, of those only that go at least as far as asked for; never 0.
-        p_most = min(_P_MOST, _P_TOP * exp(-par.least_deg / _SCALE_DEG))
+        p_most = min(_P_MOST, _P_TOP * exp(-least / _SCALE_DEG))
         p = (1.0 - float(self._rng.random())) * p_most
         return min(most, -_SCALE_DEG * log(p / _P_TOP))
 
@@ -259,6 +277,12 @@ class Aversion:
         sigma2 = log(1.0 + (sd_s / mean_s) ** 2)
         drawn = mean_s * exp(sqrt(sigma2) * float(self._rng.standard_normal()) - 0.5 * sigma2)
         return max(drawn, self._params.min_dwell_s)
+
+
+def _edge_deg(way_rad: float, distance_m: float) -> float:
+    """Return how far a face extends from its centre in a direction, 0 right and 90 deg up."""
+    across, up = cos(way_rad) / _HALF_WIDE_M, sin(way_rad) / _HALF_HIGH_M
+    return degrees(atan2(1.0 / hypot(across, up), distance_m))
 
 
 def _centre(target: Target) -> Vec3:

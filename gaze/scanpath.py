@@ -7,6 +7,7 @@ part (3.5).
 """
 
 from dataclasses import dataclass
+from math import inf
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
@@ -92,7 +93,7 @@ class ScanpathParams:
         "(whole_visit), or another dwell that makes one rest with the last, spread by rest_spread (one_rest)"] = "one_rest"
     dwell_distribution: Annotated[str, Choices(*LAWS), "distribution of the dwell times"] = "lognormal"
     min_dwell_ms: Annotated[float, Bounds(0, 2000),
-        "shortest dwell, from landing to departure; what lasts longer is distributed above it, with the same mean"] = 130.0
+        "shortest dwell, from landing to departure; what lasts longer is distributed above it, with the same mean"] = 140.0
     rest_spread: Annotated[float, Bounds(0.05, 3),
         "with diagonal one_rest: standard deviation over mean of what a rest lasts beyond min_dwell_ms"] = 0.6
     shift_ms: Annotated[float, Bounds(0, 500),
@@ -193,6 +194,7 @@ class Scanpath:
         self._searched: Percept | None = None
         self._last = None
         self._shift = 0
+        self._rests_until_s = -inf
         self.looks.enter()
 
     def wander(
@@ -215,10 +217,12 @@ class Scanpath:
             face, entered = self._find(target.id, percept)
             if face is not None and entered:
                 self.looks.enter(_nearest(face, p_world_head_m, gaze_world_m))
+                settled = False  # at what was looked at before
         look = None
         if face is not None:
             look = self.looks.step(face, p_world_head_m, t_s, settled)
             self._shift += look.moved
+        self._rests_until_s = self._until_s(look, settled)
         point = look.p_world_m if look is not None else None
         last = self._last
         if last is not None and last.of(target, face, point, self._shift):
@@ -226,6 +230,22 @@ class Scanpath:
         result = _replaced(target, face, look, self._shift)
         self._last = _Replaced(target, face, point, self._shift, result)
         return result
+
+    @property
+    def rests_until_s(self) -> float:
+        """Return until when the gaze rests on a part of a face.
+
+        inf while it is on its way there, -inf where no end is drawn or no face looked at.
+        """
+        return self._rests_until_s
+
+    def _until_s(self, look: ScanpathStep | None, settled: bool) -> float:
+        if look is None:
+            return -inf
+        _, until_s = self.looks.dwell
+        if until_s is not None:
+            return until_s
+        return -inf if settled and not look.moved else inf
 
     def _find(self, face_id: int, percept: Percept | None) -> tuple[Face | None, bool]:
         """Return the face, the last known while it is out of sight, and whether it is new."""

@@ -40,7 +40,7 @@ def test_a_run_is_made_once_and_its_parameters_count(run: MeasuredRun) -> None:
     still = measured_run(
         "face-to-face", seconds=8.0, overrides={"gaze.scanpath.model": "face_tracking"}
     )
-    assert still.saccades[-1] < 0.5 * run.saccades[-1]
+    assert still.saccades[-1] < 0.7 * run.saccades[-1]  # small ones within the face are left
 
 
 def test_every_row_measures_what_it_wants(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -100,7 +100,7 @@ def test_random_angles_are_outside() -> None:
     seen = verdicts(looked("face-to-face", 60.0, SLOWER, scanpath="random"))
     for key in ("on_parts", "below_15", "heat"):
         assert seen[key].verdict == "outside", seen[key]
-    assert seen["rate"].verdict == "uncertain" and seen["rate"].value < 1.5  # of 90 events
+    assert seen["rate"].value < 1.5 and seen["rate"].verdict != "pass"
 
 
 def test_jumps_of_two_frames_are_outside() -> None:

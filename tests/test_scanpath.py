@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from math import inf
 
 import numpy as np
 import pytest
@@ -169,7 +170,7 @@ def test_parts_are_visited_for_as_long_as_in_the_table_but_for_the_two_shortest(
     visits = [times[parts == part].mean() + ScanpathParams().shift_ms / 1e3 for part in range(8)]
     table = (0.244, 0.480, 0.173, 0.261, 0.288, 0.286, 0.286, 0.165)
     for name, visit, wanted in zip(WALK.order, visits, table, strict=True):
-        low, high = (1.05, 1.2) if name in ("LE", "UP") else (0.95, 1.0)
+        low, high = (1.05, 1.25) if name in ("LE", "UP") else (0.95, 1.0)
         assert low * wanted < visit < high * wanted, name
 
 
@@ -182,14 +183,14 @@ def test_a_rate_that_rests_allow_is_kept(rate_scale: float) -> None:
 
 def test_a_rate_beyond_the_shortest_rests_is_as_fast_as_they_allow() -> None:
     _, times = rests(5000, rate_scale=5.0)
-    assert times.min() >= 0.13 and times.mean() == pytest.approx(0.13 * 1.15, rel=0.02)
+    assert times.min() >= 0.14 and times.mean() == pytest.approx(0.14 * 1.15, rel=0.02)
 
 
 def test_a_walk_with_a_part_that_is_never_left_still_rests() -> None:
     stuck = replace(WALK, matrix=(*WALK.matrix[:7], (0.0,) * 7 + (1.0,)))
     walk = markov_walk(ScanpathParams(), stuck, np.random.default_rng(0))
     assert walk.next_part(7) == 7
-    assert all(0.13 <= walk.dwell_s(part) < 30.0 for part in range(8))
+    assert all(0.14 <= walk.dwell_s(part) < 30.0 for part in range(8))
 
 
 @pytest.mark.parametrize("diagonal", ["refixation", "whole_visit"])
@@ -221,3 +222,27 @@ def test_a_face_is_entered_at_the_part_nearest_to_the_gaze(
     away = TARGET._replace(kind="away")
     assert walk.wander(away, PERCEPT, 0.2, True, head, (1.0, 0.9, 0.2)).part is None
     assert walk.wander(TARGET, PERCEPT, 0.3, True, head, (1.0, 0.9, 0.2)).part == PARTS[-1]
+
+
+def test_the_first_rest_on_a_face_begins_when_the_gaze_arrives() -> None:
+    """What "settled" says in the tick of entry is of what was looked at before."""
+    walk = walker(6, ScanpathParams())
+    assert walk.rests_until_s == -inf
+    entered = walk.wander(TARGET, PERCEPT, 0.0, True)
+    assert walk.rests_until_s == inf and walk.looks.dwell[1] is None
+    walk.wander(TARGET, PERCEPT, 0.005, False)  # the saccade is in flight
+    assert walk.rests_until_s == inf
+    walk.wander(TARGET, PERCEPT, 0.060, True)
+    until_s = walk.rests_until_s
+    assert until_s >= 0.060 + 0.14
+    moved = walk.wander(TARGET, PERCEPT, until_s, True)
+    assert moved.part != entered.part and walk.rests_until_s == inf
+    walk.wander(TARGET._replace(kind="away"), PERCEPT, until_s + 0.1, True)
+    assert walk.rests_until_s == -inf
+
+
+def test_a_face_that_is_one_point_is_never_held_by_a_rest() -> None:
+    walk = walker(6, ScanpathParams(model="face_tracking"))
+    walk.wander(TARGET, PERCEPT, 0.0, True)
+    walk.wander(TARGET, PERCEPT, 0.1, True)
+    assert walk.rests_until_s == -inf

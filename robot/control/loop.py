@@ -231,7 +231,8 @@ class Robot:
         chosen = self.attention.choose(percept, pose, t_s)
         self._executor.gesture_by_rule(chosen, t_s)
         target = self._lead.target(chosen, percept, t_s)
-        target = self._aversion.step(target, pose.p_world_head_m, t_s, self._lead.active)
+        rests_s = self._scanpath.rests_until_s
+        target = self._aversion.step(target, pose.p_world_head_m, t_s, self._lead.active, rests_s)
         target = self._scanpath.wander(
             target, percept, t_s, self._oculomotor.settled, pose.p_world_head_m, self._gaze_m
         )
@@ -243,8 +244,7 @@ class Robot:
             self._stop.keep_released(self.body, joints, t_s)
             guard_result = at_rest(joints, desired, stopped, self.body.names)
         else:
-            age_s = self._frame_age_s(percept, t_s)
-            guard_result = self._guard.check(desired, joints, age_s, t_s)
+            guard_result = self._guard.check(desired, joints, self._frame_age_s(percept, t_s), t_s)
             self.body.write(guard_result.command_rad)
         self._executor.commanded_rad = guard_result.command_rad
         converges = not self._kinematics.one_pan

@@ -7,8 +7,7 @@ from gazerig.robot.report.gaze_trace import GazeTrace
 from gazerig.robot.report.landing import planned_saccades
 from gazerig.robot.report.statistics import MeasuredValue, mean
 
-SHORT_S, SLOT_S = 0.14, 0.01
-"""150 ms less the 10 ms by which saccades are found longer than they are, at 200 Hz."""
+SHORT_S, SLOT_S = 0.15, 0.01
 
 _SPIKES_S = (0.04, 1.0)
 _NEAR_SLOTS = 5

@@ -98,7 +98,8 @@ def _wilson(share: float, n: int) -> tuple[float, float]:
     z2 = _Z95 * _Z95
     middle = (share + 0.5 * z2 / n) / (1.0 + z2 / n)
     half = _Z95 * sqrt(share * (1.0 - share) / n + 0.25 * z2 / n**2) / (1.0 + z2 / n)
-    return max(0.0, middle - half), min(1.0, middle + half)
+    # Nor does rounding leave the share itself out.
+    return min(share, middle - half), max(share, middle + half)
 
 
 def compared(measured: MeasuredValue, band: NormBand) -> MeasureResult:
