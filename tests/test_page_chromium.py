@@ -140,13 +140,13 @@ def test_a_target_is_dragged_through_the_scene(at_the_rig: tuple[Rig, Person]) -
     rig, person = at_the_rig
     person.click(saying("lead"))
     person.run("window.drawScene = true")
-    # The page is behind the rig: what it says must be of this target, not of one before.
-    chosen = "a user chose this point"
-    wait_for(lambda: not person.reads(chosen), "the page knowing of no target")
     there = (0.5, -0.25, 0.2)  # no label before it
     rig.robot.command(LookAt(there, stay=True))
-    wait_for(lambda: present(rig.newest).target.p_world_m == there, "the head being led")
-    wait_for(lambda: person.reads(chosen), "the page knowing of it")
+    wait_for(lambda: present(rig.newest).gaze.gaze_point_world_m == pytest.approx(there), "a look")
+    # The target to drag starts where the page last knew the head to look. It is behind the rig:
+    # once it says what was asked for afterwards, it knows of the look too.
+    rig.robot.command(Ask("behaviour", "attack"))
+    wait_for(lambda: person.reads("in force: behaviour attack"), "the page knowing of the look")
     person.click(beside("drag a target", "input"))
     rect = "(() => { const r = document.querySelector('canvas').getBoundingClientRect();"
     bounds: Any = person.run(rect + "return [r.x, r.y, r.width, r.height]; })()")
