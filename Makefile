@@ -13,7 +13,7 @@ run: $(VENV)/.installed
 	$(BIN)/gazerig run --mock
 
 test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
+	$(BIN)/python -m pytest --workers auto
 
 check: $(VENV)/.installed-dev links
 	$(BIN)/ruff check .

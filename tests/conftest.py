@@ -12,6 +12,7 @@ import time
 from collections.abc import Iterator
 
 import child_processes
+import forked_workers
 import pytest
 import running_order
 import shared_compiling
@@ -42,15 +43,32 @@ for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "OPENCV_FOR_THREADS_N
     os.environ.setdefault(threads, "1")
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Have an option for test files side by side."""
+    parser.addoption("--workers", default="1", help="test files at the same time, or auto")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtestloop(session: pytest.Session) -> bool | None:
+    """Run the tests in forks of this process, where more than one is wanted."""
+    workers = forked_workers.count(session.config)
+    if workers == 1 or session.config.option.collectonly or session.testsfailed:
+        return None
+    forked_workers.run(session, workers)
+    return True
+
+
 @pytest.hookimpl(hookwrapper=True)
 def pytest_collection(session: pytest.Session) -> Iterator[None]:
-    """Share compiling among workers, and let what is imported lie.
+    """Share compiling among processes, and let what is imported lie.
 
     It stays, and looking it through takes a third of the time.
     """
     gc.disable()
     if worker := os.environ.get("PYTEST_XDIST_WORKER"):
         shared_compiling.compile_missing(worker, session.config)
+    elif forked_workers.count(session.config) > 1:
+        shared_compiling.compile_in_two(session.config)
     yield
     gc.freeze()
     gc.enable()
@@ -75,9 +93,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """Return four workers for two processors: for a third of the time tests wait."""
-    processors = os.cpu_count() or 1
-    return processors + processors // 2 + 1
+    """Return how many workers the processors here keep busy."""
+    return forked_workers.enough()
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -113,15 +113,18 @@ class Person:
 
     def click(self, element: str, across: float = 0.5) -> None:
         """Click on an element once it can be seen and stays where it is."""
+        wait_for(lambda: self.clicked(element, across), f"a place to click: {element}")
 
-        def steady() -> tuple[float, float] | None:
-            first = self.place(element, across)
-            return first if first is not None and first == self.place(element, across) else None
-
-        x, y = wait_for(steady, f"a place to click: {element}")
+    def clicked(self, element: str, across: float = 0.5) -> bool:
+        """Click on an element if it can be seen and stays where it is; was it so?"""
+        first = self.place(element, across)
+        if first is None or first != self.place(element, across):
+            return False
+        x, y = first
         for kind, button in (("mouseMoved", "none"), ("mousePressed", "left")):
             self._mouse(kind, x, y, button)
         self._mouse("mouseReleased", x, y, "left")
+        return True
 
     def fill(self, field: str, text: str) -> None:
         """Put a text in the place of what stands in a field; again, if the field moved away.

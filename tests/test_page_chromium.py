@@ -57,8 +57,15 @@ def resumed(rig: Rig, person: Person, question: str = "Fingers out?") -> None:
     person.click(saying("Resume …"))
     assert rig.robot.stopped  # not without being asked again
     wait_for(lambda: person.reads(question), "the question")
-    person.click(saying("Yes, resume"))
-    wait_for(lambda: not rig.robot.stopped, "the rig going on")
+
+    # A stop that was sent twice holds for longer, and the rig refuses: then it is asked again.
+    def goes_on() -> bool:
+        if rig.robot.stopped and not person.clicked(saying("Yes, resume")):
+            person.clicked(saying("Resume …"))
+        person.wait_for_frames(UNHURRIED_FRAMES)
+        return not rig.robot.stopped
+
+    wait_for(goes_on, "the rig going on")
     wait_for(lambda: not person.reads("Torque is off"), "the page going on")
 
 
