@@ -68,6 +68,31 @@ def test_a_hand_remains_one_where_it_turns_or_passes_before_the_face_and_not_for
     assert kinds(Hands(), *seen)[-1] == "thing"
 
 
+@pytest.mark.parametrize(("last_m_s", "stays"), [(0.1, True), (1.2, False)])
+def test_a_hand_that_has_come_to_rest_is_still_there_and_one_that_went_is_not(
+    last_m_s: float, stays: bool
+) -> None:
+    hands, there = Hands(), []
+    for k in range(90):
+        speed = 1.2 if k < 10 else last_m_s
+        seen = [patch(v=(0.0, speed, 0.0))] if k < 12 else []
+        there.append(
+            [(one.kind, one.v_world_m_s) for one in hands.named(seen, [FACE], EYE, k / 30)]
+        )
+    assert there[11][0][0] == HAND
+    assert there[12:71] == [[(HAND, (0.0, 0.0, 0.0))] if stays else []] * 59
+    assert there[-1] == [] and not hands.held
+
+
+def test_a_hand_that_moves_again_is_one_hand() -> None:
+    hands = Hands()
+    for k in range(6):
+        hands.named([patch(v=(0.0, 1.2 if k < 4 else 0.1, 0.0))], [FACE], EYE, k / 30)
+    for k in range(30, 34):
+        found = hands.named([patch(mark=8)], [FACE], EYE, k / 30)
+    assert [one.kind for one in found] == [HAND] and not hands.held
+
+
 def test_a_hand_is_as_far_as_the_person_unless_its_distance_is_measured() -> None:
     for measured, far in ((False, 1.0), (True, 0.62)):
         p: Vec3 = (0.6, 0.15, -0.05) if measured else (2.0, 0.5, -0.2)

@@ -3,12 +3,14 @@
 A camera without a hand detector shows a moving arm as one patch of flow. The quarter of it that
 moves fastest is taken to be the hand, as far away as the person's face is, unless the distance was
 measured. What a hand is called it keeps for as long as the detector's number of it lasts and it
-moves now and then; so a track does not break where a hand turns or passes before the face.
+moves now and then; so a track does not break where a hand turns or passes before the face. A hand
+that has come to rest is still there for a while, though flow shows nothing that stands still.
 """
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from math import hypot
+from typing import NamedTuple
 
 from gazerig.gaze.angles import add, dot, norm, scale, sub, unit
 from gazerig.gaze.types import Vec3
@@ -31,6 +33,9 @@ _SAME_M = 0.3
 """A face so near to where one was a frame ago is the same."""
 # Seen to move so in so many frames within the time for which a rest is bridged.
 _FRAMES, _RESTS_S = 2, 0.4
+# A hand that was last seen slower than this has come to rest, and is there for so long; what moves
+# so near to it is the hand again.
+_AT_REST_M_S, _HELD_S, _AGAIN_M = 0.4, 2.0, 0.3
 _HAND_RADIUS_M = 0.07
 _ACROSS_SD_M, _ALONG_SD_M = 0.04, 0.25
 
@@ -40,11 +45,20 @@ class _Moving:
     """A patch that may be a hand.
 
     at_s: when it last moved as one; p_face: of whom it is; frames: in how many it moved so
+    hand: where it was then
     """
 
     at_s: float
     p_face: Vec3
+    hand: LocalisedDetection
     frames: int = 0
+
+
+class _Held(NamedTuple):
+    """A hand that has come to rest, and when it was seen last."""
+
+    hand: LocalisedDetection
+    seen_s: float
 
 
 class Hands:
@@ -52,6 +66,7 @@ class Hands:
 
     def __init__(self) -> None:
         self._moving: dict[int, _Moving] = {}
+        self._held: dict[int, _Held] = {}
 
     def named(
         self,
@@ -62,6 +77,8 @@ class Hands:
     ) -> list[LocalisedDetection]:
         """Return the things, those that are hands by this name and where the hand is.
 
+        Behind them come hands that do not move any more.
+
         Args:
             things: what moves in a frame.
             faces: of the people in view.
@@ -71,7 +88,23 @@ class Hands:
         self._moving = {
             mark: one for mark, one in self._moving.items() if t_s - one.at_s <= _RESTS_S
         }
-        return [self._named(thing, faces, p_camera, t_s) for thing in things]
+        found = [self._named(thing, faces, p_camera, t_s) for thing in things]
+        return [*found, *self._at_rest(found, t_s)] if self._held else found
+
+    @property
+    def held(self) -> bool:
+        """Return whether there are hands that do not move any more."""
+        return bool(self._held)
+
+    def _at_rest(self, found: list[LocalisedDetection], t_s: float) -> list[LocalisedDetection]:
+        """Return the hands that have come to rest and are not seen to move."""
+        marks = {thing.mark for thing in found}
+        self._held = {
+            mark: one
+            for mark, one in self._held.items()
+            if mark in marks or (t_s - one.seen_s <= _HELD_S and not _moves_again(one.hand, found))
+        }
+        return [one.hand for mark, one in self._held.items() if mark not in marks]
 
     def _named(
         self, thing: LocalisedDetection, faces: list[Known], p_camera: Vec3, t_s: float
@@ -92,9 +125,26 @@ class Hands:
         begins = _BEFORE_HEAD_M_S if hypot(aside, up) < _HEAD_M else _BEGINS_M_S
         # Legs and parts of the trunk of somebody who walks are no faster than that, seen from them.
         if speed > (_STAYS_M_S if named else max(begins, norm(v_face))):
-            known = self._moving.setdefault(thing.mark, _Moving(t_s, p_face))
-            known.at_s, known.p_face, known.frames = t_s, p_face, known.frames + 1
-        return placed if known is not None and known.frames >= _FRAMES else thing
+            known = self._moving.setdefault(thing.mark, _Moving(t_s, p_face, placed))
+            known.at_s, known.p_face, known.hand = t_s, p_face, placed
+            known.frames += 1
+        if known is None or known.frames < _FRAMES:
+            return thing
+        if speed >= _AT_REST_M_S:
+            self._held.pop(thing.mark, None)
+            return placed
+        # A patch that hardly moves may be all of the person: the hand is where it moved last.
+        still = replace(known.hand, v_world_m_s=(0.0, 0.0, 0.0))
+        self._held[thing.mark] = _Held(still, t_s)
+        return placed if known.at_s == t_s else still
+
+
+def _moves_again(hand: LocalisedDetection, found: list[LocalisedDetection]) -> bool:
+    """Return whether something moves where a hand has come to rest, as far as that is known."""
+    return any(
+        thing.kind == HAND and norm(sub(thing.p_world_m, hand.p_world_m)) < _AGAIN_M
+        for thing in found
+    )
 
 
 def _as_hand(thing: LocalisedDetection) -> LocalisedDetection:

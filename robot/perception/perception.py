@@ -110,7 +110,7 @@ class Perception:
         located = self._located(detections)
         faces = [placed(face, R, p) for face in located.faces]
         things = [placed(thing, R, p) for thing in located.things]
-        if things:
+        if things or self._hands.held:
             if self._own_parts is not None:
                 things = own_named(things, self._own_parts(R_head, self._p_head), p)
             known = self._known(t_s)
