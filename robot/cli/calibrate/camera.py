@@ -11,7 +11,6 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import typer
 from rich.console import Console
-from rich.table import Table
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.camera.oak.calibration import OakCalibration
@@ -34,6 +33,7 @@ from gazerig.robot.calibration.camera_procedure import (
 )
 from gazerig.robot.calibration.charuco_page import RULER_MM, write_page
 from gazerig.robot.calibration.hand_eye import HandEye, HandEyeParams, camera_on_head
+from gazerig.robot.cli.calibrate.difference_table import difference_table
 from gazerig.robot.cli.calibrate.oak import (
     as_seen,
     calibration_of_file,
@@ -143,7 +143,7 @@ def calibrate_camera(
                     with moving_neck(loaded, eye.mock, port, stopped, yes) as neck:
                         found = _mount(job, eye, neck, lens.camera, lens.good)
                         changes |= mount_changes(found, lens.camera)
-        Console().print(_table(rig, loaded, changes))
+        Console().print(difference_table(rig, loaded, changes))
         if not dry_run:
             write_found(rig, changes, out, TerminalPerson(Lines(None), stopped, yes))
 
@@ -381,20 +381,3 @@ def _board(columns: int, rows: int, square_mm: float, ruler_mm: float) -> BoardP
         return BoardParams(columns, rows, square_mm, marker_mm).scaled(ruler_mm / RULER_MM)
     except ValueError as error:
         raise SetupError(f"this board cannot be: {error}") from error
-
-
-def _table(rig: str, loaded: Rig, changes: dict[str, Any]) -> Table:
-    """Show what was found beside what the rig file says."""
-    table = Table(caption=f"what was found, against {rig}")
-    for name in ("key", "old", "new"):
-        table.add_column(name, justify="left" if name == "key" else "right", no_wrap=True)
-    for key, new in changes.items():
-        old: Any = loaded
-        for step in key.split("."):
-            old = getattr(old, step, "-")
-        table.add_row(key, _number(old), _number(new))
-    return table
-
-
-def _number(value: Any) -> str:
-    return " ".join(f"{v:g}" for v in value) if isinstance(value, tuple) else f"{value}"
