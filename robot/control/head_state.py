@@ -117,6 +117,7 @@ class Person:
         distance_from: what the distance rests on: "camera", "face size", or "" where unknown.
         age_s: of the frame.
         looks_at_head: whether the person looks at the head; None where that is too uncertain.
+        speaks: whether the mouth moves as of a speaking person; None where no mesh is made of it.
     """
 
     id: int
@@ -128,6 +129,7 @@ class Person:
     distance_from: str
     age_s: float
     looks_at_head: bool | None = None
+    speaks: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -289,4 +291,5 @@ def _person(face: Face, age_s: float) -> Person:
         face.distance_from,
         age_s,
         face.looks_at_head,
+        face.speaks,
     )

@@ -42,6 +42,9 @@ _FaceRow = tuple[
     float | None,
     bool | None,
     Vec3 | None,
+    float | None,
+    float | None,
+    bool | None,
 ]  # the fields of a Face
 
 

@@ -27,6 +27,7 @@ def perception_text(tick: Tick, residual: ResidualFigures) -> str:
             f"face {face.id} at {norm(sub(face.p_world_m, head)):.2f} m{by}, "
             f"+- {100.0 * face.along_sd_m:.0f} cm"
             + (", looks at the head" if face.looks_at_head else "")
+            + (", speaks" if face.speaks else "")
         )
     if residual.speed_deg_s is not None:
         parts.append(

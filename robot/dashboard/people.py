@@ -164,9 +164,10 @@ class PeopleView:
 
 
 def face_label(face: SeenFace) -> str:
-    """Return what stands above a face, e.g. "face 3, looks at the head"."""
+    """Return what stands above a face, e.g. "face 3, looks at the head, speaks"."""
     looks = ", looks at the head" if face.looks_at_head else ""
-    return f"face {face.id}{looks}"
+    speaks = ", speaks" if face.speaks else ""
+    return f"face {face.id}{looks}{speaks}"
 
 
 def fixated_part(face: SeenFace, p_world_target_m: Vec3) -> int | None:

@@ -223,6 +223,7 @@ def _faces(tick: Tick) -> tuple[SeenFace, ...]:
             face.parts_world_m,
             face.v_world_m_s,
             face.looks_at_head,
+            face.speaks,
         )
         for face in tick.percept.faces
     )

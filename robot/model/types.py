@@ -141,6 +141,7 @@ class SeenFace:
 
     v_world_m_s: velocity of the centre; places are those at the frame's capture
     looks_at_head: whether the person looks at the head, None where that is too uncertain
+    speaks: whether the mouth moves as of a speaking person, None where it is not found
     """
 
     id: int
@@ -149,6 +150,7 @@ class SeenFace:
     parts_world_m: tuple[Vec3, ...]
     v_world_m_s: Vec3 = (0.0, 0.0, 0.0)
     looks_at_head: bool | None = None
+    speaks: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,6 +27,7 @@ from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PUPIL_DISTANCE_M
 from gazerig.robot.model.frames import LensParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, lens_fault
 from gazerig.robot.perception.face_pose import FacePose, face_pose
+from gazerig.robot.perception.mesh_reading import read_mesh
 
 Box = tuple[float, float, float, float]
 """x, y, width, height in pixels."""
@@ -108,9 +109,13 @@ class FrameLocator:
         self, face: DetectedFace, found: Detections, lens: Intrinsics
     ) -> DetectionInCamera | None:
         """Locate a face, None where its landmarks show none from its front."""
-        pose = face_pose(face.landmarks_px, lens)
+        reading = read_mesh(face.mesh, lens) if face.mesh is not None else None
+        pose = face_pose(face.landmarks_px, lens) if reading is None else reading.pose
         if pose is None:
             return None
+        gaze, signs = face.gaze_camera, None
+        if reading is not None:
+            gaze, signs = reading.gaze_camera or gaze, reading.signs
         focal_px = sqrt(lens.fx_px * lens.fy_px)
         eyes_px = focal_px * PUPIL_DISTANCE_M / pose.p_camera_m[2]
         far = norm(pose.p_camera_m)
@@ -134,7 +139,8 @@ class FrameLocator:
             None if measured is None else 1.0 / share,
             None,
             pose.turn_sd_rad,
-            face.gaze_camera,
+            gaze,
+            signs=signs,
         )
 
     def _measured(

@@ -28,6 +28,7 @@ from gazerig.robot.perception.gyro_fusion import GyroFusion
 from gazerig.robot.perception.hand_ownership import known_faces, without_own_motion
 from gazerig.robot.perception.hands import Hands, Known
 from gazerig.robot.perception.localisation import placed
+from gazerig.robot.perception.mesh_reading import EYES_SHUT
 from gazerig.robot.perception.own_body import OwnParts, own_named
 from gazerig.robot.perception.tracker import Track, Tracker
 
@@ -190,7 +191,12 @@ class Perception:
         across_sd, along_sd = _deviations(track)
         found = track.detection
         off_rad = angle_off_head_rad(R, found.gaze_world, sub(self._p_head, p))
-        if track.seen_s == track.at_s:
+        signs = found.signs
+        if track.seen_s == track.at_s and signs is not None:
+            track.speech = track.speech.seen(signs.mouth_opening_m, track.at_s)
+        # A blink takes no look away.
+        blinks = signs is not None and signs.eye_opening < EYES_SHUT
+        if track.seen_s == track.at_s and not blinks:
             track.looks_at_head = looks_at_head(
                 self._tracker.params,
                 off_rad,
@@ -211,6 +217,9 @@ class Perception:
             off_rad,
             track.looks_at_head,
             found.gaze_world,
+            None if signs is None else signs.eye_opening,
+            None if signs is None else signs.mouth_opening_m,
+            None if signs is None else track.speech.speaks(track.at_s),
         )
 
     def _face_parts(self, R: Mat3, p: Vec3, size: float, length: float) -> tuple[Vec3, ...]:

