@@ -150,6 +150,18 @@ def test_who_is_hidden_is_not_whoever_appears_nearby() -> None:
     assert tracker.step([across(0.5, 2.0)], CAMERA, 1.0)[0].id == alone.id
 
 
+def test_what_the_detector_follows_stays_itself_beside_something_nearer() -> None:
+    """A patch whose middle jumps by half a metre keeps the number that the detector gave it."""
+    tracker = Tracker(TrackParams())
+    near, far = across(0.0, 1.9, "thing"), across(0.05, 2.0, "thing")
+    near.mark, far.mark = 1, 2
+    for k in range(10):
+        tracks = tracker.step([near, far], CAMERA, k / 30)
+    jumped = replace(far, p_world_m=(2.0, 0.5, 0.2))
+    after = tracker.step([near, jumped], CAMERA, 10 / 30)
+    assert [track.id for track in after] == [track.id for track in tracks]
+
+
 def _y(track: Track) -> float:
     return track.p_world_m[1]
 

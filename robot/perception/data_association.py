@@ -119,7 +119,7 @@ def pair_costs(
     across_sum, along_sum = across_sum + surprise, along_sum + surprise
     far = aside / across_sum + deep / along_sum
     surprising = far + np.log(across_sum * across_sum * along_sum / exact) + _SURPRISE
-    hidden = _hidden(t[:, :, 0])[:, None]
+    hidden = _hidden(t[:, :, 0])[:, None] & ((t[1] != d[1]) | (t[1] == NO_MARK))
     costs = np.where(hidden, expected, np.minimum(expected, surprising)) + _OTHER_MARK * other
     unlikely = hidden & (costs > UNPAIRED)
     costs = np.minimum(costs, UNPAIRED - _SLOWLY / np.maximum(costs, _NEARLY_UNPAIRED))
@@ -134,7 +134,8 @@ def pair_costs(
 def _hidden(t: Floats) -> NDArray[np.bool_]:
     """Return which tracks are expected behind or just beside a nearer one.
 
-    Who is about to be hidden is not seen somewhere else all of a sudden: that is another person.
+    Who is about to be hidden is not seen somewhere else all of a sudden: that is another person,
+    unless the detector gave both one number.
 
     Args:
         t: columns of the rows of tracks.
