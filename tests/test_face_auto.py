@@ -88,6 +88,23 @@ def test_no_face_is_invented_in_an_empty_room() -> None:
     assert not any(detector.find(room(seed=seed % 7)[0]) for seed in range(60))
 
 
+def test_a_face_in_a_dark_room_is_found_and_no_face_in_a_dark_empty_one() -> None:
+    frame, (truth,) = room(("astronaut", 1.2, 300.0, 180.0))
+    (face,) = auto().find(noisy((frame * 0.1).astype(np.uint8), 2.0, np.random.default_rng(1)))
+    assert error(face, truth) < 0.1
+    detector = auto()
+    for seed in range(20):
+        dark = (room()[0] * 0.1).astype(np.uint8)
+        assert detector.find(noisy(dark, 2.0, np.random.default_rng(seed))) == ()
+
+
+def test_a_bright_face_before_the_dark_is_not_made_brighter() -> None:
+    frame = np.zeros((400, 640, 3), np.uint8)
+    truth = paste(frame, portrait("astronaut"), (300.0, 180.0), 30.0)
+    (face,) = auto().find(frame)
+    assert error(face, truth) < 0.06
+
+
 def test_another_size_begins_anew() -> None:
     detector = auto()
     frame, _ = room(("astronaut", 1.2, 300.0, 180.0))

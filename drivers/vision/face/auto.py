@@ -26,7 +26,7 @@ from gazerig.drivers.vision.face.mtcnn_networks import (
     squared,
 )
 from gazerig.drivers.vision.face.params import FaceDetectorParams
-from gazerig.drivers.vision.face.preprocess import as_bgr, largest_first, prepare
+from gazerig.drivers.vision.face.preprocess import Prepared, as_bgr, largest_first, prepare
 from gazerig.drivers.vision.face.search_plan import Tile, far_tiles
 from gazerig.drivers.vision.face.yunet_network import YunetNetwork, face_of_row, found_file
 
@@ -45,6 +45,8 @@ _YUNET_AROUND, _YUNET_PX = 2.0, 96
 # Half the side of the square that the last network wants, in root mean square distances of the five
 # landmarks from their middle, and how far above that middle it lies.
 _SQUARE, _ABOVE = 2.1, 0.13
+# With YuNet, MTCNN searches too in every so many searches: it sees tilted and drawn faces better.
+_BOTH_EVERY = 4
 # What so many rows and columns of a frame show has changed by more grey levels: another shot.
 _CUT_GREY, _SAMPLES = 30.0, 24
 
@@ -77,7 +79,7 @@ class AutoDetector:
         self._known: list[_Known] = []
         self._size: tuple[int, ...] = ()
         self._samples = np.zeros(0)
-        self._since_search, self._next_tile = 0, 0
+        self._since_search, self._searches, self._next_tile = 0, 0, 0
 
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
         """Find faces, the largest first, in pixels of the image given."""
@@ -92,7 +94,7 @@ class AutoDetector:
         soon = len(known) < len(self._known) or self._is_cut(frame)
         if first or self._search_due(soon, not known):
             self._since_search = 0
-            known += self._near(frame, known)
+            known += self._near(frame, known, first)
         else:
             known += self._far(frame, known, self._tile(frame))
         if first:
@@ -111,7 +113,7 @@ class AutoDetector:
         if not file:
             return None
         try:
-            return YunetNetwork(file, self._params.min_confidence)
+            return YunetNetwork(file)
         except ModelFileError as error:
             self._log.add(f"{error}; until then mtcnn finds the faces")
             return None
@@ -140,9 +142,8 @@ class AutoDetector:
         judged = self._judged(frame, boxes, self._params.keep_confidence)
         for row, (one, now) in enumerate(zip(self._known, judged, strict=True)):
             if now is None:
-                judged[row] = (
-                    self._by_yunet(frame, one) if one.by_yunet else self._around(frame, one)
-                )
+                around = None if one.by_yunet else self._around(frame, one)
+                judged[row] = around or self._by_yunet(frame, one)
         return _distinct([one for one in judged if one is not None], [])
 
     def _judged(self, frame: ImageArray, boxes: Floats, least: float) -> list[_Known | None]:
@@ -168,7 +169,7 @@ class AutoDetector:
         if self._yunet is None:
             return None
         part, where = cut_square(frame, _widened(one.box, _YUNET_AROUND), _YUNET_PX)
-        rows = self._yunet.search(part)
+        rows = self._yunet.search(part, self._params.keep_confidence)
         if not len(rows):
             return None
         row = rows[np.argmax(rows[:, 14])]
@@ -177,20 +178,32 @@ class AutoDetector:
         row[4:14] += np.tile(where[:2], 5)
         return _Known(_square_of(row[4:14].reshape(5, 2)), face_of_row(row), True)
 
-    def _near(self, frame: ImageArray, known: list[_Known]) -> list[_Known]:
+    def _near(self, frame: ImageArray, known: list[_Known], first: bool) -> list[_Known]:
         """Search the whole frame: return the faces that are new."""
         prepared = prepare(frame, self._params.work_width_px)
         assert prepared is not None
-        if self._yunet is None:
+        self._searches += 1
+        found: list[_Known] = []
+        if self._yunet is not None:
+            found += self._near_by_yunet(self._yunet, prepared, known)
+        if self._yunet is None or first or self._searches % _BOTH_EVERY == 0:
             boxes = proposed(self._networks, prepared, self._params.min_face_px)
-            boxes = self._networks.refine(frame, boxes[_is_new(boxes, known)])
-            return self._accepted(frame, known, boxes, self._params.min_confidence)
-        rows = self._yunet.search(prepared.small)
+            boxes = self._networks.refine(frame, boxes[_is_new(boxes, [*known, *found])])
+            least = self._params.min_confidence
+            found += self._accepted(frame, [*known, *found], boxes, least)
+        return found
+
+    def _near_by_yunet(
+        self, yunet: YunetNetwork, prepared: Prepared, known: list[_Known]
+    ) -> list[_Known]:
+        """Search the whole frame by YuNet; the last network of MTCNN places what it sees too."""
+        least = self._params.min_confidence
+        rows = yunet.search(prepared.small, least)
         rows[:, :14] *= np.tile(prepared.stretch, 7)
         points = rows[:, 4:14].reshape(-1, 5, 2)
         boxes = np.array([_square_of(five) for five in points]).reshape(-1, 4)
         fresh = np.flatnonzero(_is_new(boxes, known))
-        judged = self._judged(frame, boxes[fresh], self._params.min_confidence)
+        judged = self._judged(prepared.full, boxes[fresh], least)
         found = [
             now if now is not None else _Known(boxes[row], face_of_row(rows[row]), True)
             for row, now in zip(fresh, judged, strict=True)

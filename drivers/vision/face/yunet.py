@@ -18,7 +18,7 @@ class YunetDetector:
             ModelFileError: the file is missing or is not YuNet.
         """
         self._params = params
-        self._network = YunetNetwork(model_file, params.min_confidence)
+        self._network = YunetNetwork(model_file)
 
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
         """Find faces, the largest first, in pixels of the image given."""
@@ -28,7 +28,7 @@ class YunetDetector:
         smallest = self._params.min_face_px
         if min(prepared.small.shape[:2]) < smallest:
             return ()  # no face fits
-        rows = self._network.search(prepared.small)
+        rows = self._network.search(prepared.small, self._params.min_confidence)
         rows = rows[rows[:, 3] >= smallest]
         rows[:, :14] *= np.tile(prepared.stretch, 7)
         return largest_first([face_of_row(row) for row in rows])

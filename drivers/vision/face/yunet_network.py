@@ -18,6 +18,7 @@ _CURE = (
 # Boxes that share more than this part of their union are the same face, and the most
 # boxes looked at: the values OpenCV's zoo runs the network with.
 _SAME, _MOST = 0.3, 5000
+_CONFIDENCE = 0.7
 # No frame is searched that is narrower: OpenCV reads beyond the memory of strips a few pixels wide.
 _LEAST_PX = 24
 # What other files begin with, and outputs that only YuNet has.
@@ -34,16 +35,16 @@ _KINDS = (
 class YunetNetwork:
     """Finds faces in an image of any size."""
 
-    def __init__(self, model_file: str, min_confidence: float) -> None:
+    def __init__(self, model_file: str) -> None:
         """Load the network and try it on an empty image.
 
         Raises:
             ModelFileError: the file is missing or is not YuNet.
         """
-        self._net = _load(model_file, min_confidence)
+        self._net = _load(model_file)
 
-    def search(self, scaled: ImageArray) -> NDArray[np.float64]:
-        """Return a row a face: OpenCV's fifteen numbers, in pixel edges of the image given.
+    def search(self, scaled: ImageArray, least: float) -> NDArray[np.float64]:
+        """Return a row a face at least so sure: OpenCV's fifteen numbers, in its pixel edges.
 
         Box, right eye, left eye, nose, right and left mouth corner, confidence.
         """
@@ -51,6 +52,7 @@ class YunetNetwork:
         if min(height, width) < _LEAST_PX:
             return np.zeros((0, 15))
         self._net.setInputSize((width, height))
+        self._net.setScoreThreshold(least)
         rows = self._net.detect(np.ascontiguousarray(scaled))[1]
         if rows is None:  # OpenCV's word for no face
             return np.zeros((0, 15))
@@ -76,7 +78,7 @@ def face_of_row(row: NDArray[np.float64]) -> DetectedFace:
     return DetectedFace((left - 0.5, top - 0.5, width, height), landmarks, float(row[14]))
 
 
-def _load(model_file: str, min_confidence: float) -> cv2.FaceDetectorYN:
+def _load(model_file: str) -> cv2.FaceDetectorYN:
     """Make the network out of the file's bytes."""
     if not model_file:
         raise ModelFileError(f"the yunet detector needs a model file: {_CURE}")
@@ -91,7 +93,7 @@ def _load(model_file: str, min_confidence: float) -> cv2.FaceDetectorYN:
         # Any network loads; only YuNet's outputs can be decoded, so it is tried at once.
         with quiet_opencv():
             net = cv2.FaceDetectorYN.create(
-                "onnx", weights, nothing, (64, 64), min_confidence, _SAME, _MOST
+                "onnx", weights, nothing, (64, 64), _CONFIDENCE, _SAME, _MOST
             )
             net.detect(np.zeros((64, 64, 3), np.uint8))
     except cv2.error as error:

@@ -1,0 +1,123 @@
+"""Faces found in the dark, blurred, tilted and narrow, and how truly they are placed."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+from seeing.material import (
+    MODELS,
+    at_hand,
+    background,
+    carphone,
+    eyes_at,
+    noisy,
+    paste,
+    portrait,
+)
+
+from gazerig.drivers.types import FaceDetector, ImageArray
+from gazerig.drivers.vision.face.detector import face_detector
+from gazerig.drivers.vision.face.params import FaceDetectorParams
+
+YUNET = "face_detection_yunet_2026may.onnx"
+WANTED = {
+    "found of hard faces, share": (80 / 117, 1),
+    "found of hard faces with YuNet's file, share": (110 / 117, 1),
+    "landmark error, eye distances": (0, 0.05),
+    "frames of the car film with one face": (0.99, 1),
+    "frames of the cartoon film with a face": (0.98, 1),
+    "faces a frame in a square without near faces": (0, 0.01),
+}
+# Frames of a still after which what is found is counted.
+_FRAMES = 9
+
+
+def measure(full: bool) -> dict[str, float]:
+    """Return the figures; those of YuNet and of the other films where they are at hand."""
+    figures = {
+        "found of hard faces, share": hard_faces(FaceDetectorParams()),
+        "landmark error, eye distances": placing_error(24 if full else 10),
+        "frames of the car film with one face": shown(carphone(), 1 if full else 4, 1),
+    }
+    yunet = at_hand(YUNET, MODELS)
+    if full and yunet is not None:
+        params = FaceDetectorParams(model_file=str(yunet))
+        figures["found of hard faces with YuNet's file, share"] = hard_faces(params)
+    if full and (film := at_hand("Megamind.avi")) is not None:
+        figures["frames of the cartoon film with a face"] = shown(film, 1)
+    if full and (film := at_hand("vtest.avi")) is not None:
+        figures["faces a frame in a square without near faces"] = shown(film, 4)
+    return figures
+
+
+def hard_faces(params: FaceDetectorParams) -> float:
+    """Return the share of portraits found that are dark, blurred, tilted, narrow or small."""
+    found = [bool(after_frames(face_detector(params), hard)) for hard in hard_portraits()]
+    return float(np.mean(found))
+
+
+def hard_portraits() -> Iterator[ImageArray]:
+    """Yield the portraits made hard to find in twelve ways."""
+    rng = np.random.default_rng(0)
+    changes: tuple[Callable[[ImageArray], np.ndarray], ...] = (
+        lambda image: image * 0.2,
+        lambda image: image * 0.08,
+        lambda image: cv2.GaussianBlur(image, (0, 0), 3.0),
+        lambda image: cv2.GaussianBlur(image, (0, 0), 5.0),
+        lambda image: cv2.blur(image, (15, 1)),
+        lambda image: _tilted(image, 30.0),
+        lambda image: _tilted(image, -30.0),
+        lambda image: cv2.resize(image, None, fx=0.6, fy=1.0),
+        lambda image: cv2.resize(image, None, fx=0.1, fy=0.1, interpolation=cv2.INTER_AREA),
+        lambda image: image[:, : image.shape[1] // 2],
+        lambda image: 255.0 - (255.0 - image) * 0.3,
+        lambda image: image + rng.normal(0.0, 30.0, image.shape),
+    )
+    for who in ("astronaut", "hopper"):
+        image = portrait(who).image
+        small = cv2.resize(image, (320, image.shape[0] * 320 // image.shape[1]))
+        for change in changes:
+            yield noisy(change(small.astype(np.uint8)), 2.0, rng)
+
+
+def placing_error(frames: int) -> float:
+    """Return the mean landmark error of faces that move at 1 to 2.5 m, in eye distances."""
+    errors: list[float] = []
+    for who in ("astronaut", "hopper"):
+        for far_m in (1.0, 2.5):
+            detector, eyes = face_detector(FaceDetectorParams()), eyes_at(far_m, 640, 69.0)
+            for step in range(frames):
+                frame = background(640, 400).copy()
+                at = 250.0 + 0.15 * eyes * step, 200.0
+                truth = paste(frame, portrait(who), at, eyes, 10.0 * np.sin(step / 6.0))
+                frame = noisy(frame, 2.0, np.random.default_rng(step))
+                for face in detector.find(frame):
+                    off = np.linalg.norm(face.landmarks_px - truth, axis=1).mean() / eyes
+                    errors.append(float(min(off, 1.0)))
+    return float(np.mean(errors))
+
+
+def shown(film: Path, step: int, count: int | None = None) -> float:
+    """Return the share of a film's frames with so many faces; None: with any."""
+    video, detector = cv2.VideoCapture(str(film)), face_detector(FaceDetectorParams())
+    found: list[bool] = []
+    for number in range(10**6):
+        read, frame = video.read()
+        if not read:
+            return float(np.mean(found))
+        if number % step == 0:
+            faces = len(detector.find(np.asarray(frame, np.uint8)))
+            found.append(faces > 0 if count is None else faces == count)
+    raise AssertionError("a film without an end")
+
+
+def after_frames(detector: FaceDetector, image: ImageArray) -> int:
+    """Return how many faces are found when a still has been shown for some frames."""
+    return [len(detector.find(image)) for _ in range(_FRAMES)][-1]
+
+
+def _tilted(image: ImageArray, angle_deg: float) -> np.ndarray:
+    height, width = image.shape[:2]
+    M = cv2.getRotationMatrix2D((width / 2.0, height / 2.0), angle_deg, 1.0)
+    return cv2.warpAffine(image, M, (width, height))
