@@ -9,7 +9,7 @@ that has come to rest is still there for a while, though flow shows nothing that
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from math import hypot
+from math import hypot, inf
 from typing import NamedTuple
 
 from gazerig.gaze.angles import add, dot, norm, scale, sub, unit
@@ -111,32 +111,28 @@ class Hands:
     ) -> LocalisedDetection:
         if thing.kind != UNNAMED or thing.mark is None or not faces:
             return thing
-        hand, known = _as_hand(thing), self._moving.get(thing.mark)
-        last = None if known is None else known.p_face
-        owner = _owner(hand, thing, faces, p_camera, last)
-        if owner is None:
+        known = self._moving.get(thing.mark)
+        arm = _owned(thing, faces, p_camera, None if known is None else known.p_face)
+        if arm is None:
             return thing
-        p_face, v_face = owner
-        placed = _as_far(hand, _level(p_face, p_camera), p_camera)
-        v_face = v_face or (0.0, 0.0, 0.0)
-        speed = _across(placed, v_face, p_camera)
+        p_face, v_face = arm.face[0], arm.face[1] or (0.0, 0.0, 0.0)
+        speed = _across(arm, v_face, p_camera)
         named = known is not None and known.frames >= _FRAMES
-        aside, up = _off(placed.p_world_m, p_face)
-        begins = _BEFORE_HEAD_M_S if hypot(aside, up) < _HEAD_M else _BEGINS_M_S
+        begins = _BEFORE_HEAD_M_S if hypot(*_off(arm.tip_m, p_face)) < _HEAD_M else _BEGINS_M_S
         # Legs and parts of the trunk of somebody who walks are no faster than that, seen from them.
         if speed > (_STAYS_M_S if named else max(begins, norm(v_face))):
-            known = self._moving.setdefault(thing.mark, _Moving(t_s, p_face, placed))
-            known.at_s, known.p_face, known.hand = t_s, p_face, placed
+            known = self._moving.setdefault(thing.mark, _Moving(t_s, p_face, thing))
+            known.at_s, known.p_face, known.hand = t_s, p_face, _as_hand(thing, arm)
             known.frames += 1
         if known is None or known.frames < _FRAMES:
             return thing
         if speed >= _AT_REST_M_S:
             self._held.pop(thing.mark, None)
-            return placed
+            return known.hand
         # A patch that hardly moves may be all of the person: the hand is where it moved last.
         still = replace(known.hand, v_world_m_s=(0.0, 0.0, 0.0))
         self._held[thing.mark] = _Held(still, t_s)
-        return placed if known.at_s == t_s else still
+        return known.hand if known.at_s == t_s else still
 
 
 def _moves_again(hand: LocalisedDetection, found: list[LocalisedDetection]) -> bool:
@@ -147,64 +143,66 @@ def _moves_again(hand: LocalisedDetection, found: list[LocalisedDetection]) -> b
     )
 
 
-def _as_hand(thing: LocalisedDetection) -> LocalisedDetection:
+class _Arm(NamedTuple):
+    """A patch as the arm of a person.
+
+    face: of the person; tip_m, tip_m_s: place and velocity of its fastest part, as far away as they
+    ratio: how many metres there one of the patch is
+    """
+
+    face: Known
+    tip_m: Vec3
+    tip_m_s: Vec3
+    ratio: float
+
+
+def _owned(
+    thing: LocalisedDetection, faces: list[Known], p_camera: Vec3, last: Vec3 | None
+) -> _Arm | None:
+    """Return a patch as an arm of the person whose it may be, None where it is nobody's.
+
+    last: face of the owner in the frame before; they remain it
+    """
+    p_tip = thing.p_world_m if thing.fastest_m is None else thing.fastest_m
+    v_tip = thing.v_world_m_s if thing.fastest_m_s is None else thing.fastest_m_s
+    away = _level(p_tip, p_camera)
+    best, least = None, inf
+    for face in faces:
+        far, ratio = _level(face[0], p_camera), 1.0
+        if not thing.depth_measured:
+            ratio = far / away
+        elif abs(away - far) > _REACH_M + 2.0 * thing.along_sd_m:
+            continue
+        tip = add(p_camera, scale(sub(p_tip, p_camera), ratio))
+        aside, up = _off(tip, face[0])
+        large = ratio * thing.radius_m >= _LARGEST_M
+        if large or not -_BELOW_M < up < _ABOVE_M or hypot(aside, up) >= _REACH_M:
+            continue
+        # The arm goes on from the hand over the patch's middle to the shoulder.
+        middle = add(p_camera, scale(sub(thing.p_world_m, p_camera), ratio))
+        aside, up = _off(sub(scale(middle, 2.0), tip), face[0])
+        off_m = hypot(aside - _SHOULDER_ASIDE_M, up + _SHOULDER_BELOW_M)
+        if last is not None and norm(sub(last, face[0])) < _SAME_M:
+            off_m -= _REACH_M
+        if off_m < least:
+            v = (0.0, 0.0, 0.0) if v_tip is None else scale(v_tip, ratio)
+            best, least = _Arm(face, tip, v, ratio), off_m
+    return best
+
+
+def _as_hand(thing: LocalisedDetection, arm: _Arm) -> LocalisedDetection:
     """Return a patch as a hand at its fastest part."""
-    p, v = thing.fastest_m, thing.fastest_m_s
     return replace(
         thing,
         kind=HAND,
-        p_world_m=thing.p_world_m if p is None else p,
-        v_world_m_s=thing.v_world_m_s if v is None else v,
+        p_world_m=arm.tip_m,
+        v_world_m_s=arm.tip_m_s,
         radius_m=_HAND_RADIUS_M,
         spin_rad_s=0.0,
         across_sd_m=_ACROSS_SD_M,
-    )
-
-
-def _owner(
-    hand: LocalisedDetection,
-    thing: LocalisedDetection,
-    faces: list[Known],
-    p_camera: Vec3,
-    last: Vec3 | None,
-) -> Known | None:
-    """Return the face of the person whose hand it may be, None where there is none.
-
-    hand, thing: the fastest part of a patch, and the patch
-    last: face of the owner in the frame before; they remain it
-    """
-    found: list[tuple[float, Known]] = []
-    for face in faces:
-        far, away = _level(face[0], p_camera), _level(hand.p_world_m, p_camera)
-        if hand.depth_measured and abs(away - far) > _REACH_M + 2.0 * hand.along_sd_m:
-            continue
-        size = thing.radius_m * (1.0 if hand.depth_measured else far / away)
-        tip = _as_far(hand, far, p_camera).p_world_m
-        aside, up = _off(tip, face[0])
-        if size < _LARGEST_M and -_BELOW_M < up < _ABOVE_M and hypot(aside, up) < _REACH_M:
-            middle = _as_far(thing, far, p_camera).p_world_m
-            # The arm goes on from the hand over the patch's middle to the shoulder.
-            aside, up = _off(sub(scale(middle, 2.0), tip), face[0])
-            off_m = hypot(aside - _SHOULDER_ASIDE_M, up + _SHOULDER_BELOW_M)
-            stays = last is not None and norm(sub(last, face[0])) < _SAME_M
-            found.append((off_m - (_REACH_M if stays else 0.0), face))
-    return min(found, key=lambda one: one[0])[1] if found else None
-
-
-def _as_far(hand: LocalisedDetection, far_m: float, p_camera: Vec3) -> LocalisedDetection:
-    """Return a hand whose distance was not measured as far away as the person, who is upright."""
-    if hand.depth_measured:
-        return hand
-    way = sub(hand.p_world_m, p_camera)
-    ratio = far_m / _level(hand.p_world_m, p_camera)
-    v = hand.v_world_m_s
-    return replace(
-        hand,
-        p_world_m=add(p_camera, scale(way, ratio)),
-        v_world_m_s=None if v is None else scale(v, ratio),
-        across_sd_m_s=hand.across_sd_m_s * ratio,
-        along_sd_m_s=hand.along_sd_m_s * ratio,
-        along_sd_m=_ALONG_SD_M,
+        along_sd_m=thing.along_sd_m if thing.depth_measured else _ALONG_SD_M,
+        across_sd_m_s=arm.ratio * thing.across_sd_m_s,
+        along_sd_m_s=arm.ratio * thing.along_sd_m_s,
     )
 
 
@@ -219,10 +217,8 @@ def _off(p_m: Vec3, p_face: Vec3) -> tuple[float, float]:
     return hypot(x, y), z
 
 
-def _across(hand: LocalisedDetection, v_face: Vec3, p_camera: Vec3) -> float:
+def _across(arm: _Arm, v_face: Vec3, p_camera: Vec3) -> float:
     """Return how fast a hand moves across the view, seen from the person."""
-    if hand.v_world_m_s is None:
-        return 0.0
-    view = unit(sub(hand.p_world_m, p_camera))
-    other = sub(hand.v_world_m_s, v_face)
+    view = unit(sub(arm.tip_m, p_camera))
+    other = sub(arm.tip_m_s, v_face)
     return norm(sub(other, scale(view, dot(other, view))))
