@@ -12,6 +12,7 @@ from seeing.moving_room import CLOSE, frames, pan, rotation, shake
 from seeing.row_02_camera_motion import judged
 
 import gazerig
+from gazerig.drivers.camera import recording_format as fmt
 from gazerig.drivers.camera.guarded_camera import fault_of
 from gazerig.drivers.camera.oak.gyro import Gyro
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
@@ -151,7 +152,8 @@ def test_gyro_is_tried_again_after_a_minute_and_told_no_second_time():
 
 def test_camera_that_is_placed_anew_is_there_at_once():
     mount = CameraMount(CameraParams(position_mm=(20.0, 0.0, 45.0)))
-    perception, base = Perception(mount, 69.0, Tracker(TrackParams())), Base(shaken, 3.0)
+    fusion, base = GyroFusion(lambda line: None), Base(shaken, 3.0)
+    perception = Perception(mount, 69.0, Tracker(TrackParams()), gyro=fusion)
     poses = PoseHistory(KINEMATICS)
     poses.remember(0.0, (0.0, 0.0, 0.0))
     places = []
@@ -162,7 +164,7 @@ def test_camera_that_is_placed_anew_is_there_at_once():
         t = k / HZ
         found = Detections(t, k, WIDTH, HEIGHT, turn=base.turn(t))
         perception.see(found, poses)
-        places.append(perception._gyro._before[2])  # type: ignore[index]
+        places.append(fusion._before[2])  # type: ignore[index]
     assert apart_deg(places[58], places[59]) == pytest.approx(10.0, abs=1.5)
 
 
@@ -197,7 +199,8 @@ def wander_deg(gyro):
     """Return how far a still face 2 m away seems to move while the table shakes."""
     base = Base(shaken, 4.0)
     mount = CameraMount(CameraParams(position_mm=(20.0, 0.0, 45.0)))
-    perception = Perception(mount, 69.0, Tracker(TrackParams()))
+    fusion = GyroFusion(lambda line: None)
+    perception = Perception(mount, 69.0, Tracker(TrackParams()), gyro=fusion)
     poses = PoseHistory(KINEMATICS)
     poses.remember(0.0, (0.0, 0.0, 0.0))
     frontal = np.array([(0.0, 1.0, 0.0), (0.0, 0.0, -1.0), (-1.0, 0.0, 0.0)])
@@ -297,3 +300,14 @@ def test_turn_that_is_no_rotation_ends_the_camera_of_a_program_alone():
     wrong = Detections(0.0, 1, WIDTH, HEIGHT, turn=CameraTurn(1, rows(np.full((3, 3), np.nan))))
     assert "no rotation" in fault_of(wrong)
     assert fault_of(replace(wrong, turn=CameraTurn(1, rows(np.eye(3))))) == ""
+
+
+def test_recording_keeps_the_turn():
+    turn = CameraTurn(7, rows(turned_by((0.1, -0.2, 0.3))))
+    shot = Shot(1.0, 1, np.zeros((4, 6, 3), np.uint8), turn=turn)
+    messages = dict(fmt.encoded(shot, None))
+    found = fmt.turn(messages[fmt.TURN])
+    assert found.epoch == 7 and np.allclose(found.R_start_camera, turn.R_start_camera)
+    for wrong in (b"{}", b'{"epoch": 1, "R": [1, 0]}', b'{"epoch": 1, "R": [1,0,0,0,1,0,0,0,2]}'):
+        with pytest.raises(fmt.BadMessage):
+            fmt.turn(wrong)

@@ -86,6 +86,7 @@ class Recording:
                 fmt.depth(self._data(places[fmt.DEPTH])) if fmt.DEPTH in places else None,
                 fmt.lens(self._data(places[fmt.LENS])) if fmt.LENS in places else None,
                 fmt.faces(self._data(places[fmt.FACES])) if fmt.FACES in places else None,
+                fmt.turn(self._data(places[fmt.TURN])) if fmt.TURN in places else None,
             )
         except (fmt.BadMessage, McapError, OSError, KeyError, ValueError) as error:
             raise CameraError(

@@ -57,6 +57,7 @@ from gazerig.robot.model.frames import (
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.types import JointAngles, further
+from gazerig.robot.perception.gyro_fusion import GyroFusion
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
 from gazerig.robot.perception.tracker import Tracker
@@ -181,7 +182,7 @@ def assemble(rig: Rig, options: RunOptions, substitutes: Substitutes = RIGS_OWN)
             camera,
             walk,
             random,
-            messages.append,
+            _gyro_fusion(options, messages.append),
         )
         placement = CameraPlacement(
             lambda rig: _camera_params(rig, options, kinematics)[0], camera.mount
@@ -233,7 +234,7 @@ def _components(
     placed: CameraParams,
     walk: Walk,
     random: _Generators,
-    report: Callable[[str], None],
+    gyro: GyroFusion | None,
 ) -> Components:
     """Build all components that have parameters."""
     lids = Lids(rig.gaze.lids, random.lids)
@@ -254,7 +255,7 @@ def _components(
             own_parts(rig),
             placed.lens,
             depth_at,
-            report,
+            gyro,
             kinematics.own_parts,
         ),
         tracker=tracker,
@@ -280,6 +281,11 @@ def _components(
             lid_spans(rig),
         ),
     )
+
+
+def _gyro_fusion(options: RunOptions, report: Callable[[str], None]) -> GyroFusion | None:
+    """Return what fuses gyro and joints; a recorded camera was on other joints than these."""
+    return GyroFusion(report) if options.replay is None else None
 
 
 def _body(rig: Rig, wires: RunBus) -> Body:

@@ -5,7 +5,7 @@ taken, not by its present one (localisation); motion of a person's own body is s
 that of other things (hand_ownership); a tracker gives all of them identities and velocities.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from math import cos, hypot, radians, sqrt
 
 import numpy as np
@@ -50,7 +50,7 @@ class Perception:
             the average ones (Nakamoto & Tsuruno 3.7).
         lens: as calibrated, used for frames of the aspect ratio at which it was calibrated.
         depth_at: reads depth images; without it, distances come from the size of faces.
-        report: called with each event as one line.
+        gyro: places frames by the camera's own gyro as well; None: by the joints alone.
         own_parts: where the robot's own head and neck are; None: they are things as others.
     """
 
@@ -62,13 +62,13 @@ class Perception:
         parts_face_m: Mapping[str, Vec3] | None = None,
         lens: LensParams | None = None,
         depth_at: DepthAt | None = None,
-        report: Callable[[str], None] = lambda line: None,
+        gyro: GyroFusion | None = None,
         own_parts: OwnParts | None = None,
     ) -> None:
         self._mount = mount
         self._own_parts = own_parts
         self._depth_at = depth_at
-        self._gyro = GyroFusion(report)
+        self._gyro = gyro
         self.retune(horizontal_field_deg, parts_face_m, lens)
         self._tracker = tracker
         self._hands = Hands()
@@ -89,7 +89,8 @@ class Perception:
         lens: LensParams | None,
     ) -> None:
         """Change field of view, parts and lens, from the next frame on; the camera may sit anew."""
-        self._gyro.reset()
+        if self._gyro is not None:
+            self._gyro.reset()
         own = parts_face_m or {}
         self._parts = tuple((own.get(code, PARTS_FACE_M[code]), code in own) for code in PARTS)
         self._locator = FrameLocator(lens, radians(horizontal_field_deg), self._depth_at)
@@ -104,7 +105,8 @@ class Perception:
         t_s = detections.captured_s
         R_head, self._p_head = poses.head_pose(t_s)
         R, p = self._mount.pose(R_head, self._p_head)
-        R = self._gyro.orientation(t_s, R, detections.turn)
+        if self._gyro is not None:
+            R = self._gyro.orientation(t_s, R, detections.turn)
         if self._is_cut(detections.scene, (R[0][2], R[1][2], R[2][2])):
             self._tracker.forget()
             self._tracks = ()
