@@ -86,7 +86,7 @@ def test_standard_tools_read_the_file(file):
     with file.open("rb") as stream:
         reader = make_reader(stream)
         summary = reader.get_summary()
-        assert present(present(summary).statistics).message_count == 4 * len(TIMES_S)
+        assert present(present(summary).statistics).message_count == 5 * len(TIMES_S)
         names = {schema.name for schema in present(summary).schemas.values()}
         assert {"foxglove.CompressedImage", "foxglove.CameraCalibration"} <= names
         assert [m.metadata["source"] for m in reader.iter_metadata()] == ["test"]
