@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from gazerig.drivers.camera.off_frame import OffFrameReport
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import Detections, FaceDetector, LocatedFrame, MovingBlob
 
@@ -33,12 +34,15 @@ class FrameAnalyzer:
         from gazerig.drivers.vision.cut_detector import CutDetector
 
         self._cuts = CutDetector()
+        self._off_frame = OffFrameReport()
 
     def look(self, shot: Shot) -> Detections:
         """Find and locate the faces of a frame, unless the camera itself has, and what moves."""
         faces = shot.faces if shot.faces is not None else self._detector.find(shot.image)
         blobs = self._motion(shot) if self._motion is not None else ()
         height, width = shot.image.shape[:2]
+        for line in self._off_frame.told_of(faces, width, height):
+            self._faults.setdefault(line, False)
         found = Detections(
             shot.captured_s,
             shot.number,

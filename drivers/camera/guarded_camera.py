@@ -4,6 +4,7 @@ from math import isfinite
 from typing import Any
 
 from gazerig.drivers.bounded_call import BoundedCall
+from gazerig.drivers.camera.off_frame import OffFrameReport
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.plugins import PluginError, failure
@@ -45,6 +46,7 @@ class GuardedCamera:
         self._longest_s, self._close_s = longest_s, close_s
         self._call = BoundedCall(f"camera {label}", longest_s)
         self._log = EventLog()
+        self._off_frame = OffFrameReport()
         self._newest: Detections | None = None
         self._checked: object = None
         self._failed = False
@@ -90,6 +92,10 @@ class GuardedCamera:
                 self._fail(f"returned {wrong}")
                 return None
             self._newest = self._checked = found
+            if found is not None:
+                size_px = found.width_px, found.height_px
+                for line in self._off_frame.told_of(found.faces, *size_px):
+                    self._log.add(f"{self._label}: {line}")
         return self._newest
 
     def events(self) -> tuple[str, ...]:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera import depth_roi
+from gazerig.drivers.camera.off_frame import is_off_frame
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import (
     DetectedFace,
@@ -97,7 +98,8 @@ class FrameLocator:
 
     def locate(self, found: Detections, intrinsics: Intrinsics) -> LocatedFrame:
         """Return what a frame of known intrinsics shows in the camera's axes."""
-        faces = [self._face(face, found, intrinsics) for face in found.faces]
+        inside = [f for f in found.faces if not is_off_frame(f, found.width_px, found.height_px)]
+        faces = [self._face(face, found, intrinsics) for face in inside]
         things = [thing_in_camera(blob) for blob in found.blobs]
         return LocatedFrame(
             intrinsics,

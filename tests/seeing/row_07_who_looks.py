@@ -23,7 +23,7 @@ from gazerig.robot.perception.mesh_reading import read_mesh
 WANTED = {
     "AUC, five points": (0.76, 1.0),
     "AUC, mesh and irises": (0.85, 1.0),
-    "right within 8 deg, mesh and irises, %": (75.0, 100.0),
+    "right within 6 deg, mesh and irises, %": (80.0, 100.0),
     "pose of the mesh, yaw, rms deg": (0.0, 4.0),
     "pose of the mesh, pitch, rms deg": (0.0, 5.0),
 }
@@ -98,7 +98,7 @@ def measure(full: bool) -> dict[str, float]:
     return {
         "AUC, five points": auc(-np.array(five), looks),
         "AUC, mesh and irises": auc(-np.array(eyes), looks),
-        "right within 8 deg, mesh and irises, %": 100.0 * np.mean((np.array(eyes) < 8.0) == looks),
+        "right within 6 deg, mesh and irises, %": 100.0 * np.mean((np.array(eyes) < 6.0) == looks),
         "pose of the mesh, yaw, rms deg": yaw,
         "pose of the mesh, pitch, rms deg": pitch,
         "gaze of the eyes, yaw, rms deg": gaze_yaw,

@@ -1,0 +1,47 @@
+"""Faces whose landmarks are not in the frame: no such face is looked at.
+
+A net may guess a point or two of a face that the edge cuts; a face whose middle lies outside, or a
+point of which lies farther outside than the face is large, is a mistake of the detector, mostly
+pixels of another size of frame.
+"""
+
+import numpy as np
+
+from gazerig.drivers.types import DetectedFace
+
+
+def is_off_frame(face: DetectedFace, width_px: int, height_px: int) -> bool:
+    """Return whether the landmarks of a face are not those of a face in the frame."""
+    points = face.landmarks_px
+    if points.size == 0:
+        return False  # a face without points: whoever needs them says so
+    edge = np.array([width_px, height_px]) - 0.5
+    middle = points.mean(axis=0)
+    if bool((middle < -0.5).any() or (middle > edge).any()):
+        return True
+    size = float(np.ptp(points, axis=0).max())
+    return bool((points < -0.5 - size).any() or (points > edge + size).any())
+
+
+class OffFrameReport:
+    """Tells once that a detector gives such faces."""
+
+    def __init__(self) -> None:
+        self._told = False
+
+    def told_of(
+        self, faces: tuple[DetectedFace, ...], width_px: int, height_px: int
+    ) -> tuple[str, ...]:
+        """Return the line to tell of the faces of a frame; empty where there is none."""
+        if self._told:
+            return ()
+        for face in faces:
+            if is_off_frame(face, width_px, height_px):
+                self._told = True
+                x, y = face.landmarks_px.mean(axis=0).tolist()
+                return (
+                    f"a face with landmarks about ({x:.0f}, {y:.0f}), outside the frame of "
+                    f"{width_px} x {height_px}, is left out, and so is every other: a detector "
+                    "must give them in pixels of the frame it was given",
+                )
+        return ()
