@@ -267,11 +267,11 @@ _Row = tuple[float, float, float]
 class FaceSigns(NamedTuple):
     """What eyes and mouth of a face do, at an adult's size.
 
-    eye_opening: of the lids, over the usual opening; 0 is shut
+    eye_opening: of the lids, over the usual opening, 0 is shut; None where lids are not seen
     mouth_opening_m: gap between the lips
     """
 
-    eye_opening: float
+    eye_opening: float | None
     mouth_opening_m: float
 
 

@@ -10,6 +10,8 @@ import numpy as np
 import orjson
 import pytest
 from seeing.material import portrait
+from seeing.rendered_heads import PEOPLE, rendered
+from seeing.row_07_who_looks import LENS
 from test_face_pose import CAMERA, angle_between, turned
 from test_gaze_at_head import AT_EYES, percept_of, standing
 
@@ -18,6 +20,7 @@ from gazerig.drivers.types import DetectedFace, Detections, FaceMesh
 from gazerig.drivers.vision.face import mesh as networks
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.mesh import MeshedDetector, MeshNetworks
+from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.gaze.types import Face, Percept
 from gazerig.robot.control.tick_stream import _percept, decode_plain, encode
@@ -47,7 +50,7 @@ def mesh_of(
     R: np.ndarray,
     p_m: np.ndarray,
     gaze: np.ndarray = INTO_CAMERA,
-    lids_m: float = 0.0095,
+    lids_m: float = 0.0088,
     lips_m: float = 0.001,
 ) -> FaceMesh:
     """The mesh that an exact network would return of the usual face."""
@@ -57,9 +60,6 @@ def mesh_of(
     placed = {index: at for index, at in zip(rigid, face, strict=True)}
     placed[152] = np.array((-0.0405, 0.0, -0.0695))
     placed[13], placed[14] = (np.array((-0.024, 0, -0.028 + 0.5 * s * lips_m)) for s in (1, -1))
-    for (upper, lower), eye in zip(mesh_reading._LIDS, mesh_reading._EYES_M, strict=True):
-        placed[upper] = eye + (0.0, 0.0, 0.5 * lids_m)
-        placed[lower] = eye - (0.0, 0.0, 0.5 * lids_m)
     for index, at in placed.items():
         seen = R @ at + p_m
         points[index, :2] = project(seen[np.newaxis], CAMERA)[0]
@@ -110,8 +110,9 @@ def test_eyes_that_turn_in_a_still_face_turn_the_gaze_alone() -> None:
 
 def test_shut_eyes_look_nowhere_and_lips_tell_their_gap() -> None:
     R, p = turned(0.1, 0.0, 0.0), np.array((0.0, 0.0, 0.6))
-    shut = reading_of(R, p, lids_m=0.002)
-    assert shut.gaze_camera is None and shut.signs.eye_opening < EYES_SHUT
+    shut = reading_of(R, p, lids_m=0.0045)
+    assert shut.gaze_camera is None
+    assert shut.signs.eye_opening is not None and shut.signs.eye_opening < EYES_SHUT
     for gap in (0.0, 0.005, 0.015):
         assert reading_of(R, p, lips_m=gap).signs.mouth_opening_m == pytest.approx(gap, abs=0.001)
 
@@ -176,7 +177,7 @@ def seen_faces(meshes: list[FaceMesh]) -> list[Face]:
 def test_the_percept_tells_gaze_lids_and_speech_and_a_blink_takes_no_look_away() -> None:
     R, p = turned(radians(20.0), 0.0, 0.0), np.array((0.0, 0.0, 0.6))
     wide = [mesh_of(R, p, lips_m=0.004 + 0.004 * sin(2 * pi * 4.0 * k / 30)) for k in range(45)]
-    blink = [mesh_of(R, p, lids_m=0.001)] * 4
+    blink = [mesh_of(R, p, lids_m=0.0045)] * 4
     faces = seen_faces([*wide, *blink])
     # The face is turned away, the eyes are not.
     assert faces[40].looks_at_head is True and faces[40].speaks is True
@@ -184,6 +185,11 @@ def test_the_percept_tells_gaze_lids_and_speech_and_a_blink_takes_no_look_away()
     shut = faces[-1]
     assert shut.eye_opening is not None and shut.eye_opening < EYES_SHUT
     assert shut.looks_at_head is True and shut.gaze_world is None
+    # Irises are looked for in every second frame: in those between, the eyes go on.
+    between = mesh_of(R, p)._replace(irises_px=None, lids_px=None)
+    turns = seen_faces([mesh_of(R, p), between, between, *[between] * 8])
+    assert [face.looks_at_head for face in turns[:3]] == [True] * 3
+    assert turns[2].gaze_world is not None and turns[-1].gaze_world is None
     aside = np.array((sin(radians(25)), 0.0, -np.cos(radians(25))))
     (away,) = seen_faces([mesh_of(turned(0.0, 0.0, 0.0), p, aside)])
     assert away.looks_at_head is False
@@ -248,7 +254,26 @@ def test_photographed_people_look_at_the_camera(name: str) -> None:
     ahead = np.array(reading.pose.R_camera_face)[:, 0]
     for direction in (np.array(reading.gaze_camera), ahead):
         assert degrees(np.arccos(-direction[2])) < 15.0
-    assert 0.6 < reading.signs.eye_opening < 1.5
+    assert reading.signs.eye_opening is not None and 0.6 < reading.signs.eye_opening < 1.7
+
+
+@NEEDS_NETWORKS
+def test_shut_eyes_are_told_from_open_ones() -> None:
+    rng, ahead = np.random.default_rng(0), turned(0.0, 0.0, 0.0)
+    at = np.array((0.02, 0.01, 0.5))
+    openings = {
+        opening: [
+            reading.signs.eye_opening or 0.0
+            for name in PEOPLE
+            for image in [rendered(name, ahead, at, INTO_CAMERA, rng, opening=opening)]
+            for face in MtcnnDetector(FaceDetectorParams()).find(image)[:1]
+            for mesh in [MeshNetworks().mesh(image, face.landmarks_px)]
+            if mesh is not None and (reading := read_mesh(mesh, LENS)) is not None
+        ]
+        for opening in (1.0, 0.1)
+    }
+    assert len(openings[1.0]) == len(openings[0.1]) == 2
+    assert min(openings[1.0]) > EYES_SHUT > max(openings[0.1])
 
 
 @NEEDS_NETWORKS
@@ -263,6 +288,7 @@ def test_only_the_largest_faces_get_a_mesh_and_a_wall_gets_none() -> None:
 
     first, second = MeshedDetector(Two(), 1).find(shown.image)
     assert first.mesh is not None and second.mesh is None
+    assert first.mesh.irises_px is not None
     assert first.landmarks_px is face.landmarks_px
     assert MeshNetworks().mesh(wall, shown.landmarks_px) is None
     tiny = shown.landmarks_px.mean(axis=0) + 0.1 * (

@@ -7,11 +7,14 @@ Where it is less certain than the cone is wide, nothing is said.
 """
 
 from math import radians
+from typing import NamedTuple, Self
 
 from gazerig.gaze.angles import angle_between
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.track_params import TrackParams
 
+_EYES_HELD_S = 0.12
+"""What the eyes do holds so long where the next frames show a mesh, but not the irises."""
 _EYES_SD_RAD = radians(4.0)
 """Usual error of a gaze that a detector finds from images of both eyes."""
 _SMOOTHED = 0.6
@@ -19,6 +22,23 @@ _SMOOTHED = 0.6
 errors of landmarks is the same in all of them."""
 _EDGE_OF_CONE, _EDGE_OF_SD = 0.2, 0.5
 """Distance of inner and outer edge from the cone: share of the cone, and of the uncertainty."""
+
+
+class SeenEyes(NamedTuple):
+    """What the eyes of a person did in the last frame that showed them.
+
+    gaze_world: unit vector along which they look, None where they were shut
+    opening: of the lids over the usual opening
+    at_s: capture time of that frame
+    """
+
+    gaze_world: Vec3 | None
+    opening: float
+    at_s: float
+
+    def at(self, t_s: float) -> Self | None:
+        """Return them if they hold at a time."""
+        return self if t_s - self.at_s <= _EYES_HELD_S else None
 
 
 def angle_off_head_rad(R_world_face: Mat3, gaze_world: Vec3 | None, from_face_m: Vec3) -> float:

@@ -22,7 +22,7 @@ from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
 from gazerig.robot.model.intrinsics import rays
 from gazerig.robot.perception.face_pose import FacePose
 
-EYES_SHUT = 0.4
+EYES_SHUT = 0.35
 """Eye opening below which eyes count as shut."""
 
 # Points of the mesh on a usual face, mm: out of the face and up of those in its middle; out, aside
@@ -47,15 +47,15 @@ _RIGID_M: Floats = 1e-3 * np.array(
 )
 _EYES = (33, 133), (362, 263)
 _EYES_M = np.array([_RIGID_M[[_RIGID.index(i) for i in pair]].mean(axis=0) for pair in _EYES])
-_LIPS, _LIDS, _FOREHEAD, _CHIN, _HEIGHT_M = (13, 14), ((159, 145), (386, 374)), 10, 152, 0.152
+_LIPS, _FOREHEAD, _CHIN, _HEIGHT_M = (13, 14), 10, 152, 0.152
 # Lids along the contour of an eye: middle of the upper and of the lower one.
 _UPPER_LID, _LOWER_LID, _CORNERS = 12, 4, (0, 8)
 
 # Centre of the eyeball behind the middle between the corners; from it to the iris; and how much
 # of the place of the corners is taken from the image, the rest from the pose.
 _BALL_BEHIND_M, _IRIS_FROM_BALL_M, _SEEN_SHARE = 0.007, 0.0115, 0.75
-# Gap between the lids of eyes that are open as usual.
-_LIDS_OPEN_M = 0.0095
+# Gap between the lids as the network gives it of eyes that are shut, and open as usual.
+_LIDS_SHUT_M, _LIDS_OPEN_M = 0.0043, 0.0088
 # Usual error of a turn, and of a point in pixels, which grows with the turn's share of the face.
 _TURN_SD_RAD, _POINT_PX, _DEEP_M = radians(3.0), 0.7, 0.03
 _MOST_TURNED = 0.25
@@ -97,8 +97,10 @@ def read_mesh(mesh: FaceMesh, intrinsics: Intrinsics) -> MeshReading | None:
         return None
     length = min(max(tall / apart * PUPIL_DISTANCE_M / _HEIGHT_M, 1.0 / _LONGEST), _LONGEST)
     sd = hypot(_TURN_SD_RAD, _POINT_PX * px_m / _DEEP_M)
-    signs = FaceSigns(_eye_opening(mesh, points, apart), _gap_m(points, _LIPS, apart))
-    gaze = None if signs.eye_opening < EYES_SHUT else _gaze(mesh, R, p, intrinsics)
+    opening = None if mesh.lids_px is None else _eye_opening(mesh.lids_px, apart)
+    signs = FaceSigns(opening, _gap_m(points, _LIPS, apart))
+    shut = opening is None or opening < EYES_SHUT
+    gaze = None if shut else _gaze(mesh, R, p, intrinsics)
     return MeshReading(FacePose(_vector(p), _matrix(R), length, sd), gaze, signs)
 
 
@@ -146,15 +148,15 @@ def _gap_m(points: Floats, pair: tuple[int, int], apart: float) -> float:
     return float(np.linalg.norm(points[pair[0]] - points[pair[1]])) / apart * PUPIL_DISTANCE_M
 
 
-def _eye_opening(mesh: FaceMesh, points: Floats, apart: float) -> float:
-    """Return how far the eyes are open, 1 as usual; by the contours of the lids where there are."""
-    if mesh.lids_px is None:
-        gaps = [_gap_m(points, pair, apart) for pair in _LIDS]
-    else:
-        lids = mesh.lids_px.astype(np.float64)
-        gap = np.linalg.norm(lids[:, _UPPER_LID] - lids[:, _LOWER_LID], axis=1)
-        gaps = (gap / apart * PUPIL_DISTANCE_M).tolist()
-    return max(0.0, sum(gaps) / len(gaps) / _LIDS_OPEN_M)
+def _eye_opening(lids_px: NDArray[np.float32], apart: float) -> float:
+    """Return how far the eyes are open, 1 as usual, by the contours of the lids.
+
+    The points of the mesh itself hardly follow the lids.
+    """
+    lids = lids_px.astype(np.float64)
+    gap_px = float(np.linalg.norm(lids[:, _UPPER_LID] - lids[:, _LOWER_LID], axis=1).mean())
+    gap_m = gap_px / apart * PUPIL_DISTANCE_M
+    return max(0.0, (gap_m - _LIDS_SHUT_M) / (_LIDS_OPEN_M - _LIDS_SHUT_M))
 
 
 def _gaze(mesh: FaceMesh, R: Floats, p: Floats, intrinsics: Intrinsics) -> Vec3 | None:

@@ -23,7 +23,11 @@ from gazerig.robot.perception.egomotion_residual import (
     turning_rad_s,
 )
 from gazerig.robot.perception.frame_locator import SIZE_SPREAD, DepthAt, FrameLocator
-from gazerig.robot.perception.gaze_at_head import angle_off_head_rad, looks_at_head
+from gazerig.robot.perception.gaze_at_head import (
+    SeenEyes,
+    angle_off_head_rad,
+    looks_at_head,
+)
 from gazerig.robot.perception.gyro_fusion import GyroFusion
 from gazerig.robot.perception.hand_ownership import known_faces, without_own_motion
 from gazerig.robot.perception.hands import Hands, Known
@@ -192,18 +196,17 @@ class Perception:
         p = track.p_world_m
         across_sd, along_sd = _deviations(track)
         found = track.detection
-        off_rad = angle_off_head_rad(R, found.gaze_world, sub(self._p_head, p))
-        signs = found.signs
-        if track.seen_s == track.at_s and signs is not None:
-            track.speech = track.speech.seen(signs.mouth_opening_m, track.at_s)
+        eyes = _eyes(track)
+        gaze = found.gaze_world if eyes is None else eyes.gaze_world
+        off_rad = angle_off_head_rad(R, gaze, sub(self._p_head, p))
         # A blink takes no look away.
-        blinks = signs is not None and signs.eye_opening < EYES_SHUT
+        blinks = eyes is not None and eyes.opening < EYES_SHUT
         if track.seen_s == track.at_s and not blinks:
             track.looks_at_head = looks_at_head(
                 self._tracker.params,
                 off_rad,
                 found.turn_sd_rad,
-                found.gaze_world is not None,
+                gaze is not None,
                 track.looks_at_head,
             )
         return Face(
@@ -218,10 +221,10 @@ class Perception:
             along_sd,
             off_rad,
             track.looks_at_head,
-            found.gaze_world,
-            None if signs is None else signs.eye_opening,
-            None if signs is None else signs.mouth_opening_m,
-            None if signs is None else track.speech.speaks(track.at_s),
+            gaze,
+            None if eyes is None else eyes.opening,
+            None if found.signs is None else found.signs.mouth_opening_m,
+            None if found.signs is None else track.speech.speaks(track.at_s),
         )
 
     def _face_parts(self, R: Mat3, p: Vec3, size: float, length: float) -> tuple[Vec3, ...]:
@@ -256,6 +259,18 @@ def _deviations(track: Track) -> tuple[float, float]:
     across, along = track.filter.across.p, track.filter.along.p
     unknown_size = 0.0 if track.depth_s is not None else SIZE_SPREAD * track.filter.range_m
     return sqrt(across), hypot(sqrt(along), unknown_size)
+
+
+def _eyes(track: Track) -> SeenEyes | None:
+    """Update what mouth and eyes of a face do; return the eyes, None where they are not known."""
+    signs, t_s = track.detection.signs, track.at_s
+    if signs is None:
+        return None
+    if track.seen_s == t_s:
+        track.speech = track.speech.seen(signs.mouth_opening_m, t_s)
+        if signs.eye_opening is not None:
+            track.eyes = SeenEyes(track.detection.gaze_world, signs.eye_opening, t_s)
+    return None if track.eyes is None else track.eyes.at(t_s)
 
 
 def _bodies(tracks: tuple[Track, ...]) -> Bodies:

@@ -20,6 +20,7 @@ from gazerig.robot.perception.data_association import (
     assign,
     pair_costs,
 )
+from gazerig.robot.perception.gaze_at_head import SeenEyes
 from gazerig.robot.perception.kalman import ProcessNoise, TrackFilter, sight
 from gazerig.robot.perception.speech import NO_SPEECH, Speech
 
@@ -79,6 +80,7 @@ class Track:
     looks_at_head: of a face, whether the person looked at the head in its last frame; None where
         that was too uncertain
     speech: of a face, how its mouth has moved lately
+    eyes: of a face, what its eyes did when they were seen last
     """
 
     id: int
@@ -92,6 +94,7 @@ class Track:
     depth_s: float | None = None
     looks_at_head: bool | None = None
     speech: Speech = NO_SPEECH
+    eyes: SeenEyes | None = None
 
     @property
     def p_world_m(self) -> Vec3:

@@ -150,6 +150,18 @@ def _draw_triangle(
     into[y0:y1, x0:x1][mask > 0] = patch[mask > 0]
 
 
+def _cover(into: ImageArray, lids_px: np.ndarray) -> None:
+    """Draw the skin of the lids over the whole eye of the photo, and the lashes along its foot."""
+    wider = lids_px.mean(axis=0) + 1.15 * (lids_px - lids_px.mean(axis=0))
+    above = wider[1:8] + 1.2 * (wider[1:8] - wider[9:][::-1])
+    inside = np.clip(np.round(above).astype(int), 0, (WIDTH - 1, HEIGHT - 1))
+    skin = np.median(into[inside[:, 1], inside[:, 0]], axis=0)
+    at = np.round(wider * 16).astype(np.int32)
+    cv2.fillPoly(into, [at], tuple(map(float, skin)), lineType=cv2.LINE_AA, shift=4)
+    foot = at[[0, *range(15, 8, -1), 8]]
+    cv2.polylines(into, [foot], False, tuple(map(float, 0.4 * skin)), 1, cv2.LINE_AA, 4)
+
+
 def _draw_eye(
     into: ImageArray,
     vertices: np.ndarray,
@@ -172,6 +184,8 @@ def _draw_eye(
     x1, y1 = np.minimum(np.ceil(outline.max(axis=0)).astype(int) + 4, (WIDTH, HEIGHT))
     if x1 - x0 < 2 or y1 - y0 < 2:
         return
+    if opening < 1.0:
+        _cover(into, _pixels(vertices[list(eye[2])] @ R.T + p_m))
     part = into[y0:y1, x0:x1]
     fine = cv2.resize(part, None, fx=_FINER, fy=_FINER)
 

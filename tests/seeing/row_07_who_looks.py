@@ -6,6 +6,7 @@ of them look at the camera, half 15 to 40 deg past it; heads take .6 to 1 of the
 one who looks at the camera is ranked before one who does not, by the angle off it.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +14,7 @@ from seeing.rendered_heads import FOCAL_PX, HEIGHT, PEOPLE, WIDTH, rendered
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import DetectedFace
-from gazerig.drivers.vision.face.mesh import MeshedDetector
+from gazerig.drivers.vision.face.mesh import MeshNetworks
 from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.gaze.angles import rotation
@@ -47,7 +48,7 @@ class Looking(NamedTuple):
 def people(count: int, seed: int) -> list[Looking]:
     """Render people and find their faces."""
     rng = np.random.default_rng(seed)
-    detector = MeshedDetector(MtcnnDetector(FaceDetectorParams()), 1)
+    detector, meshes = MtcnnDetector(FaceDetectorParams()), MeshNetworks()
     found = []
     for i in range(count):
         looks = i % 4 < 2
@@ -63,7 +64,8 @@ def people(count: int, seed: int) -> list[Looking]:
         image = rendered(PEOPLE[i % 2], R, p, gaze, rng, stretch)
         faces = detector.find(image)
         if faces:
-            found.append(Looking(looks, gaze, R[:, 0], p, faces[0]))
+            mesh = meshes.mesh(image, faces[0].landmarks_px)
+            found.append(Looking(looks, gaze, R[:, 0], p, replace(faces[0], mesh=mesh)))
     return found
 
 

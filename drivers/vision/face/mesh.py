@@ -44,6 +44,8 @@ _LEAST_CERTAINTY = 0.5
 class MeshedDetector:
     """A face detector that adds a mesh to the largest faces that another finds.
 
+    The network of the eyes costs more than that of the whole face: it looks at every second frame.
+
     Args:
         detector: finds the faces.
         count: of faces that get a mesh, the largest first.
@@ -57,6 +59,7 @@ class MeshedDetector:
         """
         self._detector, self._count = detector, count
         self._meshes = MeshNetworks()
+        self._with_eyes = False
 
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
         """Find faces, the largest first, in pixels of the image given."""
@@ -64,13 +67,14 @@ class MeshedDetector:
         if not faces:
             return faces
         full = as_bgr(image)
+        self._with_eyes = not self._with_eyes
         meshed = [
             DetectedFace(
                 face.box_px,
                 face.landmarks_px,
                 face.confidence,
                 face.gaze_camera,
-                self._meshes.mesh(full, face.landmarks_px),
+                self._meshes.mesh(full, face.landmarks_px, self._with_eyes),
             )
             for face in faces[: self._count]
         ]
@@ -95,12 +99,15 @@ class MeshNetworks:
         self._face = _network(folder, "face_landmark")
         self._eye = _network(folder, "iris_landmark")
 
-    def mesh(self, image: ImageArray, landmarks_px: Pixels) -> FaceMesh | None:
+    def mesh(
+        self, image: ImageArray, landmarks_px: Pixels, with_eyes: bool = True
+    ) -> FaceMesh | None:
         """Return the mesh of a face, None where it is too small or the network sees none.
 
         Args:
             image: (height, width, 3) BGR.
             landmarks_px: (5, 2) in the order of DetectedFace.
+            with_eyes: whether irises and lids are looked for.
         """
         eyes, mouth = landmarks_px[:2].mean(axis=0), landmarks_px[3:].mean(axis=0)
         across = landmarks_px[1] - landmarks_px[0]
@@ -116,9 +123,8 @@ class MeshNetworks:
         grid = points.reshape(_POINTS, 3)
         depth = grid[:, 2:] * (side / _MESH_PX)
         found = np.hstack([_placed(grid[:, :2], to_image), depth]).astype(np.float32)
-        seen = (
-            [self._eye_of(image, found, i) for i in (0, 1)] if apart > _LEAST_IRIS_EYES_PX else []
-        )
+        with_eyes = with_eyes and apart > _LEAST_IRIS_EYES_PX
+        seen = [self._eye_of(image, found, i) for i in (0, 1)] if with_eyes else []
         if any(one is None for one in seen):
             seen = []
         irises = np.array([one[0] for one in seen if one], dtype=np.float32)
