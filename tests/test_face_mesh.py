@@ -15,6 +15,8 @@ from seeing.row_07_who_looks import LENS
 from test_face_pose import CAMERA, angle_between, turned
 from test_gaze_at_head import AT_EYES, percept_of, standing
 
+from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
+from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import DetectedFace, Detections, FaceMesh
 from gazerig.drivers.vision.face import mesh as networks
@@ -290,6 +292,10 @@ def test_only_the_largest_faces_get_a_mesh_and_a_wall_gets_none() -> None:
     assert first.mesh is not None and second.mesh is None
     assert first.mesh.irises_px is not None
     assert first.landmarks_px is face.landmarks_px
+    # Those that a camera itself has found get theirs too.
+    analyzer = FrameAnalyzer(MeshedDetector(Two(), 1))
+    found = analyzer.look(Shot(0.1, 1, shown.image, faces=(face,))).faces
+    assert len(found) == 1 and found[0].mesh is not None
     assert MeshNetworks().mesh(wall, shown.landmarks_px) is None
     tiny = shown.landmarks_px.mean(axis=0) + 0.1 * (
         shown.landmarks_px - shown.landmarks_px.mean(axis=0)

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from gazerig.drivers.camera.off_frame import OffFrameReport
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.types import Detections, FaceDetector, LocatedFrame, MovingBlob
+from gazerig.drivers.types import DetectedFace, Detections, FaceDetector, LocatedFrame, MovingBlob
 
 Motion = Callable[[Shot], tuple[MovingBlob, ...]]
 """Finds what moves, from one frame to the next."""
@@ -38,7 +38,7 @@ class FrameAnalyzer:
 
     def look(self, shot: Shot) -> Detections:
         """Find and locate the faces of a frame, unless the camera itself has, and what moves."""
-        faces = shot.faces if shot.faces is not None else self._detector.find(shot.image)
+        faces = self._faces(shot)
         blobs = self._motion(shot) if self._motion is not None else ()
         height, width = shot.image.shape[:2]
         for line in self._off_frame.told_of(faces, width, height):
@@ -59,6 +59,12 @@ class FrameAnalyzer:
         if (fault := getattr(self._locate, "fault", None)) is not None and (line := fault(found)):
             self._faults.setdefault(line, False)
         return found.located_by(self._locate)
+
+    def _faces(self, shot: Shot) -> tuple[DetectedFace, ...]:
+        if shot.faces is None:
+            return self._detector.find(shot.image)
+        meshed = getattr(self._detector, "meshed", None)
+        return shot.faces if meshed is None else meshed(shot.image, shot.faces)
 
     def events(self) -> tuple[str, ...]:
         """Return what detector and calibration have to tell since the last call, one line each."""

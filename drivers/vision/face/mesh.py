@@ -63,7 +63,12 @@ class MeshedDetector:
 
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
         """Find faces, the largest first, in pixels of the image given."""
-        faces = self._detector.find(image)
+        return self.meshed(image, self._detector.find(image))
+
+    def meshed(
+        self, image: ImageArray, faces: tuple[DetectedFace, ...]
+    ) -> tuple[DetectedFace, ...]:
+        """Return faces, which a camera itself may have found, with meshes of the first."""
         if not faces:
             return faces
         full = as_bgr(image)
