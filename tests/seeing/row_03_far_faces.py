@@ -103,7 +103,7 @@ def relative_cost(width_px: int, height_px: int, people: int = 1) -> float:
         paste(still, portrait(_WHO[i % 2]), at, eyes_at(1.5, width_px, _FIELD_DEG))
     frames = [noisy(still, 2.0, rng) for _ in range(49)]
     spent = {
-        kind: min(_frame_ms(FaceDetectorParams(kind=kind), frames) for _ in range(3))
+        kind: min(_frame_ms(FaceDetectorParams(kind=kind), frames) for _ in range(2))
         for kind in (FaceDetectorParams().kind, "mtcnn")
     }
     cv2.setNumThreads(threads)
