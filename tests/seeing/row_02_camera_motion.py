@@ -46,6 +46,8 @@ FILMS: dict[str, tuple[Motion, tuple[Board, ...], tuple[Board, ...], bool, float
     "still, a plain wall": (still, BEFORE_PLAIN, PLAIN, False, 0.95),
     "shake": (shake, PEOPLE, ROOM, False, 0.9),
     "bump": (bump, PEOPLE, ROOM, False, 0.9),
+    "shake, somebody close": (shake, CLOSE, ROOM, False, 0.9),
+    "bump, somebody close": (bump, CLOSE, ROOM, False, 0.9),
     "pan": (pan, PEOPLE, ROOM, False, 0.9),
     "knock": (bump, PEOPLE, ROOM, True, 0.9),
     "knock, somebody close": (bump, CLOSE, ROOM, True, 0.9),

@@ -51,6 +51,8 @@ _KIND = "thing"
 # Flow is searched again where the camera moved the image by more than was foreseen: what is seen
 # through a shift is blurred, and at the edges lost.
 _SEARCH_AGAIN_PX = 1.5
+# A camera that shook is believed to move for so long: where a shake turns back, it stands.
+_SHAKES_ON_S = 0.5
 # With less of the older image in view, too little is left to tell motions apart.
 _LEAST_KNOWN = 0.4
 # Points enough for an affine fit.
@@ -84,7 +86,7 @@ class MotionDetector:
         self._search = FlowSearch(params.preset, params.finest_level)
         self._tracks = MotionTracks(params)
         self._before: SmallImage | None = None
-        self._moved = False  # the image alone told of a motion of the camera
+        self._moved_s = -np.inf  # when the image alone told of a motion of the camera
         self.report = MotionReport()
 
     def retune(self, params: MotionParams) -> None:
@@ -129,7 +131,7 @@ class MotionDetector:
 
     def forget(self) -> None:
         """Forget the last image: the next one is the first of another scene."""
-        self._before, self._moved = None, False
+        self._before, self._moved_s = None, -np.inf
         self._tracks.forget()
 
     def _look(
@@ -168,9 +170,10 @@ class MotionDetector:
         """Find the flow and the camera's own motion; a large unforeseen one is taken out first."""
         H = turn_homography(R_now_before, now, before)
         pair = self._search.compare(now, before, H)._replace(shift=shift)
-        moved_before, self._moved = self._moved, False
+        moved_before = now.captured_s - self._moved_s < _SHAKES_ON_S
         ego = own_motion(pair, now.K, R_now_before is not None, moved_before)
-        self._moved = ego.unforeseen_px > 0.0
+        if ego.unforeseen_px > 0.0:
+            self._moved_s = now.captured_s
         if ego.share < self._params.min_background_share or ego.unforeseen_px < _SEARCH_AGAIN_PX:
             return pair, ego
         again = self._search.compare(now, before, ego.total)._replace(shift=shift)

@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from gazerig.drivers.vision.motion.image import Floats, Grey, middle
 from gazerig.drivers.vision.motion.optical_flow import Compared, moved
@@ -39,6 +40,8 @@ _TUKEY = 4.685
 _LEAST_NOISE_PX, _MOST_NOISE_PX = 0.02, 1.5
 # Joints at rest are right; in motion they may be wrong by all of the motion, at its onset.
 _STANDING_REACH_PX = 0.75
+# A fit that leaves more lies between two motions.
+_MIXED_PX = 0.25
 # What a homography's last numbers may be, in focal lengths: keeps it tame between points.
 _SPREADS = np.array([0.1, 0.1, 0.2, 0.1, 0.1, 0.2, 0.05, 0.05])
 _PLAIN = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
@@ -49,7 +52,7 @@ class _Need(NamedTuple):
     """What the image must show to be believed that all of it moved.
 
     share: of the points with texture that moved as one; cells: of the image that they lie in
-    kept: of the points, fewer than this may have stayed where they were
+    kept: of the points at the edge, fewer than this may have stayed where they were
     """
 
     share: float
@@ -59,7 +62,7 @@ class _Need(NamedTuple):
 
 # Somebody close to the lens fills most of the image; a strip of wall that keeps its place tells.
 # A camera that moves follows somebody now and then, who keeps their place.
-_AGAINST_JOINTS, _STOOD, _MOVES = _Need(0.6, 24, 0.015), _Need(0.35, 24, 0.03), _Need(0.35, 12, 0.2)
+_AGAINST_JOINTS, _STOOD, _MOVES = _Need(0.45, 24, 0.1), _Need(0.35, 24, 0.15), _Need(0.35, 12, 0.4)
 
 
 class Fit(NamedTuple):
@@ -102,7 +105,7 @@ def own_motion(pair: Compared, K: Floats, predicted: bool, moved_before: bool = 
     K: (3, 3) camera matrix
     predicted: ``pair`` was turned by what the joints said; else nothing is known of the
         camera, and any motion that most agree on is taken for its
-    moved_before: the image alone told of a motion of the camera a frame before
+    moved_before: the image alone told of a motion of the camera shortly before
     """
     points = _textured(pair)
     B, share, noise, fitted, free = np.eye(3), 1.0, _LEAST_NOISE_PX, False, False
@@ -154,12 +157,46 @@ def _room(
     if found is not None and found.share >= _LEAST_SHARE:
         return found
     free = _fitted(points, there, K, shape, np.inf, need.cells)
+    if free is not None and free.noise_px > _MIXED_PX:
+        free = _of_two(points, there, K, shape, need.cells) or free
     if free is None or free.share < need.share:
         return found
     # What has kept its place although all is said to have moved.
     parted = np.hypot(*(moved(free.B, points) - points).T) > 2 * _STANDING_REACH_PX
-    kept = float(((off < _STANDING_REACH_PX) & parted).mean())
+    edge = _edge(points, shape)
+    kept = float(((off < _STANDING_REACH_PX) & parted)[edge].mean()) if edge.any() else 0.0
     return free if kept < need.kept else found
+
+
+def _of_two(
+    points: Floats, there: Floats, K: Floats, shape: tuple[int, ...], least_cells: int
+) -> Fit | None:
+    """Fit the room where two motions share the image: more of the edge goes along with it.
+
+    Somebody close fills the middle. None where there are not two, or neither explains the image.
+    """
+    flow = there - points
+    flow = flow - flow.mean(axis=0)
+    _, axes = np.linalg.eigh(np.cov(flow.T))
+    side = flow @ axes[:, -1] > 0.0
+    edge = _edge(points, shape)
+    best, most = None, 0.0
+    for mine in (side, ~side):
+        if np.count_nonzero(mine) < _LEAST_POINTS:
+            continue
+        start = _fitted(points[mine], there[mine], K, shape, np.inf)
+        if start is None:
+            continue
+        left = moved(_inverse(start.B), there)
+        rest = _fitted(points, left, K, shape, _STANDING_REACH_PX, least_cells)
+        if rest is None or rest.noise_px > _MIXED_PX:
+            continue
+        B = start.B @ rest.B
+        off = np.hypot(*(moved(B, points) - there).T)
+        along = float((off[edge] < _STANDING_REACH_PX).mean()) if edge.any() else 0.0
+        if along > most:
+            best, most = Fit(B / B[2, 2], rest.share, rest.noise_px, True), along
+    return best
 
 
 def _fitted(
@@ -233,6 +270,13 @@ def _image(h: Floats, a: Floats) -> Floats:
 def _noise(errors: Floats, mask: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> float:
     """Return the standard deviation along one axis: half of such lengths are below 1.18 of it."""
     return max(_LEAST_NOISE_PX, middle(errors[mask]) / 1.177)
+
+
+def _edge(points: Floats, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """Return which points lie at the left, right or upper edge, where most of the room shows."""
+    x, y = np.floor(points / (shape[1], shape[0]) * _CELLS).T
+    out: NDArray[np.bool_] = (x == 0) | (x == _CELLS[0] - 1) | (y == 0)
+    return out
 
 
 def _cells(points: Floats, shape: tuple[int, ...]) -> int:
