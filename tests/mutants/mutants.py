@@ -36,7 +36,7 @@ MUTANTS = (
            "no inhibition of return", ("habituation",)),
     Mutant("gaze/habituation.py", "id: left + risen for id", "id: left for id",
            "interest that was lost never recovers", ("habituation",)),
-    Mutant("gaze/top_down.py", "/= self._params.stay_with_person", "/= 1.0",
+    Mutant("gaze/top_down.py", "self._params.stay_with_person**self._params.nearness", "1.0",
            "the gaze does not stay with a person", ("attention", "attention_choice", "habituation")),
     Mutant("gaze/field_of_view.py", "before = (along > 0.0) & ", "before = ",
            "what is behind the eye hides things", ("attention", "attention_choice")),
