@@ -17,8 +17,8 @@ WIDTH, HEIGHT = 48, 32
 # Pixels of the frame of which the small ones are means; more of them tell nothing more.
 _SAMPLED_PX = 192
 # Correlations below which two images show two scenes. From one frame of a film to the next they are
-# above .9 and .8, across its cuts below .3 and .65.
-_WHOLE, _MIDDLE = 0.5, 0.7
+# above .9 as a whole, of pans above .9 in the middle; across cuts below .3 and .72.
+_WHOLE, _MIDDLE = 0.5, 0.8
 # What has less contrast, grey levels, shows nothing: dark, covered, blinded.
 _LEAST_CONTRAST = 6.0
 _MARGIN = 4  # the middle is all but a fourth of the image on each side
