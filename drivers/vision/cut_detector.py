@@ -18,7 +18,7 @@ WIDTH, HEIGHT = 48, 32
 _SAMPLED_PX = 192
 # Correlations below which two images show two scenes. From one frame of a film to the next they are
 # above .9 as a whole, of pans above .9 in the middle; across cuts below .3 and .72.
-_WHOLE, _MIDDLE = 0.5, 0.8
+_WHOLE, _MIDDLE = 0.4, 0.8
 # What has less contrast, grey levels, shows nothing: dark, covered, blinded.
 _LEAST_CONTRAST = 6.0
 _MARGIN = 4  # the middle is all but a fourth of the image on each side

@@ -206,6 +206,14 @@ def _as_hand(thing: LocalisedDetection, arm: _Arm) -> LocalisedDetection:
     )
 
 
+def _place_as_far(thing: LocalisedDetection, far_m: float, p_camera: Vec3) -> Vec3:
+    """Return the place of something whose distance was not measured if it is so far away."""
+    if thing.depth_measured:
+        return thing.p_world_m
+    ratio = far_m / _level(thing.p_world_m, p_camera)
+    return add(p_camera, scale(sub(thing.p_world_m, p_camera), ratio))
+
+
 def _level(p_m: Vec3, p_camera: Vec3) -> float:
     """Return how far away a place is, its height apart."""
     return max(hypot(p_m[0] - p_camera[0], p_m[1] - p_camera[1]), 1e-6)
