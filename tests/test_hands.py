@@ -5,9 +5,16 @@ from math import dist
 
 import numpy as np
 import pytest
+from attention_scene import looking
 from seeing.drawn_scene import frames, off_deg
 
+from gazerig.config.schema import load_rules
+from gazerig.gaze.attention import Attention, AttentionParams
+from gazerig.gaze.bottom_up import BottomUp, BottomUpParams
+from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
+from gazerig.gaze.idle import Idle, IdleParams
 from gazerig.gaze.persons import Persons
+from gazerig.gaze.top_down import TopDown
 from gazerig.gaze.types import Vec3
 from gazerig.robot.perception.hands import HAND, Hands, Known
 from gazerig.robot.perception.tracker import LocalisedDetection
@@ -142,6 +149,25 @@ def test_e91_a_punch_is_a_hand_before_it_lands() -> None:
         if frame.t_s > 4.2 and any(off_deg(p, frame.hands[1]) < 15.0 for _, p in frame.seen(HAND))
     )
     assert first < 4.45
+
+
+def test_e91_a_rule_that_names_a_hand_matches_one_that_is_seen() -> None:
+    """The visitor raises a hand at 17.5 s; the rule's salience is that of `show`."""
+    rules = replace(load_rules("conversation"), behaviour="show")
+    attention = Attention(
+        AttentionParams(),
+        FieldOfView(FieldOfViewParams()),
+        BottomUp(BottomUpParams()),
+        TopDown(rules),
+        Idle(IdleParams()),
+    )
+    at_rest = looking()._replace(p_world_head_m=HEAD_M)
+    targets = []
+    for frame in frames(scenes()["visitor"], 17.2, 18.2):
+        target = attention.choose(frame.percept, at_rest, frame.t_s - 17.2)
+        targets.append((frame.t_s, target.kind, target.saliences[0].rule))
+    assert {kind for t_s, kind, _ in targets if t_s < 17.4} == {"face"}
+    assert {(kind, rule) for t_s, kind, rule in targets if t_s > 18.0} == {(HAND, 0.9)}
 
 
 @pytest.mark.parametrize(("scene", "start_s"), [("walks-past", 5.2), ("sits-still", 0.0)])
