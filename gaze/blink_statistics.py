@@ -1,6 +1,6 @@
 """Random parts of blinking: intervals, gaze-evoked blinks, depth, double blinks."""
 
-from math import exp, hypot, inf, log, pi, sqrt
+from math import exp, inf, log, sqrt
 
 import numpy as np
 
@@ -53,17 +53,16 @@ def _logistic(params: LidParams, shift_deg: float) -> float:
     return 1.0 / (1.0 + exp(min(700.0, -params.gaze_evoked_blink_steepness_1_deg * beyond)))
 
 
-def evoked_delay_s(params: LidParams, rng: np.random.Generator) -> float:
-    """Draw the time from the onset of a gaze shift to that of its blink.
+def evoked_offset_s(params: LidParams, rng: np.random.Generator) -> float:
+    """Draw the time from the onset of a gaze shift to that of its blink, negative before it.
 
-    Blinks set off with eyes and head (Evinger 1994), hardly any in the same moment. A shift is
-    known when it starts, so its blink comes after it: by a Rayleigh distribution, cut off.
+    The two typically begin together (Evinger 1994), the muscle of the lids some tens of ms sooner
+    or later than eyes and head: a normal distribution, cut off at twice its deviation.
     """
-    mean_s = params.gaze_evoked_blink_jitter_ms / 1e3
-    if mean_s == 0.0:
+    sd_s = params.gaze_evoked_blink_jitter_ms / 1e3
+    if sd_s == 0.0:
         return 0.0
-    drawn = mean_s * sqrt(2.0 / pi) * hypot(rng.standard_normal(), rng.standard_normal())
-    return min(drawn, 2.0 * mean_s)
+    return sd_s * min(2.0, max(-2.0, float(rng.standard_normal())))
 
 
 def blink_depth(params: LidParams, rng: np.random.Generator) -> float:

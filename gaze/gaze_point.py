@@ -147,6 +147,10 @@ class GazePoint:
         self._trigger.record_shift(shift, wait_s, lands_s, t_s)
         self._refixations.reset()
 
+    def postpone(self, wait_s: float) -> None:
+        """Let the saccade to a new target wait for longer."""
+        self._trigger.postpone(wait_s)
+
     def move(
         self, point: Vec3, velocity: Vec3, p_head: Vec3, t_s: float, dt_s: float
     ) -> float | None:

@@ -60,7 +60,8 @@ class LidParams:
         "steepness of that probability; larger: closer to a fixed threshold"] = 0.217
     gaze_evoked_blink_least_deg: Annotated[float, Bounds(0, 180), "size of a gaze shift up to which there is no such blink"] = 6.0
     gaze_evoked_blink_jitter_ms: Annotated[float, Bounds(0, 500),
-        "mean time from the onset of the gaze shift to that of its blink, which varies from 0 to twice that; 0: at once"] = 30.0
+        "standard deviation of the time from the onset of the gaze shift to that of its blink, which may come first; at most twice "
+        "that; 0: at once"] = 30.0
     gaze_evoked_blink_replaces: Annotated[bool,
         "a gaze-evoked blink takes the place of the next spontaneous one, so that the rate stays"] = True
     gaze_evoked_blink_pause_ms: Annotated[float, Bounds(0, 10000),

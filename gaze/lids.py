@@ -16,7 +16,7 @@ from gazerig.gaze.blink_profile import LidClosure, closure
 from gazerig.gaze.blink_statistics import (
     blink_depth,
     blink_pause_s,
-    evoked_delay_s,
+    evoked_offset_s,
     evokes_blink,
     is_double_blink,
 )
@@ -88,6 +88,7 @@ class Lids:
         self._winks: dict[Side, LidClosure | None] = {"left": None, "right": None}
         self._shut_until_s = -inf
         self._evoked_s = inf
+        self._announced = False
         self._redraw = False
         self._rest.reset(t_s)
         self._next_s = t_s + self._pause_s(self._length_s())
@@ -143,10 +144,32 @@ class Lids:
         """
         self._rest.sleepy(level, self._t_s)
 
+    def announce(self, shift_rad: float, onset_s: float, t_s: float) -> float:
+        """Draw the blink of a gaze shift that is about to begin; return how long it has to wait.
+
+        A blink that comes before its shift begins now at the soonest, and the shift after it.
+
+        Args:
+            shift_rad: size of the shift.
+            onset_s: when it is to begin.
+            t_s: now.
+        """
+        par, blink = self._params, self._blink
+        shift_deg = degrees(shift_rad)
+        self._announced = shift_deg > par.gaze_evoked_blink_least_deg
+        if not self._announced or not evokes_blink(par, shift_deg, self._rng):
+            return 0.0
+        if blink is not None and onset_s - blink.onset_s < self._pause_after_s():
+            return 0.0
+        blinks_s = onset_s + evoked_offset_s(par, self._rng)
+        self._evoked_s = min(self._evoked_s, max(blinks_s, t_s))
+        return max(0.0, t_s - blinks_s)
+
     def step(self, t_s: float, eye_pitch_rad: float, shift_rad: float | None) -> LidOpenings:
         """Return the openings of the lids and whether a blink is under way.
 
-        shift_rad: size of a gaze shift that begins in this very tick, else None
+        shift_rad: size of a gaze shift that begins in this very tick, else None; one that was
+            announced has its blink already
         """
         self._t_s = t_s
         if self._redraw:
@@ -177,9 +200,11 @@ class Lids:
     def _due(self, t_s: float, shift_rad: float | None) -> bool:
         """Return whether a blink begins now; each gaze shift is drawn for once."""
         par, blink = self._params, self._blink
-        evoked = shift_rad is not None and evokes_blink(par, degrees(abs(shift_rad)), self._rng)
-        if evoked:
-            self._evoked_s = min(self._evoked_s, t_s + evoked_delay_s(par, self._rng))
+        if shift_rad is not None:
+            announced, self._announced = self._announced, False
+            if not announced and evokes_blink(par, degrees(abs(shift_rad)), self._rng):
+                after_s = abs(evoked_offset_s(par, self._rng))
+                self._evoked_s = min(self._evoked_s, t_s + after_s)
         if any(wink is not None and wink.under_way(t_s) for wink in self._winks.values()):
             # Both eyes would shut, and the wink be lost in it.
             self._evoked_s = inf
@@ -187,7 +212,7 @@ class Lids:
             return False
         if t_s >= self._evoked_s:
             since_s = inf if blink is None else t_s - blink.onset_s
-            if since_s >= max(par.gaze_evoked_blink_pause_ms / 1e3, self._length_s()):
+            if since_s >= self._pause_after_s():
                 return True
             self._evoked_s = inf
         # A rate that was just raised may want the next one before this one is over.
@@ -226,6 +251,10 @@ class Lids:
         return LidClosure(
             onset_s, par.close_ms / 1e3, hold_ms / 1e3, par.open_ms / 1e3, par.lower_close_share
         )
+
+    def _pause_after_s(self) -> float:
+        """Return the shortest time from the onset of a blink to that of a gaze-evoked one."""
+        return max(self._params.gaze_evoked_blink_pause_ms / 1e3, self._length_s())
 
     def _length_s(self) -> float:
         """Return the length of the last blink, of an awake one before the first."""

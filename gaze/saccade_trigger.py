@@ -97,6 +97,11 @@ class SaccadeTrigger:
                 after_s = -inf if due_s <= lands_s - self._redirect_s else lands_s
             self._due_s = self.onset_s = max(due_s, after_s + self._interval_s)
 
+    def postpone(self, wait_s: float) -> None:
+        """Let the saccade that is to come wait for longer."""
+        if self._due_s is not None:
+            self._due_s = self.onset_s = self._due_s + wait_s
+
     def redirects(self, t_s: float) -> bool:
         """Return whether a new target bends the saccade in flight now, at most once for each."""
         if self._due_s is None or t_s < self._due_s - 1e-9:

@@ -175,7 +175,41 @@ def test_e74_a_shift_of_3_degrees_brings_no_blink() -> None:
     assert Shifts(5.9, lids(blinks_per_min=0.0)).share == 0.0
 
 
-def test_e74_evoked_blinks_set_off_about_when_the_gaze_does_and_not_in_its_tick() -> None:
+def test_e74_blinks_of_new_targets_begin_about_when_the_gaze_does_before_it_or_after() -> None:
+    """A person moves from side to side every two seconds; eyes and head wait for lids that lead."""
+    span = (-radians(60.0), radians(60.0))
+    kinematics = Kinematics(GeometryParams(0.0, 0.0, 0.0), GAZE_JOINTS, LIDS)
+    model = Oculomotor(
+        EXACT,
+        kinematics,
+        ((span, span), (span, span)),
+        SaccadeModel(SaccadeParams()),
+        Pursuit(PursuitParams()),
+        HeadModel(HeadParams(), radians(60.0), (span, span)),
+        lids(3, blinks_per_min=0.0),
+    )
+    state = kinematics.forward(JointState((0.0,) * 9, (0.0,) * 9, (0.0,) * 9, ()))
+    blinks_s, waits_s, counts, every = [], [], (0, 0), 400
+    for k in range(200 * every):
+        side = radians(20.0) * (1 if k // every % 2 else -1)
+        at = (2.0 * np.cos(side), 2.0 * np.sin(side), 0.2)
+        target = Target(at, (0.0,) * 3, k * DT, "face", 1, 0.5, True, None, k // every, "")
+        command = model.step(target, state, k * DT, DT)
+        if command.blinks > counts[1]:
+            blinks_s.append((k // every, k % every * DT))
+        if command.saccades > counts[0]:
+            waits_s.append((k // every, k % every * DT))
+        counts = command.saccades, command.blinks
+    first = dict(reversed(waits_s))
+    apart = np.array([at - first[look] for look, at in blinks_s])
+    assert len(apart) >= 180  # 40 deg nearly always bring one, and one only
+    assert len({look for look, _ in blinks_s}) == len(blinks_s)
+    assert np.abs(apart).max() <= 0.066 and abs(np.median(apart)) <= 0.012
+    assert 0.3 < (apart < -0.001).mean() < 0.7 and (np.abs(apart) < 0.001).mean() < 0.15
+    assert max(first.values()) <= 0.066 and min(first.values()) == 0.0
+
+
+def test_e74_blinks_of_shifts_that_come_unforeseen_set_off_after_them() -> None:
     delays = np.array(Shifts(45.0, lids(blinks_per_min=0.0)).delays)
     assert len(delays) >= 190
     assert (delays == 0.0).mean() <= 0.01
