@@ -19,6 +19,9 @@ _EACH_S = 2.5
 _TURNED_S = 0.75
 _FREE_DEG, _SLOPE = 17.9, 0.77
 _MARGIN_DEG = 1.5
+_SEARCHED = ("search", "glance", "rest")
+"""Looks about after a light has gone: many from one place, in which the head relieves the eyes."""
+
 _EYES_M: Vec3 = (0.04, 0.0, 0.13)
 
 WANTED = {
@@ -109,7 +112,7 @@ def _shifts(one: MeasuredRun) -> np.ndarray:
         if done >= len(one.t_s) or (np.diff(one.shift[k:done]) > 0).any():
             continue
         yaw = one.head_deg[:, 0]
-        if abs(yaw[k] - yaw[before]) > 0.5:
+        if abs(yaw[k] - yaw[before]) > 0.5 or one.target_name[k].split()[0] in _SEARCHED:
             continue
         goes, sign = one.target_deg[k, 0], np.sign(one.target_deg[k, 0] - yaw[k])
         rows.append(
