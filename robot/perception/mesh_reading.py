@@ -53,7 +53,7 @@ _UPPER_LID, _LOWER_LID, _CORNERS = 12, 4, (0, 8)
 
 # Centre of the eyeball behind the middle between the corners; from it to the iris; and how much
 # of the place of the corners is taken from the image, the rest from the pose.
-_BALL_BEHIND_M, _IRIS_FROM_BALL_M, _SEEN_SHARE = 0.007, 0.0115, 0.75
+_BALL_BEHIND_M, _IRIS_FROM_BALL_M, _SEEN_SHARE = 0.007, 0.0105, 0.75
 # Gap between the lids as the network gives it of eyes that are shut, and open as usual.
 _LIDS_SHUT_M, _LIDS_OPEN_M = 0.0043, 0.0088
 # Usual error of a turn, and of a point in pixels, which grows with the turn's share of the face.
