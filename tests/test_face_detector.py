@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 from present import present
+from seeing.material import carphone, in_package
 from skimage import data
 
 from gazerig.drivers.camera.video_file import VideoFile
@@ -20,11 +21,9 @@ from gazerig.drivers.vision.face.preprocess import prepare
 SHARED = Path(__file__).parents[2] / "shared"
 YUNET_FILE = SHARED / "models" / "face_detection_yunet_2026may.onnx"
 FILM_FILE = SHARED / "media" / "Megamind.avi"
-PHOTO_FILE = SHARED / "media" / "astronaut.png"
 
 needs_yunet = pytest.mark.skipif(not YUNET_FILE.exists(), reason=f"no {YUNET_FILE}")
 needs_film = pytest.mark.skipif(not FILM_FILE.exists(), reason=f"no {FILM_FILE}")
-needs_photo = pytest.mark.skipif(not PHOTO_FILE.exists(), reason=f"no {PHOTO_FILE}")
 
 # Marked by hand in a 16-fold enlargement, to half a pixel: right eye, left eye, nose tip,
 # right and left mouth corner of the person in the picture.
@@ -309,11 +308,18 @@ def test_yunet_is_deterministic_and_obeys_the_smallest_size(yunet, astronaut):
 # ---- films and photos -------------------------------------------------------------------
 
 
-@needs_photo
 def test_photo_from_a_file_is_found(mtcnn):
-    video = VideoFile(PHOTO_FILE)
+    video = VideoFile(in_package("skimage", "data/astronaut.png"))
     video.open()
     assert error_of_eyes(mtcnn.find(video.image(1))[0], ASTRONAUT_PX) < 0.06
+
+
+def test_film_of_a_man_in_a_car_shows_a_face_in_every_frame(mtcnn):
+    video = VideoFile(carphone())
+    video.open()
+    found = [len(mtcnn.find(video.image(number))) for number in range(1, 121, 10)]
+    video.close()
+    assert found == [1] * 12
 
 
 @needs_film
