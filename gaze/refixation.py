@@ -25,7 +25,7 @@ class RefixationParams:
     refixation_deg: Annotated[float, Bounds(0, 5),
         "largest re-fixation, a small saccade within what is looked at; 0: none"] = 1.5
     refixation_least_deg: Annotated[float, Bounds(0.1, 5), "smallest one; three steps of the servos and their play show"] = 0.9
-    refixation_after_ms: Annotated[float, Bounds(50, 60_000), "shortest rest of the gaze before a re-fixation"] = 300.0
+    refixation_after_ms: Annotated[float, Bounds(50, 60_000), "shortest rest of the gaze before a re-fixation"] = 350.0
     refixation_spread_ms: Annotated[float, Bounds(0, 60_000), "that rest is drawn from so long to so much longer"] = 700.0
     # fmt: on
 
