@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from desk import GAZE_JOINTS
 from retuned_run import DT_S, RIG, Judge, Running, fresh, inside, put, started
 
 from gazerig.config.parameters import changed, value_of
@@ -135,7 +136,8 @@ def test_a_changed_zero_moves_the_joint_without_a_jump(changes: dict[str, Value]
     tick = running.ticks[-1]
     assert tick.guard_result.level in ("ok", "limited")
     off = np.subtract(tick.guard_result.command_rad, tick.joints.position_rad)
-    assert np.degrees(np.abs(off)).max() < 4.0
+    off_deg = dict(zip(GAZE_JOINTS, np.degrees(np.abs(off)), strict=True))
+    assert max(deg for name, deg in off_deg.items() if "lid" not in name) < 4.0  # those may blink
 
 
 def test_another_rate_goes_on_from_the_last_slot() -> None:

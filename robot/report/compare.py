@@ -8,6 +8,7 @@ bootstrap's (Efron 1979). Events count as independent of each other, as is usual
 they are not quite, so a difference just above chance deserves another run.
 """
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite, nan
 from pathlib import Path
@@ -113,7 +114,10 @@ def chance_of_shape(a: MeasuredValue, b: MeasuredValue) -> float:
         return nan
     from scipy import stats  # a second of processor, which other commands need not wait for
 
-    return float(stats.ks_2samp(a.rows, b.rows).pvalue)
+    with warnings.catch_warnings():
+        # Where the exact chance overflows, SciPy takes the asymptotic one by itself, and says so.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        return float(stats.ks_2samp(a.rows, b.rows).pvalue)
 
 
 def corrected(chances: Mapping[str, float]) -> dict[str, float]:
