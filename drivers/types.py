@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.located_frame import LocatedFrame
 
 ImageArray = NDArray[np.uint8]
 """(height, width, 3) BGR."""
@@ -264,62 +265,6 @@ class MovingBlob:
 _Row = tuple[float, float, float]
 
 
-class FaceSigns(NamedTuple):
-    """What eyes and mouth of a face do, at an adult's size.
-
-    eye_opening: of the lids, over the usual opening, 0 is shut; None where lids are not seen
-    mouth_opening_m: gap between the lips
-    """
-
-    eye_opening: float | None
-    mouth_opening_m: float
-
-
-class DetectionInCamera(NamedTuple):
-    """One detection with its place in the camera's axes (x right, y down, z forward).
-
-    All of it follows from the image and the calibration alone.
-
-    R_camera_face: axes of a face, None of anything else
-    confidence: 0..1
-    face_length: of a face, in lengths of the canonical one
-    depth_measured: whether the distance was measured by the camera; else a face's is from
-        its size and a thing's is assumed
-    across_sd_m, along_sd_m: standard deviations of the place, across and along the view
-    v_camera_m_s: velocity over ground, None where only the place is known;
-        across_sd_m_s, along_sd_m_s: its standard deviations
-    size_depth: of a face, its distance if it were of an adult's size, over the distance
-        measured; None where the camera measured none
-    mark: the detector's own number of it, None where it gives none
-    turn_sd_rad: of a face, standard deviation of its turn
-    gaze_camera: of a face, unit vector along which the eyes look, None where it is unknown
-    fastest_m, fastest_m_s: of what moves, place and velocity of its fastest part, None where
-        they are not known
-    signs: of a face, what eyes and mouth do, None where they are not found
-    """
-
-    kind: str
-    p_camera_m: tuple[float, float, float]
-    R_camera_face: tuple[_Row, _Row, _Row] | None
-    radius_m: float
-    spin_rad_s: float
-    confidence: float
-    face_length: float
-    depth_measured: bool
-    across_sd_m: float
-    along_sd_m: float
-    v_camera_m_s: tuple[float, float, float] | None
-    across_sd_m_s: float
-    along_sd_m_s: float
-    size_depth: float | None
-    mark: int | None
-    turn_sd_rad: float = 0.0
-    gaze_camera: tuple[float, float, float] | None = None
-    fastest_m: tuple[float, float, float] | None = None
-    fastest_m_s: tuple[float, float, float] | None = None
-    signs: FaceSigns | None = None
-
-
 class CameraTurn(NamedTuple):
     """How a camera was turned when an image was exposed, by its own gyro.
 
@@ -342,17 +287,6 @@ class CameraTurn(NamedTuple):
         if before is None or before.epoch != self.epoch:
             return None
         return np.asarray(np.array(self.R_start_camera).T @ np.array(before.R_start_camera))
-
-
-class LocatedFrame(NamedTuple):
-    """What one image shows, located in the camera's axes by one calibration.
-
-    intrinsics: the calibration; things: what moves, with a place
-    """
-
-    intrinsics: Intrinsics
-    faces: tuple[DetectionInCamera, ...]
-    things: tuple[DetectionInCamera, ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,34 +6,28 @@ from collections.abc import Callable
 from dataclasses import replace
 from html import unescape
 from pathlib import Path
-from types import SimpleNamespace
-from typing import cast
 
 import cv2
 import numpy as np
 import pytest
+from made_traces import EMPTY, run_of, verdicts
 from typer.testing import CliRunner
 
 from gazerig.config.schema import Rig, load_rig, load_walk
 from gazerig.drivers.errors import SetupError
-from gazerig.gaze.lids import LidParams, Lids
-from gazerig.gaze.types import PARTS, Bodies, Percept
+from gazerig.gaze.types import PARTS
 from gazerig.robot.analysis import human_norms as human
-from gazerig.robot.analysis.blink_finder import BlinkEvent
-from gazerig.robot.analysis.event_detector import Commanded, FixationEvent, SaccadeEvent
-from gazerig.robot.analysis.reaction_finder import ReactionFinder
+from gazerig.robot.analysis.event_detector import FixationEvent
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.report import app, page_file
 from gazerig.robot.control.loop import run
-from gazerig.robot.control.tick import Tick
-from gazerig.robot.report import blinks, face, landing, rests
+from gazerig.robot.report import face
 from gazerig.robot.report import norm_bands as bands
 from gazerig.robot.report import report as build
 from gazerig.robot.report.compare import differences_of
 from gazerig.robot.report.compare_page import compare_page
 from gazerig.robot.report.gaze_trace import GazeTrace, GazeTraceBuilder, TraceRow
-from gazerig.robot.report.lid_closure import blinks_of
 from gazerig.robot.report.page import band_text, gauge, number, report_page
 from gazerig.robot.report.plotting import COLOURS, Shown, png
 from gazerig.robot.report.reference_walk import own, published
@@ -41,7 +35,6 @@ from gazerig.robot.report.report import DRAWINGS, found, measured, report_of
 from gazerig.robot.report.run_header import RunHeader
 from gazerig.robot.report.statistics import (
     MeasuredValue,
-    MeasureResult,
     judged,
     longest,
     mean,
@@ -53,7 +46,6 @@ pytestmark = pytest.mark.usefixtures("ideal_servos")
 RIG = load_rig("desk")
 SLOWER = replace(RIG, loop=replace(RIG.loop, rate_hz=100.0))
 """Half the ticks: a minute of them is what takes longest here."""
-EMPTY = GazeTrace(np.zeros((0, len(TraceRow._fields))), (), (), ())
 
 
 def looked(scene: str, seconds: float, rig: Rig = RIG, **choice: str) -> GazeTrace:
@@ -70,10 +62,6 @@ def looked(scene: str, seconds: float, rig: Rig = RIG, **choice: str) -> GazeTra
 @pytest.fixture(scope="module")
 def walking() -> GazeTrace:
     return looked("face-to-face", 60.0, SLOWER)
-
-
-def verdicts(run: GazeTrace) -> dict[str, MeasureResult]:
-    return {finding.band.key: finding for finding in found(run)}
 
 
 @pytest.mark.slow
@@ -114,19 +102,6 @@ def test_one_point_is_too_few_or_outside() -> None:
     assert seen["never_taken"].verdict == "too few events"
     assert seen["transitions"].verdict == "too few events"
     assert not any(seen[key].verdict == "pass" for key in ("part_share", "heat", "peak_small"))
-
-
-def run_of(saccades: list[tuple[float, float, float, float]], blinks: int = 0) -> GazeTrace:
-    """Make a run of saccades: amplitude, duration in ms, peak, time of the peak."""
-    every = tuple(
-        SaccadeEvent(0.4 * n, d / 1e3, a, v, at, Commanded(0.4 * n, d / 1e3, a, v))
-        for n, (a, d, v, at) in enumerate(saccades)
-    )
-    shuts = tuple(BlinkEvent(3.0 * n, 0.08, 0.04, 0.19, 1.0, 20.0, 10.0) for n in range(blinks))
-    rows = np.full((600, len(TraceRow._fields)), np.nan)
-    rows[:, 0] = np.arange(600) * 0.05
-    rows[:, -1] = 0.0
-    return GazeTrace(rows, every, (), shuts, shuts)
 
 
 def human_saccades(faster: float = 1.0, longer: float = 1.0) -> list[tuple[float, ...]]:
@@ -333,135 +308,3 @@ def test_the_command_takes_a_file_or_a_scene() -> None:
 
 
 # --- landings, rests, reactions
-
-
-def flown(
-    jumps: list[tuple[float, float, float]], goal: float = 12.0, over: float = 0.0
-) -> GazeTrace:
-    """Make a run of planned saccades to a goal, onset in s, and from and to in deg of yaw.
-
-    over: how far the gaze swings beyond in flight, in deg
-    """
-    t = np.arange(0.0, 3.0, 0.005)
-    rows = np.zeros((len(t), len(TraceRow._fields)))
-    column = {name: at for at, name in enumerate(TraceRow._fields)}
-    rows[:, column["t"]], rows[:, column["target_yaw"]] = t, goal
-    gaze, events = np.full(len(t), jumps[0][1]), []
-    for onset, start, end in jumps:
-        s = np.clip((t - onset) / 0.05, 0.0, 1.0)
-        gaze += (end - start) * s * s * (3.0 - 2.0 * s)
-        gaze += over * np.exp(-(((t - onset - 0.06) / 0.008) ** 2))
-        rows[(t >= onset) & (t < onset + 0.05), column["phase"]] = 1.0
-        size = abs(end - start)
-        events.append(
-            SaccadeEvent(onset, 0.05, size, 300.0, 0.4, Commanded(onset, 0.05, size, 300.0))
-        )
-    rows[:, column["gaze_yaw"]] = gaze
-    return GazeTrace(rows, tuple(events), (), ())
-
-
-def test_a_landing_is_short_and_corrected_or_beyond() -> None:
-    short = landing.landings(flown([(0.5, 0.0, 11.0), (0.7, 11.0, 12.0)]))
-    assert short[0] == pytest.approx((11.0 / 12.0, 1.0), abs=0.01) and len(short) == 1
-    late = landing.landings(flown([(0.5, 0.0, 11.0), (1.1, 11.0, 12.0)]))
-    assert late[0, 1] == 0.0
-    assert landing.overshoots(flown([(0.5, 0.0, 12.0)])) == pytest.approx([0.0], abs=0.01)
-    assert landing.overshoots(flown([(0.5, 0.0, 12.0)], over=1.8)) == pytest.approx(
-        [0.15], abs=0.03
-    )
-
-
-def test_an_eye_at_the_end_of_its_range_has_not_landed() -> None:
-    run = flown([(0.5, 0.0, 11.0), (1.1, 11.0, 12.0)])
-    rows = run.rows.copy()
-    rows[80:200, TraceRow._fields.index("eye_limited")] = 1.0
-    assert len(landing.landings(run)) == 1
-    assert len(landing.landings(replace(run, rows=rows))) == 0
-
-
-def test_a_floor_under_rests_is_a_spike_and_a_smooth_law_is_none() -> None:
-    dice = np.random.default_rng(2)
-    smooth = [dice.lognormal(-1.4, 0.45, 600) for _ in range(40)]
-    found = [rests.spike(each) for each in smooth]
-    assert abs(np.mean(found)) < 0.005 and max(found) < 0.04  # chance makes none
-    assert all(rests.spike(np.maximum(each, 0.2)) > 0.2 for each in smooth)
-
-
-@pytest.mark.parametrize(("gain", "verdict"), [(0.97, "pass"), (1.2, "outside")])
-def test_the_highest_gain_knows_how_uncertain_it_is(gain: float, verdict: str) -> None:
-    """A face sways at all frequencies below 1 Hz; what the gaze adds is noise."""
-    dice = np.random.default_rng(5)
-    t = np.arange(0.0, 300.0, 0.02)
-    f = dice.uniform(0.05, 1.0, 40)
-    phases = dice.uniform(0.0, 2.0 * np.pi, 40)
-    target = np.sin(2.0 * np.pi * np.outer(t, f) + phases).sum(axis=1)
-    speed = (2.0 * np.pi * f * np.cos(2.0 * np.pi * np.outer(t, f) + phases)).sum(axis=1)
-    rows = np.zeros((len(t), len(TraceRow._fields)))
-    noise = np.convolve(dice.standard_normal(len(t)), np.ones(50) / 4.0, "same")
-    for name, values in (("t", t), ("target_yaw", target), ("target_yaw_rate", speed),
-                         ("gaze_yaw", gain * target + noise)):  # fmt: skip
-        rows[:, TraceRow._fields.index(name)] = values
-    most = verdicts(GazeTrace(rows, (), (), ()))["pursuit_most"]
-    assert most.value > gain + 0.01  # the largest of many is beyond the truth
-    assert most.low95 < gain + 0.02 and most.high95 - most.low95 > 0.03
-    assert most.verdict == verdict
-
-
-def test_a_blink_that_comes_with_a_glance_begins_when_it_does() -> None:
-    """The lids go down with the eyes at 1.0 s, and shut .1 s later; they stay low."""
-    t = np.arange(0.0, 20.0, 0.005)
-    lids = Lids(LidParams(), np.random.default_rng(0))
-    pitch = np.where(t % 4.0 < 1.0, 10.0, -10.0)
-    pitch = np.convolve(np.pad(pitch, 5, "edge"), np.ones(11) / 11.0, "valid")
-    rest = 0.55 + 0.025 * pitch
-    shut = np.array([lids.closure(s % 4.0 - 1.1) for s in t])
-    found = blinks_of(t, rest * (1.0 - shut), pitch)
-    assert [b.onset_s % 4.0 for b in found] == pytest.approx([1.1] * 5, abs=0.01)
-    assert all(b.depth > 0.95 for b in found)
-    assert blinks_of(t, rest, pitch) == ()  # a glance down is none
-    assert blinks_of(t, np.full(len(t), np.nan), pitch) == ()
-
-
-def test_a_shift_of_eyes_that_are_shut_brings_no_blink() -> None:
-    run = run_of([(40.0, 120.0, 400.0, 0.3)] * 40)
-    with_each = tuple(BlinkEvent(0.4 * n + 0.03, 0.08, 0.04, 0.19, 1.0, 20.0, 10.0)
-                      for n in range(0, 40, 4))  # fmt: skip
-    trials = blinks.evoked(replace(run, blinks=with_each))
-    # The next shift comes .4 s later, .07 s after the lids are open again: no trial.
-    assert len(trials) == 30 and trials[:, 1].sum() == 10
-
-
-def test_blinks_that_begin_with_saccades_are_told_from_others() -> None:
-    run = run_of([(5.0, 40.0, 200.0, 0.45)] * 40)
-    for late_s, share in ((0.0, 1.0), (0.05, 0.0)):
-        shuts = tuple(
-            BlinkEvent(0.4 * n + late_s, 0.08, 0.04, 0.19, 0.9, 20.0, 10.0) for n in range(20)
-        )
-        seen = verdicts(replace(run, blinks=shuts))
-        assert seen["blink_tied"].value == share
-        assert seen["blink_partial"].value == 1.0 and seen["blink_partial"].verdict == "outside"
-
-
-def test_reactions_begin_with_the_first_frame_and_are_told_from_choices() -> None:
-    def tick(t_s: float, ids: tuple[int, ...], on: int, saccades: int) -> Tick:
-        n = len(ids)
-        zero = np.zeros((n, 3))
-        seen = Bodies(ids, ("hand",) * n, zero, zero, zero, np.zeros(n))
-        return cast(
-            Tick,
-            SimpleNamespace(
-                t_s=t_s, percept=Percept(t_s - 0.06, seen), stopped="",
-                target=SimpleNamespace(kind="hand", id=on),
-                gaze=SimpleNamespace(saccades=saccades),
-            ),
-        )  # fmt: skip
-
-    finder = ReactionFinder()
-    assert finder.update(tick(1.0, (1,), 1, 0)) is None
-    assert finder.update(tick(1.1, (1,), 1, 1)) is None  # was there from the beginning
-    assert finder.update(tick(2.0, (1, 2), 1, 1)) is None
-    found = finder.update(tick(2.2, (1, 2), 2, 2))
-    assert found is not None and found.latency_s == pytest.approx(0.26)
-    assert finder.update(tick(2.5, (1, 2), 2, 3)) is None  # no longer new
-    assert finder.update(tick(3.0, (1, 2, 3), 2, 3)) is None
-    assert finder.update(tick(4.5, (1, 2, 3), 3, 4)) is None  # a choice

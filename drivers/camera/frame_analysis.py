@@ -4,7 +4,8 @@ from collections.abc import Callable
 
 from gazerig.drivers.camera.off_frame import OffFrameReport
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.types import DetectedFace, Detections, FaceDetector, LocatedFrame, MovingBlob
+from gazerig.drivers.located_frame import LocatedFrame
+from gazerig.drivers.types import DetectedFace, Detections, FaceDetector, MovingBlob
 
 Motion = Callable[[Shot], tuple[MovingBlob, ...]]
 """Finds what moves, from one frame to the next."""

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.types import FaceMesh, FaceSigns
+from gazerig.drivers.located_frame import FaceSigns
+from gazerig.drivers.types import FaceMesh
 from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
 from gazerig.robot.model.intrinsics import rays

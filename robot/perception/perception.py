@@ -10,7 +10,8 @@ from math import cos, hypot, radians, sqrt
 
 import numpy as np
 
-from gazerig.drivers.types import Detections, LocatedFrame
+from gazerig.drivers.located_frame import LocatedFrame
+from gazerig.drivers.types import Detections
 from gazerig.gaze.angles import add, dot, rotate, scale, sub
 from gazerig.gaze.types import PARTS, Bodies, Face, Floats, Mat3, Percept, Vec3
 from gazerig.robot.model.face_geometry import PARTS_FACE_M

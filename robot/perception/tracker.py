@@ -8,7 +8,7 @@ the detection by a Kalman filter of direction and range (kalman).
 
 from dataclasses import dataclass
 
-from gazerig.drivers.types import FaceSigns
+from gazerig.drivers.located_frame import FaceSigns
 from gazerig.gaze.angles import add, cross, scale, sub, unit
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.track_params import TrackParams
