@@ -11,8 +11,9 @@ from human.commanded_looks import commanded, point
 from human.measured_run import Runner
 
 SCENES = ("visitor", "face-to-face")
-EARLY_S, LATE_S = (0.005, 0.015, 0.025), (0.06, 0.07, 0.08)
-"""When the look is changed after its command; such a saccade takes 105 to 125 ms."""
+EARLY_S, LATE_S = (0.005, 0.015, 0.025), (0.07, 0.075, 0.08)
+"""When the look is changed after its command; such a saccade takes 105 to 130 ms, and is bent until 70 ms
+before its end."""
 
 WANTED = {
     "shortest pause after a landing, ms": (95.0, 1e6),
@@ -57,6 +58,8 @@ def changed(
             continue
         flight = looks.flight[rows]
         first = int(np.argmax(flight))
+        if first > 2:  # a blink came with the look and led it: the jump was at another time of it
+            continue
         landed = first + int(np.argmin(flight[first:]))
         counts.append(1 + int(np.any(flight[landed : landed + 21])))
         plan = looks.plan_deg[rows[: landed + 2]]
