@@ -12,8 +12,8 @@ from human.measured_run import Runner
 
 SCENES = ("visitor", "face-to-face")
 EARLY_S, LATE_S = (0.005, 0.015, 0.025), (0.07, 0.075, 0.08)
-"""When the look is changed after its command; such a saccade takes 105 to 130 ms, and is bent until 70 ms
-before its end."""
+"""When the look is changed after its command; such a saccade takes 105 to 130 ms, and is bent until
+70 ms before its end."""
 
 WANTED = {
     "shortest pause after a landing, ms": (95.0, 1e6),
@@ -58,7 +58,7 @@ def changed(
             continue
         flight = looks.flight[rows]
         first = int(np.argmax(flight))
-        if first > 2:  # a blink came with the look and led it: the jump was at another time of it
+        if first:  # a blink came with the look and led it: the jump was at another time of it
             continue
         landed = first + int(np.argmin(flight[first:]))
         counts.append(1 + int(np.any(flight[landed : landed + 21])))
