@@ -1,7 +1,7 @@
 """Blinks, winks, sleepiness and lids that follow the gaze; numbered checks: docs/checks.md."""
 
 from itertools import pairwise
-from math import radians
+from math import cos, radians, sin
 
 import numpy as np
 import pytest
@@ -192,8 +192,9 @@ def test_e74_blinks_of_new_targets_begin_about_when_the_gaze_does_before_it_or_a
     blinks_s, waits_s, counts, every = [], [], (0, 0), 400
     for k in range(200 * every):
         side = radians(20.0) * (1 if k // every % 2 else -1)
-        at = (2.0 * np.cos(side), 2.0 * np.sin(side), 0.2)
-        target = Target(at, (0.0,) * 3, k * DT, "face", 1, 0.5, True, None, k // every, "")
+        at = (2.0 * cos(side), 2.0 * sin(side), 0.2)
+        seen_s = k // 10 * 10 * DT  # twenty frames a second
+        target = Target(at, (0.0,) * 3, seen_s, "face", 1, 0.5, True, None, k // every, "")
         command = model.step(target, state, k * DT, DT)
         if command.blinks > counts[1]:
             blinks_s.append((k // every, k % every * DT))
