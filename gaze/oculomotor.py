@@ -190,10 +190,8 @@ class Oculomotor:
         aside_rad = angle_between(ahead, toward)
         place, eyes_on = self._gaze, self._geometry.eyes_on
         if target.shift != place.shift:
-            wait_s, waits = self._head.leads_s(target, aside_rad), place.waits
-            place.record_shift(target.shift, wait_s, t_s, target.kind == ORDERED)
-            if not waits:
-                self._announce(angle_between(sub(place.point_m, p_head), toward), t_s)
+            off_rad = angle_between(sub(place.point_m, p_head), toward)
+            self._record_shift(target, aside_rad, off_rad, t_s)
         jumps = place.jumps
         shift_rad = place.move(point, velocity, p_head, t_s, dt_s)
         head = self._head.step(target, centre, facing, aside_rad, t_s - place.onset_s, t_s)
@@ -249,15 +247,23 @@ class Oculomotor:
         """Return ((yaw low, high), (pitch low, high)) of left eye, right eye and head."""
         return (*self._eye_limits, self._head.range_rad)
 
-    def _announce(self, shift_rad: float, t_s: float) -> None:
-        """Have the lids draw the blink that comes with a new target's saccade, or its bend."""
+    def _record_shift(self, target: Target, aside_rad: float, off_rad: float, t_s: float) -> None:
+        """Record a new target; the lids draw the blink that comes with its saccade, or its bend.
+
+        aside_rad, off_rad: how far the target is off the head's facing, and off the gaze
+        """
         gaze = self._gaze
+        waits = gaze.waits
+        wait_s = self._head.leads_s(target, aside_rad)
+        gaze.record_shift(target.shift, wait_s, t_s, target.kind == ORDERED)
+        if waits:
+            return
         if not gaze.jumps:
-            wait_s = self._lids.announce(shift_rad, gaze.onset_s, t_s)
+            wait_s = self._lids.announce(off_rad, gaze.onset_s, t_s)
             if wait_s > 0.0:
                 gaze.postpone(wait_s)
         elif gaze.onset_s <= t_s:
-            self._lids.announce(shift_rad, t_s, t_s)
+            self._lids.announce(off_rad, t_s, t_s)
 
     def _in_range(self, eyes: tuple[Angles2, Angles2]) -> tuple[Angles2, Angles2]:
         """Return the angles of both eyes clipped to their ranges; the same where nothing is."""

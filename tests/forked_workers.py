@@ -69,7 +69,7 @@ def run(session: pytest.Session, workers: int) -> None:
 
 
 def _hear(session: pytest.Session, crew: list["_Worker"], files: deque[list[pytest.Item]]) -> None:
-    """Take one message from each worker that has one; give files, replace who has died."""
+    """Receive one message from each worker that has one; give files, replace who has died."""
     ready = wait([worker.line for worker in crew])
     for worker in [worker for worker in crew if worker.line in ready]:
         try:

@@ -12,16 +12,15 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from film_gaze import gaze_point, in_picture
 from numpy.typing import NDArray
 
 from gazerig.config.schema import load_rig
-from gazerig.gaze.angles import add, angle_between, norm, scale, sub
-from gazerig.gaze.types import Vec3
+from gazerig.gaze.angles import angle_between
 from gazerig.robot.analysis.summary import cyclopean
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
-from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
 
 FILM = Path(__file__).parents[2] / "shared" / "media" / "vtest.avi"
 SECONDS, BEGIN_S, RATE_HZ = 24.0, 1.0, 10.0
@@ -95,28 +94,11 @@ def fixations(ticks: tuple[Assembly, list[Tick]], masks: list[NDArray[np.uint8]]
         fixation.names.add(f"{tick.target.kind} {tick.target.id}")
         number = int(tick.t_s * RATE_HZ + 1e-6)
         if tick.t_s - number / RATE_HZ < dt_s:  # a picture is taken now
-            x, y = (round(c / SHRINK) for c in in_picture(made, gaze_point(tick)))
+            x, y = (round(c / SHRINK) for c in in_picture(made, gaze_point(tick), WIDTH, HEIGHT))
             mask = masks[number]
             inside = 0 <= x < mask.shape[1] and 0 <= y < mask.shape[0]
             fixation.on.append(inside and bool(mask[y, x]))
     return list(found.values())
-
-
-def gaze_point(tick: Tick) -> Vec3:
-    """Return where the measured eyes look, as far away as what they look at."""
-    left, right = tick.pose.p_world_eye_left_m, tick.pose.p_world_eye_right_m
-    eye = scale(add(left, right), 0.5)
-    return add(eye, scale(cyclopean(tick), norm(sub(tick.target.p_world_m, eye))))
-
-
-def in_picture(made: Assembly, point: Vec3) -> tuple[float, float]:
-    """Return where the film shows a point of the world: its camera stands still."""
-    ahead = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    R, p = made.mount.pose(ahead, (0.0, 0.0, 0.0))
-    lens = intrinsics_of_lens(None, radians(made.horizontal_field_deg), WIDTH, HEIGHT)
-    seen = np.array(R).T @ np.array(sub(point, p))
-    x, y = project(seen[None], lens)[0].tolist()
-    return x, y
 
 
 def moving_masks() -> list[NDArray[np.uint8]]:

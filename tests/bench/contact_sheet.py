@@ -8,7 +8,8 @@ looked while the frame was shown (orange), and the target's name. For looking at
 """
 
 import argparse
-from math import ceil, radians
+import sys
+from math import ceil
 from pathlib import Path
 
 import cv2
@@ -16,14 +17,13 @@ import numpy as np
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Detections, ImageArray
-from gazerig.gaze.angles import add, norm, scale, sub
-from gazerig.gaze.types import Vec3
-from gazerig.robot.analysis.summary import cyclopean
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from film_gaze import gaze_point, in_picture  # noqa: E402
 
 COLUMNS, ROWS = 4, 5
 WIDTH_PX = 320
@@ -73,30 +73,13 @@ def tile(made: Assembly, tick: Tick, found: Detections, image: ImageArray) -> Im
     for blob in found.blobs:
         x, y = blob.centre_px
         cv2.circle(small, (round(x * shrink), round(y * shrink)), 5, BLUE, 1)
-    x, y = in_picture(made, gaze_point(tick), found)
+    x, y = in_picture(made, gaze_point(tick), found.width_px, found.height_px)
     if np.isfinite((x, y)).all():
         cv2.circle(small, (round(x * shrink), round(y * shrink)), 12, ORANGE, 2)
     words = f"{tick.t_s:.1f} s  {tick.target.kind} {tick.target.part or ''}"
     cv2.putText(small, words, (6, 16), cv2.FONT_HERSHEY_SIMPLEX, 0.45, (0, 0, 0), 3)
     cv2.putText(small, words, (6, 16), cv2.FONT_HERSHEY_SIMPLEX, 0.45, WHITE, 1)
     return np.asarray(small, np.uint8)
-
-
-def gaze_point(tick: Tick) -> Vec3:
-    """Return where the measured eyes look, as far away as what they look at."""
-    left, right = tick.pose.p_world_eye_left_m, tick.pose.p_world_eye_right_m
-    eye = scale(add(left, right), 0.5)
-    return add(eye, scale(cyclopean(tick), norm(sub(tick.target.p_world_m, eye))))
-
-
-def in_picture(made: Assembly, point: Vec3, found: Detections) -> tuple[float, float]:
-    """Return where the film shows a point of the world: its camera stands still."""
-    R, p = made.mount.pose(AHEAD, (0.0, 0.0, 0.0))
-    lens = intrinsics_of_lens(
-        None, radians(made.horizontal_field_deg), found.width_px, found.height_px
-    )
-    x, y = project((np.array(R).T @ np.array(sub(point, p)))[None], lens)[0].tolist()
-    return x, y
 
 
 def sheet(tiles: list[ImageArray]) -> ImageArray:

@@ -48,7 +48,7 @@ class GyroBias:
             self._means.clear()
 
     def _judge(self, means: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> None:
-        """Take averages over if they are those of a rest."""
+        """Replace the bias by these averages if they are those of a rest."""
         mean = means.mean(axis=0)
         if np.abs(means - mean).max() > _SPREAD_RAD_S or np.abs(mean).max() > _MOST_RAD_S:
             self._elsewhere = 0

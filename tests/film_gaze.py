@@ -1,0 +1,29 @@
+"""Where in the frames of a film the measured eyes look."""
+
+from math import radians
+
+import numpy as np
+
+from gazerig.gaze.angles import add, norm, scale, sub
+from gazerig.gaze.types import Vec3
+from gazerig.robot.analysis.summary import cyclopean
+from gazerig.robot.app.assemble import Assembly
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
+
+
+def gaze_point(tick: Tick) -> Vec3:
+    """Return where the measured eyes look, as far away as what they look at."""
+    left, right = tick.pose.p_world_eye_left_m, tick.pose.p_world_eye_right_m
+    eye = scale(add(left, right), 0.5)
+    return add(eye, scale(cyclopean(tick), norm(sub(tick.target.p_world_m, eye))))
+
+
+def in_picture(made: Assembly, point: Vec3, width_px: int, height_px: int) -> tuple[float, float]:
+    """Return where the film shows a point of the world: its camera stands still."""
+    ahead = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    R, p = made.mount.pose(ahead, (0.0, 0.0, 0.0))
+    lens = intrinsics_of_lens(None, radians(made.horizontal_field_deg), width_px, height_px)
+    seen = np.array(R).T @ np.array(sub(point, p))
+    x, y = project(seen[None], lens)[0].tolist()
+    return x, y
