@@ -8,7 +8,7 @@ at a joint is known by gazerig.robot.control.body alone. Times are host monotoni
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, nan
-from typing import NamedTuple, Protocol
+from typing import Final, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -287,6 +287,11 @@ class CameraTurn(NamedTuple):
         if before is None or before.epoch != self.epoch:
             return None
         return np.asarray(np.array(self.R_start_camera).T @ np.array(before.R_start_camera))
+
+
+SCENES_OF_A_PROCESS: Final = 1_000_000
+"""Scenes that a camera's process counts; those of the one started after it are numbered from so
+many on."""
 
 
 @dataclass(frozen=True, slots=True)

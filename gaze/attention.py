@@ -124,6 +124,7 @@ class Attention:
         self._memory.reset()
         self._persons.reset()
         self._seen_s = -inf
+        self._scene = 0
         self._target: Target | None = None
         self._shift = 0
         self._since_s = -inf
@@ -174,6 +175,11 @@ class Attention:
         What wins over it waits for its reaction time; a present target that is gone stays where it
         was until then.
         """
+        if percept.scene != self._scene:  # a cut: nobody is where they were
+            self._scene = percept.scene
+            self._memory.reset()
+            self._persons.reset()
+            self._idle.forget_places()
         attended = self._identity[1] if self._identity is not None else -1
         lasts_s = self._params.face_memory_s
         bodies = self._memory.step(percept.bodies, attended, percept.captured_s, lasts_s)

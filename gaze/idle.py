@@ -135,6 +135,10 @@ class Idle:
         for id, place in zip(ids, p_world_m, strict=True):
             self._keep(id, place, t_s)
 
+    def forget_places(self) -> None:
+        """Forget what was in view: another scene is shown."""
+        self._seen, self._in_view = {}, frozenset()
+
     def _keep(self, id: int, place: Vec3, t_s: float) -> None:
         self._seen.pop(id, None)
         self._seen[id] = place, t_s

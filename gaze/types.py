@@ -122,11 +122,15 @@ class Face:
 
 @dataclass(frozen=True, slots=True)
 class Percept:
-    """What one frame showed, placed in the world by the head pose at its time of capture."""
+    """What one frame showed, placed in the world by the head pose at its time of capture.
+
+    scene: counts the cuts so far; where it has changed, nothing of before is there any more
+    """
 
     captured_s: float
     bodies: Bodies = field(default_factory=Bodies)
     faces: tuple[Face, ...] = ()
+    scene: int = 0
 
     def age_s(self, t_s: float) -> float:
         """Return the age of the frame at ``t_s``."""

@@ -1,6 +1,7 @@
 """Identities end at a cut of a film; pans, switched light, saccades and crossings end none."""
 
 import pickle
+from dataclasses import replace
 from math import radians
 
 import numpy as np
@@ -8,7 +9,8 @@ import pytest
 from seeing import row_09_identities as row
 from test_perception import Neck, face_at
 
-from gazerig.drivers.types import Detections
+from gazerig.drivers.camera.process import renumbered
+from gazerig.drivers.types import Detections, MovingBlob
 from gazerig.drivers.vision.cut_detector import CutDetector
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.track_params import TrackParams
@@ -65,6 +67,47 @@ def test_a_head_that_turned_sees_another_part_of_the_same_room(
         ids.append([face.id for face in percept.faces])
     assert ids[0] == ids[1] and len(ids[2]) == 1
     assert (ids[2] != ids[1]) is ends
+
+
+def test_a_camera_process_that_was_started_again_shows_another_scene() -> None:
+    """Each process counts from 0; where the head has turned meanwhile, there is no saccade."""
+    perception, poses = (
+        Perception(
+            CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0))), 69.0, Tracker(TrackParams())
+        ),
+        PoseHistory(Neck()),
+    )
+    ids, scenes = [], []
+    for number, (starts, yaw_deg) in enumerate(((0, 0.0), (1, 0.0), (1, 0.0), (2, 30.0)), start=1):
+        yaw = radians(yaw_deg)
+        poses.remember(number / 30, (yaw, 0.0, 0.0))
+        face = face_at((np.sin(yaw), 0.0, np.cos(yaw)))
+        found = Detections(number / 30, number, 640, 400, (face,), scene=2 if starts == 0 else 0)
+        percept = perception.see(renumbered(found, starts), poses)
+        assert percept is not None
+        ids.append(percept.faces[0].id)
+        scenes.append(percept.scene)
+    assert ids[1] == ids[2] and len({*ids}) == 3
+    assert scenes == [0, 1, 1, 2]
+
+
+def test_a_hand_at_rest_ends_with_its_scene() -> None:
+    perception, poses = row.perception()
+    patch = MovingBlob(
+        7, "thing", (0.35, 0.25, 1.0), 0.05, v_camera_m_s=(1.2, 0.0, 0.0), depth_known=True,
+        depth_sd_m=0.02, fastest_m=(0.35, 0.25, 1.0), fastest_m_s=(1.2, 0.0, 0.0),
+    )  # fmt: skip
+    rests = replace(patch, v_camera_m_s=(0.1, 0.0, 0.0), fastest_m_s=(0.1, 0.0, 0.0))
+    kinds = []
+    for number in range(1, 30):
+        blobs = () if number > 8 else (rests,) if number > 6 else (patch,)
+        scene = int(number > 20)
+        face = face_at((0.0, 0.0, 1.0))
+        found = Detections(number / 30, number, 640, 400, (face,), blobs, scene=scene)
+        percept = perception.see(found, poses)
+        assert percept is not None
+        kinds.append(percept.bodies.kinds)
+    assert "hand" in kinds[19] and "hand" not in kinds[20]
 
 
 def test_a_camera_without_the_count_of_scenes_goes_on_as_ever() -> None:

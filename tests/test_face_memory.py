@@ -1,5 +1,6 @@
 """Faces out of view: they stay in mind where they were, and keep their identity."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -59,6 +60,20 @@ def test_who_is_not_found_is_forgotten_and_who_is_lost_is_searched_for() -> None
     # The one that is looked at while it leaves is nowhere to be remembered.
     last = looks(model, [], 20.5, 3.0)
     assert last[5].why == "lost, waiting" and last[-1].kind != "face"
+
+
+@pytest.mark.parametrize("cut", [False, True])
+def test_after_a_cut_nobody_is_looked_for_where_they_were(cut: bool) -> None:
+    model = attention()
+    looks(model, [FACE, OTHER], 0.0, 0.5)
+    stranger = body(7, "face", (1.0, -0.3, 0.0))
+    ids = set()
+    for t in 0.5 + np.arange(300) / 30:
+        seen = replace(percept(t, stranger), scene=int(cut))
+        target = model.choose(seen, looking(), t)
+        if t > 1.5:  # by then the choice of a new target has been made
+            ids.add(target.id)
+    assert (ids == {7}) is cut
 
 
 def test_memory_lasts_as_long_as_it_is_told_and_no_longer() -> None:

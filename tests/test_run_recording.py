@@ -263,7 +263,7 @@ def test_any_percept_comes_back(recorded: Recorded, odd: float) -> None:
     face = Face(3, (odd, 0.0, 1.0), (0.0,) * 3, ((1.0, 0.0, 0.0),) * 3, ((odd,) * 3,) * 8, 0.5)
     bodies = Bodies((3, 9), ("face", "hand"), *(np.full((2, 3), odd),) * 3, np.array([odd, 1.0]),
                     np.full((2, 6, 6), odd))  # fmt: skip
-    for percept in (Percept(odd, bodies, (face,)), Percept(1.0)):
+    for percept in (Percept(odd, bodies, (face,)), Percept(1.0, scene=4)):
         (handed,), row = handed_over(recorded.ticks[-1]._replace(percept=percept))
         data = orjson.loads(orjson.dumps(moments.percept_as_json(handed)))
         number, back = moments.percept_from_json(data)

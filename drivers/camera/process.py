@@ -29,7 +29,7 @@ from gazerig.drivers.camera.shared_frames import SlotReader
 from gazerig.drivers.camera.worker import LONGEST_END_S, CameraParts, Ended, Found, Retune, run
 from gazerig.drivers.child_process import hidden_script
 from gazerig.drivers.errors import CameraError, SetupError
-from gazerig.drivers.types import Detections, FaceDetector
+from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections, FaceDetector
 
 _LONGEST_START_S = 60.0
 _POLL_S = 0.1
@@ -308,7 +308,7 @@ class CameraProcess:
         self.frames_with_face += bool(found.faces)
         self._number = self._counted + found.number
         if self._starts > 1:
-            found = _renumbered(found, (self._starts - 1) * _BLOB_IDS)
+            found = renumbered(found, self._starts - 1)
         slots[0].see(message.image)
         slots[1].see(message.depth)
         found = replace(found, number=self._number)
@@ -322,9 +322,17 @@ class CameraProcess:
             self._losses = 0
 
 
-def _renumbered(found: Detections, first: int) -> Detections:
-    """Return detections whose things are numbered from ``first`` on."""
-    located = found.located
+def renumbered(found: Detections, starts: int) -> Detections:
+    """Return detections of a process before which there were others.
+
+    Its things are other ones, and what it shows is another scene: nobody knows what was before the
+    camera meanwhile, nor whether it is the same camera.
+
+    Args:
+        found: by the process.
+        starts: how many there were before.
+    """
+    located, first = found.located, starts * _BLOB_IDS
     if located is not None:
         things = [
             thing if thing.mark is None else thing._replace(mark=first + thing.mark)
@@ -332,7 +340,8 @@ def _renumbered(found: Detections, first: int) -> Detections:
         ]
         located = located._replace(things=tuple(things))
     blobs = tuple([replace(blob, id=first + blob.id) for blob in found.blobs])
-    return replace(found, blobs=blobs, located=located)
+    scene = starts * SCENES_OF_A_PROCESS + found.scene
+    return replace(found, blobs=blobs, located=located, scene=scene)
 
 
 def _no_reply() -> SetupError:

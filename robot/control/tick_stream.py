@@ -83,6 +83,7 @@ class _PerceptRow(NamedTuple):
     captured_s: float
     bodies: tuple[Any, ...]
     faces: list[_FaceRow]
+    scene: int
 
 
 class TickBatch(NamedTuple):
@@ -214,12 +215,12 @@ def _percept_of(row: _PerceptRow) -> Percept:
     p, v, w = (np.array(rows, float).reshape(-1, 3) for rows in (p_m, v_m_s, w_rad_s))
     pv_cov = None if cov is None else np.array(cov, float).reshape(-1, 6, 6)
     bodies = Bodies(tuple(ids), tuple(kinds), p, v, w, np.array(radius_m, float), pv_cov)
-    return Percept(row.captured_s, bodies, tuple([Face(*face) for face in row.faces]))
+    return Percept(row.captured_s, bodies, tuple([Face(*face) for face in row.faces]), row.scene)
 
 
 def _percept(number: int, percept: Percept) -> tuple[Any, ...]:
     faces = [_face_values(face) for face in percept.faces]
-    return (number, percept.captured_s, _body_values(percept.bodies), faces)
+    return (number, percept.captured_s, _body_values(percept.bodies), faces, percept.scene)
 
 
 def _array(value: Any) -> Any:

@@ -11,7 +11,7 @@ from math import cos, hypot, radians, sqrt
 import numpy as np
 
 from gazerig.drivers.located_frame import LocatedFrame
-from gazerig.drivers.types import Detections
+from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections
 from gazerig.gaze.angles import add, dot, rotate, scale, sub
 from gazerig.gaze.types import PARTS, Bodies, Face, Floats, Mat3, Percept, Vec3
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
@@ -84,6 +84,7 @@ class Perception:
         self._percept: Percept | None = None
         self._number = 0
         self._scene: tuple[int, Vec3] | None = None
+        self._cuts = 0
         self.frames = 0
         self.frames_with_face = 0
 
@@ -114,7 +115,8 @@ class Perception:
             R = self._gyro.orientation(t_s, R, detections.turn)
         if self._is_cut(detections.scene, (R[0][2], R[1][2], R[2][2])):
             self._tracker.forget()
-            self._tracks = ()
+            self._tracks, self._hands = (), Hands()
+            self._cuts += 1
         located = self._located(detections)
         faces = [placed(face, R, p) for face in located.faces]
         things = [placed(thing, R, p) for thing in located.things]
@@ -131,6 +133,7 @@ class Perception:
             t_s,
             _bodies(tracks),
             tuple(self._face(track) for track in tracks if track.detection.kind == "face"),
+            self._cuts,
         )
         return self._percept
 
@@ -155,6 +158,8 @@ class Perception:
     def _is_cut(self, scene: int, axis: Vec3) -> bool:
         """Return whether a frame shows another scene although the camera was hardly turned.
 
+        After a camera's process was started again it does so wherever the camera looks.
+
         Args:
             scene: as counted from the images.
             axis: where the camera looks, in the world.
@@ -162,7 +167,8 @@ class Perception:
         before, self._scene = self._scene, (scene, axis)
         if before is None or before[0] == scene:
             return False
-        return dot(before[1], axis) > _COS_SAME_VIEW
+        restarted = scene // SCENES_OF_A_PROCESS != before[0] // SCENES_OF_A_PROCESS
+        return restarted or dot(before[1], axis) > _COS_SAME_VIEW
 
     def _known(self, t_s: float) -> list[Known]:
         """Return where the faces of the last frame are expected now."""

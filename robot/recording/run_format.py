@@ -135,6 +135,7 @@ _PERCEPT = _says(
             mouth_opening_m=_says(_MAYBE, "gap between the lips; null: not found"),
             speaks=_says(_MAYBE_YES, "null: no mouth is found"),
         )),
+        scene=_says(_WHOLE, "counts the cuts so far; 0 where it is left out"),
     ),
     "what one frame showed, placed in the world by the head's pose at its capture",
 )  # fmt: skip

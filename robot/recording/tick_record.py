@@ -198,11 +198,12 @@ def _present_names(data: Json) -> Json:
 
 def percept_as_json(values: Sequence[Any], finite: bool = False) -> Json:
     """Name the fields of a percept as ``tick_stream.decode_plain`` gives them; see ``as_json``."""
-    number, captured_s, bodies, faces = values
+    number, captured_s, bodies, faces, scene = values
     data = {
         "captured_s": captured_s,
         "bodies": dict(zip(Bodies.__slots__, bodies, strict=True)),
         "faces": [dict(zip(Face.__slots__, face, strict=True)) for face in faces],
+        "scene": scene,
     }
     if finite or _finite(data):
         return {"number": number, **data}
@@ -228,7 +229,7 @@ def percept_from_json(data: Json) -> tuple[int, Percept]:
         pv_cov=None if cov is None else np.array(cov, float).reshape(-1, 6, 6),
     )
     faces = tuple([Face(**{k: _tupled(v) for k, v in face.items()}) for face in data["faces"]])
-    return data["number"], Percept(data["captured_s"], bodies, faces)
+    return data["number"], Percept(data["captured_s"], bodies, faces, data.get("scene", 0))
 
 
 def _body_record(data: Json) -> BodyRecord:
