@@ -24,7 +24,7 @@ OWNERS = {
     "zstandard": ("robot.recording.",),
     "msgspec": ("robot.control.tick_stream",),
     "orjson": ("robot.recording.",),
-    "matplotlib": ("robot.report.", "robot.sweep.response_figure"),
+    "matplotlib": ("robot.report.plotting",),
     "pyarrow": ("robot.sweep.table",),
     "jinja2": ("robot.report.",),
     "aiohttp": ("robot.dashboard.",),

@@ -258,7 +258,8 @@ def test_depthai_is_loaded_without_telemetry_and_without_a_word():
     assert (done.returncode, done.stdout) == (0, ""), done.stderr
 
 
-def test_depthai_that_is_not_there_is_named(monkeypatch):
+def test_depthai_that_is_not_there_is_named_with_its_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "depthai", None)
-    with pytest.raises(CameraError, match="pip install 'depthai"):
+    with pytest.raises(CameraError) as told:
         load_depthai()
+    assert str(told.value) == "depthai is not installed: pip install 'gazerig[oak]'"

@@ -120,7 +120,8 @@ def test_systemd_finds_no_fault_in_the_service(tmp_path: Path) -> None:
 def test_the_list_of_wheels_is_that_of_the_dependencies() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     wanted = {}
-    for dependency in project["dependencies"]:
+    extras = project["optional-dependencies"]
+    for dependency in (*project["dependencies"], *extras["oak"], *extras["report"]):
         match = re.match(r"([\w.-]+)[><=!~]+([\d.]+)", dependency)
         assert match is not None, dependency
         wanted[match[1]] = match[2]

@@ -3,9 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.patches import Circle, Ellipse
 
 from gazerig.gaze.types import PART_NAMES, PARTS, Floats
 from gazerig.robot.analysis import human_norms as human
@@ -16,7 +13,11 @@ from gazerig.robot.report.plotting import (
     HUMAN,
     HUMAN_FILL,
     INK,
+    Axes,
+    Circle,
     Drawing,
+    Ellipse,
+    Figure,
     Shown,
     label,
     legend,

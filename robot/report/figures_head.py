@@ -3,13 +3,21 @@
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from gazerig.robot.analysis import human_norms as human
 from gazerig.robot.report import eye_head
 from gazerig.robot.report import pursuit as following
 from gazerig.robot.report.norm_bands import FOLLOWING, HEAD
-from gazerig.robot.report.plotting import HUMAN, HUMAN_FILL, Drawing, Shown, label, legend, nothing
+from gazerig.robot.report.plotting import (
+    HUMAN,
+    HUMAN_FILL,
+    Drawing,
+    Figure,
+    Shown,
+    label,
+    legend,
+    nothing,
+)
 
 
 def _contribution(figure: Figure, runs: Sequence[Shown]) -> None:

@@ -3,8 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from gazerig.robot.analysis import human_norms as human
 from gazerig.robot.report import blinks
@@ -13,7 +11,9 @@ from gazerig.robot.report.norm_bands import LIDS, SOCIAL
 from gazerig.robot.report.plotting import (
     HUMAN,
     HUMAN_FILL,
+    Axes,
     Drawing,
+    Figure,
     Shown,
     basis_text,
     label,

@@ -3,13 +3,21 @@
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from gazerig.robot.analysis import human_norms as human
 from gazerig.robot.report import saccades
 from gazerig.robot.report.norm_bands import SACCADES
-from gazerig.robot.report.plotting import HUMAN, HUMAN_FILL, Drawing, Shown, label, legend, nothing
+from gazerig.robot.report.plotting import (
+    HUMAN,
+    HUMAN_FILL,
+    Axes,
+    Drawing,
+    Figure,
+    Shown,
+    label,
+    legend,
+    nothing,
+)
 
 _OVERVIEW_S = 12.0
 _NO_SACCADES = "no saccade of 1 deg or more"

@@ -1,16 +1,27 @@
-"""How figures look: one style, drawn without a screen, given as PNG."""
+"""How figures look: one style, drawn without a screen, given as PNG.
+
+The one place where matplotlib is imported: it is an extra, and importing this module without it
+raises SetupError with the command that installs it.
+"""
 
 from collections.abc import Callable, Sequence
 from io import BytesIO
 from typing import Any, Literal, NamedTuple
 
-import matplotlib as mpl
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.extras import extra_hint
 from gazerig.robot.report.gaze_trace import GazeTrace
 from gazerig.robot.report.reference_walk import ReferenceWalk
+
+try:
+    import matplotlib as mpl
+    from matplotlib.axes import Axes as Axes
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure as Figure
+    from matplotlib.patches import Circle as Circle
+    from matplotlib.patches import Ellipse as Ellipse
+except ImportError as error:
+    raise SetupError(extra_hint("matplotlib", "report", error)) from error
 
 COLOURS = ("#1c6ea4", "#d9660a")
 HUMAN = "#7f8c8d"

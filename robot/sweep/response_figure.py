@@ -4,12 +4,10 @@ import textwrap
 from collections.abc import Sequence
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from gazerig.gaze.types import Floats
 from gazerig.robot.report.norm_bands import NormBand
-from gazerig.robot.report.plotting import COLOURS, HUMAN_FILL, INK, nothing, png_of
+from gazerig.robot.report.plotting import COLOURS, HUMAN_FILL, INK, Axes, Figure, nothing, png_of
 from gazerig.robot.sweep.axes import Axis
 from gazerig.robot.sweep.outcome import OUTSIDE, Outcome
 from gazerig.robot.sweep.response import (

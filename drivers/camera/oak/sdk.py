@@ -9,6 +9,7 @@ import os
 from typing import Any
 
 from gazerig.drivers.errors import CameraError
+from gazerig.drivers.extras import extra_hint
 
 
 def load_depthai() -> Any:
@@ -22,8 +23,5 @@ def load_depthai() -> Any:
     try:
         import depthai
     except ImportError as error:
-        raise CameraError(
-            f"depthai cannot be loaded ({' '.join(str(error).split())}): "
-            "reinstall it with: pip install 'depthai>=3.12,<4'"
-        ) from error
+        raise CameraError(extra_hint("depthai", "oak", error)) from error
     return depthai

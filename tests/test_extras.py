@@ -1,0 +1,99 @@
+"""What is installed only as an extra: the program does without, and names it where it is needed."""
+
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+from gazerig.drivers.extras import extra_hint
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+EXTRAS: dict[str, list[str]] = PROJECT["optional-dependencies"]
+
+_WITHOUT = """
+import sys
+sys.modules["matplotlib"] = sys.modules["depthai"] = None  # as if neither were installed
+from gazerig.robot.cli.main import main
+for words in COMMANDS:
+    sys.argv = ["gazerig", *words]
+    try:
+        main()
+    except SystemExit as end:
+        print("exit", end.code or 0)
+"""
+
+
+def without_extras(folder: Path, *commands: tuple[str, ...]) -> tuple[list[str], list[str]]:
+    """Run commands where no extra is installed; return their exit codes and all they said."""
+    code = _WITHOUT.replace("COMMANDS", repr(commands))
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=folder, check=False
+    )
+    return re.findall(r"^exit (\d+)$", done.stdout, re.MULTILINE), done.stderr.splitlines()
+
+
+def test_a_command_that_needs_an_extra_names_it_in_one_line_before_anything_is_done(
+    tmp_path: Path,
+) -> None:
+    codes, said = without_extras(
+        tmp_path,
+        ("report", "--scene", "face-to-face"),
+        ("compare", "a.mcap", "b.mcap"),
+        ("sweep", "--set", "gaze.head.comfort_deg=4:16:7"),
+        (
+            "calibrate",
+            "camera",
+            "--what",
+            "lens",
+            "--oak-calibration",
+            "none.json",
+            "--out",
+            "copy.yaml",
+        ),  # fmt: skip
+    )
+    draws = "matplotlib is not installed: pip install 'gazerig[report]'"
+    sees = "depthai is not installed: pip install 'gazerig[oak]'"
+    assert (codes, said) == (["2"] * 4, [draws, draws, draws, sees])
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_head_runs_without_extras(tmp_path: Path) -> None:
+    codes, said = without_extras(
+        tmp_path,
+        ("run", "--mock", "--fast", "--seconds", "1", "--summary", "run.json"),
+        ("check", "desk"),
+        ("report", "--help"),
+    )
+    assert codes == ["0"] * 3, said
+    assert (tmp_path / "run.json").is_file()
+
+
+def test_a_package_that_is_there_and_does_not_load_is_told_with_the_reason() -> None:
+    broken = ImportError("libstdc++.so.6: cannot open\nshared object file", name="depthai")
+    assert extra_hint("depthai", "oak", broken) == (
+        "depthai cannot be loaded (libstdc++.so.6: cannot open shared object file): "
+        "pip install 'gazerig[oak]'"
+    )
+    within = ModuleNotFoundError("No module named 'numpy.core'", name="numpy.core")
+    assert extra_hint("depthai", "oak", within).startswith("depthai cannot be loaded (No module")
+
+
+def test_every_extra_that_is_named_brings_its_package_and_the_tests_have_them_all() -> None:
+    named = {
+        (package, extra)
+        for path in ROOT.glob("[dgr]*/**/*.py")
+        for package, extra in re.findall(
+            r'extra_hint\("([\w-]+)", "(\w+)"', path.read_text("utf-8")
+        )
+        if "docs" not in path.parts
+    }
+    assert {("depthai", "oak"), ("matplotlib", "report")} <= named
+    base = " ".join(PROJECT["dependencies"])
+    tested = re.search(r"gazerig\[(.+)\]", " ".join(EXTRAS["dev"]))
+    assert tested is not None
+    for package, extra in named:
+        assert any(wanted.startswith(package) for wanted in EXTRAS[extra]), extra
+        assert package not in base
+        assert extra in tested[1].split(",")
