@@ -7,7 +7,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from gazerig.robot.perception.data_association import FORBIDDEN, assign
+from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.perception import data_association
+from gazerig.robot.perception.data_association import (
+    FORBIDDEN,
+    DetectionRow,
+    TrackRow,
+    assign,
+    pair_costs,
+)
 
 PRICES = st.sampled_from([0.0, 1.0, 2.5, 7.0, FORBIDDEN])
 COSTS = st.tuples(st.integers(1, 4), st.integers(1, 4)).flatmap(
@@ -81,3 +89,55 @@ def test_a_pair_too_many_is_not_made_at_the_cost_of_others() -> None:
     assert assign(costs) == [(0, 1), (1, 0)]
     assert assign(costs, unpaired=30.0) == [(0, 0)]
     assert assign([[28.0]], unpaired=30.0) == [(0, 0)]
+
+
+def a_direction(rng: np.random.Generator) -> tuple[float, float, float]:
+    """Return a direction near straight ahead."""
+    v = np.array([1.0, *rng.normal(0.0, 0.08, 2)])
+    x, y, z = (v / np.linalg.norm(v)).tolist()
+    return x, y, z
+
+
+def a_track(rng: np.random.Generator) -> TrackRow:
+    """Return any track."""
+    kind, mark, (across_m2, along_m2) = rng.integers(2), rng.integers(-1, 2), rng.uniform(-6, 0, 2)
+    return TrackRow(
+        int(kind), int(mark), *a_direction(rng), rng.uniform(1.0, 2.0), 10.0**across_m2,
+        10.0**along_m2, rng.uniform(0.02, 0.4), rng.uniform(0.8, 1.2),
+        rng.choice([0.0, 0.2, 1.5]), bool(rng.integers(2)),
+    )  # fmt: skip
+
+
+def a_detection(rng: np.random.Generator) -> DetectionRow:
+    """Return any detection."""
+    kind, mark, (across_m, along_m) = rng.integers(2), rng.integers(-1, 2), rng.uniform(-5, 0, 2)
+    return DetectionRow(
+        int(kind), int(mark), *a_direction(rng), rng.uniform(1.0, 2.0), 10.0**across_m,
+        10.0**along_m, rng.uniform(0.02, 0.4), int(rng.integers(2)),
+    )  # fmt: skip
+
+
+def test_pairs_cost_the_same_one_by_one_and_all_at_once() -> None:
+    rng = np.random.default_rng(0)
+    possible = 0
+    for _ in range(400):
+        tracks = [a_track(rng) for _ in range(rng.integers(1, 6))]
+        found = [a_detection(rng) for _ in range(rng.integers(1, 6))]
+        few = pair_costs(tracks, found, TrackParams())
+        many = data_association._all_pairs(tracks, found, TrackParams())
+        np.testing.assert_allclose(few, many, rtol=1e-12, atol=1e-12)
+        possible += sum(cost < FORBIDDEN for row in few for cost in row)
+    assert possible > 500
+
+
+def test_a_pair_among_many_costs_what_it_costs_alone() -> None:
+    rng = np.random.default_rng(5)
+    tracks, found = [], []
+    for k in range(9):
+        y = 0.05 * k + 0.02 * rng.random()
+        tracks.append(TrackRow(k % 2, -1, 1.0, y, 0.0, 2.0, 1e-4, 1e-2, 0.1, 1.0, 0.0, False))
+        found.append(DetectionRow(k % 2, -1, 1.0, y + 0.01, 0.0, 2.1, 0.01, 0.1, 0.1, 1))
+    many = pair_costs(tracks, found, TrackParams())
+    alone = [[pair_costs([t], [d], TrackParams())[0][0] for d in found] for t in tracks]
+    np.testing.assert_allclose(many, alone, rtol=1e-12)
+    assert 9 < sum(cost < FORBIDDEN for row in alone for cost in row) < 81

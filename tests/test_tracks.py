@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gazerig.robot.model.track_params import TrackParams
-from gazerig.robot.perception.perception import covariances
+from gazerig.robot.perception.perception import covariance
 from gazerig.robot.perception.tracker import LocalisedDetection, Track, Tracker, blended
 
 CAMERA = (0.0, 0.0, 0.2)
@@ -214,8 +214,7 @@ def test_a_sudden_step_is_followed_at_once_and_standing_stays_smooth() -> None:
 
 def cov_of(track: Track) -> np.ndarray:
     f = track.filter
-    view, across, along = np.array([f.view]), np.array([f.across]), np.array([f.along])
-    return covariances(view, across, along)[0]
+    return np.array(covariance(f.view, f.across, f.along)).reshape(6, 6)
 
 
 def test_the_covariance_tells_how_far_off_the_track_is() -> None:

@@ -1,13 +1,13 @@
 """Data association: the pairing of tracks and detections that is likeliest as a whole.
 
 A pair is judged by the distance between where the track is expected and where the detection is,
-in standard deviations of their difference, all pairs in one expression of arrays. Taking the
-nearest pair first gives each of two people who pass each other the other's detection whenever
-one of them happens to be nearer to both places.
+in standard deviations of their difference: a handful of pairs one by one, many in one expression
+of arrays. Taking the nearest pair first gives each of two people who pass each other the other's
+detection whenever one of them happens to be nearer to both places.
 """
 
 from collections.abc import Sequence
-from math import inf
+from math import inf, log
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -37,6 +37,8 @@ _LEAST_SD_M = 1e-4
 _OTHER_MARK = 16.0
 # Within so many radii of its middle is about where something is.
 _OUTLINE = 1.5
+# Up to here plain numbers cost less than arrays, which take as long for one pair as for fifty.
+_FEW_PAIRS = 25
 
 
 class TrackRow(NamedTuple):
@@ -97,8 +99,15 @@ def pair_costs(
     Returns:
         n rows of m, FORBIDDEN where a pair cannot be.
     """
-    if not (tracks and detections):
-        return [[] for _ in tracks]
+    if len(tracks) * len(detections) > _FEW_PAIRS:
+        return _all_pairs(tracks, detections, par)
+    return [[_pair_cost(k, found, tracks, par) for found in detections] for k in range(len(tracks))]
+
+
+def _all_pairs(
+    tracks: Sequence[TrackRow], detections: Sequence[DetectionRow], par: TrackParams
+) -> list[list[float]]:
+    """Return the costs of pairs, all at once."""
     t, d = np.array(tracks).T[:, :, None], np.array(detections).T
     far_m = d[5] * (1.0 + d[9] * (t[9] - 1.0))
     widest_m = par.gate_m * np.maximum(1.0, far_m)
@@ -146,6 +155,63 @@ def _hidden(t: Floats) -> NDArray[np.bool_]:
     np.fill_diagonal(before, False)
     hidden: NDArray[np.bool_] = before.any(axis=1)
     return hidden
+
+
+def _pair_cost(k: int, found: DetectionRow, tracks: Sequence[TrackRow], par: TrackParams) -> float:
+    """Return what ``_all_pairs`` does, for track k and one detection."""
+    kind, mark, x, y, z, range_m, across_m2, along_m2, radius_m, size, moved_m, _ = tracks[k]
+    its_kind, its_mark, its_x, its_y, its_z, its_m, across_sd, along_sd, its_radius_m, sized = found
+    if kind != its_kind:
+        return FORBIDDEN
+    far_m = its_m * (1.0 + sized * (size - 1.0))
+    wide_m = par.gate_m * max(1.0, far_m)
+    other = NO_MARK != mark != its_mark != NO_MARK
+    if other:
+        wide_m = min(wide_m, _OUTLINE * max(radius_m, its_radius_m))
+    dx, dy, dz = x - its_x, y - its_y, z - its_z
+    aside = range_m * range_m * (dx * dx + dy * dy + dz * dz)
+    reach = wide_m + moved_m
+    if aside > reach * reach:
+        return FORBIDDEN
+    ratio = range_m / far_m
+    ratio *= ratio
+    deep = 2.0 * range_m * (far_m - range_m) / (far_m + range_m)  # nearly log(far_m / range_m)
+    deep *= deep
+    across_sd, along_sd = max(across_sd, _LEAST_SD_M), max(along_sd, _LEAST_SD_M)
+    across, along = ratio * across_sd * across_sd, ratio * along_sd * along_sd
+    exact = across * across * along
+    wide = wide_m / par.gate_sigma
+    surprise = ratio * (wide * wide)
+    across_sum, along_sum = across_m2 + across, along_m2 + along
+    most_across, most_along = across_sum + surprise, along_sum + surprise
+    far = aside / most_across + deep / most_along
+    if not (far <= par.gate_sigma * par.gate_sigma and across_sum > 0.0 and along_sum > 0.0):
+        return FORBIDDEN  # too far off, or no numbers
+    cost = aside / across_sum + deep / along_sum + log(across_sum * across_sum * along_sum / exact)
+    hidden = (mark != its_mark or mark == NO_MARK) and _is_hidden(k, tracks)
+    if not hidden:
+        surprising = far + log(most_across * most_across * most_along / exact) + _SURPRISE
+        cost = min(cost, surprising)
+    if other:
+        cost += _OTHER_MARK
+    if hidden and cost > UNPAIRED:
+        return FORBIDDEN
+    return min(cost, UNPAIRED - _SLOWLY / max(cost, _NEARLY_UNPAIRED))
+
+
+def _is_hidden(k: int, tracks: Sequence[TrackRow]) -> bool:
+    """Return what ``_hidden`` does, for one track."""
+    _, _, x, y, z, range_m, _, _, radius_m, _, _, _ = tracks[k]
+    far_m = _NEARER * range_m
+    for i, (_, _, its_x, its_y, its_z, its_m, _, _, its_radius_m, _, _, in_sight) in enumerate(
+        tracks
+    ):
+        if in_sight and its_m < far_m and i != k:
+            dx, dy, dz = x - its_x, y - its_y, z - its_z
+            covered = (its_radius_m + radius_m) / its_m
+            if dx * dx + dy * dy + dz * dz < covered * covered:
+                return True
+    return False
 
 
 def assign(costs: Sequence[Sequence[float]], unpaired: float = FORBIDDEN) -> list[tuple[int, int]]:

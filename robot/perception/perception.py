@@ -13,7 +13,7 @@ import numpy as np
 from gazerig.drivers.located_frame import LocatedFrame
 from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections
 from gazerig.gaze.angles import add, dot, rotate, scale, sub
-from gazerig.gaze.types import PARTS, Bodies, Face, Floats, Mat3, Percept, Vec3
+from gazerig.gaze.types import PARTS, Bodies, Face, Mat3, Percept, Vec3
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, LensParams, PoseHistory
 from gazerig.robot.perception.egomotion_residual import (
@@ -32,6 +32,7 @@ from gazerig.robot.perception.gaze_at_head import (
 from gazerig.robot.perception.gyro_fusion import GyroFusion
 from gazerig.robot.perception.hand_ownership import known_faces, without_own_motion
 from gazerig.robot.perception.hands import Hands, Known
+from gazerig.robot.perception.kalman import Variances
 from gazerig.robot.perception.localisation import placed
 from gazerig.robot.perception.mesh_reading import EYES_SHUT
 from gazerig.robot.perception.own_body import OwnParts, own_named
@@ -39,7 +40,6 @@ from gazerig.robot.perception.tracker import Track, Tracker
 
 # The head's turn at a capture is taken over so long before and after it.
 _HALF_TURN_S = 0.015
-_AXES = np.eye(3)
 # A camera that turned farther between two frames shows another part of the same room.
 _COS_SAME_VIEW = cos(radians(5.0))
 
@@ -285,45 +285,39 @@ def _bodies(tracks: tuple[Track, ...]) -> Bodies:
     if not tracks:
         return Bodies(pv_cov=np.zeros((0, 6, 6)))
     filters = [track.filter for track in tracks]
-    table = np.array(
-        [
-            (
-                *f.p_m,
-                *f.v_m_s,
-                *f.view,
-                t.detection.spin_rad_s,
-                t.detection.radius_m,
-                *f.across,
-                *f.along,
-            )
-            for t, f in zip(tracks, filters, strict=True)
-        ]
-    )
-    view = table[:, 6:9]
+    spins = [scale(f.view, t.detection.spin_rad_s) for t, f in zip(tracks, filters, strict=True)]
+    cov = [number for f in filters for number in covariance(f.view, f.across, f.along)]
     return Bodies(
         tuple([track.id for track in tracks]),
         tuple([track.detection.kind for track in tracks]),
-        table[:, 0:3],
-        table[:, 3:6],
-        view * table[:, 9:10],
-        table[:, 10],
-        covariances(view, table[:, 11:14], table[:, 14:17]),
+        np.array([f.p_m for f in filters]),
+        np.array([f.v_m_s for f in filters]),
+        np.array(spins),
+        np.array([track.detection.radius_m for track in tracks]),
+        np.array(cov).reshape(-1, 6, 6),
     )
 
 
-def covariances(view: Floats, across: Floats, along: Floats) -> Floats:
-    """Return covariances of position and velocity in the world, (n, 6, 6).
+def covariance(view: Vec3, across: Variances, along: Variances) -> tuple[float, ...]:
+    """Return the covariance of position and velocity in the world, (6, 6) row by row.
 
     Args:
-        view: (n, 3) unit vectors from the camera to the things.
-        across: (n, 3) of each the covariances of position, of position and velocity, and of
-            velocity, across the view.
-        along: (n, 3) the same along it.
+        view: unit vector from the camera to the thing.
+        across: variances of position, of position and velocity, and of velocity, across the view.
+        along: the same along it.
     """
-    blocks = across[:, :, None, None] * _AXES
-    blocks += (along - across)[:, :, None, None] * (view[:, None, :, None] * view[:, None, None])
-    cov = np.empty((len(view), 6, 6))
-    cov[:, :3, :3] = blocks[:, 0]
-    cov[:, :3, 3:] = cov[:, 3:, :3] = blocks[:, 1]
-    cov[:, 3:, 3:] = blocks[:, 2]
-    return cov
+    x, y, z = view
+    xx, yy, zz, xy, xz, yz = x * x, y * y, z * z, x * y, x * z, y * z
+    a, b, c = across
+    d, e, f = along[0] - a, along[1] - b, along[2] - c
+    pxy, pxz, pyz, qxy, qxz, qyz = d * xy, d * xz, d * yz, e * xy, e * xz, e * yz
+    vxy, vxz, vyz = f * xy, f * xz, f * yz
+    qxx, qyy, qzz = b + e * xx, b + e * yy, b + e * zz
+    return (
+        a + d * xx, pxy, pxz, qxx, qxy, qxz,
+        pxy, a + d * yy, pyz, qxy, qyy, qyz,
+        pxz, pyz, a + d * zz, qxz, qyz, qzz,
+        qxx, qxy, qxz, c + f * xx, vxy, vxz,
+        qxy, qyy, qyz, vxy, c + f * yy, vyz,
+        qxz, qyz, qzz, vxz, vyz, c + f * zz,
+    )  # fmt: skip
