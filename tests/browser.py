@@ -82,8 +82,10 @@ class Browser:
         self.ask("Page.navigate", url=url)
 
     def words(self) -> str:
-        """Everything there is to read on the page."""
-        answer = self.ask("Runtime.evaluate", expression="document.body.innerText")
+        """Everything there is to read on the page, and in the frame of the view."""
+        frames = "[document, document.querySelector('#view')?.contentDocument]"
+        script = f"{frames}.map(d => d?.body?.innerText ?? '').join('\\n')"
+        answer = self.ask("Runtime.evaluate", expression=script)
         return str(answer["result"].get("value", ""))
 
     def run(self, script: str) -> None:
@@ -91,12 +93,7 @@ class Browser:
         self.ask("Runtime.evaluate", expression=script)
 
     def photograph(self) -> bytes:
-        """A PNG of the page, without the notice that this browser has no graphics card."""
-        hide = (
-            "document.querySelectorAll('.mantine-Notifications-root')"
-            ".forEach(notice => { notice.style.display = 'none' })"
-        )
-        self.ask("Runtime.evaluate", expression=hide)
+        """A PNG of the page."""
         return base64.b64decode(self.ask("Page.captureScreenshot", format="png")["data"])
 
     def photograph_part(self, x: float, y: float, width: float, height: float) -> bytes:

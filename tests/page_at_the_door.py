@@ -95,14 +95,14 @@ class Rig:
         words = {k: v for k, v in given.items() if v is not None}
         return fetch(f"{self.url}/rig/ask", words, body)
 
-    def knock(self, path: str = "/", **headers: str | None) -> ClientConnection:
+    def knock(self, path: str = "/view", **headers: str | None) -> ClientConnection:
         """Open a websocket as a browser does, with other headers as given."""
         given: dict[str, Any] = {"Cookie": self.cookie, **headers}
         origin = given.pop("origin", self.url)
         return connect(
             f"ws://{self.address}{path}",
             origin=origin,
-            subprotocols=VISER if path == "/" else None,  # type: ignore[arg-type]
+            subprotocols=VISER if path == "/view" else None,  # type: ignore[arg-type]
             max_size=None,
             compression=None,
             open_timeout=PATIENCE_S,

@@ -105,8 +105,9 @@ class Person:
         found = self.run(
             f"(() => {{ const e = {element}; if (!e || !e.getClientRects().length) return null;"
             f"const r = e.getBoundingClientRect(), x = r.x + r.width * {across};"
-            "const y = r.y + r.height / 2, hit = document.elementFromPoint(x, y);"
-            "if (e.contains(hit)) return [x, y];"
+            "const y = r.y + r.height / 2, hit = e.ownerDocument.elementFromPoint(x, y);"
+            "const frame = e.ownerDocument.defaultView.frameElement?.getBoundingClientRect();"
+            "if (e.contains(hit)) return [x + (frame?.x ?? 0), y + (frame?.y ?? 0)];"
             "e.scrollIntoView({block: 'center'}); return null; })()"
         )
         return None if found is None else (found[0], found[1])  # type: ignore[index]
@@ -135,7 +136,7 @@ class Person:
 
         def filled() -> bool:
             self.click(field)
-            if self.run(f"{field}?.select(); document.activeElement === {field}") is not True:
+            if self.run(f"{field}?.select(); {field}?.ownerDocument.activeElement === {field}") is not True:
                 return False
             self.wait_for_frames(UNHURRIED_FRAMES)
             self.type(text)
@@ -188,10 +189,16 @@ class Person:
         self.tab.ask("Input.insertText", text=text)
 
 
+def everywhere(kind: str) -> str:
+    """All elements of a kind, on the page and in the frame of the view."""
+    frames = "[document, document.querySelector('#view')?.contentDocument]"
+    return f"{frames}.flatMap(d => [...(d?.querySelectorAll({json.dumps(kind)}) ?? [])])"
+
+
 def saying(words: str, kind: str = "button, [role=tab], label") -> str:
     """The element that says so, whatever is written smaller beside it."""
     return (
-        f"[...document.querySelectorAll({json.dumps(kind)})].find("
+        f"{everywhere(kind)}.find("
         f"e => e.textContent.trim() === {json.dumps(words)} && e.getClientRects().length)"
     )
 

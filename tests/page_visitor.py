@@ -88,8 +88,8 @@ class Visitor:
         except urllib.error.HTTPError as error:
             return error.code
 
-    def open(self, path: str = "/", receive_bytes: int | None = None) -> ClientConnection:
-        """Open a websocket: "/" is the page's own, "/rig/line" that of the stop button."""
+    def open(self, path: str = "/view", receive_bytes: int | None = None) -> ClientConnection:
+        """Open a websocket: "/view" is that of the view, "/rig/line" that of the stop button."""
         there = socket.socket()
         if receive_bytes is not None:
             there.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_bytes)
@@ -99,7 +99,7 @@ class Visitor:
             f"ws://{parts.netloc}{path}",
             sock=there,
             origin=Origin(self.url),
-            subprotocols=[VISER] if path == "/" else None,
+            subprotocols=[VISER] if path == "/view" else None,
             additional_headers={"Cookie": self.headers["Cookie"]},
             max_size=None,
             compression=None,

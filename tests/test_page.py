@@ -31,7 +31,7 @@ from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
 T = TypeVar("T")
 WINDOW_SMALL_PX = (900, 500)  # a processor that does a graphics card's work has less to do
 PANEL_PX = 370
-CLOSE_TO_THE_RIG = "&initialCameraPosition=0.45,-0.3,0.2&initialCameraLookAt=0,0,0.12"
+CLOSE_TO_THE_RIG = "initialCameraPosition=0.45,-0.3,0.2&initialCameraLookAt=0,0,0.12"
 
 # A person's face in its own frame (x out of the face, y to the owner's left, z up), in the
 # order chin, left side, left eye, mouth, nose, right side, right eye, forehead.
@@ -177,7 +177,9 @@ def test_page_shows_a_head_that_turns() -> None:
         # All is sent before the browser comes: who is late sees the whole scene.
         page.show(looking(1.0, face_at((0.9, -0.2, 0.25))))
         page.show_frame(encode(PICTURE))
-        browser.go(url + CLOSE_TO_THE_RIG)
+        browser.go(url)
+        wait_for(lambda: reads("STOP"), "the page")
+        browser.run(f"document.querySelector('#view').src = '/view/?{CLOSE_TO_THE_RIG}'")
         wait_for(lambda: reads("nothing has come from the rig", "camera"), "the silence")
         before = wait_for(eyes, "the rig's eyes").mean(axis=0)
         there = looking(2.0, face_at((0.9, 0.6, 0.25)))

@@ -21,12 +21,15 @@ from page_visitor import LOOKING
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
 
+from gazerig.robot.dashboard import auth_proxy
 from gazerig.robot.dashboard.auth_proxy import MOST_LINES
 from gazerig.robot.dashboard.browser_requests import from_browser
 from gazerig.robot.dashboard.browsers import TabLimits
 from gazerig.robot.dashboard.connection_limits import MOST as MOST_CONNECTIONS
 from gazerig.robot.dashboard.token_bucket import TokenBucket
 from gazerig.robot.dashboard.viser_server import FROM_BROWSER_BYTES, browser_of
+
+BROWSER = Path(auth_proxy.__file__).with_name("browser")
 
 
 @pytest.fixture(scope="module")
@@ -43,8 +46,28 @@ def test_the_page_comes_with_its_stop_button(near: Rig) -> None:
     status, headers, text = near.get()
     assert status == 200 and '<script src="/rig/stop.js"></script>' in text
     assert headers["X-Frame-Options"] == "DENY"
+    assert "frame-ancestors 'none'" in headers["Content-Security-Policy"]
     status, headers, text = near.get("/rig/stop.js")
     assert status == 200 and "text/javascript" in headers["Content-Type"] and "STOP" in text
+
+
+def test_the_view_is_viser_in_a_frame_of_this_page_alone(near: Rig) -> None:
+    status, headers, text = near.get("/view/")
+    assert status == 200 and '<link rel="stylesheet" href="/rig/view.css"></head>' in text
+    assert headers["X-Frame-Options"] == "SAMEORIGIN"
+    assert headers["Content-Security-Policy"] == "frame-ancestors 'self'"
+    assert near.get("/view")[:2] == (302, {**near.get("/view")[1], "Location": "/view/"})
+    assert near.get("/elsewhere")[0] == near.get("/rig/page_files.py")[0] == 404
+
+
+@pytest.mark.parametrize(
+    "name", sorted({path.name for path in BROWSER.iterdir()} - {"index.html"})
+)
+def test_every_file_of_the_page_is_served_as_what_it_is(near: Rig, name: str) -> None:
+    status, headers, text = near.get(f"/rig/{name}")
+    kind = {"js": "text/javascript", "css": "text/css", "svg": "image/svg+xml"}
+    assert status == 200 and text == (BROWSER / name).read_text(encoding="utf-8")
+    assert headers["Content-Type"] == f"{kind[name.rpartition('.')[2]]}; charset=utf-8"
 
 
 def test_a_browser_gets_what_the_server_sends(near: Rig) -> None:

@@ -32,7 +32,7 @@ def either(request: pytest.FixtureRequest, near: Rig, far: Rig) -> Rig:
 
 
 @pytest.mark.parametrize(
-    "path", ["/", "/rig/line", "/rig/stop.js", "/?token=wrong", "/?token=", "/?token=%ff"]
+    "path", ["/", "/view/", "/rig/line", "/rig/stop.js", "/?token=wrong", "/?token=", "/?token=%ff"]
 )
 def test_without_the_token_nothing_is_seen(either: Rig, path: str) -> None:
     status, headers, text = fetch(either.url + path)
@@ -47,7 +47,7 @@ def test_without_the_token_nothing_moves(either: Rig, cookie: str | None) -> Non
     given = None if cookie is None else f"{either.door._cookie}={cookie}"
     for body in (b'{"do":"resume"}', b'{"do":"stop","why":"x"}'):
         assert either.post(body, Cookie=given)[0] == 403
-    for path in ("/", "/rig/line"):
+    for path in ("/view", "/rig/line"):
         with pytest.raises(InvalidStatus) as refused:
             either.knock(path, Cookie=given)
         assert refused.value.response.status_code == 403

@@ -1,14 +1,15 @@
 """The page's door: the only way in, at the asked address, for those who may come in.
 
-A reverse proxy before viser, which itself listens where no other program can reach it
+Viser itself listens where no other program can reach it
 (``gazerig.robot.dashboard.viser_server``). A client shows a token, once, in the query of
 the first address; a cookie takes its place. That holds on this machine as well, which may have
 other users. The Origin of every websocket and of everything that is sent must be the address of
 this page, and on the loopback that address must be a name of the loopback, or a foreign name
 made to point here would do (DNS rebinding).
 
-It also serves what must work whatever viser does: the stop button, written into the page,
-and what the button talks to.
+It serves the page itself (``gazerig.robot.dashboard.page_files``), so that the stop button and
+what it talks to work whatever viser does; viser draws the view in a frame of the page
+(``gazerig.robot.dashboard.view_proxy``).
 """
 
 import asyncio
@@ -24,46 +25,33 @@ from urllib.parse import urlsplit
 import aiohttp
 from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
-from yarl import URL
 
 from gazerig.robot.dashboard.browser_requests import ASKED_BYTES, compact, from_browser, leads
 from gazerig.robot.dashboard.browsers import Browsers, TabLimits
 from gazerig.robot.dashboard.connection_limits import Connections
+from gazerig.robot.dashboard.page_files import PageFiles
 from gazerig.robot.dashboard.stop_sender import StopSender
 from gazerig.robot.dashboard.token_bucket import TokenBucket
-from gazerig.robot.dashboard.viser_server import (
-    BROWSER_HEADER,
-    FROM_BROWSER_BYTES,
-    TO_BROWSER_BYTES,
-)
-from gazerig.robot.dashboard.websocket_relay import TAKES_S, carry_in, carry_out, until_one_ends
+from gazerig.robot.dashboard.view_proxy import VIEW, ViewProxy
+from gazerig.robot.dashboard.websocket_relay import TAKES_S, until_one_ends
 
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
-MOST_TABS = 16
-"""Tabs that show the page at a time."""
 MOST_LINES = 32
 """Tabs whose stop button receives the state of the rig."""
 
-_SCRIPT = Path(__file__).with_name("stop.js")
-_SCRIPT_TAG = b'<script src="/rig/stop.js"></script>'
-_HEAD = b"<head>"
 _ASKED_PER_S, _ASKED_BURST = 20.0, 40.0  # clicks of all people together
-_TABS_PER_S, _TABS_BURST = 2.0, 20.0  # each receives the whole state, which takes a moment
 _READ_S = 5.0
 _BEAT_S = 1.0
 _RENEWED_EVERY_S = 0.25
 _OPEN_TIMEOUT_S = 20.0
 _CLOSE_TIMEOUT_S = 3.0
 _DAY_S = 86400
-# What a proxy must not hand on: it is about one leg of the way (RFC 9110, 7.6.1).
-_ONE_LEG = {"connection", "transfer-encoding", "content-encoding", "content-length", "keep-alive"}
 _HEADERS = {
     "X-Frame-Options": "DENY",  # no other page may lie over the buttons
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
 }
-_PLAIN = {"Accept-Encoding": "identity"}
 
 Ask = Callable[[bytes], bool]
 """Hands a JSON object to the rig; False where the rig does not take it."""
@@ -95,9 +83,8 @@ class AuthProxy:
         self._cookie = f"gazerig_{port}"  # cookies do not tell ports apart
         self._state: Mapping[str, object] = {}
         self._asked_rate = TokenBucket(_ASKED_PER_S, _ASKED_BURST)
-        self._tab_rate = TokenBucket(_TABS_PER_S, _TABS_BURST)
         self._news: set[asyncio.Event] = set()
-        self._lines, self._tabs = TabLimits(MOST_LINES), TabLimits(MOST_TABS)
+        self._lines = TabLimits(MOST_LINES)
         self._loop = asyncio.new_event_loop()
         self._over = asyncio.Event()
         self._opened = threading.Event()
@@ -139,29 +126,35 @@ class AuthProxy:
 
     async def _serve(self) -> None:
         app = web.Application(middlewares=[self._doorkeeper()], client_max_size=ASKED_BYTES)
-        app.router.add_get("/rig/stop.js", self._script)
         app.router.add_get("/rig/line", self._line)
         app.router.add_post("/rig/ask", self._asked)
-        app.router.add_get("/{path:.*}", self._pass_on)
+        PageFiles(_HEADERS).add_to(app.router)
+        app.router.add_get(VIEW, self._pass_on)
+        app.router.add_get(f"{VIEW}/{{path:.*}}", self._pass_on)
+        app.router.add_get("/{path:.*}", self._nothing)
         runner = web.AppRunner(
             app, access_log=None, shutdown_timeout=0.5, lingering_time=0.0, max_line_size=4096
         )
         await runner.setup()
         assert runner.server is not None
         self._connections = Connections(runner.server)
-        try:
-            listener = await self._loop.create_server(
-                self._connections.accept, self._host, self._port, reuse_address=True, backlog=512
-            )
-        except OSError as error:
-            self._failed = error
-            return
-        finally:
-            self._opened.set()
-        self._stop.attach(self._loop)
         connector = aiohttp.UnixConnector(self._inside, limit=0)
-        self._client = aiohttp.ClientSession(connector=connector, auto_decompress=True)
-        async with self._client:
+        async with aiohttp.ClientSession(connector=connector, auto_decompress=True) as client:
+            self._view = ViewProxy(client, self._connections, _HEADERS)
+            try:
+                listener = await self._loop.create_server(
+                    self._connections.accept,
+                    self._host,
+                    self._port,
+                    reuse_address=True,
+                    backlog=512,
+                )
+            except OSError as error:
+                self._failed = error
+                return
+            finally:
+                self._opened.set()
+            self._stop.attach(self._loop)
             await until_one_ends(self._over.wait(), self._connections.watch(), self._renew())
             self._wake()
             listener.close()
@@ -228,11 +221,6 @@ class AuthProxy:
         return self.browsers.name(request.cookies.get(self._name_cookie))
 
     # --- the stop button ------------------------------------------------------------------
-
-    async def _script(self, request: web.Request) -> web.Response:
-        return web.Response(
-            body=_SCRIPT.read_bytes(), content_type="text/javascript", headers=_HEADERS
-        )
 
     async def _asked(self, request: web.Request) -> web.Response:
         """Hand what is asked for to the rig, and say whether it was taken."""
@@ -315,53 +303,13 @@ class AuthProxy:
 
     async def _pass_on(self, request: web.Request) -> web.StreamResponse:
         if "upgrade" in request.headers:
-            return await self._relay(request)
-        async with self._client.get(self._address("http", request), headers=_PLAIN) as inside:
-            body = await inside.read()
-            headers = {k: v for k, v in inside.headers.items() if k.lower() not in _ONE_LEG}
-            status = inside.status
-        if headers.get("Content-Type", "").startswith("text/html"):
-            body = body.replace(_HEAD, _HEAD + _SCRIPT_TAG, 1)
-        return web.Response(status=status, body=body, headers={**headers, **_HEADERS})
+            return await self._view.relay(request, self._who(request), self._over.wait())
+        if request.path == VIEW:  # what the document names is beside it
+            return web.Response(status=302, headers={**_HEADERS, "Location": f"{VIEW}/"})
+        return await self._view.get(request)
 
-    async def _relay(self, request: web.Request) -> web.StreamResponse:
-        """Carry a browser's websocket to the server and back, each side as slow as the other."""
-        if not self._tab_rate.take(self._loop.time()):
-            return web.Response(status=429, text="too many tabs at once\n", headers=_HEADERS)
-        offered = [
-            word.strip()
-            for word in request.headers.get("Sec-WebSocket-Protocol", "").split(",")
-            if word.strip()
-        ]
-        browser = web.WebSocketResponse(
-            protocols=offered, max_msg_size=FROM_BROWSER_BYTES, compress=False
-        )
-        who = self._who(request)
-        with self._tabs.take(who) as leave:
-            async with self._client.ws_connect(
-                self._address("ws", request),
-                protocols=offered,
-                headers={BROWSER_HEADER: who},
-                max_msg_size=TO_BROWSER_BYTES,
-                compress=0,
-            ) as inside:
-                await browser.prepare(request)
-                self._connections.lasting(request)
-                await until_one_ends(
-                    carry_in(browser, inside),
-                    carry_out(inside, browser),
-                    self._over.wait(),
-                    leave.wait(),
-                )
-        with suppress(TimeoutError, ConnectionError):
-            async with asyncio.timeout(_BEAT_S):
-                await browser.close()
-        if request.transport is not None:  # one who reads nothing does not read that it is over
-            request.transport.abort()
-        return browser
-
-    def _address(self, scheme: str, request: web.Request) -> URL:
-        return URL(f"{scheme}://page/{request.rel_url.raw_path_qs.lstrip('/')}", encoded=True)
+    async def _nothing(self, request: web.Request) -> web.Response:
+        return web.Response(status=404, text="there is nothing at this address\n", headers=_HEADERS)
 
 
 def _netloc(origin: str) -> str | None:

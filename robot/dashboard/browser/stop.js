@@ -1,45 +1,20 @@
 // The red button that is always there, whatever the rest of the page does.
 //
-// It stands outside of everything that viser draws, and talks to the rig over the page's
-// door by a connection of its own, which stands before it is needed. The space bar does the
-// same, unless the user types. A stop is sent again until the rig has taken it. A click into
-// the camera image makes the head look there.
+// It needs none of the page's other scripts, and talks to the rig over the page's door by a
+// connection of its own, which stands before it is needed. The space bar does the same, in the
+// frame of the view too, unless the user types. A stop is sent again until the rig has taken it.
+//
+// What comes over the connection is an event "rig-state" of the window for the other scripts;
+// they talk to the rig by window.rig: ask(what) waits for an answer, tell(what) does not.
 
 (() => {
   "use strict";
 
   const SILENT_AFTER_MS = 3000; // the door gives a sign of life every second
   const AGAIN_MS = 250;
-  const RED = "#c92a2a";
-  const css = `
-    #rig-stop-bar { position: fixed; left: 50%; top: 8px; transform: translateX(-50%);
-      z-index: 2147483647; display: flex; flex-direction: column; gap: 8px;
-      align-items: center; width: max-content; max-width: calc(100vw - 28px);
-      font: 600 15px/1.3 system-ui, sans-serif; color: #fff; pointer-events: none }
-    #rig-stop-bar > * { pointer-events: auto; border-radius: 10px;
-      box-shadow: 0 2px 10px rgba(0, 0, 0, .35) }
-    #rig-stop-bar button { font: inherit; color: #fff; border: 0; border-radius: 10px;
-      cursor: pointer; padding: 0 18px }
-    #rig-stop { background: ${RED}; min-width: 150px; min-height: 60px;
-      font-size: 24px !important; letter-spacing: 2px; touch-action: manipulation }
-    #rig-stop.going { background: #801515 }
-    #rig-stop:active { background: #801515 }
-    #rig-stop small { display: block; font: 400 11px system-ui, sans-serif; letter-spacing: 0 }
-    #rig-words { background: #212529; padding: 10px 14px; display: flex; gap: 12px;
-      align-items: center; flex-wrap: wrap; max-width: 520px }
-    #rig-words[hidden], #rig-stop[hidden] { display: none }
-    #rig-words button { background: #2b8a3e; min-height: 40px }
-    #rig-words button.no { background: #495057 }
-    #rig-words.alarm { background: ${RED} }
-    img.rig-camera { cursor: crosshair }`;
 
-  const bar = document.createElement("div");
-  bar.id = "rig-stop-bar";
-  bar.innerHTML = `
-    <button id="rig-stop" type="button"><span>STOP</span><small>or the space bar</small></button>
-    <div id="rig-words" role="status" hidden></div>`;
-  const stop = bar.querySelector("#rig-stop");
-  const words = bar.querySelector("#rig-words");
+  let stop = null; // the button and the words beside it, once the document has them
+  let words = null;
 
   const QUIET = { stopped: "", silent: false, you: "" };
   let state = QUIET;
@@ -154,6 +129,7 @@
     + "that the rig's terminal shows.";
   let drawn = "";
   function draw() {
+    if (!stop) return;
     stop.hidden = Boolean(state.recording);
     stop.classList.toggle("going", Boolean(stopping));
     const label = stopping ? "stopping…" : "STOP";
@@ -182,6 +158,7 @@
       state = { ...QUIET, ...said.state };
       if (state.stopped !== before) { confirming = false; failed = ""; }
       draw();
+      window.dispatchEvent(new CustomEvent("rig-state", { detail: state }));
     };
     mine.onclose = () => {
       line = null;
@@ -193,15 +170,12 @@
     };
   }
 
-  const TEXT = new Set(["text", "search", "number", "password", "email", "url", "tel", ""]);
+  const TEXT = new Set(["text", "search", "number", "password", "email", "url", "tel"]);
+  // By name: what is in a frame is not of this window's classes.
   function typing(where) {
-    if (!(where instanceof HTMLElement)) return false;
     if (where.isContentEditable) return true;
-    if (where instanceof HTMLTextAreaElement) return !where.readOnly;
-    if (where instanceof HTMLInputElement) {
-      return TEXT.has(where.getAttribute("type") ?? "") && !where.readOnly;
-    }
-    return false;
+    if (where.tagName === "TEXTAREA") return !where.readOnly;
+    return where.tagName === "INPUT" && TEXT.has(where.type) && !where.readOnly;
   }
 
   // Caught before other handlers see it: a space would also press the button in focus.
@@ -214,6 +188,7 @@
 
   // The camera image is the one that is called so, in the panel or laid out large.
   function isCamera(image) {
+    if (image.tagName !== "IMG") return false;
     const title = image.closest(".mantine-Modal-content")?.querySelector(".mantine-Modal-title")
       ?? image.parentElement?.previousElementSibling;
     return /^camera\b/.test(title?.textContent?.trim() ?? "");
@@ -221,7 +196,7 @@
 
   function pick(event) {
     const image = event.target;
-    if (!(image instanceof HTMLImageElement) || !isCamera(image)) return;
+    if (!isCamera(image)) return;
     const box = image.getBoundingClientRect();
     ask({ pick: {
       x: (event.clientX - box.left) / box.width,
@@ -230,28 +205,37 @@
   }
 
   function hover(event) {
-    if (event.target instanceof HTMLImageElement && isCamera(event.target)) {
-      event.target.classList.add("rig-camera");
-    }
+    if (isCamera(event.target)) event.target.style.cursor = "crosshair";
+  }
+
+  function tell(what) {
+    if (line && line.readyState === WebSocket.OPEN) line.send(JSON.stringify(what));
   }
 
   function begin() {
-    const style = document.createElement("style");
-    style.textContent = css;
-    document.head.append(style);
-    document.body.append(bar);
+    stop = document.getElementById("rig-stop");
+    words = document.getElementById("rig-words");
     // Pressed, not released: a hand that trembles may leave the button before it lets go.
     stop.addEventListener("pointerdown", () => halt("STOP was pressed on the page"));
     stop.addEventListener("click", (event) => { // a screen reader or Enter clicks only
       if (event.detail === 0) halt("STOP was pressed on the page");
     });
-    document.addEventListener("click", pick, true);
-    document.addEventListener("mouseover", hover, true);
     setInterval(draw, 500);
-    listen();
+    draw();
   }
 
-  for (const type of ["keydown", "keyup", "keypress"]) window.addEventListener(type, key, true);
+  function listenForKeys(where) {
+    for (const type of ["keydown", "keyup", "keypress"]) where.addEventListener(type, key, true);
+    where.addEventListener("click", pick, true);
+    where.addEventListener("mouseover", hover, true);
+  }
+
+  window.rig = { ask, tell };
+  listenForKeys(window);
+  document.addEventListener("load", (event) => { // a frame's does not rise to its parents
+    if (event.target.tagName === "IFRAME") listenForKeys(event.target.contentWindow);
+  }, true);
+  listen();
   if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", begin);
   else begin();
 })();
