@@ -136,7 +136,10 @@ class Person:
 
         def filled() -> bool:
             self.click(field)
-            if self.run(f"{field}?.select(); {field}?.ownerDocument.activeElement === {field}") is not True:
+            if (
+                self.run(f"{field}?.select(); {field}?.ownerDocument.activeElement === {field}")
+                is not True
+            ):
                 return False
             self.wait_for_frames(UNHURRIED_FRAMES)
             self.type(text)

@@ -156,8 +156,9 @@ def test_a_target_is_dragged_through_the_scene(at_the_rig: tuple[Rig, Person]) -
     rig.robot.command(Ask("behaviour", "attack"))
     wait_for(lambda: person.reads("in force: behaviour attack"), "the page knowing of the look")
     person.click(beside("drag a target", "input"))
-    rect = "(() => { const r = document.querySelector('#view').getBoundingClientRect();"
-    bounds: Any = person.run(rect + "return [r.x, r.y, r.width, r.height]; })()")
+    rect = f"(() => {{ const r = {everywhere('canvas')}[0].getBoundingClientRect();"
+    rect += "const f = document.querySelector('#view').getBoundingClientRect();"
+    bounds: Any = person.run(rect + "return [f.x + r.x, f.y + r.y, r.width, r.height]; })()")
     x, y, width, height = bounds
     canvas = (x, y, width, height)
     arrow, farther = ((*there[:2], there[2] + up) for up in (0.08, 0.2))

@@ -60,9 +60,7 @@ def test_the_view_is_viser_in_a_frame_of_this_page_alone(near: Rig) -> None:
     assert near.get("/elsewhere")[0] == near.get("/rig/page_files.py")[0] == 404
 
 
-@pytest.mark.parametrize(
-    "name", sorted({path.name for path in BROWSER.iterdir()} - {"index.html"})
-)
+@pytest.mark.parametrize("name", sorted({path.name for path in BROWSER.iterdir()} - {"index.html"}))
 def test_every_file_of_the_page_is_served_as_what_it_is(near: Rig, name: str) -> None:
     status, headers, text = near.get(f"/rig/{name}")
     kind = {"js": "text/javascript", "css": "text/css", "svg": "image/svg+xml"}
