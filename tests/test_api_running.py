@@ -86,7 +86,7 @@ def test_a_second_interrupt_skips_what_is_left_of_parking(
         join(self, timeout)
 
     def parked(self: Robot, *given: Any) -> bool:
-        again = given[-1]
+        again = given[3]
         parking.set()
         while not again():  # as far from the parking pose as can be
             parking.wait(0.01)

@@ -28,7 +28,7 @@ from gazerig.robot.model.commands import (
     LookAtPixel,
     Stop,
 )
-from gazerig.robot.model.lead import ARRIVED_RAD
+from gazerig.robot.model.lead import ARRIVED_RAD, NOBODY_LEADS
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.recording.read import RunRecording
 
@@ -195,7 +195,7 @@ def test_a_lead_ends_after_its_time_and_says_so(rig: Simulated) -> None:
 
 
 def test_leads_are_counted_and_their_ends_have_reasons(rig: Simulated) -> None:
-    assert rig.go(0.006)[-1].lead == (0, False, False, 0.0, "")
+    assert rig.go(0.006)[-1].lead == NOBODY_LEADS
     assert rig.do(LookAt((1.0, 0.0, 0.3), stay=True))[0].lead == 1
     reply, ticks = rig.do(LookAt((1.0, 0.4, 0.3), stay=True), 1.5)
     assert reply.lead == 2 and ticks[0].lead.number == 2 and not ticks[0].lead.arrived

@@ -135,10 +135,11 @@ def test_the_first_tick_after_set_has_it(rig: RobotClient, beat: Beat) -> None:
 
 def test_looking_jogging_and_asking(rig: RobotClient, beat: Beat) -> None:
     rig.look_at(1.0, 0.2, 0.1, stay=True)
-    assert rig.status()["why"] == "a user chose this point"
+    assert rig.status()["why"].endswith("makes it look at 1 0.2 0.1")
+    assert rig.status()["leads"] == "person"
     assert beat.ticks[-1].target.p_world_m == (1.0, 0.2, 0.1)
     rig.look_freely()
-    assert rig.status()["why"] != "a user chose this point"
+    assert rig.status()["leads"] == "gaze" and "makes it" not in rig.status()["why"]
     rig.jog("neck_yaw", 10.0, stay=True)
     desired = dict(zip(rig.status()["joints_deg"], beat.ticks[-1].desired_rad, strict=True))
     assert desired["neck_yaw"] == pytest.approx(radians(10.0))

@@ -56,10 +56,11 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
 
 def test_every_tick_comes_back_bit_for_bit(recorded: Recorded) -> None:
     # A new field must be recorded too: add it to TickRow, as_json and from_json.
+    # Ticks of parking are never recorded.
     assert Tick._fields == (
         "t_s", "joints", "pose", "detections", "percept", "target", "gaze", "desired_rad",
         "guard_result", "events", "commands", "stopped", "led", "lead",
-            "gesture",
+            "gesture", "parking",
     )  # fmt: skip
     back = list(RunRecording(recorded.path).ticks())
     assert len(back) == len(recorded.ticks) == 299

@@ -96,8 +96,10 @@ class RunObservers:
         health = made.robot.body.bus.health
         self._status = StatusLine(status, health) if live and status is not None else None
         self._stream = recorder.stream if recorder is not None else TickStream(say)
+        self._parking = TickStream(say)
         if self._publisher is not None:
             self._stream.add("the page", self._publisher.take)
+            self._parking.add("the page", self._publisher.take)
         self._observers = Observers(say)
         self.join(self._observers)
 
@@ -145,6 +147,15 @@ class RunObservers:
     def update(self, tick: Tick) -> None:
         """Update all observers with a tick; called by a loop that does not update them itself."""
         self._observers.update(tick)
+
+    def parking(self, tick: Tick) -> None:
+        """Show a tick of the way to the parking pose, which is no part of a recording."""
+        with contextlib.suppress(Exception):  # nothing may keep the head from parking
+            if self._status is not None:
+                self._status.update(tick)
+            if self._live is not None:
+                self._live.update(tick)
+            self._parking.update(tick)
 
     def timed(self, stop: Callable[[float], str | None]) -> Callable[[float], str | None]:
         """Return the loop's ``stop`` as the recording needs it."""

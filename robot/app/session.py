@@ -202,7 +202,10 @@ class Session:
         run_observers.open_files()
         begun = False
         try:
-            with self._interrupts, way_out(made, say, self._interrupts) as leaving:
+            with (
+                self._interrupts,
+                way_out(made, say, self._interrupts, run_observers.parking) as leaving,
+            ):
                 leaving.switch_on(lambda: made.robot.start(made.clock, self._interrupts.refuse))
                 begun = True
                 self._start_s = made.clock.now_s()
@@ -299,17 +302,22 @@ def leave(
     leaving.leave()
 
 
-def way_out(made: Assembly, say: Callable[[str], None], interrupts: Interrupts) -> PowerDown:
-    """Return the way out of a run of this robot."""
-    return PowerDown(lambda again: parked(made, again), made.robot.stop, say, interrupts)
+def way_out(
+    made: Assembly,
+    say: Callable[[str], None],
+    interrupts: Interrupts,
+    watch: Callable[[Tick], object] | None = None,
+) -> PowerDown:
+    """Return the way out of a run of this robot; watch: gets a tick at every step of parking."""
+    return PowerDown(lambda again: parked(made, again, watch), made.robot.stop, say, interrupts)
 
 
-def parked(made: Assembly, again: Again) -> str:
+def parked(made: Assembly, again: Again, watch: Callable[[Tick], object] | None = None) -> str:
     """Park a robot unless it was stopped; return what to say of it."""
     robot = made.robot
     if robot.stopped:
         return "not parked, as it was stopped"
-    if robot.park(made.park_rad, made.clock, made.loop, again):
+    if robot.park(made.park_rad, made.clock, made.loop, again, watch):
         return "parked"
     return "not parked (interrupted)" if again() else "not parked"
 

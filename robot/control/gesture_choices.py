@@ -145,7 +145,8 @@ class GestureChoices:
             return CommandReply(f"{command.gesture}: {refused}")
         wait_s = self._fit.wait_s(state, fade_s, fitted.played, limits, share)
         self._player.play(fitted.played, t_s, fade_s, wait_s)
-        self._state = GestureState(self._state.number + 1, command.gesture)
+        number = self._state.number + 1
+        self._state = GestureState(number, command.gesture, who=command.who, since_s=t_s)
         left_out = self._made_of(command.gesture, command.times).left_out
         return CommandReply(
             gesture=GestureReply(

@@ -13,8 +13,9 @@ from gazerig.gaze.angles import add, unit, yaw_pitch
 from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import PART_NAMES, PARTS, Angles2, Angles3, Face, Vec3
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.tick_text import target_name
+from gazerig.robot.control.tick_text import doing, leader, target_name
 from gazerig.robot.model.lead import NO_GESTURE, NOBODY_LEADS, GestureState, LeadState
+from gazerig.robot.model.leader import Leader
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +71,7 @@ class GazeReading:
     """Where head and eyes are, as measured, and where they are going.
 
     Attributes:
-        target: what is looked at, e.g. "face 3: left eye".
+        target: what is looked at, e.g. "face 3: left eye"; while somebody leads, who.
         reason: why.
         point_m: where both eyes are meant to point now, world.
         direction_rad: (yaw, pitch) of the mean line of sight, world, as measured.
@@ -79,7 +80,7 @@ class GazeReading:
         left_eye_rad: (yaw, pitch) in the head.
         right_eye_rad: (yaw, pitch) in the head.
         lids: opening of the left and the right upper lid, 0 shut .. 1 open.
-        phase: "fixate", "saccade" or "pursue".
+        phase: "fixate", "saccade" or "pursue"; "held" while joints are held, "stopped", "parking".
         blink: whether a blink is under way.
     """
 
@@ -162,6 +163,8 @@ class HeadState:
         led: who leads gaze or joints and with what, "" while the head chooses.
         lead: the newest lead.
         gesture: the newest gesture.
+        leader: who leads now: the gaze models, a client, a gesture, a stop.
+        headline: what the head does now, in one sentence.
         frame_s: time of the newest camera frame; None before the first.
     """
 
@@ -176,6 +179,8 @@ class HeadState:
     lead: LeadState = field(default=NOBODY_LEADS)
     gesture: GestureState = field(default=NO_GESTURE)
     frame_s: float | None = None
+    leader: Leader = field(default=Leader())
+    headline: str = ""
 
 
 def head_state(tick: Tick) -> HeadState:
@@ -195,12 +200,15 @@ def head_state(tick: Tick) -> HeadState:
         tick.lead,
         tick.gesture,
         percept.captured_s if percept is not None else None,
+        leader(tick),
+        doing(tick).headline,
     )
 
 
 def as_json(state: HeadState) -> dict[str, Any]:
     """Return a state as plain JSON values."""
-    return {**asdict(state), "lead": list(state.lead), "gesture": list(state.gesture)}
+    named = {"lead": state.lead, "gesture": state.gesture, "leader": state.leader}
+    return {**asdict(state), **{name: list(value) for name, value in named.items()}}
 
 
 def from_json(data: Mapping[str, Any]) -> HeadState:
@@ -215,9 +223,17 @@ def from_json(data: Mapping[str, Any]) -> HeadState:
     }
     made["gaze"] = GazeReading(**_known(GazeReading, data["gaze"]))
     made["people"] = tuple(_read_person(one) for one in data["people"])
-    made["lead"] = LeadState(*data["lead"])
-    made["gesture"] = GestureState(*data["gesture"])
+    made["lead"] = _read(LeadState, data["lead"])
+    made["gesture"] = _read(GestureState, data["gesture"])
+    if "leader" in data:
+        made["leader"] = _read(Leader, data["leader"])
     return HeadState(**made)
+
+
+def _read(kind: Any, values: Sequence[Any]) -> Any:
+    """Return a named tuple of JSON's values; those that this version has no field for are left."""
+    known = values[: len(kind._fields)]
+    return kind(*[tuple(value) if isinstance(value, list) else value for value in known])
 
 
 def _read_person(data: Mapping[str, Any]) -> Person:
@@ -261,11 +277,13 @@ def _or_none(values: Sequence[Any], count: int) -> Sequence[Any]:
 
 
 def _gaze(tick: Tick) -> GazeReading:
-    pose, gaze = tick.pose, tick.gaze
+    pose, gaze, does = tick.pose, tick.gaze, doing(tick)
+    # What a client has chosen to look at is looked at; while joints are held, nothing is.
+    target = target_name(tick.target) if tick.lead.by != "joint" and tick.led else does.target
     sight = add(line_of_sight(pose, left=True), line_of_sight(pose, left=False))
     return GazeReading(
-        target_name(tick.target),
-        tick.target.why,
+        target,
+        does.reason,
         gaze.gaze_point_world_m,
         yaw_pitch(unit(sight)),
         pose.p_world_head_m,
@@ -273,7 +291,7 @@ def _gaze(tick: Tick) -> GazeReading:
         pose.eye_left_rad,
         pose.eye_right_rad,
         (pose.lid_left, pose.lid_right),
-        gaze.phase,
+        gaze.phase if does.phase == "blink" else does.phase,
         gaze.blink,
     )
 

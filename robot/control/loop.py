@@ -34,7 +34,7 @@ from gazerig.robot.model.command_checks import check
 from gazerig.robot.model.commands import Ask, Command, Express, Jog, Play, SetLevel, Tune
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
-from gazerig.robot.model.lead import Lead
+from gazerig.robot.model.lead import NO_GESTURE, NOBODY_LEADS, Lead
 from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.reply import Ticket
 from gazerig.robot.model.types import JointAngles
@@ -253,7 +253,7 @@ class Robot:
         self._messages.clear()
         tick = tuple.__new__(Tick, (
             t_s, joints, pose, detections, percept, target, gaze, desired, guard_result, events, commands,
-            stopped, self._lead.words, lead, self._gestures.state,
+            stopped, self._lead.words, lead, self._gestures.state, False,
         ))  # fmt: skip
         self._looks.known = tick
         return tick
@@ -264,14 +264,17 @@ class Robot:
         clock: Clock,
         params: LoopParams,
         again: Callable[[], bool] | None = None,
+        watch: Callable[[Tick], object] | None = None,
     ) -> bool:
         """Move slowly to the parking pose; return whether it was reached in time.
 
         A user's stop ends it: the torque is off then. Other commands wait for nothing any more.
 
         again: asked at every step, returns whether the rest is to be skipped
+        watch: gets the last tick at every step, with what has changed since
         """
         self._guard.go_gently()
+        newest = self._looks.known
         rate_hz, start_s, slot = params.rate_hz, clock.now_s(), 0
         end_s = start_s + params.park_s + 0.5 / rate_hz
         last = int(params.park_s * rate_hz)
@@ -286,7 +289,14 @@ class Robot:
                     stop.ticket.answer(self._executor.execute(stop.command, t_s))
                 return False
             joints = self.body.read(t_s)  # it goes home whatever the camera shows
-            self.body.write(self._guard.check(pose_rad, joints, 0.0, t_s).command_rad)
+            guard_result = self._guard.check(pose_rad, joints, 0.0, t_s)
+            self.body.write(guard_result.command_rad)
+            if watch is not None and isinstance(newest, Tick):
+                watch(newest._replace(
+                    t_s=t_s, joints=joints, pose=self._kinematics.forward(joints),
+                    desired_rad=pose_rad, guard_result=guard_result, events=(), commands=(),
+                    stopped="", led="", lead=NOBODY_LEADS, gesture=NO_GESTURE, parking=True,
+                ))  # fmt: skip
             errors = zip(pose_rad, joints.position_rad, strict=True)
             if max(abs(desired - now) for desired, now in errors) < radians(2.0):
                 return True

@@ -18,6 +18,7 @@ class Tick(NamedTuple):
     led: who leads gaze or joints and with what, "" while no client leads
     lead: the newest lead, and whether the head is where it was to be
     gesture: the newest gesture, and whether it is under way
+    parking: the run is over, and the head moves to its parking pose; such ticks are only shown
     """
 
     t_s: float
@@ -35,6 +36,7 @@ class Tick(NamedTuple):
     led: str = ""
     lead: LeadState = NOBODY_LEADS
     gesture: GestureState = NO_GESTURE
+    parking: bool = False
 
 
 def at_rest(

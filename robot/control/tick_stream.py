@@ -73,6 +73,7 @@ class TickRow(NamedTuple):
     led: str
     lead: LeadState
     gesture: GestureState
+    parking: bool
     before: list[Any]
 
 
@@ -168,7 +169,7 @@ class TickStream:
                 tick.target, tick.gaze, tick.desired_rad, guard,
                 guard.desired_rad == tick.desired_rad, tick.events,
                 [as_recorded(command) for command in tick.commands], tick.stopped, tick.led,
-                tick.lead, tick.gesture, before,
+                tick.lead, tick.gesture, tick.parking, before,
             ))  # fmt: skip
         return encode((percepts, rows))
 

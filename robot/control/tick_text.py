@@ -1,12 +1,14 @@
 """One tick in words: what is looked at, who leads, what the guard did, what is seen."""
 
 from math import degrees
+from typing import NamedTuple
 
 from gazerig.drivers.types import BusHealth
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import ORDERED, PART_NAMES, Target
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.gaze_error import gaze_error
+from gazerig.robot.model.leader import Leader, leader_of, sentence, title
 from gazerig.robot.model.types import GuardResult
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
@@ -42,6 +44,59 @@ def target_name(target: Target) -> str:
     return name if target.part is None else f"{name}: {PART_NAMES[target.part]}"
 
 
+class Doing(NamedTuple):
+    """What the head does, and why, in words.
+
+    headline: in one sentence
+    target: what is looked at, or in its place who leads; reason: why
+    phase: of the eyes; "held" where joints are held, "stopped", "parking"
+    """
+
+    headline: str
+    target: str
+    reason: str
+    phase: str
+
+
+def leader(tick: Tick) -> Leader:
+    """Return who leads the head."""
+    return leader_of(tick.stopped, tick.parking, tick.lead, tick.gesture)
+
+
+def doing(tick: Tick) -> Doing:
+    """Return what the head does; while somebody leads, that and nothing else."""
+    leads = leader(tick)
+    phase: str = "blink" if tick.gaze.blink else tick.gaze.phase
+    said = sentence(leads, tick.t_s)
+    if leads.led:
+        phase = {"joint": "held", "stopped": "stopped", "parking": "parking"}.get(leads.kind, phase)
+        beside = _beside(tick) if leads.kind in ("person", "pointer") else ""
+        return Doing(said + beside, title(leads), said + beside, phase)
+    looks = _looks(tick.target)
+    headline = f"{said}, and {looks}" if leads.kind == "gesture" else looks
+    return Doing(headline, target_name(tick.target), tick.target.why, phase)
+
+
+def _looks(target: Target) -> str:
+    """Return what the gaze does, as a sentence about the head."""
+    match target.kind:
+        case "rest":
+            return "looks ahead: nobody is there"
+        case "glance":
+            return "looks around: nobody is there"
+        case "search":
+            return "looks for somebody who has gone"
+        case "away":
+            return "looks away for a moment"
+        case "face":
+            part = f" ({PART_NAMES[target.part]})" if target.part is not None else ""
+            return f"looks at person {target.id}{part}"
+        case "thing":
+            return "looks at something that moves"
+        case kind:
+            return f"looks at a {kind}"
+
+
 def lead_text(tick: Tick) -> str:
     """Return who leads and how far the gaze is from the point, "" if no client leads.
 
@@ -49,15 +104,20 @@ def lead_text(tick: Tick) -> str:
     """
     if not tick.led:
         return ""
-    text, limited = tick.led, tick.gaze.limited
-    if tick.target.kind != ORDERED or not limited or ": jog " in tick.led:
-        return text
+    return tick.led if tick.lead.by == "joint" else tick.led + _beside(tick)
+
+
+def _beside(tick: Tick) -> str:
+    """Return how far the gaze stays from the point that was chosen, "" where it reaches it."""
+    limited = tick.gaze.limited
+    if tick.target.kind != ORDERED or not limited:
+        return ""
     error = degrees(gaze_error(tick.target.p_world_m, tick.pose).whole)
     ends = (
         f"{one.axis} {degrees(one.done_rad):.0f} of {degrees(one.asked_rad):.0f} deg"
         for one in limited
     )
-    return f"{text}; {error:.0f} deg beside it: {', '.join(ends)}"
+    return f"; {error:.0f} deg beside it: {', '.join(ends)}"
 
 
 def guard_text(guard_result: GuardResult) -> str:

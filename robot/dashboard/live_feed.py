@@ -190,7 +190,7 @@ class LiveFeed:
         return Tick(
             row.t_s, row.joints, row.pose, self._found, self._percept, row.target, row.gaze,
             row.desired_rad, row.guard_result, row.events, (), row.stopped, row.led, row.lead,
-            row.gesture,
+            row.gesture, row.parking,
         )  # fmt: skip
 
     def _take_frame(self, head: FrameHead, fd: int) -> None:

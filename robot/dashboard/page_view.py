@@ -15,6 +15,7 @@ from gazerig.robot.dashboard.page_process import ALL_USERS, CHOICES, MESSAGE, PA
 from gazerig.robot.dashboard.panel import PanelView
 from gazerig.robot.dashboard.people import PeopleView
 from gazerig.robot.dashboard.replay import ReplayView
+from gazerig.robot.model.leader import Leader, sentence
 from gazerig.robot.model.types import Snapshot
 
 _HALF_WIDTH = 0.84  # tangent of half the horizontal field of view: 80 deg
@@ -94,11 +95,16 @@ class PageView:
 
         without_feedback: joints without feedback, which do not take hold where they are but jump
         """
-        if self._replay is not None:
-            return {"recording": True}
         shot = self._newest
+        if self._replay is not None:
+            return {"recording": True, **leads_state(Leader("recording"), shot)}
         stopped, without_feedback = (shot.stopped, len(shot.estimated)) if shot else ("", 0)
-        return {"stopped": stopped, "silent": False, "without_feedback": without_feedback}
+        return {
+            "stopped": stopped,
+            "silent": False,
+            "without_feedback": without_feedback,
+            **leads_state(shot.leader if shot else Leader(), shot),
+        }
 
     def _take(self, kind: bytes, data: object) -> None:
         """Apply messages of the rig other than snapshots and frames."""
@@ -152,6 +158,22 @@ class PageView:
         if self._drawn:
             self._panel.silent()
             self._tell({"stopped": "", "silent": True})
+
+
+def leads_state(leader: Leader, shot: Snapshot | None) -> dict[str, object]:
+    """Return who leads and what the head does, as the page's frame shows it.
+
+    Args:
+        leader: who leads.
+        shot: the newest look at the rig; None before the first.
+    """
+    t_s = shot.t_s if shot is not None else 0.0
+    return {
+        "leads": leader.kind,
+        "leads_words": sentence(leader, t_s),
+        "headline": shot.headline if shot is not None else "",
+        "busy": "",
+    }
 
 
 def _greet(client: viser.ClientHandle) -> None:

@@ -11,12 +11,13 @@ from gazerig.gaze.types import GazeState, Vec3
 from gazerig.robot.analysis.blink_finder import BlinkEvent
 from gazerig.robot.analysis.event_detector import Event, EventDetector, FixationEvent, SaccadeEvent
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.tick_text import lead_text, target_name
+from gazerig.robot.control.tick_text import doing, lead_text, leader
 from gazerig.robot.dashboard.loop_timing import LoopTiming
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.guard_params import HealthParams
 from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.kinematics import Kinematics
+from gazerig.robot.model.leader import sentence
 from gazerig.robot.model.types import (
     CommandedPose,
     JointState,
@@ -151,6 +152,7 @@ def snapshot(
     rig: how it is built, for the commanded pose, the camera and the servos' limits
     """
     pose, percept, target = tick.pose, tick.percept, tick.target
+    does, leads = doing(tick), leader(tick)
     joints = joint_names(tick, rig)
     return Snapshot(
         t_s=tick.t_s,
@@ -162,9 +164,9 @@ def snapshot(
         gaze_world=(line_of_sight(pose, True), line_of_sight(pose, False)),
         lids=(pose.lid_left, pose.lid_right),
         p_world_target_m=tick.gaze.gaze_point_world_m,
-        target_name=target_name(target),
-        why=target.why,
-        phase="blink" if tick.gaze.blink else tick.gaze.phase,
+        target_name=does.target,
+        why=does.reason,
+        phase=does.phase,
         level=tick.guard_result.level,
         reasons=tick.guard_result.reasons,
         faces=_faces(tick),
@@ -172,14 +174,17 @@ def snapshot(
         rate_hz=rate_hz,
         health=health,
         behaviour=behaviour,
-        saliences=target.saliences,
+        saliences=() if leads.led else target.saliences,
         perception=perception,
         commanded_rad=tick.guard_result.command_rad,
-        target_kind=target.kind,
-        target_id=target.id,
-        target_part=target.part,
+        target_kind=leads.kind if leads.led else target.kind,
+        target_id=-1 if leads.led else target.id,
+        target_part=None if leads.led else target.part,
         stopped=tick.stopped,
         led=lead_text(tick),
+        leader=leads,
+        leads_words=sentence(leads, tick.t_s),
+        headline=does.headline,
         frame_age_s=percept.age_s(tick.t_s) if percept is not None else None,
         commanded_pose=_commanded_pose(tick, rig) if rig is not None else None,
         camera=_camera(tick, rig) if rig is not None else None,

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from gazerig.drivers.types import BusHealth
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.tick_text import guard_text, health_text, lead_text, target_name
+from gazerig.robot.control.tick_text import doing, guard_text, health_text
 
 _LINE_S = 0.2
 _RATE_S = 1.0
@@ -39,8 +39,7 @@ class StatusLine:
             self._from = (tick.t_s, self._ticks)
         parts = [
             f"{self._hz:5.1f} Hz",
-            f"{target_name(tick.target)} - {tick.target.why}",
-            *([f"led by {lead_text(tick)}"] if tick.led else []),
+            doing(tick).headline,
             guard_text(tick.guard_result),
             health_text(self._health()),
         ]

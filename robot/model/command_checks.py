@@ -81,6 +81,8 @@ def check(command: Command) -> None:
 def _check_look(command: Look) -> None:
     """See that what is to be looked at can be."""
     match command:
+        case LookAt(pointer=pointer) if not isinstance(pointer, bool):
+            raise ValueError("pointer is true or false")
         case LookAt(None):
             pass
         case LookAt(p) | LookAtInHead(p):

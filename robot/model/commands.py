@@ -33,12 +33,14 @@ class LookAt(NamedTuple):
     who: who asks, in words; stay: until another command; else for as long as ``Renew`` comes
         at least every ``HEARTBEAT_S``
     for_s: ends after so many seconds; None: without such an end
+    pointer: the point is somebody's mouse pointer, which is said of who leads
     """
 
     p_world_m: Vec3 | None
     who: str = ""
     stay: bool = False
     for_s: float | None = None
+    pointer: bool = False
 
 
 class LookAtInHead(NamedTuple):

@@ -5,7 +5,7 @@ are those of the ticks and heartbeats are commands, so a recorded run lapses as 
 """
 
 from math import degrees, radians
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from gazerig.gaze.angles import add, scale
 from gazerig.gaze.types import ORDERED, Face, GazeState, Percept, Target, Vec3
@@ -37,6 +37,10 @@ class LeadState(NamedTuple):
     arrived: the gaze has been measured on the point, or the joints at their angles, since
     error_rad: between gaze and point, or of the worst joint, as measured; 0 while not active
     ended: why it is not in force any more, "" while it is
+    by: what leads while it is in force: a person or program that chose what to look at, somebody's
+        pointer, or joints that are held
+    who: asked for it, as given; what: e.g. "look at 1 0 0.3"; joints: those that are held
+    since_s: since when the same client leads in this way without a break
     """
 
     number: int = 0
@@ -44,6 +48,11 @@ class LeadState(NamedTuple):
     arrived: bool = False
     error_rad: float = 0.0
     ended: str = ""
+    by: Literal["person", "pointer", "joint"] = "person"
+    who: str = ""
+    what: str = ""
+    joints: tuple[str, ...] = ()
+    since_s: float = 0.0
 
 
 class GestureState(NamedTuple):
@@ -52,11 +61,14 @@ class GestureState(NamedTuple):
     number: counts the gestures since the start; 0 before the first
     name: of the one under way, "" where there is none
     ended: why it is over, "" where it has come to its own end or is under way
+    who: asked for it, "" where that is not known; since_s: when it began
     """
 
     number: int = 0
     name: str = ""
     ended: str = ""
+    who: str = ""
+    since_s: float = 0.0
 
 
 NOBODY_LEADS = LeadState()
@@ -84,8 +96,9 @@ class Lead:
         self._jogged_at: tuple[int, ...] = ()
         self._what = ""
         self._who = ""
-        self._stay = False
-        self._renewed_s = 0.0
+        self._stay = self._pointer = False
+        self._leads = "", ""
+        self._since_s = self._renewed_s = 0.0
         self._until_s: float | None = None
         self._face: Face | None = None
         self._seen_s = 0.0
@@ -126,8 +139,11 @@ class Lead:
             self.pose_rad = ()
             self._jogged.clear()
             if self.point is None and self.person is None:
-                self._leave(f"{command.who or 'a client'} has returned the joints")
+                self.end(f"{command.who or 'a client'} has returned the joints")
             self._describe()
+            if self.state.active:  # what was to be looked at before is looked at again
+                arrived = self.state.arrived
+                self.state = self._begun(self.state.number, t_s)._replace(arrived=arrived)
             return
         if command.who != self._who:
             self.point = self.person = None
@@ -162,6 +178,7 @@ class Lead:
         if self.point is not None or self.person is not None:
             self._shifts += 1
         self._leave(why)
+        self._leads = "", ""
         self._describe()
 
     def target(self, target: Target, percept: Percept | None, t_s: float) -> Target:
@@ -225,9 +242,28 @@ class Lead:
     def _take(self, command: Leading, t_s: float) -> None:
         self._who, self._stay, self._renewed_s = command.who, command.stay, t_s
         self._until_s = None if command.for_s is None else t_s + command.for_s
+        if isinstance(command, LookAt):
+            self._pointer = command.pointer
+            if command.p_world_m is None:
+                self._leads = "", ""
+        elif not isinstance(command, Jog):
+            self._pointer = False
         self._describe()
         if self.words:
-            self.state = LeadState(self.state.number + 1, True)
+            self.state = self._begun(self.state.number + 1, t_s)
+
+    def _begun(self, number: int, t_s: float) -> LeadState:
+        """Return the state of a lead that begins, or goes on with something else."""
+        joints = tuple(self._jogged)
+        by: Literal["person", "pointer", "joint"] = (
+            "joint" if joints else "pointer" if self._pointer else "person"
+        )
+        if (by, self._who) != self._leads:
+            self._leads, self._since_s = (by, self._who), t_s
+        what = self._held() if joints else self._what
+        return LeadState(
+            number, True, by=by, who=self._who, what=what, joints=joints, since_s=self._since_s
+        )
 
     def _leave(self, why: str) -> None:
         """Let go of everything that is led."""
@@ -235,7 +271,7 @@ class Lead:
         self.pose_rad = ()
         self._jogged.clear()
         if self.state.active:
-            self.state = self.state._replace(active=False, error_rad=0.0, ended=why)
+            self.state = LeadState(self.state.number, arrived=self.state.arrived, ended=why)
 
     def _describe(self) -> None:
         """Describe who leads and what."""
@@ -248,6 +284,10 @@ class Lead:
             self.words = ""
             return
         self.words = f"{self._who or 'a client'}: {what}"
+
+    def _held(self) -> str:
+        """Return the joints that are held and their angles."""
+        return ", ".join(f"{name} at {degrees(a):.1f} deg" for name, a in self._jogged.items())
 
 
 def _what(command: Look) -> str:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from gazerig.gaze.vectors import Mat3, Vec3
+from gazerig.robot.model.leader import Leader
 
 if TYPE_CHECKING:
     from gazerig.gaze.types import Salience
@@ -282,11 +283,14 @@ class Snapshot:
     p_world_eyes_m: left and right eye centres; gaze_world: their unit lines of sight
     lids: left and right opening 0..1, measured; lower_lids: that of the lower lids, None
         where the rig has none
-    target_name: e.g. "face 3: left eye"; why: why it won
+    leader: who leads; leads_words: the same in one sentence
+    headline: what the head does now, in one sentence
+    target_name: e.g. "face 3: left eye", and why it won; while somebody leads, who and with what
     rate_hz: control rate of the last second; health: bus figures in words
     behaviour: the behaviour in force; saliences: of the winner and the next bodies, highest first
     perception: age of the frame, distances and what they rest on, still things that seem to move
-    target_kind, target_id, target_part: the target as in gaze.types.Target
+    target_kind, target_id, target_part: the target as in gaze.types.Target; while somebody leads,
+        the kind of leader, -1 and None
     character, conversation: those in force, "" if unknown
     stopped: why the robot was stopped, "" while it moves
     led: who leads gaze or joints and how well the head can follow, "" while no client leads
@@ -327,6 +331,9 @@ class Snapshot:
     conversation: str = ""
     stopped: str = ""
     led: str = ""
+    leader: Leader = Leader()
+    leads_words: str = ""
+    headline: str = ""
     frame_age_s: float | None = None
     commanded_pose: CommandedPose | None = None
     camera: SeenCamera | None = None

@@ -87,8 +87,12 @@ _VERDICT = _object(
     wish_rad={"type": ["array", "null"], "items": _NUMBER}, why=_TEXTS, gravest=_TEXTS,
     joints=_says(_TEXTS, "names, in the order of every list of joints"),
 )  # fmt: skip
-_GESTURE = _object(number=_WHOLE, name=_TEXT, ended=_TEXT)
-_LEAD = _object(number=_WHOLE, active=_YES, arrived=_YES, error_rad=_NUMBER, ended=_TEXT)
+_GESTURE = _object(number=_WHOLE, name=_TEXT, ended=_TEXT, who=_TEXT, since_s=_NUMBER)
+_LEAD = _object(
+    number=_WHOLE, active=_YES, arrived=_YES, error_rad=_NUMBER, ended=_TEXT,
+    by=_says(_TEXT, "person, pointer or joint"), who=_TEXT, what=_TEXT, joints=_TEXTS,
+    since_s=_NUMBER,
+)  # fmt: skip
 _ORDER: Schema = {"type": "object", "properties": {"order": _TEXT}}
 
 _TICK = _says(

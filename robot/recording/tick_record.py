@@ -99,7 +99,7 @@ def as_json(row: Sequence[Any], finite: bool = False) -> Json:
     if not finite:
         row = _worded(row)
     (t_s, dt_s, percept, joints, pose, target, gaze, desired, guard_result, as_desired, events,
-     commands, stopped, led, lead, gesture, before) = row  # fmt: skip
+     commands, stopped, led, lead, gesture, _, before) = row  # fmt: skip
     guard = _named(GuardResult, guard_result)
     if as_desired:  # nearly always: written once
         guard["desired_rad"] = None

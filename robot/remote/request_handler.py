@@ -27,10 +27,11 @@ from gazerig.robot.control.head_state import as_json as state_as_json
 from gazerig.robot.control.head_state import head_state
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_feed import TickFeed
-from gazerig.robot.control.tick_text import lead_text, target_name
+from gazerig.robot.control.tick_text import doing, lead_text, leader
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.command_json import signed
 from gazerig.robot.model.commands import REPEATED, Command
+from gazerig.robot.model.leader import sentence
 from gazerig.robot.model.reply import CommandReply, Ticket
 
 _TAKEN_UP_S = 1.0
@@ -81,6 +82,7 @@ class Pulse:
         tick = self._feed.newest
         if tick is None:
             return {"ticks": 0, "stopped": "", "said": []}
+        does, leads = doing(tick), leader(tick)
         measured = zip(tick.guard_result.joints, tick.joints.position_rad, strict=True)
         return {
             "ticks": self._feed.ticks,
@@ -89,6 +91,9 @@ class Pulse:
             "stopped": tick.stopped,
             "led": tick.led,
             "lead": lead_text(tick),
+            "leads": leads.kind,
+            "leads_words": sentence(leads, tick.t_s),
+            "headline": does.headline,
             "limited": [
                 {
                     "axis": one.axis,
@@ -100,9 +105,9 @@ class Pulse:
             ],
             "level": tick.guard_result.level,
             "reasons": list(tick.guard_result.reasons),
-            "target": target_name(tick.target),
-            "why": tick.target.why,
-            "phase": tick.gaze.phase,
+            "target": does.target,
+            "why": does.reason,
+            "phase": does.phase,
             "joints_deg": {name: round(degrees(angle), 2) for name, angle in measured},
             "estimated": list(estimated_joints(tick)),
             "reckoned": list(estimated_joints(tick)),  # the key until this version

@@ -1,0 +1,149 @@
+"""Who leads the head is one value, said in the same words to everybody."""
+
+from collections.abc import Iterator
+
+import pytest
+from commanded_robot import Running
+
+from gazerig.config.schema import load_rig
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.control.head_state import as_json, from_json, head_state
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.tick_text import doing, leader
+from gazerig.robot.dashboard.attention_panel import saliences, winner
+from gazerig.robot.dashboard.snapshot import snapshot
+from gazerig.robot.dashboard.status import status
+from gazerig.robot.model.commands import Jog, LookAt, LookAtPerson, Play, Resume, Stop
+from gazerig.robot.model.leader import Leader, sentence
+from gazerig.robot.model.types import Snapshot
+
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
+
+@pytest.fixture
+def running() -> Iterator[Running]:
+    made = assemble(
+        load_rig("desk"), RunOptions(mock=True, fast=True, seed=3, scene="face-to-face")
+    )
+    made.robot.start(made.clock)
+    try:
+        running = Running(made)
+        running.go(2.0)
+        yield running
+    finally:
+        made.robot.stop()
+        made.close()
+
+
+def shown(tick: Tick) -> Snapshot:
+    return snapshot(tick, 200.0, "", "")
+
+
+def test_by_itself_it_says_what_it_looks_at(running: Running) -> None:
+    tick = running.go(0.1)[-1]
+    assert leader(tick) == Leader() and not leader(tick).led
+    shot = shown(tick)
+    assert shot.headline.startswith("looks at person 1") and shot.target_kind == "face"
+    assert shot.leads_words == "nobody leads: it chooses by itself what to look at"
+
+
+def test_a_held_joint_is_named_with_who_and_since_when_and_nothing_else(running: Running) -> None:
+    running.order(Jog((("neck_yaw", 0.3),), "ann"))
+    first = running.go(0.2)[0]
+    running.order(Jog((("neck_yaw", 0.1), ("neck_pitch", 0.1)), "ann"))
+    for _ in range(6):
+        running.order(Jog((("neck_yaw", 0.3),), "ann"))
+        tick = running.go(0.5)[-1]
+    leads = leader(tick)
+    assert (leads.kind, leads.who, leads.since_s) == ("joint", "ann", first.t_s)
+    assert leads.joints == ("neck_yaw", "neck_pitch")
+    shot = shown(tick)
+    assert shot.headline == "ann holds neck_yaw at 17.2 deg, neck_pitch at 5.7 deg, for 3 s"
+    assert (shot.target_name, shot.phase) == ("neck_yaw and neck_pitch held", "held")
+    assert shot.why == shot.leads_words == shot.headline
+    assert (shot.target_part, shot.saliences) == (None, ())
+    for said in (status(shot), winner(shot), saliences(shot)):
+        assert "face 1" not in said and "person 1" not in said
+
+
+def test_another_client_leads_from_when_it_took_over(running: Running) -> None:
+    running.order(Jog((("neck_yaw", 0.3),), "ann"))
+    running.go(0.4)
+    running.order(Jog((("neck_yaw", 0.2),), "ben"))
+    took = running.go(0.2)[0]
+    assert leader(running.ticks[-1]).who == "ben"
+    assert leader(running.ticks[-1]).since_s == took.t_s
+
+
+@pytest.mark.parametrize(
+    ("pointer", "kind", "said"),
+    [
+        (False, "person", "ann makes it look at 1 0.2 0.3, for 2 s"),
+        (True, "pointer", "it looks at the pointer of ann, for 2 s"),
+    ],
+)
+def test_a_point_and_a_pointer_are_led_by_who_chose_them(
+    running: Running, pointer: bool, kind: str, said: str
+) -> None:
+    for _ in range(10):
+        running.order(LookAt((1.0, 0.2, 0.3), "ann", pointer=pointer))
+        tick = running.go(0.2)[-1]
+    assert leader(tick).kind == kind
+    assert doing(tick).headline == said
+
+
+def test_what_was_looked_at_before_joints_were_held_leads_again(running: Running) -> None:
+    running.order(LookAt((1.0, 0.2, 0.3), "ann", stay=True))
+    running.go(0.2)
+    running.order(Jog((("neck_yaw", 0.3),), "ann", stay=True))
+    assert leader(running.go(0.2)[-1]).kind == "joint"
+    running.order(Jog((), "ann"))
+    tick = running.go(0.2)[-1]
+    assert leader(tick).kind == "person" and leader(tick).what == "look at 1 0.2 0.3"
+
+
+def test_a_person_who_was_chosen_and_a_gesture(running: Running) -> None:
+    running.order(LookAtPerson(1, "ann"))
+    tick = running.go(0.3)[-1]
+    assert leader(tick).kind == "person" and "look at person 1" in doing(tick).headline
+    running.order(LookAt(None, "ann"))
+    running.order(Play("nod", who="ben"))
+    tick = running.go(0.2)[-1]
+    assert leader(tick)[:3] == ("gesture", "ben", "nod")
+    assert doing(tick).headline.startswith("it plays nod for ben, and looks at person 1")
+    assert leader(running.go(4.0)[-1]) == Leader()
+
+
+def test_stopped_says_that_and_nothing_else(running: Running) -> None:
+    running.order(Jog((("neck_yaw", 0.3),), "ann"))
+    running.go(0.2)
+    running.order(Stop("STOP was pressed", "ann"))
+    shot = shown(running.go(0.5)[-1])
+    assert shot.leader.kind == shot.target_name == shot.phase == "stopped"
+    assert shot.headline == shot.why == "stopped: STOP was pressed; the torque is off"
+    running.go(2.0)
+    running.order(Resume("ann"))
+    assert leader(running.go(0.1)[-1]) == Leader()
+
+
+def test_programs_are_told_the_same(running: Running) -> None:
+    running.order(Jog((("neck_yaw", 0.3),), "ann"))
+    tick = running.go(0.2)[-1]
+    state = from_json(as_json(head_state(tick)))
+    assert state.leader == leader(tick) and state.headline == doing(tick).headline
+    assert (state.gaze.target, state.gaze.phase) == ("neck_yaw held", "held")
+
+
+def test_parking_is_shown_as_such_and_changes_nothing_of_it(running: Running) -> None:
+    running.order(Jog((("neck_yaw", 0.3),), "ann", stay=True))
+    running.go(1.0)
+    made = running.made
+    ticks: list[Tick] = []
+    assert made.robot.park(made.park_rad, made.clock, made.loop, watch=ticks.append)
+    assert {leader(tick).kind for tick in ticks} == {"parking"} and len(ticks) > 5
+    assert doing(ticks[-1]).headline == sentence(Leader("parking"), 0.0)
+    yaw = [
+        tick.joints.position_rad[ticks[0].guard_result.joints.index("neck_yaw")] for tick in ticks
+    ]
+    assert abs(yaw[-1]) < abs(yaw[0])
