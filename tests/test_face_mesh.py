@@ -187,7 +187,7 @@ def test_the_percept_tells_gaze_lids_and_speech_and_a_blink_takes_no_look_away()
     shut = faces[-1]
     assert shut.eye_opening is not None and shut.eye_opening < EYES_SHUT
     assert shut.looks_at_head is True and shut.gaze_world is None
-    # Irises are looked for in every second frame: in those between, the eyes go on.
+    # Eyes that move are not looked at in every frame: in those between, they go on.
     between = mesh_of(R, p)._replace(irises_px=None, lids_px=None)
     turns = seen_faces([mesh_of(R, p), between, between, *[between] * 8])
     assert [face.looks_at_head for face in turns[:3]] == [True] * 3

@@ -18,6 +18,7 @@ from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import DetectedFace, FaceDetector, FaceMesh, ImageArray, Pixels
 from gazerig.drivers.vision.face.model_file import read_known
 from gazerig.drivers.vision.face.preprocess import as_bgr
+from gazerig.drivers.vision.face.watched_eyes import EyePoints, WatchedEyes
 
 Floats = NDArray[np.float64]
 
@@ -44,8 +45,6 @@ _LEAST_CERTAINTY = 0.5
 class MeshedDetector:
     """A face detector that adds a mesh to the largest faces that another finds.
 
-    The network of the eyes costs more than that of the whole face: it looks at every second frame.
-
     Args:
         detector: finds the faces.
         count: of faces that get a mesh, the largest first.
@@ -59,7 +58,7 @@ class MeshedDetector:
         """
         self._detector, self._count = detector, count
         self._meshes = MeshNetworks()
-        self._with_eyes = False
+        self._eyes = [WatchedEyes() for _ in range(count)]
 
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
         """Find faces, the largest first, in pixels of the image given."""
@@ -72,16 +71,15 @@ class MeshedDetector:
         if not faces:
             return faces
         full = as_bgr(image)
-        self._with_eyes = not self._with_eyes
         meshed = [
             DetectedFace(
                 face.box_px,
                 face.landmarks_px,
                 face.confidence,
                 face.gaze_camera,
-                self._meshes.mesh(full, face.landmarks_px, self._with_eyes),
+                self._meshes.mesh(full, face.landmarks_px, eyes),
             )
-            for face in faces[: self._count]
+            for face, eyes in zip(faces, self._eyes, strict=False)
         ]
         return (*meshed, *faces[self._count :])
 
@@ -105,22 +103,22 @@ class MeshNetworks:
         self._eye = _network(folder, "iris_landmark")
 
     def mesh(
-        self, image: ImageArray, landmarks_px: Pixels, with_eyes: bool = True
+        self, image: ImageArray, landmarks_px: Pixels, eyes: WatchedEyes | None = None
     ) -> FaceMesh | None:
         """Return the mesh of a face, None where it is too small or the network sees none.
 
         Args:
             image: (height, width, 3) BGR.
             landmarks_px: (5, 2) in the order of DetectedFace.
-            with_eyes: whether irises and lids are looked for.
+            eyes: of the frames before, which are looked at only where they have changed.
         """
-        eyes, mouth = landmarks_px[:2].mean(axis=0), landmarks_px[3:].mean(axis=0)
+        between, mouth = landmarks_px[:2].mean(axis=0), landmarks_px[3:].mean(axis=0)
         across = landmarks_px[1] - landmarks_px[0]
         apart = float(np.hypot(*across))
-        side = _SIDE * max(_EYES_AS_HEIGHT * apart, float(np.hypot(*(mouth - eyes))))
+        side = _SIDE * max(_EYES_AS_HEIGHT * apart, float(np.hypot(*(mouth - between))))
         if not _LEAST_EYES_PX <= side / (_SIDE * _EYES_AS_HEIGHT) <= max(image.shape[:2]):
             return None
-        to_image = _square(eyes + _MIDDLE * (mouth - eyes), side, across, _MESH_PX)
+        to_image = _square(between + _MIDDLE * (mouth - between), side, across, _MESH_PX)
         points, certainty = _run(self._face, _MESH_OUTPUTS, _crop(image, to_image, _MESH_PX))
         sure = 1.0 / (1.0 + exp(-min(max(float(certainty[0]), -50.0), 50.0)))
         if sure < _LEAST_CERTAINTY or not np.isfinite(points).all():
@@ -128,36 +126,50 @@ class MeshNetworks:
         grid = points.reshape(_POINTS, 3)
         depth = grid[:, 2:] * (side / _MESH_PX)
         found = np.hstack([_placed(grid[:, :2], to_image), depth]).astype(np.float32)
-        with_eyes = with_eyes and apart > _LEAST_IRIS_EYES_PX
-        seen = [self._eye_of(image, found, i) for i in (0, 1)] if with_eyes else []
-        if any(one is None for one in seen):
-            seen = []
-        irises = np.array([one[0] for one in seen if one], dtype=np.float32)
-        lids = np.array([one[1] for one in seen if one], dtype=np.float32)
-        return FaceMesh(found, irises if seen else None, lids if seen else None, sure)
+        seen = self._eyes(image, found, eyes) if apart > _LEAST_IRIS_EYES_PX else None
+        return FaceMesh(found, *(seen or (None, None)), sure)
 
-    def _eye_of(
-        self, image: ImageArray, points: NDArray[np.float32], which: int
-    ) -> tuple[Floats, Floats] | None:
-        """Return five points of an iris and the contour of its lids; the right eye is 0."""
-        corners = points[list(_EYE_CORNERS[which]), :2].astype(np.float64)
-        across = corners[1] - corners[0]
-        side = _EYE_SIDE * float(np.hypot(*across))
-        if not side > 1.0:
+    def _eyes(
+        self, image: ImageArray, points: NDArray[np.float32], eyes: WatchedEyes | None
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]] | None:
+        """Return irises and lids of both eyes in pixels of the image, None where they are unknown.
+
+        Args:
+            image: (height, width, 3) BGR.
+            points: of the mesh.
+            eyes: of the frames before.
+        """
+        maps = [_eye_square(points, corners) for corners in _EYE_CORNERS]
+        placed = [to_image for to_image in maps if to_image is not None]
+        if len(placed) < len(maps):
             return None
-        to_image = _square(corners.mean(axis=0), side, across, _IRIS_PX)
-        crop = _crop(image, to_image, _IRIS_PX)
+        crops = [_crop(image, to_image, _IRIS_PX) for to_image in placed]
+        if eyes is None:
+            eyes = WatchedEyes()
+        seen = [eye for eye in eyes.read(crops, self._eye_points) or () if eye is not None]
+        if len(seen) < len(maps):
+            return None
+        irises, lids = (
+            np.array(
+                [_placed(eye[k], to_image) for eye, to_image in zip(seen, placed, strict=True)]
+            )
+            for k in (0, 1)
+        )
+        return irises.astype(np.float32), lids.astype(np.float32)
+
+    def _eye_points(self, crop: ImageArray, which: int) -> EyePoints | None:
+        """Return an iris and its lids in pixels of the crop; the right eye is 0."""
         # The network knows right eyes only: the left one is mirrored.
-        outputs = _run(self._eye, _IRIS_OUTPUTS, crop[:, ::-1] if which else crop)
-        placed = []
+        outputs = _run(self._eye, _IRIS_OUTPUTS, cv2.flip(crop, 1) if which else crop)
+        found = []
         for output, count in zip(outputs, (_OF_IRIS, _OF_LIDS), strict=True):
             grid = output.reshape(-1, 3)[:count, :2].astype(np.float64)
             if not np.isfinite(grid).all():
                 return None
             if which:
                 grid[:, 0] = _IRIS_PX - 1 - grid[:, 0]
-            placed.append(_placed(grid, to_image))
-        return placed[0], placed[1]
+            found.append(grid)
+        return found[0], found[1]
 
 
 def package_folder() -> Path:
@@ -187,6 +199,19 @@ def _square(middle: Floats, side: float, across: Floats, size_px: int) -> Floats
     return np.column_stack([turn, middle - turn @ np.full(2, 0.5 * (size_px - 1))])
 
 
+def _eye_square(points: NDArray[np.float32], which: tuple[int, int]) -> Floats | None:
+    """Return the map (2, 3) from the crop of an eye to pixels of the image, None where it is none.
+
+    Args:
+        points: of the mesh.
+        which: of them are the corners of the eye.
+    """
+    corners = points[list(which), :2].astype(np.float64)
+    across = corners[1] - corners[0]
+    side = _EYE_SIDE * float(np.hypot(*across))
+    return _square(corners.mean(axis=0), side, across, _IRIS_PX) if side > 1.0 else None
+
+
 def _crop(image: ImageArray, to_image: Floats, size_px: int) -> ImageArray:
     """Cut a square out of an image, black where it reaches beyond it."""
     flags = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
@@ -202,7 +227,5 @@ def _run(
     network: cv2.dnn.Net, outputs: tuple[str, ...], crop: ImageArray
 ) -> tuple[NDArray[np.float32], ...]:
     """Run a network on a BGR crop; return its outputs flat."""
-    blob = crop[:, :, ::-1].transpose(2, 0, 1)[np.newaxis].astype(np.float32)
-    blob *= 1.0 / 255.0
-    network.setInput(blob)
+    network.setInput(cv2.dnn.blobFromImage(crop, 1.0 / 255.0, swapRB=True))
     return tuple(np.asarray(out, np.float32).ravel() for out in network.forward(list(outputs)))
