@@ -11,7 +11,9 @@ One core is slowed to three quarters, a half and a quarter, and runs are pinned 
 The loop runs as ``gazerig run --mock`` does, real time, scene visitor, profile small at several
 rates; the process that emulates the servos, which are real ones on a robot, stays on the other
 core, and so do browsers. With a page the page's process shares the slow core, as on a computer
-that has only one. Detectors look at drawn people. Needs root, and two cores without other work.
+that has only one. Detectors look at drawn people, the camera's whole process at photographed ones
+(camera_stages.py has its stages by processor time, which needs no idle computer). Needs root, and
+two cores without other work.
 
     fits   less than 1 % of the slots skipped and half a slot late at most in 99 of 100
 """
@@ -62,6 +64,13 @@ DETECTORS = (
     ("motion, 320 px", {"motion": 320}),
     ("motion, 160 px", {"motion": 160}),
 )
+CAMERAS = (
+    ("camera, 640x400", {"camera": ("", 1, False, 0)}),
+    ("camera, 640x400, YuNet", {"camera": ("", 1, True, 0)}),
+    ("camera, 640x400, mesh", {"camera": ("", 1, False, 1)}),
+    ("camera, 640x400, no motion", {"camera": ("", 1, False, 0, False)}),
+    ("camera, 320x240, small", {"camera": ("small", 1, False, 0)}),
+)
 
 
 @contextmanager
@@ -104,7 +113,8 @@ def main() -> None:
     args = parser.parse_args()
     if args.one:
         asked = json.loads(args.one)
-        print(json.dumps(detecting(asked) if "rate" not in asked else looping(asked)))
+        measure = looping if "rate" in asked else looking if "camera" in asked else detecting
+        print(json.dumps(measure(asked)))
         return
     print(f"{os.cpu_count()} cores, load {os.getloadavg()[0]:.2f} at the start, by {args.by}")
     full = apart(args, 1.0, {"rate": 0.0})["loops"]
@@ -112,7 +122,7 @@ def main() -> None:
         with slowed(args.core, share, args.by):
             left = apart(args, share, {"rate": 0.0})["loops"] / full
             print(f"\n{share:.0%} of a core ({left:.0%} of its speed, measured)\n", flush=True)
-            for name, asked in (*LOOPS, *DETECTORS):
+            for name, asked in (*LOOPS, *DETECTORS, *CAMERAS):
                 if not args.only or any(word in name for word in args.only):
                     said = apart(args, share, asked | {"rig": args.rig})
                     print(f"| {name} | {said['cell']} |", flush=True)
@@ -245,6 +255,16 @@ def detecting(asked: dict[str, Any]) -> dict[str, Any]:
         spent.append(1e3 * (time.monotonic() - began))
     p50, p95 = np.percentile(spent[5:], (50, 95))
     return {"cell": f"{p50:.0f} / {p95:.0f} ms"}
+
+
+def looking(asked: dict[str, Any]) -> dict[str, Any]:
+    """Look at photographed people as the camera's process does, as fast as it goes."""
+    pin(asked)
+    from camera_stages import Case, camera_hz, rate_hz
+
+    case = Case(*asked["camera"])
+    found = rate_hz(case, asked["seconds"])
+    return {"cell": f"{found:.0f} frames/s, of {camera_hz(case):.0f} that come"}
 
 
 def drawn(count: int) -> list[Any]:

@@ -127,7 +127,8 @@ class MeshNetworks:
         depth = grid[:, 2:] * (side / _MESH_PX)
         found = np.hstack([_placed(grid[:, :2], to_image), depth]).astype(np.float32)
         seen = self._eyes(image, found, eyes) if apart > _LEAST_IRIS_EYES_PX else None
-        return FaceMesh(found, *(seen or (None, None)), sure)
+        irises, lids = seen if seen is not None else (None, None)
+        return FaceMesh(found, irises, lids, sure)
 
     def _eyes(
         self, image: ImageArray, points: NDArray[np.float32], eyes: WatchedEyes | None
@@ -160,7 +161,8 @@ class MeshNetworks:
     def _eye_points(self, crop: ImageArray, which: int) -> EyePoints | None:
         """Return an iris and its lids in pixels of the crop; the right eye is 0."""
         # The network knows right eyes only: the left one is mirrored.
-        outputs = _run(self._eye, _IRIS_OUTPUTS, cv2.flip(crop, 1) if which else crop)
+        seen = np.asarray(cv2.flip(crop, 1), np.uint8) if which else crop
+        outputs = _run(self._eye, _IRIS_OUTPUTS, seen)
         found = []
         for output, count in zip(outputs, (_OF_IRIS, _OF_LIDS), strict=True):
             grid = output.reshape(-1, 3)[:count, :2].astype(np.float64)
