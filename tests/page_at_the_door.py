@@ -72,6 +72,8 @@ class Rig:
         self.door = AuthProxy(
             host, port, folder / "page.sock", self.take, StopSender(theirs), TOKEN
         )  # fmt: skip
+        self.points: list[tuple[object, str]] = []
+        self.door.point = self.point
         self.door.open()
         self.address = f"{host}:{port}"
         self.url = f"http://{self.address}"
@@ -80,6 +82,10 @@ class Rig:
     def take(self, data: bytes) -> bool:
         self.asked.append(json.loads(data))
         return self.takes
+
+    def point(self, asked: object, who: str) -> bool:
+        self.points.append((asked, who))
+        return True
 
     def stop(self, asked: Any) -> str:
         self.stops.append(dict(asked))

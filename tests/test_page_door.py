@@ -155,6 +155,24 @@ def test_a_lead_is_renewed_while_the_browser_that_leads_is_there(near: Rig) -> N
     assert renewed() <= before + 1
 
 
+def test_a_pointer_is_taken_without_an_answer_that_could_be_a_stops(near: Rig) -> None:
+    near.points.clear()
+    before = len(near.asked)
+    near.door.browsers.led_by("somebody")
+    with near.knock("/rig/line", Cookie=f"{near.cookie}; {near.door._name_cookie}=ana") as line:
+        for x in (0.1, 0.2, 0.3):
+            line.send(json.dumps({"point": {"x": x, "y": 0.5, "aspect": 1.5}}))
+        line.send(json.dumps({"do": "nonsense"}))
+        answers = 0
+        while not answers:  # the first of them is that to the last request
+            answers += "answer" in json.loads(line.recv(timeout=PATIENCE_S))
+    who = near.door.browsers.name("ana")
+    assert near.points == [({"x": x, "y": 0.5, "aspect": 1.5}, who) for x in (0.1, 0.2, 0.3)]
+    assert [asked["do"] for asked in near.asked[before:]] == ["nonsense"]
+    # Its lead lasts as long as its points come, and no other is renewed meanwhile.
+    assert near.door.browsers._leads == ""
+
+
 def test_what_the_rig_does_not_take_is_told(near: Rig) -> None:
     near.takes = False
     try:

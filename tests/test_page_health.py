@@ -255,7 +255,8 @@ def test_who_comes_late_sees_all_panels_as_they_are_now(
         view.show(News((snapshot(1.1 + 0.1 * k),), None, ended=False))
     last = replace(of_six(snapshot(4.0)), target_name="the last", stopped="a test")
     view.show(News((last,), None, ended=False))
-    assert button.reported == {"stopped": "a test", "silent": False, "without_feedback": 6}
+    known = {"stopped": "a test", "silent": False, "without_feedback": 6}
+    assert button.reported.items() >= known.items()
     assert "the first" in view._panel._status.content
     people[0] = object()
     view.show(News((), None, ended=False))

@@ -55,10 +55,15 @@ _HEADERS = {
 
 Ask = Callable[[bytes], bool]
 """Hands a JSON object to the rig; False where the rig does not take it."""
+Point = Callable[[object, str], bool]
+"""Takes where a pointer is, as a browser sent it, and the name of the browser."""
 
 
 class AuthProxy:
-    """Lets people in to the server behind it, from a thread of its own."""
+    """Lets people in to the server behind it, from a thread of its own.
+
+    point: takes where a browser's pointer is, which is not answered; set before ``open``
+    """
 
     def __init__(
         self, host: str, port: int, inside: Path, ask: Ask, stop: StopSender, token: str
@@ -79,6 +84,7 @@ class AuthProxy:
         self._ask = ask
         self._stop = stop
         self.token = token
+        self.point: Point = _nowhere
         self.browsers = Browsers(token)
         self._cookie = f"gazerig_{port}"  # cookies do not tell ports apart
         self._state: Mapping[str, object] = {}
@@ -226,12 +232,12 @@ class AuthProxy:
         """Hand what is asked for to the rig, and say whether it was taken."""
         async with asyncio.timeout(_READ_S):
             body = await request.read()
-        status, text = await self._handle(body, self._who(request))
+        who = self._who(request)
+        status, text = await self._handle(from_browser(body, who), who)
         return web.Response(status=status, text=f"{text}\n" if text else None, headers=_HEADERS)
 
-    async def _handle(self, body: bytes | str, who: str) -> tuple[int, str]:
+    async def _handle(self, asked: dict[str, object] | None, who: str) -> tuple[int, str]:
         """Hand on what a browser asks; return an HTTP status, and words of a refusal."""
-        asked = from_browser(body, who)
         if asked is None:
             return 400, "not a JSON object that can be asked for"
         if asked.get("do") == "stop":
@@ -284,7 +290,12 @@ class AuthProxy:
         async for message in line:
             if message.type is not aiohttp.WSMsgType.TEXT:
                 continue
-            status, text = await self._handle(message.data, who)
+            asked = from_browser(message.data, who)
+            if asked is not None and "point" in asked:
+                self.browsers.led_by("")  # nobody's lead is renewed while a pointer leads
+                self.point(asked["point"], who)
+                continue
+            status, text = await self._handle(asked, who)
             async with asyncio.timeout(TAKES_S):
                 await line.send_str(json.dumps({"answer": status, "words": text}))
 
@@ -310,6 +321,11 @@ class AuthProxy:
 
     async def _nothing(self, request: web.Request) -> web.Response:
         return web.Response(status=404, text="there is nothing at this address\n", headers=_HEADERS)
+
+
+def _nowhere(asked: object, who: str) -> bool:
+    """Take no pointer."""
+    return False
 
 
 def _netloc(origin: str) -> str | None:

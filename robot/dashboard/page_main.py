@@ -26,7 +26,7 @@ import viser
 
 from gazerig.robot.dashboard.auth_proxy import AuthProxy
 from gazerig.robot.dashboard.live_feed import LiveFeed
-from gazerig.robot.dashboard.outbox import Outbox
+from gazerig.robot.dashboard.outbox import DOOR, Outbox
 from gazerig.robot.dashboard.page_feed import drain
 from gazerig.robot.dashboard.page_process import (
     CANNOT_OPEN,
@@ -36,8 +36,11 @@ from gazerig.robot.dashboard.page_process import (
     URL,
 )
 from gazerig.robot.dashboard.page_view import PageView
+from gazerig.robot.dashboard.pointer_to_look import PointerToLook
 from gazerig.robot.dashboard.stop_sender import StopSender
-from gazerig.robot.dashboard.viser_server import browser_of, open_server
+from gazerig.robot.dashboard.viser_server import browser_of, camera_of, open_server
+from gazerig.robot.model.command_json import as_json
+from gazerig.robot.model.commands import LookAt
 
 _FRAME_S = 0.04
 _SILENT_AFTER_S = 1.0
@@ -72,11 +75,13 @@ def free_port(host: str, port: int) -> int:
 class Served(NamedTuple):
     """A page that can be reached: the server behind the door, the door, and where it is.
 
+    pointer: takes where browsers point
     words: what there is to say to the person in front of the rig, None for nothing
     """
 
     server: viser.ViserServer
     door: AuthProxy
+    pointer: PointerToLook
     url: str
     words: str | None
 
@@ -102,13 +107,19 @@ def serve(
     door = AuthProxy(host, open_port, folder / "page.sock", outbox.hand_on, stop, token)
     outbox.name = lambda client: _browser(server, client)
     outbox.leads = door.browsers.led_by
+    pointer = PointerToLook(
+        lambda browser: camera_of(server, browser),
+        # Not as the one who leads: that the pointer is there is said by its points alone.
+        lambda point, who: outbox.ask(as_json(LookAt(point, who, pointer=True)), DOOR),
+    )
+    door.point = pointer.take
     door.open()
     text = []
     if port not in (0, open_port):  # 0 asks for any port
         text.append(f"port {port} is busy, using {open_port}")
     name = socket.gethostname() if host in _EVERYWHERE else host
     url = f"http://[{name}]:{open_port}" if ":" in name else f"http://{name}:{open_port}"
-    return Served(server, door, f"{url}/?token={token}", "; ".join(text) or None)
+    return Served(server, door, pointer, f"{url}/?token={token}", "; ".join(text) or None)
 
 
 def _browser(server: viser.ViserServer, client: str) -> str:
@@ -117,12 +128,13 @@ def _browser(server: viser.ViserServer, client: str) -> str:
     return browser_of(server, int(number)) if number.isdecimal() else ""
 
 
-def watch(feed: socket.socket, view: PageView, parent: int, door: AuthProxy) -> None:
+def watch(feed: socket.socket, view: PageView, parent: int, served: Served) -> None:
     """Draw what comes until the other side is gone.
 
     Raises:
         RuntimeError: no browser can connect any more; a page that is started again may help.
     """
+    door, pointer = served.door, served.pointer
     pause, live = threading.Event(), LiveFeed()
     while True:
         if not door.is_open():
@@ -133,6 +145,8 @@ def watch(feed: socket.socket, view: PageView, parent: int, door: AuthProxy) -> 
             if news.ended:
                 return
             view.show(news)
+            if news.snapshots:
+                pointer.p_world_eyes_m = news.snapshots[-1].p_world_head_m
             pause.wait(_FRAME_S)
         else:
             # A process forked by the rig may hold the socket open after the rig's death.
@@ -187,7 +201,7 @@ def _show(
         feed.send(NOTICE + served.words.encode())
     view = PageView(served.server, outbox, served.door.tell)
     feed.send(URL + served.url.encode())
-    watch(feed, view, parent, served.door)
+    watch(feed, view, parent, served)
     served.door.close()
     served.server.stop()
     return 0

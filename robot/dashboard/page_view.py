@@ -1,6 +1,6 @@
 """The scene and the panels that browsers see, drawn from what the rig sends."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from math import atan
 
 import viser
@@ -14,6 +14,7 @@ from gazerig.robot.dashboard.page_feed import News
 from gazerig.robot.dashboard.page_process import ALL_USERS, CHOICES, MESSAGE, PARAMS, REPLAY, VALUES
 from gazerig.robot.dashboard.panel import PanelView
 from gazerig.robot.dashboard.people import PeopleView
+from gazerig.robot.dashboard.quick_moves import refused_moves
 from gazerig.robot.dashboard.replay import ReplayView
 from gazerig.robot.model.leader import Leader, sentence
 from gazerig.robot.model.types import Snapshot
@@ -55,6 +56,7 @@ class PageView:
         self._controls = ControlTabs(server, outbox)
         self._replay: ReplayView | None = None
         self._newest: Snapshot | None = None
+        self._menus: Mapping[str, Sequence[str]] = {}
         self._jpeg: bytes | None = None
         self._image: ImageArray | None = None
         self._drawn = self._watched = False
@@ -103,6 +105,7 @@ class PageView:
             "stopped": stopped,
             "silent": False,
             "without_feedback": without_feedback,
+            "refused": refused_moves(self._menus, shot.joints if shot else None),
             **leads_state(shot.leader if shot else Leader(), shot),
         }
 
@@ -115,6 +118,7 @@ class PageView:
             self._controls.params(data)
         elif isinstance(data, dict):
             if kind == CHOICES:
+                self._menus = data
                 self._controls.offer(data)
             elif kind == VALUES:
                 self._controls.values(data)

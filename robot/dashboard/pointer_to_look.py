@@ -5,8 +5,7 @@ the viewer sees it. A pointer leads only as long as its points come: without one
 gaze is free again.
 """
 
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from math import isfinite, tan
 from typing import NamedTuple
 
@@ -71,9 +70,7 @@ def pointed_at(pointer: Pointer, camera: ViewCamera, p_world_eyes_m: Vec3) -> Ve
     towards = dot(ray, to_head)
     if towards <= 0.0:  # the head is behind the viewer
         return None
-    point = add(
-        camera.p_world_m, scale(ray, TOWARDS_HEAD * dot(to_head, to_head) / towards)
-    )
+    point = add(camera.p_world_m, scale(ray, TOWARDS_HEAD * dot(to_head, to_head) / towards))
     return point if all(map(isfinite, point)) else None
 
 

@@ -11,7 +11,9 @@ from pathlib import Path
 
 import viser
 import websockets.asyncio.server as websocket_server
-from viser import _messages
+from viser import _messages, transforms
+
+from gazerig.robot.dashboard.pointer_to_look import ViewCamera
 
 BROWSER_HEADER = "X-Gazerig-Browser"
 """Says to the server which browser a websocket is of."""
@@ -41,6 +43,17 @@ def browser_of(server: viser.ViserServer, client_id: int) -> str:
     if connection is None or connection.request is None:
         return ""
     return connection.request.headers.get(BROWSER_HEADER, "")
+
+
+def camera_of(server: viser.ViserServer, browser: str) -> ViewCamera | None:
+    """Return from where a browser sees the scene in its newest tab; None: it does not see it."""
+    for client_id, client in sorted(server.get_clients().items(), reverse=True):
+        if browser_of(server, client_id) == browser:
+            seen = client.camera
+            x, y, z = seen.position.tolist()
+            R = transforms.SO3(seen.wxyz).as_matrix().tolist()
+            return ViewCamera((x, y, z), (tuple(R[0]), tuple(R[1]), tuple(R[2])), float(seen.fov))
+    return None
 
 
 @contextlib.contextmanager

@@ -4,7 +4,9 @@
 // (window.rig). What the drawers hold is filled in by widgets.js.
 
 const $ = (selector) => document.querySelector(selector);
-const { ask } = window.rig;
+const { ask, tell } = window.rig;
+
+const moves = [...document.querySelectorAll("#moves button")];
 
 // --- what is said ---------------------------------------------------------------------
 
@@ -23,20 +25,36 @@ function write(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
-function show(state) {
-  const headline = state.recording ? "a recording" : state.silent ? "the rig is silent"
-    : state.headline || (state.stopped ? `stopped: ${state.stopped}` : "awake");
-  write($("#headline"), [state.leads_words, headline].filter(Boolean).join(" · "));
+let state = {};
+
+function show(now) {
+  state = now;
+  const led = state.leads && state.leads !== "gaze";
+  const headline = state.silent ? "nothing comes from the rig"
+    : state.headline || state.leads_words || "awake";
+  write($("#headline"), headline);
+  // Who leads is read out when it changes; what is looked at changes three times a second.
+  write($("#leads"), state.leads_words && !headline.startsWith(state.leads_words)
+    ? state.leads_words : "");
+  write($("#announced"), led ? state.leads_words.replace(/, for \d.*$/, "") : "");
+  document.body.dataset.leads = state.leads ?? "";
   write($("#busy"), state.busy || "");
   $("#busy").hidden = !state.busy;
-  document.title = state.stopped ? "■ stopped - gazerig" : "gazerig";
+  document.title = `${state.stopped ? "■ stopped - " : state.silent ? "! silent - " : ""}gazerig`;
+  $("#dock").hidden = Boolean(state.recording);
+  for (const button of moves) {
+    const why = state.refused?.[button.textContent.trim()];
+    if (why) button.setAttribute("aria-disabled", "true");
+    else button.removeAttribute("aria-disabled");
+    if (button.title !== (why ?? "")) button.title = why ?? "";
+  }
 }
 
 window.addEventListener("rig-state", (event) => show(event.detail));
 
 // --- buttons --------------------------------------------------------------------------
 
-for (const button of document.querySelectorAll("#moves button")) {
+for (const button of moves) {
   const { gesture, menu, choice } = button.dataset;
   const what = gesture ? { do: "play", gesture } : { do: "ask", menu, choice };
   button.addEventListener("click", () => {
@@ -54,6 +72,50 @@ function toggled(button) {
 $("#swap").addEventListener("click", () => {
   document.body.classList.toggle("swapped", toggled($("#swap")));
 });
+
+// --- the head looks at the pointer -----------------------------------------------------
+
+const POINT_MS = 50, AGAIN_MS = 250;
+const RESTED_MS = 3000; // the rig lets go a second after the last point
+const FREE = new Set(["", "gaze", "gesture", "pointer"]); // from whom the pointer may take the lead
+const following = () => $("#pointer").getAttribute("aria-pressed") === "true";
+let pointer = null; // over the view: {x, y, aspect}
+let moved = false, movedAt = 0, sentAt = 0;
+let takesOver = false; // the button was pressed: from whoever leads
+
+function pointed(event) {
+  // Who drags turns the view; a finger has no other way to point.
+  if (event.buttons && event.pointerType !== "touch") return;
+  const { innerWidth, innerHeight } = event.view;
+  const x = event.clientX / innerWidth, y = event.clientY / innerHeight;
+  if (!(x >= 0 && x <= 1 && y >= 0 && y <= 1)) return;
+  pointer = { x, y, aspect: innerWidth / innerHeight };
+  moved = true;
+  movedAt = performance.now();
+}
+
+const pointerGone = () => { pointer = null; };
+
+setInterval(() => {
+  const now = performance.now();
+  if (state.leads === "pointer") takesOver = false;
+  if (!pointer || !following() || document.hidden || now - movedAt > RESTED_MS) return;
+  if (state.stopped || state.recording || !(takesOver || FREE.has(state.leads ?? ""))) return;
+  if (!moved && now - sentAt < AGAIN_MS) return;
+  moved = false;
+  sentAt = now;
+  tell({ point: pointer });
+}, POINT_MS);
+
+$("#pointer").addEventListener("click", () => { takesOver = toggled($("#pointer")); });
+
+function watchPointer() {
+  const inside = $("#view").contentWindow;
+  for (const kind of ["pointermove", "pointerdown"]) inside.addEventListener(kind, pointed, true);
+  inside.document.documentElement.addEventListener("pointerleave", pointerGone);
+}
+$("#view").addEventListener("load", watchPointer);
+if ($("#view").contentDocument?.readyState === "complete") watchPointer();
 
 // --- drawers --------------------------------------------------------------------------
 

@@ -1,0 +1,39 @@
+"""The five buttons under the head say why they are grey."""
+
+import pytest
+from desk import GAZE_JOINTS
+
+from gazerig.config.schema import load_rig
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.dashboard.quick_moves import GESTURES, refused_moves
+
+LIDLESS = tuple(joint for joint in GAZE_JOINTS if "lid" not in joint)
+ALL = {"gesture": ("none", *GESTURES)}
+
+
+@pytest.mark.parametrize("rig", ["desk", "maker", "feetech", "expressive"])
+def test_the_shipped_rigs_can_do_all_five(rig: str) -> None:
+    described = load_rig(rig)
+    made = assemble(described, RunOptions(mock=True, fast=True, seed=0))
+    assert refused_moves(made.robot.menus(), tuple(described.joints)) == {}
+    made.close()
+
+
+def test_without_lids_a_button_says_that_there_are_none() -> None:
+    only_neck = {"gesture": ("none", "nod", "shake")}
+    assert refused_moves(only_neck, LIDLESS) == dict.fromkeys(
+        ("wink", "surprised", "sleepy"), "this rig has no lids"
+    )
+    assert refused_moves(ALL, GAZE_JOINTS) == {}
+
+
+def test_joints_that_are_absent_and_a_calibration_are_named() -> None:
+    assert "none of the joints" in refused_moves({"gesture": ("none",)}, GAZE_JOINTS)["nod"]
+    calibrating = refused_moves({"steer": ("next",)}, GAZE_JOINTS)
+    assert set(calibrating) == {*GESTURES, "wink"}
+    assert set(calibrating.values()) == {"not while a calibration is under way"}
+
+
+def test_before_the_rig_has_said_what_it_offers_nothing_is_grey() -> None:
+    assert refused_moves({}, None) == {} and refused_moves(ALL, None) == {}
