@@ -128,7 +128,7 @@ def test_make_and_pip_have_what_the_papers_ask_for() -> None:
         for package in re.findall(r"pip install --no-deps ([^\s'`]+)", text):
             assert f":= {package}\n" in makefile, f"{paper.name}: {package}"
         for package in re.findall(r"pip install (?!--no-deps)(?:-\w+ )?'?([^\s'`]+)", text):
-            extra = re.fullmatch(r"\.\[(\w+)\]", package)
+            extra = re.fullmatch(r"(?:\.|gazerig)\[(\w+)\]", package)
             assert extra and f"\n{extra[1]} = [" in extras, f"{paper.name}: {package}"
 
 

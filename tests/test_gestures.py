@@ -17,7 +17,8 @@ from gazerig.gaze.types import Floats
 from gazerig.robot.app.rig_limits import lid_spans, limits
 from gazerig.robot.model.gesture_fit import FittedGesture, GestureFit, GestureRefused, motions
 
-RIGS = {name: load_rig(name) for name in shipped_names("rigs")}
+RIGS = {name: load_rig(name) for name in shipped_names("rigs") if name != "minimal"}
+"""The shipped rigs but the one without neck and lids, which has nothing to laugh or tilt with."""
 
 
 def fitted(gesture: Gesture, rig: str = "desk", speed: float = 1.0, **at: float) -> FittedGesture:

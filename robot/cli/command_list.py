@@ -91,6 +91,11 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
         ),
     },
     "Tools": {
+        "new": CommandEntry(
+            "new",
+            "Write a rig's YAML of your own from a few answers, check it, and say what to type "
+            "next.",
+        ),
         "check": CommandEntry(
             "rig_check",
             "Check a rig's YAML and nothing else: all faults at once, no servo is touched.",

@@ -16,6 +16,10 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("run my.yaml --oak --page 0.0.0.0:8080", "the page for other machines too"),
         ("run my.yaml --oak --record evening.mcap", "keep every tick, to replay and judge"),
     ),
+    "new": (
+        ("new", "asks for board, mechanism, camera and eye distance, and writes myrig.yaml"),
+        ("new eyes.yaml --board pca9685 --joints eyes-lids --camera webcam", "without questions"),
+    ),
     "check": (("check my.yaml", "all faults of a file at once; no servo is touched"),),
     "schema": (("schema rig.schema.json", "let an editor complete and check rig files"),),
     "kinds": (

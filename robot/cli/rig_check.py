@@ -16,10 +16,19 @@ app = typer.Typer()
 def check(rig: RigArgument = "desk") -> None:
     """Check a rig's YAML and nothing else: all faults at once, no servo is touched."""
     with clear_errors(rig):
-        from gazerig.config.schema import Rig, load_rig
+        say(checked_line(rig))
 
-        found: Rig = load_rig(rig)
-        say(f"{rig}: good: rig {found.name!r}, {len(found.joints)} joints, profile {found.profile}")
+
+def checked_line(rig: str) -> str:
+    """Load a rig and return one line that says that it is good.
+
+    Raises:
+        ConfigError: with every fault of its files.
+    """
+    from gazerig.config.schema import Rig, load_rig
+
+    found: Rig = load_rig(rig)
+    return f"{rig}: good: rig {found.name!r}, {len(found.joints)} joints, profile {found.profile}"
 
 
 @app.command()

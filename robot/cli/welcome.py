@@ -8,6 +8,7 @@ from gazerig.drivers.serial.list_ports import SerialPort
 _BEGIN = (
     ("gazerig run --mock", "see a head look at a visitor in your browser; no hardware needed"),
     ("gazerig report --scene face-to-face", "how human that gaze is, as one HTML file"),
+    ("gazerig new my.yaml", "a rig file of your own, from four questions"),
 )
 
 
@@ -35,7 +36,7 @@ def next_steps(ports: Iterable[SerialPort], rigs: Iterable[Path], running: bool)
             f"A servo adapter is there ({usb[0].by_id or usb[0].device}):",
             (
                 (f"gazerig scan --port {usb[0].device}", "which servos answer; changes nothing"),
-                ("gazerig calibrate --out my.yaml", "copy a rig file and fit it to your head"),
+                ("gazerig new my.yaml", "a rig file of your own, from four questions"),
             ),
         )
     elif own is not None:

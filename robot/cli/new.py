@@ -1,0 +1,194 @@
+"""The command ``gazerig new``: a rig of one's own from a few answers."""
+
+import sys
+from collections.abc import Iterable, Mapping
+from importlib.util import find_spec
+from pathlib import Path
+from shlex import quote
+from typing import Annotated
+
+import typer
+
+from gazerig.config.faults import ConfigError
+from gazerig.config.new_rig import (
+    BOARDS,
+    CAMERAS,
+    MECHANISMS,
+    NewRig,
+    joints_of,
+    rig_text,
+    usual_port,
+)
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.file_output import refuse_existing, write_file
+from gazerig.robot.cli.terminal import ForceOption, clear_errors, say
+
+app = typer.Typer()
+
+_EYES_MM = 62.0
+_BOARD, _JOINTS, _CAMERA = "none", "eyes-lids", "webcam"
+"""What is taken where nothing is said and nobody can be asked."""
+
+
+@app.command()
+def new(
+    file: Annotated[Path, typer.Argument(help="The YAML file to write.")] = Path("myrig.yaml"),
+    board: Annotated[
+        str | None,
+        typer.Option(help=f"{', '.join(BOARDS)}.", autocompletion=lambda: list(BOARDS)),
+    ] = None,
+    joints: Annotated[
+        str | None,
+        typer.Option(
+            help=f"{', '.join(MECHANISMS)}; or names of joints: eyes_pan,eyes_tilt,jaw.",
+            autocompletion=lambda: list(MECHANISMS),
+        ),
+    ] = None,
+    camera: Annotated[
+        str | None,
+        typer.Option(help=f"{', '.join(CAMERAS)}.", autocompletion=lambda: list(CAMERAS)),
+    ] = None,
+    eyes_mm: Annotated[
+        float | None,
+        typer.Option(min=10, max=500, help=f"Distance between the eye centres: {_EYES_MM:g}."),
+    ] = None,
+    port: Annotated[
+        str | None, typer.Option(help="Port of the board; default: the adaptor plugged in.")
+    ] = None,
+    force: ForceOption = False,
+) -> None:
+    """Write a rig's YAML of your own from a few answers, check it, and say what to type next."""
+    with clear_errors():
+        if file.suffix not in (".yaml", ".yml"):
+            raise SetupError(f"{file}: a rig's file ends in .yaml: gazerig new {file.stem}.yaml")
+        refuse_existing(file, force=force)
+        asked = Questions(sys.stdin.isatty())
+        chosen = asked.choice("What are the servos on?", "board", board, BOARDS, _BOARD)
+        mechanisms = {name: one.summary for name, one in MECHANISMS.items()}
+        wanted = asked.choice(
+            "What do the servos move? (or names of joints: eyes_pan,eyes_tilt,jaw)",
+            "joints", joints, mechanisms, _JOINTS, others=True,
+        )  # fmt: skip
+        seen = asked.choice("What does it see with?", "camera", camera, CAMERAS, _CAMERA)
+        distance = asked.number("How far apart are the eyes, in mm?", "eyes-mm", eyes_mm, _EYES_MM)
+        rig = NewRig(
+            file.stem, chosen, joints_of(wanted), seen, distance, port or _plugged_in(chosen)
+        )
+        _write(rig, file, force)
+        for line in next_steps(rig, str(file)):
+            print(line)
+
+
+class Questions:
+    """Asks on the terminal what no option has answered; without one, what is usual is taken.
+
+    terminal: a person can be asked
+    """
+
+    def __init__(self, terminal: bool) -> None:
+        self._terminal = terminal
+
+    def choice(
+        self, question: str, option: str, given: str | None, choices: Mapping[str, str],
+        usual: str, others: bool = False,
+    ) -> str:  # fmt: skip
+        """Return one of some choices, by its name or its number.
+
+        Args:
+            question: What is asked.
+            option: The option that answers it.
+            given: What that option was given.
+            choices: Each with what it is.
+            usual: The answer of who presses Enter.
+            others: Other answers are right as well.
+
+        Raises:
+            SetupError: the option was given something else, or there is no answer.
+        """
+        names = list(choices)
+        if given is not None:
+            if given in choices or (others and given):
+                return given
+            raise SetupError(f"--{option} {given}: there is {', '.join(names)}")
+        if not self._terminal:
+            say(f"{option}: {usual} ({choices[usual]}); --{option} takes {', '.join(names)}")
+            return usual
+        say(question)
+        for number, (name, what) in enumerate(choices.items(), 1):
+            say(f"  {number}  {name:10} {what}")
+        while True:
+            answer = _answer(f"1 to {len(names)}", str(names.index(usual) + 1), option)
+            if answer.isdecimal() and 0 < int(answer) <= len(names):
+                return names[int(answer) - 1]
+            if answer in choices or (others and "_" in answer):
+                return answer
+            say(f"{answer!r} is none of them: a number from 1 to {len(names)}, or a name")
+
+    def number(self, question: str, option: str, given: float | None, usual: float) -> float:
+        """Return a length in mm.
+
+        Raises:
+            SetupError: there is no answer.
+        """
+        if given is not None:
+            return given
+        if not self._terminal:
+            return usual
+        say(question)
+        while True:
+            answer = _answer("10 to 500", f"{usual:g}", option)
+            try:
+                if 10.0 <= (value := float(answer)) <= 500.0:
+                    return value
+            except ValueError:
+                pass
+            say(f"{answer!r} is no length from 10 to 500 mm")
+
+
+def next_steps(rig: NewRig, file: str) -> Iterable[str]:
+    """Return what to type with a rig that was just written, as lines."""
+    named = quote(file)
+    sees = {"webcam": "--camera 0", "oak": "--oak", "none": "--scene visitor"}[rig.camera]
+    steps = [(f"gazerig run {named} --mock", "the head in your browser, without any hardware")]
+    if rig.board != "none":
+        numbers = "tries each channel" if rig.board in ("maestro", "pca9685") else "gives ids"
+        steps += [
+            (f"gazerig setup {named}", f"with the board plugged in: {numbers}"),
+            (f"gazerig doctor {named} --fix", "port, servos and settings against the file"),
+            (f"gazerig calibrate {named}", "zero, sign and range of each joint"),
+            (f"gazerig run {named} {sees}", "the real head"),
+        ]
+    wide = max(len(command) for command, _ in steps)
+    yield "next:"
+    yield from (f"  {command:{wide}}  {what}" for command, what in steps)
+    if rig.camera == "oak" and find_spec("depthai") is None:
+        yield "an OAK-D needs one more package: pip install 'gazerig[oak]'"
+
+
+def _write(rig: NewRig, file: Path, force: bool) -> None:
+    """Write a rig's file and check it as ``gazerig check`` does; a faulty one is not left there."""
+    from gazerig.robot.cli.rig_check import checked_line
+
+    write_file(file, rig_text(rig), force)
+    try:
+        say(checked_line(str(file)))
+    except ConfigError:
+        file.unlink()
+        raise
+
+
+def _plugged_in(board: str) -> str:
+    """Return the only USB serial adaptor's port, where the board is behind one; else ""."""
+    if not usual_port(board).startswith("/dev/tty") or board == "none":
+        return ""
+    from gazerig.drivers.serial.list_ports import serial_ports
+
+    usb = [port for port in serial_ports() if port.usb]
+    return (usb[0].by_id or usb[0].device) if len(usb) == 1 else ""
+
+
+def _answer(what: str, usual: str, option: str) -> str:
+    try:
+        return input(f"{what} [{usual}]: ").strip() or usual
+    except EOFError:
+        raise SetupError(f"no answer: give it as an option, --{option}") from None

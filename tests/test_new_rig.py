@@ -1,0 +1,165 @@
+"""gazerig new: what it asks, what it writes, and that every rig it writes runs."""
+
+import itertools
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+from command_line import figures, invoked, typed
+
+from gazerig.config.new_rig import BOARDS, CAMERAS, MECHANISMS, NewRig, joints_of, rig_text
+from gazerig.config.save import save_rig
+from gazerig.config.schema import load_rig
+from gazerig.config.shipped import SHIPPED
+from gazerig.robot.cli import new as command
+
+TEMPLATES = {
+    "minimal": ("--board", "dynamixel", "--joints", "eyes", "--camera", "webcam"),
+    "six_hobby": ("--board", "maestro", "--joints", "eyes-lids", "--camera", "webcam"),
+    "six_xl330": ("--board", "dynamixel", "--joints", "two-eyes", "--camera", "webcam"),
+    "nine_xl330": ("--board", "dynamixel", "--joints", "head", "--camera", "webcam"),
+}
+"""Shipped rigs, each as ``gazerig new`` writes it with these options."""
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(command, "_plugged_in", lambda board: "")
+
+
+@pytest.mark.parametrize("name", TEMPLATES)
+def test_a_shipped_template_is_what_new_writes(name: str) -> None:
+    assert typed("new", f"{name}.yaml", *TEMPLATES[name], "--eyes-mm", "62") == 0
+    shipped = SHIPPED / "rigs" / f"{name}.yaml"
+    assert Path(f"{name}.yaml").read_text("utf-8") == shipped.read_text("utf-8")
+
+
+def test_the_smallest_is_fifteen_lines_at_most() -> None:
+    lines = (SHIPPED / "rigs" / "minimal.yaml").read_text("utf-8").splitlines()
+    assert len(lines) <= 15
+
+
+@pytest.mark.parametrize("board", BOARDS)
+def test_every_board_with_every_mechanism_and_camera_is_good(board: str) -> None:
+    for mechanism, camera in itertools.product(MECHANISMS, CAMERAS):
+        new = NewRig("mine", board, joints_of(mechanism), camera, 55.5)
+        file = Path("mine.yaml")
+        file.write_text(rig_text(new), "utf-8")
+        rig = load_rig(str(file))
+        assert set(rig.joints) == set(new.joints)
+        assert rig.geometry.interocular_mm == 55.5
+        assert rig.bus.kind == ("dynamixel" if board == "none" else board)
+        assert rig.camera.mount == ("head" if new.has_neck or camera == "none" else "base")
+
+
+@pytest.mark.parametrize(
+    ("board", "joints"),
+    [("dynamixel", "eyes"), ("maestro", "eyes-lids"), ("pca9685", "head"), ("feetech", "two-eyes")],
+)
+def test_what_new_writes_runs_and_looks_at_its_visitor(board: str, joints: str) -> None:
+    assert typed("new", "a.yaml", "--board", board, "--joints", joints, "--camera", "none") == 0
+    ran = figures("a.yaml", "--seconds", "6", "--scene", "visitor")
+    assert ran["target_share"]["face"] > 0.5
+    assert ran["saccades"] > 5
+    assert ran["gaze_error_deg"]["median"] < 2.0  # one linkage keeps both eyes parallel
+    assert not ran["joint_faults"]
+    assert not ran["events"]
+
+
+def test_joints_by_name_get_ids_in_their_order() -> None:
+    assert typed("new", "a.yaml", "--board", "pca9685", "--joints", "eyes_tilt,eyes_pan, jaw") == 0
+    joints = load_rig("a.yaml").joints
+    assert [(name, joints[name].id) for name in ("eyes_tilt", "eyes_pan", "jaw")] == [
+        ("eyes_tilt", 0),
+        ("eyes_pan", 1),
+        ("jaw", 2),
+    ]
+
+
+def test_without_a_terminal_what_is_left_out_is_said() -> None:
+    done = invoked("new", "a.yaml", "--joints", "eyes")
+    assert done.code == 0, done.err
+    assert "board: none" in done.err and "--board takes dynamixel, feetech" in done.err
+    assert "camera: webcam" in done.err and "joints:" not in done.err
+    assert "gazerig run a.yaml --mock" in done.out and "calibrate" not in done.out
+
+
+def test_on_a_terminal_it_asks_again_until_an_answer_is_one(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    answers = iter(["9", "maestro", "", "oak", "far", "5", "70"])
+    monkeypatch.setattr("builtins.input", lambda prompt: next(answers))
+    monkeypatch.setattr("sys.stdin", type("Tty", (), {"isatty": lambda self: True})())
+    assert typed("new", "a.yaml") == 0
+    rig = load_rig("a.yaml")
+    assert rig.bus.kind == "maestro" and "left_eye_pan" not in rig.joints
+    assert rig.geometry.interocular_mm == 70 and rig.camera.horizontal_field_deg == 69
+    said = capfd.readouterr()
+    assert "'9' is none of them" in said.err and "'far' is no length" in said.err
+    steps = [line.split("  ")[1] for line in said.out.splitlines()[1:6]]
+    assert steps == [
+        "gazerig run a.yaml --mock",
+        "gazerig setup a.yaml",
+        "gazerig doctor a.yaml --fix",
+        "gazerig calibrate a.yaml",
+        "gazerig run a.yaml --oak",
+    ]
+
+
+def test_an_end_of_answers_names_the_option(monkeypatch: pytest.MonkeyPatch) -> None:
+    def ended(prompt: str) -> str:
+        raise EOFError
+
+    monkeypatch.setattr("builtins.input", ended)
+    monkeypatch.setattr("sys.stdin", type("Tty", (), {"isatty": lambda self: True})())
+    assert typed("new", "a.yaml") == 2
+    assert not Path("a.yaml").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("a.yaml", "--board", "arduino"), "--board arduino: there is dynamixel, feetech"),
+        (("a.txt",), "a.txt: a rig's file ends in .yaml: gazerig new a.yaml"),
+        (("a.yaml", "--joints", "eyes_pan"), "nothing turns the eyes in tilt"),
+        (("a.yaml", "--joints", "eyes_pan,eyes_tilt,Jaw"), "no name of a joint"),
+        (("there.yaml",), "there.yaml already exists"),
+    ],
+)
+def test_what_cannot_be_is_one_clear_line_and_writes_nothing(
+    words: tuple[str, ...], told: str
+) -> None:
+    Path("there.yaml").write_text("mine", "utf-8")
+    done = invoked("new", *words)
+    assert done.code == 2 and told in done.err, done.err
+    assert [path.name for path in Path(".").iterdir()] == ["there.yaml"]
+    assert Path("there.yaml").read_text("utf-8") == "mine"
+
+
+@pytest.mark.parametrize("name", ["on", "12", "a: b", "my rig", "größe", "#x", 'say "hi"'])
+def test_a_name_that_yaml_might_misread_stays_a_name(name: str) -> None:
+    text = rig_text(NewRig(name, "none", joints_of("eyes"), "none", port="COM3"))
+    Path("a.yaml").write_text(text, "utf-8")
+    rig = load_rig("a.yaml")
+    assert rig.name == name and rig.bus.port == "COM3"
+
+
+def test_what_calibration_measures_can_be_written_into_it() -> None:
+    typed("new", "a.yaml", "--board", "maestro", "--joints", "eyes-lids", "--camera", "webcam")
+    before = Path("a.yaml").read_text("utf-8")
+    points = ((-20.0, 1200.0), (0.0, 1500.0), (21.0, 1810.0))
+    changes = {
+        "joints.eyes_tilt.transmission_points": points,
+        "joints.eyes_tilt.min_deg": -20.0,
+        "joints.eyes_tilt.max_deg": 20.0,
+        "lid_joints.left_shut_deg": -24.0,
+        "camera.yaw_deg": 2.0,
+        "loop.rate_hz": 100.0,
+    }
+    save_rig("a.yaml", changes, datetime(2026, 1, 2, tzinfo=UTC))
+    rig = load_rig("a.yaml")
+    assert rig.joints["eyes_tilt"].transmission_points == points
+    assert (rig.lid_joints.left_shut_deg, rig.camera.yaw_deg, rig.loop.rate_hz) == (-24, 2, 100)
+    comments = [line for line in before.splitlines() if line.startswith("#")]
+    assert all(line in Path("a.yaml").read_text("utf-8") for line in comments)
