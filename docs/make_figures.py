@@ -14,6 +14,7 @@ import numpy as np
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402  # the backend must be chosen before
+import start_figures  # noqa: E402
 import trace_figure  # noqa: E402
 
 from gazerig.config.schema import load_rig, load_walk  # noqa: E402
@@ -64,6 +65,7 @@ def main() -> None:
     ):
         draw()
         print(f"docs/figures/{draw.__name__}.png")
+    start_figures.main()
 
 
 def saved(name: str, figure: plt.Figure) -> None:

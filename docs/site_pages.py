@@ -26,7 +26,19 @@ FROM_ELSEWHERE = {
 }
 """Pages whose source is not in docs/, and their names on the site."""
 
-FIRST = ("index", "tutorial", "examples", "api", "hardware", "tuning", "gestures", "plugins")
+FIRST = (
+    *(
+        "index",
+        "start",
+        "troubleshooting",
+        "tutorial",
+        "examples",
+        "api",
+        "hardware",
+        "raspberry-pi",
+    ),
+    *("tuning", "gestures", "plugins"),
+)
 """Pages at the head of the navigation, in this order; all others follow by name."""
 
 _LINK = re.compile(r"(!?\[([^\]]*)\])\(([^)#\s]*)(#[^)\s]*)?\)")

@@ -1,14 +1,18 @@
 """gazerig new: what it asks, what it writes, and that every rig it writes runs."""
 
+import importlib
 import itertools
 from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
-from command_line import figures, invoked, typed
+from command_line import figures as figures_of
+from command_line import invoked, typed
+from matplotlib.figure import Figure
 
 from gazerig.config.new_rig import BOARDS, CAMERAS, MECHANISMS, NewRig, joints_of, rig_text
 from gazerig.config.save import save_rig
+from gazerig.config.save_text import Value
 from gazerig.config.schema import load_rig
 from gazerig.config.shipped import SHIPPED
 from gazerig.robot.cli import new as command
@@ -59,7 +63,7 @@ def test_every_board_with_every_mechanism_and_camera_is_good(board: str) -> None
 )
 def test_what_new_writes_runs_and_looks_at_its_visitor(board: str, joints: str) -> None:
     assert typed("new", "a.yaml", "--board", board, "--joints", joints, "--camera", "none") == 0
-    ran = figures("a.yaml", "--seconds", "6", "--scene", "visitor")
+    ran = figures_of("a.yaml", "--seconds", "6", "--scene", "visitor")
     assert ran["target_share"]["face"] > 0.5
     assert ran["saccades"] > 5
     assert ran["gaze_error_deg"]["median"] < 2.0  # one linkage keeps both eyes parallel
@@ -149,7 +153,7 @@ def test_what_calibration_measures_can_be_written_into_it() -> None:
     typed("new", "a.yaml", "--board", "maestro", "--joints", "eyes-lids", "--camera", "webcam")
     before = Path("a.yaml").read_text("utf-8")
     points = ((-20.0, 1200.0), (0.0, 1500.0), (21.0, 1810.0))
-    changes = {
+    changes: dict[str, Value] = {
         "joints.eyes_tilt.transmission_points": points,
         "joints.eyes_tilt.min_deg": -20.0,
         "joints.eyes_tilt.max_deg": 20.0,
@@ -163,3 +167,15 @@ def test_what_calibration_measures_can_be_written_into_it() -> None:
     assert (rig.lid_joints.left_shut_deg, rig.camera.yaw_deg, rig.loop.rate_hz) == (-24, 2, 100)
     comments = [line for line in before.splitlines() if line.startswith("#")]
     assert all(line in Path("a.yaml").read_text("utf-8") for line in comments)
+
+
+def test_the_picture_of_the_mechanisms_shows_every_joint_with_its_number(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.syspath_prepend(Path(__file__).parents[1] / "docs")
+    figures = importlib.import_module("start_figures")
+    axes = Figure().add_subplot()
+    for mechanism in MECHANISMS.values():
+        for number, joint in enumerate(mechanism.joints):
+            figures._numbered(axes, joint, number)
+            assert axes.texts[-1].get_text() == f"{joint}\nid {number + 1} · channel {number}"

@@ -52,7 +52,7 @@ def next_steps(ports: Iterable[SerialPort], rigs: Iterable[Path], running: bool)
             ),
         )
     else:
-        lines += ["No USB serial adapter is plugged in; docs/hardware.md tells which fit.", ""]
+        lines += ["No USB serial adapter is plugged in; docs/start.md tells which fit.", ""]
     lines.append("All commands: gazerig --help    one of them, with examples: gazerig run --help")
     return "\n".join(lines)
 
