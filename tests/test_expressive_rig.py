@@ -5,11 +5,13 @@ from dataclasses import replace
 from math import degrees
 from pathlib import Path
 
+import numpy as np
 import pytest
 import viser
 from command_line import answers_in, invoked
 from expressive_rig import started
 from shown_page import SNAPSHOT
+from viser import transforms
 
 from gazerig.config.load import shipped
 from gazerig.config.parameters import changed, parameters
@@ -148,12 +150,17 @@ def test_the_chin_on_the_page_opens_with_the_jaw() -> None:
     try:
         head = HeadView(server.scene)
         head.show(SNAPSHOT)
-        assert not head._jaw.visible
         rest = (0.0,) * len(NAMES)
         head.show(replace(SNAPSHOT, joints=NAMES, measured_rad=rest))
         shut = tuple(head._jaw.wxyz)
         head.show(replace(SNAPSHOT, joints=NAMES, measured_rad=(*rest[:6], 0.2, 0.0, 0.0)))
-        assert head._jaw.visible and tuple(head._jaw.wxyz) != shut
+        assert tuple(head._jaw.wxyz) != shut
+        # It turns about its hinge, and a rig without a jaw keeps its mouth shut.
+        hinge = np.array(head.measures.hinge_m)
+        turned = transforms.SO3(head._jaw.wxyz).apply(hinge) + head._jaw.position
+        assert turned == pytest.approx(hinge)
+        head.show(SNAPSHOT)
+        assert tuple(head._jaw.wxyz) == shut == (1.0, 0.0, 0.0, 0.0)
     finally:
         server.stop()
 

@@ -145,6 +145,7 @@ def test_buttons_ask_and_the_picture_leads(at_the_rig: tuple[Rig, Person]) -> No
 
 def test_a_target_is_dragged_through_the_scene(at_the_rig: tuple[Rig, Person]) -> None:
     rig, person = at_the_rig
+    person.click(saying("both"))
     person.click(saying("lead"))
     view = "document.querySelector('#view').contentWindow"
     person.run(f"{view}.drawScene = true")

@@ -13,7 +13,7 @@ from six_joints import SIX, TELLS_NOTHING, of_six
 from gazerig.gaze.types import Salience
 from gazerig.robot.dashboard.attention_panel import saliences, winner
 from gazerig.robot.dashboard.commanded_pose import CommandedPoseView
-from gazerig.robot.dashboard.head_view import HeadView
+from gazerig.robot.dashboard.head_view import FLOOR_M, LEAST_M, HeadView
 from gazerig.robot.dashboard.html import AMBER, RED
 from gazerig.robot.dashboard.joint_charts import JointCharts, JointSeries
 from gazerig.robot.dashboard.outbox import Outbox
@@ -29,6 +29,7 @@ from gazerig.robot.dashboard.servo_health import (
     strain_of_load,
     strain_of_voltage,
 )
+from gazerig.robot.model.head_shape import CHIN
 from gazerig.robot.model.types import (
     CommandedPose,
     LoopFigures,
@@ -293,8 +294,8 @@ def test_the_head_has_the_lids_and_the_neck_that_the_rig_has(server: viser.Viser
         view.show(shot)
         ghost.show(shot)
         nodes = {
-            "upper": "/head/lids_left/upper", "lower": "/head/lids_left/lower", "neck": "/neck",
-            "post": "/post", "ghost's upper": "/ghost/lid_left",
+            "upper": "/head/lids_left/upper", "lower": "/head/lids_left/lower",
+            "ghost's upper": "/ghost/lid_left",
             "ghost's lower": "/ghost/lower_lid_left",
         }  # fmt: skip
         return {name for name, node in nodes.items() if handles[node].visible}
@@ -304,35 +305,40 @@ def test_the_head_has_the_lids_and_the_neck_that_the_rig_has(server: viser.Viser
         w, _, y, _ = handles[f"/head/lids_{part}"].wxyz
         return -2.0 * degrees(atan2(y, w))
 
-    assert drawn(snapshot()) == {"upper", "lower", "neck", "ghost's upper"}
+    assert drawn(snapshot()) == {"upper", "lower", "ghost's upper"}
     still = edge_deg("left/lower")
     assert drawn(of_six(snapshot())) == {
-        "upper", "lower", "post", "ghost's upper", "ghost's lower",
+        "upper", "lower", "ghost's upper", "ghost's lower",
     }  # fmt: skip
     assert edge_deg("left/lower") < edge_deg("right/lower") < still - 3.0
     met = replace(of_six(snapshot()), lids=(0.0, 0.0), lower_lids=(0.0, 0.0))
     drawn(met)
     assert edge_deg("left/lower") == pytest.approx(still) == edge_deg("left/upper")
     bare = replace(snapshot(), joints=("eyes_pan", "eyes_tilt", "neck_yaw"))
-    assert drawn(bare) == {"neck"}
+    assert drawn(bare) == set()
     lower_only = replace(bare, joints=("eyes_pan", "left_lower_lid"), lower_lids=(0.5, 1.0))
-    assert drawn(lower_only) == {"lower", "post", "ghost's lower"}
+    assert drawn(lower_only) == {"lower", "ghost's lower"}
 
 
-def test_a_head_without_a_neck_stands_on_a_post(server: viser.ViserServer) -> None:
+def test_a_head_without_a_neck_stands_on_a_base_below_it(server: viser.ViserServer) -> None:
     view = HeadView(server.scene)
+
+    def stood() -> tuple[float, float]:
+        """Where the neck begins and ends; the base reaches from the table to its beginning."""
+        begins = view._neck.position[2]
+        base, neck = (cast(tuple[float, float, float], h.scale) for h in (view._bust, view._neck))
+        assert view._bust.position[2] == pytest.approx(begins)
+        assert begins - base[2] == pytest.approx(FLOOR_M, abs=2e-3) or base[2] == LEAST_M
+        return begins, begins + neck[2]
+
     view.show(replace(of_six(snapshot()), p_world_head_m=(0.1, 0.05, 0.12)))
-    (x, y, _), (fx, fy, _) = view._post.position, view._foot.position
-    assert (x, y) == (fx, fy) and y == pytest.approx(0.05)
-    _, _, high = cast(tuple[float, float, float], view._post.scale)
-    top_m = view._post.position[2] + high
-    assert 0.0 < top_m < 0.12  # up to the shell and not out of its top
+    assert view._bust.position[1] == pytest.approx(0.05)
+    begins_m, ends_m = stood()
+    assert begins_m < 0.12 + CHIN * 0.062 and begins_m < ends_m < 0.12
     view.show(replace(of_six(snapshot(2.0)), p_world_head_m=(0.0, 0.0, -0.3)))
-    assert (
-        0.0 < cast(tuple[float, float, float], view._post.scale)[2] < 0.02
-    )  # a head that lies on the table
+    assert cast(tuple[float, float, float], view._bust.scale)[2] == LEAST_M  # it lies on the table
     view.show(snapshot(3.0))
-    assert view._foot.position[0] == 0.0 and not view._post.visible
+    assert tuple(view._bust.position[:2]) == (0.0, 0.0)
 
 
 def test_layers_are_seen_where_they_are_wanted(server: viser.ViserServer) -> None:

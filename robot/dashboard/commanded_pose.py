@@ -8,21 +8,19 @@ import viser
 
 from gazerig.gaze.angles import rotate_back, sub
 from gazerig.robot.dashboard.head_view import (
-    EYE_RADIUS_M,
-    SHELL_HALF_AXES_M,
-    SHELL_MIDDLE_M,
     SIDES,
     Colour,
     lid_turn,
     lower_lid_turn,
 )
-from gazerig.robot.dashboard.mesh import Mesh, ellipsoid, lid, ring
+from gazerig.robot.dashboard.mesh import Mesh, grid, lid, ring
 from gazerig.robot.dashboard.scene_node import along, put, quaternion
+from gazerig.robot.model.head_shape import EYE_RADIUS, measures_of, surface
 from gazerig.robot.model.types import CommandedPose, Snapshot
 
 _GHOST: Colour = (70, 110, 255)
-_SIGHT_M = 0.35
-_SWELL = 1.03  # the ghost's skin lies outside the rig's, or both would flicker
+_SIGHT = 5.6  # length of its lines of sight, in distances between the eyes
+_SWELL = 0.04  # in distances between the eyes: the ghost's skin lies outside the rig's, or both would flicker
 _IRIS_RAD = radians(29.0)
 _APART = radians(1.5)  # of the head's axes: less would only tint the rig's own shell
 
@@ -39,16 +37,18 @@ class CommandedPoseView:
 
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene
+        # What has a size, and how far ahead in its frame it is; in distances between the eyes.
+        self._sized: list[tuple[viser.MeshHandle | viser.LineSegmentsHandle, float]] = []
         self._frame = scene.add_frame("/ghost", show_axes=False, visible=False)
-        x, y, z = SHELL_HALF_AXES_M
-        shell = ellipsoid((_SWELL * x, _SWELL * y, _SWELL * z), 0.86, 25)
+        points, normals = (array[::3, ::3] for array in surface())
+        shell = grid(points + _SWELL * normals, closed=True)
         self._shell = self._add("/ghost/shell", shell, 0.2)
-        self._shell.position = SHELL_MIDDLE_M
         self._eyes = tuple(self._add_eye(side) for side in SIDES)
         self._joints: tuple[str, ...] = ()
+        self._unit = 0.0
 
-    def _add(self, name: str, mesh: Mesh, opacity: float) -> viser.MeshHandle:
-        return self._scene.add_mesh_simple(
+    def _add(self, name: str, mesh: Mesh, opacity: float, x: float = 0.0) -> viser.MeshHandle:
+        handle = self._scene.add_mesh_simple(
             name,
             mesh.vertices,
             mesh.faces,
@@ -57,24 +57,27 @@ class CommandedPoseView:
             cast_shadow=False,
             receive_shadow=False,
         )
+        self._sized.append((handle, x))
+        return handle
 
     def _add_eye(self, side: str) -> _CommandedEye:
         """Add an iris as a ring with a line of sight, and the lids' edges."""
         name = f"/ghost/eye_{side}"
         ball = self._scene.add_frame(name, show_axes=False)
-        iris = ring(1.05 * EYE_RADIUS_M * float(np.sin(_IRIS_RAD)), 0.0007)
-        at_m = 1.05 * EYE_RADIUS_M * float(np.cos(_IRIS_RAD))
-        self._add(f"{name}/iris", iris, 0.8).position = (at_m, 0.0, 0.0)
-        ahead = np.array((((EYE_RADIUS_M, 0.0, 0.0), (_SIGHT_M, 0.0, 0.0)),))
-        self._scene.add_line_segments(
-            f"{name}/sight", ahead, _GHOST, thickness=1.0, thickness_units="screen"
+        iris = ring(1.12 * EYE_RADIUS * float(np.sin(_IRIS_RAD)), 0.012)
+        ahead = 1.12 * EYE_RADIUS * float(np.cos(_IRIS_RAD))
+        self._add(f"{name}/iris", iris, 0.8, ahead)
+        line = np.array((((EYE_RADIUS, 0.0, 0.0), (_SIGHT, 0.0, 0.0)),))
+        sight = self._scene.add_line_segments(
+            f"{name}/sight", line, _GHOST, thickness=1.0, thickness_units="screen"
         )
+        self._sized.append((sight, 0.0))
         upper, lower = (
             self._scene.add_frame(f"/ghost/{name}_{side}", show_axes=False)
             for name in ("lid", "lower_lid")
         )
         for frame, sweep_deg in ((upper, 14.0), (lower, -9.0)):
-            edge = lid(1.12 * EYE_RADIUS_M, radians(sweep_deg))
+            edge = lid(1.14 * EYE_RADIUS, radians(sweep_deg))
             self._add(f"{frame.name}/edge", edge, 0.45)
         return _CommandedEye(side, ball, upper, lower)
 
@@ -106,6 +109,12 @@ class CommandedPoseView:
             ghost.lower_lids or (1.0, 1.0),
             strict=True,
         )
+        unit = measures_of(*ghost.p_world_eyes_m).interocular_m
+        if unit != self._unit:
+            self._unit = unit
+            for part, x in self._sized:
+                part.scale = unit
+                part.position = (x * unit, 0.0, 0.0)
         for eye, p_world_m, gaze_world, opening, lower in sides:
             p_head_m = rotate_back(R, sub(p_world_m, p_world_head_m))
             put(eye.ball, p_head_m, along(rotate_back(R, gaze_world)))

@@ -1,9 +1,10 @@
-"""Draw the rig's head on the page as measured: neck, shell, eyes, lids and lines of sight.
+"""Draw the rig's head on the page as measured: bust, neck, skin, eyes, lids and lines of sight.
 
-Every pose comes from the snapshot; the sizes of shell, eyeballs and stand are for looks only.
+Every pose comes from the snapshot, and the measures of the shape from where its eyes and the axes
+of its neck are (robot/model/head_shape.py).
 """
 
-from math import dist, pi, radians
+from math import dist, radians
 from typing import NamedTuple
 
 import numpy as np
@@ -11,69 +12,50 @@ import viser
 from viser import transforms
 
 from gazerig.gaze.angles import add, norm, rotate, rotate_back, sub
-from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.dashboard.mesh import Mesh, cap, ellipsoid, lid, ring, turned
-from gazerig.robot.dashboard.scene_node import (
-    Turn,
-    along,
-    put,
-    quaternion,
-    turn_to,
-    turned_up,
-    upright_along,
-)
+from gazerig.gaze.types import Vec3
+from gazerig.robot.dashboard import head_mesh
+from gazerig.robot.dashboard.glb import CLOTH, EYE, FLAT, PLASTIC, SKIN, Finish, Painted, glb
+from gazerig.robot.dashboard.scene_node import Turn, along, put, turn_to, turned_up, upright_along
+from gazerig.robot.dashboard.scene_node import quaternion as quaternion_of
+from gazerig.robot.model.head_shape import CHIN, HeadMeasures, measures_of
 from gazerig.robot.model.types import Snapshot
 
-FLOOR_M = -0.14
+FLOOR_M = -0.09
 """Height of the table the rig stands on, below the neck base."""
 
 Colour = tuple[int, int, int]
 
-_SHELL: Colour = (236, 232, 222)
-_TRIM: Colour = (92, 100, 112)
-_METAL: Colour = (150, 158, 170)
-_LID: Colour = (226, 164, 128)
-_SCLERA: Colour = (255, 255, 255)
-_IRIS: Colour = (44, 122, 190)
-_IRIS_RIM: Colour = (16, 46, 84)
-_PUPIL: Colour = (6, 6, 10)
 _SIGHT: dict[str, Colour] = {
     "fixate": (48, 190, 120),
     "saccade": (255, 120, 40),
     "pursue": (60, 150, 255),
 }
 
-EYE_RADIUS_M = 0.019
 _AHEAD = np.array((((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),))
-SHELL_MIDDLE_M = (-0.078, 0.0, 0.004)
-SHELL_HALF_AXES_M = (0.084, 0.074, 0.098)
-_FOOT = (
-    *((0.0, 0.0), (0.085, 0.0), (0.085, 0.0), (0.080, 0.014), (0.080, 0.014)),
-    *((0.034, 0.022), (0.0, 0.022)),
-)
-_NECK_TOP_M = (-0.062, 0.0, -0.075)
 # Edges of the lids above the eye's equator: where they meet, and each wide open. A lower lid
 # that no servo moves stands where they meet.
 _SHUT_RAD = radians(-24.0)
 _OPEN_RAD = radians(48.0)
 _LOWER_OPEN_RAD = radians(-46.0)
+UPPER_LID, LOWER_LID = 1.075, 1.06
+"""Radii of the lids, in those of the eyeball."""
+_NECK_RADIUS, _BUST, _BELOW_CHIN = 0.42, 1.45, 0.25  # in distances between the eyes
+LEAST_M = 0.01
+"""No part is drawn shorter."""
+_BROW_OUT = 0.35  # how far a brow's joint moves it up, in distances between the eyes a radian
 
 SIDES = ("left", "right")
 JAW = "jaw"
-"""A joint of this name is drawn as a chin that opens downwards."""
-_JAW_HINGE_M: Vec3 = (-0.05, 0.0, -0.03)
-"""Below the ears."""
-_CHIN_M: Vec3 = (-0.018, 0.0, -0.078)
-_CHIN_HALF_AXES_M: Vec3 = (0.026, 0.032, 0.014)
+"""A joint of this name opens the mouth."""
 
 
 class _EyeModel(NamedTuple):
     side: str
-    ball: viser.FrameHandle
+    ball: viser.GlbHandle
     sight: viser.LineSegmentsHandle
-    lids: viser.FrameHandle
-    upper: viser.FrameHandle
-    lower: viser.MeshHandle
+    upper: viser.GlbHandle
+    lower: viser.GlbHandle
+    brow: viser.GlbHandle
 
 
 class HeadView:
@@ -82,92 +64,86 @@ class HeadView:
     def __init__(self, scene: viser.SceneApi) -> None:
         self._scene = scene
         self._joints: tuple[str, ...] = ()
-        self._foot = self._add("/foot", turned(_FOOT), _METAL, (0.0, 0.0, FLOOR_M))
-        self._stand = self._add_stand()
-        self._post = self._add("/post", turned([(0.022, 0.0), (0.022, 1.0)]), _METAL)
-        self._post.visible = False
-        self._neck = self._add("/neck", turned([(0.024, 0.0), (0.020, 1.0)]), _TRIM)
+        self.measures = HeadMeasures()
+        self._shade = self._add("/shade", head_mesh.glow((20, 24, 34, 120)), FLAT)
+        self._shade.position = (0.0, 0.0, FLOOR_M + 0.001)
+        self._bust = self._add("/bust", head_mesh.bust(), CLOTH)
+        self._neck = self._add("/neck", head_mesh.neck(), PLASTIC)
         self._head = scene.add_frame("/head", show_axes=False)
-        self._add_shell()
+        skin = head_mesh.skin()
+        self._skin = (
+            self._add("/head/skin", skin.head, SKIN),
+            self._add("/head/jaw", skin.jaw, SKIN),
+            self._add("/head/cap", head_mesh.cap(), PLASTIC),
+        )
+        self._jaw = self._skin[1]
+        self._ears = tuple(self._add_ear(side) for side in SIDES)
         self._eyes = tuple(self._add_eye(side) for side in SIDES)
         self._colour = _SIGHT["fixate"]
-        self._neck_m = self._post_m = 1.0
         self._necked = True
+        self._fit(self.measures)
 
-    def _add(
-        self, name: str, mesh: Mesh, colour: Colour, at_m: Vec3 = (0.0, 0.0, 0.0)
-    ) -> viser.MeshHandle:
-        return self._scene.add_mesh_simple(
-            name,
-            mesh.vertices,
-            mesh.faces,
-            color=colour,
-            side="double",
-            receive_shadow=False,
-            position=at_m,
+    def _add(self, name: str, painted: Painted, finish: Finish) -> viser.GlbHandle:
+        return self._scene.add_glb(
+            name, glb(painted, finish), cast_shadow=False, receive_shadow=False
         )
 
-    def _add_stand(self) -> tuple[viser.MeshHandle, ...]:
-        """Add the column and the joint on it, which only a rig with a neck has."""
-        column = [(0.034, 0.022), (0.030, 0.05), (0.028, -FLOOR_M), (0.0, -FLOOR_M)]
-        return (
-            self._add("/stand", turned(column), _METAL, (0.0, 0.0, FLOOR_M)),
-            self._add("/joint", cap(0.031, pi, 24), _TRIM),
-        )
-
-    def _add_shell(self) -> None:
-        self._add("/head/shell", ellipsoid(SHELL_HALF_AXES_M, 0.86, 33), _SHELL, SHELL_MIDDLE_M)
-        self._add("/head/nose", ellipsoid((0.013, 0.008, 0.014)), _SHELL, (0.005, 0.0, -0.034))
-        self._add("/head/mouth", ellipsoid((0.005, 0.019, 0.002)), _TRIM, (-0.0105, 0.0, -0.064))
-        self._jaw = self._scene.add_frame("/head/jaw", show_axes=False, position=_JAW_HINGE_M)
-        self._jaw.visible = False
-        chin = sub(_CHIN_M, _JAW_HINGE_M)
-        self._add("/head/jaw/chin", ellipsoid(_CHIN_HALF_AXES_M), _SHELL, chin)
-        ear = turned([(0.0, 0.0), (0.022, 0.0), (0.022, 0.0), (0.018, 0.009), (0.0, 0.011)])
-        x, _, z = SHELL_MIDDLE_M
-        for side, y, turn in (("left", 0.070, -pi / 2), ("right", -0.070, pi / 2)):
-            disc = self._add(f"/head/ear_{side}", ear, _TRIM, (x, y, z))
-            disc.wxyz = transforms.SO3.from_x_radians(turn).wxyz
+    def _add_ear(self, side: str) -> viser.GlbHandle:
+        ear = self._add(f"/head/ear_{side}", head_mesh.ear(), PLASTIC)
+        turn = radians(-84.0) if side == "left" else radians(84.0)
+        ear.wxyz = transforms.SO3.from_x_radians(turn).wxyz
+        return ear
 
     def _add_eye(self, side: str) -> _EyeModel:
         name = f"/head/eye_{side}"
-        ball = self._scene.add_frame(name, show_axes=False)
-        caps = (
-            ("sclera", 1.0, 180.0, _SCLERA),
-            ("iris_rim", 1.006, 33.0, _IRIS_RIM),
-            ("iris", 1.012, 29.0, _IRIS),
-            ("pupil", 1.018, 13.0, _PUPIL),
-        )
-        for part, swell, half_deg, colour in caps:
-            self._add(f"{name}/{part}", cap(swell * EYE_RADIUS_M, radians(half_deg), 24), colour)
-        gleam = self._add(f"{name}/gleam", cap(1.022 * EYE_RADIUS_M, radians(4.5)), _SCLERA)
-        gleam.wxyz = transforms.SO3.from_rpy_radians(0.0, radians(-13), radians(13)).wxyz
+        ball = self._add(name, head_mesh.eye(), EYE)
         sight = self._scene.add_line_segments(
-            f"{name}/sight", _AHEAD, _SIGHT["fixate"], thickness=2.0, thickness_units="screen"
+            f"/head/sight_{side}", _AHEAD, _SIGHT["fixate"], thickness=2.0, thickness_units="screen"
         )
-        return _EyeModel(side, ball, sight, *self._add_lids(side))
-
-    def _add_lids(self, side: str) -> tuple[viser.FrameHandle, viser.FrameHandle, viser.MeshHandle]:
-        name = f"/head/lids_{side}"
-        lids = self._scene.add_frame(name, show_axes=False)
-        upper = self._scene.add_frame(f"{name}/upper", show_axes=False)
-        self._add(f"{name}/upper/skin", lid(1.07 * EYE_RADIUS_M, radians(120.0)), _LID)
-        lower = self._add(f"{name}/lower", lid(1.06 * EYE_RADIUS_M, radians(-100.0)), _LID)
+        sight.visible = False
+        upper, lower = (
+            self._add(f"/head/lids_{side}/{part}", head_mesh.eyelid(part == "upper"), SKIN)
+            for part in ("upper", "lower")
+        )
+        brow = head_mesh.brow()
+        brow = brow if side == "left" else head_mesh.mirrored(brow)
         lower.wxyz = turned_up(_SHUT_RAD)
-        rim = self._add(f"{name}/rim", ring(1.14 * EYE_RADIUS_M, 0.0026), _TRIM, (0.001, 0.0, 0.0))
-        outwards = radians(26.0) if side == "left" else radians(-26.0)
-        rim.wxyz = transforms.SO3.from_z_radians(outwards).wxyz
-        return lids, upper, lower
+        return _EyeModel(
+            side, ball, sight, upper, lower, self._add(f"/head/brow_{side}", brow, SKIN)
+        )
 
-    def show(self, snapshot: Snapshot) -> None:
-        """Move everything to where it was measured."""
+    def _fit(self, measures: HeadMeasures) -> None:
+        """Give every part the size that the rig's measures say."""
+        self.measures = measures
+        unit = measures.interocular_m
+        for part in (*self._skin, *(eye.brow for eye in self._eyes)):
+            part.scale = unit
+        for ear, side in zip(self._ears, (1.0, -1.0), strict=True):
+            ear.scale = 0.36 * unit
+            ear.position = measures.scaled((-1.12, 1.155 * side, -0.02))
+        for eye in self._eyes:
+            eye.ball.scale = measures.eye_radius_m
+            eye.upper.scale = UPPER_LID * measures.eye_radius_m
+            eye.lower.scale = LOWER_LID * measures.eye_radius_m
+        self._shade.scale = 5.2 * unit
+
+    def show(self, snapshot: Snapshot, *, sight: bool = False) -> None:
+        """Move everything to where it was measured; ``sight``: with the lines of sight."""
         if snapshot.joints != self._joints:
             self._have(snapshot.joints)
         R_world_head, p_world_head_m = snapshot.R_world_head, snapshot.p_world_head_m
-        put(self._head, p_world_head_m, quaternion(R_world_head))
-        self._hold_up(R_world_head, p_world_head_m)
+        measures = shown_measures(snapshot)
+        if measures != self.measures:
+            self._fit(measures)
+        put(self._head, p_world_head_m, quaternion_of(R_world_head))
+        self._hold_up(p_world_head_m, add(p_world_head_m, rotate(R_world_head, measures.pivot_m)))
         if JAW in self._joints:
             turn_to(self._jaw, jaw_turn(snapshot.measured_rad[self._joints.index(JAW)]))
+            put(self._jaw, _about(measures.hinge_m, self._jaw.wxyz))
+        self._show_eyes(snapshot, sight)
+
+    def _show_eyes(self, snapshot: Snapshot, sight: bool) -> None:
+        R_world_head, p_world_head_m = snapshot.R_world_head, snapshot.p_world_head_m
         colour = _SIGHT.get(snapshot.phase, _SIGHT["fixate"])
         sides = zip(
             self._eyes,
@@ -179,31 +155,39 @@ class HeadView:
         )
         for eye, p_world_m, gaze_world, opening, lower in sides:
             p_head_m = rotate_back(R_world_head, sub(p_world_m, p_world_head_m))
-            put(eye.ball, p_head_m, along(rotate_back(R_world_head, gaze_world)))
-            put(eye.lids, p_head_m)
-            turn_to(eye.upper, lid_turn(opening))
-            turn_to(eye.lower, lower_lid_turn(lower))
-            # As far as the target is: the lines meet there only if the eyes truly fixate it.
-            eye.sight.scale = round(dist(p_world_m, snapshot.p_world_target_m), 2)
+            turn = along(rotate_back(R_world_head, gaze_world))
+            put(eye.ball, p_head_m, turn)
+            put(eye.upper, p_head_m, lid_turn(opening))
+            put(eye.lower, p_head_m, lower_lid_turn(lower))
+            self._raise_brow(eye, snapshot)
+            if sight:
+                put(eye.sight, p_head_m, turn)
+                # As far as the target is: the lines meet there only if the eyes truly fixate it.
+                eye.sight.scale = round(dist(p_world_m, snapshot.p_world_target_m), 2)
+            eye.sight.visible = sight
         if colour != self._colour:
             self._colour = colour
             for eye in self._eyes:
                 eye.sight.colors = np.array(colour, np.uint8)
 
+    def _raise_brow(self, eye: _EyeModel, snapshot: Snapshot) -> None:
+        """Move a brow by its joint, if there is one."""
+        name = f"{eye.side}_brow"
+        if name in self._joints:
+            up = _BROW_OUT * snapshot.measured_rad[self._joints.index(name)]
+            put(eye.brow, self.measures.scaled((0.0, 0.0, up)))
+
     def _have(self, joints: tuple[str, ...]) -> None:
         """Draw what these joints move, and what stands still beside it."""
         self._joints = joints
         self._necked = any(joint.startswith("neck_") for joint in joints)
-        for part in (*self._stand, self._neck):
-            part.visible = self._necked
-        self._post.visible = not self._necked
-        if self._necked:
-            put(self._foot, (0.0, 0.0, FLOOR_M))
-        self._jaw.visible = JAW in joints
+        if JAW not in joints:
+            put(self._jaw, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
         for eye in self._eyes:
             eye.upper.visible = f"{eye.side}_upper_lid" in joints
             # An upper lid shuts upon a lower one, moved or not.
             eye.lower.visible = eye.upper.visible or f"{eye.side}_lower_lid" in joints
+            put(eye.brow, (0.0, 0.0, 0.0))
 
     def _lower(self, snapshot: Snapshot) -> list[float]:
         """Return how far the lower lids are open; one that nothing moves stands where they meet."""
@@ -213,26 +197,41 @@ class HeadView:
             for side, opening in zip(SIDES, openings, strict=True)
         ]
 
-    def _hold_up(self, R_world_head: Mat3, p_world_head_m: Vec3) -> None:
-        """Add a neck, or a post if there is none, between the table and the head."""
-        if self._necked:
-            self._stretch_neck(add(p_world_head_m, rotate(R_world_head, _NECK_TOP_M)))
-            return
-        x, y, z = add(p_world_head_m, SHELL_MIDDLE_M)
-        length = max(0.01, round(z - 0.9 * SHELL_HALF_AXES_M[2] - FLOOR_M, 4))
-        for part in (self._foot, self._post):
-            put(part, (x, y, FLOOR_M))
-        if length != self._post_m:
-            self._post_m = length
-            self._post.scale = (1.0, 1.0, length)
+    def _hold_up(self, p_world_head_m: Vec3, p_world_pivot_m: Vec3) -> None:
+        """Stand the bust on the table, and a neck between it and the head's pivot."""
+        x, y, z = (0.0, 0.0, 0.0) if self._necked else p_world_pivot_m
+        unit = self.measures.interocular_m
+        base_m = (x, y, min(0.0, z, p_world_head_m[2] + (CHIN - _BELOW_CHIN) * unit))
+        put(self._bust, base_m)
+        put(self._shade, (x, y, FLOOR_M + 0.001))
+        tall = max(LEAST_M, round(base_m[2] - FLOOR_M, 4))
+        _resize(self._bust, (_BUST * unit, _BUST * unit, tall))
+        way = sub(p_world_pivot_m, base_m)
+        length = max(LEAST_M, round(norm(way), 4))
+        radius = _NECK_RADIUS * unit
+        put(self._neck, base_m, upright_along(way))
+        _resize(self._neck, (radius, radius, length))
 
-    def _stretch_neck(self, top_m: Vec3) -> None:
-        """Lay the column, which stands along z, onto the way from base to head."""
-        length = round(norm(top_m), 4)
-        if length != self._neck_m:
-            self._neck_m = length
-            self._neck.scale = (1.0, 1.0, length)
-        turn_to(self._neck, upright_along(top_m))
+
+def shown_measures(snapshot: Snapshot) -> HeadMeasures:
+    """Return the measures of the head in a snapshot, from its eyes and the pivot of its neck."""
+    pivot_m = None
+    if snapshot.p_world_pivot_m is not None:
+        off = sub(snapshot.p_world_pivot_m, snapshot.p_world_head_m)
+        x, y, z = rotate_back(snapshot.R_world_head, off)
+        pivot_m = (round(x, 4), round(y, 4), round(z, 4))
+    return measures_of(*snapshot.p_world_eyes_m, pivot_m)
+
+
+def _resize(part: viser.GlbHandle, scale: Vec3) -> None:
+    if part.scale != scale:
+        part.scale = scale
+
+
+def _about(hinge_m: Vec3, turn: object) -> Vec3:
+    """Return where a part's origin goes when the part turns about a hinge."""
+    x, y, z = transforms.SO3(np.asarray(turn)).apply(np.array(hinge_m)).tolist()
+    return sub(hinge_m, (x, y, z))
 
 
 def jaw_turn(angle_rad: float) -> Turn:

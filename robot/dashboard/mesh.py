@@ -79,6 +79,22 @@ def ring(radius_m: float, thickness_m: float) -> Mesh:
     return Mesh(band.vertices[:, (2, 0, 1)], band.faces)
 
 
+def grid(points: Floats, *, closed: bool) -> Mesh:
+    """Return the surface through points (rows, columns, 3); ``closed`` joins a row's ends."""
+    rows, columns = points.shape[:2]
+    return Mesh(points.reshape(-1, 3), _quads(rows, columns, closed=closed))
+
+
+def smooth_normals(mesh: Mesh) -> Floats:
+    """Return unit vectors (n, 3) out of a surface at its vertices."""
+    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
+    across = np.cross(b - a, c - a)
+    total = np.zeros_like(mesh.vertices)
+    for corner in range(3):
+        np.add.at(total, mesh.faces[:, corner], across)
+    return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12))
+
+
 def _quads(rows: int, columns: int, *, closed: bool) -> NDArray[np.uint32]:
     """Join a grid of points, row after row, to triangles; ``closed`` joins its ends."""
     row, column = np.mgrid[0 : rows - 1, 0 : columns if closed else columns - 1]

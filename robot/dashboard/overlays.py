@@ -14,12 +14,14 @@ from gazerig.robot.model.types import Snapshot
 class OverlayChoices:
     """Which of them are wanted; changed by the users of the page."""
 
-    ghost: bool = True
-    camera: bool = True
+    ghost: bool = False
+    sight: bool = False
+    camera: bool = False
     eyes: bool = False
 
     NAMES: ClassVar[dict[str, str]] = {
         "ghost": "ghost of the desired pose",
+        "sight": "lines of sight",
         "camera": "what the camera covers",
         "eyes": "what the eyes can attend to",
     }

@@ -1,13 +1,13 @@
 """The scene and the panels that browsers see, drawn from what the rig sends."""
 
 from collections.abc import Callable, Mapping, Sequence
-from math import atan
 
 import viser
 
 from gazerig.drivers.types import ImageArray
 from gazerig.robot.dashboard.control_tabs import ControlTabs
-from gazerig.robot.dashboard.head_view import FLOOR_M, HeadView
+from gazerig.robot.dashboard.head_view import HeadView
+from gazerig.robot.dashboard.lights import furnish
 from gazerig.robot.dashboard.outbox import Outbox
 from gazerig.robot.dashboard.overlays import OverlayPanel
 from gazerig.robot.dashboard.page_feed import News
@@ -16,17 +16,10 @@ from gazerig.robot.dashboard.panel import PanelView
 from gazerig.robot.dashboard.people import PeopleView
 from gazerig.robot.dashboard.quick_moves import refused_moves
 from gazerig.robot.dashboard.replay import ReplayView
+from gazerig.robot.dashboard.viewpoints import Viewpoints
+from gazerig.robot.dashboard.views import NAMES
 from gazerig.robot.model.leader import Leader, sentence
 from gazerig.robot.model.types import Snapshot
-
-_HALF_WIDTH = 0.84  # tangent of half the horizontal field of view: 80 deg
-_FOV_STEP_RAD = 0.01
-# Name of the view: where the camera is and what it looks at.
-VIEWS = {
-    "both": ((0.80, -1.32, 0.54), (0.50, 0.0, 0.10)),
-    "rig": ((0.34, -0.11, 0.19), (0.0, 0.0, 0.11)),
-    "over its shoulder": ((-0.52, 0.22, 0.42), (0.60, 0.0, 0.16)),
-}
 
 
 class PageView:
@@ -45,9 +38,9 @@ class PageView:
         self._server = server
         self._outbox = outbox
         self._tell = tell
-        server.initial_camera.position, server.initial_camera.look_at = VIEWS["both"]
-        server.on_client_connect(_greet)
-        _furnish(server)
+        self._viewpoints = Viewpoints(server)
+        furnish(server.scene)
+        _arrange(server)
         self._head = HeadView(server.scene)
         self._people = PeopleView(server.scene)
         self._panel = PanelView(server.gui)
@@ -66,13 +59,12 @@ class PageView:
         self._outbox.ask({"show": {"depth": on}}, ALL_USERS)
 
     def _add_views(self) -> None:
-        buttons = self._server.gui.add_button_group("view", tuple(VIEWS), order=9)
+        buttons = self._server.gui.add_button_group("view", NAMES, order=9)
 
         @buttons.on_click
         def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
             if event.client is not None:
-                camera = event.client.camera
-                camera.position, camera.look_at = VIEWS[event.target.value]
+                self._viewpoints.take(event.client, event.target.value)
 
     def show(self, news: News) -> None:
         """Draw the newest of what came; without a spectator it is kept until one comes."""
@@ -143,7 +135,8 @@ class PageView:
 
     def _draw(self) -> None:
         if self._newest is not None:
-            self._head.show(self._newest)
+            self._viewpoints.fit(self._newest)
+            self._head.show(self._newest, sight=self._panel.layers.sight)
             self._people.show(self._newest)
             self._layers.show(self._newest, self._panel.layers)
             self._panel.show(self._newest)
@@ -180,34 +173,7 @@ def leads_state(leader: Leader, shot: Snapshot | None) -> dict[str, object]:
     }
 
 
-def _greet(client: viser.ClientHandle) -> None:
-    """Show rig and person from side to side, whatever the shape the window has or is given."""
-
-    @client.camera.on_update
-    def _(camera: viser.CameraHandle) -> None:
-        fov_rad = 2.0 * atan(_HALF_WIDTH / camera.aspect)
-        if abs(camera.fov - fov_rad) > _FOV_STEP_RAD:
-            camera.fov = fov_rad
-
-
-def _furnish(server: viser.ViserServer) -> None:
+def _arrange(server: viser.ViserServer) -> None:
     server.gui.configure_theme(show_logo=False, show_share_button=False)
     server.gui.main_panel.dock_right()
     server.gui.main_panel.set_width(360)
-    # A room's frame as light would fade the scene in slowly, and shadows cost a browser
-    # without a graphics card, often on the rig's own computer, three quarters of its rate.
-    server.scene.configure_environment_map(None)
-    server.scene.configure_default_lights(cast_shadow=False)
-    server.scene.add_light_hemisphere(
-        "/sky", sky_color=(255, 255, 255), ground_color=(176, 168, 160), intensity=3.0
-    )
-    server.scene.add_grid(
-        "/floor",
-        cell_size=0.1,
-        section_size=0.5,
-        infinite_grid=True,
-        fade_distance=5.0,
-        plane_color=(240, 242, 245),
-        plane_opacity=1.0,
-        position=(0.0, 0.0, FLOOR_M),
-    )

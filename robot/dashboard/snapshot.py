@@ -195,6 +195,7 @@ def snapshot(
         joints=joints,
         estimated=_estimated(tick.joints, joints),
         lower_lids=_lower_lids(pose, joints),
+        p_world_pivot_m=_pivot(pose, rig),
     )
 
 
@@ -215,6 +216,14 @@ def _estimated(joints: JointState, names: tuple[str, ...]) -> tuple[str, ...]:
 
 def _lower_lids(pose: GazeState, names: tuple[str, ...]) -> tuple[float, float] | None:
     return None if _LOWER_LIDS.isdisjoint(names) else (pose.lower_left, pose.lower_right)
+
+
+def _pivot(pose: GazeState, rig: ShownRig | None) -> Vec3 | None:
+    """Return where in the world the neck turns the head."""
+    if rig is None:
+        return None
+    head, _ = rig.kinematics.own_parts(pose.R_world_head, pose.p_world_head_m)
+    return head.start_m
 
 
 def _faces(tick: Tick) -> tuple[SeenFace, ...]:

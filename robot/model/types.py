@@ -300,6 +300,7 @@ class Snapshot:
     servos, timing: health of servos and loop
     worst: the guard's gravest level since the last snapshot
     trail, events: joints, and eye movements that ended, since the last snapshot, oldest first
+    p_world_pivot_m: where the pitch and roll axes of the neck meet, None where it is not known
     """
 
     t_s: float
@@ -346,3 +347,4 @@ class Snapshot:
     joints: tuple[str, ...] = ()
     estimated: tuple[str, ...] = ()
     lower_lids: tuple[float, float] | None = None
+    p_world_pivot_m: Vec3 | None = None

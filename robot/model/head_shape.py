@@ -1,0 +1,184 @@
+"""The one shape of the head: a smooth solid whose measures follow from those of the rig.
+
+Everything scales with the distance between the eyes. Head frame: origin midway between the eyes,
+x ahead, y left, z up. In here the unit of length is the distance between the eyes, and left and
+right are alike; what leaves is in metres.
+"""
+
+from functools import lru_cache
+from math import dist, radians
+from typing import NamedTuple
+
+import numpy as np
+
+from gazerig.gaze.types import Floats, Vec3
+from gazerig.robot.model.solid import (
+    Field,
+    capsule,
+    carve,
+    crossings,
+    ellipsoid,
+    normals,
+    ray_grid,
+    union,
+)
+
+EYE_RADIUS = 0.335
+"""Radius of an eyeball, in distances between the eyes."""
+TOP, CHIN = 1.80, -1.62
+"""Height of the head's top and of the chin, in distances between the eyes."""
+_CENTRE: Vec3 = (-0.80, 0.0, -0.02)
+_FARTHEST = 2.6
+_ROWS, _COLUMNS = 112, 116
+_SOLIDS: tuple[tuple[Field, float], ...] = (
+    (ellipsoid((-1.10, 0.0, 0.50), (1.30, 1.20, 1.30)), 0.1),  # skull
+    (ellipsoid((-0.66, 0.0, -0.36), (0.84, 1.00, 1.00)), 0.45),  # face
+    (ellipsoid((-0.42, 0.0, -1.08), (0.58, 0.66, 0.50)), 0.36),  # jaw
+    (ellipsoid((-0.02, 0.0, -1.42), (0.18, 0.24, 0.17)), 0.24),  # chin
+    (ellipsoid((-0.22, 0.54, -0.60), (0.38, 0.36, 0.30)), 0.28),  # cheeks
+    (ellipsoid((-0.06, 0.42, 0.44), (0.20, 0.40, 0.12)), 0.24),  # brow
+    (capsule((0.02, 0.0, 0.10), (0.25, 0.0, -0.50), 0.100, 0.120), 0.18),  # bridge of the nose
+    (ellipsoid((0.275, 0.0, -0.54), (0.150, 0.145, 0.125)), 0.09),  # its tip
+    (ellipsoid((0.190, 0.120, -0.580), (0.10, 0.075, 0.070)), 0.08),  # its wings
+)
+_LIPS: tuple[tuple[Field, float], ...] = (
+    (ellipsoid((0.060, 0.10, -0.965), (0.115, 0.26, 0.056)), 0.09),
+    (ellipsoid((0.050, 0.0, -1.095), (0.130, 0.27, 0.070)), 0.09),
+)
+_DISH = ellipsoid((0.46, 0.5, 0.0), (0.27, 0.40, 0.33))
+_NECK = capsule((-0.80, 0.0, -0.9), (-0.72, 0.0, -1.55), 0.62, 0.44)
+_SMILE = 0.85
+_MOUTH_Z, _MOUTH_HALF = -1.030, 0.32
+_HINGE: Vec3 = (-0.85, 0.0, -0.55)
+
+
+def smiling(y: Floats, z: Floats) -> Floats:
+    """Return heights as they were before a smile lifted the corners of the mouth."""
+    return np.asarray(z - _SMILE * y * y)
+
+
+class HeadMeasures(NamedTuple):
+    """What of a rig the shape follows.
+
+    interocular_m: distance between the eye centres
+    pivot_m: where the neck's pitch axis is in the head frame
+    """
+
+    interocular_m: float = 0.0619
+    pivot_m: Vec3 = (-0.038, 0.0, -0.055)
+
+    @property
+    def eye_radius_m(self) -> float:
+        """Return the radius of the eyeballs."""
+        return EYE_RADIUS * self.interocular_m
+
+    @property
+    def height_m(self) -> float:
+        """Return how tall the head is from chin to top."""
+        return (TOP - CHIN) * self.interocular_m
+
+    def scaled(self, point: Vec3) -> Vec3:
+        """Return a point of this module's unit in metres."""
+        x, y, z = point
+        return x * self.interocular_m, y * self.interocular_m, z * self.interocular_m
+
+    @property
+    def hinge_m(self) -> Vec3:
+        """Return where a jaw turns."""
+        return self.scaled(_HINGE)
+
+
+def measures_of(left_m: Vec3, right_m: Vec3, pivot_m: Vec3 | None = None) -> HeadMeasures:
+    """Return the measures of a head from its eyes' centres in any frame, and its pivot."""
+    plain = HeadMeasures()
+    interocular_m = round(dist(left_m, right_m), 4) or plain.interocular_m
+    if pivot_m is None:
+        share = interocular_m / plain.interocular_m
+        x, y, z = plain.pivot_m
+        pivot_m = (share * x, share * y, share * z)
+    return HeadMeasures(interocular_m, pivot_m)
+
+
+class HeadSurface(NamedTuple):
+    """The outside of the head, in distances between the eyes.
+
+    points, normals: (rows, columns, 3), rows from below to above, columns around, closed behind
+    """
+
+    points: Floats
+    normals: Floats
+
+
+def field(points: Floats) -> Floats:
+    """Return how far points (n, 3) are outside the head."""
+    folded = points * (1.0, 1.0, 1.0)
+    folded[:, 1] = np.abs(folded[:, 1])
+    solid = _SOLIDS[0][0](folded)
+    for part, round_by in _SOLIDS[1:]:
+        solid = union(solid, part(folded), round_by)
+    solid = union(solid, _NECK(folded), 0.30)
+    solid = carve(solid, _DISH(folded), 0.30)
+    folded[:, 2] = smiling(folded[:, 1], folded[:, 2])
+    for part, round_by in _LIPS:
+        solid = union(solid, part(folded), round_by)
+    return solid
+
+
+@lru_cache(maxsize=1)
+def surface() -> HeadSurface:
+    """Return the head's surface; it is worked out once."""
+    rays = ray_grid(_ROWS, _COLUMNS, radians(-30.0), radians(30.0))
+    points = crossings(field, _CENTRE, rays.reshape(-1, 3), _FARTHEST)
+    return HeadSurface(points.reshape(rays.shape), normals(field, points).reshape(rays.shape))
+
+
+def beyond(normal: Vec3, offset: float, rows: int, columns: int, out: float) -> HeadSurface:
+    """Return the part of the surface with normal . point > offset; its edge is a clean line.
+
+    Args:
+        normal: of the plane that cuts the head, any length.
+        offset: of the plane.
+        rows: from the edge to the middle.
+        columns: around.
+        out: how far the part stands off the surface.
+    """
+    ahead = np.array(normal) / np.linalg.norm(normal)
+    aside = np.array((0.0, 1.0, 0.0))
+    around = np.linspace(0.0, 2.0 * np.pi, columns, endpoint=False)
+    radial = np.outer(np.cos(around), aside) + np.outer(np.sin(around), np.cross(ahead, aside))
+    low, high = np.zeros(columns), np.full(columns, np.pi)
+    for _ in range(12):
+        middle = 0.5 * (low + high)
+        edge = _at(middle, ahead, radial) @ np.array(normal) > offset
+        low, high = np.where(edge, middle, low), np.where(edge, high, middle)
+    share = np.sin(np.linspace(0.5 * np.pi, 0.0, rows))
+    points = np.stack([_at(low * part, ahead, radial) for part in share.tolist()])
+    shape = points.shape
+    outwards = normals(field, points.reshape(-1, 3)).reshape(shape)
+    return HeadSurface(points + out * outwards, outwards)
+
+
+def _at(angles: Floats, ahead: Floats, radial: Floats) -> Floats:
+    """Return surface points at angles (n,) from an axis, each in its direction (n, 3) from it."""
+    rays = np.cos(angles)[:, None] * ahead + np.sin(angles)[:, None] * radial
+    return crossings(field, _CENTRE, rays, _FARTHEST)
+
+
+def front(y: Floats, z: Floats) -> Floats:
+    """Return points (n, 3) on the front of the head at given heights and distances aside."""
+    farthest = np.stack((np.full(len(y), 0.8), y, z), axis=1)
+    nearest = farthest * (0.0, 1.0, 1.0) + (-0.6, 0.0, 0.0)
+    for _ in range(16):
+        middle = 0.5 * (farthest + nearest)
+        inside = (field(middle) < 0.0)[:, None]
+        nearest, farthest = np.where(inside, middle, nearest), np.where(inside, farthest, middle)
+    return np.asarray(0.5 * (farthest + nearest))
+
+
+def of_jaw(points: Floats) -> Floats:
+    """Return which points (..., 3) of the surface a jaw would move."""
+    x, z = points[..., 0], points[..., 2]
+    # From the line of the mouth back to the hinge, and down to where the throat begins.
+    above = _MOUTH_Z + 0.42 * np.maximum(0.0, -0.16 - x)
+    z = smiling(np.minimum(np.abs(points[..., 1]), _MOUTH_HALF), z)
+    return np.asarray((z < above) & (z > -1.66 - 0.6 * x - 0.9) & (x > -0.62))

@@ -1,0 +1,106 @@
+"""Smooth solids as signed distances, and the surface of one as a grid of points.
+
+A distance field is a function from points (n, 3) to distances (n,), negative inside. Lengths in any
+unit. A surface is found along rays from a centre: its outermost crossing in each direction.
+"""
+
+from collections.abc import Callable
+from math import pi
+
+import numpy as np
+
+from gazerig.gaze.types import Floats, Vec3
+
+Field = Callable[[Floats], Floats]
+
+_STEPS, _HALVINGS = 26, 9
+_GRADIENT_STEP = 0.012
+
+
+def ellipsoid(middle: Vec3, half_axes: Vec3) -> Field:
+    """Return the field of an ellipsoid; away from its surface the distance is approximate."""
+    half = np.array(half_axes)
+
+    def field(points: Floats) -> Floats:
+        scaled = (points - middle) / half
+        near = np.sqrt((scaled * scaled).sum(axis=1))
+        steep = np.sqrt(((scaled / half) ** 2).sum(axis=1))
+        return np.asarray(near * (near - 1.0) / np.maximum(steep, 1e-9))
+
+    return field
+
+
+def capsule(start: Vec3, end: Vec3, start_radius: float, end_radius: float) -> Field:
+    """Return the field of a rod with round ends whose radius changes along it."""
+    a, way = np.array(start), np.subtract(end, start)
+
+    def field(points: Floats) -> Floats:
+        share = np.clip((points - a) @ way / (way @ way), 0.0, 1.0)
+        away = points - a - share[:, None] * way
+        radius = start_radius + share * (end_radius - start_radius)
+        return np.asarray(np.sqrt((away * away).sum(axis=1)) - radius)
+
+    return field
+
+
+def union(one: Floats, other: Floats, round_by: float) -> Floats:
+    """Return the distance to either, the seam rounded."""
+    blend = np.maximum(round_by - np.abs(one - other), 0.0) / round_by
+    return np.asarray(np.minimum(one, other) - 0.25 * round_by * blend * blend)
+
+
+def carve(solid: Floats, tool: Floats, round_by: float) -> Floats:
+    """Return the distance to a solid from which a tool was taken away, the edge rounded."""
+    return np.asarray(-union(-solid, tool, round_by))
+
+
+def crossings(field: Field, centre: Vec3, directions: Floats, farthest: float) -> Floats:
+    """Return the outermost points (n, 3) of a solid along unit vectors (n, 3) from its centre."""
+    at = np.linspace(farthest, 0.0, _STEPS)
+    outside = np.full(len(directions), farthest)
+    inside = np.zeros(len(directions))
+    open_rays = np.ones(len(directions), bool)
+    for before, here in zip(at, at[1:], strict=False):
+        rays = np.flatnonzero(open_rays)
+        hit = rays[field(directions[rays] * here + centre) < 0.0]
+        outside[hit], inside[hit] = before, here
+        open_rays[hit] = False
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (outside + inside)
+        within = field(directions * middle[:, None] + centre) < 0.0
+        inside, outside = np.where(within, middle, inside), np.where(within, outside, middle)
+    return np.asarray(directions * (0.5 * (outside + inside))[:, None] + centre)
+
+
+def normals(field: Field, points: Floats) -> Floats:
+    """Return unit vectors (n, 3) out of a solid at points on its surface."""
+    steps = _GRADIENT_STEP * np.eye(3)
+    slope = np.stack([field(points + step) - field(points - step) for step in steps], axis=1)
+    return np.asarray(slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9))
+
+
+def ray_grid(rows: int, columns: int, focus_rad: float, spread_rad: float) -> Floats:
+    """Return unit vectors (rows, columns, 3) in all directions, the densest ahead (+x).
+
+    Args:
+        rows: from below to above.
+        columns: around, from behind over the right (-y), ahead and the left; the last is not the
+            first again.
+        focus_rad: elevation around which the rows are twice as dense and more.
+        spread_rad: how far from it they are so.
+    """
+    fine = np.linspace(-pi / 2, pi / 2, 2001)
+    weight = 0.32 + np.exp(-(((fine - focus_rad) / spread_rad) ** 2))
+    total = np.concatenate(((0.0,), np.cumsum(0.5 * (weight[1:] + weight[:-1]))))
+    up = np.interp(np.linspace(0.0, total[-1], rows), total, fine)
+    share = np.linspace(-1.0, 1.0, columns, endpoint=False)
+    around = pi * np.sign(share) * (0.30 * np.abs(share) + 0.70 * np.abs(share) ** 2.8)
+    level = np.cos(up)[:, None]
+    return np.stack(
+        (
+            level * np.cos(around),
+            level * np.sin(around),
+            np.broadcast_to(np.sin(up)[:, None], (rows, columns)),
+        ),
+        axis=-1,
+    )

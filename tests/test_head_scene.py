@@ -1,0 +1,183 @@
+"""The page opens on a face: how much of the canvas the head fills, and whether its lids shut."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shown_page import SNAPSHOT
+from viser import transforms
+
+from gazerig.config.load import shipped
+from gazerig.config.schema import load_rig
+from gazerig.gaze.types import Floats
+from gazerig.robot.app.gaze_models import kinematics_of
+from gazerig.robot.dashboard import head_mesh
+from gazerig.robot.dashboard.glb import EYE, SKIN, Painted, glb
+from gazerig.robot.dashboard.head_view import (
+    LOWER_LID,
+    UPPER_LID,
+    lid_turn,
+    lower_lid_turn,
+    shown_measures,
+)
+from gazerig.robot.dashboard.mesh import Mesh
+from gazerig.robot.dashboard.views import BOTH, FACE, SHOULDER, View, view
+from gazerig.robot.model.head_shape import EYE_RADIUS, field, measures_of, of_jaw, surface
+from gazerig.robot.model.types import JointState, Snapshot
+
+RIGS = sorted(path.stem for path in shipped("rigs", "desk").parent.glob("*.yaml"))
+CANVASES = (1.6, 1280 / 720, 1.0, 0.9, 390 / 380)
+
+
+def at_rest(name: str) -> Snapshot:
+    """A snapshot of a shipped rig with all joints at 0."""
+    rig = load_rig(name)
+    kinematics = kinematics_of(rig)
+    zero = (0.0,) * len(kinematics.names)
+    pose = kinematics.forward(JointState(zero, zero, zero, ()))
+    head, _ = kinematics.own_parts(pose.R_world_head, pose.p_world_head_m)
+    return replace(
+        SNAPSHOT,
+        joints=kinematics.names,
+        measured_rad=zero,
+        R_world_head=pose.R_world_head,
+        p_world_head_m=pose.p_world_head_m,
+        p_world_eyes_m=(pose.p_world_eye_left_m, pose.p_world_eye_right_m),
+        p_world_pivot_m=head.start_m,
+    )
+
+
+def drawn(seen: View, points_m: Floats, aspect: float) -> Floats:
+    """Where points are on the canvas: -1..1 from side to side and from below to above."""
+    eye = np.array(seen.position_m)
+    ahead = np.array(seen.look_at_m) - eye
+    ahead /= np.linalg.norm(ahead)
+    right = np.cross(ahead, (0.0, 0.0, 1.0))
+    right /= np.linalg.norm(right)
+    away = points_m - eye
+    half_height = np.tan(0.5 * seen.field_rad(aspect)) * (away @ ahead)
+    return np.stack(
+        (away @ right / (half_height * aspect), away @ np.cross(right, ahead) / half_height), axis=1
+    )
+
+
+@pytest.mark.parametrize("name", RIGS)
+@pytest.mark.parametrize("aspect", CANVASES)
+def test_the_head_fills_most_of_the_canvas_and_is_all_in_sight(name: str, aspect: float) -> None:
+    shot = at_rest(name)
+    unit = shown_measures(shot).interocular_m
+    parts = (head_mesh.skin().head.mesh, head_mesh.cap().mesh)
+    points = np.concatenate([part.vertices for part in parts]) * unit + shot.p_world_head_m
+    on_canvas = drawn(view(FACE, shot), points, aspect)
+    low, high = on_canvas.min(axis=0), on_canvas.max(axis=0)
+    assert 0.60 <= 0.5 * (high[1] - low[1]) <= 0.8
+    assert np.abs(on_canvas).max() < 1.0
+
+
+def test_the_face_is_seen_from_beside_and_not_past_the_visitor() -> None:
+    seen = view(FACE, at_rest("desk"))
+    off = np.subtract(seen.position_m, seen.look_at_m)
+    assert 25.0 <= abs(np.degrees(np.arctan2(off[1], off[0]))) <= 35.0
+    assert 0.0 <= np.degrees(np.arctan2(off[2], np.hypot(off[0], off[1]))) < 10.0
+    assert 0.4 < np.linalg.norm(off) < 0.8  # before the visitors of the shipped scenes
+
+
+@pytest.mark.parametrize("name", [BOTH, SHOULDER])
+def test_other_views_show_as_much_from_side_to_side_in_any_window(name: str) -> None:
+    wide, tall = (np.tan(0.5 * view(name).field_rad(a)) * a for a in (1.6, 0.5))
+    assert wide == pytest.approx(tall)
+
+
+def met(mesh: Mesh, rays: Floats) -> np.ndarray:
+    """Which rays from the origin meet a triangle (Moeller and Trumbore)."""
+    a, b, c = (mesh.vertices[mesh.faces[:, i]] for i in range(3))
+    one, other = b - a, c - a
+    found = np.zeros(len(rays), bool)
+    for i, ray in enumerate(rays):
+        p = np.cross(ray, other)
+        det = (one * p).sum(axis=1)
+        det[np.abs(det) < 1e-12] = np.inf
+        u = -(a * p).sum(axis=1) / det
+        q = np.cross(-a, one)
+        v = q @ ray / det
+        t = (other * q).sum(axis=1) / det
+        found[i] = ((u >= -1e-9) & (v >= -1e-9) & (u + v <= 1 + 1e-9) & (t > 0.0)).any()
+    return found
+
+
+def covered(opening: float, lower: float) -> Floats:
+    """Which directions of the visible eye the lids hide; rows from below to above."""
+    up, aside = np.meshgrid(np.radians(np.arange(-60, 61, 8)), np.radians(np.arange(-60, 61, 12)))
+    rays = np.stack(
+        (np.cos(up) * np.cos(aside), np.cos(up) * np.sin(aside), np.sin(up)), axis=-1
+    ).reshape(-1, 3)
+    hidden = np.zeros(len(rays), bool)
+    for upper, turn in ((True, lid_turn(opening)), (False, lower_lid_turn(lower))):
+        painted = head_mesh.eyelid(upper)
+        into_lid = transforms.SO3(np.array(turn)).inverse().apply(rays).astype(np.float64)
+        hidden |= met(painted.mesh, into_lid)
+    return hidden
+
+
+def test_lids_shut_fully_and_open_as_far_as_measured() -> None:
+    assert covered(0.0, 0.0).all()
+    assert covered(0.0, 1.0).mean() < 1.0  # the lower lid takes its part of the shutting
+    opened = [covered(opening, opening).mean() for opening in (0.0, 0.3, 0.6, 1.0)]
+    assert opened == sorted(opened, reverse=True) and opened[-1] < 0.45
+    # A lid lies outside the eyeball, cornea and all, wherever the eye looks.
+    assert min(UPPER_LID, LOWER_LID) > 1.0
+    tallest = np.linalg.norm(head_mesh.eye().mesh.vertices, axis=1).max()
+    assert tallest < 1.1
+
+
+def test_the_skin_leaves_the_eyes_free() -> None:
+    eyes = EYE_RADIUS
+    yaw, pitch = np.meshgrid(np.radians(np.arange(-50, 51, 10)), np.radians(np.arange(-40, 41, 10)))
+    front = np.stack(
+        (np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)), axis=-1
+    ).reshape(-1, 3)
+    for side in (0.5, -0.5):
+        assert (field(eyes * front + (0.0, side, 0.0)) > 0.0).all()
+        assert field(np.array(((0.0, side, 0.0),)))[0] < 0.0  # and hides what holds them
+
+
+def test_the_surface_is_closed_and_faces_outwards() -> None:
+    points, normals = surface()
+    assert np.isfinite(points).all()
+    out = points - points.reshape(-1, 3).mean(axis=0)
+    assert ((out * normals).sum(axis=-1) > -0.3).all()
+    assert field(points.reshape(-1, 3)) == pytest.approx(0.0, abs=0.02)
+    jaw = of_jaw(points)
+    assert 0.02 < jaw.mean() < 0.3 and not jaw[points[..., 2] > -0.75].any()
+
+
+def test_measures_follow_the_rig() -> None:
+    small = measures_of((0.0, 0.02, 0.0), (0.0, -0.02, 0.0))
+    assert small.interocular_m == 0.04
+    assert small.height_m == pytest.approx(
+        0.04 / 0.0619 * measures_of((0, 0.03095, 0), (0, -0.03095, 0)).height_m, rel=1e-3
+    )
+    for name in RIGS:
+        rig = load_rig(name)
+        found = shown_measures(at_rest(name))
+        assert 1e3 * found.interocular_m == pytest.approx(rig.geometry.interocular_mm, abs=0.1)
+        assert -1e3 * found.pivot_m[2] == pytest.approx(rig.geometry.eyes_above_mm, abs=0.1)
+
+
+def test_a_glossy_eye_is_written_as_one(tmp_path: Path) -> None:
+    tree = _tree(glb(head_mesh.eye(), EYE))
+    assert "KHR_materials_clearcoat" in tree["materials"][0]["extensions"]
+    assert tree["meshes"][0]["primitives"][0]["material"] == 0
+    assert {"COLOR_0", "NORMAL", "POSITION"} <= set(
+        tree["meshes"][0]["primitives"][0]["attributes"]
+    )
+    assert "alphaMode" not in tree["materials"][0]
+    plain: Painted = head_mesh.glow((0, 0, 0, 90))
+    assert _tree(glb(plain, SKIN))["materials"][0]["alphaMode"] == "BLEND"
+
+
+def _tree(data: bytes) -> dict:
+    length = int.from_bytes(data[12:16], "little")
+    return json.loads(data[20 : 20 + length])
