@@ -126,6 +126,7 @@ class Aversion:
         self._away: Vec3 | None = None
         self._away_shift = 0
         self._shifts = 0
+        self._last: tuple[Target, Target] | None = None
 
     @property
     def mode(self) -> AversionMode:
@@ -182,7 +183,14 @@ class Aversion:
             return self._beside(target, self._away, t_s)
         if self._shifts == 0:
             return target
-        return target._replace(shift=target.shift + self._shifts)
+        return self._passed(target)
+
+    def _passed(self, target: Target) -> Target:
+        """Return a target with the shifts that looks away have added, made once for many ticks."""
+        last, shift = self._last, target.shift + self._shifts
+        if last is None or last[0] is not target or last[1].shift != shift:
+            last = self._last = target, target._replace(shift=shift)
+        return last[1]
 
     def _attend(self, face: int | None, t_s: float) -> None:
         """Start mutual gaze with another face; end an aversion when there is none."""

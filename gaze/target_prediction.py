@@ -235,8 +235,8 @@ class TargetPrediction:
     def _past_m(self) -> float:
         """Return how far apart the target's places have been, along the axis of most."""
         some = [p for _, p, _ in islice(self._past, 0, None, _SPARSE)]
-        axes = [[p[i] for p in some] for i in range(3)]
-        return max([max(axis) - min(axis) for axis in axes])
+        spans: list[float] = [max(axis) - min(axis) for axis in zip(*some, strict=True)]
+        return max(spans)
 
 
 def _no_longer(v: Vec3, most: float) -> Vec3:
@@ -260,29 +260,31 @@ def fitted(past: Floats, at_s: float, limit: float) -> Sine | None:
     t, p, v = past[:, 0] - at_s, past[:, 1:4], past[:, 4:7]
     if len(t) < 8:
         return None
-    steps = np.diff(t)[:, None]
-    area = np.zeros_like(p)
+    n = len(t)
+    steps = (t[1:] - t[:-1])[:, None]
+    both = np.zeros((n, 6))
+    both[:, 3:] = v
+    area, speed = both[:, :3], both[:, 3:]
     # The trapezia corrected by the velocities at their ends, as a cubic's area is.
-    pieces = 0.5 * steps * (p[1:] + p[:-1]) - steps**2 / 12.0 * (v[1:] - v[:-1])
-    np.cumsum(pieces, axis=0, out=area[1:])
-    both = np.hstack([area, v])
-    both -= both.mean(axis=0)
-    since = t - t.mean()
-    both -= np.outer(since, since @ both / (since @ since))
-    area, v = both[:, :3], both[:, 3:]
+    pieces = 0.5 * steps * (p[1:] + p[:-1]) - steps * steps / 12.0 * (v[1:] - v[:-1])
+    np.add.accumulate(pieces, axis=0, out=area[1:])
+    both -= np.add.reduce(both, axis=0) / n
+    since = t - np.add.reduce(t) / n
+    both -= since[:, None] * (since @ both / (since @ since))
     power = float((area * area).sum())
-    w2 = -float((area * v).sum()) / power if power > 0.0 else 0.0
+    w2 = -float((area * speed).sum()) / power if power > 0.0 else 0.0
     if w2 <= 0.0:
         return None
     w = sqrt(w2)
     cycles = -float(t[0]) * w / (2.0 * pi)
     if not _CYCLES[0] <= cycles <= _CYCLES[1]:
         return None
-    base = np.column_stack([np.ones_like(t), np.cos(w * t), np.sin(w * t)])
+    base = np.ones((n, 3))
+    base[:, 1], base[:, 2] = np.cos(w * t), np.sin(w * t)
     x = np.linalg.solve(base.T @ base, base.T @ p)
     swing = float((x[1:] ** 2).sum())
     rest = p - base @ x
-    off = float((rest * rest).sum()) / len(t)
+    off = float((rest * rest).sum()) / n
     if swing < _LEAST_M * _LEAST_M or off > limit * limit * 0.5 * swing:
         return None
     m, c, s = ((row[0], row[1], row[2]) for row in x.tolist())

@@ -5,22 +5,27 @@ point of which lies farther outside than the face is large, is a mistake of the 
 pixels of another size of frame.
 """
 
-import numpy as np
+from math import isnan
 
 from gazerig.drivers.types import DetectedFace
 
 
 def is_off_frame(face: DetectedFace, width_px: int, height_px: int) -> bool:
     """Return whether the landmarks of a face are not those of a face in the frame."""
-    points = face.landmarks_px
-    if points.size == 0:
+    points: list[tuple[float, float]] = face.landmarks_px.tolist()
+    if not points:
         return False  # a face without points: whoever needs them says so
-    edge = np.array([width_px, height_px]) - 0.5
-    middle = points.mean(axis=0)
-    if bool((middle < -0.5).any() or (middle > edge).any()):
+    xs, ys = [x for x, _ in points], [y for _, y in points]
+    x, y = sum(xs) / len(xs), sum(ys) / len(ys)
+    if isnan(x) or isnan(y):
+        return False  # no numbers: the same
+    right, bottom = width_px - 0.5, height_px - 0.5
+    if not (-0.5 <= x <= right and -0.5 <= y <= bottom):
         return True
-    size = float(np.ptp(points, axis=0).max())
-    return bool((points < -0.5 - size).any() or (points > edge + size).any())
+    left_x, right_x, top_y, bottom_y = min(xs), max(xs), min(ys), max(ys)
+    size = max(right_x - left_x, bottom_y - top_y)
+    least = -0.5 - size
+    return min(left_x, top_y) < least or right_x > right + size or bottom_y > bottom + size
 
 
 class OffFrameReport:

@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Callable, Mapping
+from operator import itemgetter
 from typing import NamedTuple
 
 from gazerig.config.schema import Rig
@@ -56,8 +57,8 @@ def run_bus(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:
             refuse_owner(path, rig.bus_named(name).kind, here)
         return RunBus(guarded_rig_bus(rig, paths))
     if options.bus == "ideal":
-        ideal = ideal_bus(rig, clock.now_s)
-        return RunBus(ideal, lambda: dict(zip(rig.names, ideal.positions_steps(), strict=True)))
+        ideal, names = ideal_bus(rig, clock.now_s), rig.names
+        return RunBus(ideal, lambda: dict(zip(names, ideal.positions_steps(), strict=True)))
     lines = emulated_lines(rig)
     if not options.fast:
         buses = PtyBuses()
@@ -96,13 +97,16 @@ def true_head(true_steps: TrueSteps | None, rig: Rig, poses: PoseHistory) -> Hea
         & rig.joints.keys()
     }
 
+    absent = dict.fromkeys((*NECK, *LOWER_NECK), 0.0)
+    angles_of = itemgetter(*NECK, *LOWER_NECK)
+
     def now(_: float) -> tuple[Mat3, Vec3]:
-        steps = true_steps()
-        angles = {name: linkage.angle_rad(steps[name]) for name, linkage in linkages.items()}
+        steps, angles = true_steps(), absent.copy()
+        for name, linkage in linkages.items():
+            angles[name] = linkage.angle_rad(steps[name])
         for first, second, coupling in pairs:
             angles[first], angles[second] = coupling.joint_rad((angles[first], angles[second]))
-        yaw, pitch, roll = (angles.get(name, 0.0) for name in NECK)
-        lower_yaw, lower_pitch = (angles.get(name, 0.0) for name in LOWER_NECK)
+        yaw, pitch, roll, lower_yaw, lower_pitch = angles_of(angles)
         return kinematics.head_pose((yaw, pitch, roll), (lower_yaw, lower_pitch))
 
     return now

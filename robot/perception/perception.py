@@ -284,17 +284,23 @@ def _bodies(tracks: tuple[Track, ...]) -> Bodies:
     """List faces and moving things alike; a spin seen in the image is about the view line."""
     if not tracks:
         return Bodies(pv_cov=np.zeros((0, 6, 6)))
-    filters = [track.filter for track in tracks]
-    spins = [scale(f.view, t.detection.spin_rad_s) for t, f in zip(tracks, filters, strict=True)]
-    cov = [number for f in filters for number in covariance(f.view, f.across, f.along)]
+    numbers: list[float] = []
+    for track in tracks:
+        known, found = track.filter, track.detection
+        numbers += known.p_m
+        numbers += known.v_m_s
+        numbers += scale(known.view, found.spin_rad_s)
+        numbers.append(found.radius_m)
+        numbers += covariance(known.view, known.across, known.along)
+    table = np.array(numbers).reshape(-1, 46)
     return Bodies(
         tuple([track.id for track in tracks]),
         tuple([track.detection.kind for track in tracks]),
-        np.array([f.p_m for f in filters]),
-        np.array([f.v_m_s for f in filters]),
-        np.array(spins),
-        np.array([track.detection.radius_m for track in tracks]),
-        np.array(cov).reshape(-1, 6, 6),
+        table[:, 0:3],
+        table[:, 3:6],
+        table[:, 6:9],
+        table[:, 9],
+        table[:, 10:].reshape(-1, 6, 6),
     )
 
 
