@@ -1,0 +1,184 @@
+"""The page in every state on a desk, a laptop and a phone: all in sight, nothing cut off."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from browser import RARE_DRAWING, Browser, browsing
+from page_layout import boxes, faults, value, violations
+from shown_page import SNAPSHOT, running_page, wait_for
+
+from gazerig.robot.dashboard.camera_overlay import encode
+from gazerig.robot.dashboard.page_process import PageProcess
+from gazerig.robot.model.leader import Leader, sentence
+from gazerig.robot.model.types import Snapshot
+
+pytestmark = pytest.mark.own_timeouts
+
+SIZES = {"desk": (1600, 1000), "laptop": (1280, 720), "phone": (390, 844)}
+TABS = ("watch", "steer", "tune", "health", "report")
+MENUS = {"gesture": ("none", "nod", "shake", "surprised", "sleepy"), "lids": ("awake",)}
+LEADS = {
+    "awake": Leader(),
+    "stopped": Leader("stopped", "", "STOP was pressed on the page (browser 1a2b)"),
+    "jogging": Leader("joint", "browser 1a2b", "neck_yaw at 17.2 deg", ("neck_yaw",), 0.0),
+    "led by a click": Leader("person", "browser 1a2b", "look at 0.9 0.1 0.25", (), 0.0),
+    "hold": Leader(),
+    "bus lost": Leader(),
+}
+CHANGES: dict[str, dict[str, Any]] = {
+    "stopped": {"stopped": LEADS["stopped"].what, "level": "torque_off"},
+    "hold": {"level": "hold", "reasons": ("neck_pitch: no feedback for 120 ms: all joints hold",)},
+    "bus lost": {
+        "level": "torque_off",
+        "reasons": ("the servo bus is lost: /dev/ttyUSB0 is not there",),
+        "health": "bus lost: /dev/ttyUSB0 is not there, tried again every 0.5 s",
+    },
+}
+
+
+def snapshot(state: str) -> Snapshot:
+    leader = LEADS[state]
+    words = sentence(leader, 12.0)
+    headline = words if leader.led else "looks at person 3 (left eye)"
+    changes = CHANGES.get(state, {})
+    return replace(
+        SNAPSHOT, t_s=12.0, leader=leader, leads_words=words, headline=headline, **changes
+    )
+
+
+class Shown:
+    """A page in a browser, and what feeds it."""
+
+    def __init__(self, browser: Browser, page: PageProcess) -> None:
+        self.browser, self.page = browser, page
+        self.t_s = 0.0
+
+    def state(self, name: str) -> None:
+        """Show a state and wait until the page says it."""
+        self.t_s += 1.0
+        shot = replace(snapshot(name), t_s=self.t_s)
+        self.page.show(shot)
+        said = "document.querySelector('#headline').textContent"
+
+        def says() -> bool:
+            self.t_s += 0.01
+            self.page.show(replace(shot, t_s=self.t_s))
+            return bool(value(self.browser, said) == shot.headline)
+
+        wait_for(says, f"the headline of {name}")
+
+    def size(self, name: str) -> None:
+        width, height = SIZES[name]
+        shape = {"width": width, "height": height, "deviceScaleFactor": 1}
+        self.browser.ask("Emulation.setDeviceMetricsOverride", **shape, mobile=False)
+        wait_for(lambda: value(self.browser, "innerWidth") == width, name)
+
+    def theme(self, name: str) -> None:
+        features = [{"name": "prefers-color-scheme", "value": name}]
+        self.browser.ask("Emulation.setEmulatedMedia", features=features)
+
+    def tab(self, name: str) -> None:
+        """Open a drawer, or close it if it is open."""
+        self.browser.run(f"document.querySelector('#tab-{name}').click()")
+
+
+@pytest.fixture(scope="module")
+def shown() -> Iterator[Shown]:
+    with browsing(SIZES["laptop"], RARE_DRAWING) as browser, running_page() as (page, url):
+        page.offer(MENUS)
+        page.show(snapshot("awake"))
+        page.show_frame(encode(np.full((400, 640, 3), (140, 120, 100), np.uint8)))
+        browser.go(url)
+        shown = Shown(browser, page)
+        wait_for(lambda: value(browser, "document.querySelector('#headline') !== null"), "it")
+        yield shown
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("state", LEADS)
+def test_nothing_is_cut_off_covered_or_too_small(shown: Shown, state: str, size: str) -> None:
+    shown.size(size)
+    shown.state(state)
+    assert faults(shown.browser) == []
+    # STOP is where it always is, whatever else there is to say.
+    stop = boxes(shown.browser)["rig-stop"]
+    assert stop is not None and stop[3] - stop[1] >= 44.0
+
+
+def apart(one: tuple[float, ...] | None, other: tuple[float, ...] | None) -> bool:
+    if one is None or other is None:
+        return True
+    beside = one[2] <= other[0] + 1 or other[2] <= one[0] + 1
+    return beside or one[3] <= other[1] + 1 or other[3] <= one[1] + 1
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("tab", TABS)
+def test_a_drawer_leaves_head_stop_and_buttons_in_sight(shown: Shown, tab: str, size: str) -> None:
+    shown.size(size)
+    shown.state("awake")
+    shown.tab(tab)
+    try:
+        assert faults(shown.browser) == []
+        found = boxes(shown.browser)
+        for part in ("stage", "camera", "rig-stop", "moves", "tabs"):
+            assert apart(found["drawer"], found[part]), f"the drawer lies over {part}"
+        left, top, right, bottom = found["stage"] or (0.0, 0.0, 0.0, 0.0)
+        width, height = SIZES[size]
+        if size == "phone":
+            assert right - left == width and bottom - top > 0.2 * height
+        else:
+            assert right - left >= 0.6 * width and bottom - top > 0.6 * height
+    finally:
+        shown.tab(tab)
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("tab", ["", *TABS])
+def test_axe_finds_nothing_serious(shown: Shown, tab: str, theme: str) -> None:
+    shown.size("laptop")
+    shown.state("awake")
+    shown.theme(theme)
+    if tab:
+        shown.tab(tab)
+    try:
+        assert violations(shown.browser) == []
+    finally:
+        if tab:
+            shown.tab(tab)
+        shown.theme("light")
+
+
+@pytest.mark.parametrize("size", ["laptop", "phone"])
+@pytest.mark.parametrize("state", [state for state in LEADS if state != "awake"])
+def test_axe_finds_nothing_serious_in_other_states(shown: Shown, state: str, size: str) -> None:
+    shown.size(size)
+    shown.state(state)
+    assert violations(shown.browser) == []
+
+
+BAD = """(() => {
+  const bad = document.createElement('div');
+  bad.id = 'bad';
+  bad.innerHTML = '<button style="position:fixed;left:-20px;top:100px;width:40px"></button>' +
+    '<p style="position:fixed;top:200px;font-size:9px;color:#999;background:#aaa">words</p>' +
+    '<div style="position:fixed;inset:auto 0 0 0;height:200px;z-index:9"></div>';
+  document.body.append(bad);
+})()"""
+
+
+def test_what_is_measured_finds_faults_that_are_there(shown: Shown) -> None:
+    shown.size("laptop")
+    shown.state("awake")
+    shown.browser.run(BAD)
+    try:
+        found = " ".join(faults(shown.browser))
+        for fault in ("is cut off at the side", "is written in 9.0 px", "is covered by div"):
+            assert fault in found
+        serious = " ".join(violations(shown.browser))
+        assert "button-name" in serious and "color-contrast" in serious
+    finally:
+        shown.browser.run("document.querySelector('#bad').remove()")
