@@ -173,6 +173,30 @@ def test_a_pointer_is_taken_without_an_answer_that_could_be_a_stops(near: Rig) -
     assert near.door.browsers._leads == ""
 
 
+def test_a_browser_that_is_silent_renews_nothing_though_its_connection_stands(near: Rig) -> None:
+    ana = f"{near.cookie}; {near.door._name_cookie}=ana"
+    host, port = near.address.split(":")
+    hello = (
+        f"GET /rig/line HTTP/1.1\r\nHost: {near.address}\r\nOrigin: {near.url}\r\nCookie: {ana}\r\n"
+        "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n\r\n"
+    )
+    near.asked.clear()
+    with socket.create_connection((host, int(port)), timeout=20.0) as deaf:
+        deaf.sendall(hello.encode())
+        assert b" 101 " in deaf.recv(4096).splitlines()[0]
+        body = b'{"do": "look_at", "p_world_m": [1, 0, 0]}'
+        assert near.post(body, Cookie=ana)[0] == 204
+        time.sleep(1.0)  # four pings
+        assert near.door.browsers.leading() and [one["do"] for one in near.asked] == ["look_at"]
+        deaf.sendall(bytes((0x8A, 0x80, 0, 0, 0, 0)))  # a pong, as of a computer that wakes up
+        for _ in range(400):
+            if len(near.asked) > 1:
+                break
+            time.sleep(0.05)
+        assert near.asked[-1]["do"] == "renew"
+
+
 def test_what_the_rig_does_not_take_is_told(near: Rig) -> None:
     near.takes = False
     try:

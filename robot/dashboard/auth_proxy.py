@@ -161,7 +161,7 @@ class AuthProxy:
             finally:
                 self._opened.set()
             self._stop.attach(self._loop)
-            await until_one_ends(self._over.wait(), self._connections.watch(), self._renew())
+            await until_one_ends(self._over.wait(), self._connections.watch())
             self._wake()
             listener.close()
             await runner.cleanup()
@@ -257,7 +257,7 @@ class AuthProxy:
 
         A connection that stands already when STOP is pressed: a browser opens only six others.
         """
-        line = web.WebSocketResponse(max_msg_size=ASKED_BYTES, compress=False)
+        line = web.WebSocketResponse(max_msg_size=ASKED_BYTES, compress=False, autoping=False)
         await line.prepare(request)
         self._connections.lasting(request)
         who = self._who(request)
@@ -268,6 +268,7 @@ class AuthProxy:
                 await until_one_ends(
                     self._send_state(line, news, who),
                     self._receive_line(line, who),
+                    self._ping(line, who),
                     self._over.wait(),
                     leave.wait(),
                 )
@@ -288,6 +289,11 @@ class AuthProxy:
 
     async def _receive_line(self, line: web.WebSocketResponse, who: str) -> None:
         async for message in line:
+            if message.type is aiohttp.WSMsgType.PING:
+                async with asyncio.timeout(TAKES_S):
+                    await line.pong(message.data)
+            elif message.type is aiohttp.WSMsgType.PONG and who == self.browsers.leading():
+                self._ask(compact({"do": "renew", "who": who}))
             if message.type is not aiohttp.WSMsgType.TEXT:
                 continue
             asked = from_browser(message.data, who)
@@ -303,12 +309,17 @@ class AuthProxy:
         for news in self._news:
             news.set()
 
-    async def _renew(self) -> None:
-        """Renew the lead for the browser that holds it; until cancelled."""
+    async def _ping(self, line: web.WebSocketResponse, who: str) -> None:
+        """Ask a browser that leads for signs of life; each of them renews its lead.
+
+        A connection that stands proves nothing: that of a computer that was shut or has lost its
+        network stands for minutes. Browsers answer also for pages in the background.
+        """
         while True:
             await asyncio.sleep(_RENEWED_EVERY_S)
-            if who := self.browsers.leading():
-                self._ask(compact({"do": "renew", "who": who}))
+            if who == self.browsers.leading():
+                async with asyncio.timeout(TAKES_S):
+                    await line.ping()
 
     # --- the server behind the door -------------------------------------------------------
 

@@ -4,11 +4,12 @@ import json
 from collections.abc import Mapping
 from typing import NoReturn
 
-from gazerig.robot.model.commands import COMMANDS
+from gazerig.robot.model.commands import COMMANDS, Leading
 
 ASKED_BYTES = 2048
 """Longest request; a stop with its reason has a hundred bytes."""
 
+_LEADING = frozenset(name for name, kind in COMMANDS.items() if issubclass(kind, Leading))
 _SAY_WHO = tuple(name for name, kind in COMMANDS.items() if "who" in kind._fields)
 """Commands that carry who asks."""
 
@@ -37,7 +38,7 @@ def from_browser(body: bytes | str, who: str) -> dict[str, object] | None:
 
 def leads(asked: Mapping[str, object]) -> bool:
     """Return whether a request makes who asks the one that leads the head."""
-    return "pick" in asked or asked.get("do") in ("look_at", "jog")
+    return "pick" in asked or "point" in asked or asked.get("do") in _LEADING
 
 
 def compact(asked: Mapping[str, object]) -> bytes:
