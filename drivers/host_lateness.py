@@ -27,10 +27,22 @@ STOOD_STILL = (
 )
 
 
+LATE_COMPUTER = "late computer"
+"""Kind of what servos did because this computer was late; it is no fault of theirs."""
+
+AFTERMATH_S = 2.0
+"""What servos do within such a time of a late computer is put down to it."""
+
+
 class HostLateness:
-    """Counts the answers that came after waiting for them had ended."""
+    """Records how this computer was late.
+
+    Counts answers that came after waiting for them had ended, and remembers the last time at
+    which it sent nothing for long.
+    """
 
     def __init__(self) -> None:
+        self._silent_s, self._silent_until_s = 0.0, -inf
         self._late: deque[float] = deque(maxlen=1000)
         self._last_s = -inf
 
@@ -42,6 +54,20 @@ class HostLateness:
     def any_since(self, begin_s: float) -> bool:
         """Return whether an answer came late since then, noise beside it or not."""
         return self._last_s >= begin_s
+
+    def own_silence(self, silent_s: float, until_s: float) -> None:
+        """Record that this computer has sent nothing for so long."""
+        if until_s - self._silent_until_s >= AFTERMATH_S or silent_s > self._silent_s:
+            self._silent_s = silent_s
+        self._silent_until_s = until_s
+
+    def cause(self, now_s: float) -> str:
+        """Return how this computer was late a moment ago, "" where it was not."""
+        if now_s - self._silent_until_s < AFTERMATH_S:
+            return f"this computer was late: it sent nothing for {self._silent_s:.2f} s"
+        if self.any_since(now_s - AFTERMATH_S):
+            return "this computer was busy, or the emulator stood still: answers came late"
+        return ""
 
     def forget(self) -> None:
         """Reset the count."""

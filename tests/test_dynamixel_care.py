@@ -4,6 +4,7 @@ import pytest
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
+from gazerig.drivers.host_lateness import LATE_COMPUTER
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
@@ -72,14 +73,14 @@ def test_a_host_that_stalled_brings_the_servos_back_without_a_jump(rig):
     # The first exchange shows the stall, the next one heals it.
     rig.tick()
     rig.tick()
-    assert rig.errors() == {"watchdog": 3}
+    assert rig.errors() == {LATE_COMPUTER: 3}
     assert [s.memory.get("bus_watchdog") for s in rig.chain.servos] == [10] * 3
     rig.now_s += 0.1
     assert all(abs(a - b) <= 40 for a, b in zip(rig.chain.positions_steps(), stopped, strict=True))
     for _ in range(200):
         rig.tick([2500] * 3)
     assert rig.places() == pytest.approx([2500] * 3, abs=12)
-    assert rig.errors() == {"watchdog": 3}
+    assert rig.errors() == {LATE_COMPUTER: 3}
 
 
 def test_a_stall_shown_by_a_write_is_healed_by_the_next_read_and_told(rig):
@@ -94,7 +95,7 @@ def test_a_stall_shown_by_a_write_is_healed_by_the_next_read_and_told(rig):
     assert [r.rearmed for r in rig.tick([2500] * 3)] == [False] * 3
     rig.now_s += 0.19
     assert all(x > 2100 for x in rig.chain.positions_steps())
-    assert rig.errors() == {"watchdog": 3}
+    assert rig.errors() == {LATE_COMPUTER: 3}
 
 
 def test_a_sleep_that_the_clock_does_not_show_is_found_by_asking(rig):
@@ -140,7 +141,7 @@ def test_healing_keeps_to_the_limits():
     rig.now_s += 1.0
     rig.tick()
     rig.tick()
-    assert rig.errors() == {"watchdog": 3}
+    assert rig.errors() == {LATE_COMPUTER: 3}
     assert rig.chain[1].memory.get("goal_position") == 1000
 
 

@@ -237,7 +237,7 @@ def test_27_watchdog_trip(rig):
     rig.tick([2900] * 4)
     readings = rig.tick([2900] * 4)
     assert [r.rearmed for r in readings] == [True] * 4
-    assert rig.errors()["watchdog"] == 4
+    assert rig.errors()["late computer"] == 4
     assert [s.memory.get("bus_watchdog") for s in rig.chain.servos] == [10] * 4
 
 

@@ -8,7 +8,7 @@ from line_noise import Noisy
 
 from gazerig.drivers.errors import PortError
 from gazerig.drivers.event_log import SELDOM_S, EventLog, RateLimitedLog
-from gazerig.drivers.host_lateness import BUSY, WITHIN_S, HostLateness
+from gazerig.drivers.host_lateness import AFTERMATH_S, BUSY, LATE_COMPUTER, WITHIN_S, HostLateness
 from gazerig.drivers.serial.port import BlockingPort
 
 KINDS = ("dynamixel", "feetech")
@@ -23,6 +23,21 @@ def test_few_late_answers_are_no_busy_computer():
     lateness.late_answer(5.1)
     assert lateness.busy(5.1) == BUSY
     assert lateness.busy(5.2 + WITHIN_S) == 0
+
+
+def test_what_servos_do_soon_after_a_late_computer_is_put_down_to_it():
+    lateness = HostLateness()
+    assert lateness.cause(0.0) == ""
+    lateness.own_silence(0.7, 5.0)
+    lateness.own_silence(0.12, 5.1)  # the longest of one episode is told
+    assert lateness.cause(5.2) == "this computer was late: it sent nothing for 0.70 s"
+    assert lateness.cause(5.2 + AFTERMATH_S) == ""
+    lateness.own_silence(0.2, 9.0)
+    assert "0.20 s" in lateness.cause(9.0)
+    starved = HostLateness()
+    starved.late_answer(3.0)
+    assert "the emulator stood still" in starved.cause(3.5)
+    assert starved.cause(3.0 + 2 * AFTERMATH_S) == ""
 
 
 def test_the_same_is_said_seldom_and_counted():
@@ -69,7 +84,7 @@ def test_a_host_that_slept_is_told_as_that_and_servos_go_on():
     noisy.now += 0.5  # the loop was stopped; the servos' own watchdog is not
     outcome = noisy.run("clear", 0.0, 40)
     assert sum("this computer was late: it sent nothing for 0.5" in t for t in outcome.said) == 1
-    assert outcome.errors["watchdog"] == 6
+    assert outcome.errors[LATE_COMPUTER] == 6 and "watchdog" not in outcome.errors
     assert "restarted" not in outcome.errors
     assert outcome.outside == 0
 

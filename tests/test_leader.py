@@ -9,6 +9,7 @@ from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.head_state import as_json, from_json, head_state
+from gazerig.robot.control.joint_faults import JointFaults
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import doing, leader
 from gazerig.robot.dashboard.attention_panel import saliences, winner
@@ -147,3 +148,23 @@ def test_parking_is_shown_as_such_and_changes_nothing_of_it(running: Running) ->
         tick.joints.position_rad[ticks[0].guard_result.joints.index("neck_yaw")] for tick in ticks
     ]
     assert abs(yaw[-1]) < abs(yaw[0])
+
+
+def test_what_holds_all_joints_at_once_is_one_line(running: Running) -> None:
+    said: list[str] = []
+    faults = JointFaults(said.append)
+    tick = running.go(0.1)[-1]
+    count = len(tick.guard_result.joints)
+    held = tick.guard_result._replace(
+        level="hold",
+        why=("stale joints",) * count,
+        critical_reasons=tuple(f"{joint}: stale joints" for joint in tick.guard_result.joints),
+    )
+    for k in range(200):
+        faults.update(tick._replace(t_s=0.005 * k, guard_result=held))
+    for k in range(200, 500):
+        faults.update(tick._replace(t_s=0.005 * k))
+    assert said == [
+        f"0.00 s: all {count} joints: stale joints: held",
+        f"0.99 s: all {count} joints: stale joints: over after 1.0 s",
+    ]

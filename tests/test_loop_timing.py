@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gazerig.robot.dashboard.loop_timing import OVER_S, LoopTiming
+from gazerig.robot.control.loop_timing import OVER_S, LoopTiming, busy_text
 from gazerig.robot.model.types import LoopFigures
 
 
@@ -69,3 +69,22 @@ def test_the_first_tick_and_a_clock_set_back_give_nothing() -> None:
     timing.update(0.005)
     figures = timing.figures()
     assert figures is not None and figures.overruns_ever == 0
+
+
+def test_a_computer_that_misses_slots_is_called_busy_with_its_figures() -> None:
+    assert busy_text(None) == "" and busy_text(timed([0.005 * k for k in range(400)])) == ""
+    times = [0.005 * k for k in range(400) if not 100 <= k % 200 < 116]  # 80 ms, twice
+    figures = timed(times)
+    assert figures.late_share == pytest.approx(32 / 399)
+    assert busy_text(figures) == ("the computer is too busy: 8% of ticks came late (worst 80 ms)")
+    assert busy_text(timed(times[:90])) == ""  # half a second tells nothing
+
+
+def test_slots_of_a_tuned_rate_are_no_late_ticks() -> None:
+    timing = LoopTiming(200.0)
+    for k in range(400):
+        timing.update(0.005 * k)
+    timing.retune(100.0)
+    for k in range(400):
+        timing.update(2.0 + 0.01 * k)
+    assert busy_text(timing.figures()) == ""

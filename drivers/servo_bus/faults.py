@@ -137,17 +137,15 @@ class ServoHealth:
         self.all_silent_since_s = self._back_s = None
         self._all_silent = False
 
-    def stopped(self, count: int, asleep_s: float, now_s: float) -> None:
+    def stopped(self, count: int, late: str, now_s: float) -> None:
         """Record that servos were stopped by their own watchdog and go on from where they are.
 
-        asleep_s: how long this computer has sent nothing; 0 if it has
+        late: how this computer was late a moment ago, "" where it was not
         """
         servos = f"the watchdog of {count} servo{'s' if count > 1 else ''}"
-        if asleep_s:
-            self._seldom.add(
-                f"this computer was late: it sent nothing for {asleep_s:.2f} s, so {servos} "
-                "stopped them; they go on from where they are", now_s, "late",
-            )  # fmt: skip
+        if late:
+            text = f"{late}, so {servos} stopped them; they go on from where they are"
+            self._seldom.add(text, now_s, "late")
         else:
             self._seldom.add(
                 f"{servos} stopped them, as packets get lost: check cable and plugs; they go on "

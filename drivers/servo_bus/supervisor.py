@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping
 from math import inf
 
+from gazerig.drivers.host_lateness import LATE_COMPUTER
 from gazerig.drivers.servo_bus.faults import ServoHealth
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.read_plan import ReadPlan
@@ -157,10 +158,11 @@ class Supervisor(ABC):
         healed = rearm_tripped(self._line, ids, self._watchdog, self._recovery.clip)
         self._rearmed.update(healed)
         self.due_s = -inf
-        self._line.errors["watchdog"] += len(healed)
         if healed:
-            self._health.stopped(len(healed), self._line.asleep_s, self._line.port.now_s())
-        self._line.asleep_s = 0.0
+            now_s = self._line.port.now_s()
+            late = self._line.lateness.cause(now_s)
+            self._line.errors[LATE_COMPUTER if late else "watchdog"] += len(healed)
+            self._health.stopped(len(healed), late, now_s)
 
     def _name_fault(self, servo_id: int) -> None:
         """Copy a servo's fault to the feedback."""

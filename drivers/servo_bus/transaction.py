@@ -29,8 +29,7 @@ class Transactions:
     tries: how often a servo is asked outside the cyclic exchange; in the loop, once
     starving_s: silence after which a servo's own watchdog trips; inf where none is armed
     starved: such a silence has happened
-    asleep_s: the longest silence that this computer itself has kept since it was set to 0
-    lateness: answers that came after waiting had ended
+    lateness: how this computer was late: its own silences, answers after waiting had ended
     quiet: nothing came any more when the last exchange was given up
     whole_s: when the last exchange's answer was due as far as the wire goes
     """
@@ -53,7 +52,6 @@ class Transactions:
         self.tries = TRIES
         self.starving_s = inf
         self.starved = False
-        self.asleep_s = 0.0
         self.lateness = HostLateness()
         self._silent = self._reply_owed = False
         self.quiet = True
@@ -83,7 +81,7 @@ class Transactions:
     def _starve(self, silent_s: float) -> None:
         """Record a silence of this computer after which the servos' watchdogs have tripped."""
         self.starved = True
-        self.asleep_s = max(self.asleep_s, silent_s)
+        self.lateness.own_silence(silent_s, self.port.now_s())
 
     def exchange(self, request: bytes, length: int, reserve: bool = True) -> tuple[bytes, float]:
         """Send a request, wait for ``length`` bytes; return what came, and when.

@@ -16,6 +16,7 @@ from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.control.loop import LoopCount
+from gazerig.robot.control.loop_timing import LoopTiming
 from gazerig.robot.control.observers import Observers, left_out
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
@@ -26,7 +27,7 @@ from gazerig.robot.dashboard.param_feed import ParamFeed
 from gazerig.robot.dashboard.publisher import Publisher
 from gazerig.robot.dashboard.request_handler import PageRequestHandler
 from gazerig.robot.dashboard.status_line import StatusLine
-from gazerig.robot.model.commands import Command, Resume, Stop
+from gazerig.robot.model.commands import Command, Resume, Stop, Tune
 from gazerig.robot.model.reply import CommandTaker, Ticket
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
 from gazerig.robot.remote.live_server import LiveServer
@@ -79,11 +80,13 @@ class RunObservers:
     ) -> None:
         self._steer = steer
         self._made, self._fast, self._say = made, options.fast, say
-        self._rate_hz = made.loop.rate_hz
+        self._timing = LoopTiming(made.loop.rate_hz)
         self._tuning, self._recorder = tuning, recorder
         about = {"rig": options.rig, "pid": os.getpid()}
         self._live = (
-            LiveServer(made.robot, tuning, (ConfigError,), made.clock, about, say)
+            LiveServer(
+                made.robot, tuning, (ConfigError,), made.clock, about, say, self._timing.figures
+            )
             if tuning is not None and not options.fast
             else None
         )
@@ -94,7 +97,11 @@ class RunObservers:
         live = not options.fast
         self._publisher = self._made_publisher(self._page) if live and self._page else None
         health = made.robot.body.bus.health
-        self._status = StatusLine(status, health) if live and status is not None else None
+        self._status = (
+            StatusLine(status, health, self._timing.figures)
+            if live and status is not None
+            else None
+        )
         self._stream = recorder.stream if recorder is not None else TickStream(say)
         self._parking = TickStream(say)
         if self._publisher is not None:
@@ -123,7 +130,7 @@ class RunObservers:
         return Publisher(page, self._live_rig, self._run_state, feed, self._say)
 
     def _live_rig(self) -> LiveRig:
-        return LiveRig(self._rate_hz, self._made.shown())
+        return LiveRig(self._made.loop.rate_hz, self._made.shown())
 
     def _run_state(self) -> RunState:
         """Return what the page shows and ticks do not tell."""
@@ -137,6 +144,8 @@ class RunObservers:
             observers.add("the recording", self._recorder.record)
         elif self._publisher is not None:
             observers.add("the page", self._stream.update)
+        if not self._fast:
+            observers.add("the loop's time", self._keep_time)
         if self._page is not None:
             observers.add("picking a point on the page", self._follow)
         if self._status is not None:
@@ -243,6 +252,12 @@ class RunObservers:
     def _show_depth(self, on: bool) -> None:
         if self._publisher is not None:
             self._publisher.depth = on
+
+    def _keep_time(self, tick: Tick) -> None:
+        """Record when a tick came; a tuned loop has slots of its own."""
+        if tick.commands and any(isinstance(command, Tune) for command in tick.commands):
+            self._timing.retune(self._made.loop.rate_hz)
+        self._timing.update(tick.t_s)
 
     def _follow(self, tick: Tick) -> None:
         """Keep what a click is placed by, and show the rig as it is after tuning."""

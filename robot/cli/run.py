@@ -14,7 +14,7 @@ from gazerig.robot.app.options import RunOptions, camera_of
 from gazerig.robot.cli import run_options as options
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
-from gazerig.robot.control.joint_faults import JointFault
+from gazerig.robot.control.joint_faults import JointFault, named
 
 app = typer.Typer()
 
@@ -70,11 +70,12 @@ def run(
 
 def had_faults(figures: Mapping[str, Any], say: Callable[[str], None]) -> bool:
     """Return whether a run had faults, and say which joints they held."""
-    held = [
-        str(JointFault(joint, reason, count["times"], count["seconds"]))
-        for joint, reasons in figures["joint_faults"].items()
-        for reason, count in reasons.items()
-    ]
+    alike: dict[tuple[str, int, float], list[str]] = {}
+    for joint, reasons in figures["joint_faults"].items():
+        for reason, count in reasons.items():
+            key = reason, count["times"], round(count["seconds"], 1)
+            alike.setdefault(key, []).append(joint)
+    held = [str(JointFault(named(joints), *key)) for key, joints in alike.items()]
     if held:
         say(f"the run had faults: {'; '.join(held)}")
     return bool(held) or str(figures["stopped_by"]).startswith("fault")

@@ -1,6 +1,6 @@
 """Joints that the guard held for a fault: reported when that begins and ends, and counted."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
@@ -15,6 +15,9 @@ _PASSING_S = {"stale joints": 0.5, "torque off": 0.5}
 """A lost answer or a restart that is over sooner is no fault."""
 _OVER_S = 1.0
 """A fault is over when the joint has not been held for so long; a retry alone does not end it."""
+
+
+_MOST_NAMED = 3
 
 
 class JointFault(NamedTuple):
@@ -42,6 +45,28 @@ class _OpenFault:
         self.said = False
 
 
+class _Lines:
+    """What there is to say of joints in one tick: the same of several is one line."""
+
+    def __init__(self) -> None:
+        self._joints: dict[tuple[float, str], list[str]] = {}
+
+    def add(self, joint: str, t_s: float, what: str) -> None:
+        """Say something of a joint, as at a time."""
+        self._joints.setdefault((t_s, what), []).append(joint)
+
+    def all(self, count: int) -> list[tuple[float, str]]:
+        """Return time and line of each; count: of the rig's joints."""
+        return [(t_s, f"{named(of, count)}: {what}") for (t_s, what), of in self._joints.items()]
+
+
+def named(joints: Sequence[str], count: int = 0) -> str:
+    """Return joints as people are told of them: three at most by name; count: of the rig's."""
+    if len(joints) == count and count > 1:
+        return f"all {count} joints"
+    return ", ".join(joints) if len(joints) <= _MOST_NAMED else f"{len(joints)} joints"
+
+
 class JointFaults:
     """Observes ticks for joints that are held by a fault.
 
@@ -63,20 +88,23 @@ class JointFaults:
         held = guard_result.level in ("hold", "torque_off") and not tick.stopped
         if not held and not self._running:
             return
+        lines = _Lines()
         for joint, reason in _held(tick) if held else ():
             running = self._running.setdefault((joint, reason), _OpenFault(tick.t_s))
             running.last_s = tick.t_s
             if not running.said and tick.t_s - running.from_s >= _PASSING_S.get(reason, 0.0):
                 running.said = True
-                self._tell(running.from_s, f"{joint}: {reason}: held")
+                lines.add(joint, running.from_s, f"{reason}: held")
         for key, running in tuple(self._running.items()):
             if tick.t_s - running.last_s > _OVER_S:
-                self._end(key, running)
+                self._end(key, running, lines)
+        for t_s, line in lines.all(len(guard_result.joints)):
+            self._say(f"{t_s - self._first_s:.2f} s: {line}")
 
     def close(self) -> None:
         """Count what still lasts, at the end of a run."""
         for key, running in tuple(self._running.items()):
-            self._end(key, running, lasts=True)
+            self._end(key, running, None)
 
     def counted(self) -> tuple[JointFault, ...]:
         """Return all faults that are over, by joint and reason."""
@@ -91,19 +119,17 @@ class JointFaults:
             figures.setdefault(fault.joint, {})[fault.reason] = entry
         return figures
 
-    def _end(self, key: tuple[str, str], running: _OpenFault, lasts: bool = False) -> None:
+    def _end(self, key: tuple[str, str], running: _OpenFault, lines: "_Lines | None") -> None:
+        """Count a fault; lines: takes what there is to say, None for one that lasts."""
         del self._running[key]
         if not running.said:
             return
         seconds = running.last_s - running.from_s
         times, before_s = self._counted.get(key, (0, 0.0))
         self._counted[key] = times + 1, before_s + seconds
-        if not lasts:
+        if lines is not None:
             joint, reason = key
-            self._tell(running.last_s, f"{joint}: {reason}: over after {seconds:.1f} s")
-
-    def _tell(self, t_s: float, what: str) -> None:
-        self._say(f"{t_s - (self._first_s or 0.0):.2f} s: {what}")
+            lines.add(joint, running.last_s, f"{reason}: over after {seconds:.1f} s")
 
 
 def _held(tick: "Tick") -> list[tuple[str, str]]:

@@ -3,6 +3,7 @@
 from math import degrees
 from typing import NamedTuple
 
+from gazerig.drivers.host_lateness import LATE_COMPUTER
 from gazerig.drivers.types import BusHealth
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import ORDERED, PART_NAMES, Target
@@ -129,8 +130,6 @@ def guard_text(guard_result: GuardResult) -> str:
 
 
 def health_text(health: BusHealth) -> str:
-    """Return the state of the bus, e.g. "bus: 3 lost"."""
-    errors = sum(health.errors.values())
-    if errors == 0:
-        return "bus ok"
-    return "bus: " + ", ".join(f"{n} {kind}" for kind, n in sorted(health.errors.items()) if n)
+    """Return the state of the bus, e.g. "bus: 3 timeout"; what a late computer did is no fault."""
+    errors = [(n, kind) for kind, n in sorted(health.errors.items()) if n and kind != LATE_COMPUTER]
+    return "bus: " + ", ".join(f"{n} {kind}" for n, kind in errors) if errors else "bus ok"

@@ -171,6 +171,7 @@ class LiveFeed:
             self._builder = SnapshotBuilder(rig.rate_hz, rig.shown)
             self._poses = PoseHistory(rig.shown.kinematics)
         self._builder.rig = rig.shown
+        self._builder.retune(rig.rate_hz)
 
     def _take_ticks(self, data: bytes) -> None:
         if self._builder is None or self._poses is None:

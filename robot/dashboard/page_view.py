@@ -169,7 +169,7 @@ def leads_state(leader: Leader, shot: Snapshot | None) -> dict[str, object]:
         "leads": leader.kind,
         "leads_words": sentence(leader, t_s),
         "headline": shot.headline if shot is not None else "",
-        "busy": "",
+        "busy": shot.busy if shot is not None else "",
     }
 
 

@@ -10,9 +10,9 @@ from gazerig.gaze.field_of_view import FieldOfViewParams, line_of_sight
 from gazerig.gaze.types import GazeState, Vec3
 from gazerig.robot.analysis.blink_finder import BlinkEvent
 from gazerig.robot.analysis.event_detector import Event, EventDetector, FixationEvent, SaccadeEvent
+from gazerig.robot.control.loop_timing import LoopTiming, busy_text
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import doing, lead_text, leader
-from gazerig.robot.dashboard.loop_timing import LoopTiming
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.guard_params import HealthParams
 from gazerig.robot.model.joint_limit import JointLimit
@@ -86,6 +86,12 @@ class SnapshotBuilder:
         self._events = EventDetector()
         self._unanswered: Counter[str] = Counter()
 
+    def retune(self, rate_hz: float) -> None:
+        """Go on with a loop of another rate."""
+        if rate_hz != self._rate_hz:
+            self._rate_hz = rate_hz
+            self._timing.retune(rate_hz)
+
     def update(self, tick: Tick) -> None:
         """Add a tick."""
         self._ticks.append(tick)
@@ -122,6 +128,7 @@ class SnapshotBuilder:
                 unanswered=tuple([self._unanswered[name] for name in plain.joints])
             ),
             timing=timing,
+            busy=busy_text(timing),
             worst=worst,
             trail=tuple(trail),
             events=tuple(events),

@@ -1,10 +1,13 @@
 """The status line of a running rig: one line of words, five times a second."""
 
 from collections.abc import Callable
+from math import inf
 
 from gazerig.drivers.types import BusHealth
+from gazerig.robot.control.loop_timing import busy_text
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import doing, guard_text, health_text
+from gazerig.robot.model.types import LoopFigures
 
 _LINE_S = 0.2
 _RATE_S = 1.0
@@ -16,31 +19,37 @@ class StatusLine:
     Args:
         write: rewrites the line, without waiting.
         health: returns the present state of the bus.
+        timing: returns how the loop keeps its time; None where that is not known yet.
     """
 
-    def __init__(self, write: Callable[[str], None], health: Callable[[], BusHealth]) -> None:
-        self._write, self._health = write, health
+    def __init__(
+        self,
+        write: Callable[[str], None],
+        health: Callable[[], BusHealth],
+        timing: Callable[[], LoopFigures | None],
+    ) -> None:
+        self._write, self._health, self._timing = write, health, timing
         self._due_s: float | None = None
-        self._ticks = 0
-        self._hz = 0.0
-        self._from: tuple[float, int] | None = None
+        self._timed_s = -inf
+        self._busy = self._rate = ""
 
     def update(self, tick: Tick) -> None:
         """Add a tick; called by the loop."""
-        self._ticks += 1
         if self._due_s is None or tick.t_s >= self._due_s:
             self._due_s = tick.t_s + _LINE_S
             self._write(self._line(tick))
 
     def _line(self, tick: Tick) -> str:
-        start_s, ticks = self._from = self._from or (tick.t_s, self._ticks)
-        if tick.t_s - start_s >= _RATE_S:
-            self._hz = (self._ticks - ticks) / (tick.t_s - start_s)
-            self._from = (tick.t_s, self._ticks)
+        if abs(tick.t_s - self._timed_s) >= _RATE_S:
+            self._timed_s, timing = tick.t_s, self._timing()
+            known = timing is not None and timing.over_s >= 0.9 * _RATE_S
+            self._rate = f"{timing.rate_hz:5.1f} Hz" if timing is not None and known else ""
+            self._busy = busy_text(timing)
         parts = [
-            f"{self._hz:5.1f} Hz",
+            self._busy,
+            self._rate,
             doing(tick).headline,
             guard_text(tick.guard_result),
             health_text(self._health()),
         ]
-        return " | ".join(parts)
+        return " | ".join(filter(None, parts))

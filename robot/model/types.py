@@ -234,6 +234,7 @@ class LoopFigures(NamedTuple):
 
     p50_ms, p99_ms, worst_ms: how far the time between two ticks is off its slots
     overruns: slots skipped in these seconds; overruns_ever: since the start
+    late_share: slots skipped, of all; latest_ms: how much later than its slot a tick came at worst
     """
 
     rate_hz: float
@@ -243,6 +244,8 @@ class LoopFigures(NamedTuple):
     overruns: int
     overruns_ever: int
     over_s: float
+    late_share: float = 0.0
+    latest_ms: float = 0.0
 
 
 class SeenSaccade(NamedTuple):
@@ -297,7 +300,8 @@ class Snapshot:
     frame_age_s: None before the first frame
     commanded_pose: head and eyes at the desired angles; camera: where the camera is
     field_deg: what an eye can see, towards temple, nose, above and below
-    servos, timing: health of servos and loop
+    servos, timing: health of servos and loop; busy: that the computer is too busy, and how it
+        shows, "" where it is not
     worst: the guard's gravest level since the last snapshot
     trail, events: joints, and eye movements that ended, since the last snapshot, oldest first
     p_world_pivot_m: where the pitch and roll axes of the neck meet, None where it is not known
@@ -341,6 +345,7 @@ class Snapshot:
     field_deg: tuple[float, float, float, float] | None = None
     servos: Servos = Servos()
     timing: LoopFigures | None = None
+    busy: str = ""
     worst: Level = "ok"
     trail: tuple[Trail, ...] = ()
     events: tuple[SeenEvent, ...] = ()

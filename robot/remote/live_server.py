@@ -9,6 +9,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.robot.control.command_handler import Commandable, ParamAccess
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.clock import Clock
+from gazerig.robot.model.types import LoopFigures
 from gazerig.robot.remote.file_watch import FileWatch
 from gazerig.robot.remote.request_handler import Pulse, RequestHandler
 from gazerig.robot.remote.socket_server import RemoteServer
@@ -36,6 +37,7 @@ class LiveServer:
         clock: the clock of the loop.
         about: what does not change, as {"rig": name, "pid": process}.
         say: prints a line on the terminal.
+        timing: returns how the loop keeps its time.
     """
 
     def __init__(
@@ -46,11 +48,12 @@ class LiveServer:
         clock: Clock,
         about: Mapping[str, object],
         say: Callable[[str], None],
+        timing: Callable[[], LoopFigures | None] = lambda: None,
     ) -> None:
         self._tuning = tuning
         self._refusals: tuple[type[Exception], ...] = (OSError, ValueError, *refusals)
         self._say = say
-        self._pulse = Pulse(clock)
+        self._pulse = Pulse(clock, timing)
         self._in_use: tuple[int, tuple[Path, ...]] = (-1, ())
         self._watch = FileWatch(self._files, self._read_again)
         requests = RequestHandler(robot, tuning, self._pulse, about, refusals, self._watch.saved)

@@ -25,6 +25,7 @@ from gazerig.robot.control.command_handler import (
 from gazerig.robot.control.feedback_basis import estimated_joints
 from gazerig.robot.control.head_state import as_json as state_as_json
 from gazerig.robot.control.head_state import head_state
+from gazerig.robot.control.loop_timing import busy_text
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_feed import TickFeed
 from gazerig.robot.control.tick_text import doing, lead_text, leader
@@ -33,6 +34,7 @@ from gazerig.robot.model.command_json import signed
 from gazerig.robot.model.commands import REPEATED, Command
 from gazerig.robot.model.leader import sentence
 from gazerig.robot.model.reply import CommandReply, Ticket
+from gazerig.robot.model.types import LoopFigures
 
 _TAKEN_UP_S = 1.0
 """Within this the loop must have obeyed; a servo that answers late costs it some 50 ms."""
@@ -46,10 +48,17 @@ _HANGS = (
 
 
 class Pulse:
-    """The newest tick, and whether the loop lives."""
+    """The newest tick, and whether the loop lives.
 
-    def __init__(self, clock: Clock) -> None:
-        self._clock = clock
+    Args:
+        clock: the loop's.
+        timing: returns how the loop keeps its time; None where that is not known.
+    """
+
+    def __init__(
+        self, clock: Clock, timing: Callable[[], LoopFigures | None] = lambda: None
+    ) -> None:
+        self._clock, self._timing = clock, timing
         self._feed = TickFeed()
         self._never = threading.Event()
 
@@ -94,6 +103,7 @@ class Pulse:
             "leads": leads.kind,
             "leads_words": sentence(leads, tick.t_s),
             "headline": does.headline,
+            "busy": busy_text(self._timing()),
             "limited": [
                 {
                     "axis": one.axis,

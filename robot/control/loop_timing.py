@@ -8,6 +8,10 @@ from gazerig.robot.model.types import LoopFigures
 
 OVER_S = 5.0
 """How far back the figures reach."""
+BUSY_SHARE = 0.05
+"""A computer that misses this share of the slots is too busy."""
+_TELLING_S = 1.0
+"""Less time than this tells nothing."""
 
 
 class LoopTiming:
@@ -18,10 +22,15 @@ class LoopTiming:
     """
 
     def __init__(self, rate_hz: float) -> None:
-        self._period_s = 1.0 / rate_hz
-        self._rows: deque[tuple[float, float, int]] = deque()
-        self._last_s: float | None = None
+        self._rows: deque[tuple[float, float, int, float]] = deque()
         self._overruns = 0
+        self.retune(rate_hz)
+
+    def retune(self, rate_hz: float) -> None:
+        """Go on with slots of another rate; what came before tells nothing of them."""
+        self._rate_hz, self._period_s = rate_hz, 1.0 / rate_hz
+        self._last_s: float | None = None
+        self._rows.clear()
 
     def update(self, t_s: float) -> None:
         """Record the start time of a tick; a time before the last resets the record."""
@@ -31,16 +40,19 @@ class LoopTiming:
             return
         wait_s = t_s - last_s
         slots = max(1, round(wait_s / self._period_s))
-        self._rows.append((t_s, abs(wait_s - slots * self._period_s), slots - 1))
+        off_s = abs(wait_s - slots * self._period_s)
+        self._rows.append((t_s, off_s, slots - 1, wait_s - self._period_s))
         self._overruns += slots - 1
         while t_s - self._rows[0][0] >= OVER_S:
             self._rows.popleft()
 
     def figures(self) -> LoopFigures | None:
-        """Return the figures, None before the second tick."""
-        if not self._rows:
+        """Return the figures, None before the second tick; for any thread."""
+        rows = list(self._rows)
+        if not rows:
             return None
-        table = np.array(self._rows)
+        table = np.array(rows)
+        overruns = int(table[:, 2].sum())
         spread_s = table[-1, 0] - table[0, 0]
         p50, p99, worst = (1e3 * np.percentile(table[:, 1], (50.0, 99.0, 100.0))).tolist()
         return LoopFigures(
@@ -48,7 +60,23 @@ class LoopTiming:
             p50_ms=p50,
             p99_ms=p99,
             worst_ms=worst,
-            overruns=int(table[:, 2].sum()),
+            overruns=overruns,
             overruns_ever=self._overruns,
             over_s=min(OVER_S, float(spread_s)),
+            late_share=overruns / (overruns + len(rows)),
+            latest_ms=1e3 * max(0.0, float(table[:, 3].max())),
         )
+
+
+def busy_text(figures: LoopFigures | None) -> str:
+    """Return that the computer is too busy, and how it shows; "" where it is not.
+
+    Args:
+        figures: of the last seconds; None where nothing is known.
+    """
+    if figures is None or figures.over_s < _TELLING_S or figures.late_share < BUSY_SHARE:
+        return ""
+    return (
+        f"the computer is too busy: {figures.late_share:.0%} of ticks came late "
+        f"(worst {figures.latest_ms:.0f} ms)"
+    )
