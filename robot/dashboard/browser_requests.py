@@ -38,7 +38,7 @@ def from_browser(body: bytes | str, who: str) -> dict[str, object] | None:
 
 def leads(asked: Mapping[str, object]) -> bool:
     """Return whether a request makes who asks the one that leads the head."""
-    return "pick" in asked or "point" in asked or asked.get("do") in _LEADING
+    return "pick" in asked or asked.get("do") in _LEADING
 
 
 def compact(asked: Mapping[str, object]) -> bytes:
