@@ -18,6 +18,7 @@ ROOMS = ("config", "drivers", "gaze", "robot", "sim_mock")
 OWNERS = {
     "serial": ("drivers.serial.", "sim_mock.in_process_port"),
     "dynamixel_sdk": ("drivers.serial.port", "sim_mock.in_process_port"),
+    "evdev": ("robot.remote.gamepad",),
     "depthai": ("drivers.camera.oak.sdk",),
     "mcap": ("drivers.camera.recording_", "robot.recording."),
     "smbus2": ("drivers.i2c.port",),

@@ -18,8 +18,11 @@ from typer.testing import CliRunner
 from gazerig.config.parameters import Parameter, parameters
 from gazerig.config.schema import load_rig
 from gazerig.robot.cli.entry_point import main as quick_main
+from gazerig.robot.cli.steer import END, lead
 from gazerig.robot.cli.tune import app, state_lines
+from gazerig.robot.model.clock import RealClock
 from gazerig.robot.remote.client import RobotClient, running
+from gazerig.robot.remote.steering import STOP, Steering, Stick
 
 GAZERIG = (
     "import sys; sys.argv[0] = 'gazerig'; from gazerig.robot.cli.entry_point import main; main()"
@@ -365,3 +368,31 @@ def test_without_a_rig_a_shell_completes_keys_of_the_shipped_one(
 def knobs_of_desk() -> tuple[Parameter, ...]:
     desk = load_rig("desk")
     return parameters(desk, desk)
+
+
+class _Turns:
+    """Controls that hold a stick for some turns, let go, play and stop."""
+
+    def __init__(self, rig: RobotClient, seen: list[str]) -> None:
+        self._rig, self._seen, self._turn = rig, seen, 0
+
+    def update(self, steering: Steering, now_s: float) -> tuple[str, ...]:
+        self._turn += 1
+        self._seen.append(str(self._rig.status()["lead"]))
+        steering.stick(Stick(1.0, 0.0) if self._turn < 5 else Stick())
+        return {6: ("nod",), 8: (STOP,), 9: (END,)}.get(self._turn, ())
+
+
+def test_steer_leads_a_running_rig_and_lets_go() -> None:
+    seen: list[str] = []
+    with RobotClient.connect(who="gazerig ctl steer") as rig:
+        lead(rig, _Turns(rig, seen), Steering(), RealClock(), lambda line: None)
+        assert rig.status()["stopped"]
+    assert "steer" in seen[2] and "steer" in seen[4]
+    assert "steer" not in seen[0] and "steer" not in seen[6]
+
+
+def test_steer_needs_a_terminal_or_a_gamepad() -> None:
+    done = gazerig("ctl", "steer")
+    assert done.returncode == 2 and "type this in one, or use --gamepad" in done.stderr
+    assert "one of them" in gazerig("ctl", "steer", "--keyboard", "--gamepad").stderr

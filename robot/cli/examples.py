@@ -113,6 +113,10 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("ctl status", "what the running rig looks at and why, guard, joints"),
         ("ctl status --json", "the same for a program"),
     ),
+    "steer": (
+        ("ctl steer", "arrow keys lead the gaze; space is STOP"),
+        ("ctl steer --gamepad", "stick, buttons, and Start for STOP"),
+    ),
     "look": (
         ("ctl look 1 0.2 0.3", "the running head looks there"),
         ("ctl look free", "and freely again"),

@@ -8,7 +8,7 @@ import sys
 import termios
 import tty
 from queue import Empty, Full, Queue
-from typing import Protocol, Self, get_args
+from typing import Protocol, Self, cast, get_args
 
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.calibration.face_calibration import Key
@@ -42,16 +42,24 @@ _BEGUN = re.compile(r"\x1b(?:\[[0-9;?]*|O)?$")
 
 def keys_of(text: str) -> tuple[list[Key], str]:
     """Return the keys in what a terminal has sent, and the rest that a sequence begins with."""
+    typed, rest = split_keys(text)
+    named = ((one if len(one) > 1 else _PLAIN.get(one.lower())) for one in typed)
+    return [cast(Key, key) for key in named if key is not None], rest
+
+
+def split_keys(text: str) -> tuple[list[str], str]:
+    """Return what was typed key by key, and the rest that a sequence begins with.
+
+    A letter is itself, an arrow key "up", "down", "left" or "right"; other keys that send
+    sequences are left out.
+    """
     begun = _BEGUN.search(text)
     rest = begun[0] if begun is not None else ""
     text = text[: len(text) - len(rest)]
-    keys: list[Key] = []
+    keys: list[str] = []
     while text:
         sequence = _SEQUENCE.match(text)
-        if sequence is not None:
-            key = _ARROWS.get(sequence[1] or sequence[2])
-        else:
-            key = _PLAIN.get(text[0].lower())
+        key = text[0] if sequence is None else _ARROWS.get(sequence[1] or sequence[2])
         keys += [key] if key is not None else []
         text = text[sequence.end() if sequence is not None else 1 :]
     return keys, rest
@@ -109,15 +117,22 @@ class TerminalKeys:
 
     def next(self, ready: bool) -> Key | None:
         """Return the next key, None where none has been pressed; ``ready`` does not matter."""
-        if not self._ready and select.select([sys.stdin.fileno()], [], [], 0.0)[0]:
-            try:
-                data = os.read(sys.stdin.fileno(), 256)
-            except OSError:
-                data = b""
-            if not data:  # the terminal is gone
+        if not self._ready:
+            text = self.text()
+            if text is None:
                 return "end"
-            self._ready, self._rest = keys_of(self._rest + data.decode(errors="replace"))
+            self._ready, self._rest = keys_of(self._rest + text)
         return self._ready.pop(0) if self._ready else None
+
+    def text(self) -> str | None:
+        """Return what has been typed, "" for nothing, None where the terminal is gone."""
+        if not select.select([sys.stdin.fileno()], [], [], 0.0)[0]:
+            return ""
+        try:
+            data = os.read(sys.stdin.fileno(), 256)
+        except OSError:
+            data = b""
+        return data.decode(errors="replace") if data else None
 
 
 class LineKeys:

@@ -1,0 +1,178 @@
+"""The command ``gazerig ctl steer``: keys or a gamepad lead a rig that runs in another terminal."""
+
+import contextlib
+import sys
+from collections.abc import Callable, Generator
+from typing import Annotated, ClassVar, Protocol
+
+import typer
+
+from gazerig.drivers.errors import SetupError
+from gazerig.gaze.vectors import Angles2
+from gazerig.robot.cli.lead import PidOption
+from gazerig.robot.cli.terminal import clear_errors, say, status
+from gazerig.robot.model.clock import Clock, RealClock
+from gazerig.robot.model.commands import LookAtDirection
+from gazerig.robot.remote.client import RequestRejected, RobotClient
+from gazerig.robot.remote.gamepad import Gamepad, open_gamepad
+from gazerig.robot.remote.steering import GESTURES, STOP, Steering
+
+app = typer.Typer()
+_EVERY_S = 0.05
+_FAR_M = 1.5
+END = "end"
+HELP = {
+    "keyboard": "arrow keys: where it looks; 1 nod, 2 shake, 3 wink, 4 surprised, 5 sleepy; "
+    "space: STOP; q: end",
+    "gamepad": "stick: where it looks; A nod, B shake, X wink, Y surprised, left shoulder sleepy; "
+    "Start: STOP; Ctrl-C: end",
+}
+
+
+class Controls(Protocol):
+    """What a person steers with."""
+
+    def update(self, steering: Steering, now_s: float) -> tuple[str, ...]:
+        """Tell the steering what was moved, and return what was pressed: gestures, STOP, END."""
+        ...
+
+
+@app.command()
+def steer(
+    keyboard: Annotated[bool, typer.Option("--keyboard", help="Arrow keys (the default).")] = False,
+    gamepad: Annotated[bool, typer.Option("--gamepad", help="The first gamepad there is.")] = False,
+    device: Annotated[
+        str | None, typer.Option(metavar="PATH", help="That gamepad: /dev/input/event7.")
+    ] = None,
+    behind: Annotated[
+        bool, typer.Option("--behind", help="You stand behind the head: its right is yours.")
+    ] = False,
+    pid: PidOption = None,
+) -> None:
+    """Steer the running head by arrow keys or a gamepad; let go, and it looks freely again."""
+    with clear_errors():
+        with_pad = gamepad or device is not None
+        if keyboard and with_pad:
+            raise SetupError("--keyboard or --gamepad: one of them")
+        if not with_pad and not sys.stdin.isatty():
+            raise SetupError("keys are read from a terminal: type this in one, or use --gamepad")
+        with contextlib.ExitStack() as stack:
+            controls = stack.enter_context(_gamepad(device) if with_pad else _keyboard())
+            rig = stack.enter_context(RobotClient.connect(pid, "gazerig ctl steer"))
+            say(HELP["gamepad" if with_pad else "keyboard"])
+            with contextlib.suppress(KeyboardInterrupt):
+                lead(rig, controls, Steering(behind), RealClock(), status)
+            if rig.leads:
+                rig.look_freely()
+            say("it looks freely")
+
+
+def lead(
+    rig: RobotClient,
+    controls: Controls,
+    steering: Steering,
+    clock: Clock,
+    show: Callable[[str], None],
+) -> None:
+    """Do what a person steers until they end it.
+
+    Args:
+        rig: that runs.
+        controls: what they steer with.
+        steering: what that means.
+        clock: of this program.
+        show: writes the status line.
+    """
+    looks: Angles2 | None = None
+    while True:
+        now_s = clock.now_s()
+        pressed = controls.update(steering, now_s)
+        if STOP in pressed:  # before all else
+            rig.stop("gazerig ctl steer")
+            say("torque is off; gazerig ctl resume goes on")
+        if END in pressed:
+            return
+        wanted = steering.direction_rad(now_s)
+        try:
+            for gesture in pressed:
+                if gesture in GESTURES:
+                    _play(rig, gesture)
+            if wanted is not None and (wanted != looks or not rig.leads):
+                rig.give(LookAtDirection(wanted, "world", _FAR_M, rig.who))
+            elif wanted is None and looks is not None:
+                rig.look_freely()
+            show("you lead" if wanted is not None else "it looks freely")
+        except RequestRejected as error:
+            show(str(error))
+        looks = wanted
+        clock.sleep_until(now_s + _EVERY_S)
+
+
+def _play(rig: RobotClient, gesture: str) -> None:
+    """Play a gesture, or wink."""
+    if gesture == "wink":
+        rig.ask("lids", "wink left")
+    else:
+        rig.play(gesture)
+
+
+class KeyControls:
+    """Keys of a terminal.
+
+    text: returns what was typed since the last call, "" for nothing; None: the terminal is gone
+    """
+
+    _ARROWS: ClassVar = {"up": (0, 1), "down": (0, -1), "right": (1, 0), "left": (-1, 0)}
+
+    def __init__(self, text: Callable[[], str | None]) -> None:
+        self._text = text
+        self._rest = ""
+
+    def update(self, steering: Steering, now_s: float) -> tuple[str, ...]:
+        """Do what keys say; see Controls."""
+        from gazerig.robot.cli.key_input import split_keys
+
+        typed = self._text()
+        if typed is None:
+            return (END,)
+        keys, self._rest = split_keys(self._rest + typed)
+        pressed: list[str] = []
+        for key in keys:
+            if key in self._ARROWS:
+                steering.key(*self._ARROWS[key], now_s)
+            elif key in "12345":
+                pressed.append(GESTURES[int(key) - 1])
+            elif key == " ":
+                pressed.append(STOP)
+            elif key in "qQ":
+                pressed.append(END)
+        return tuple(pressed)
+
+
+@contextlib.contextmanager
+def _keyboard() -> Generator[Controls, None, None]:
+    from gazerig.robot.cli.key_input import TerminalKeys
+
+    with TerminalKeys() as keys:
+        yield KeyControls(keys.text)
+
+
+class GamepadControls:
+    """A gamepad."""
+
+    def __init__(self, pad: Gamepad) -> None:
+        self._pad = pad
+
+    def update(self, steering: Steering, now_s: float) -> tuple[str, ...]:
+        """Do what stick and buttons say; see Controls."""
+        news = self._pad.news()
+        steering.stick(news.stick)
+        return news.pressed
+
+
+@contextlib.contextmanager
+def _gamepad(path: str | None) -> Generator[Controls, None, None]:
+    pad = open_gamepad(path)
+    say(f"gamepad: {pad.name}")
+    with contextlib.closing(pad):
+        yield GamepadControls(pad)
