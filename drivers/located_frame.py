@@ -39,6 +39,8 @@ class DetectionInCamera(NamedTuple):
     fastest_m, fastest_m_s: of what moves, place and velocity of its fastest part, None where
         they are not known
     signs: of a face, what eyes and mouth do, None where they are not found
+    compact: of what moves, whether its patch is about as wide as high and full, as a fist's or a
+        hand's alone is and an arm's is not
     """
 
     kind: str
@@ -61,6 +63,7 @@ class DetectionInCamera(NamedTuple):
     fastest_m: tuple[float, float, float] | None = None
     fastest_m_s: tuple[float, float, float] | None = None
     signs: FaceSigns | None = None
+    compact: bool = False
 
 
 class LocatedFrame(NamedTuple):

@@ -191,3 +191,16 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[object]:
 
     monkeypatch.setattr(frame_locator, "face_pose", noted)
     return fits
+
+
+@pytest.mark.parametrize(
+    ("box_px", "area_px", "compact"),
+    [((9.0, 9.0, 50.0, 48.0), 1800.0, True), ((9.0, 9.0, 50.0, 30.0), 1200.0, False),
+     ((9.0, 9.0, 50.0, 48.0), 1200.0, False), (None, 1800.0, False),
+     ((9.0, 9.0, 0.0, 0.0), 0.0, False)],
+)  # fmt: skip
+def test_a_patch_as_wide_as_high_that_fills_its_box_is_compact(
+    box_px: tuple[float, float, float, float] | None, area_px: float, compact: bool
+) -> None:
+    found = frame_locator.thing_in_camera(replace(BALL, box_px=box_px, area_px=area_px))
+    assert found is not None and found.compact is compact

@@ -174,3 +174,75 @@ def test_e91_a_rule_that_names_a_hand_matches_one_that_is_seen() -> None:
 def test_e92_who_walks_by_or_sits_still_has_no_hands(scene: str, start_s: float) -> None:
     for frame in frames(scenes()[scene], start_s, start_s + 3.0):
         assert frame.seen(HAND) == []
+
+
+FIST: LocalisedDetection = patch(radius_m=0.13 * 2.0, compact=True)
+"""Too large for a hand at the person's distance of 1 m."""
+
+
+def test_what_is_too_large_for_a_hand_at_the_persons_distance_is_as_near_as_makes_it_one() -> None:
+    hands, far = Hands(), []
+    for k in range(12):
+        (found,) = hands.named([replace(FIST, radius_m=0.26 + 0.01 * k)], [FACE], EYE, k / 30)
+        far.append(level(found.p_world_m))
+    size_m = (0.26 + 0.11) * 1.0 / level(FIST.p_world_m)  # as far away as the person
+    assert far[-1] == pytest.approx(0.065 / size_m, rel=0.1)
+    assert far[-1] < 0.45 and found.v_world_m_s is not None
+    assert found.v_world_m_s[1] == pytest.approx(1.2 * far[-1] / level(FIST.p_world_m))
+    # A hand that is drawn back, or goes on as an arm, is at the person's distance again.
+    for k in range(12, 20):
+        (found,) = hands.named([patch(radius_m=0.2)], [FACE], EYE, k / 30)
+    assert level(found.p_world_m) == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    "seen",
+    [replace(FIST, compact=False), replace(FIST, radius_m=0.19),
+     replace(FIST, p_world_m=(0.9, 0.2, -0.1), fastest_m=(0.9, 0.2, -0.1), radius_m=0.13,
+             depth_measured=True, along_sd_m=0.02)],
+    ids=["an arm", "a large hand", "its distance is measured"],
+)  # fmt: skip
+def test_other_hands_are_as_far_as_the_person_or_as_measured(seen: LocalisedDetection) -> None:
+    hands = Hands()
+    for k in range(6):
+        (found,) = hands.named([seen], [FACE], EYE, k / 30)
+    assert level(found.p_world_m) == pytest.approx(
+        level(seen.p_world_m) if seen.depth_measured else 1.0, abs=0.02
+    )
+
+
+def test_one_large_frame_brings_no_hand_near() -> None:
+    hands = Hands()
+    for k, seen in enumerate([patch()] * 4 + [FIST] + [patch()] * 2):
+        (found,) = hands.named([seen], [FACE], EYE, k / 30)
+        assert k == 0 or level(found.p_world_m) == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_hand_that_was_near_and_moves_again_at_the_person_leaves_none_behind() -> None:
+    hands = Hands()
+    for k in range(10):
+        v: Vec3 = (0.0, 1.2 if k < 8 else 0.1, 0.0)
+        hands.named([replace(FIST, v_world_m_s=v, fastest_m_s=v)], [FACE], EYE, k / 30)
+    assert hands.held
+    for k in range(10, 14):
+        found = hands.named([patch(mark=8)], [FACE], EYE, k / 30)
+    assert [one.kind for one in found] == [HAND] and not hands.held
+
+
+@pytest.mark.parametrize(("start_s", "side"), [(23.3, 1.0), (35.8, -1.0)])
+def test_e91_a_hand_that_reaches_in_beside_the_camera_is_believed_near(
+    start_s: float, side: float
+) -> None:
+    """The event of the scene: within .25 m of where the hand comes in, .5 m ahead."""
+    place = (HEAD_M[0] + 0.46, HEAD_M[1] + side * 0.316, HEAD_M[2])
+    near = [
+        any(dist(p, place) < 0.25 for _, p in frame.seen(HAND))
+        for frame in frames(scenes()["boxing"], start_s, start_s + 1.0)
+    ]
+    assert sum(near[15:]) >= 14
+
+
+def test_e91_a_waving_hand_is_believed_no_nearer_than_it_is() -> None:
+    for frame in frames(scenes()["visitor"], 17.3, 18.6):
+        for _, p in frame.seen(HAND):
+            assert dist(p, HEAD_M) > 0.85 * dist(frame.hands[0], HEAD_M)

@@ -54,6 +54,8 @@ _FLOW_SHARE, _FLOW_RAD_S, _LOOM_SD_1_S = 0.1, 0.03, 0.5
 # Legs that stride and people who part grow and shrink a patch that comes no nearer; where
 # no distance bears a growth out, it is believed the less.
 _SHAPE_1_S = 0.3
+# A patch so nearly square that so much of its box is full (of a disc's: .79) is compact.
+_LEAST_ASPECT, _LEAST_FILL = 0.87, 0.6
 # A place is all that is known of a face's motion; the fields stand for a velocity's errors.
 _NO_SPEED_SDS = (0.1, 0.5)
 
@@ -198,6 +200,18 @@ def thing_in_camera(blob: MovingBlob) -> DetectionInCamera | None:
         blob.id,
         fastest_m=_finite(blob.fastest_m),
         fastest_m_s=_finite(blob.fastest_m_s),
+        compact=_is_compact(blob),
+    )
+
+
+def _is_compact(blob: MovingBlob) -> bool:
+    """Return whether a patch is about as wide as high and fills its box as a disc does."""
+    if blob.box_px is None:
+        return False
+    _, _, width, height = blob.box_px
+    return (
+        min(width, height) > _LEAST_ASPECT * max(width, height) > 0.0
+        and blob.area_px > _LEAST_FILL * width * height
     )
 
 

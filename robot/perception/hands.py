@@ -5,6 +5,10 @@ moves fastest is taken to be the hand, as far away as the person's face is, unle
 measured. What a hand is called it keeps for as long as the detector's number of it lasts and it
 moves now and then; so a track does not break where a hand turns or passes before the face. A hand
 that has come to rest is still there for a while, though flow shows nothing that stands still.
+
+A hand that comes towards the camera, or reaches in from the side near it, is nearer than the person
+it is taken to be of. Where depth is not measured its size tells: what is compact, and not an arm,
+and too large for a hand at the person's distance is as near as makes it a hand's size.
 """
 
 from collections.abc import Iterable
@@ -37,6 +41,12 @@ _FRAMES, _RESTS_S = 2, 0.4
 # so near to it is the hand again.
 _AT_REST_M_S, _HELD_S, _AGAIN_M = 0.4, 2.0, 0.3
 _HAND_RADIUS_M = 0.07
+# A hand or fist as flow shows it when it is all that moves, and how many times that size at the
+# person's distance, in how many frames, means that it is nearer: other people's hands are not so
+# much larger.
+_ALONE_M, _TOO_LARGE, _LARGE_FRAMES = 0.065, 1.6, 2
+# What is found of that counts by this share of the way in each frame, as in frames without.
+_NEARER_GAIN = 0.5
 _ACROSS_SD_M, _ALONG_SD_M = 0.04, 0.25
 
 
@@ -46,12 +56,32 @@ class _Moving:
 
     at_s: when it last moved as one; p_face: of whom it is; frames: in how many it moved so
     hand: where it was then
+    large: frames in a row in which it was too large for a hand as far away as the person
+    nearer: its distance over that of the person, by its size
     """
 
     at_s: float
     p_face: Vec3
     hand: LocalisedDetection
     frames: int = 0
+    large: int = 0
+    nearer: float = 1.0
+
+    def sized(self, thing: LocalisedDetection, radius_m: float) -> None:
+        """Update how far away it is by its size.
+
+        Args:
+            thing: the patch.
+            radius_m: its size as far away as the person.
+        """
+        seen = 1.0
+        if thing.compact and not thing.depth_measured and radius_m > _TOO_LARGE * _ALONE_M:
+            seen = _ALONE_M / radius_m
+        self.large = self.large + 1 if seen < 1.0 else 0
+        if self.large == _LARGE_FRAMES:
+            self.nearer = min(self.nearer, seen)
+        elif self.large == 0 or self.large > _LARGE_FRAMES:
+            self.nearer += _NEARER_GAIN * (seen - self.nearer)
 
 
 class _Held(NamedTuple):
@@ -89,20 +119,23 @@ class Hands:
             mark: one for mark, one in self._moving.items() if t_s - one.at_s <= _RESTS_S
         }
         found = [self._named(thing, faces, p_camera, t_s) for thing in things]
-        return [*found, *self._at_rest(found, t_s)] if self._held else found
+        return [*found, *self._at_rest(found, p_camera, t_s)] if self._held else found
 
     @property
     def held(self) -> bool:
         """Return whether there are hands that do not move any more."""
         return bool(self._held)
 
-    def _at_rest(self, found: list[LocalisedDetection], t_s: float) -> list[LocalisedDetection]:
+    def _at_rest(
+        self, found: list[LocalisedDetection], p_camera: Vec3, t_s: float
+    ) -> list[LocalisedDetection]:
         """Return the hands that have come to rest and are not seen to move."""
         marks = {thing.mark for thing in found}
         self._held = {
             mark: one
             for mark, one in self._held.items()
-            if mark in marks or (t_s - one.seen_s <= _HELD_S and not _moves_again(one.hand, found))
+            if mark in marks
+            or (t_s - one.seen_s <= _HELD_S and not _moves_again(one.hand, found, p_camera))
         }
         return [one.hand for mark, one in self._held.items() if mark not in marks]
 
@@ -122,7 +155,9 @@ class Hands:
         # Legs and parts of the trunk of somebody who walks are no faster than that, seen from them.
         if speed > (_STAYS_M_S if named else max(begins, norm(v_face))):
             known = self._moving.setdefault(thing.mark, _Moving(t_s, p_face, thing))
-            known.at_s, known.p_face, known.hand = t_s, p_face, _as_hand(thing, arm)
+            known.sized(thing, arm.ratio * thing.radius_m)
+            known.at_s, known.p_face = t_s, p_face
+            known.hand = _as_hand(thing, arm, known.nearer, p_camera)
             known.frames += 1
         if known is None or known.frames < _FRAMES:
             return thing
@@ -135,12 +170,20 @@ class Hands:
         return known.hand if known.at_s == t_s else still
 
 
-def _moves_again(hand: LocalisedDetection, found: list[LocalisedDetection]) -> bool:
-    """Return whether something moves where a hand has come to rest, as far as that is known."""
-    return any(
-        thing.kind == HAND and norm(sub(thing.p_world_m, hand.p_world_m)) < _AGAIN_M
-        for thing in found
-    )
+def _moves_again(hand: LocalisedDetection, found: list[LocalisedDetection], p_camera: Vec3) -> bool:
+    """Return whether something moves where a hand has come to rest, as far as that is known.
+
+    Of distances that were not measured the farther one is taken for both.
+    """
+    far = _level(hand.p_world_m, p_camera)
+    for thing in found:
+        if thing.kind != HAND:
+            continue
+        farther = max(far, _level(thing.p_world_m, p_camera))
+        here, there = (_place_as_far(one, farther, p_camera) for one in (hand, thing))
+        if norm(sub(here, there)) < _AGAIN_M:
+            return True
+    return False
 
 
 class _Arm(NamedTuple):
@@ -190,19 +233,28 @@ def _owned(
     return best
 
 
-def _as_hand(thing: LocalisedDetection, arm: _Arm) -> LocalisedDetection:
-    """Return a patch as a hand at its fastest part."""
+def _as_hand(
+    thing: LocalisedDetection, arm: _Arm, nearer: float, p_camera: Vec3
+) -> LocalisedDetection:
+    """Return a patch as a hand at its fastest part.
+
+    Args:
+        thing: the patch.
+        arm: the same as far away as the person.
+        nearer: its distance over that.
+        p_camera: from where it was seen.
+    """
     return replace(
         thing,
         kind=HAND,
-        p_world_m=arm.tip_m,
-        v_world_m_s=arm.tip_m_s,
+        p_world_m=add(p_camera, scale(sub(arm.tip_m, p_camera), nearer)),
+        v_world_m_s=scale(arm.tip_m_s, nearer),
         radius_m=_HAND_RADIUS_M,
         spin_rad_s=0.0,
         across_sd_m=_ACROSS_SD_M,
-        along_sd_m=thing.along_sd_m if thing.depth_measured else _ALONG_SD_M,
-        across_sd_m_s=arm.ratio * thing.across_sd_m_s,
-        along_sd_m_s=arm.ratio * thing.along_sd_m_s,
+        along_sd_m=thing.along_sd_m if thing.depth_measured else _ALONG_SD_M * nearer,
+        across_sd_m_s=nearer * arm.ratio * thing.across_sd_m_s,
+        along_sd_m_s=nearer * arm.ratio * thing.along_sd_m_s,
     )
 
 

@@ -31,4 +31,5 @@ def placed(found: DetectionInCamera, R_world_camera: Mat3, p_world_m: Vec3) -> L
         None if fastest is None else add(p_world_m, rotate(R_world_camera, fastest)),
         None if faster is None else rotate(R_world_camera, faster),
         found.signs,
+        found.compact,
     )

@@ -46,6 +46,8 @@ class LocalisedDetection:
     gaze_world: of a face, direction of the gaze of the eyes, None where it is unknown
     fastest_m, fastest_m_s: of what moves, place and velocity of its fastest part
     signs: of a face, what eyes and mouth do, None where they are not found
+    compact: of what moves, whether its patch is about as wide as high and full, as a fist's or a
+        hand's alone is and an arm's is not
     """
 
     kind: str
@@ -68,6 +70,7 @@ class LocalisedDetection:
     fastest_m: Vec3 | None = None
     fastest_m_s: Vec3 | None = None
     signs: FaceSigns | None = None
+    compact: bool = False
 
 
 @dataclass(slots=True)
