@@ -99,9 +99,9 @@ RIG_OF = dict(
 
 
 @pytest.mark.parametrize("gesture", shipped_gestures())
-def test_no_joint_jumps_or_breaks_a_limit_at_1000_random_moments(gesture: str) -> None:
-    found = interrupted(gesture, RIG_OF[gesture], 1000, seed=len(gesture))
-    assert found.began > 700
+def test_no_joint_jumps_or_breaks_a_limit_at_400_random_moments(gesture: str) -> None:
+    found = interrupted(gesture, RIG_OF[gesture], 400, seed=len(gesture))
+    assert found.began > 280
     assert found.step_deg.max() > 0.1  # something has moved
     assert found.speed_share.max() < 1.0
     assert found.accel_share.max() < 1.0

@@ -2,15 +2,16 @@
 
 import numpy as np
 import pytest
-from human.measured_run import MeasuredRun, measured_run
+from human.measured_run import MeasuredRun, ideal_run
 from human.row_03_rests import TABLE_S, beyond_the_law, visits
 from human.row_09_mutual_gaze import nearest, stays
+from human.row_11_in_flight import pauses_ms
 
 
 @pytest.fixture(scope="module")
 def run() -> MeasuredRun:
     # Rests are those of the plan, which servos without bytes show as well.
-    return measured_run("face-to-face", seconds=45.0, bus="ideal")
+    return ideal_run("face-to-face", seconds=45.0)
 
 
 def test_e63_rests_on_a_face_are_as_the_table_and_seldom_short(run: MeasuredRun) -> None:
@@ -43,3 +44,8 @@ def test_e69_a_face_is_left_after_bouts_and_entered_where_the_gaze_comes_from(
     entries = [begin for on, _, begin in every if on]
     assert all(run.part[begin] in nearest(run, begin) for begin in entries)
     assert len({run.part[begin] for begin in entries}) >= 3
+
+
+def test_e71_no_saccade_comes_sooner_than_100_ms_after_another(run: MeasuredRun) -> None:
+    pauses = pauses_ms(run.phase == "saccade", run.t_s)
+    assert len(pauses) > 60 and pauses.min() >= 99.0

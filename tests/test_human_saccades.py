@@ -6,7 +6,7 @@ from human.commanded_looks import commanded, point
 from human.eye_steps import Step, steps
 from human.measured_run import measured_run
 from human.row_06_profile import inside
-from human.row_11_in_flight import EARLY_S, LATE_S, changed, pauses_ms
+from human.row_11_in_flight import EARLY_S, LATE_S, changed
 from human.row_12_landing import landings
 from human.row_13_small_motion import WANTED as SMALL
 from human.row_13_small_motion import measure as small_motion
@@ -51,17 +51,11 @@ def test_e71_an_early_jump_bends_a_saccade_without_a_step_of_speed_and_a_late_on
     assert waits and min(waits) >= 95.0 and max(waits) < 1e5
 
 
-def test_e71_no_saccade_comes_sooner_than_100_ms_after_another() -> None:
-    one = measured_run("face-to-face", seconds=45.0, bus="ideal")
-    pauses = pauses_ms(one.phase == "saccade", one.t_s)
-    assert len(pauses) > 60 and pauses.min() >= 99.0
-
-
 def test_e72_large_saccades_fall_short_scatter_and_a_third_is_corrected() -> None:
     rng = np.random.default_rng(0)
-    sides = np.where(np.arange(60) % 2, 1.0, -1.0)
-    places = [point(float(y), 1.0) for y in sides * rng.uniform(5.5, 7.0, 60)]
-    looks = commanded(list(0.8 * np.arange(60)), places, "desk", 1)
+    sides = np.where(np.arange(45) % 2, 1.0, -1.0)
+    places = [point(float(y), 1.0) for y in sides * rng.uniform(5.5, 7.0, 45)]
+    looks = commanded(list(0.8 * np.arange(45)), places, "desk", 1)
     short, across, after_ms, rest, _ = landings(looks).T
     assert 0.05 <= short.mean() <= 0.1
     assert 0.025 <= short.std() <= 0.06 and 0.01 <= across.std() <= 0.04
@@ -72,7 +66,7 @@ def test_e72_large_saccades_fall_short_scatter_and_a_third_is_corrected() -> Non
 
 
 def test_e73_small_saccades_keep_the_eyes_alive_where_servos_can_show_them() -> None:
-    found = small_motion(measured_run, 33.0, [0])
+    found = small_motion(measured_run, 20.0, [0])
     for name, (low, high) in SMALL.items():
         assert low <= found[name] <= high, name
 

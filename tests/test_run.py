@@ -62,7 +62,7 @@ def bytes_sent(*words: str) -> str:
 
 @pytest.mark.slow
 def test_e59_same_seed_same_bytes_in_another_process(half: str) -> None:
-    words = (half, "--seconds", "12", "--seed", "1")
+    words = (half, "--seconds", "5", "--seed", "1")
     done = gazerig("run", "--mock", "--fast", "--summary", "-", *words)
     assert done.returncode == 0, done.stderr
     one: dict[str, Any] = json.loads(done.stdout)

@@ -138,6 +138,18 @@ def measured_run(
     return _kept[key]
 
 
+def ideal_run(
+    scene: str | Scene,
+    profile: str = "robot",
+    seed: int = 0,
+    seconds: float = 60.0,
+    overrides: Mapping[str, Value] | None = None,
+    **options: Any,
+) -> MeasuredRun:
+    """Return a measured run on servos without bytes, in half the processor time."""
+    return measured_run(scene, profile, seed, seconds, overrides, bus="ideal", **options)
+
+
 @contextmanager
 def _scenes(scene: str | Scene) -> Any:
     """Have a scene of a test's own among those that a run can be put into."""
