@@ -177,6 +177,12 @@ class Person:
         )
         wait_for(lambda: self.run("window.framesDrawn") == count, f"{count} frames")
 
+    def open(self, drawer: str) -> None:
+        """Open a drawer by its tab, unless it is open."""
+        tab = saying(drawer, "[role=tab]")
+        if self.run(f"{tab}.getAttribute('aria-selected')") != "true":
+            self.click(tab)
+
     def press(self, key: str, code: str, number: int) -> None:
         for kind in ("keyDown", "keyUp"):
             self.tab.ask(
@@ -207,7 +213,7 @@ def saying(words: str, kind: str = "button, [role=tab], label") -> str:
 
 def beside(words: str, kind: str) -> str:
     """The control of a kind that a label names."""
-    return f"({saying(words, 'label')})?.closest('.mantine-Flex-root').querySelector('{kind}')"
+    return f"({saying(words, 'label')})?.parentElement.querySelector('{kind}')"
 
 
 def seen_at(p_world_m: Vec3, canvas: tuple[float, float, float, float]) -> tuple[float, float]:

@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 from gazerig.config.schema import load_rig
 from gazerig.config.text import rig_text, walk_text
+from gazerig.robot.analysis.norm_bands import BY_KEY
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.report import app
@@ -19,7 +20,6 @@ from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo, versions
 from gazerig.robot.report import report as build
 from gazerig.robot.report.compare import chance, compare, corrected, differences_of
-from gazerig.robot.report.norm_bands import BY_KEY
 from gazerig.robot.report.run_header import RunHeader
 from gazerig.robot.report.statistics import MeasuredValue, mean, median
 

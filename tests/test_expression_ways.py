@@ -1,14 +1,12 @@
 """Expressions and levels asked for from the command line, from Python and on the page."""
 
-import asyncio
 from collections.abc import Iterator
 
 import pytest
-import viser
-from page_visitor import PATIENCE_S
 from ticked_rig import TickedRig, connected, gazerig
 
 from gazerig.robot.dashboard.animation_panel import AnimationPanel
+from gazerig.robot.dashboard.widgets import Widgets
 from gazerig.robot.model.commands import Command, Express, SetLevel
 
 
@@ -40,7 +38,6 @@ def test_levels_come_from_standard_input(rig: TickedRig) -> None:
 
 
 def test_buttons_and_strength_on_the_page() -> None:
-    server = viser.ViserServer(port=0, verbose=False)
     asked: list[tuple[Command, str]] = []
 
     class Outbox:
@@ -48,18 +45,12 @@ def test_buttons_and_strength_on_the_page() -> None:
             asked.append((command, who))
             return True
 
-    try:
-        panel = AnimationPanel(server.gui, server.gui.add_panel(), Outbox())  # type: ignore[arg-type]
-        panel.offer(["sad", "neutral", "happy"])
-        panel.offer(["happy", "neutral", "sad"])
-        group, strength = panel._expressions, panel._strength
-        assert group is not None and strength is not None
-        assert group.options == ("neutral", "happy", "sad")
-        strength._impl.value = 0.4
-        group._impl.value = "sad"
-        (callback,) = group._impl.update_cb
-        event = viser.GuiEvent(None, 5, group)
-        asyncio.run_coroutine_threadsafe(callback(event), server._event_loop).result(PATIENCE_S)  # type: ignore[arg-type]
-        assert asked == [(Express("sad", 0.4), "5")]
-    finally:
-        server.stop()
+    panel = AnimationPanel(Widgets().panel("steer"), Outbox())  # type: ignore[arg-type]
+    panel.offer(["sad", "neutral", "happy"])
+    panel.offer(["happy", "neutral", "sad"])
+    expressions, strength = panel.expressions, panel.strength
+    assert expressions is not None and strength is not None
+    assert expressions.options == ("neutral", "happy", "sad")
+    strength.arrived(0.4, "5")
+    expressions.arrived("sad", "5")
+    assert asked == [(Express("sad", 0.4), "5")]

@@ -1,11 +1,8 @@
 """Gestures asked for from the command line, from Python, on the page, from menus and by rules."""
 
-import asyncio
 from collections.abc import Iterator
 
 import pytest
-import viser
-from page_visitor import PATIENCE_S
 from ticked_rig import TickedRig, connected, gazerig
 
 from gazerig.config.load import ConfigError
@@ -17,6 +14,7 @@ from gazerig.gaze.types import Target
 from gazerig.robot.app import session
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.dashboard.animation_panel import AnimationPanel
+from gazerig.robot.dashboard.widgets import Widgets
 from gazerig.robot.model.command_checks import check
 from gazerig.robot.model.command_json import as_json, as_recorded, from_json, from_recording
 from gazerig.robot.model.commands import Ask, Command, Jog, Play, Resume, Stop
@@ -91,7 +89,6 @@ def test_the_command_is_data() -> None:
 
 
 def test_buttons_and_speed_on_the_page() -> None:
-    server = viser.ViserServer(port=0, verbose=False)
     asked: list[tuple[Command, str]] = []
 
     class Outbox:
@@ -99,21 +96,15 @@ def test_buttons_and_speed_on_the_page() -> None:
             asked.append((command, who))
             return True
 
-    try:
-        panel = AnimationPanel(server.gui, server.gui.add_panel(), Outbox())  # type: ignore[arg-type]
-        panel.offer_gestures(["tilt", "none", "nod"])
-        group, speed = panel._gestures, panel._speed
-        assert group is not None and speed is not None
-        assert group.options == ("none", "nod", "tilt")
-        speed._impl.value = 1.5
-        for chosen in ("nod", "none"):
-            group._impl.value = chosen
-            (callback,) = group._impl.update_cb
-            event = viser.GuiEvent(None, 5, group)
-            asyncio.run_coroutine_threadsafe(callback(event), server._event_loop).result(PATIENCE_S)  # type: ignore[arg-type]
-        assert asked == [(Play("nod", 1.5), "5"), (Play("", 1.5), "5")]
-    finally:
-        server.stop()
+    panel = AnimationPanel(Widgets().panel("steer"), Outbox())  # type: ignore[arg-type]
+    panel.offer_gestures(["tilt", "none", "nod"])
+    gestures, speed = panel.gestures, panel.speed
+    assert gestures is not None and speed is not None
+    assert gestures.options == ("none", "nod", "tilt")
+    speed.arrived(1.5, "5")
+    for chosen in ("nod", "none"):
+        gestures.arrived(chosen, "5")
+    assert asked == [(Play("nod", 1.5), "5"), (Play("", 1.5), "5")]
 
 
 def looked_at(kind: str, number: int = 1) -> Target:

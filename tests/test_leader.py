@@ -13,8 +13,8 @@ from gazerig.robot.control.joint_faults import JointFaults
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import doing, leader
 from gazerig.robot.dashboard.attention_panel import saliences, winner
+from gazerig.robot.dashboard.servo_health import health
 from gazerig.robot.dashboard.snapshot import snapshot
-from gazerig.robot.dashboard.status import status
 from gazerig.robot.model.commands import Jog, LookAt, LookAtPerson, Play, Resume, Stop
 from gazerig.robot.model.leader import Leader, sentence
 from gazerig.robot.model.types import Snapshot
@@ -64,7 +64,7 @@ def test_a_held_joint_is_named_with_who_and_since_when_and_nothing_else(running:
     assert (shot.target_name, shot.phase) == ("neck_yaw and neck_pitch held", "held")
     assert shot.why == shot.leads_words == shot.headline
     assert (shot.target_part, shot.saliences) == (None, ())
-    for said in (status(shot), winner(shot), saliences(shot)):
+    for said in (health(shot), winner(shot), saliences(shot)):
         assert "face 1" not in said and "person 1" not in said
 
 

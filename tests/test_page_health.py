@@ -14,7 +14,6 @@ from gazerig.gaze.types import Salience
 from gazerig.robot.dashboard.attention_panel import saliences, winner
 from gazerig.robot.dashboard.commanded_pose import CommandedPoseView
 from gazerig.robot.dashboard.head_view import FLOOR_M, LEAST_M, HeadView
-from gazerig.robot.dashboard.html import AMBER, RED
 from gazerig.robot.dashboard.joint_charts import JointCharts, JointSeries
 from gazerig.robot.dashboard.outbox import Outbox
 from gazerig.robot.dashboard.overlays import OverlayChoices, OverlayPanel
@@ -29,6 +28,8 @@ from gazerig.robot.dashboard.servo_health import (
     strain_of_load,
     strain_of_voltage,
 )
+from gazerig.robot.dashboard.widget import Html, Widget
+from gazerig.robot.dashboard.widgets import Widgets
 from gazerig.robot.model.head_shape import CHIN
 from gazerig.robot.model.types import (
     CommandedPose,
@@ -93,13 +94,18 @@ def test_voltage_is_told_by_both_ends(volts: float | None, strain: str) -> None:
 def test_without_limits_nothing_is_coloured() -> None:
     hot = WELL._replace(temperature_c=(90.0,) * 9, limits=None)
     assert strain_of_heat(hot, 0) == ""
-    assert AMBER not in servo_table(hot, GAZE_JOINTS) and RED not in servo_table(hot, GAZE_JOINTS)
+    assert strained(servo_table(hot, GAZE_JOINTS)) == 0
+
+
+def strained(html: str) -> int:
+    """How many figures are coloured."""
+    return html.count("<td class='near'>") + html.count("<td class='over'>")
 
 
 def test_a_healthy_rig_has_no_alarm_and_every_joint_a_row() -> None:
     table = servo_table(WELL, GAZE_JOINTS)
     assert table.count("<tr") == 10
-    assert AMBER not in table and RED not in table
+    assert strained(table) == 0 and "class='fault'" not in table
     assert "neck roll" in table and "+10 %" in table
 
 
@@ -108,8 +114,8 @@ def test_faults_and_silence_are_said_beside_the_joint() -> None:
     table = servo_table(
         WELL._replace(fault=fault, age_s=(0.0, 0.0, 1.25) + (0.0,) * 6), GAZE_JOINTS
     )
-    assert "left eye tilt<div" in table and "overload &lt;1&gt;" in table
-    assert "right eye pan<div" in table and "silent for 1.2 s" in table
+    assert "left eye tilt<div class='fault'>" in table and "overload &lt;1&gt;" in table
+    assert "right eye pan<div class='fault'>" in table and "silent for 1.2 s" in table
     assert "torque off" in servo_table(WELL._replace(torque=(False,) * 9), GAZE_JOINTS)
     assert "nothing is known" in servo_table(Servos(), ())
 
@@ -138,9 +144,9 @@ def test_loop_figures_are_told_and_coloured_when_late() -> None:
     said = health(snapshot())
     for words in ("200.0 Hz", "0.04 ms", "0.21 ms", "0.90 ms", "3 slots overrun", "60 ms</b> old"):
         assert words in said
-    assert AMBER not in said
+    assert strained(said) == 0
     late = replace(snapshot(), timing=LoopFigures(200.0, 0.1, 2.0, 4.0, 2, 2, 5.0))
-    assert health(late).count(f"background:{AMBER}") == 2
+    assert strained(health(late)) == 2
     assert "no frame yet" in health(replace(snapshot(), frame_age_s=None))
 
 
@@ -176,65 +182,76 @@ def server():
     made.stop()
 
 
-def handles(server: viser.ViserServer, kind: type[T]) -> list[T]:
-    """Everything of a kind that stands on the page, in whatever tab."""
-    places = server.gui._container_handle_from_uuid.values()
-    return [
-        thing for place in places for thing in place._children.values() if isinstance(thing, kind)
-    ]
+def watched() -> tuple[Widgets, PanelView]:
+    """Panels that a browser shows."""
+    widgets = Widgets()
+    panel = PanelView(widgets)
+    widgets.join("a browser", lambda: None)
+    return widgets, panel
+
+
+def words_of(widgets: Widgets) -> str:
+    """Everything that is written in the panels, in whatever drawer."""
+    every = widgets._widgets.values()
+    titles = [str(one.props.get("title", "")) for one in every if type(one) is Widget]
+    return " ".join([one.content for one in every if isinstance(one, Html)] + titles)
 
 
 @pytest.mark.parametrize(("made", "last"), [(as_it_is, "neck roll"), (of_six, "right lower lid")])
 def test_panel_takes_snapshots_and_fills_its_tabs(
-    server: viser.ViserServer, made: Callable[[Snapshot], Snapshot], last: str
+    made: Callable[[Snapshot], Snapshot], last: str
 ) -> None:
-    panel = PanelView(server.gui)
+    widgets, panel = watched()
     shots = tuple(made(snapshot(0.04 * k)) for k in range(51))
     for shot in shots:
         panel.update((shot,))
-        panel.show(shot)
-    said = " ".join(html.content for html in handles(server, viser.GuiHtmlHandle))
+        panel.show()
+    said = words_of(widgets)
     for words in (
         "thing &lt;4&gt;", "51 saccades", "51 rests", last, "the last 30 seconds",
+        "saccades a second", "bus ok",
     ):  # fmt: skip
         assert words in said
-    plots = panel._traces_view._plots
-    assert len(plots) == 3
-    assert all(len(plot.plot.data[0]) > 40 for plot in plots)
+    charts = panel.traces.charts
+    assert len(charts) == 3
+    assert all(len(cast("list[float]", chart.props["x"])) > 40 for chart in charts)
     panel.update((made(snapshot(0.0)),))
     for _ in range(26):
-        panel.show(made(snapshot(0.0)))
-    again = " ".join(html.content for html in handles(server, viser.GuiHtmlHandle))
+        panel.show()
+    again = words_of(widgets)
     assert "51 saccades" not in again and "1 saccade<" in again
     panel.silent()
-    assert "nothing has come from the rig" in panel._status.content
+    assert "nothing has come from the rig" in panel.silence.content
+    panel.update((made(snapshot(0.1)),))
+    assert panel.silence.content == ""
 
 
-def test_what_nobody_measured_is_drawn_and_named_otherwise(server: viser.ViserServer) -> None:
-    panel = PanelView(server.gui)
-    view = panel._traces_view
+def test_what_nobody_measured_is_drawn_and_named_otherwise() -> None:
+    _, panel = watched()
+    view = panel.traces
 
     def shown(t_s: float, estimated: tuple[str, ...]) -> list[bool]:
         shot = of_six(snapshot(t_s), estimated)
         panel.update((shot,))
-        panel._shown = 0
-        panel.show(shot)
-        named = [plot.plot.series[3]["label"] == "estimated, not measured" for plot in view._plots]
-        assert named == ["dash" in plot.plot.series[3] for plot in view._plots]
-        assert named == ["no feedback" in plot.title.content for plot in view._plots]
+        panel.draw_all()
+        panel.show()
+        named = [chart.names()[2] == "estimated, not measured" for chart in view.charts]
+        lines = [cast("list[list[str]]", chart.props["lines"]) for chart in view.charts]
+        assert named == [line[2][1] == "estimated" for line in lines]
+        assert named == ["no feedback" in chart.title for chart in view.charts]
         return named
 
     assert shown(1.0, SIX) == [True, True, True]
-    assert "> measured<" not in view._key.content and "estimated" in view._key.content
-    assert "no measurements" in panel._of_what.content
-    before = view._plots
+    assert "> measured<" not in view.key.content and "estimated" in view.key.content
+    assert "no measurements" in panel.of_what.content
+    before = view.charts
     assert shown(1.1, SIX) == [True, True, True]
-    assert view._plots is before  # what stays as it is is not made again
+    assert view.charts is before  # what stays as it is is not made again
     assert shown(1.2, ("left_lower_lid",)) == [False, False, True]
-    assert "> measured<" in view._key.content and "estimated" in view._key.content
-    assert panel._of_what.content == ""
+    assert "> measured<" in view.key.content and "estimated" in view.key.content
+    assert panel.of_what.content == ""
     assert shown(1.3, ()) == [False, False, False]
-    assert "estimated" not in view._key.content
+    assert "estimated" not in view.key.content
 
 
 class Nobody:
@@ -245,12 +262,11 @@ class Nobody:
 
 
 def test_who_comes_late_sees_all_panels_as_they_are_now(
-    server: viser.ViserServer, monkeypatch: pytest.MonkeyPatch
+    server: viser.ViserServer,
 ) -> None:
-    people: dict[int, object] = {}
-    monkeypatch.setattr(server, "get_clients", lambda: people)
     button = Nobody()
-    view = PageView(server, Outbox(None), button.tell)  # type: ignore[arg-type]
+    widgets = Widgets()
+    view = PageView(server, widgets, Outbox(None), button.tell)  # type: ignore[arg-type]
     view.show(News((replace(snapshot(1.0), target_name="the first"),), None, ended=False))
     for k in range(20):  # nobody looks
         view.show(News((snapshot(1.1 + 0.1 * k),), None, ended=False))
@@ -258,31 +274,30 @@ def test_who_comes_late_sees_all_panels_as_they_are_now(
     view.show(News((last,), None, ended=False))
     known = {"stopped": "a test", "silent": False, "without_feedback": 6}
     assert button.reported.items() >= known.items()
-    assert "the first" in view._panel._status.content
-    people[0] = object()
-    view.show(News((), None, ended=False))
     panel = view._panel
-    assert "the last" in panel._status.content and NO_FEEDBACK in panel._health.content
-    assert len(panel._traces_view._plots) == 3 and panel._traces_view._drawn[0][1]
+    widgets.join("a browser", lambda: None)
+    view.show(News((), None, ended=False))
+    assert "the last" in panel.winner.content and NO_FEEDBACK in panel.health.content
+    assert len(panel.traces.charts) == 3 and "no feedback" in panel.traces.charts[0].title
 
 
-def test_the_menu_of_traces_is_that_of_the_rig(server: viser.ViserServer) -> None:
+def test_the_menu_of_traces_is_that_of_the_rig() -> None:
     traces = JointSeries()
-    view = JointCharts(server.gui, server.gui.add_tab_group().add_tab("traces"))
+    view = JointCharts(Widgets().panel("watch"))
     traces.add(snapshot(1.0))
     view.show(traces)
-    assert view._what.options == ("yaw", "pitch", "left eye", "right eye", "neck")
-    view._what.value = "neck"  # type: ignore[misc]
+    assert view.what.options == ("yaw", "pitch", "left eye", "right eye", "neck")
+    view.what.value = "neck"
     view.show(traces)
-    assert "neck, roll" in view._plots[-1].title.content
+    assert "neck, roll" in view.charts[-1].title
     traces.add(of_six(snapshot(2.0)))
     view.show(traces)
-    assert view._what.options == ("yaw", "pitch", "left eye", "right eye")
-    assert view._what.value == "yaw" and "lower lids" in view._plots[-1].title.content
-    view._what.value = "left eye"  # type: ignore[misc]
+    assert view.what.options == ("yaw", "pitch", "left eye", "right eye")
+    assert view.what.value == "yaw" and "lower lids" in view.charts[-1].title
+    view.what.value = "left eye"
     view.show(traces)
-    titles = " ".join(plot.title.content for plot in view._plots)
-    assert len(view._plots) == 4 and titles.count("both eyes") == 2
+    titles = " ".join(chart.title for chart in view.charts)
+    assert len(view.charts) == 4 and titles.count("both eyes") == 2
     assert "left upper lid" in titles and "left lower lid" in titles
 
 

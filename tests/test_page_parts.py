@@ -13,6 +13,7 @@ from six_joints import ESTIMATED_RAD, SIX, WISH_RAD, of_six
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.angles import rotation
+from gazerig.robot.dashboard.attention_panel import winner
 from gazerig.robot.dashboard.camera_overlay import (
     FARTHEST_M,
     IMAGE_WIDTH_PX,
@@ -34,7 +35,8 @@ from gazerig.robot.dashboard.mesh import Mesh, cap, ellipsoid, lid, ring, turned
 from gazerig.robot.dashboard.page_process import MESSAGE_BYTES
 from gazerig.robot.dashboard.people import fixated_part
 from gazerig.robot.dashboard.scene_node import along, quaternion, turned_up, upright_along
-from gazerig.robot.dashboard.status import drawn_together, status
+from gazerig.robot.dashboard.servo_health import guard, health
+from gazerig.robot.dashboard.status import alarms, drawn_together, without_feedback
 from gazerig.robot.model.types import GAZE_JOINTS as EVERY_JOINT
 from gazerig.robot.model.types import SeenFace, Snapshot, Trail
 
@@ -78,13 +80,13 @@ def camera_picture() -> tuple[np.ndarray, Detections]:
     return picture, Detections(1.0, 1, 640, 480, faces, blobs, picture)
 
 
-def test_status_tells_target_reason_and_guard_and_runs_no_markup() -> None:
-    words = status(snapshot(reasons=tuple(f"joint {n}: too <fast>" for n in range(6))))
-    for word in ("face &lt;3&gt;", "pursue", "guard: limited", "200 Hz", "3 lost"):
-        assert word in words
-    assert "the rule &#x27;person&#x27; pulls" in words
-    assert "too &lt;fast&gt; (joint 0, +5)" in words
-    assert "too" not in status(snapshot())
+def test_target_reason_and_guard_are_told_and_run_no_markup() -> None:
+    shot = snapshot(reasons=tuple(f"joint {n}: too <fast>" for n in range(6)))
+    for word in ("face &lt;3&gt;", "pursue", "the rule &#x27;person&#x27; pulls"):
+        assert word in winner(shot)
+    for word in ("guard: limited", "3 lost", "too &lt;fast&gt; (joint 0, +5)"):
+        assert word in health(shot)
+    assert "too" not in health(snapshot()) and alarms(snapshot()) == ""
 
 
 def test_equal_reasons_are_said_once() -> None:
@@ -93,25 +95,28 @@ def test_equal_reasons_are_said_once() -> None:
 
 
 def test_a_short_limit_moves_nothing_on_the_page() -> None:
-    limited = status(snapshot(reasons=tuple(f"joint {n}: too fast" for n in range(9))))
-    assert limited.count("<div") == status(snapshot()).count("<div")
+    limited = snapshot(reasons=tuple(f"joint {n}: too fast" for n in range(9)))
+    assert guard(limited).count("<div") == guard(snapshot()).count("<div")
+    assert alarms(limited) == ""
 
 
 def test_what_holds_says_why_joint_by_joint() -> None:
-    held = status(
-        replace(snapshot(reasons=tuple(f"joint {n}: hot" for n in range(6))), level="hold")
-    )
+    shot = replace(snapshot(reasons=tuple(f"joint {n}: hot" for n in range(6))), level="hold")
+    held = alarms(shot)
     assert "joint 3: hot" in held and "joint 4" not in held and "and 2 more" in held
+    assert "joint 5: hot" in health(shot)
 
 
 def test_what_stands_still_shouts() -> None:
-    stopped = status(replace(snapshot(), stopped="somebody pressed <STOP>"))
-    assert "STOPPED: somebody pressed &lt;STOP&gt;; torque is off" in stopped
-    held = status(replace(snapshot(reasons=("neck_yaw: hot",)), level="hold"))
-    assert "font-weight:700'>guard: hold" in held and "neck_yaw: hot" in held
-    assert "font-weight:700" not in status(snapshot())
-    assert "the frame is 2.5 s old" in status(replace(snapshot(), frame_age_s=2.5))
-    assert "s old" not in status(replace(snapshot(), frame_age_s=0.08))
+    stopped = replace(snapshot(), stopped="somebody pressed <STOP>", level="torque_off")
+    assert "somebody pressed &lt;STOP&gt;" in health(stopped) and "guard: stopped" in health(
+        stopped
+    )
+    assert alarms(stopped) == ""  # it is said beside the stop button, once
+    held = alarms(replace(snapshot(reasons=("neck_yaw: hot",)), level="hold"))
+    assert "class='banner hold'><b>guard: hold" in held and "neck_yaw: hot" in held
+    assert "the frame is 2.5 s old" in alarms(replace(snapshot(), frame_age_s=2.5))
+    assert "s old" not in alarms(replace(snapshot(), frame_age_s=0.08))
 
 
 def moving(t_s: float, slope_deg: float = 1.0) -> Snapshot:
@@ -181,17 +186,17 @@ def test_traces_take_the_joints_of_the_rig_that_is_shown() -> None:
     assert angles_deg[0, 2] == pytest.approx(np.degrees(ESTIMATED_RAD))
 
 
-def test_status_says_how_many_joints_nobody_measures() -> None:
-    assert "without feedback" not in status(snapshot())
+def test_health_says_how_many_joints_nobody_measures() -> None:
+    assert without_feedback(snapshot()) == ""
     said = "6 of 6 joints without feedback: shown where they should be"
-    assert said in status(of_six(snapshot()))
-    assert "2 of 6 joints" in status(of_six(snapshot(), SIX[:2]))
-    assert "anywhere" not in status(of_six(snapshot()))
+    assert said in without_feedback(of_six(snapshot())) and said in health(of_six(snapshot()))
+    assert "2 of 6 joints" in without_feedback(of_six(snapshot(), SIX[:2]))
+    assert "anywhere" not in without_feedback(of_six(snapshot()))
     limp = of_six(snapshot())
     limp = replace(limp, servos=limp.servos._replace(torque=(True,) + (False,) * 5))
-    assert "5 without torque: may be anywhere" in status(limp)
+    assert "5 without torque: may be anywhere" in without_feedback(limp)
     limp = replace(limp, servos=limp.servos._replace(torque=(False,) * 6))
-    assert "all without torque: may be anywhere" in status(limp)
+    assert "all without torque: may be anywhere" in without_feedback(limp)
 
 
 def turn(q: tuple[float, float, float, float], v: tuple[float, float, float]) -> np.ndarray:

@@ -10,12 +10,11 @@ import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import cast
 from urllib.parse import urlsplit
 
 import pytest
 import shown_page
-from page_visitor import LOOKING, PATIENCE_S, Visitor, said
+from page_visitor import PATIENCE_S, Visitor
 from shown_page import AHEAD, free_port, running_page, wait_for
 
 from gazerig.robot.dashboard.page_main import free_port as first_free_port
@@ -173,9 +172,8 @@ def test_a_page_that_died_is_started_again_at_its_address_and_told_all() -> None
         assert not folder.exists() and Path(page._folder).stat().st_mode & 0o077 == 0
         assert page_process(os.getpid()) not in (None, first) and page.started == 2
         assert wait_for(page.notice, "the second notice") == f"the page is there again, at {url}"
-        with Visitor(url).open() as talk:
-            talk.send(LOOKING)
-            while "'blink'" not in said(cast(bytes, talk.recv(timeout=PATIENCE_S))):
+        with Visitor(url).open("/rig/panels") as talk:
+            while '"blink"' not in str(talk.recv(timeout=PATIENCE_S)):
                 pass
         # Once more: no more words about it.
         second = page_process(os.getpid())

@@ -1,22 +1,20 @@
 """Controls of the page: menus, joints and parameters, in every browser."""
 
-import asyncio
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from math import radians
 
 import pytest
-import viser
 from desk import GAZE_JOINTS
-from page_visitor import PATIENCE_S
 from shown_page import PARAM, SNAPSHOT
 from six_joints import SIX, of_six
 
 from gazerig.config.parameters import parameters, values
 from gazerig.config.schema import load_rig
 from gazerig.robot.control.command_handler import plain
-from gazerig.robot.dashboard.control_tabs import LeadView
+from gazerig.robot.dashboard.container import Container
+from gazerig.robot.dashboard.controls import LeadPanel
 from gazerig.robot.dashboard.inbox import (
     parse_request,
     request_message,
@@ -33,18 +31,18 @@ from gazerig.robot.dashboard.param_control import (
     written,
 )
 from gazerig.robot.dashboard.param_panel import found, group_of
+from gazerig.robot.dashboard.widget import Slider, TextField
+from gazerig.robot.dashboard.widgets import Widgets
 from gazerig.robot.model.command_json import as_json, from_json
-from gazerig.robot.model.commands import Ask, Command, Jog
+from gazerig.robot.model.commands import Ask, Command, Jog, LookAt
 from gazerig.robot.remote.param_info import JsonValue, ParamInfo
 
 # --- controls -----------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def server() -> Iterator[viser.ViserServer]:
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    yield server
-    server.stop()
+@pytest.fixture
+def place() -> Container:
+    return Widgets().panel("steer")
 
 
 class Mouth:
@@ -62,37 +60,46 @@ class Mouth:
         return True
 
 
-def touch(server: viser.ViserServer, handle: object, value: object) -> None:
-    """What viser does when the browser with number 5 sends another value."""
-    event = viser.GuiEvent(None, 5, handle)  # type: ignore[type-var]
-    handle._impl.value = value  # type: ignore[attr-defined]
-    (callback,) = handle._impl.update_cb  # type: ignore[attr-defined]
-    asyncio.run_coroutine_threadsafe(callback(event), server._event_loop).result(PATIENCE_S)
+WHO = "panels-5"
 
 
-def test_menus_become_buttons_that_ask(server: viser.ViserServer) -> None:
-    mouth = Mouth()
-    tab = server.gui.add_tab_group().add_tab("lead")
-    lead = LeadView(server, tab, mouth)  # type: ignore[arg-type]
+class Scene:
+    """A scene that holds the target to drag."""
+
+    visible = True
+    position = (0.0, 0.0, 0.0)
+
+    def add_transform_controls(self, name: str, **of_it: object) -> "Scene":
+        return self
+
+    def on_update(self, do: object) -> None:
+        """Nobody drags here."""
+
+
+def test_menus_become_buttons_that_ask(place: Container) -> None:
+    mouth, freed = Mouth(), []
+    lead = LeadPanel(place, Scene(), mouth, lambda: freed.append(True))  # type: ignore[arg-type]
     lead.offer("behaviour", ["wait", "guard"])
     lead.offer("steer", ["left", "right"])
     lead.characters(["none", "calm"], "none")
-    touch(server, lead._menus["behaviour"], "guard")
-    touch(server, lead._menus["steer"], "left")
-    assert lead._characters is not None
-    touch(server, lead._characters, "calm")
+    lead.menus["behaviour"].arrived("guard", WHO)
+    lead.menus["steer"].arrived("left", WHO)
+    lead.menus["character"].arrived("calm", WHO)
+    lead.free.arrived("look freely", WHO)
     assert mouth.parse_request == [
-        (Ask("behaviour", "guard"), "5"),
-        ({"steer": "left"}, "5"),
-        ({"do": "character", "name": "calm"}, "5"),
+        (Ask("behaviour", "guard"), WHO),
+        ({"steer": "left"}, WHO),
+        ({"do": "character", "name": "calm"}, WHO),
+        (LookAt(None), WHO),
     ]
-    lead.show(replace(SNAPSHOT, behaviour="<b>"))
-    assert "behaviour <b>&lt;b&gt;</b>" in lead._words.content
+    assert freed == [True]
+    lead.show(replace(SNAPSHOT, behaviour="guard"))
+    assert (lead.menus["behaviour"].current, lead.menus["character"].current) == ("guard", "none")
 
 
-def jogging(server: viser.ViserServer) -> tuple[JogPanel, Mouth]:
+def jogging(place: Container) -> tuple[JogPanel, Mouth]:
     mouth = Mouth()
-    view = JogPanel(server.gui, server.gui.add_tab_group().add_tab("joints"), mouth)  # type: ignore[arg-type]
+    view = JogPanel(place, mouth)  # type: ignore[arg-type]
     ends = {
         f"joints.{j}.{end}_deg": v for j in GAZE_JOINTS for end, v in (("min", -30), ("max", 40.0))
     }
@@ -100,24 +107,24 @@ def jogging(server: viser.ViserServer) -> tuple[JogPanel, Mouth]:
     return view, mouth
 
 
-def test_every_joint_has_a_slider_with_its_limits(server: viser.ViserServer) -> None:
-    view, _ = jogging(server)
-    assert tuple(view._sliders) == GAZE_JOINTS
-    assert {(s.min, s.max) for s in view._sliders.values()} == {(-30.0, 40.0)}
+def test_every_joint_has_a_slider_with_its_limits(place: Container) -> None:
+    view, _ = jogging(place)
+    assert tuple(view.sliders) == GAZE_JOINTS
+    assert {slider.ends for slider in view.sliders.values()} == {(-30.0, 40.0)}
     view.values({"joints.neck_yaw.min_deg": -10.0, "joints.neck_yaw.max_deg": 10.0})
-    assert (view._sliders["neck_yaw"].min, view._sliders["neck_yaw"].max) == (-10.0, 10.0)
+    assert view.sliders["neck_yaw"].ends == (-10.0, 10.0)
 
 
-def test_a_slider_jogs_and_then_follows_its_joint(server: viser.ViserServer) -> None:
-    view, mouth = jogging(server)
-    slider = view._sliders["neck_yaw"]
+def test_a_slider_jogs_and_then_follows_its_joint(place: Container) -> None:
+    view, mouth = jogging(place)
+    slider = view.sliders["neck_yaw"]
     yaw = GAZE_JOINTS.index("neck_yaw")
     view.show(replace(SNAPSHOT, t_s=1.0))
     assert (
         slider.value == pytest.approx(5.7) and mouth.parse_request == []
     )  # 0.1 rad, and nobody asked
-    touch(server, slider, 20.0)
-    assert mouth.parse_request == [(Jog((("neck_yaw", radians(20.0)),)), "5")]
+    slider.arrived(20.0, WHO)
+    assert mouth.parse_request == [(Jog((("neck_yaw", radians(20.0)),)), WHO)]
 
     def wished(t_s: float, desired_deg: float, stopped: str = "") -> float:
         desired = tuple(radians(desired_deg) if i == yaw else 0.1 for i in range(9))
@@ -129,7 +136,7 @@ def test_a_slider_jogs_and_then_follows_its_joint(server: viser.ViserServer) -> 
     assert wished(5.0, 20.0) == 20.0
     assert wished(5.2, -3.0) == 20.0
     assert wished(5.8, -3.0) == pytest.approx(5.7)  # somebody let go elsewhere
-    touch(server, slider, 20.0)
+    slider.arrived(20.0, WHO)
     assert wished(5.9, 20.0, "a test") == pytest.approx(5.7)  # a stop lets go at once
 
 
@@ -141,30 +148,28 @@ def test_the_table_shows_wish_and_measured() -> None:
 def test_what_nobody_measured_has_a_column_of_its_own() -> None:
     assert ESTIMATED not in measured_table(SNAPSHOT)
     table = measured_table(of_six(SNAPSHOT))
-    assert f">{ESTIMATED}</td>" in table and f">{MEASURED}</td>" not in table
+    assert f">{ESTIMATED}</th>" in table and f">{MEASURED}</th>" not in table
     assert "eyes pan" in table and "20.0" in table and "neck" not in table
     mixed = measured_table(of_six(SNAPSHOT, SIX[:1]))
     lines = mixed.split("<tr>")
     assert mixed.index(f">{MEASURED}<") < mixed.index(f">{ESTIMATED}<")
-    cells = [line.split("<td style='text-align:right'>")[1:] for line in lines[1:]]
+    cells = [line.split("<td>")[1:] for line in lines[2:]]
     assert [cell.partition("<")[0] for cell in cells[0]] == ["10.0", "", "20.0"]
     assert [cell.partition("<")[0] for cell in cells[1]] == ["11.0", "21.0", ""]
 
 
-def test_sliders_are_those_of_the_rig(server: viser.ViserServer) -> None:
+def test_sliders_are_those_of_the_rig(place: Container) -> None:
     mouth = Mouth()
-    view = JogPanel(server.gui, server.gui.add_tab_group().add_tab("joints"), mouth)  # type: ignore[arg-type]
+    view = JogPanel(place, mouth)  # type: ignore[arg-type]
     rig = values(load_rig("maker"))
     view.values(rig)
-    assert tuple(view._sliders) == SIX
-    lid = view._sliders["left_lower_lid"]
-    assert (lid.min, lid.max) == tuple(
-        rig[f"joints.left_lower_lid.{e}_deg"] for e in ("min", "max")
-    )
+    assert tuple(view.sliders) == SIX
+    lid = view.sliders["left_lower_lid"]
+    assert lid.ends == tuple(rig[f"joints.left_lower_lid.{e}_deg"] for e in ("min", "max"))
     view.show(of_six(SNAPSHOT))
-    assert view._sliders["eyes_pan"].value == pytest.approx(20.0)
-    touch(server, lid, 5.0)
-    assert mouth.parse_request == [(Jog((("left_lower_lid", radians(5.0)),)), "5")]
+    assert view.sliders["eyes_pan"].value == pytest.approx(20.0)
+    lid.arrived(5.0, WHO)
+    assert mouth.parse_request == [(Jog((("left_lower_lid", radians(5.0)),)), WHO)]
     view.show(SNAPSHOT)  # of another rig: nothing to follow, and nothing breaks
 
 
@@ -217,22 +222,18 @@ def test_what_cannot_be_read_is_refused_with_an_example() -> None:
     assert read(PARAM._replace(optional=True), "null") is None
 
 
-def test_a_slider_makes_room_where_null_comes_into_force(server: viser.ViserServer) -> None:
+def test_a_slider_makes_room_where_null_comes_into_force(place: Container) -> None:
     param = PARAM._replace(optional=True)
-    tab = server.gui.add_tab_group().add_tab("null")
-    with tab:
-        slider = ParamControl(server.gui, param, 1.0, False, ignore, ignored, 0.0)
-        typed = ParamControl(server.gui, param, None, False, ignore, ignored, 1.0)
+    slider = ParamControl(place, param, 1.0, False, ignore, ignored, 0.0)
+    typed = ParamControl(place, param, None, False, ignore, ignored, 1.0)
     assert slider.can_show(2.0) and not slider.can_show(None)
     assert typed.can_show(None) and typed.can_show(2.0)
     typed.show(2.0, False)
-    assert typed._handle.value == "2.0"
+    assert typed.field.value == "2.0"
 
 
 @pytest.mark.parametrize("name", ["maker", "feetech", "desk"])
-def test_every_parameter_of_every_rig_becomes_a_control(
-    server: viser.ViserServer, name: str
-) -> None:
+def test_every_parameter_of_every_rig_becomes_a_control(place: Container, name: str) -> None:
     rig = load_rig(name)
     now, texts = values(rig), {}
     sent = json.loads(
@@ -240,19 +241,18 @@ def test_every_parameter_of_every_rig_becomes_a_control(
     )
     places = [ParamInfo.from_json(data) for data in sent]
     assert {param.key for param in places} == set(now)
-    tab = server.gui.add_tab_group().add_tab(name)
     refused: list[str] = []
-    with tab:
-        for param in places:
-            if param.kind in ("list", "mapping") or param.key.startswith("joints."):
-                value = json.loads(json.dumps(plain(now[param.key])))
-                control = ParamControl(server.gui, param, value, False, ignore, refused.append, 0.0)
-                control.show(value, True)
-                assert hint(param).startswith(param.key)
-                if control._form is not None:
-                    texts[param.key] = str(control._handle.value)
-                    assert read(param, texts[param.key]) == value
-                control.remove()
+    for param in places:
+        value = json.loads(json.dumps(plain(now[param.key])))
+        control = ParamControl(place, param, value, False, ignore, refused.append, 0.0)
+        control.show(value, True)
+        assert hint(param).startswith(param.key)
+        if isinstance(control.field, TextField):
+            texts[param.key] = control.field.value
+            assert read(param, texts[param.key]) == value
+        elif isinstance(control.field, Slider):
+            assert control.field.checked(control.field.value) == value
+        control.remove()
     if name == "maker":
         assert texts["joints.eyes_pan.transmission_points"].startswith("[[-32.0, 1068.0], [")
         linkage = next(

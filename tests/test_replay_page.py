@@ -1,16 +1,14 @@
 """The page of a replay: its slider, its events and its words."""
 
 import json
-import time
 from collections.abc import Iterator, Mapping
-from types import SimpleNamespace
 
 import pytest
-import viser
 from replayed_run import RATE_HZ, SECONDS, Screen, ticks_of
 
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.dashboard.replay import ReplayView, clock, event_list, strip
+from gazerig.robot.dashboard.widgets import Widgets
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.commands import Ask
 from gazerig.robot.recording.replay import Replay
@@ -37,34 +35,17 @@ def frames(ticks: list[Tick]) -> Iterator[SnapshotIndex]:
 
 
 class Shelf:
-    """A view of a recording with what it asked for, on a server without a browser."""
+    """A view of a recording with what it asked for, on a page without a browser."""
 
-    def __init__(self, server: viser.ViserServer) -> None:
-        self.asked: list[tuple[int, Mapping[str, object]]] = []
-        self.view = ReplayView(server.gui, lambda who, what: self.asked.append((who, what)), 10.0)
-        self.handles = list(server.gui._gui_input_handle_from_uuid.values())
-
-    def handle(self, label: str):
-        (found,) = (h for h in self.handles if getattr(h, "label", None) == label)
-        return found
-
-    def by_hand(self, label: str, value: object) -> None:
-        """Do what a browser does: the value changes, and the callbacks hear who did it."""
-        handle = self.handle(label)
-        if value is not None:
-            handle._impl.value = value
-        event = SimpleNamespace(client=SimpleNamespace(client_id=7), target=handle)
-        for callback in handle._impl.update_cb:
-            callback(event)
+    def __init__(self) -> None:
+        self.asked: list[tuple[str, Mapping[str, object]]] = []
+        place = Widgets().panel("replay")
+        self.view = ReplayView(place, lambda who, what: self.asked.append((who, what)), 10.0)
 
 
 @pytest.fixture
-def shelf() -> Iterator[Shelf]:
-    server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    try:
-        yield Shelf(server)
-    finally:
-        server.stop()
+def shelf() -> Shelf:
+    return Shelf()
 
 
 def state(at_s: float, **more: object) -> dict[str, object]:
@@ -74,53 +55,53 @@ def state(at_s: float, **more: object) -> dict[str, object]:
 
 def test_the_slider_follows_what_is_played_and_asks_nothing(shelf: Shelf) -> None:
     shelf.view.show(state(2.5, playing=True, speed=0.5))
-    assert shelf.handle("time, s").value == 2.5 and shelf.handle("speed").value == "0.5x"
-    assert shelf.handle("pause")
-    time.sleep(0.3)  # callbacks run in threads of the server
+    assert shelf.view.slider.value == 2.5 and shelf.view.speed.value == "0.5x"
+    assert shelf.view.play.options == ("pause",)
     assert shelf.asked == []
     shelf.view.show(state(3.0))
-    assert shelf.handle("play")
+    assert shelf.view.play.options == ("play",)
 
 
 def test_what_a_hand_does_is_asked_for(shelf: Shelf) -> None:
-    shelf.by_hand("time, s", 4.0)
-    shelf.by_hand("play", None)
-    shelf.by_hand("speed", "2x")
-    shelf.by_hand("next", "saccade")
-    shelf.by_hand("previous", "event")
+    view = shelf.view
+    view.slider.arrived(4.0, "7")
+    view.play.arrived("play", "7")
+    view.speed.arrived("2x", "7")
+    view.steps["next"].arrived("saccade", "7")
+    view.steps["previous"].arrived("event", "7")
     assert shelf.asked == [
-        (7, {"replay": {"seek_s": 4.0}}), (7, {"replay": {"play": True}}),
-        (7, {"replay": {"speed": 2.0}}), (7, {"replay": {"step": "next saccade"}}),
-        (7, {"replay": {"step": "previous event"}}),
+        ("7", {"replay": {"seek_s": 4.0}}), ("7", {"replay": {"play": True}}),
+        ("7", {"replay": {"speed": 2.0}}), ("7", {"replay": {"step": "next saccade"}}),
+        ("7", {"replay": {"step": "previous event"}}),
     ]  # fmt: skip
 
 
 def test_a_slider_in_the_hand_is_not_pulled_back(shelf: Shelf) -> None:
     shelf.view.show(state(1.0, playing=True))
-    shelf.by_hand("time, s", 5.0)
-    shelf.by_hand("time, s", 6.0)
+    shelf.view.slider.arrived(5.0, "7")
+    shelf.view.slider.arrived(6.0, "7")
     shelf.view.show(state(1.1, playing=True))
-    assert shelf.handle("time, s").value == 6.0
+    assert shelf.view.slider.value == 6.0
     shelf.view.show(state(5.0, playing=True, sought_s=5.0))  # an older wish is heard
-    assert shelf.handle("time, s").value == 6.0
+    assert shelf.view.slider.value == 6.0
     shelf.view.show(state(6.02, playing=True, sought_s=6.0))
-    assert shelf.handle("time, s").value == 6.02
+    assert shelf.view.slider.value == 6.02
     shelf.view.show(state(6.5, playing=True, sought_s=6.0))
-    assert shelf.handle("time, s").value == 6.5
+    assert shelf.view.slider.value == 6.5
 
 
 def test_a_player_takes_every_place_the_slider_can_ask_for(
     shelf: Shelf, frames: SnapshotIndex
 ) -> None:
     replay = Replay(frames, SimulatedClock())
-    shelf.by_hand("time, s", 3.725)
+    shelf.view.slider.arrived(3.725, "7")
     (_, asked) = shelf.asked[0]
     assert replay.handle_request(json.loads(json.dumps(asked))) is None
     screen = Screen()
     replay.show(screen, 0.0)
     shelf.view.show(screen.states()[0])
     shelf.view.show(screen.states()[0] | {"at_s": 3.8})
-    assert shelf.handle("time, s").value == 3.8  # it was heard: the slider is free again
+    assert shelf.view.slider.value == 3.8  # it was heard: the slider is free again
 
 
 def test_words_that_were_recorded_cannot_become_a_page(shelf: Shelf) -> None:

@@ -17,13 +17,13 @@ from gazerig.config.schema import Rig, load_rig, load_walk
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.types import PARTS
 from gazerig.robot.analysis import human_norms as human
+from gazerig.robot.analysis import norm_bands as bands
 from gazerig.robot.analysis.event_detector import FixationEvent
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli.report import app, page_file
 from gazerig.robot.control.loop import run
 from gazerig.robot.report import face
-from gazerig.robot.report import norm_bands as bands
 from gazerig.robot.report import report as build
 from gazerig.robot.report.compare import differences_of
 from gazerig.robot.report.compare_page import compare_page

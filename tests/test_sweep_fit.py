@@ -10,8 +10,8 @@ from command_line import invoked
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
+from gazerig.robot.analysis.norm_bands import BY_KEY
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.report.norm_bands import BY_KEY
 from gazerig.robot.sweep.axes import Axis, Point
 from gazerig.robot.sweep.fit import counted_in, fit, trial_of
 from gazerig.robot.sweep.outcome import Outcome

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 _SWITCH_S = 0.0003
 
 STEER = "steer"
-"""The menu of this name is the page's steps of a calibration (dashboard/control_tabs.py)."""
+"""The menu of this name is the page's steps of a calibration (dashboard/controls.py)."""
 
 
 class SteeringButtons(NamedTuple):

@@ -11,6 +11,7 @@ import typer
 from gazerig.config.export import suggestion
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_output import write_file
+from gazerig.robot.analysis.norm_bands import BY_KEY
 from gazerig.robot.app.options import DEFAULT_SCENE, RunOptions
 from gazerig.robot.cli import run_options as options
 from gazerig.robot.cli import sweep_options as own
@@ -18,7 +19,6 @@ from gazerig.robot.cli.progress_bar import progress_bar
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import FAULT, INTERRUPTED, RigArgument, clear_errors, say, signals
 from gazerig.robot.cli.tune import read_value
-from gazerig.robot.report.norm_bands import BY_KEY
 
 if TYPE_CHECKING:
     from gazerig.robot.sweep.axes import Point

@@ -34,6 +34,8 @@ from gazerig.robot.dashboard.stop_sender import StopSender
 from gazerig.robot.dashboard.token_bucket import TokenBucket
 from gazerig.robot.dashboard.view_proxy import VIEW, ViewProxy
 from gazerig.robot.dashboard.websocket_relay import TAKES_S, until_one_ends
+from gazerig.robot.dashboard.widget_socket import WidgetSocket
+from gazerig.robot.dashboard.widgets import RECEIVED_BYTES, Widgets
 
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
 MOST_LINES = 32
@@ -86,6 +88,9 @@ class AuthProxy:
         self.token = token
         self.point: Point = _nowhere
         self.browsers = Browsers(token)
+        self.widgets = Widgets()
+        self._panel_socket = WidgetSocket(self.widgets)
+        self._panel_tabs = TabLimits(MOST_LINES)
         self._cookie = f"gazerig_{port}"  # cookies do not tell ports apart
         self._state: Mapping[str, object] = {}
         self._asked_rate = TokenBucket(_ASKED_PER_S, _ASKED_BURST)
@@ -124,6 +129,7 @@ class AuthProxy:
         if self._thread.is_alive():
             self._loop.call_soon_threadsafe(self._over.set)
             self._thread.join(_CLOSE_TIMEOUT_S)
+        self._panel_socket.close()
 
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
@@ -133,6 +139,7 @@ class AuthProxy:
     async def _serve(self) -> None:
         app = web.Application(middlewares=[self._doorkeeper()], client_max_size=ASKED_BYTES)
         app.router.add_get("/rig/line", self._line)
+        app.router.add_get("/rig/panels", self._panels)
         app.router.add_post("/rig/ask", self._asked)
         PageFiles(_HEADERS).add_to(app.router)
         app.router.add_get(VIEW, self._pass_on)
@@ -304,6 +311,27 @@ class AuthProxy:
             status, text = await self._handle(asked, who)
             async with asyncio.timeout(TAKES_S):
                 await line.send_str(json.dumps({"answer": status, "words": text}))
+
+    # --- the panels -----------------------------------------------------------------------
+
+    async def _panels(self, request: web.Request) -> web.StreamResponse:
+        """Show the panels in a browser, as fast as it takes them."""
+        socket = web.WebSocketResponse(max_msg_size=RECEIVED_BYTES, compress=False)
+        await socket.prepare(request)
+        self._connections.lasting(request)
+        who = self._who(request)
+        with self._panel_tabs.take(who) as leave:
+            await until_one_ends(
+                self._panel_socket.serve(socket, who), self._over.wait(), leave.wait()
+            )
+        with suppress(TimeoutError, ConnectionError):
+            async with asyncio.timeout(_BEAT_S):
+                await socket.close()
+        if request.transport is not None:  # one who reads nothing does not read that it is over
+            request.transport.abort()
+        return socket
+
+    # --- what is said to all --------------------------------------------------------------
 
     def _wake(self) -> None:
         for news in self._news:

@@ -6,13 +6,9 @@ from typing import NamedTuple
 
 from gazerig.gaze.types import PART_NAMES
 from gazerig.robot.dashboard.html import (
-    GREY,
     LEVELS,
     LINE_PX,
-    ORANGE,
     OTHER_TARGET,
-    PALE,
-    PARTS,
     TARGETS,
     box,
     line,
@@ -25,12 +21,12 @@ from gazerig.robot.model.types import SeenBlink, SeenEvent, SeenSaccade, Snapsho
 STRIP_S = 30.0
 """How far back the strip reaches."""
 
-_LEFT_PX = 54.0
+_LEFT_PX = 64.0
 _RIGHT_PX = LINE_PX - 4.0
-_ROWS_PX = {"target": 2.0, "part": 24.0, "saccades": 42.0, "blinks": 82.0, "guard": 100.0}
-_AXIS_PX = 118.0
+_ROWS_PX = {"target": 2.0, "part": 25.0, "saccades": 46.0, "blinks": 86.0, "guard": 105.0}
+_AXIS_PX = 124.0
 _SACCADE_PX, _LARGE_DEG = 34.0, 30.0
-_LETTER_PX = 5.2
+_LETTER_PX = 7.4
 
 
 class _Stretch(NamedTuple):
@@ -96,17 +92,28 @@ class Timeline:
         if now_s is None:
             return note("waiting for the rig")
         parts = [*_ground(), *self._bands(now_s), *self._marks(now_s)]
-        return f"<div style='padding:2px 8px'>{svg(_AXIS_PX + 14.0, parts)}</div>"
+        return svg(_AXIS_PX + 18.0, parts, self._says())
+
+    def _says(self) -> str:
+        """Return the strip in words, for those who do not see it."""
+        targets = dict.fromkeys(stretch.what for stretch in self._rows["target"] if stretch.what)
+        saccades = sum(isinstance(event, SeenSaccade) for event in self._events)
+        blinks = sum(isinstance(event, SeenBlink) for event in self._events)
+        levels = dict.fromkeys(stretch.kind for stretch in self._rows["guard"])
+        return (
+            f"the last {STRIP_S:.0f} seconds: looked at {', '.join(targets) or 'nothing'}; "
+            f"{saccades} saccades, {blinks} blinks; guard {', '.join(levels)}"
+        )
 
     def _bands(self, now_s: float) -> Iterable[str]:
         for stretch in self._rows["target"]:
-            colour = TARGETS.get(stretch.kind, OTHER_TARGET)
-            yield from _band("target", stretch, now_s, 19.0, colour, stretch.what)
+            colour = stretch.kind if stretch.kind in TARGETS else OTHER_TARGET
+            yield from _band("target", stretch, now_s, 20.0, colour, stretch.what)
         for stretch in self._rows["part"]:
             if stretch.kind:
-                yield from _band("part", stretch, now_s, 14.0, PARTS[stretch.kind], stretch.kind)
+                yield from _band("part", stretch, now_s, 18.0, f"part-{stretch.kind}", stretch.kind)
         for stretch in self._rows["guard"]:
-            yield from _band("guard", stretch, now_s, 12.0, LEVELS[stretch.kind], "")
+            yield from _band("guard", stretch, now_s, 14.0, LEVELS[stretch.kind], "")
 
     def _marks(self, now_s: float) -> Iterable[str]:
         foot = _ROWS_PX["saccades"] + _SACCADE_PX
@@ -116,11 +123,11 @@ class Timeline:
                 size = min(1.0, event.amplitude_deg / _LARGE_DEG) ** 0.5
                 says = f"{event.amplitude_deg:.1f} deg, {1e3 * event.duration_s:.0f} ms"
                 high = 2.0 + (_SACCADE_PX - 2.0) * size
-                yield box(x - 0.5, foot - high, 1.2, high, ORANGE, says)
+                yield box(x - 0.5, foot - high, 1.2, high, "saccade", says)
             elif isinstance(event, SeenBlink):
                 wide = _x(event.start_s + event.duration_s, now_s) - x
                 says = f"blink, {1e3 * event.duration_s:.0f} ms"
-                yield box(x, _ROWS_PX["blinks"], max(wide, 1.5), 11.0, GREY, says)
+                yield box(x, _ROWS_PX["blinks"], max(wide, 1.5), 13.0, "calm", says)
 
 
 def _x(t_s: float, now_s: float) -> float:
@@ -132,14 +139,15 @@ def _x(t_s: float, now_s: float) -> float:
 def _ground() -> Iterable[str]:
     """Return the names of the rows, their lines, and the axis of time."""
     for name, y in _ROWS_PX.items():
-        yield text(2.0, y + (28.0 if name == "saccades" else 10.5), name, 10.0)
-    yield line(((_LEFT_PX, 76.5), (_RIGHT_PX, 76.5)), PALE)
-    yield line(((_LEFT_PX, _AXIS_PX), (_RIGHT_PX, _AXIS_PX)), GREY)
+        yield text(1.0, y + (28.0 if name == "saccades" else 12.0), name)
+    foot = _ROWS_PX["saccades"] + _SACCADE_PX + 0.5
+    yield line(((_LEFT_PX, foot), (_RIGHT_PX, foot)), "grid")
+    yield line(((_LEFT_PX, _AXIS_PX), (_RIGHT_PX, _AXIS_PX)), "axis")
     for ago_s in (-30, -20, -10, 0):
         x = _RIGHT_PX + ago_s * (_RIGHT_PX - _LEFT_PX) / STRIP_S
-        yield line(((x, _AXIS_PX), (x, _AXIS_PX + 3.0)), GREY)
+        yield line(((x, _AXIS_PX), (x, _AXIS_PX + 3.0)), "axis")
         anchor = "end" if ago_s == 0 else "middle"
-        yield text(x, _AXIS_PX + 12.0, "now" if ago_s == 0 else f"{ago_s} s", 9.0, anchor)
+        yield text(x, _AXIS_PX + 15.0, "now" if ago_s == 0 else f"{ago_s} s", anchor)
 
 
 def _band(
@@ -150,5 +158,5 @@ def _band(
     says = PART_NAMES.get(stretch.what, stretch.what)
     yield box(x0, _ROWS_PX[row], x1 - x0 - 0.3, high, colour, says)
     if label and x1 - x0 > _LETTER_PX * len(label) + 4.0:
-        words = text(x0 + 3.0, _ROWS_PX[row] + high / 2 + 3.2, label, 9.0)
-        yield words.replace("currentColor", "#fff")
+        words = text(x0 + 3.0, _ROWS_PX[row] + high / 2 + 4.8, label)
+        yield words.replace("svg-text", "svg-label")

@@ -1,55 +1,46 @@
-"""Colours and small pieces of HTML and SVG that the page's panels share."""
+"""Small pieces of HTML and SVG that the page's panels share.
+
+They carry classes, whose colours are in browser/panels.css, so that they fit both themes.
+"""
 
 from collections.abc import Iterable
 from html import escape
 
-GREEN, AMBER, ORANGE, RED, BLUE, GREY = (
-    "#2b8a5a", "#d9830a", "#e8590c", "#c92a2a", "#1c7ed6", "#868e96",
-)  # fmt: skip
-PALE = "#dee2e6"
-PALE_BLUE = "#74b0e4"
-INK = "#343a40"
-
-PHASES = {"fixate": GREEN, "saccade": ORANGE, "pursue": BLUE, "blink": GREY}
-LEVELS = {"ok": GREEN, "limited": AMBER, "hold": ORANGE, "torque_off": RED, "stopped": RED}
-PARTS = {
-    "DN": "#8d6e63",
-    "FL": "#9c36b5",
-    "LE": "#1c7ed6",
-    "M": "#e03131",
-    "N": "#f08c00",
-    "FR": "#6741d9",
-    "RE": "#0c8599",
-    "UP": "#5c940d",
-}
-"""A colour for every part of the face."""
-TARGETS = {"face": "#4263eb", "hand": "#c2255c", "puppet": "#ae3ec9", "idle": "#adb5bd"}
-OTHER_TARGET = "#2f9e44"
+PHASES = {"fixate": "ok", "saccade": "saccade", "pursue": "pursue", "blink": "calm"}
+LEVELS = {
+    "ok": "ok", "limited": "near", "hold": "hold", "torque_off": "alarm", "stopped": "alarm",
+}  # fmt: skip
+"""Names of colours of the gaze's phases and of the guard's levels."""
+TARGETS = ("face", "hand", "puppet", "idle")
+OTHER_TARGET = "other"
+"""Names of colours of targets."""
 
 LINE_PX = 320
 """Width in which the panels are drawn; they are scaled to the width that there is."""
 
-
-def frame(inner: str) -> str:
-    """Return HTML with the panel's margins."""
-    return f"<div style='padding:4px 12px;font-size:13px;line-height:1.5'>{inner}</div>"
+LETTER_PX = 13.2
+"""Size of letters in a drawing: 13 px in the narrowest drawer."""
 
 
-def pill(text: str, colour: str) -> str:
-    """Return words on a coloured ground."""
-    return (
-        f"<span style='background:{colour};color:#fff;border-radius:9px;padding:0 9px;"
-        f"margin:1px 6px 1px 0;font-weight:600;display:inline-block'>{escape(text)}</span>"
-    )
+def pill(text: str, kind: str = "") -> str:
+    """Return words on a coloured ground; kind: the name of its colour."""
+    return f"<span class='pill-word {escape(kind)}'>{escape(text)}</span>"
+
+
+def chip(text: str) -> str:
+    """Return words in a frame."""
+    return f"<span class='chip'>{escape(text)}</span>"
+
+
+def banner(text: str, kind: str, reasons: Iterable[str] = ()) -> str:
+    """Return an emphasised message, with its reasons below."""
+    lines = "".join(f"<div>{escape(reason)}</div>" for reason in reasons)
+    return f"<div class='banner {escape(kind)}'><b>{escape(text)}</b>{lines}</div>"
 
 
 def heading(text: str, aside: str = "") -> str:
-    """Return a line above a frame or table, with something smaller at its right end."""
-    return (
-        "<div style='font-size:12px;font-weight:600;margin-top:4px'>"
-        f"<span style='float:right;font-weight:400;opacity:.7'>{escape(aside)}</span>"
-        f"{escape(text)}</div>"
-    )
+    """Return a line above a drawing or table, with something smaller at its right end."""
+    return f"<div class='heading'>{escape(text)}<span>{escape(aside)}</span></div>"
 
 
 def counted(n: int, what: str) -> str:
@@ -59,35 +50,36 @@ def counted(n: int, what: str) -> str:
 
 def note(text: str) -> str:
     """Return a small line, for sources and explanations."""
-    return f"<div style='font-size:11px;opacity:.75;line-height:1.35'>{escape(text)}</div>"
+    return f"<div class='note'>{escape(text)}</div>"
 
 
-def svg(height: float, parts: Iterable[str]) -> str:
-    """Return a drawing LINE_PX wide and as high as asked for, scaled to the panel's width."""
+def svg(height: float, parts: Iterable[str], says: str) -> str:
+    """Return a drawing LINE_PX wide, scaled to the panel; says: what it shows, in words."""
     return (
-        f"<svg viewBox='0 0 {LINE_PX} {height:.0f}' width='100%' "
-        f"style='display:block;font-family:inherit'>{''.join(parts)}</svg>"
+        f"<svg viewBox='0 0 {LINE_PX} {height:.0f}' role='img' aria-label='{escape(says)}'>"
+        f"{''.join(parts)}</svg>"
     )
 
 
 def box(x: float, y: float, width: float, height: float, colour: str, says: str = "") -> str:
-    """Return a filled rectangle; ``says`` is shown under the mouse."""
+    """Return a filled rectangle; colour: a name of panels.css; ``says`` is shown by the mouse."""
     title = f"<title>{escape(says)}</title>" if says else ""
     return (
         f"<rect x='{x:.1f}' y='{y:.1f}' width='{max(width, 0.4):.1f}' height='{height:.1f}' "
-        f"fill='{colour}'>{title}</rect>"
+        f"fill='var(--{escape(colour)})'>{title}</rect>"
     )
 
 
-def line(points: Iterable[tuple[float, float]], colour: str, wide: float = 1.0) -> str:
-    """Return a line through points."""
+def line(points: Iterable[tuple[float, float]], kind: str, dash: str = "") -> str:
+    """Return a line through points; kind: grid, axis or mean."""
     path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
-    return f"<polyline points='{path}' fill='none' stroke='{colour}' stroke-width='{wide}'/>"
+    dashed = f" stroke-dasharray='{dash}'" if dash else ""
+    return f"<polyline points='{path}' fill='none' class='svg-{kind}'{dashed}/>"
 
 
-def text(x: float, y: float, text: str, size: float = 10.0, anchor: str = "start") -> str:
+def text(x: float, y: float, text: str, anchor: str = "start", size: float = LETTER_PX) -> str:
     """Return words whose baseline begins, ends or is centred at a point."""
     return (
         f"<text x='{x:.1f}' y='{y:.1f}' font-size='{size}' text-anchor='{anchor}' "
-        f"fill='currentColor'>{escape(text)}</text>"
+        f"class='svg-text'>{escape(text)}</text>"
     )

@@ -5,25 +5,24 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import viser
-from viser import uplot
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.dashboard.html import AMBER, BLUE, GREY, PALE_BLUE, frame
+from gazerig.robot.dashboard.container import Container
+from gazerig.robot.dashboard.widget import Chart
 from gazerig.robot.model.types import Snapshot, Trail
 
 TRACE_S = 30.0
 """How far back the traces are kept."""
 
 SPANS = {"3 s": 3.0, "10 s": 10.0, "30 s": TRACE_S}
-MOST_POINTS = 600
+MOST_POINTS = 300
 """More points than this in a trace are thinned out: the panel is not wider."""
 
 _LEAST_SPAN_DEG = 10.0
-_COMMANDS = (("desired", GREY, 1.5), ("commanded", AMBER, 1.5))
-_MEASURED = ("measured", BLUE, 2.0)
-_ESTIMATED = ("estimated, not measured", PALE_BLUE, 2.0)
-_DASH_PX = (6.0, 4.0)
+_COMMANDS = (("desired", "desired"), ("commanded", "commanded"))
+_MEASURED = ("measured", "measured")
+_ESTIMATED = ("estimated, not measured", "estimated")
+"""Names of lines, and their style on the page."""
 
 
 class ChartGroup(NamedTuple):
@@ -134,105 +133,54 @@ def mean_deg(angles_deg: Floats, group: ChartGroup, joints: tuple[str, ...]) -> 
     return mean
 
 
-class _Plot(NamedTuple):
-    """One plot and the line above it."""
-
-    title: viser.GuiHtmlHandle
-    plot: viser.GuiUplotHandle
-
-    def remove(self) -> None:
-        self.title.remove()
-        self.plot.remove()
-
-
 class JointCharts:
-    """Two menus, and a plot for each group of what is chosen."""
+    """Two menus, and a chart for each group of what is chosen.
 
-    def __init__(self, gui: viser.GuiApi, place: viser.GuiTabHandle) -> None:
-        self._gui = gui
+    Args:
+        place: where they stand.
+    """
+
+    def __init__(self, place: Container) -> None:
         self._place = place
-        with place:
-            self._what = gui.add_dropdown("show", ("yaw",), order=1)
-            self._span = gui.add_dropdown(
-                "of the last", tuple(SPANS), initial_value="10 s", order=2
-            )
-            self._key = gui.add_html("", order=3)
+        self.what = place.choice("show", ("yaw",), order=1)
+        self.span = place.choice("of the last", tuple(SPANS), "10 s", order=2)
+        self.key = place.html(order=3)
         self._drawn: tuple[tuple[ChartGroup, bool], ...] = ()
-        self._plots: list[_Plot] = []
+        self.charts: list[Chart] = []
 
     def show(self, traces: JointSeries) -> None:
         """Draw the traces as they are now."""
-        ago_s, angles_deg = traces.table(SPANS[self._span.value])
+        ago_s, angles_deg = traces.table(SPANS[self.span.value])
         menu = groups_of(traces.joints)
         if not len(ago_s) or not menu:
             return
-        if self._what.options != tuple(menu):
-            self._what.options = tuple(menu)
-        groups = menu.get(self._what.value) or next(iter(menu.values()))
+        if self.what.options != tuple(menu):
+            self.what.options = tuple(menu)
+        groups = menu.get(self.what.value) or next(iter(menu.values()))
         self._make(tuple((g, not traces.estimated.isdisjoint(g.joints)) for g in groups))
-        for (_, plot), group in zip(self._plots, groups, strict=True):
-            plot.data = _columns(ago_s, mean_deg(angles_deg, group, traces.joints))
+        x = np.round(ago_s, 3).tolist()
+        for chart, group in zip(self.charts, groups, strict=True):
+            columns = np.round(mean_deg(angles_deg, group, traces.joints).T, 2).tolist()
+            chart.draw(x, dict(zip(chart.names(), columns, strict=True)))
 
     def _make(self, wanted: tuple[tuple[ChartGroup, bool], ...]) -> None:
-        """Create the plots again if other groups are chosen, or values are estimated now."""
+        """Create the charts again if other groups are chosen, or values are estimated now."""
         if wanted == self._drawn:
             return
-        for plot in self._plots:
-            plot.remove()
-        self._key.content = _key([estimated for _, estimated in wanted])
-        with self._place:
-            self._plots = [
-                self._add(group.title, estimated, 4 + 2 * row)
-                for row, (group, estimated) in enumerate(wanted)
-            ]
-        self._drawn = wanted
-
-    def _add(self, title: str, estimated: bool, order: int) -> _Plot:
-        lines = [
-            uplot.Series(label=name, stroke=colour, width=width, points={"show": False})
-            for name, colour, width in _COMMANDS
+        for chart in self.charts:
+            chart.remove()
+        self.key.content = _key([estimated for _, estimated in wanted])
+        self.charts = [
+            self._place.chart(
+                f"{group.title}, degrees{'; no feedback' if estimated else ''}",
+                (*_COMMANDS, _ESTIMATED if estimated else _MEASURED),
+                unit="degrees",
+                least=_LEAST_SPAN_DEG,
+                order=4 + row,
+            )
+            for row, (group, estimated) in enumerate(wanted)
         ]
-        lines.append(_result(estimated))
-        # Nothing is seen of the last line: it keeps the scale from following the noise.
-        room = uplot.Series(label="", stroke="transparent", width=0, points={"show": False})
-        return _Plot(
-            self._gui.add_html(_title(title, estimated), order=order),
-            self._gui.add_uplot(
-                tuple(np.zeros(1) for _ in range(len(lines) + 2)),
-                (uplot.Series(label="s"), *lines, room),
-                # No fixed range: with one, the x axis is at times never drawn (viser 1.1.1).
-                scales={"x": uplot.Scale(time=False), "y": uplot.Scale(auto=True)},
-                axes=(uplot.Axis(size=24), uplot.Axis(size=38)),
-                legend=uplot.Legend(show=False),
-                padding=(8, 14, 0, 0),
-                height=128,
-                order=order + 1,
-            ),
-        )
-
-
-def _result(estimated: bool) -> uplot.Series:
-    """Return the line of the resulting angle: dashed and pale if it is not measured."""
-    name, colour, width = _ESTIMATED if estimated else _MEASURED
-    line = uplot.Series(label=name, stroke=colour, width=width, points={"show": False})
-    if estimated:
-        line["dash"] = _DASH_PX
-    return line
-
-
-def _columns(ago_s: Floats, angles_deg: Floats) -> tuple[Floats, ...]:
-    """Return x, the three lines, and one that spans at least _LEAST_SPAN_DEG around them."""
-    low, high = float(angles_deg.min()), float(angles_deg.max())
-    room = angles_deg[:, 2].copy()
-    if high - low < _LEAST_SPAN_DEG and len(room) > 1:
-        room[0] = (low + high - _LEAST_SPAN_DEG) / 2
-        room[1] = room[0] + _LEAST_SPAN_DEG
-    return (ago_s, *(np.ascontiguousarray(column) for column in angles_deg.T), room)
-
-
-def _title(text: str, estimated: bool) -> str:
-    said = f"{text}, degrees{'; no feedback' if estimated else ''}"
-    return f"<div style='padding:4px 12px 0;font-size:12px;opacity:.85'>{said}</div>"
+        self._drawn = wanted
 
 
 def _key(estimated: Sequence[bool]) -> str:
@@ -243,8 +191,7 @@ def _key(estimated: Sequence[bool]) -> str:
     if any(estimated):
         shown.append((*_ESTIMATED, "- -"))
     names = "".join(
-        f"<span style='margin-right:12px;white-space:nowrap'>"
-        f"<span style='color:{colour};font-weight:700'>{mark}</span> {name}</span>"
-        for name, colour, _, mark in shown
+        f"<span><b class='line-{kind}' aria-hidden='true'>{mark}</b> {name}</span>"
+        for name, kind, mark in shown
     )
-    return frame(f"<div style='font-size:12px'>{names}</div>")
+    return f"<div class='key'>{names}</div>"

@@ -105,7 +105,7 @@ def serve(
     open_port = free_port(host, port)
     server = open_server(folder / "page.sock")
     door = AuthProxy(host, open_port, folder / "page.sock", outbox.hand_on, stop, token)
-    outbox.name = lambda client: _browser(server, client)
+    outbox.name = lambda client: door.widgets.browser(client) or _browser(server, client)
     outbox.leads = door.browsers.led_by
     pointer = PointerToLook(
         lambda browser: camera_of(server, browser),
@@ -199,7 +199,7 @@ def _show(
         return CANNOT_OPEN
     if served.words is not None:
         feed.send(NOTICE + served.words.encode())
-    view = PageView(served.server, outbox, served.door.tell)
+    view = PageView(served.server, served.door.widgets, outbox, served.door.tell)
     feed.send(URL + served.url.encode())
     watch(feed, view, parent, served)
     served.door.close()

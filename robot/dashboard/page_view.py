@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import viser
 
 from gazerig.drivers.types import ImageArray
-from gazerig.robot.dashboard.control_tabs import ControlTabs
+from gazerig.robot.dashboard.controls import Controls
 from gazerig.robot.dashboard.head_view import HeadView
 from gazerig.robot.dashboard.lights import furnish
 from gazerig.robot.dashboard.outbox import Outbox
@@ -18,8 +18,12 @@ from gazerig.robot.dashboard.quick_moves import refused_moves
 from gazerig.robot.dashboard.replay import ReplayView
 from gazerig.robot.dashboard.viewpoints import Viewpoints
 from gazerig.robot.dashboard.views import NAMES
+from gazerig.robot.dashboard.viser_server import browser_of
+from gazerig.robot.dashboard.widgets import Widgets
 from gazerig.robot.model.leader import Leader, sentence
 from gazerig.robot.model.types import Snapshot
+
+_REFUSED = "refused: "
 
 
 class PageView:
@@ -28,6 +32,7 @@ class PageView:
     def __init__(
         self,
         server: viser.ViserServer,
+        widgets: Widgets,
         outbox: Outbox,
         tell: Callable[[Mapping[str, object]], None],
     ) -> None:
@@ -35,7 +40,7 @@ class PageView:
 
         outbox: takes what people do to the rig; tell: shows what the stop button must know
         """
-        self._server = server
+        self._server, self._widgets = server, widgets
         self._outbox = outbox
         self._tell = tell
         self._viewpoints = Viewpoints(server)
@@ -43,10 +48,10 @@ class PageView:
         _arrange(server)
         self._head = HeadView(server.scene)
         self._people = PeopleView(server.scene)
-        self._panel = PanelView(server.gui)
+        self._panel = PanelView(widgets)
         self._layers = OverlayPanel(server.scene)
         self._panel.depth = self._ask_depth
-        self._controls = ControlTabs(server, outbox)
+        self._controls = Controls(widgets, server.scene, outbox)
         self._replay: ReplayView | None = None
         self._newest: Snapshot | None = None
         self._menus: Mapping[str, Sequence[str]] = {}
@@ -59,12 +64,15 @@ class PageView:
         self._outbox.ask({"show": {"depth": on}}, ALL_USERS)
 
     def _add_views(self) -> None:
-        buttons = self._server.gui.add_button_group("view", NAMES, order=9)
+        buttons = self._panel.view.buttons("look from", NAMES, order=-1)
+        buttons.on_press(self._look_from)
 
-        @buttons.on_click
-        def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
-            if event.client is not None:
-                self._viewpoints.take(event.client, event.target.value)
+    def _look_from(self, name: str, client: str) -> None:
+        """Show another view in the tabs of a client's browser."""
+        browser = self._widgets.browser(client)
+        for number, one in self._server.get_clients().items():
+            if browser_of(self._server, number) == browser:
+                self._viewpoints.take(one, name)
 
     def show(self, news: News) -> None:
         """Draw the newest of what came; without a spectator it is kept until one comes."""
@@ -76,12 +84,13 @@ class PageView:
             self._tell(self._stop_state())
         self._jpeg = news.jpeg or self._jpeg
         self._image = news.image if news.image is not None else self._image
-        watched = bool(self._server.get_clients())
+        watched = self._widgets.watched or bool(self._server.get_clients())
         if watched and not self._watched:  # who comes late may find a rig that stands still
             self._panel.draw_all()
         self._watched = watched
         if watched or not self._drawn:
-            with self._server.atomic():  # a browser never sees half of a snapshot
+            # A browser never sees half of a snapshot.
+            with self._server.atomic(), self._widgets.hold():
                 self._draw()
 
     def _stop_state(self) -> dict[str, object]:
@@ -105,7 +114,7 @@ class PageView:
         """Apply messages of the rig other than snapshots and frames."""
         if kind == MESSAGE and isinstance(data, list):
             who, text = data
-            self._controls.answered(who, text)
+            self._answered(who, text)
         elif kind == PARAMS and isinstance(data, list):
             self._controls.params(data)
         elif isinstance(data, dict):
@@ -117,6 +126,18 @@ class PageView:
             elif kind == REPLAY:
                 self._show_replay(data)
 
+    def _answered(self, who: str, text: str | None) -> None:
+        """Show the rig's reply to who asked; other messages go to all users."""
+        self._controls.answered(who)
+        if text:
+            client = who.partition(":")[0]
+            self._widgets.notify(
+                text.removeprefix(_REFUSED),
+                client,
+                self._outbox.name(client),
+                refused=text.startswith(_REFUSED),
+            )
+
     def _show_replay(self, state: Mapping[str, object]) -> None:
         if self._replay is None:
             duration_s = state.get("duration_s")
@@ -124,14 +145,12 @@ class PageView:
             self._controls.leave()
             self._tell({"recording": True})
             self._replay = ReplayView(
-                self._server.gui,
-                self._ask_replay,
-                float(duration_s),
+                self._widgets.panel("replay"), self._ask_replay, float(duration_s)
             )
         self._replay.show(state)
 
-    def _ask_replay(self, client: int, asked: Mapping[str, object]) -> None:
-        self._outbox.ask(asked, str(client))
+    def _ask_replay(self, client: str, asked: Mapping[str, object]) -> None:
+        self._outbox.ask(asked, client)
 
     def _draw(self) -> None:
         if self._newest is not None:
@@ -139,12 +158,12 @@ class PageView:
             self._head.show(self._newest, sight=self._panel.layers.sight)
             self._people.show(self._newest)
             self._layers.show(self._newest, self._panel.layers)
-            self._panel.show(self._newest)
             if self._replay is None:
                 self._controls.show(self._newest)
             self._drawn = True
+        self._panel.show()
         if self._jpeg is not None:
-            self._panel.show_frame(self._jpeg)
+            self._panel.show_jpeg(self._jpeg)
         if self._image is not None:
             self._panel.show_image(self._image)
         self._newest = self._jpeg = self._image = None
@@ -175,5 +194,3 @@ def leads_state(leader: Leader, shot: Snapshot | None) -> dict[str, object]:
 
 def _arrange(server: viser.ViserServer) -> None:
     server.gui.configure_theme(show_logo=False, show_share_button=False)
-    server.gui.main_panel.dock_right()
-    server.gui.main_panel.set_width(360)

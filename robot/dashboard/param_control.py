@@ -5,9 +5,8 @@ from collections.abc import Callable
 from math import floor, isclose, log10
 from typing import cast
 
-import viser
-
-from gazerig.robot.dashboard.widget import put
+from gazerig.robot.dashboard.container import Container
+from gazerig.robot.dashboard.widget import Checkbox, Choice, Slider, TextField
 from gazerig.robot.remote.param_info import ParamInfo
 
 Put = Callable[[str, object], None]
@@ -89,11 +88,20 @@ def read(param: ParamInfo, text: str) -> object:
 
 
 class ParamControl:
-    """A parameter's control in one browser."""
+    """A parameter's control in one browser.
+
+    Args:
+        place: where it is added.
+        param: the parameter.
+        value: the one in force; unsaved: whether it differs from the file's.
+        put: called when a person asks for another value.
+        refuse: called with words when what was typed cannot be read.
+        order: its place among the others.
+    """
 
     def __init__(
         self,
-        gui: viser.GuiApi,
+        place: Container,
         param: ParamInfo,
         value: object,
         unsaved: bool,
@@ -101,98 +109,69 @@ class ParamControl:
         refuse: Callable[[str], None],
         order: float,
     ) -> None:
-        """Add the control where ``gui`` adds now.
-
-        put: called when a person asks for another value; refuse: when it cannot be read
-        """
-        self.param = param
-        self.order = order
-        self._put = put
-        self._refuse = refuse
-        self._unsaved = unsaved
-        self._form: viser.GuiFormHandle | None = None
-        text = label(param, unsaved)
-        self._handle = self._add(gui, text, value, order)
-        if self._form is None:
-            self._listen()
-        else:
-            self._listen_to_enter(self._form)
+        self.param, self.order = param, order
+        self._put, self._refuse = put, refuse
+        self.field = self._add(place, label(param, unsaved), value, order)
+        self.field.on_change(lambda shown, _: self._asked(shown))
 
     def _add(
-        self, gui: viser.GuiApi, text: str, value: object, order: float
-    ) -> viser.GuiInputHandle[object]:
+        self, place: Container, text: str, value: object, order: float
+    ) -> Checkbox | Choice | Slider | TextField:
         param, tooltip = self.param, hint(self.param)
-        handle: object
         if param.kind == "bool" and not param.optional:
-            handle = gui.add_checkbox(text, bool(value), hint=tooltip, order=order)
-        elif param.choices and not param.optional and value in param.choices:
+            return place.checkbox(text, bool(value), hint=tooltip, order=order)
+        if param.choices and not param.optional and value in param.choices:
             names = tuple(map(str, param.choices))
-            handle = gui.add_dropdown(
-                text, names, initial_value=str(value), hint=tooltip, order=order
-            )
-        elif slides(param, value):
-            handle = self._slider(gui, text, value, order)
+            return place.choice(text, names, str(value), hint=tooltip, order=order)
+        if slides(param, value):
+            return self._slider(place, text, value, order)
+        shown = written(param, value)
+        return place.text(text, shown, hint=f"{tooltip}; Enter sets it", order=order)
+
+    def _slider(self, place: Container, text: str, value: object, order: float) -> Slider:
+        low, high = cast(float, self.param.low), cast(float, self.param.high)
+        now, whole, step = cast(float, value), self.param.kind == "whole", step_of(low, high)
+        if whole:
+            step = max(1, round(step)) if high - low > 500 else 1
+        return place.slider(
+            text, (low, high), step, now, hint=hint(self.param), whole=whole, order=order
+        )
+
+    def _asked(self, shown: object) -> None:
+        """Ask for what a person has set."""
+        try:
+            value = self._meant(shown)
+        except ValueError as error:
+            self._refuse(str(error))
         else:
-            # A number on its way to what is meant is another number: only Enter counts.
-            self._form = gui.add_form(None, order=order)
-            with self._form:
-                handle = gui.add_text(text, written(param, value), hint=f"{tooltip}; Enter sets it")
-        return cast("viser.GuiInputHandle[object]", handle)
-
-    def _slider(self, gui: viser.GuiApi, text: str, value: object, order: float) -> object:
-        param = self.param
-        assert param.low is not None and param.high is not None  # slides() has seen to it
-        if param.kind == "whole":
-            low, high, now = int(param.low), int(param.high), int(cast(int, value))
-            step: float = max(1, round(step_of(low, high))) if high - low > 500 else 1
-            return gui.add_slider(text, low, high, int(step), now, hint=hint(param), order=order)
-        low_, high_, now_ = float(param.low), float(param.high), float(cast(float, value))
-        step = step_of(low_, high_)
-        return gui.add_slider(text, low_, high_, step, now_, hint=hint(param), order=order)
-
-    def _listen(self) -> None:
-        @self._handle.on_update
-        async def _(event: viser.GuiEvent[viser.GuiInputHandle[object]]) -> None:
-            if event.client_id is not None:  # else it was set from here
-                self._put(self.param.key, self._meant(event.target.value))
-
-    def _listen_to_enter(self, form: viser.GuiFormHandle) -> None:
-        @form.on_submit
-        async def _(event: viser.GuiEvent[viser.GuiFormHandle]) -> None:
-            try:
-                value = read(self.param, str(self._handle.value))
-            except ValueError as error:
-                self._refuse(str(error))
-            else:
-                self._put(self.param.key, value)
+            self._put(self.param.key, value)
 
     def _meant(self, shown: object) -> object:
-        """Return the choice that a name stands for; anything else is itself."""
+        """Return the choice that a name stands for, what a text says, or the value itself.
+
+        Raises:
+            ValueError: the text cannot be read.
+        """
+        if isinstance(self.field, TextField):
+            return read(self.param, str(shown))
         return next((c for c in self.param.choices if str(c) == shown), shown)
 
     def show(self, value: object, unsaved: bool) -> None:
         """Show the value in force."""
-        shown: object = value
-        if self._form is not None:
-            shown = written(self.param, value)
-        elif self.param.choices:
-            shown = str(value)
-        now = self._handle.value
-        near = (
-            isinstance(shown, int | float)
-            and isinstance(now, int | float)
-            and isclose(shown, now, rel_tol=1e-12)
-        )
-        if shown is not None and not near and now != shown:
-            put(self._handle, shown)
-        if unsaved != self._unsaved:
-            self._unsaved = unsaved
-            self._handle.label = label(self.param, unsaved)
+        self.field.label = label(self.param, unsaved)
+        if isinstance(self.field, TextField):
+            self.field.value = written(self.param, value)
+        elif isinstance(self.field, Choice):
+            self.field.value = str(value)
+        elif isinstance(self.field, Checkbox):
+            self.field.value = bool(value)
+        elif isinstance(value, int | float) and not isclose(value, self.field.value, rel_tol=1e-12):
+            self.field.value = value
 
     def can_show(self, value: object) -> bool:
         """Return whether this control can show a value: a slider cannot show null."""
-        return self._form is not None or value is not None
+        return isinstance(self.field, TextField) or value is not None
 
     def remove(self) -> None:
         """Remove the control."""
-        (self._form or self._handle).remove()
+        self.field.remove()

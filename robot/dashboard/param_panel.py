@@ -9,11 +9,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import cast
 
-import viser
-
+from gazerig.robot.dashboard.container import Container
+from gazerig.robot.dashboard.html import note
 from gazerig.robot.dashboard.outbox import Outbox
 from gazerig.robot.dashboard.param_control import ParamControl
-from gazerig.robot.dashboard.widget import put
+from gazerig.robot.dashboard.widgets import Widgets
 from gazerig.robot.remote.param_info import ParamInfo
 
 MOST_SHOWN = 30
@@ -21,37 +21,45 @@ SAVE, REVERT = "save", "revert to the file"
 NOTHING, UNSAVED, DIFFERENT = "choose a group ...", "what is not saved", "what differs from default"
 
 _OF_TUNING = ":tuning"
-_REFUSED_S = 12.0
-_SAID_S = 8.0
+_NO_TAKER = "the rig takes nothing now"
+_SAVE: dict[str, object] = {"do": "save", "path": None}
+_REVERT: dict[str, object] = {"do": "revert"}
 
 
 class ParamState:
     """The parameters, and one panel of controls for each browser."""
 
-    def __init__(self, server: viser.ViserServer, tab: viser.GuiTabHandle, outbox: Outbox) -> None:
-        self._tab = tab
-        self._outbox = outbox
+    def __init__(self, widgets: Widgets, place: Container, outbox: Outbox) -> None:
+        self._widgets, self._place, self._outbox = widgets, place, outbox
         self._params: dict[str, ParamInfo] = {}
         self._panels: dict[str, ParamPanel] = {}
-        # A tab takes one builder at a time, and browsers come and go in a thread of their own.
+        # What people do, and that they come and go, is told in a thread of its own.
         self._lock = threading.RLock()
         self.in_force: dict[str, object] = {}
         self._unsaved: frozenset[str] = frozenset()
         self._path = ""
-        self._clients = server.get_clients
-        server.on_client_connect(self._greet)
-        server.on_client_disconnect(self._forget)
+        self._over = False
+        widgets.on_join(self._greet)
+        widgets.on_leave(self._forget)
 
-    async def _greet(self, client: viser.ClientHandle) -> None:
+    def leave(self) -> None:
+        """Have no parameters any more."""
         with self._lock:
-            panel = ParamPanel(client, self._tab, self._outbox, self._lock)
+            self._over = True
+            self._panels.clear()
+
+    def _greet(self, client: str) -> None:
+        with self._lock:
+            if self._over:
+                return
+            panel = ParamPanel(self._widgets, client, self._place, self._outbox, self._lock)
             panel.offer(self._params)
             panel.take(self.in_force, self._unsaved, self._path)
-            self._panels[str(client.client_id)] = panel
+            self._panels[client] = panel
 
-    async def _forget(self, client: viser.ClientHandle) -> None:
+    def _forget(self, client: str) -> None:
         with self._lock:
-            self._panels.pop(str(client.client_id), None)
+            self._panels.pop(client, None)
 
     def params(self, params: Sequence[Mapping[str, object]]) -> None:
         """Add parameters that can be tuned."""
@@ -71,81 +79,69 @@ class ParamState:
             for panel in self._panels.values():
                 panel.take(self.in_force, self._unsaved, self._path)
 
-    def answered(self, who: str, text: str | None) -> None:
-        """Pass the rig's answer on to who asked; other messages go to all users."""
+    def answered(self, who: str) -> None:
+        """Record that the rig has answered who asked for a change."""
         client, _, of_tuning = who.partition(":")
         with self._lock:
             panel = self._panels.get(client)
             if panel is not None and of_tuning:
                 panel.answered()
-        if not text:
-            return
-        clients = self._clients()
-        asked = [c for c in clients.values() if str(c.client_id) == client]
-        for handle in asked or clients.values():
-            _notify(handle, text)
 
 
 class ParamPanel:
-    """The controls of one browser."""
+    """The controls of one browser; parameters come when they are chosen.
+
+    Args:
+        widgets: all panels.
+        client: the browser's tab.
+        place: where the controls stand.
+        outbox: takes requests for the rig.
+        lock: held by who changes the panels.
+    """
 
     def __init__(
         self,
-        client: viser.ClientHandle,
-        tab: viser.GuiTabHandle,
+        widgets: Widgets,
+        client: str,
+        place: Container,
         outbox: Outbox,
         lock: threading.RLock,
     ) -> None:
-        """Add search, groups and buttons; parameters come when they are chosen."""
-        self._client = client
-        self._gui = client.gui
-        self._tab = tab
+        self._widgets, self._client = widgets, client
         self._outbox = outbox
         self._lock = lock
-        self._who = f"{client.client_id}{_OF_TUNING}"
+        self._who = f"{client}{_OF_TUNING}"
         self._params: Mapping[str, ParamInfo] = {}
         self._values: Mapping[str, object] = {}
         self._unsaved: frozenset[str] = frozenset()
         self._controls: dict[str, ParamControl] = {}
         self._unanswered = 0
-        with tab:
-            self._build()
+        self._build(place.own(client))
         self._listen()
 
-    def _build(self) -> None:
-        gui = self._gui
-        self._words = gui.add_html(_note("nothing to tune has been named yet"), order=0)
-        self._buttons = gui.add_button_group("file", (SAVE, REVERT), order=1)
-        self._form = gui.add_form(None, order=2)
-        with self._form:
-            self._file = gui.add_text(
-                "save as", "", hint="a new .yaml file in the rig's folder; Enter saves"
-            )
-        self._find = gui.add_text("find", "", order=3, hint="words of a key or its meaning")
-        self._group = gui.add_dropdown("group", (NOTHING,), order=4)
-        self._folder = gui.add_folder("parameters", order=5)
-        self._rest = gui.add_html("", order=6)
+    def _build(self, place: Container) -> None:
+        self._find = place.text("find", on="key", hint="words of a key or its meaning", order=1)
+        self._group = place.choice("group", (NOTHING,), order=2)
+        self._found = place.section("parameters", order=3)
+        self._rest = place.html(order=4)
+        self._words = place.html(note("nothing to tune has been named yet"), order=0)
+        file = place.section("file", order=5)
+        self._buttons = file.buttons("", (SAVE, REVERT), order=2)
+        self._file = file.text(
+            "save as", on="enter", hint="a new .yaml file in the rig's folder; Enter saves", order=3
+        )
 
     def _listen(self) -> None:
-        @self._find.on_update
-        async def _(event: viser.GuiEvent[viser.GuiTextHandle]) -> None:
-            if event.client_id is not None:
-                self._show_chosen()
+        self._find.on_change(lambda text, _: self._show_chosen())
+        self._group.on_change(lambda group, _: self._choose())
+        self._buttons.on_press(lambda button, _: self._ask(_SAVE if button == SAVE else _REVERT))
+        self._file.on_change(
+            lambda path, _: self._ask({"do": "save", "path": path.strip() or None})
+        )
 
-        @self._group.on_update
-        async def _(event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
-            if event.client_id is not None:
-                put(self._find, "")
-                self._show_chosen()
-
-        @self._buttons.on_click
-        async def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
-            save = {"do": "save", "path": None}
-            self._ask(save if event.target.value == SAVE else {"do": "revert"})
-
-        @self._form.on_submit
-        async def _(event: viser.GuiEvent[viser.GuiFormHandle]) -> None:
-            self._ask({"do": "save", "path": self._file.value.strip() or None})
+    def _choose(self) -> None:
+        self._find.value = ""
+        self._show_chosen()
 
     def offer(self, params: Mapping[str, ParamInfo]) -> None:
         """Set the parameters that there are."""
@@ -157,9 +153,9 @@ class ParamPanel:
         """Update the values in force; a control that is being moved keeps its value."""
         self._values, self._unsaved = values, unsaved
         some = f"<b>● {len(unsaved)} not saved</b>" if unsaved else "all saved"
-        text = _note(f"{len(self._params)} parameters, {some}<br>{escape(path)}")
-        if self._words.content != text:
-            self._words.content = text
+        self._words.content = (
+            f"<div>{len(self._params)} parameters, {some}</div><div>{escape(path)}</div>"
+        )
         if not self._unanswered:
             self._refresh()
 
@@ -176,12 +172,11 @@ class ParamPanel:
                     control.show(self._values[key], key in self._unsaved)
                 else:
                     control.remove()
-                    with self._folder:
-                        self._controls[key] = self._control(key, control.order)
+                    self._controls[key] = self._control(key, control.order)
 
     def _ask(self, what: Mapping[str, object]) -> None:
         if not self._outbox.ask(what, self._who):
-            _notify(self._client, "refused: the rig takes nothing now")
+            self._say(_NO_TAKER)
             self._refresh()
 
     def _put(self, key: str, value: object) -> None:
@@ -189,12 +184,15 @@ class ParamPanel:
             self._unanswered += 1
             if not self._outbox.ask({"do": "set", "changes": {key: value}}, self._who):
                 self._unanswered -= 1
-                _notify(self._client, "refused: the rig takes nothing now")
+                self._say(_NO_TAKER)
                 self._refresh()
 
     def _refuse(self, text: str) -> None:
-        _notify(self._client, f"refused: {text}")
+        self._say(text)
         self._refresh()
+
+    def _say(self, refusal: str) -> None:
+        self._widgets.notify(refusal, self._client, refused=True)
 
     def _show_chosen(self) -> None:
         """Build the controls of what is searched for, or of the chosen group."""
@@ -202,16 +200,15 @@ class ParamPanel:
             wanted = self._chosen()
             for key in [key for key in self._controls if key not in wanted[:MOST_SHOWN]]:
                 self._controls.pop(key).remove()
-            with self._folder:
-                for place, key in enumerate(wanted[:MOST_SHOWN]):
-                    if key not in self._controls:
-                        self._controls[key] = self._control(key, float(place))
+            for order, key in enumerate(wanted[:MOST_SHOWN]):
+                if key not in self._controls:
+                    self._controls[key] = self._control(key, float(order))
             more = len(wanted) - MOST_SHOWN
-            self._rest.content = _note(f"and {more} more: search for less") if more > 0 else ""
+            self._rest.content = note(f"and {more} more: search for less") if more > 0 else ""
 
     def _control(self, key: str, place: float) -> ParamControl:
         return ParamControl(
-            self._gui,
+            self._found,
             self._params[key],
             self._values[key],
             key in self._unsaved,
@@ -246,20 +243,3 @@ def found(text: str, params: Iterable[ParamInfo]) -> list[str]:
         for param in params
         if all(word in f"{param.key} {param.description} {param.unit}".lower() for word in words)
     ]
-
-
-def _notify(client: viser.ClientHandle, text: str) -> None:
-    refused = text.startswith("refused")
-    client.add_notification(
-        "refused" if refused else "the rig says",
-        text.removeprefix("refused: "),
-        color="red" if refused else "blue",
-        auto_close_seconds=_REFUSED_S if refused else _SAID_S,
-    )
-
-
-def _note(html: str) -> str:
-    return (
-        "<div style='padding:4px 12px;font-size:12px;opacity:.85;overflow-wrap:anywhere'>"
-        f"{html}</div>"
-    )

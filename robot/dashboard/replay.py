@@ -1,4 +1,4 @@
-"""The page's place for a recording: a time slider, play and pause, speed, steps, what happened.
+"""The page's panel for a recording: a time slider, play and pause, speed, steps, what happened.
 
 What a person does is only told to the rig's side, which plays; what is shown here is what
 it says back, so that every browser shows the same.
@@ -8,72 +8,70 @@ from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from typing import Any
 
-import viser
-
+from gazerig.robot.dashboard.container import Container
 from gazerig.robot.dashboard.page_process import MARK_KINDS, SPEEDS
-from gazerig.robot.dashboard.widget import put
 
-Tell = Callable[[int, Mapping[str, object]], None]
-"""Hands what a person asks for to the rig's side: the browser's number, and the request."""
+Tell = Callable[[str, Mapping[str, object]], None]
+"""Hands what a person asks for to the rig's side: the browser's tab, and the request."""
 
 _WIDTH, _HEIGHT = 340, 26
-_ROWS = (("saccade", "#e8590c", 0, 12), ("blink", "#1c7ed6", 13, 6), ("event", "#d02f2f", 20, 6))
+_ROWS = (("saccade", "saccade", 0, 12), ("blink", "pursue", 13, 6), ("event", "alarm", 20, 6))
+"""Kind of mark, its colour, and where its row is."""
 _EVENTS_BEFORE, _EVENTS_AFTER = 2, 2
 _STEP_S = 0.005
 _WORDS = 90
+_PLAY, _PAUSE = "play", "pause"
 
 
 class ReplayView:
-    """The controls of a recording that is shown."""
+    """The controls of a recording that is shown.
 
-    def __init__(self, gui: viser.GuiApi, tell: Tell, duration_s: float) -> None:
+    Args:
+        place: where they stand.
+        tell: takes what people ask for.
+        duration_s: length of the recording.
+    """
+
+    def __init__(self, place: Container, tell: Tell, duration_s: float) -> None:
         self._tell = tell
         self._asked_s: float | None = None
         self._events: Sequence[tuple[float, str]] = ()
         self._duration_s = max(duration_s, _STEP_S)
-        window = gui.add_panel()
-        with window.add_tab("recording"):
-            self._place = gui.add_html(_frame(""))
-            self._slider = gui.add_slider("time, s", 0.0, self._duration_s, _STEP_S, 0.0)
-            self._strip = gui.add_html("")
-            self._play = gui.add_button("play", icon=viser.Icon.PLAYER_PLAY)
-            self._speed = gui.add_dropdown(
-                "speed", tuple(_speed_name(s) for s in SPEEDS), initial_value=_speed_name(1.0)
-            )
-            self._steps = [
-                gui.add_button_group(way, MARK_KINDS, hint=f"stand still at the {way} one")
-                for way in ("previous", "next")
-            ]
-            self._list = gui.add_html("")
-        window.dock_below(gui.main_panel)
+        self.place = place.html(order=1)
+        self.slider = place.slider("time, s", (0.0, self._duration_s), _STEP_S, 0.0, order=2)
+        self.strip = place.html(order=3)
+        self.play = place.buttons("", (_PLAY,), order=4)
+        speeds = tuple(_speed_name(speed) for speed in SPEEDS)
+        self.speed = place.choice("speed", speeds, _speed_name(1.0), order=5)
+        self.steps = {
+            way: place.buttons(way, MARK_KINDS, hint=f"stand still at the {way} one", order=6)
+            for way in ("previous", "next")
+        }
+        self.events = place.section("events", order=7).html()
         self._playing = False
         self._listen()
 
     def _listen(self) -> None:
-        @self._slider.on_update
-        def _(event: viser.GuiEvent[viser.GuiSliderHandle[float]]) -> None:
-            if event.client is not None:  # else it was moved by what is played
-                self._asked_s = float(event.target.value)
-                self._ask(event.client, {"seek_s": self._asked_s})
+        self.slider.on_change(self._seek)
+        self.play.on_press(lambda _, client: self._ask(client, {"play": not self._playing}))
+        self.speed.on_change(
+            lambda speed, client: self._ask(client, {"speed": float(speed.removesuffix("x"))})
+        )
+        for way, group in self.steps.items():
+            group.on_press(self._stepper(way))
 
-        @self._play.on_click
-        def _(event: viser.GuiEvent[viser.GuiButtonHandle]) -> None:
-            self._ask(event.client, {"play": not self._playing})
+    def _stepper(self, way: str) -> Callable[[str, str], None]:
+        def step(kind: str, client: str) -> None:
+            self._ask(client, {"step": f"{way} {kind}"})
 
-        @self._speed.on_update
-        def _(event: viser.GuiEvent[viser.GuiDropdownHandle[str]]) -> None:
-            if event.client is not None:
-                self._ask(event.client, {"speed": float(event.target.value[:-1])})
+        return step
 
-        for group in self._steps:
+    def _seek(self, at_s: float, client: str) -> None:
+        self._asked_s = at_s
+        self._ask(client, {"seek_s": at_s})
 
-            @group.on_click
-            def _(event: viser.GuiEvent[viser.GuiButtonGroupHandle]) -> None:
-                self._ask(event.client, {"step": f"{event.target.label} {event.target.value}"})
-
-    def _ask(self, client: viser.ClientHandle | None, asked: dict[str, object]) -> None:
-        if client is not None:
-            self._tell(client.client_id, {"replay": asked})
+    def _ask(self, client: str, asked: dict[str, object]) -> None:
+        self._tell(client, {"replay": asked})
 
     def show(self, state: Mapping[str, Any]) -> None:
         """Show where it stands, as gazerig.robot.recording.replay writes it: a player's State.
@@ -81,26 +79,25 @@ class ReplayView:
         Once there are also marks, counts along the recording by kind, and events, (at_s, words).
         """
         if (marks := state.get("marks")) is not None:
-            self._strip.content = strip(marks)
+            self.strip.content = strip(marks)
         if (events := state.get("events")) is not None:
             self._events = [(float(at_s), str(text)) for at_s, text in events]
         at_s, sought_s = float(state["at_s"]), state["sought_s"]
         # While a hand moves the slider, what is played is behind it and must not pull it back.
         if self._asked_s is None or sought_s == self._asked_s:
             self._asked_s = None
-            put(self._slider, min(round(at_s, 3), self._duration_s))
+            self.slider.value = min(round(at_s, 3), self._duration_s)
         self._show_playing(bool(state["playing"]), float(state["speed"]))
-        _put(self._place, place(at_s, self._duration_s, self._playing))
-        _put(self._list, event_list(self._events, at_s))
+        self.place.content = place_words(at_s, self._duration_s, self._playing)
+        self.events.content = event_list(self._events, at_s)
 
     def _show_playing(self, playing: bool, speed: float) -> None:
         if playing != self._playing:
             self._playing = playing
-            self._play.label = "pause" if playing else "play"
-            self._play.icon = viser.Icon.PLAYER_PAUSE if playing else viser.Icon.PLAYER_PLAY
+            self.play.options = (_PAUSE if playing else _PLAY,)
         name = _speed_name(speed)
-        if name in self._speed.options:
-            put(self._speed, name)
+        if name in self.speed.options:
+            self.speed.value = name
 
 
 def strip(marks: Mapping[str, Sequence[int]]) -> str:
@@ -111,13 +108,14 @@ def strip(marks: Mapping[str, Sequence[int]]) -> str:
     bars = "".join(
         _bars(marks.get(kind, ()), colour, top, height) for kind, colour, top, height in _ROWS
     )
-    legend = " &middot; ".join(
-        f"<span style='color:{colour}'>{kind}s</span>" for kind, colour, _, _ in _ROWS
+    legend = "".join(
+        f"<span><span class='swatch ground-{colour}'></span>{kind}s</span>"
+        for kind, colour, _, _ in _ROWS
     )
-    return _frame(
-        f"<svg viewBox='0 0 {_WIDTH} {_HEIGHT}' width='100%' preserveAspectRatio='none' "
-        f"style='display:block;height:{_HEIGHT}px;background:#8881'>{bars}</svg>"
-        f"<div style='font-size:11px'>{legend}</div>"
+    said = ", ".join(f"{sum(marks.get(kind, ()))} {kind}s" for kind, *_ in _ROWS)
+    return (
+        f"<svg viewBox='0 0 {_WIDTH} {_HEIGHT}' preserveAspectRatio='none' class='strip' "
+        f"role='img' aria-label='{said}'>{bars}</svg><div class='key'>{legend}</div>"
     )
 
 
@@ -126,20 +124,16 @@ def _bars(counts: Sequence[int], colour: str, top: int, height: int) -> str:
     most, width = max(counts, default=0), _WIDTH / max(len(counts), 1)
     return "".join(
         f"<rect x='{i * width:.1f}' y='{top}' width='{width:.1f}' height='{height}' "
-        f"fill='{colour}' fill-opacity='{0.25 + 0.75 * n / most:.2f}'/>"
+        f"fill='var(--{colour})' fill-opacity='{0.25 + 0.75 * n / most:.2f}'/>"
         for i, n in enumerate(counts)
         if n
     )
 
 
-def place(at_s: float, duration_s: float, playing: bool) -> str:
+def place_words(at_s: float, duration_s: float, playing: bool) -> str:
     """Show the present position in the recording."""
     word = "playing" if playing else "standing still"
-    return _frame(
-        f"{word}"
-        f"<span style='float:right;font-variant-numeric:tabular-nums'>"
-        f"{clock(at_s)} / {clock(duration_s)}</span>"
-    )
+    return f"<div class='ends'><span>{word}</span><span>{clock(at_s)} / {clock(duration_s)}</span></div>"
 
 
 def clock(seconds: float) -> str:
@@ -152,28 +146,15 @@ def event_list(events: Sequence[tuple[float, str]], at_s: float) -> str:
     """List the events about a time: the last two, and the next two paler."""
     past = [e for e in events if e[0] <= at_s + 1e-6][-_EVENTS_BEFORE:]
     coming = [e for e in events if e[0] > at_s + 1e-6][:_EVENTS_AFTER]
-    rows = [_event(*event, 1.0) for event in past] + [_event(*event, 0.5) for event in coming]
-    return _frame("".join(rows) or "no event")
+    rows = [_event(*event, "past") for event in past]
+    rows += [_event(*event, "quiet") for event in coming]
+    return "".join(rows) or "no event"
 
 
-def _event(at_s: float, text: str, opacity: float) -> str:
+def _event(at_s: float, text: str, kind: str) -> str:
     shown = text if len(text) <= _WORDS else f"{text[: _WORDS - 1]}…"
-    return (
-        f"<div style='opacity:{opacity};font-size:11.5px'>"
-        f"<span style='font-variant-numeric:tabular-nums'>{clock(at_s)}</span> "
-        f"{escape(shown)}</div>"
-    )
-
-
-def _put(html: viser.GuiHtmlHandle, content: str) -> None:
-    """Change words only where they differ: every change goes to every browser."""
-    if html.content != content:
-        html.content = content
+    return f"<div class='{kind}'>{clock(at_s)} {escape(shown)}</div>"
 
 
 def _speed_name(speed: float) -> str:
     return f"{speed:g}x"
-
-
-def _frame(inner: str) -> str:
-    return f"<div style='padding:2px 12px;font-size:13px;line-height:1.5'>{inner}</div>"

@@ -3,8 +3,8 @@
 from html import escape
 from typing import Literal
 
-from gazerig.robot.dashboard.html import AMBER, GREEN, GREY, LEVELS, RED, frame, heading, note, pill
-from gazerig.robot.dashboard.status import OLD_FRAME_S
+from gazerig.robot.dashboard.html import LEVELS, heading, note, pill
+from gazerig.robot.dashboard.status import OLD_FRAME_S, drawn_together, without_feedback
 from gazerig.robot.model.types import LoopFigures, Servos, Snapshot
 
 Strain = Literal["", "near", "over"]
@@ -13,14 +13,6 @@ Strain = Literal["", "near", "over"]
 _OLD_S = 0.15
 _HARD_LOAD = 0.9
 _LATE_SHARE = 0.5
-_GROUNDS: dict[Strain, str] = {
-    "": "",
-    "near": f"background:{AMBER};color:#fff",
-    "over": f"background:{RED};color:#fff;font-weight:700",
-}  # noqa: E501
-_TABLE = "width:100%;font-size:12px;border-collapse:collapse;line-height:1.55"
-_RIGHT = "text-align:right;padding:0 4px"
-_NOTHING = "text-align:center;padding:0 4px;opacity:.6;font-style:italic"
 
 NO_FEEDBACK = "no feedback"
 """Said in the place of figures that a servo does not tell."""
@@ -28,19 +20,31 @@ NO_FEEDBACK = "no feedback"
 
 def health(snapshot: Snapshot) -> str:
     """Return everything of the machine's health."""
-    level = "stopped" if snapshot.stopped else snapshot.level
-    reasons = (snapshot.stopped,) if snapshot.stopped else snapshot.reasons
-    said = "".join(f"<div>{escape(reason)}</div>" for reason in reasons)
-    return frame(
-        f"<div style='min-height:3em'>{pill(f'guard: {level}', LEVELS[level])}{said}</div>"
+    return (
+        guard(snapshot)
         + heading("servos")
+        + without_feedback(snapshot)
         + servo_table(snapshot.servos, snapshot.joints, snapshot.estimated)
-        + heading("loop and frame")
-        + _timing(snapshot.timing)
-        + _frame(snapshot.frame_age_s)
         + f"<div>{escape(snapshot.health)}</div>"
-        + f"<div style='opacity:.8;font-size:12px'>{escape(snapshot.perception)}</div>"
+        + heading("loop")
+        + _timing(snapshot.timing)
+        + heading("camera")
+        + _frame(snapshot.frame_age_s)
+        + f"<div>{escape(snapshot.perception)}</div>"
     )
+
+
+def guard(snapshot: Snapshot) -> str:
+    """Return what the guard does and why, in a place that does not grow when it limits a joint."""
+    level = "stopped" if snapshot.stopped else snapshot.level
+    if snapshot.stopped:
+        said = escape(snapshot.stopped)
+    elif level in ("hold", "torque_off"):
+        said = "".join(f"<div>{escape(reason)}</div>" for reason in snapshot.reasons)
+    else:
+        said = escape(drawn_together(snapshot.reasons))
+    words = f"guard: {level.replace('_', ' ')}"
+    return f"<div class='stay'>{pill(words, LEVELS[level])}<div>{said}</div></div>"
 
 
 def servo_table(servos: Servos, joints: tuple[str, ...], estimated: tuple[str, ...] = ()) -> str:
@@ -50,8 +54,8 @@ def servo_table(servos: Servos, joints: tuple[str, ...], estimated: tuple[str, .
     """
     if not servos.age_s:
         return note("nothing is known of the servos yet")
-    names = ("", "&deg;C", "load", "V", "silent", "")
-    head = "".join(f"<th style='font-weight:400;opacity:.7;{_RIGHT}'>{name}</th>" for name in names)
+    names = ("joint", "&deg;C", "load", "V", "silent")
+    head = "".join(f"<th scope='col'>{name}</th>" for name in names)
     rows = "".join(_row(servos, i, name, name in estimated) for i, name in enumerate(joints))
     explained = (
         "amber: the guard slows the joint down; red: it stands still, or the servo is silent or "
@@ -62,20 +66,22 @@ def servo_table(servos: Servos, joints: tuple[str, ...], estimated: tuple[str, .
             f". {NO_FEEDBACK}: the servo tells nothing, neither where it is nor how it does; a "
             "joint that jams or a rod that came off is not noticed"
         )
-    return f"<table style='{_TABLE}'><tr>{head}</tr>{rows}</table>{note(explained)}"
+    return (
+        f"<div class='scroll'><table><thead><tr>{head}</tr></thead>"
+        f"<tbody>{rows}</tbody></table></div>{note(explained)}"
+    )
 
 
 def _row(servos: Servos, i: int, joint: str, estimated: bool) -> str:
     silent = servos.unanswered[i] if servos.unanswered else None
     late: Strain = "over" if servos.age_s[i] > _OLD_S else ""
-    figures = f"<td colspan='3' style='{_NOTHING}'>{NO_FEEDBACK}</td>"
+    figures = f"<td colspan='3' class='nothing'>{NO_FEEDBACK}</td>"
     said = _said(servos, i)
-    colour = RED if said != "torque off" else GREY
-    more = f"<div style='color:{colour};font-weight:600;font-size:11px'>{escape(said)}</div>"
+    more = f"<div class='{'fault' if said != 'torque off' else 'quiet'}'>{escape(said)}</div>"
     return (
-        f"<tr style='border-top:1px solid #8882'><td>{escape(joint.replace('_', ' '))}"
-        f"{more if said else ''}</td>{figures if estimated else _figures(servos, i)}"
-        f"{_cell('-' if silent is None else str(silent), late)}<td></td></tr>"
+        f"<tr><th scope='row'>{escape(joint.replace('_', ' '))}"
+        f"{more if said else ''}</th>{figures if estimated else _figures(servos, i)}"
+        f"{_cell('-' if silent is None else str(silent), late)}</tr>"
     )
 
 
@@ -134,7 +140,7 @@ def _timing(timing: LoopFigures | None) -> str:
     late: Strain = "near" if timing.worst_ms > _LATE_SHARE * period_ms else ""
     over: Strain = "near" if timing.overruns else ""
     names = ("rate", "p50", "p99", "worst", "overruns")
-    head = "".join(f"<th style='font-weight:400;opacity:.7;{_RIGHT}'>{name}</th>" for name in names)
+    head = "".join(f"<th scope='col'>{name}</th>" for name in names)
     cells = (
         _cell(f"{timing.rate_hz:.1f} Hz", ""),
         _cell(f"{timing.p50_ms:.2f} ms", ""),
@@ -146,18 +152,21 @@ def _timing(timing: LoopFigures | None) -> str:
         f"off the slots, over the last {timing.over_s:.0f} s; "
         f"{timing.overruns_ever} slots overrun since the start"
     )
-    return f"<table style='{_TABLE}'><tr>{head}</tr><tr>{''.join(cells)}</tr></table>{note(said)}"
+    return (
+        f"<div class='scroll'><table><thead><tr>{head}</tr></thead>"
+        f"<tbody><tr>{''.join(cells)}</tr></tbody></table></div>{note(said)}"
+    )
 
 
 def _frame(age_s: float | None) -> str:
     if age_s is None:
         return "<div>no frame yet</div>"
-    colour = AMBER if age_s >= OLD_FRAME_S else GREEN
-    return f"<div>frame <b style='color:{colour}'>{1e3 * age_s:.0f} ms</b> old</div>"
+    kind = " class='warn'" if age_s >= OLD_FRAME_S else ""
+    return f"<div>frame <b{kind}>{1e3 * age_s:.0f} ms</b> old</div>"
 
 
 def _cell(text: str, strain: Strain) -> str:
-    return f"<td style='{_RIGHT};{_GROUNDS[strain]}'>{text}</td>"
+    return f"<td class='{strain}'>{text}</td>" if strain else f"<td>{text}</td>"
 
 
 def _at(column: tuple[float | None, ...], i: int) -> float | None:

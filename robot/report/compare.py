@@ -17,11 +17,11 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.gaze.types import Floats
+from gazerig.robot.analysis.norm_bands import BY_KEY
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.report.compare_page import MeasureDifference, Word, compare_page, mixed
 from gazerig.robot.report.files import write_all
 from gazerig.robot.report.gaze_trace import GazeTrace
-from gazerig.robot.report.norm_bands import BY_KEY
 from gazerig.robot.report.plotting import COLOURS, Shown
 from gazerig.robot.report.report import Progress, drawn, measured, read
 from gazerig.robot.report.run_header import RunHeader

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Literal, NamedTuple
 
+from gazerig.robot.analysis.norm_bands import GROUPS
 from gazerig.robot.control.feedback_basis import Basis
 from gazerig.robot.report.gaze_trace import GazeTrace
-from gazerig.robot.report.norm_bands import GROUPS
 from gazerig.robot.report.page import (
     Figure,
     banner,

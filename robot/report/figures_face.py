@@ -7,8 +7,8 @@ import numpy as np
 from gazerig.gaze.types import PART_NAMES, PARTS, Floats
 from gazerig.robot.analysis import human_norms as human
 from gazerig.robot.analysis.heatmap_face import HEIGHT_PX, WIDTH_PX, draw_face, on_canvas
+from gazerig.robot.analysis.norm_bands import FACE
 from gazerig.robot.report import face
-from gazerig.robot.report.norm_bands import FACE
 from gazerig.robot.report.plotting import (
     HUMAN,
     HUMAN_FILL,

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from gazerig.robot.analysis import human_norms as human
+from gazerig.robot.analysis.norm_bands import LIDS, SOCIAL
 from gazerig.robot.report import blinks
 from gazerig.robot.report import eye_contact as social
-from gazerig.robot.report.norm_bands import LIDS, SOCIAL
 from gazerig.robot.report.plotting import (
     HUMAN,
     HUMAN_FILL,

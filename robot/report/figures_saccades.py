@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from gazerig.robot.analysis import human_norms as human
+from gazerig.robot.analysis.norm_bands import SACCADES
 from gazerig.robot.report import saccades
-from gazerig.robot.report.norm_bands import SACCADES
 from gazerig.robot.report.plotting import (
     HUMAN,
     HUMAN_FILL,

@@ -4,9 +4,9 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from gazerig.robot.analysis.lid_opening import UPPER
+from gazerig.robot.analysis.norm_bands import GROUPS, LIDS, PARALLEL
 from gazerig.robot.control.feedback_basis import Basis, basis_of
 from gazerig.robot.model.types import in_order
-from gazerig.robot.report.norm_bands import GROUPS, LIDS, PARALLEL
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import jinja2
 
+from gazerig.robot.analysis.norm_bands import BANDS, GROUPS, NormBand
 from gazerig.robot.control.feedback_basis import ESTIMATED, Basis
 from gazerig.robot.report.gaze_trace import GazeTrace
 from gazerig.robot.report.joint_basis import JointBasis
-from gazerig.robot.report.norm_bands import BANDS, GROUPS, NormBand
 from gazerig.robot.report.plotting import Drawing
 from gazerig.robot.report.run_header import RunHeader
 from gazerig.robot.report.statistics import MeasureResult

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gazerig.drivers.errors import SetupError
+from gazerig.robot.analysis.norm_bands import BY_KEY, applies
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.report import (
     blinks,
@@ -24,7 +25,6 @@ from gazerig.robot.report import (
 )
 from gazerig.robot.report.files import write_all
 from gazerig.robot.report.gaze_trace import GazeTrace, GazeTraceBuilder
-from gazerig.robot.report.norm_bands import BY_KEY, applies
 from gazerig.robot.report.page import Figure, report_page
 from gazerig.robot.report.plotting import COLOURS, Drawing, Shown, caption_of, png
 from gazerig.robot.report.run_header import RunHeader

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.report.norm_bands import NormBand
+from gazerig.robot.analysis.norm_bands import NormBand
 
 VerdictWord = Literal["pass", "uncertain", "outside", "too few events"]
 """uncertain: the figure is outside, but what it may be by chance reaches into the band"""

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.report.norm_bands import BANDS, BY_KEY
+from gazerig.robot.analysis.norm_bands import BANDS, BY_KEY
 from gazerig.robot.sweep.axes import Axis, Point
 from gazerig.robot.sweep.outcome import REPORT, VERDICT, Outcome, grade
 from gazerig.robot.sweep.search import search

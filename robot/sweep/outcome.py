@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite
 from typing import NamedTuple
 
+from gazerig.robot.analysis.norm_bands import BANDS, BY_KEY
 from gazerig.robot.app.simulated_run import SimulatedRun
-from gazerig.robot.report.norm_bands import BANDS, BY_KEY
 from gazerig.robot.report.report import measured
 from gazerig.robot.report.statistics import MeasureResult, compared
 from gazerig.robot.sweep.axes import Point

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.report.norm_bands import BANDS, BY_KEY, NormBand
+from gazerig.robot.analysis.norm_bands import BANDS, BY_KEY, NormBand
 from gazerig.robot.sweep.axes import Axis
 from gazerig.robot.sweep.outcome import OUTSIDE, REPORT, Outcome
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.report.norm_bands import NormBand
+from gazerig.robot.analysis.norm_bands import NormBand
 from gazerig.robot.report.plotting import COLOURS, HUMAN_FILL, INK, Axes, Figure, nothing, png_of
 from gazerig.robot.sweep.axes import Axis
 from gazerig.robot.sweep.outcome import OUTSIDE, Outcome
