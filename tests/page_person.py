@@ -184,10 +184,11 @@ class Person:
             self.click(tab)
 
     def press(self, key: str, code: str, number: int) -> None:
+        text = {"text": key} if len(key) == 1 else {}  # others write nothing
         for kind in ("keyDown", "keyUp"):
             self.tab.ask(
                 "Input.dispatchKeyEvent",
-                type=kind, key=key, code=code, windowsVirtualKeyCode=number, text=key,
+                type=kind, key=key, code=code, windowsVirtualKeyCode=number, **text,
             )  # fmt: skip
 
     def space(self) -> None:

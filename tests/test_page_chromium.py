@@ -190,6 +190,68 @@ def test_a_target_is_dragged_through_the_scene(at_the_rig: tuple[Rig, Person]) -
     person.run(f"{view}.drawScene = false")
 
 
+def test_the_head_looks_at_the_pointer_until_it_rests(at_the_rig: tuple[Rig, Person]) -> None:
+    rig, person = at_the_rig
+    person.run("document.querySelector('#view').scrollIntoView()")
+    toggle = "document.querySelector('#pointer')"
+    # On a rig that may be a real one it leads only when asked to.
+    assert person.run(f"{toggle}.getAttribute('aria-pressed')") == "false"
+    person.click(toggle)
+    width, height, left, top = cast(
+        Any,
+        person.run(
+            "(() => { const r = document.querySelector('#view').getBoundingClientRect();"
+            "return [r.width, r.height, r.x, r.y]; })()"
+        ),
+    )
+    points = []
+    for across in (0.45, 0.55):
+        before = len(rig.orders)
+        person._mouse("mouseMoved", left + across * width, top + 0.5 * height, "none")
+        wait_for(lambda n=before: len(rig.orders) > n, "the pointer's point")  # type: ignore[misc]
+        look = rig.orders[-1]
+        assert isinstance(look, LookAt) and look.pointer and look.who.startswith("browser ")
+        points.append(present(look.p_world_m))
+    assert points[0] != points[1]
+    wait_for(lambda: person.reads("looks at the pointer of browser "), "who leads")
+    rig.pace_s = 0.01  # as fast as real time
+    wait_for(lambda: not present(rig.newest).lead.active, "the pointer letting go")
+    assert present(rig.newest).lead.ended == "not renewed"
+    rig.pace_s = PACE_S
+    person.click(toggle)
+    before = len(rig.orders)
+    person._mouse("mouseMoved", left + 0.5 * width, top + 0.4 * height, "none")
+    person.wait_for_frames(UNHURRIED_FRAMES)
+    assert rig.orders[before:] == []
+
+
+def test_the_space_bar_stops_in_the_frame_of_the_view_too(at_the_rig: tuple[Rig, Person]) -> None:
+    rig, person = at_the_rig
+    view = "document.querySelector('#view')"
+    person.run(f"{view}.focus(); {view}.contentWindow.focus()")
+    assert person.run(f"document.activeElement === {view}") is True
+    person.space()
+    wait_for(lambda: "the space bar was pressed on the page (" in rig.robot.stopped, "the stop")
+    resumed(rig, person)
+
+
+def test_a_drawer_opens_by_its_tab_and_closes_by_escape(at_the_rig: tuple[Rig, Person]) -> None:
+    _, person = at_the_rig
+    selected = "document.querySelector('#tab-health').getAttribute('aria-selected')"
+    focus = "document.activeElement.id"
+    person.run("document.querySelector('#tab-watch').focus()")
+    for key in ("ArrowRight", "ArrowRight", "ArrowRight"):
+        person.press(key, key, 39)
+    assert person.run(focus) == "tab-health" and person.run(selected) == "false"
+    person.press("\r", "Enter", 13)
+    wait_for(lambda: person.run(selected) == "true", "the drawer")
+    assert person.run("document.querySelector('#drawer-health').checkVisibility()") is True
+    person.press("Escape", "Escape", 27)
+    wait_for(lambda: person.run(selected) == "false", "the drawer being shut")
+    assert person.run(focus) == "tab-health"
+    assert person.run("document.querySelector('#drawer').checkVisibility()") is False
+
+
 def test_a_parameter_is_found_changed_marked_and_put_back(
     at_the_rig: tuple[Rig, Person],
 ) -> None:

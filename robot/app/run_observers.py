@@ -81,6 +81,7 @@ class RunObservers:
         self._steer = steer
         self._made, self._fast, self._say = made, options.fast, say
         self._timing = LoopTiming(made.loop.rate_hz)
+        self._emulated = options.mock and steer is None
         self._tuning, self._recorder = tuning, recorder
         about = {"rig": options.rig, "pid": os.getpid()}
         self._live = (
@@ -130,7 +131,7 @@ class RunObservers:
         return Publisher(page, self._live_rig, self._run_state, feed, self._say)
 
     def _live_rig(self) -> LiveRig:
-        return LiveRig(self._made.loop.rate_hz, self._made.shown())
+        return LiveRig(self._made.loop.rate_hz, self._made.shown(), self._emulated)
 
     def _run_state(self) -> RunState:
         """Return what the page shows and ticks do not tell."""

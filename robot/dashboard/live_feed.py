@@ -34,10 +34,14 @@ _NEAREST_M = 0.05
 
 
 class LiveRig(NamedTuple):
-    """A running rig: the rate of its loop, and how it is built."""
+    """A running rig: the rate of its loop, and how it is built.
+
+    emulated: its servos are, and nobody calibrates them
+    """
 
     rate_hz: float
     shown: ShownRig
+    emulated: bool = False
 
 
 class RunState(NamedTuple):
@@ -109,9 +113,13 @@ def frame_message(
 
 
 class LiveFeed:
-    """Takes what the rig's side sends; returns what there is to show."""
+    """Takes what the rig's side sends; returns what there is to show.
+
+    emulated: the servos are; False before the rig has said so
+    """
 
     def __init__(self) -> None:
+        self.emulated = False
         self._builder: SnapshotBuilder | None = None
         self._poses: PoseHistory | None = None
         self._percept: Percept | None = None
@@ -172,6 +180,7 @@ class LiveFeed:
             self._poses = PoseHistory(rig.shown.kinematics)
         self._builder.rig = rig.shown
         self._builder.retune(rig.rate_hz)
+        self.emulated = rig.emulated
 
     def _take_ticks(self, data: bytes) -> None:
         if self._builder is None or self._poses is None:

@@ -144,6 +144,7 @@ def watch(feed: socket.socket, view: PageView, parent: int, served: Served) -> N
             news = drain(feed, live)
             if news.ended:
                 return
+            view.emulated = live.emulated
             view.show(news)
             if news.snapshots:
                 pointer.p_world_eyes_m = news.snapshots[-1].p_world_head_m

@@ -27,7 +27,10 @@ _REFUSED = "refused: "
 
 
 class PageView:
-    """Scene and panels of one server."""
+    """Scene and panels of one server.
+
+    emulated: the rig's servos are, so that no harm is done by a pointer that leads unasked
+    """
 
     def __init__(
         self,
@@ -55,6 +58,7 @@ class PageView:
         self._replay: ReplayView | None = None
         self._newest: Snapshot | None = None
         self._menus: Mapping[str, Sequence[str]] = {}
+        self.emulated = False
         self._jpeg: bytes | None = None
         self._image: ImageArray | None = None
         self._drawn = self._watched = False
@@ -106,6 +110,7 @@ class PageView:
             "stopped": stopped,
             "silent": False,
             "without_feedback": without_feedback,
+            "emulated": self.emulated,
             "refused": refused_moves(self._menus, shot.joints if shot else None),
             **leads_state(shot.leader if shot else Leader(), shot),
         }

@@ -42,6 +42,7 @@ function show(now) {
   $("#busy").hidden = !state.busy;
   document.title = `${state.stopped ? "■ stopped - " : state.silent ? "! silent - " : ""}gazerig`;
   $("#dock").hidden = Boolean(state.recording);
+  followUnasked();
   for (const button of moves) {
     const why = state.refused?.[button.textContent.trim()];
     if (why) button.setAttribute("aria-disabled", "true");
@@ -106,6 +107,14 @@ setInterval(() => {
   sentAt = now;
   tell({ point: pointer });
 }, POINT_MS);
+
+// Unasked it follows where no real head would turn away from the people before it.
+let begun = false;
+function followUnasked() {
+  if (begun || state.emulated === undefined) return;
+  begun = true;
+  $("#pointer").setAttribute("aria-pressed", String(state.emulated));
+}
 
 $("#pointer").addEventListener("click", () => { takesOver = toggled($("#pointer")); });
 
