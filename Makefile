@@ -69,19 +69,33 @@ figures: $(VENV)/.installed-dev
 clean:
 	rm -rf $(VENV) .links build dist site *.egg-info
 
+# One line that is written over again as an installer goes on; errors stay. Without a terminal, nothing
+# is rewritten.
+define progress
+	awk -v tty="$$(test -t 2 && echo 1)" '\
+	  /^ERROR|^error|^  (x|×|╰|├|hint)|Traceback/ { bad = 1 } \
+	  bad { print; next } \
+	  tty && /Collecting|Downloading|Downloaded|Building|Built|Installing|Resolved|Prepared|Installed/ \
+	    { printf "\r\033[K%s", substr($$0, 1, 76); fflush() } \
+	  END { if (tty) printf "\r\033[K" }'
+endef
+
 # $(call install,WHAT) makes the environment and installs WHAT into it.
 define install
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' \
 	  || { echo "$(PYTHON) is older than 3.11: give another, make PYTHON=python3.11 ..." >&2; exit 2; }
+	@echo "installing gazerig and what it needs into $(VENV): a minute or two, the first time only"
 	@if command -v uv >/dev/null 2>&1; then \
 	  { test -x $(BIN)/python || uv venv -q --python $(PYTHON) $(VENV); } \
-	    && uv pip install -q --python $(BIN)/python -e '$(1)'; \
+	    && { uv pip install --no-progress --python $(BIN)/python -e '$(1)' 2>&1; \
+	         echo $$? > $(VENV)/.status; } | $(progress) && test "$$(cat $(VENV)/.status)" = 0; \
 	else false; fi \
 	|| { { test -x $(BIN)/pip || $(PYTHON) -m venv --clear $(VENV) \
 	         || { $(PYTHON) -m pip install -q --user virtualenv \
 	              && $(PYTHON) -m virtualenv -q --clear $(VENV); }; } \
-	     && $(BIN)/python -m pip install -q -e '$(1)'; }
-	@touch $@
+	     && { $(BIN)/python -m pip install --progress-bar off -e '$(1)' 2>&1; \
+	          echo $$? > $(VENV)/.status; } | $(progress) && test "$$(cat $(VENV)/.status)" = 0; }
+	@rm -f $(VENV)/.status; touch $@
 endef
 
 # A second version of the servo maker's SDK, beside the environment: it judges the emulated bus.

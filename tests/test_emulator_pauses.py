@@ -4,7 +4,10 @@ import pytest
 from maestro_world import World, acceleration, speed, target
 from servo_bench import FeetechBench
 
+from gazerig.config.schema import load_rig
 from gazerig.drivers.dynamixel.control_table import MODELS
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import RunOptions
 from gazerig.sim_mock.dynamixel.servo import DynamixelServo
 from gazerig.sim_mock.smart_servo.controller import Loop
 from gazerig.sim_mock.smart_servo.motor import Shaft
@@ -170,3 +173,22 @@ def test_a_maestro_whose_script_runs_all_night_answers(timeout_s, monkeypatch):
     assert here[0] == (0 if timeout_s else 6000)
     swung = {world.after(0.5).position(3) for _ in range(8)}
     assert len(swung) > 1
+
+
+@pytest.mark.parametrize("rig", ["desk", "feetech", "maker", "expressive"])
+def test_a_whole_rig_that_nobody_asked_for_an_hour_answers_its_next_question(rig, lived_ms):
+    made = assemble(load_rig(rig), RunOptions(mock=True, fast=True, rig=rig, scene="visitor"))
+    robot, clock = made.robot, made.clock
+    robot.start(clock)
+    try:
+        for k in range(100):
+            clock.sleep_until(0.005 * (k + 1))
+            robot.tick(clock.now_s(), 0.005)
+        lived_ms[0] = 0
+        clock.sleep_until(HOUR_S)
+        joints = robot.body.read(clock.now_s())
+        assert not joints.missing
+        assert lived_ms[0] <= 5_000 * len(made.robot.body.names)
+    finally:
+        robot.stop()
+        made.close()

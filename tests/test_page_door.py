@@ -16,7 +16,7 @@ from typing import Any
 import msgspec
 import pytest
 import viser
-from page_at_the_door import ELSEWHERE, OPENED, PATIENCE_S, VISER, Rig, opened
+from page_at_the_door import ELSEWHERE, OPENED, PATIENCE_S, TOKEN, VISER, Rig, fetch, opened
 from page_visitor import LOOKING
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
@@ -195,6 +195,15 @@ def test_a_browser_that_is_silent_renews_nothing_though_its_connection_stands(ne
                 break
             time.sleep(0.05)
         assert near.asked[-1]["do"] == "renew"
+
+
+def test_the_address_that_a_program_is_handed_opens_the_page_once(near: Rig) -> None:
+    near.door.once = "once-and-no-more"
+    assert fetch(f"{near.url}/?token=wrong")[0] == 403
+    status, headers, _ = fetch(f"{near.url}/?token=once-and-no-more")
+    assert status == 302 and TOKEN in headers["Set-Cookie"] + str(headers)
+    assert fetch(f"{near.url}/?token=once-and-no-more")[0] == 403
+    assert fetch(f"{near.url}/?token={TOKEN}")[0] == 302 and near.door.once == ""
 
 
 def test_what_the_rig_does_not_take_is_told(near: Rig) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 
 from gazerig.config.gestures import gestures_of
 from gazerig.config.schema import Rig, load_rules, load_walk
+from gazerig.config.shipped import shipped_names
 from gazerig.drivers.camera.depth_roi import depth_at
 from gazerig.drivers.camera.pose_buffer import PoseBuffer
 from gazerig.drivers.errors import SetupError
@@ -160,7 +161,9 @@ def assemble(rig: Rig, options: RunOptions, substitutes: Substitutes = RIGS_OWN)
     kinematics = kinematics_of(rig)
     camera, notes = _camera_params(rig, options, kinematics)
     walk = load_walk(rig.gaze.scanpath.transition_matrix)
-    note = row_sums_note(walk)
+    table = rig.gaze.scanpath.transition_matrix
+    shipped = table in shipped_names("scanpaths") and not options.verbose
+    note = row_sums_note(walk) if not shipped else None
     sight = _sight(kinematics, camera, options, scene is None)
     wires = run_bus(rig, options, clock)
     messages: list[str] = []

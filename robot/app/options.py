@@ -34,6 +34,8 @@ class RunOptions:
         heatmap: PNG to write; heatmap_face: image of a face to lay it over.
         record: file to record to; record_pictures: camera frames a second in it.
         force: write over older files.
+        no_browser: leave opening the page to the user.
+        verbose: say also what concerns nobody but who looks for it.
         summary: file of the figures, "-" for standard output.
         bus: what replaces the servos, "emulated" (byte-true, the default) or "ideal" (a lag).
     """
@@ -66,6 +68,8 @@ class RunOptions:
     record: Path | None = None
     record_pictures: float = 2.0
     force: bool = False
+    no_browser: bool = False
+    verbose: bool = False
     summary: str | None = None
     bus: str | None = None
 

@@ -65,6 +65,7 @@ class RunObservers:
         status: rewrites the status line; None: there is none.
         tuning: the parameters; None if they cannot be changed from outside.
         recorder: records the run.
+        browse: opens the page in the user's browser.
         steer: buttons that lead the head; otherwise the page can then only stop and resume.
     """
 
@@ -77,8 +78,9 @@ class RunObservers:
         tuning: ParamStore | None = None,
         recorder: "Recorder | None" = None,
         steer: SteeringButtons | None = None,
+        browse: Callable[[str], object] | None = None,
     ) -> None:
-        self._steer = steer
+        self._steer, self._browse = steer, browse
         self._made, self._fast, self._say = made, options.fast, say
         self._timing = LoopTiming(made.loop.rate_hz)
         self._emulated = options.mock and steer is None
@@ -128,7 +130,7 @@ class RunObservers:
     def _made_publisher(self, page: PageProcess) -> Publisher:
         tuning = self._tuning
         feed = ParamFeed(page.send, tuning) if tuning is not None else None
-        return Publisher(page, self._live_rig, self._run_state, feed, self._say)
+        return Publisher(page, self._live_rig, self._run_state, feed, self._say, self._browse)
 
     def _live_rig(self) -> LiveRig:
         return LiveRig(self._made.loop.rate_hz, self._made.shown(), self._emulated)

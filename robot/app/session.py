@@ -19,7 +19,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.run_observers import RunObservers
 from gazerig.robot.app.scripted_behaviour import ScriptedBehaviour
-from gazerig.robot.control.event_text import drawn_together
+from gazerig.robot.control.event_text import drawn_together, is_register_change
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.joint_faults import JointFaults
 from gazerig.robot.control.loop import LoopCount, Robot, Tick, TickLoop
@@ -98,6 +98,7 @@ def run(
     say: Callable[[str], None],
     status: Callable[[str], None] | None = None,
     watch: Callable[[Tick], object] | None = None,
+    browse: Callable[[str], object] | None = None,
 ) -> dict[str, object]:
     """Run until the time is over, a signal comes or something fails; return the figures.
 
@@ -107,12 +108,13 @@ def run(
         say: writes a line.
         status: rewrites the status line; None: there is none.
         watch: gets every tick.
+        browse: opens the page in the user's browser; None: leaves that to the user.
 
     Raises:
         SetupError: before anything moved.
     """
     try:
-        return Session(composed, stopped, say, status, watch).whole()
+        return Session(composed, stopped, say, status, watch, browse).whole()
     finally:
         composed.made.close()
 
@@ -130,12 +132,13 @@ class Session:
         say: Callable[[str], None],
         status: Callable[[str], None] | None = None,
         watch: Callable[[Tick], object] | None = None,
+        browse: Callable[[str], object] | None = None,
     ) -> None:
         options, made = composed.options, composed.made
         self._options, self._made, self._stopped = options, made, stopped
         self._say = say = _never_raising(say)
         self._run_observers = RunObservers(
-            made, options, say, status, composed.tuning, composed.recorder
+            made, options, say, status, composed.tuning, composed.recorder, browse=browse
         )
         self._summary, self._faults = Summary(), JointFaults(say)
         scene = made.scene
@@ -209,7 +212,7 @@ class Session:
                 leaving.switch_on(lambda: made.robot.start(made.clock, self._interrupts.refuse))
                 begun = True
                 self._start_s = made.clock.now_s()
-                for note in (*made.notes, *drawn_together(made.robot.body.bus.events())):
+                for note in (*made.notes, *self._start_events()):
                     say(note)
                 run_observers.open()
                 loop = TickLoop(
@@ -224,6 +227,13 @@ class Session:
                 run_observers.close(self._count)
             else:
                 run_observers.give_up()
+
+    def _start_events(self) -> list[str]:
+        """Return what the bus did to begin; of emulated servos, not which registers were set."""
+        events, options = self._made.robot.body.bus.events(), self._options
+        if options.mock and not options.verbose:
+            events = tuple([event for event in events if not is_register_change(event)])
+        return drawn_together(events)
 
     def _unwritten_heatmap(self) -> Path | None:
         """Write the heat map where one is asked for; return its file where that failed."""

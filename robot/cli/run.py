@@ -12,6 +12,7 @@ import typer
 from gazerig.drivers.file_output import refuse_existing, write_file
 from gazerig.robot.app.options import RunOptions, camera_of
 from gazerig.robot.cli import run_options as options
+from gazerig.robot.cli.browser import desktop_here, open_page
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
 from gazerig.robot.control.joint_faults import JointFault, named
@@ -43,6 +44,8 @@ def run(
     saccade: options.Saccade = None,
     page: options.Page = "127.0.0.1:8080",
     no_page: options.NoPage = False,
+    no_browser: options.NoBrowser = False,
+    verbose: options.Verbose = False,
     heatmap: options.Heatmap = None,
     heatmap_face: options.HeatmapFace = None,
     record: options.Record = None,
@@ -56,16 +59,28 @@ def run(
     with clear_errors(rig, port, mock):
         asked = asked.checked()
         refuse_existing(*asked.written_at_the_end, force=force)
+        shows = status if not fast and sys.stderr.isatty() else None
+        if not fast:
+            say(what_runs(asked))
+        if shows is not None:
+            shows("loading: a few seconds ...")
         # Vision and emulator are heavy; `check` and `--help` do without them.
         from gazerig.robot.app import session
 
         composed = session.compose(asked)
-        shows = status if not fast and sys.stderr.isatty() else None
+        browse = open_page if not no_browser and desktop_here() else None
         with signals() as stopped:
-            figures = session.run(composed, stopped, say, shows)
+            figures = session.run(composed, stopped, say, shows, browse=browse)
         _write_summary(figures, summary, force)
     if had_faults(figures, say) or "not_written" in figures:
         raise typer.Exit(FAULT)
+
+
+def what_runs(asked: RunOptions) -> str:
+    """Return what is started, and how it is ended, in one line."""
+    servos = "emulated servos" if asked.mock else "its servos"
+    sight = asked.looks_through or f"a simulated scene, {asked.scene}"
+    return f"{asked.rig}: {servos}; it looks at {sight}. Ctrl-C parks the head and ends."
 
 
 def had_faults(figures: Mapping[str, Any], say: Callable[[str], None]) -> bool:

@@ -85,6 +85,13 @@ Page = Annotated[
     ),
 ]
 NoPage = Annotated[bool, typer.Option(help="Without the live page.")]
+NoBrowser = Annotated[
+    bool,
+    typer.Option("--no-browser", help="Leave opening the page to you; else the browser shows it."),
+]
+Verbose = Annotated[
+    bool, typer.Option("--verbose", help="Say also which registers are set and tables adjusted.")
+]
 Heatmap = Annotated[
     Path | None, typer.Option(help="Write a heat map of the gaze on the face as PNG.")
 ]

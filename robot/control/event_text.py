@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterable, Sequence
 
 _SERVO = re.compile(r"servo (\d+)")
+_REGISTER = re.compile(r": .+ (-?\d+ -> -?\d+|set)$")
 
 
 def drawn_together(events: Iterable[str]) -> list[str]:
@@ -22,6 +23,11 @@ def drawn_together(events: Iterable[str]) -> list[str]:
         who = f"servos {runs(ids)}" if several else ", ".join(filter(None, names))
         lines.append(f"{who}: {what}" if who else what)
     return lines
+
+
+def is_register_change(event: str) -> bool:
+    """Return whether an event says that a register of a servo was set, and nothing else."""
+    return _REGISTER.search(event) is not None
 
 
 def runs(numbers: Sequence[int]) -> str:

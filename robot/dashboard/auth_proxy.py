@@ -64,6 +64,7 @@ Point = Callable[[object, str], bool]
 class AuthProxy:
     """Lets people in to the server behind it, from a thread of its own.
 
+    once: another token, which opens the page one time; "" for none
     point: takes where a browser's pointer is, which is not answered; set before ``open``
     """
 
@@ -86,6 +87,7 @@ class AuthProxy:
         self._ask = ask
         self._stop = stop
         self.token = token
+        self.once = ""
         self.point: Point = _nowhere
         self.browsers = Browsers(token)
         self.widgets = Widgets()
@@ -202,6 +204,9 @@ class AuthProxy:
             return f"refused: on this machine the page is at http://{self._host}:{self._port}"
         given = request.query.get("token") or request.cookies.get(self._cookie) or ""
         if hmac.compare_digest(given.encode(errors="replace"), self.token.encode()):
+            return None
+        if self.once and hmac.compare_digest(given.encode(errors="replace"), self.once.encode()):
+            self.once = ""
             return None
         return (
             "refused: open the address with the token that the rig's terminal shows; "

@@ -32,6 +32,7 @@ from gazerig.robot.dashboard.page_process import (
     CANNOT_OPEN,
     FOLDER_VARIABLE,
     NOTICE,
+    ONCE_VARIABLE,
     TOKEN_VARIABLE,
     URL,
 )
@@ -198,6 +199,7 @@ def _show(
         host, port = address
         sys.stderr.write(f"cannot open {host} port {port}: {error.strerror or error}\n")
         return CANNOT_OPEN
+    served.door.once = os.environ.pop(ONCE_VARIABLE, "")
     if served.words is not None:
         feed.send(NOTICE + served.words.encode())
     view = PageView(served.server, served.door.widgets, outbox, served.door.tell)

@@ -38,6 +38,8 @@ SNAPSHOT, FRAME, CHOICES, PARAMS, VALUES, MESSAGE, REPLAY = b"s", b"p", b"c", b"
 URL, NOTICE = b"u", b"n"
 TOKEN_VARIABLE = "GAZERIG_PAGE_TOKEN"
 """Of the page's environment: what browsers must show."""
+ONCE_VARIABLE = "GAZERIG_PAGE_ONCE"
+"""Of the page's environment: a token that opens the page once, "" for none."""
 FOLDER_VARIABLE = "GAZERIG_PAGE_FOLDER"
 """Of the page's environment: a folder of this user's alone, for its server's socket."""
 CANNOT_OPEN = 3
@@ -112,6 +114,7 @@ class PageProcess:
         self._port = port
         self._on_request = on_request
         self._token = secrets.token_urlsafe(_TOKEN_BYTES)
+        self._once = secrets.token_urlsafe(_TOKEN_BYTES)
         self._socket: socket.socket | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._inbox: Inbox | None = None
@@ -154,7 +157,11 @@ class PageProcess:
                 *self._arguments(*fds),
                 stderr=self._errors_fd,
                 pass_fds=fds,
-                variables={TOKEN_VARIABLE: self._token, FOLDER_VARIABLE: self._folder},
+                variables={
+                    TOKEN_VARIABLE: self._token,
+                    ONCE_VARIABLE: self._once if self.started == 0 else "",
+                    FOLDER_VARIABLE: self._folder,
+                },
             )
         self._began_s = self._clock.now_s()
         self.join(ours, stops)
@@ -217,6 +224,13 @@ class PageProcess:
     def url(self) -> str | None:
         """Return the page's address, token included, once it is there and as long as it is."""
         return self._url
+
+    def url_once(self) -> str | None:
+        """Return an address that opens the page once, for a program that is handed it.
+
+        What a program is started with can be read by all users of this computer.
+        """
+        return self._url and self._url.replace(self._token, self._once)
 
     def notice(self) -> str | None:
         """Return the next line for the person in front of the rig, each one once."""

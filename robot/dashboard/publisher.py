@@ -36,6 +36,7 @@ class Publisher:
         state: returns what ticks do not tell.
         feed: sends the parameters to the page.
         tell: prints a line that stays, such as the page's address.
+        browse: opens an address in the user's browser, once; None: leaves that to the user.
 
     depth: the depth image is to be shown in place of the camera's
     """
@@ -47,7 +48,9 @@ class Publisher:
         state: Callable[[], RunState],
         feed: ParamFeed | None,
         tell: Callable[[str], None],
+        browse: Callable[[str], object] | None = None,
     ) -> None:
+        self._browse = browse
         self._page, self._rig, self._state, self._tell = page, rig, state, tell
         self._params = ParamThread(feed, tell) if feed is not None else None
         self.depth = False
@@ -107,6 +110,8 @@ class Publisher:
         if not self._url_told and (url := page.url()) is not None:
             self._url_told = True
             self._tell(f"the page is at {url}")
+            if self._browse is not None and (once := page.url_once()) is not None:
+                self._browse(once)
         while (note := page.notice()) is not None:
             self._tell(note)
 

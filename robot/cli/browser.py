@@ -1,0 +1,41 @@
+"""Opening the live page in the user's browser, where there is a desktop and somebody before it."""
+
+import contextlib
+import os
+import sys
+import threading
+import webbrowser
+from collections.abc import Mapping
+
+
+def has_desktop(environ: Mapping[str, str], platform: str, terminal: bool) -> bool:
+    """Return whether a browser can be opened that the user sees.
+
+    Args:
+        environ: environment variables.
+        platform: as ``sys.platform``.
+        terminal: standard output is a terminal; else a program has started this one.
+    """
+    if not terminal or environ.get("CI"):
+        return False
+    if environ.get("SSH_CONNECTION") or environ.get("SSH_TTY"):
+        return False  # it would open at the other computer, before nobody
+    if platform in ("darwin", "win32"):
+        return True
+    return bool(environ.get("DISPLAY") or environ.get("WAYLAND_DISPLAY"))
+
+
+def desktop_here() -> bool:
+    """Return ``has_desktop`` of this process."""
+    terminal = sys.stdout is not None and sys.stdout.isatty()
+    return has_desktop(os.environ, sys.platform, terminal)
+
+
+def open_page(url: str) -> None:
+    """Open an address in the user's browser; returns at once, and failing changes nothing."""
+    threading.Thread(target=_open, args=(url,), name="browser", daemon=True).start()
+
+
+def _open(url: str) -> None:
+    with contextlib.suppress(webbrowser.Error, OSError):
+        webbrowser.open(url)
