@@ -14,7 +14,7 @@ from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Floats
 from gazerig.robot.app.gaze_models import kinematics_of
 from gazerig.robot.dashboard import head_mesh
-from gazerig.robot.dashboard.glb import EYE, SKIN, Painted, glb
+from gazerig.robot.dashboard.glb import EYE, SKIN, glb
 from gazerig.robot.dashboard.head_view import (
     LOWER_LID,
     UPPER_LID,
@@ -22,9 +22,10 @@ from gazerig.robot.dashboard.head_view import (
     lower_lid_turn,
     shown_measures,
 )
-from gazerig.robot.dashboard.mesh import Mesh
 from gazerig.robot.dashboard.views import BOTH, FACE, SHOULDER, View, view
 from gazerig.robot.model.head_shape import EYE_RADIUS, field, measures_of, of_jaw, surface
+from gazerig.robot.model.mesh import Mesh
+from gazerig.robot.model.paint import Painted
 from gazerig.robot.model.types import JointState, Snapshot
 
 RIGS = sorted(path.stem for path in shipped("rigs", "desk").parent.glob("*.yaml"))

@@ -31,12 +31,12 @@ from gazerig.robot.dashboard.joint_charts import (
     groups_of,
     mean_deg,
 )
-from gazerig.robot.dashboard.mesh import Mesh, cap, ellipsoid, lid, ring, turned
 from gazerig.robot.dashboard.page_process import MESSAGE_BYTES
 from gazerig.robot.dashboard.people import fixated_part
 from gazerig.robot.dashboard.scene_node import along, quaternion, turned_up, upright_along
 from gazerig.robot.dashboard.servo_health import guard, health
 from gazerig.robot.dashboard.status import alarms, drawn_together, without_feedback
+from gazerig.robot.model.mesh import Mesh, cap, ellipsoid, lid, ring, turned
 from gazerig.robot.model.types import GAZE_JOINTS as EVERY_JOINT
 from gazerig.robot.model.types import SeenFace, Snapshot, Trail
 

@@ -9,13 +9,13 @@ import viser
 from gazerig.gaze.angles import rotate_back, sub
 from gazerig.robot.dashboard.head_view import (
     SIDES,
-    Colour,
     lid_turn,
     lower_lid_turn,
 )
-from gazerig.robot.dashboard.mesh import Mesh, grid, lid, ring
 from gazerig.robot.dashboard.scene_node import along, put, quaternion
 from gazerig.robot.model.head_shape import EYE_RADIUS, measures_of, surface
+from gazerig.robot.model.mesh import Mesh, grid, lid, ring
+from gazerig.robot.model.paint import Colour
 from gazerig.robot.model.types import CommandedPose, Snapshot
 
 _GHOST: Colour = (70, 110, 255)

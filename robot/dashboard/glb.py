@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from trimesh.exchange.gltf import export_glb
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.dashboard.mesh import Mesh
+from gazerig.robot.model.paint import Painted
 
 Bytes = NDArray[np.uint8]
 
@@ -32,14 +32,6 @@ CLOTH = Finish(0.9)
 PLASTIC = Finish(0.45)
 EYE = Finish(0.35, 1.0, 0.1)
 FLAT = Finish(lit=False)
-
-
-class Painted(NamedTuple):
-    """A mesh with a colour a vertex (n, 3 or 4) in 0..255, and unit normals (n, 3) or None."""
-
-    mesh: Mesh
-    colours: Floats
-    normals: Floats | None = None
 
 
 def glb(painted: Painted, finish: Finish) -> bytes:

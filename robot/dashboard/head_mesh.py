@@ -7,16 +7,17 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.dashboard.glb import Painted
-from gazerig.robot.dashboard.mesh import Mesh, grid, smooth_normals, turned
-from gazerig.robot.model.head_shape import beyond, front, of_jaw, smiling, surface
-
-Colour = tuple[int, int, int]
+from gazerig.robot.model.face_features import brow as bow
+from gazerig.robot.model.face_features import lips
+from gazerig.robot.model.head_shape import HEAD, MOUTH, of_jaw, surface
+from gazerig.robot.model.mesh import Mesh, grid, smooth_normals, turned
+from gazerig.robot.model.paint import Colour, Painted, merged, mix, plain, spot, step
 
 SKIN: Colour = (247, 206, 178)
 LID: Colour = (243, 198, 170)
 _BLUSH: Colour = (240, 160, 140)
 _LIPS: Colour = (206, 106, 98)
+_MOUTH_LINE: Colour = (128, 58, 56)
 _SHADE: Colour = (222, 160, 130)
 _HOLLOW: Colour = (110, 66, 56)
 CAP: Colour = (58, 62, 74)
@@ -56,7 +57,8 @@ def skin() -> HeadSkin:
         Painted(*_used(whole.vertices, whole.faces[which], colours.reshape(-1, 3), flat_normals))
         for which in (~moved, moved)
     )
-    return HeadSkin(head, chin)
+    upper, lower, line = lips(HEAD, MOUTH, _LIPS, _MOUTH_LINE)
+    return HeadSkin(merged([head, upper, line]), merged([chin, lower]))
 
 
 def _used(
@@ -70,14 +72,14 @@ def _used(
 
 def cap() -> Painted:
     """Return the cap over the back of the head, in distances between the eyes."""
-    points, normals = beyond(_CAP_NORMAL, _CAP_LINE, 40, 84, _CAP_OUT)
+    points, normals = HEAD.beyond(_CAP_NORMAL, _CAP_LINE, 40, 84, _CAP_OUT)
     # Its edge is rounded down to the skin and a little below it.
     rim = [points[0] - out * normals[0] for out in (0.10, 0.03, 0.012)]
     lifted = np.concatenate((np.stack(rim), points[1:]))
     mesh = grid(lifted, closed=True)
     near = np.concatenate(((1.0, 1.0, 1.0, 0.7), np.zeros(len(lifted) - 4)))
     colours = np.broadcast_to(np.array(CAP, float), lifted.shape)
-    colours = _mix(colours, _CAP_EDGE, np.broadcast_to(near[:, None], lifted.shape[:2]))
+    colours = mix(colours, _CAP_EDGE, np.broadcast_to(near[:, None], lifted.shape[:2]))
     return Painted(mesh, colours.reshape(-1, 3), smooth_normals(mesh))
 
 
@@ -85,20 +87,15 @@ def _complexion(points: Floats, normals: Floats) -> Floats:
     """Return the skin's colours: cheeks, lips, hollows of the eyes and the nose."""
     x, y, z = np.moveaxis(points, -1, 0)
     y = np.abs(y)
+    folded = np.stack((x, y, z), axis=-1)
     colours = np.broadcast_to(np.array(SKIN, float), points.shape).copy()
     below = np.clip(-normals[..., 2], 0.0, 1.0)
-    colours = _mix(colours, _SHADE, 0.45 * below)
-    colours = _mix(colours, _BLUSH, 0.50 * _spot(x, y, z, (0.10, 0.62, -0.52), 0.30))
-    colours = _mix(colours, _BLUSH, 0.30 * _spot(x, y, z, (0.42, 0.0, -0.55), 0.14))
-    colours = _mix(colours, _SHADE, 0.55 * _spot(x, y, z, (0.10, 0.5, 0.0), 0.46))
-    colours = _mix(colours, _HOLLOW, 0.8 * _spot(x, y, z, (0.33, 0.075, -0.655), 0.042))
-    mouth = smiling(y, z)
-    lips = np.maximum(
-        _ellipse(y - 0.06, mouth + 0.965, 0.26, 0.062), _ellipse(y, mouth + 1.095, 0.25, 0.075)
-    )
-    colours = _mix(colours, _LIPS, _step(lips, 0.20) * (x > -0.15))
-    line = np.exp(-(((mouth + 1.030) / 0.017) ** 2)) * _step(0.32 - y, 0.05)
-    return _mix(colours, _HOLLOW, 0.85 * line * (x > -0.2))
+    colours = mix(colours, _SHADE, 0.45 * below)
+    colours = mix(colours, _BLUSH, 0.50 * spot(folded, (0.10, 0.62, -0.52), 0.30))
+    colours = mix(colours, _BLUSH, 0.30 * spot(folded, (0.42, 0.0, -0.55), 0.14))
+    colours = mix(colours, _SHADE, 0.55 * spot(folded, (0.10, 0.5, 0.0), 0.46))
+    colours = mix(colours, _HOLLOW, 0.8 * spot(folded, (0.33, 0.075, -0.655), 0.042))
+    return colours
 
 
 def brow() -> Painted:
@@ -106,21 +103,7 @@ def brow() -> Painted:
     share = np.linspace(0.0, 1.0, 28)
     y = 0.20 + 0.68 * share
     z = 0.50 + 0.20 * np.sin(pi * (0.16 + 0.66 * share)) - 0.06 * share
-    middle = front(y, z) + (0.012, 0.0, 0.0)
-    radius = 0.052 * (1.0 - 0.72 * share**1.6) * np.sqrt(np.clip(share / 0.05, 0.25, 1.0))
-    around = np.linspace(0.0, 2.0 * pi, 12, endpoint=False)
-    ring = np.stack((0.55 * np.cos(around), np.zeros(12), np.sin(around)), axis=1)
-    tube = middle[:, None] + radius[:, None, None] * ring
-    mesh = grid(tube, closed=True)
-    return Painted(mesh, _plain(mesh, _HAIR), smooth_normals(mesh))
-
-
-def mirrored(painted: Painted) -> Painted:
-    """Return the same on the other side."""
-    other = np.array((1.0, -1.0, 1.0))
-    mesh = Mesh(painted.mesh.vertices * other, painted.mesh.faces[:, ::-1])
-    normals = None if painted.normals is None else painted.normals * other
-    return Painted(mesh, painted.colours, normals)
+    return bow(HEAD, y, z, 0.052, _HAIR)
 
 
 def eye() -> Painted:
@@ -152,15 +135,15 @@ def _eye_colours(angles: Floats, columns: int) -> Floats:
     a = np.degrees(angles)[:, None] + 0.0 * fibres
     share = np.clip((a - 12.5) / 17.0, 0.0, 1.0)
     colours = np.broadcast_to(np.array(_IRIS, float), (*a.shape, 3)).copy()
-    colours = _mix(colours, _IRIS_INNER, np.exp(-(((share - 0.18) / 0.20) ** 2)) * 0.75)
-    colours = _mix(colours, _IRIS_INNER, np.clip(fibres, 0.0, 1.0) * np.sin(pi * share) * 0.55)
-    colours = _mix(colours, _LIMBUS, np.clip(-fibres, 0.0, 1.0) * np.sin(pi * share) * 0.40)
-    colours = _mix(colours, _LIMBUS, _step(a - 27.4, 1.6) * 0.95)
+    colours = mix(colours, _IRIS_INNER, np.exp(-(((share - 0.18) / 0.20) ** 2)) * 0.75)
+    colours = mix(colours, _IRIS_INNER, np.clip(fibres, 0.0, 1.0) * np.sin(pi * share) * 0.55)
+    colours = mix(colours, _LIMBUS, np.clip(-fibres, 0.0, 1.0) * np.sin(pi * share) * 0.40)
+    colours = mix(colours, _LIMBUS, step(a - 27.4, 1.6) * 0.95)
     white = np.broadcast_to(np.array(_SCLERA, float), colours.shape)
-    white = _mix(white, _SCLERA_FAR, np.clip((a - 48.0) / 40.0, 0.0, 1.0))
-    outside = _step(a - 30.6, 0.8)[..., None]
+    white = mix(white, _SCLERA_FAR, np.clip((a - 48.0) / 40.0, 0.0, 1.0))
+    outside = step(a - 30.6, 0.8)[..., None]
     colours = colours * (1.0 - outside) + white * outside
-    return _mix(colours, _PUPIL, _step(np.degrees(_PUPIL_RAD) - a, 0.7))
+    return mix(colours, _PUPIL, step(np.degrees(_PUPIL_RAD) - a, 0.7))
 
 
 def eyelid(upper: bool) -> Painted:
@@ -185,8 +168,8 @@ def eyelid(upper: bool) -> Painted:
     lash = np.array((1.0, 1.0, 1.0, 0.85, 0.25, *np.zeros(22))) * (1.0 if upper else 0.62)
     colours = np.broadcast_to(np.array(LID, float), points.shape)
     fold = np.exp(-(((sweep - 0.62) / 0.10) ** 2)) * 0.30 + np.clip(sweep - 0.9, 0.0, 0.2)
-    colours = _mix(colours, _SHADE, np.broadcast_to(fold[:, None], points.shape[:2]))
-    colours = _mix(colours, _LASH, np.broadcast_to(lash[:, None], points.shape[:2]))
+    colours = mix(colours, _SHADE, np.broadcast_to(fold[:, None], points.shape[:2]))
+    colours = mix(colours, _LASH, np.broadcast_to(lash[:, None], points.shape[:2]))
     return Painted(mesh, colours.reshape(-1, 3), smooth_normals(mesh))
 
 
@@ -196,7 +179,7 @@ def ear() -> Painted:
     mesh = turned([*profile, (0.30, 0.13), (0.0, 0.13)])
     radius = np.hypot(mesh.vertices[:, 0], mesh.vertices[:, 1])
     accent = np.exp(-(((radius - 0.62) / 0.10) ** 2))
-    return Painted(mesh, _mix(_plain(mesh, CAP), (64, 190, 220), accent), smooth_normals(mesh))
+    return Painted(mesh, mix(plain(mesh, CAP), (64, 190, 220), accent), smooth_normals(mesh))
 
 
 def neck() -> Painted:
@@ -205,7 +188,7 @@ def neck() -> Painted:
     profile = [(1.0 + 0.05 * cos(18.0 * pi * h), h) for h in height]
     mesh = turned(profile)
     groove = np.repeat(0.5 - 0.5 * np.cos(18.0 * pi * height), len(mesh.vertices) // 73)
-    return Painted(mesh, _mix(_plain(mesh, (104, 110, 124)), (44, 47, 56), groove * 0.8),
+    return Painted(mesh, mix(plain(mesh, (104, 110, 124)), (44, 47, 56), groove * 0.8),
                    smooth_normals(mesh))  # fmt: skip
 
 
@@ -226,7 +209,7 @@ def bust() -> Painted:
     )
     mesh = grid(points, closed=True)
     ring = np.exp(-(((mesh.vertices[:, 2] + 0.02) / 0.035) ** 2))
-    colours = _mix(_plain(mesh, (74, 84, 108)), (150, 160, 182), ring * 0.7)
+    colours = mix(plain(mesh, (74, 84, 108)), (150, 160, 182), ring * 0.7)
     return Painted(mesh, colours, smooth_normals(mesh))
 
 
@@ -242,31 +225,5 @@ def glow(inner: tuple[int, int, int, int], rings: int = 20) -> Painted:
     alpha = np.repeat(
         (0.5 + 0.5 * np.cos(pi * radius)) ** 1.3 * inner[3], len(mesh.vertices) // rings
     )
-    colours = np.column_stack((_plain(mesh, inner[:3]), alpha))
+    colours = np.column_stack((plain(mesh, inner[:3]), alpha))
     return Painted(mesh, colours, np.tile((0.0, 0.0, 1.0), (len(mesh.vertices), 1)))
-
-
-def _plain(mesh: Mesh, colour: Colour) -> Floats:
-    return np.tile(np.array(colour, float), (len(mesh.vertices), 1))
-
-
-def _mix(colours: Floats, colour: Colour, share: Floats) -> Floats:
-    """Blend colours (..., 3) towards one by a share (...)."""
-    part = np.clip(share, 0.0, 1.0)[..., None]
-    return np.asarray(colours * (1.0 - part) + np.array(colour, float) * part)
-
-
-def _step(value: Floats, width: float) -> Floats:
-    """Return 0 below and 1 above zero, with a smooth way between."""
-    share = np.clip(0.5 + value / (2.0 * width), 0.0, 1.0)
-    return np.asarray(share * share * (3.0 - 2.0 * share))
-
-
-def _spot(x: Floats, y: Floats, z: Floats, at: tuple[float, float, float], size: float) -> Floats:
-    away = (x - at[0]) ** 2 + (y - at[1]) ** 2 + (z - at[2]) ** 2
-    return np.asarray(np.exp(-away / (size * size)))
-
-
-def _ellipse(y: Floats, z: Floats, half_y: float, half_z: float) -> Floats:
-    """Return 1 in the middle of an ellipse, 0 on its edge, less outside."""
-    return np.asarray(1.0 - np.sqrt((y / half_y) ** 2 + (z / half_z) ** 2))

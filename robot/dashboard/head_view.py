@@ -14,16 +14,15 @@ from viser import transforms
 from gazerig.gaze.angles import add, norm, rotate, rotate_back, sub
 from gazerig.gaze.types import Vec3
 from gazerig.robot.dashboard import head_mesh
-from gazerig.robot.dashboard.glb import CLOTH, EYE, FLAT, PLASTIC, SKIN, Finish, Painted, glb
+from gazerig.robot.dashboard.glb import CLOTH, EYE, FLAT, PLASTIC, SKIN, Finish, glb
 from gazerig.robot.dashboard.scene_node import Turn, along, put, turn_to, turned_up, upright_along
 from gazerig.robot.dashboard.scene_node import quaternion as quaternion_of
 from gazerig.robot.model.head_shape import CHIN, HeadMeasures, measures_of
+from gazerig.robot.model.paint import Colour, Painted, mirrored
 from gazerig.robot.model.types import Snapshot
 
 FLOOR_M = -0.09
 """Height of the table the rig stands on, below the neck base."""
-
-Colour = tuple[int, int, int]
 
 _SIGHT: dict[str, Colour] = {
     "fixate": (48, 190, 120),
@@ -106,7 +105,7 @@ class HeadView:
             for part in ("upper", "lower")
         )
         brow = head_mesh.brow()
-        brow = brow if side == "left" else head_mesh.mirrored(brow)
+        brow = brow if side == "left" else mirrored(brow)
         lower.wxyz = turned_up(_SHUT_RAD)
         return _EyeModel(
             side, ball, sight, upper, lower, self._add(f"/head/brow_{side}", brow, SKIN)

@@ -18,12 +18,14 @@ class OverlayChoices:
     sight: bool = False
     camera: bool = False
     eyes: bool = False
+    parts: bool = False
 
     NAMES: ClassVar[dict[str, str]] = {
         "ghost": "ghost of the desired pose",
         "sight": "lines of sight",
         "camera": "what the camera covers",
         "eyes": "what the eyes can attend to",
+        "parts": "the eight parts of a face",
     }
 
 

@@ -161,7 +161,7 @@ class PageView:
         if self._newest is not None:
             self._viewpoints.fit(self._newest)
             self._head.show(self._newest, sight=self._panel.layers.sight)
-            self._people.show(self._newest)
+            self._people.show(self._newest, parts=self._panel.layers.parts)
             self._layers.show(self._newest, self._panel.layers)
             if self._replay is None:
                 self._controls.show(self._newest)

@@ -1,65 +1,82 @@
 """Draw who and what the rig has seen: faces with their eight parts, moving bodies, the target."""
 
+from functools import lru_cache
+
 import numpy as np
 import viser
 
 from gazerig.gaze.types import PARTS, Floats, Vec3
-from gazerig.robot.dashboard.head_view import FLOOR_M, Colour
-from gazerig.robot.dashboard.mesh import Mesh, cap, disc, ellipsoid, ring
-from gazerig.robot.dashboard.scene_node import put, quaternion
+from gazerig.robot.dashboard.glb import CLOTH, FLAT, SKIN, glb
+from gazerig.robot.dashboard.head_mesh import glow
+from gazerig.robot.dashboard.head_view import FLOOR_M
+from gazerig.robot.dashboard.scene_node import along, put, quaternion, turn_to
+from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
+from gazerig.robot.model.mesh import Mesh, cap, ring
+from gazerig.robot.model.paint import Colour
+from gazerig.robot.model.person_shape import LOOKS, hand, head, torso
 from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
 
 FIXATED_WITHIN_M = 0.02
 """A face part this close to the target is the one looked at (parts are 3 cm apart or more)."""
 
-_SKIN: Colour = (224, 172, 140)
-_BODY: Colour = (86, 130, 230)
+_BODY: Colour = (118, 146, 190)
 _TARGET: Colour = (255, 120, 40)
-_OVAL_DEPTH_M = 0.085
-_OVAL_WIDER = 1.25
+_FINENESS = 0.8
+_CHEST_M = 0.34
+_LABEL_ABOVE_M, _BEHIND_M = 0.155, 0.11
+_LEFT_EYE, _RIGHT_EYE, _NOSE = (PARTS.index(part) for part in ("LE", "RE", "N"))
 
-# What stands for each part: half axes in m (out of the face, across, up) and colour.
-_EYE = ((0.006, 0.0135, 0.0085), (255, 255, 255))
-_DOT = ((0.004, 0.004, 0.004), (130, 84, 62))
-_SHAPES: dict[str, tuple[Vec3, Colour]] = {
-    "LE": _EYE,
-    "RE": _EYE,
-    "M": ((0.006, 0.023, 0.0065), (176, 66, 66)),
-    "N": ((0.012, 0.009, 0.014), (206, 146, 112)),
-}
+
+@lru_cache(maxsize=len(LOOKS))
+def _person_glb(look: int) -> tuple[bytes, bytes]:
+    """Return head and chest of a person with a look as browsers draw them."""
+    return glb(head(look, _FINENESS), SKIN), glb(torso(look, _CHEST_M), CLOTH)
+
+
+def _look(number: int) -> int:
+    """Return the look of a face; the first face is the scene's first person."""
+    return (number - 1) % len(LOOKS)
 
 
 class _Shade:
     """A dark spot on the floor, which tells where above it something is."""
 
     def __init__(self, scene: viser.SceneApi, name: str, radius_m: float) -> None:
-        mesh = disc(radius_m)
-        self._spot = scene.add_mesh_simple(
-            name, mesh.vertices, mesh.faces, color=(40, 50, 70), opacity=0.16, side="double"
+        self._spot = scene.add_glb(
+            name,
+            glb(glow((20, 24, 34, 96), 8), FLAT),
+            scale=radius_m,
+            cast_shadow=False,
+            receive_shadow=False,
         )
 
     def below(self, p_world_m: Vec3) -> None:
-        put(self._spot, (p_world_m[0], p_world_m[1], FLOOR_M + 0.001))
+        put(self._spot, (p_world_m[0], p_world_m[1], FLOOR_M + 0.002))
 
     def remove(self) -> None:
         self._spot.remove()
 
 
 class _FaceView:
-    """One face in the scene, in its own frame: x out of the face, y to its left, z up."""
+    """One person in the scene: a head in the face's frame, and a chest that stands upright."""
 
     def __init__(self, scene: viser.SceneApi, face: SeenFace) -> None:
         self._scene = scene
         self._name = f"/faces/{face.id}"
         self._frame = scene.add_frame(self._name, show_axes=False)
-        self._shade = _Shade(scene, f"/shades/{face.id}", 0.075)
-        parts_m = _parts_in_face(face)
-        self._add_oval(parts_m)
-        self._parts = [self._add_part(part) for part in PARTS]
+        self._shade = _Shade(scene, f"/shades/{face.id}", 0.3)
+        shown, chest = _person_glb(_look(face.id))
+        self._head = scene.add_glb(
+            f"{self._name}/head", shown, cast_shadow=False, receive_shadow=False
+        )
+        self._chest = scene.add_glb(
+            f"/chests/{face.id}", chest, cast_shadow=False, receive_shadow=False
+        )
+        self._size = 0.0
+        self._parts: list[viser.FrameHandle] = []
         self._halo = self._add("halo", ring(0.019, 0.0022), _TARGET)
-        top_m = (0.0, 0.0, float(parts_m[:, 2].max()) + 0.035)
         self._label = scene.add_label(
-            f"{self._name}/label", face_label(face), position=top_m, anchor="bottom-center"
+            f"{self._name}/label", face_label(face), anchor="bottom-center"
         )
 
     def _add(self, name: str, mesh: Mesh, colour: Colour) -> viser.MeshHandle:
@@ -67,61 +84,83 @@ class _FaceView:
             f"{self._name}/{name}", mesh.vertices, mesh.faces, color=colour, side="double"
         )
 
-    def _add_oval(self, parts_m: Floats) -> None:
-        """Fit an oval around the parts that passes behind the front ones; the sides lie in it."""
-        highest, lowest = parts_m.max(axis=0), parts_m.min(axis=0)
-        _, y, z = (highest + lowest) / 2
-        _, half_y, half_z = (highest - lowest) / 2 * _OVAL_WIDER
-        out = ((parts_m[:, 1] - y) / half_y) ** 2 + ((parts_m[:, 2] - z) / half_z) ** 2
-        rise = np.sqrt(np.maximum(0.0, 1.0 - out))
-        behind = parts_m[:, 0] - _OVAL_DEPTH_M * rise
-        x = float(min(behind[i] for i, part in enumerate(PARTS) if part not in ("FL", "FR")))
-        oval = self._add("oval", ellipsoid((_OVAL_DEPTH_M, half_y, half_z), rings=25), _SKIN)
-        oval.position = (x, y, z)
-
     def _add_part(self, part: str) -> viser.FrameHandle:
         frame = self._scene.add_frame(f"{self._name}/{part}", show_axes=False)
-        half_axes_m, colour = _SHAPES.get(part, _DOT)
-        self._add(f"{part}/shape", ellipsoid(half_axes_m), colour)
-        if part in ("LE", "RE"):
-            pupil = self._add(f"{part}/pupil", cap(0.0052, np.pi), (40, 26, 20))
-            pupil.position = (0.0035, 0.0, 0.0)
+        self._add(f"{part}/mark", cap(0.0042, np.pi, 8), _TARGET)
         return frame
 
-    def show(self, face: SeenFace, p_world_target_m: Vec3) -> None:
-        """Move the face and put the halo around the part that is looked at."""
+    def show(self, face: SeenFace, p_world_target_m: Vec3, parts: bool) -> None:
+        """Move the person; ``parts``: with marks at the parts, a halo around the one looked at."""
         put(self._frame, face.p_world_m, quaternion(face.R_world_face))
-        self._shade.below(face.p_world_m)
+        (ahead, _, _), (aside, _, _), _ = face.R_world_face
+        x, y, z = face.p_world_m
+        self._shade.below((x - _BEHIND_M * ahead, y - _BEHIND_M * aside, z))
         self._label.text = face_label(face)
         parts_m = _parts_in_face(face)
-        for handle, p_m in zip(self._parts, parts_m.tolist(), strict=True):
+        size = float(np.linalg.norm(parts_m[_LEFT_EYE] - parts_m[_RIGHT_EYE])) / PUPIL_DISTANCE_M
+        self._fit(round(size, 2), parts_m[_NOSE])
+        put(self._chest, face.p_world_m)
+        turn_to(self._chest, along((ahead, aside, 0.0)))
+        self._show_parts(face, parts_m, p_world_target_m, parts)
+
+    def _fit(self, size: float, nose_m: Floats) -> None:
+        """Make the person as large as the face was measured, its nose where it was found."""
+        put(self._head, nose_m.tolist())
+        if self._size != size:
+            self._size = self._head.scale = self._chest.scale = size
+            self._label.position = (-0.09, 0.0, _LABEL_ABOVE_M * size)
+
+    def _show_parts(
+        self, face: SeenFace, parts_m: Floats, p_world_target_m: Vec3, wanted: bool
+    ) -> None:
+        looked_at = fixated_part(face, p_world_target_m) if wanted else None
+        if wanted and not self._parts:
+            self._parts = [self._add_part(part) for part in PARTS]
+        for handle, p_m in zip(self._parts, parts_m.tolist(), strict=False):
+            handle.visible = wanted
             put(handle, p_m)
-        looked_at = fixated_part(face, p_world_target_m)
         self._halo.visible = looked_at is not None
         if looked_at is not None:
             put(self._halo, parts_m[looked_at] + (0.006, 0.0, 0.0))
 
     def remove(self) -> None:
-        self._frame.remove()
+        for part in (self._frame, self._chest):
+            part.remove()
         self._shade.remove()
 
 
 class _BodyView:
-    """One moving body in the scene: a ball and its kind."""
+    """One moving body in the scene: a hand, or a calm ball, and its kind."""
 
     def __init__(self, scene: viser.SceneApi, body: SeenBody) -> None:
         name = f"/bodies/{body.id}"
         self._frame = scene.add_frame(name, show_axes=False)
-        self._ball = scene.add_icosphere(f"{name}/ball", radius=1.0, color=_BODY, opacity=0.75)
+        self._kind = body.kind
+        self._shape: viser.GlbHandle | viser.IcosphereHandle
+        if body.kind == "hand":
+            data = glb(hand(0), SKIN)
+            self._shape = scene.add_glb(
+                f"{name}/hand", data, cast_shadow=False, receive_shadow=False
+            )
+        else:
+            self._shape = scene.add_icosphere(
+                f"{name}/ball", radius=1.0, color=_BODY, opacity=0.85, cast_shadow=False
+            )
         self._label = scene.add_label(f"{name}/label", body.kind, anchor="bottom-center")
-        self._shade = _Shade(scene, f"/shades/{body.id}", body.radius_m)
+        self._shade = _Shade(scene, f"/shades/{body.id}", 2.0 * body.radius_m)
+
+    def fits(self, body: SeenBody) -> bool:
+        """Return whether this is what shows such a body."""
+        return self._kind == body.kind
 
     def show(self, body: SeenBody) -> None:
-        """Move the ball."""
+        """Move it; a hand shows the rig its palm."""
+        x, y, z = body.p_world_m
         put(self._frame, body.p_world_m)
-        self._shade.below(body.p_world_m)
-        self._ball.scale = round(body.radius_m, 3)
-        put(self._label, (0.0, 0.0, body.radius_m + 0.02))
+        turn_to(self._frame, along((-x, -y, 0.0)))
+        self._shade.below((x, y, z))
+        self._shape.scale = round(body.radius_m, 3)
+        put(self._label, (0.0, 0.0, 1.1 * body.radius_m + 0.02))
         self._label.text = body.kind
 
     def remove(self) -> None:
@@ -142,8 +181,8 @@ class PeopleView:
             "/target/label", "", position=(0.0, 0.0, -0.03), anchor="top-center"
         )
 
-    def show(self, snapshot: Snapshot) -> None:
-        """Draw what is there now; what has gone is taken away."""
+    def show(self, snapshot: Snapshot, *, parts: bool = False) -> None:
+        """Draw what is there now, with the parts of faces if wanted; what has gone is removed."""
         faces = {face.id: face for face in snapshot.faces}
         # A face is drawn as a face, not once more as a ball.
         bodies = {body.id: body for body in snapshot.bodies if body.id not in faces}
@@ -154,9 +193,12 @@ class PeopleView:
         for face in faces.values():
             if face.id not in self._faces:
                 self._faces[face.id] = _FaceView(self._scene, face)
-            self._faces[face.id].show(face, snapshot.p_world_target_m)
+            self._faces[face.id].show(face, snapshot.p_world_target_m, parts)
         for body in bodies.values():
-            if body.id not in self._bodies:
+            shown = self._bodies.get(body.id)
+            if shown is None or not shown.fits(body):
+                if shown is not None:
+                    shown.remove()
                 self._bodies[body.id] = _BodyView(self._scene, body)
             self._bodies[body.id].show(body)
         put(self._target, snapshot.p_world_target_m)

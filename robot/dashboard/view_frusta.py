@@ -6,8 +6,8 @@ import numpy as np
 import viser
 
 from gazerig.gaze.types import Floats, Vec3
-from gazerig.robot.dashboard.head_view import Colour
 from gazerig.robot.dashboard.scene_node import along, put, quaternion
+from gazerig.robot.model.paint import Colour
 from gazerig.robot.model.types import Snapshot
 
 _CAMERA: Colour = (120, 128, 140)

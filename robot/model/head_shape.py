@@ -12,23 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.gaze.types import Floats, Vec3
-from gazerig.robot.model.solid import (
-    Field,
-    capsule,
-    carve,
-    crossings,
-    ellipsoid,
-    normals,
-    ray_grid,
-    union,
-)
+from gazerig.robot.model.face_features import Mouth
+from gazerig.robot.model.solid import Field, Solid, Surface, capsule, carve, ellipsoid, union
 
 EYE_RADIUS = 0.335
 """Radius of an eyeball, in distances between the eyes."""
 TOP, CHIN = 1.80, -1.62
 """Height of the head's top and of the chin, in distances between the eyes."""
-_CENTRE: Vec3 = (-0.80, 0.0, -0.02)
-_FARTHEST = 2.6
 _ROWS, _COLUMNS = 112, 116
 _SOLIDS: tuple[tuple[Field, float], ...] = (
     (ellipsoid((-1.10, 0.0, 0.50), (1.30, 1.20, 1.30)), 0.1),  # skull
@@ -49,6 +39,8 @@ _DISH = ellipsoid((0.46, 0.5, 0.0), (0.27, 0.40, 0.33))
 _NECK = capsule((-0.80, 0.0, -0.9), (-0.72, 0.0, -1.55), 0.62, 0.44)
 _SMILE = 0.85
 _MOUTH_Z, _MOUTH_HALF = -1.030, 0.32
+MOUTH = Mouth(_MOUTH_Z, 0.345, _SMILE, 0.088, 0.110)
+"""Where the lips lie, in distances between the eyes."""
 _HINGE: Vec3 = (-0.85, 0.0, -0.55)
 
 
@@ -99,16 +91,6 @@ def measures_of(left_m: Vec3, right_m: Vec3, pivot_m: Vec3 | None = None) -> Hea
     return HeadMeasures(interocular_m, pivot_m)
 
 
-class HeadSurface(NamedTuple):
-    """The outside of the head, in distances between the eyes.
-
-    points, normals: (rows, columns, 3), rows from below to above, columns around, closed behind
-    """
-
-    points: Floats
-    normals: Floats
-
-
 def field(points: Floats) -> Floats:
     """Return how far points (n, 3) are outside the head."""
     folded = points * (1.0, 1.0, 1.0)
@@ -124,55 +106,14 @@ def field(points: Floats) -> Floats:
     return solid
 
 
+HEAD = Solid(field, (-0.80, 0.0, -0.02), 2.6)
+"""The head, in distances between the eyes."""
+
+
 @lru_cache(maxsize=1)
-def surface() -> HeadSurface:
+def surface() -> Surface:
     """Return the head's surface; it is worked out once."""
-    rays = ray_grid(_ROWS, _COLUMNS, radians(-30.0), radians(30.0))
-    points = crossings(field, _CENTRE, rays.reshape(-1, 3), _FARTHEST)
-    return HeadSurface(points.reshape(rays.shape), normals(field, points).reshape(rays.shape))
-
-
-def beyond(normal: Vec3, offset: float, rows: int, columns: int, out: float) -> HeadSurface:
-    """Return the part of the surface with normal . point > offset; its edge is a clean line.
-
-    Args:
-        normal: of the plane that cuts the head, any length.
-        offset: of the plane.
-        rows: from the edge to the middle.
-        columns: around.
-        out: how far the part stands off the surface.
-    """
-    ahead = np.array(normal) / np.linalg.norm(normal)
-    aside = np.array((0.0, 1.0, 0.0))
-    around = np.linspace(0.0, 2.0 * np.pi, columns, endpoint=False)
-    radial = np.outer(np.cos(around), aside) + np.outer(np.sin(around), np.cross(ahead, aside))
-    low, high = np.zeros(columns), np.full(columns, np.pi)
-    for _ in range(12):
-        middle = 0.5 * (low + high)
-        edge = _at(middle, ahead, radial) @ np.array(normal) > offset
-        low, high = np.where(edge, middle, low), np.where(edge, high, middle)
-    share = np.sin(np.linspace(0.5 * np.pi, 0.0, rows))
-    points = np.stack([_at(low * part, ahead, radial) for part in share.tolist()])
-    shape = points.shape
-    outwards = normals(field, points.reshape(-1, 3)).reshape(shape)
-    return HeadSurface(points + out * outwards, outwards)
-
-
-def _at(angles: Floats, ahead: Floats, radial: Floats) -> Floats:
-    """Return surface points at angles (n,) from an axis, each in its direction (n, 3) from it."""
-    rays = np.cos(angles)[:, None] * ahead + np.sin(angles)[:, None] * radial
-    return crossings(field, _CENTRE, rays, _FARTHEST)
-
-
-def front(y: Floats, z: Floats) -> Floats:
-    """Return points (n, 3) on the front of the head at given heights and distances aside."""
-    farthest = np.stack((np.full(len(y), 0.8), y, z), axis=1)
-    nearest = farthest * (0.0, 1.0, 1.0) + (-0.6, 0.0, 0.0)
-    for _ in range(16):
-        middle = 0.5 * (farthest + nearest)
-        inside = (field(middle) < 0.0)[:, None]
-        nearest, farthest = np.where(inside, middle, nearest), np.where(inside, farthest, middle)
-    return np.asarray(0.5 * (farthest + nearest))
+    return HEAD.all_round(_ROWS, _COLUMNS, radians(-30.0), radians(30.0))
 
 
 def of_jaw(points: Floats) -> Floats:

@@ -6,6 +6,7 @@ unit. A surface is found along rays from a centre: its outermost crossing in eac
 
 from collections.abc import Callable
 from math import pi
+from typing import NamedTuple
 
 import numpy as np
 
@@ -77,6 +78,79 @@ def normals(field: Field, points: Floats) -> Floats:
     steps = _GRADIENT_STEP * np.eye(3)
     slope = np.stack([field(points + step) - field(points - step) for step in steps], axis=1)
     return np.asarray(slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9))
+
+
+class Surface(NamedTuple):
+    """A part of a solid's outside: points and unit normals, both (rows, columns, 3)."""
+
+    points: Floats
+    normals: Floats
+
+
+class Solid(NamedTuple):
+    """A body every ray from whose centre leaves once; what hides behind an edge is left out."""
+
+    field: Field
+    centre: Vec3
+    farthest: float
+
+    def all_round(
+        self, rows: int, columns: int, focus_rad: float = 0.0, spread_rad: float = 0.6
+    ) -> Surface:
+        """Return the whole surface; rows from below to above, columns closed behind.
+
+        See ``ray_grid`` for the arguments.
+        """
+        rays = ray_grid(rows, columns, focus_rad, spread_rad)
+        points = crossings(self.field, self.centre, rays.reshape(-1, 3), self.farthest)
+        return self._surface(points.reshape(rays.shape))
+
+    def beyond(self, normal: Vec3, offset: float, rows: int, columns: int, out: float) -> Surface:
+        """Return the part of the surface with normal . point > offset; its edge is a clean line.
+
+        Args:
+            normal: of the plane that cuts the solid, any length.
+            offset: of the plane.
+            rows: from the edge to the middle.
+            columns: around.
+            out: how far the part stands off the surface.
+        """
+        ahead = np.array(normal) / np.linalg.norm(normal)
+        aside = np.array((0.0, 1.0, 0.0))
+        around = np.linspace(0.0, 2.0 * pi, columns, endpoint=False)
+        radial = np.outer(np.cos(around), aside) + np.outer(np.sin(around), np.cross(ahead, aside))
+        low, high = np.zeros(columns), np.full(columns, pi)
+        for _ in range(12):
+            middle = 0.5 * (low + high)
+            within = self._at(middle, ahead, radial) @ np.array(normal) > offset
+            low, high = np.where(within, middle, low), np.where(within, high, middle)
+        share = np.sin(np.linspace(0.5 * pi, 0.0, rows))
+        found = self._surface(
+            np.stack([self._at(low * part, ahead, radial) for part in share.tolist()])
+        )
+        return Surface(found.points + out * found.normals, found.normals)
+
+    def front(self, y: Floats, z: Floats) -> Floats:
+        """Return points (n, 3) on its front at given distances aside and heights."""
+        beside = np.stack((np.zeros(len(y)), y, z), axis=1)
+        ahead = np.full(len(y), self.centre[0] + self.farthest)
+        behind = np.full(len(y), self.centre[0])
+        for _ in range(16):
+            middle = 0.5 * (ahead + behind)
+            beside[:, 0] = middle
+            inside = self.field(beside) < 0.0
+            behind, ahead = np.where(inside, middle, behind), np.where(inside, ahead, middle)
+        beside[:, 0] = 0.5 * (ahead + behind)
+        return beside
+
+    def _surface(self, points: Floats) -> Surface:
+        out = normals(self.field, points.reshape(-1, 3))
+        return Surface(points, out.reshape(points.shape))
+
+    def _at(self, angles: Floats, ahead: Floats, radial: Floats) -> Floats:
+        """Return surface points at angles (n,) from an axis, each in its direction (n, 3)."""
+        rays = np.cos(angles)[:, None] * ahead + np.sin(angles)[:, None] * radial
+        return crossings(self.field, self.centre, rays, self.farthest)
 
 
 def ray_grid(rows: int, columns: int, focus_rad: float, spread_rad: float) -> Floats:

@@ -1,0 +1,259 @@
+"""The one shape of a visitor: a head with hair and a face, shoulders, a hand; sculpted, no photo.
+
+Face frame: origin at the tip of the nose, x out of the face, y to the owner's left, z up. In here
+the unit of length is the distance between the pupils; what leaves is in metres. Eyes, nose and
+mouth lie where those of the canonical face are (robot/model/face_geometry.py).
+"""
+
+from functools import lru_cache
+from math import cos, pi, radians, sin
+from typing import NamedTuple
+
+import numpy as np
+
+from gazerig.gaze.types import Floats, Vec3
+from gazerig.robot.model.face_features import Mouth, brow, lips
+from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
+from gazerig.robot.model.mesh import Mesh, cap, grid
+from gazerig.robot.model.mesh import ellipsoid as ellipsoid_mesh
+from gazerig.robot.model.paint import (
+    Colour,
+    Painted,
+    merged,
+    mirrored,
+    mix,
+    moved,
+    painted,
+    spot,
+    step,
+)
+from gazerig.robot.model.solid import Field, Solid, capsule, carve, ellipsoid, union
+
+
+class PersonLook(NamedTuple):
+    """Colours of a person, and whether the hair falls to the shoulders."""
+
+    skin: Colour
+    hair: Colour
+    shirt: Colour
+    iris: Colour
+    long_hair: bool
+
+
+LOOKS = (
+    PersonLook((236, 188, 158), (84, 56, 40), (88, 124, 176), (96, 66, 44), False),
+    PersonLook((150, 102, 74), (34, 28, 28), (206, 120, 86), (58, 38, 28), True),
+    PersonLook((246, 208, 184), (196, 142, 78), (104, 148, 116), (84, 124, 150), True),
+    PersonLook((206, 156, 118), (44, 36, 36), (122, 100, 156), (62, 44, 34), False),
+)
+
+_EYE_RADIUS = 0.21
+_EYE: Vec3 = (-0.665, 0.5, 0.565)
+_SMILE = 0.30
+_PARTS: tuple[tuple[Field, float], ...] = (
+    (ellipsoid((-1.66, 0.0, 0.55), (1.36, 1.16, 1.45)), 0.1),  # skull
+    (ellipsoid((-1.22, 0.0, -0.25), (0.84, 0.92, 1.00)), 0.40),  # face
+    (ellipsoid((-1.00, 0.0, -0.80), (0.64, 0.74, 0.50)), 0.35),  # jaw
+    (ellipsoid((-0.50, 0.0, -1.14), (0.20, 0.26, 0.18)), 0.26),  # chin
+    (ellipsoid((-0.74, 0.52, 0.02), (0.34, 0.34, 0.30)), 0.26),  # cheeks
+    (ellipsoid((-0.56, 0.42, 0.92), (0.16, 0.42, 0.11)), 0.24),  # brow
+    (capsule((-0.42, 0.0, 0.52), (-0.17, 0.0, 0.04), 0.095, 0.125), 0.16),  # nose
+    (ellipsoid((-0.155, 0.0, 0.0), (0.155, 0.145, 0.125)), 0.08),
+    (ellipsoid((-0.235, 0.120, -0.03), (0.10, 0.080, 0.070)), 0.08),
+    (ellipsoid((-1.62, 1.10, 0.20), (0.22, 0.13, 0.32)), 0.10),  # ears
+)
+_LIPS: tuple[tuple[Field, float], ...] = (
+    (ellipsoid((-0.335, 0.09, -0.53), (0.11, 0.24, 0.055)), 0.09),
+    (ellipsoid((-0.345, 0.0, -0.665), (0.12, 0.24, 0.070)), 0.09),
+)
+_DISH = ellipsoid((-0.26, 0.5, 0.56), (0.24, 0.36, 0.26))
+_MOUTH = Mouth(-0.600, 0.34, 0.30, 0.085, 0.105)
+
+
+def _field(points: Floats) -> Floats:
+    folded = points * (1.0, 1.0, 1.0)
+    folded[:, 1] = np.abs(folded[:, 1])
+    solid = _PARTS[0][0](folded)
+    for part, round_by in _PARTS[1:]:
+        solid = union(solid, part(folded), round_by)
+    solid = carve(solid, _DISH(folded), 0.24)
+    folded[:, 2] -= _SMILE * folded[:, 1] ** 2
+    for part, round_by in _LIPS:
+        solid = union(solid, part(folded), round_by)
+    return solid
+
+
+_HEAD = Solid(_field, (-1.45, 0.0, 0.25), 3.4)
+
+
+class HeadParts(NamedTuple):
+    """A head in two parts, of which the second lies on the first: skin and hair; eyes and lips."""
+
+    solid: Painted
+    features: Painted
+
+
+@lru_cache(maxsize=8)
+def head_parts(number: int, fineness: float = 1.0) -> HeadParts:
+    """Return the head of a person; the same number looks the same.
+
+    fineness: 1 for a close look, less for fewer triangles
+    """
+    look = LOOKS[number % len(LOOKS)]
+    skin = _HEAD.all_round(round(84 * fineness), round(84 * fineness), radians(-4.0), radians(34.0))
+    mesh = grid(skin.points, closed=True)
+    plain = Painted(
+        mesh, _complexion(skin.points, look).reshape(-1, 3), skin.normals.reshape(-1, 3)
+    )
+    red, dark = _toward(look.skin, (186, 62, 66), 0.55), _toward(look.skin, (70, 24, 24), 0.8)
+    return HeadParts(
+        moved(merged([plain, *_hair(look, fineness)]), (0.0, 0.0, 0.0), PUPIL_DISTANCE_M),
+        moved(
+            merged([*_eyes(look, fineness), *lips(_HEAD, _MOUTH, red, dark)]),
+            (0.0, 0.0, 0.0),
+            PUPIL_DISTANCE_M,
+        ),
+    )
+
+
+def head(number: int, fineness: float = 1.0) -> Painted:
+    """Return the head of a person as one shape."""
+    return merged(head_parts(number, fineness))
+
+
+def _complexion(points: Floats, look: PersonLook) -> Floats:
+    folded = points * (1.0, 1.0, 1.0)
+    folded[..., 1] = np.abs(folded[..., 1])
+    x, y, z = np.moveaxis(folded, -1, 0)
+    shade, blush = (_toward(look.skin, to) for to in ((120, 60, 44), (236, 110, 96)))
+    colours = np.broadcast_to(np.array(look.skin, float), points.shape)
+    colours = mix(colours, blush, 0.55 * spot(folded, (-0.50, 0.58, -0.02), 0.32))
+    colours = mix(colours, blush, 0.35 * spot(folded, (0.0, 0.0, -0.02), 0.16))
+    colours = mix(colours, shade, 0.55 * spot(folded, (-0.50, 0.5, 0.57), 0.30))
+    colours = mix(colours, shade, 0.80 * spot(folded, (-0.14, 0.07, -0.10), 0.055))
+    return mix(colours, shade, 0.6 * step(-z - 1.25, 0.3))
+
+
+def _eyes(look: PersonLook, fineness: float) -> list[Painted]:
+    """Return both eyes with their lids' edges, and the brows."""
+    rings = 5 if fineness < 1.0 else 9
+    balls = (
+        (1.0, 66.0, (250, 249, 247)),
+        (1.02, 31.0, look.iris),
+        (1.04, 14.0, (14, 12, 14)),
+    )
+    parts = [
+        moved(painted(cap(size * _EYE_RADIUS, radians(deg), rings), colour), _EYE)
+        for size, deg, colour in balls
+    ]
+    glint = painted(cap(0.035, pi, 4), (255, 255, 255))
+    parts.append(moved(glint, (_EYE[0] + 1.02 * _EYE_RADIUS, _EYE[1] + 0.045, _EYE[2] + 0.05)))
+    tone = _toward(look.skin, (120, 60, 44), 0.12)
+    for edge_deg, end_deg, dark in ((20.0, 84.0, 1.0), (-25.0, -84.0, 0.35)):
+        lid = painted(_shell(1.09 * _EYE_RADIUS, edge_deg, end_deg), tone)
+        edge = step(0.05 - np.abs(_lift(lid.mesh.vertices) - radians(edge_deg)), 0.05)
+        parts.append(moved(lid._replace(colours=mix(lid.colours, (40, 28, 26), dark * edge)), _EYE))
+    share = np.linspace(0.0, 1.0, 12)
+    y, z = 0.20 + 0.62 * share, 0.90 + 0.13 * np.sin(pi * (0.2 + 0.6 * share))
+    parts.append(brow(_HEAD, y, z, 0.052, look.hair, 8))
+    return [*parts, *(mirrored(part) for part in parts)]
+
+
+def _shell(radius: float, edge_deg: float, end_deg: float) -> Mesh:
+    """Return a lid: the part of a sphere between two heights above its equator."""
+    sweep = np.radians((edge_deg, edge_deg + 0.14 * (end_deg - edge_deg), end_deg))
+    sweep = np.concatenate((sweep[:2], np.linspace(sweep[1], sweep[2], 6)[1:]))
+    across = np.linspace(0.94 * pi, 0.06 * pi, 14)
+    points = np.stack(
+        (
+            np.cos(sweep)[:, None] * np.sin(across),
+            np.broadcast_to(np.cos(across), (len(sweep), 14)),
+            np.sin(sweep)[:, None] * np.sin(across),
+        ),
+        axis=-1,
+    )
+    return grid(radius * (points if end_deg > edge_deg else points[:, ::-1]), closed=False)
+
+
+def _lift(points: Floats) -> Floats:
+    """Return how far points are swept up about the y axis, from straight ahead."""
+    return np.asarray(np.arctan2(points[:, 2], points[:, 0]))
+
+
+def _hair(look: PersonLook, fineness: float) -> list[Painted]:
+    """Return a cap of hair, and where it is long two falls of it beside the neck."""
+    around = round(56 * fineness)
+    # Short hair ends behind the ears; the parting stands off the skull.
+    found = _HEAD.beyond((-1.0, 0.0, 0.62), 1.42, round(22 * fineness), around, 0.10)
+    points = found.points.copy()
+    rim = found.points[0] - 0.22 * found.normals[0]
+    wave = 0.02 * np.sin(9.0 * np.linspace(0.0, 2.0 * pi, around))
+    points[1:] += wave[:, None] * found.normals[1:]
+    mesh = grid(np.concatenate((rim[None], points)), closed=True)
+    shine = np.clip(mesh.vertices[:, 2] - 0.9, 0.0, 1.0) * 0.22
+    hair = painted(mesh, look.hair)
+    parts = [hair._replace(colours=mix(hair.colours, _toward(look.hair, (255, 230, 200)), shine))]
+    if look.long_hair:
+        fall = painted(ellipsoid_mesh((0.42, 0.30, 1.35), 0.9, 13), look.hair)
+        left = moved(fall, (-1.95, 1.02, -0.55))
+        back = moved(
+            painted(ellipsoid_mesh((0.45, 1.05, 1.35), 0.9, 13), look.hair), (-2.35, 0.0, -0.55)
+        )
+        parts += [left, mirrored(left), back]
+    return parts
+
+
+@lru_cache(maxsize=8)
+def torso(number: int, length_m: float) -> Painted:
+    """Return neck hole, shoulders and chest in the face frame, for a person who stands upright."""
+    look = LOOKS[number % len(LOOKS)]
+    bottom = -length_m / PUPIL_DISTANCE_M
+    # Height, half depth, half width.
+    rows = [
+        (-1.60, 0.62, 0.70), (-1.75, 0.74, 0.86), (-1.95, 0.84, 1.30), (-2.15, 0.98, 2.00),
+        (-2.40, 1.12, 2.62), (-2.75, 1.22, 3.02), (-3.20, 1.30, 3.20), (-3.90, 1.38, 3.18),
+        (-4.60, 1.40, 2.96), (min(-4.61, bottom), 1.36, 2.84),
+    ]  # fmt: skip
+    around = np.linspace(0.0, 2.0 * pi, 40, endpoint=False)
+    points = np.array(
+        [[(-1.85 + x * cos(a), y * sin(a), z) for a in around.tolist()] for z, x, y in rows[::-1]]
+    )
+    mesh = grid(points, closed=True)
+    collar = step(mesh.vertices[:, 2] + 1.80, 0.06)
+    shirt = painted(mesh, look.shirt)
+    shirt = shirt._replace(colours=mix(shirt.colours, _toward(look.shirt, (255, 255, 255)), collar))
+    neck_rows = ((-1.70, 0.60, 0.60), (-1.55, 0.60, 0.60), (-1.0, 0.62, 0.64), (-0.4, 0.60, 0.62))
+    tube = [
+        [(-1.75 + x * cos(a), y * sin(a), z) for a in around[::2].tolist()] for z, x, y in neck_rows
+    ]
+    neck = painted(grid(np.array(tube), closed=True), _toward(look.skin, (120, 60, 44), 0.22))
+    return moved(merged([shirt, neck]), (0.0, 0.0, 0.0), PUPIL_DISTANCE_M)
+
+
+@lru_cache(maxsize=8)
+def hand(number: int) -> Painted:
+    """Return an open hand of radius 1 m: x out of the palm, z along the fingers."""
+    look = LOOKS[number % len(LOOKS)]
+    mitten = Solid(_mitten, (0.0, 0.0, -0.1), 2.2)
+    found = mitten.all_round(34, 34)
+    points, normals = found.points.reshape(-1, 3), found.normals.reshape(-1, 3)
+    colours = np.broadcast_to(np.array(look.skin, float), points.shape)
+    y, z = points[:, 1], points[:, 2]
+    gaps = np.exp(-((np.abs(np.abs(y) - 0.20) / 0.03) ** 2)) + np.exp(-((y / 0.03) ** 2))
+    colours = mix(colours, _toward(look.skin, (120, 60, 44)), 0.8 * gaps * step(z - 0.28, 0.1))
+    return Painted(grid(found.points, closed=True), colours, normals)
+
+
+def _mitten(points: Floats) -> Floats:
+    palm = ellipsoid((0.0, 0.0, -0.22), (0.17, 0.46, 0.52))(points)
+    fingers = ellipsoid((0.02, 0.0, 0.45), (0.13, 0.38, 0.55))(points)
+    thumb = capsule((0.04, 0.34, -0.30), (0.12, 0.66, 0.10), 0.13, 0.10)(points)
+    wrist = capsule((0.0, 0.0, -0.5), (0.0, 0.0, -0.95), 0.24, 0.24)(points)
+    solid = union(union(palm, fingers, 0.16), thumb, 0.12)
+    return union(solid, wrist, 0.2)
+
+
+def _toward(colour: Colour, other: Colour, share: float = 0.5) -> Colour:
+    """Return a colour between two."""
+    r, g, b = (round(a + share * (o - a)) for a, o in zip(colour, other, strict=True))
+    return r, g, b

@@ -1,0 +1,80 @@
+"""Visitors on the page are people with a face, where they were seen; hands are hands."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import viser
+from shown_page import SNAPSHOT
+from test_page import face_at
+
+from gazerig.robot.dashboard.people import PeopleView
+from gazerig.robot.model import person_shape
+from gazerig.robot.model.face_geometry import PARTS_FACE_M
+from gazerig.robot.model.types import SeenBody, Snapshot
+
+
+def scene() -> tuple[viser.ViserServer, PeopleView]:
+    server = viser.ViserServer(port=0, verbose=False)
+    return server, PeopleView(server.scene)
+
+
+def nodes(server: viser.ViserServer) -> set[str]:
+    handles = server.scene._handle_from_node_name
+    return {name for name, handle in handles.items() if handle.visible}
+
+
+@pytest.mark.parametrize("part", ["LE", "RE", "M", "N", "DN", "UP", "FL", "FR"])
+def test_a_person_has_the_parts_of_a_face_where_the_canonical_face_has_them(part: str) -> None:
+    for number in range(len(person_shape.LOOKS)):
+        points = person_shape.head(number, 0.8).mesh.vertices
+        nearest = np.linalg.norm(points - np.array(PARTS_FACE_M[part]), axis=1).min()
+        assert nearest < (0.012 if part in ("FL", "FR", "UP") else 0.008), number
+
+
+def test_people_look_different_and_each_as_before() -> None:
+    colours = [person_shape.head(n, 0.5).colours.mean(axis=0) for n in range(4)]
+    assert min(np.abs(a - b).max() for i, a in enumerate(colours) for b in colours[:i]) > 3.0
+    again = person_shape.head(4, 0.5).colours.mean(axis=0)
+    assert again == pytest.approx(colours[0])
+
+
+def seen(*, hand: bool = True) -> Snapshot:
+    bodies = (SeenBody(7, "hand", (0.6, 0.2, 0.1), 0.06),) if hand else ()
+    ball = SeenBody(8, "thing", (0.6, -0.2, 0.1), 0.05)
+    return replace(SNAPSHOT, faces=(face_at((0.9, 0.1, 0.25)),), bodies=(*bodies, ball))
+
+
+def test_a_person_a_hand_and_a_thing_are_drawn_and_go() -> None:
+    server, people = scene()
+    try:
+        people.show(seen())
+        assert {"/faces/3/head", "/chests/3", "/bodies/7/hand", "/bodies/8/ball"} <= nodes(server)
+        head = server.scene._handle_from_node_name["/faces/3/head"]
+        assert isinstance(head, viser.GlbHandle) and head.scale == pytest.approx(1.0, abs=0.02)
+        people.show(replace(seen(), bodies=(SeenBody(7, "thing", (0.6, 0.2, 0.1), 0.06),)))
+        assert "/bodies/7/ball" in nodes(server) and "/bodies/7/hand" not in nodes(server)
+        people.show(replace(SNAPSHOT, faces=(), bodies=()))
+        left = nodes(server)
+        assert not any(
+            name.startswith(("/faces/", "/chests/", "/bodies/", "/shades/")) for name in left
+        )
+    finally:
+        server.stop()
+
+
+def test_the_eight_parts_are_marked_only_on_request() -> None:
+    server, people = scene()
+    try:
+        shot = seen(hand=False)
+        shot = replace(shot, p_world_target_m=shot.faces[0].parts_world_m[4])
+        people.show(shot)
+        assert not any(name.endswith("/mark") for name in nodes(server))
+        people.show(shot, parts=True)
+        marks = {name for name in nodes(server) if name.endswith("/mark")}
+        assert len(marks) == 8 and "/faces/3/halo" in nodes(server)
+        people.show(shot)
+        frames = {"/".join(name.split("/")[:-1]) for name in marks}
+        assert not frames & nodes(server) and "/faces/3/halo" not in nodes(server)
+    finally:
+        server.stop()
