@@ -1,11 +1,13 @@
 """What is installed is all there is, and what is checked is the same wherever it is checked."""
 
+import json
 import re
 import tomllib
 from pathlib import Path
 from typing import Any
 
 import pytest
+from command_line import parse
 from ruamel.yaml import YAML
 
 import gazerig
@@ -108,6 +110,24 @@ def test_a_commit_is_checked_as_the_host_checks_it() -> None:
     targets = re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
     for step in steps:
         assert step is None or step.removeprefix("make ") in targets, step
+
+
+def test_the_container_holds_all_sources_and_starts_a_command_that_is_one() -> None:
+    file = (ROOT / "docs/Containerfile").read_text(encoding="utf-8")
+    copied = re.findall(r"^COPY (\w+) /src/(\w+)$", file, re.MULTILINE)
+    assert {source for source, _ in copied} == set(FOLDERS.values())
+    assert all(source == target for source, target in copied)
+    [beside] = re.findall(r"^COPY (.+) /src/$", file, re.MULTILINE)
+    assert {
+        "pyproject.toml",
+        PROJECT["project"]["readme"],
+        *PROJECT["project"]["license-files"],
+    } == {*beside.split()}
+    [start], [words] = (re.findall(rf"^{what} (.+)$", file, re.M) for what in ("ENTRYPOINT", "CMD"))
+    assert json.loads(start) == list(PROJECT["project"]["scripts"])
+    parse(json.loads(words))
+    [python] = re.findall(r"python:([\d.]+)-slim", file)
+    assert f"Programming Language :: Python :: {python}" in PROJECT["project"]["classifiers"]
 
 
 def test_every_python_that_is_promised_is_tried() -> None:
