@@ -8,6 +8,10 @@ import stat
 from pathlib import Path
 from typing import BinaryIO
 
+_FLAGS = os.O_RDONLY
+for _name in ("O_NONBLOCK", "O_CLOEXEC", "O_BINARY"):  # the last is Windows'
+    _FLAGS |= getattr(os, _name, 0)
+
 
 class NotRegularFile(OSError):
     """A path leads to a pipe, a device or a socket."""
@@ -34,7 +38,7 @@ def open_regular(path: Path | str) -> BinaryIO:
     """
     try:
         _refuse_other_kinds(os.stat(path), path)
-        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        descriptor = os.open(path, _FLAGS)
     except ValueError:  # a NUL byte
         raise FileNotFoundError(2, "no such file", str(path)) from None
     try:

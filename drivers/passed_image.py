@@ -14,7 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 _FD_BYTES = 4  # a C int
-_FD_ROOM = socket.CMSG_LEN(_FD_BYTES)
+CAN_PASS = hasattr(os, "memfd_create") and hasattr(socket, "SCM_RIGHTS")
+"""Whether this system has memory without a name, and passes it on: Linux."""
+_FD_ROOM = socket.CMSG_LEN(_FD_BYTES) if CAN_PASS else 0
 
 
 class PassedImage(NamedTuple):

@@ -69,9 +69,11 @@ def run(
     import cv2  # the control loop's process, which imports this module too, does without
 
     # Ctrl-C reaches all processes of a terminal; it is the loop's to end this one.
-    for number in (signal.SIGINT, signal.SIGHUP):
-        signal.signal(number, signal.SIG_IGN)
-    os.nice(NICE)
+    for name in ("SIGINT", "SIGHUP"):
+        if hasattr(signal, name):
+            signal.signal(getattr(signal, name), signal.SIG_IGN)
+    if hasattr(os, "nice"):  # Windows has priorities of another kind
+        os.nice(NICE)
     # One processor stays the loop's: with all of them in OpenCV's hands the loop is later, and
     # no more frames are looked at.
     cv2.setNumThreads(max(1, (os.cpu_count() or 1) - 1))

@@ -18,8 +18,6 @@ from smbus2 import SMBus, i2c_msg
 
 from gazerig.drivers.errors import BusLost, PortError
 from gazerig.drivers.i2c.bridge import NO_ACKNOWLEDGE, OK, TIMED_OUT, Part, commands
-from gazerig.drivers.serial.port import BlockingPort, BusPort
-from gazerig.drivers.serial.port_owner import is_i2c
 
 I2C_RETRIES, I2C_TIMEOUT, I2C_SLAVE = 0x0701, 0x0702, 0x0703
 """Requests of the kernel's i2c-dev."""
@@ -31,15 +29,6 @@ _STUCK = (errno.ETIMEDOUT, errno.EAGAIN, errno.EBUSY, errno.EINTR)
 
 OpenBus = Callable[[str], Any]
 """Opens a bus by its path: smbus2's SMBus, or an emulated one with its methods."""
-
-
-def port_of(
-    path: str, exclusive: bool = True, on_traffic: Callable[[], None] | None = None
-) -> BusPort:
-    """Return a port by its path: an I2C bus of the kernel, or else a serial port."""
-    if is_i2c(path):
-        return I2cPort(path, exclusive, on_traffic)
-    return BlockingPort(path, exclusive, on_traffic)
 
 
 class I2cPort:

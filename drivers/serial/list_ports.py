@@ -5,7 +5,6 @@ that tests can use others.
 """
 
 import contextlib
-import grp
 import os
 import stat
 from collections.abc import Iterable
@@ -95,7 +94,9 @@ def access(device: str) -> Access:
         return Access(False, False, False, "", False)
     allowed = os.access(device, os.R_OK | os.W_OK)
     group, members = str(found.st_gid), []
-    with contextlib.suppress(KeyError):
+    with contextlib.suppress(KeyError, ImportError):  # Windows has no such groups
+        import grp
+
         entry = grp.getgrgid(found.st_gid)
         group, members = entry.gr_name, entry.gr_mem
     joined = found.st_gid in os.getgroups() or _user() in members

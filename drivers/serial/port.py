@@ -5,7 +5,6 @@ Owns the host clock of the servo bus (monotonic seconds).
 
 import os
 import select
-import termios
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -17,6 +16,11 @@ from serial import Serial, SerialException
 from gazerig.drivers.errors import BusLost, PortError
 from gazerig.drivers.serial.list_ports import lasting_name
 from gazerig.drivers.serial.open_error import explain
+
+try:
+    import termios
+except ImportError:  # no POSIX: emulated servos run there, real ports do not
+    termios = None  # type: ignore[assignment]
 
 BITS_PER_BYTE = 10
 SDK_MARGIN_S = 0.034
@@ -293,6 +297,8 @@ class BlockingPort(PortHandler):  # type: ignore[misc]  # the SDK has no types
             PortError: absent, busy or not permitted.
         """
         self.closePort()
+        if termios is None:
+            raise PortError(f"{self.port_name}: real servos need Linux; here there is --mock")
         where = self._where()
         try:
             self.ser = Serial(where, cflag_baud, timeout=0, exclusive=self._exclusive or None)

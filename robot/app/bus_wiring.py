@@ -6,9 +6,9 @@ from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig
 from gazerig.drivers.checked_bus import CheckedBus
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.i2c.port import port_of
 from gazerig.drivers.multi_bus import BusShare, MultiBus
 from gazerig.drivers.plugins import BUS, BusPlugin, PluginError, failure, find, is_ours, load
+from gazerig.drivers.port_by_path import port_of
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_models import SERVOS
 from gazerig.drivers.types import ServoBus, ServoConfig

@@ -21,7 +21,7 @@ from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import LOWER_NECK, NECK
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import build
-from gazerig.sim_mock.pty.client import PtyBuses
+from gazerig.sim_mock.pty.client import PtyBuses, has_terminals
 
 TrueSteps = Callable[[], Mapping[str, float]]
 """Returns the true positions of the servos now in steps, by joint."""
@@ -50,7 +50,10 @@ class RunBus(NamedTuple):
 
 
 def run_bus(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:
-    """Return the real port, ideal servos, an emulated bus here, or one on a pseudo-terminal."""
+    """Return the real port, ideal servos, an emulated bus here, or one on a pseudo-terminal.
+
+    Without pseudo-terminals the bus is emulated here in real time, too.
+    """
     if not options.mock:
         paths, here = ports_of(rig, options.port), serial_ports()
         for name, path in paths.items():
@@ -60,7 +63,7 @@ def run_bus(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:
         ideal, names = ideal_bus(rig, clock.now_s), rig.names
         return RunBus(ideal, lambda: dict(zip(names, ideal.positions_steps(), strict=True)))
     lines = emulated_lines(rig)
-    if not options.fast:
+    if not options.fast and has_terminals():
         buses = PtyBuses()
         return RunBus(guarded_rig_bus(rig, buses.start(lines)), close=buses.stop)
     from gazerig.sim_mock.in_process_port import InProcessPort

@@ -13,9 +13,9 @@ from rich.table import Table
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.i2c.port import port_of
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.pca9685.probe import probe
+from gazerig.drivers.port_by_path import port_of
 from gazerig.drivers.serial.list_ports import SerialPort
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.port_owner import POLOLU, is_i2c

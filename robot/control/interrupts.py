@@ -8,9 +8,16 @@ from typing import Any, Self
 
 from gazerig.robot.model.clock import RealClock
 
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
-"""Ctrl-C, a request to end, a terminal that was closed, and Ctrl-backslash."""
-_BACKGROUND = (signal.SIGTTIN, signal.SIGTTOU)
+
+def signals_of(*names: str) -> tuple[signal.Signals, ...]:
+    """Return the signals of these names that this system has."""
+    return tuple(one for name in names if (one := getattr(signal, name, None)) is not None)
+
+
+ENDING = signals_of("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGBREAK")
+"""Ctrl-C, a request to end, a terminal that was closed, Ctrl-backslash, and Windows' Ctrl-Break."""
+_HANG_UP = signals_of("SIGHUP")
+_BACKGROUND = signals_of("SIGTTIN", "SIGTTOU")
 """Would stop a program in the background for a look at its terminal, with the torque on."""
 
 _NEVER = 1 << 30
@@ -66,7 +73,7 @@ class Interrupts:
         if main and self._signals and self._depth == 1:
             for number in ENDING:
                 # Who starts a program with nohup wants it to outlive the terminal.
-                if number == signal.SIGHUP and signal.getsignal(number) == signal.SIG_IGN:
+                if number in _HANG_UP and signal.getsignal(number) == signal.SIG_IGN:
                     continue
                 self._before[number] = signal.signal(number, self._note)
             for number in _BACKGROUND:
@@ -118,7 +125,7 @@ class Interrupts:
         self._last_s = now_s
         if self._first is None:
             self._first = signal.Signals(number).name
-        elif number == signal.SIGHUP or now_s - last_s < SAME_REQUEST_S:
+        elif number in _HANG_UP or now_s - last_s < SAME_REQUEST_S:
             return
         else:
             self._more += 1

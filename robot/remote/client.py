@@ -52,6 +52,7 @@ from gazerig.robot.remote.socket_io import (
     folder,
     is_private,
     sockets,
+    user_id,
 )
 
 if TYPE_CHECKING:
@@ -353,7 +354,7 @@ def running(pid: int | None = None, who: str = "") -> list[RobotClient]:
 
     who: as in RobotClient.connect
     """
-    uid = os.getuid()
+    uid = user_id()
     place = folder(os.environ, uid)
     if not is_private(place, uid):  # who put a socket there is not known
         return []

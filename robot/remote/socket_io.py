@@ -1,18 +1,23 @@
 """The socket of a running rig: where it is, and JSON lines through it, one each way.
 
 A Unix socket in a folder of the user's own: who may open files of the user may steer the
-head, no other user; nothing of it is seen from another machine.
+head, no other user; nothing of it is seen from another machine. Where a system has no such
+sockets, a port of the loopback takes its place: the file then holds the port and a token, which
+a caller has to show first.
 """
 
 import contextlib
+import hmac
 import json
 import os
+import secrets
 import socket
 import stat
 import struct
+import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple, NoReturn
+from typing import NamedTuple, NoReturn, Self
 
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.model.clock import RealClock
@@ -24,6 +29,16 @@ ANSWER_BYTES = 1 << 23
 _PATH_BYTES = 107
 """Longest path of a Unix socket on Linux (unix(7), sun_path), without its ending zero."""
 _CHUNK_BYTES = 1 << 16
+HAS_SOCKET_FILES = hasattr(socket, "AF_UNIX") and hasattr(socket, "SO_PEERCRED")
+"""Whether this system has sockets that are files, and tells who is at their other end: Linux."""
+_LOOPBACK = "127.0.0.1"
+_TOKEN_BYTES = 32
+_TOKEN_S = 1.0
+
+
+def user_id() -> int:
+    """Return the number of the user who runs this program; 0 where users have none."""
+    return os.getuid() if hasattr(os, "getuid") else 0
 
 
 class MalformedMessage(ValueError):
@@ -43,6 +58,8 @@ def folder(environ: Mapping[str, str], uid: int) -> Path:
         # unset, or left over from another user by sudo or su
         if runtime and os.path.isdir(runtime) and os.stat(runtime).st_uid == uid:
             return Path(runtime) / "gazerig"
+    if not hasattr(os, "getuid"):  # Windows: what lies here is shut to other users
+        return Path(environ.get("LOCALAPPDATA") or tempfile.gettempdir()) / "gazerig"
     return Path(f"/tmp/gazerig-{uid}")
 
 
@@ -70,6 +87,8 @@ def is_private(path: Path, uid: int) -> bool:
         found = path.lstat()
     except FileNotFoundError:
         return False
+    if not hasattr(os, "getuid"):
+        return stat.S_ISDIR(found.st_mode)
     return stat.S_ISDIR(found.st_mode) and found.st_uid == uid and not found.st_mode & 0o077
 
 
@@ -95,6 +114,8 @@ def dial(path: Path, within_s: float) -> socket.socket:
     Raises:
         OSError: there is no answer; ConnectionRefusedError where the process is dead.
     """
+    if not HAS_SOCKET_FILES:
+        return _dial_port(path, within_s)
     caller = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         caller.settimeout(within_s)
@@ -105,16 +126,92 @@ def dial(path: Path, within_s: float) -> socket.socket:
     return caller
 
 
-def listen(path: Path) -> socket.socket:
+def _dial_port(path: Path, within_s: float) -> socket.socket:
+    """Connect to the port that a file names, and show the token.
+
+    Raises:
+        OSError: see ``dial``.
+    """
+    port, _, token = path.read_text(encoding="ascii").partition(" ")
+    if not port.isdecimal():
+        raise ConnectionRefusedError(f"{path} names no port")
+    caller = socket.create_connection((_LOOPBACK, int(port)), within_s)
+    try:
+        caller.sendall(token.encode())
+    except BaseException:
+        caller.close()
+        raise
+    return caller
+
+
+class Peer(NamedTuple):
+    """Who is at the other end of a socket, as the kernel knows it; pid 0: it does not say."""
+
+    pid: int
+    uid: int
+
+
+class Listener:
+    """Takes callers of this user.
+
+    token: what they must show, empty where the kernel tells who they are
+    """
+
+    def __init__(self, end: socket.socket, token: str = "") -> None:
+        self._end = end
+        self._token = token
+
+    def accept(self) -> socket.socket:
+        """Wait for a caller, who is not yet known.
+
+        Raises:
+            OSError: it was closed.
+        """
+        return self._end.accept()[0]
+
+    def admitted(self, caller: socket.socket) -> Peer | None:
+        """Return who called, None for whoever may not.
+
+        Raises:
+            OSError: the caller is gone.
+        """
+        if not self._token:
+            found = peer(caller)
+            # The folder is shut to others; twice is safer.
+            return found if found.uid == user_id() else None
+        caller.settimeout(_TOKEN_S)
+        shown = b""
+        while len(shown) < _TOKEN_BYTES and (more := caller.recv(_TOKEN_BYTES - len(shown))):
+            shown += more
+        return Peer(0, user_id()) if hmac.compare_digest(shown, self._token.encode()) else None
+
+    def __enter__(self) -> Self:
+        """Listen within a block."""
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        """Close at its end."""
+        self.close()
+
+    def close(self) -> None:
+        """Take no more callers; wakes who waits for one."""
+        with contextlib.suppress(OSError):
+            self._end.shutdown(socket.SHUT_RDWR)
+        self._end.close()
+
+
+def listen(path: Path) -> Listener:
     """Listen on a socket file, for its owner alone; an existing one is replaced.
 
     Raises:
         SetupError: the path is too long, or the disk refuses.
     """
-    if len(os.fsencode(path)) > _PATH_BYTES - len(".new"):
-        raise SetupError(f"{path}: too long for a socket; set XDG_RUNTIME_DIR to a shorter path")
     # Its name only once it listens: a socket that refuses is taken for a dead rig's.
     early = path.with_name(f"{path.name}.new")
+    if not HAS_SOCKET_FILES:
+        return _listen_on_port(path, early)
+    if len(os.fsencode(path)) > _PATH_BYTES - len(".new"):
+        raise SetupError(f"{path}: too long for a socket; set XDG_RUNTIME_DIR to a shorter path")
     listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
     try:
         early.unlink(missing_ok=True)
@@ -125,18 +222,28 @@ def listen(path: Path) -> socket.socket:
     except OSError as error:
         listener.close()
         raise SetupError(f"{path}: no socket there ({error.strerror}); no remote control") from None
-    return listener
+    return Listener(listener)
 
 
-class Peer(NamedTuple):
-    """Who is at the other end of a Unix socket, as the kernel knows it."""
-
-    pid: int
-    uid: int
+def _listen_on_port(path: Path, early: Path) -> Listener:
+    """Listen on a port of the loopback, and write it with a token into a file of this user."""
+    listener = socket.socket()
+    token = secrets.token_hex(_TOKEN_BYTES // 2)
+    try:
+        listener.bind((_LOOPBACK, 0))
+        listener.listen(128)
+        early.unlink(missing_ok=True)
+        with open(os.open(early, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
+            file.write(f"{listener.getsockname()[1]} {token}")
+        os.replace(early, path)
+    except OSError as error:
+        listener.close()
+        raise SetupError(f"{path}: no port there ({error.strerror}); no remote control") from None
+    return Listener(listener, token)
 
 
 def peer(end: socket.socket) -> Peer:
-    """Return who connected.
+    """Return who connected to a Unix socket.
 
     Raises:
         OSError: the connection is gone.

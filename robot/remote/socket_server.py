@@ -16,7 +16,7 @@ from gazerig.robot.model.clock import RealClock
 from gazerig.robot.remote import socket_io as remote_socket
 from gazerig.robot.remote.budget import ALL, EACH, Budget
 from gazerig.robot.remote.request_handler import RequestHandler, is_stop
-from gazerig.robot.remote.socket_io import REQUEST_BYTES, MalformedMessage, Wire
+from gazerig.robot.remote.socket_io import REQUEST_BYTES, Listener, MalformedMessage, Wire
 
 _REST_S = 2.0
 """A request that has begun must end within this."""
@@ -41,7 +41,7 @@ class RemoteServer:
         self._clock = RealClock()
         self._budget = Budget(ALL, self._clock.now_s())
         self._path: Path | None = None
-        self._listener: socket.socket | None = None
+        self._listener: Listener | None = None
         self._lock = threading.Lock()
         self._wires: dict[Wire, None] = {}  # the quietest first
         self._threads: list[threading.Thread] = []
@@ -52,7 +52,7 @@ class RemoteServer:
         Raises:
             SetupError: no socket can be had; the message says why.
         """
-        uid = os.getuid()
+        uid = remote_socket.user_id()
         folder = remote_socket.folder(os.environ, uid)
         remote_socket.make_private(folder, uid)
         remote_socket.clear_dead(folder)
@@ -68,7 +68,6 @@ class RemoteServer:
             return
         self._path.unlink(missing_ok=True)
         listener, self._listener = self._listener, None
-        listener.shutdown(socket.SHUT_RDWR)  # wakes who waits for callers
         listener.close()
         with self._lock:
             for wire in self._wires:
@@ -77,39 +76,47 @@ class RemoteServer:
         for thread in threads:
             thread.join(timeout=2.0)
 
-    def _start(self, work: Callable[..., None], *words: object) -> None:
+    def _start(self, work: Callable[..., None], *words: object) -> bool:
+        """Start a thread, unless this was closed meanwhile."""
         thread = threading.Thread(target=work, args=words, name="remote control", daemon=True)
         with self._lock:
+            if self._listener is None:
+                return False
             self._threads = [t for t in self._threads if t.is_alive()] + [thread]
             thread.start()
+        return True
 
-    def _accept(self, listener: socket.socket) -> None:
+    def _accept(self, listener: Listener) -> None:
         """Start a thread for every program that connects."""
         while self._listener is not None:
             try:
-                end, _ = listener.accept()
+                end = listener.accept()
             except OSError:  # closed
                 return
-            try:
-                caller = remote_socket.peer(end)
-            except OSError:  # gone already
+            if not self._start(self._admit, end, listener):
                 end.close()
-                continue
-            if caller.uid != os.getuid():  # the folder is shut to others; twice is safer
-                end.close()
-                continue
-            wire = Wire(end, REQUEST_BYTES)
-            with self._lock:
-                if self._listener is None:  # closed since: nothing would close this one
-                    wire.close()
-                    return
-                if len(self._wires) >= _MOST:
-                    # A client that comes to stop the head must always be accepted.
-                    quietest = next(iter(self._wires))
-                    del self._wires[quietest]
-                    quietest.close()
-                self._wires[wire] = None
-            self._start(self._serve, wire, f"process {caller.pid}")
+
+    def _admit(self, end: socket.socket, listener: Listener) -> None:
+        """Answer a program if it is one of this user."""
+        try:
+            caller = listener.admitted(end)
+        except OSError:  # gone already
+            caller = None
+        if caller is None:
+            end.close()
+            return
+        wire = Wire(end, REQUEST_BYTES)
+        with self._lock:
+            if self._listener is None:  # closed since: nothing would close this one
+                wire.close()
+                return
+            if len(self._wires) >= _MOST:
+                # A client that comes to stop the head must always be accepted.
+                quietest = next(iter(self._wires))
+                del self._wires[quietest]
+                quietest.close()
+            self._wires[wire] = None
+        self._serve(wire, f"process {caller.pid}" if caller.pid else "another program")
 
     def _serve(self, wire: Wire, peer: str) -> None:
         """Answer one program until it hangs up or cannot be understood any more."""

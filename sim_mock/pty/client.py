@@ -2,6 +2,7 @@
 
 import json
 import subprocess
+import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -12,6 +13,15 @@ from gazerig.sim_mock.devices import DynamixelLine, Emulated, packed
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 STOP_S = 2.0
+
+
+def has_terminals() -> bool:
+    """Return whether this system has the pseudo-terminals that servos are emulated on: Linux."""
+    try:
+        import gazerig.sim_mock.pty.terminal  # noqa: F401
+    except ImportError:
+        return False
+    return sys.platform == "linux"
 
 
 class _Served:
