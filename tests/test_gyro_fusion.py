@@ -245,7 +245,6 @@ def gyro_of(motion, seconds):
 
 @pytest.mark.parametrize("motion", [shake, pan])
 def test_e94_things_are_told_from_a_moved_camera_even_if_somebody_fills_the_image(motion):
-    # The image alone does not tell: recall .38 and .25, .3 and .5 false things a picture.
     score = judged(frames(motion, 0.8, CLOSE), turn_of=gyro_of(motion, 0.8))
     figures = score.figures("close")
     assert figures["close: false things a picture"] <= 0.05

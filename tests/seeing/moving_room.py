@@ -68,6 +68,22 @@ def pan(t_s: float) -> Pose:
     return Pose(-12.0 * sin(0.5 * pi * triangle), 0.0, 0.0)
 
 
+def fast_pan(t_s: float) -> Pose:
+    """Swing to and fro at some 60 deg/s."""
+    return pan(3.0 * t_s)
+
+
+def turn(t_s: float) -> Pose:
+    """Turn as a head that looks from one to another: over 16 deg and back in 2.5 s."""
+    return Pose(8.0 * sin(2 * pi * 0.4 * t_s), 2.0 * sin(2 * pi * 0.3 * t_s))
+
+
+def knocked_turn(t_s: float) -> Pose:
+    """Turn, on a table that is bumped."""
+    a, b = turn(t_s), bump(t_s)
+    return Pose(*(one + other for one, other in zip(a, b, strict=True)))
+
+
 MOTIONS: dict[str, Motion] = {"still": still, "shake": shake, "bump": bump, "pan": pan}
 
 
@@ -125,6 +141,12 @@ ROOM = (
     Board((-2.2, 0.9, 3.6), (0.7, 0.6), 1),
     Board((2.0, 0.6, 3.0), (0.5, 0.9), 2),
     Board((0.3, 1.1, 2.2), (0.6, 0.3), 3),
+)
+# Still things nearer than most of the room, which pass it where the lens moves aside.
+NEAR = (
+    *ROOM,
+    Board((-0.45, 0.35, 0.9), (0.12, 0.15), 1),
+    Board((0.5, 0.4, 1.3), (0.15, 0.2), 2),
 )
 PEOPLE = (
     Board((1.3, 0.5, 4.2), (0.28, 0.9), 4, True, 1.0, 0.9),

@@ -159,7 +159,7 @@ class MotionDetector:
         if why:
             self._tracks.predict(ego.total, now.captured_s, dt_s)
             return MotionReport((), why, turn, ego.share, ego.noise_px)
-        things = what_moves(pair, ego, self._params)
+        things = what_moves(pair, ego, self._params, R_now_before is None)
         groups = gathered(things, self._params)
         blobs = self._blobs(groups, now, pair, ego, depth, dt_s)
         return MotionReport(blobs, "", turn, ego.share, ego.noise_px, things.threshold_px)

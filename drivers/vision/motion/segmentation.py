@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 
 from gazerig.drivers.vision.motion.ego_motion import Ego
-from gazerig.drivers.vision.motion.image import Plane
+from gazerig.drivers.vision.motion.image import Floats, Plane
 from gazerig.drivers.vision.motion.optical_flow import Compared, Flow, Mask
 from gazerig.drivers.vision.motion.params import MotionParams
 
@@ -24,6 +24,8 @@ _LIGHT_PX, _LIGHT_STEP = 41, 8.0
 _LEFT_SHARE = 0.5
 # How far above the noise a change must be (variances), and a grey level for rounding.
 _NOISE_RATIO, _ROUNDING = 2.5, 1.0
+# How much less far than the room a still thing moves that is behind most of it, as a share.
+_BEHIND = 0.03
 # How far flow smears over an edge.
 _SMEAR_PX = 17
 _ONE_MAP: Plane = np.empty(0, dtype=np.float32)
@@ -43,15 +45,27 @@ class Things(NamedTuple):
     threshold_px: float
 
 
-def what_moves(pair: Compared, ego: Ego, params: MotionParams) -> Things:
-    """Return the flow without ego-motion, where both frames confirm it."""
-    there = _background(ego, pair.now.shape)
+def what_moves(pair: Compared, ego: Ego, params: MotionParams, by_image: bool = False) -> Things:
+    """Return the flow without ego-motion, where both frames confirm it.
+
+    Args:
+        pair: the two images and their flow.
+        ego: the camera's own motion.
+        params: thresholds.
+        by_image: the image alone told that motion. What moves otherwise than a still thing nearer
+            than the room would, against the room or across its motion, then counts from the
+            least motion on.
+    """
+    there = _background(ego.B, pair.now.shape)
     if pair.shift is not None:
         there += pair.shift
     rest = there - _added(pair.flow, 1.0)
     least = max(params.min_flow_px, params.noise_factor * ego.noise_px)
-    threshold = least + params.parallax_share * ego.way_px
-    mask = cv2.magnitude(rest[..., 0], rest[..., 1]) > threshold + _jumps(pair.shift)
+    if by_image:
+        threshold, moves = least, rest - _nearer(rest, ego, params.parallax_share)
+    else:
+        threshold, moves = least + params.parallax_share * ego.way_px, rest
+    mask = cv2.magnitude(moves[..., 0], moves[..., 1]) > threshold + _jumps(pair.shift)
     mask &= pair.known
     if mask.any():
         mask &= _borne_out(pair, there, rest)
@@ -66,11 +80,34 @@ def _jumps(shift: Flow | None) -> Plane | float:
     return np.asarray(ends.sum(axis=2), dtype=np.float32)
 
 
-def _background(ego: Ego, shape: tuple[int, ...]) -> Flow:
-    """Return where the still room's pixels lie in the older image, (h, w, 2)."""
+def _nearer(rest: Flow, ego: Ego, most: float) -> Flow:
+    """Return how much of a motion could be that of a still thing nearer than the room, (h, w, 2).
+
+    A lens that turns also moves aside, so that what is near moves along with the room and farther,
+    and what is behind it a little less far.
+
+    Args:
+        rest: (h, w, 2) motion besides the room's.
+        ego: the camera's own motion.
+        most: how much farther a thing may move, as a share of the room's motion.
+    """
+    room = -_background(np.asarray(np.linalg.inv(ego.total)), rest.shape[:2])
+    room = _added(room, 1.0)
+    along = (rest * room).sum(axis=2) / np.maximum((room * room).sum(axis=2), np.float32(1e-6))
+    out: Flow = np.clip(along, -_BEHIND, most)[..., None] * room
+    return out
+
+
+def _background(B: Floats, shape: tuple[int, ...]) -> Flow:
+    """Return where the still room's pixels lie in the older image, (h, w, 2).
+
+    Args:
+        B: (3, 3) pixels of the newer image to those of the older.
+        shape: of the images.
+    """
     height, width = shape
     x, y = np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32)[:, None]
-    (a, b, c), (d, e, f), (g, h, i) = ego.B.astype(np.float32)
+    (a, b, c), (d, e, f), (g, h, i) = B.astype(np.float32)
     depth = np.maximum(g * x + h * y + i, np.float32(1e-3))
     return np.dstack(((a * x + b * y + c) / depth, (d * x + e * y + f) / depth))
 
