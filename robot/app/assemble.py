@@ -164,14 +164,15 @@ def assemble(rig: Rig, options: RunOptions, substitutes: Substitutes = RIGS_OWN)
     table = rig.gaze.scanpath.transition_matrix
     shipped = table in shipped_names("scanpaths") and not options.verbose
     note = row_sums_note(walk) if not shipped else None
-    sight = _sight(kinematics, camera, options, scene is None)
+    in_process = scene is None or (options.pixels and not options.fast)
+    sight = _sight(kinematics, camera, options, in_process)
     wires = run_bus(rig, options, clock)
     messages: list[str] = []
     try:
         seen = (
             scene_camera(
                 rig, options, scene, sight.mount, true_head(wires.true_steps, rig, sight.poses),
-                random.camera, locator_of(camera), substitutes.program,
+                random.camera, locator_of(camera), substitutes.program, clock, sight.turns,
             )
             if scene is not None
             else real_camera(rig, options, clock, camera, sight.turns, substitutes.program)

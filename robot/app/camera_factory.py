@@ -23,6 +23,7 @@ from gazerig.drivers.plugins import CAMERA, CameraPlugin, PluginError, find, is_
 from gazerig.drivers.types import Camera, FaceDetector
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.app.drawn_camera import DrawnCamera, MotionBesidePlans, drawn_camera
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts, program_camera, watched
 from gazerig.robot.model.clock import Clock
@@ -49,12 +50,27 @@ def scene_camera(
     rng: np.random.Generator,
     locate: FrameLocator,
     own: ProgramParts = NO_PARTS,
+    clock: Clock | None = None,
+    turns: PoseBuffer | None = None,
 ) -> Camera:
-    """Return a camera on a simulated scene, which renders frames or returns ideal detections."""
+    """Return a camera on a simulated scene, which renders frames or returns ideal detections.
+
+    clock, turns: the host's clock, and how the camera was turned when, for a scene that is drawn
+        in real time; that has a process of its own
+    """
     field_deg = rig.camera.horizontal_field_deg
     if not options.pixels:
         params = SceneCameraParams(horizontal_field_deg=field_deg)
         return SceneCamera(params, scene, mount, where, rng, locate)
+    if clock is not None and not options.fast and own.detector is None:
+        field_rad, lens = radians(field_deg), rig.camera.lens
+        return drawn_camera(
+            rig, scene, mount, where, rng, clock, partial(face_detector, rig.detector),
+            lambda planned: partial(
+                MotionBesidePlans, planned, rig.motion, lens, field_rad, turns
+            ),
+            locate,
+        )  # fmt: skip
     # Drawing and detecting, with OpenCV.
     from gazerig.robot.app.drawn_motion import MotionOfDrawn
     from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
@@ -153,6 +169,8 @@ def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams)
         match camera:
             case GuardedCamera():
                 return retune_camera(camera.camera, before, after, placed)
+            case DrawnCamera():
+                return retune_camera(camera.process, before, after, placed)
             case CameraProcess():
                 motion = partial(retuned, after.motion, placed.lens, field_rad)
                 done = camera.retune(detector, motion if moves else None, locate)

@@ -1,0 +1,61 @@
+"""The newest pose of the head: written by the control loop, read by a process that draws its view.
+
+Shared memory without a lock: the loop writes the older of two entries and then counts it; the
+reader looks at the count before and after, and reads again what was overwritten meanwhile.
+"""
+
+import multiprocessing
+from collections.abc import Sequence
+from typing import NamedTuple
+
+_WIDTH = 13  # time, the nine numbers of the rotation, the place
+
+Row = tuple[float, float, float]
+
+
+class PoseAt(NamedTuple):
+    """Rotation (three rows) and place [m] of the head in the world at a time [s]."""
+
+    t_s: float
+    R_world_head: tuple[Row, Row, Row]
+    p_world_head_m: Row
+
+
+class PoseSlot:
+    """The newest pose, and when the first was written.
+
+    It can be handed to a process that is being started, as an argument.
+    """
+
+    def __init__(self) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._count = context.RawValue("q", 0)
+        self._first_s = context.RawValue("d", 0.0)
+        self._entries = context.RawArray("d", 2 * _WIDTH)
+
+    def record(
+        self, t_s: float, R_world_head: Sequence[Sequence[float]], p_world_head_m: Sequence[float]
+    ) -> None:
+        """Record a pose; only one process writes."""
+        count = self._count.value
+        if count == 0:
+            self._first_s.value = t_s
+        x, y, z = R_world_head
+        start = count % 2 * _WIDTH
+        self._entries[start : start + _WIDTH] = [t_s, *x, *y, *z, *p_world_head_m]
+        self._count.value = count + 1
+
+    @property
+    def first_s(self) -> float:
+        """Return the time of the first pose, 0 before it."""
+        return float(self._first_s.value)
+
+    def newest(self) -> PoseAt | None:
+        """Return the newest pose, None before the first."""
+        while count := self._count.value:
+            start = (count - 1) % 2 * _WIDTH
+            t_s, *v = self._entries[start : start + _WIDTH]
+            if self._count.value - count < 1:
+                rows = (v[0], v[1], v[2]), (v[3], v[4], v[5]), (v[6], v[7], v[8])
+                return PoseAt(t_s, rows, (v[9], v[10], v[11]))
+        return None

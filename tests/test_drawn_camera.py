@@ -1,0 +1,114 @@
+"""A drawn scene in real time: the camera's process draws and looks, the loop says where it is."""
+
+import pickle
+import threading
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from gazerig.config.schema import load_rig
+from gazerig.drivers.camera.pose_slot import PoseSlot
+from gazerig.drivers.camera.source import Shot
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.camera_factory import retune_camera
+from gazerig.robot.app.drawn_camera import (
+    DrawnCamera,
+    DrawnSource,
+    MotionBesidePlans,
+    PlannedPlaces,
+)
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.model.frames import CameraMount
+from gazerig.sim_mock.scenes.registry import scenes
+
+LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+LEFT = ((0.8, -0.6, 0.0), (0.6, 0.8, 0.0), (0.0, 0.0, 1.0))
+
+
+def test_the_newest_pose_is_read_whole() -> None:
+    poses = PoseSlot()
+    assert poses.newest() is None and poses.first_s == 0.0
+    poses.record(2.0, LEVEL, (0.0, 0.0, 0.1))
+    poses.record(2.5, LEFT, (0.1, 0.2, 0.3))
+    assert poses.newest() == (2.5, LEFT, (0.1, 0.2, 0.3)) and poses.first_s == 2.0
+
+
+def source(scene: str, poses: PoseSlot, planned: PlannedPlaces) -> DrawnSource:
+    mount = CameraMount(load_rig("desk").camera)
+    return DrawnSource(scenes()[scene], mount, 69.0, poses, planned, np.random.default_rng(3))
+
+
+def taken(frames: DrawnSource, poses: PoseSlot, t_s: float) -> Shot:
+    poses.record(t_s, LEVEL, (0.0, 0.0, 0.1))
+    frames._due_s = 0.0
+    shot = frames.take(lambda: t_s, threading.Event())
+    assert shot is not None
+    return shot
+
+
+def test_frames_are_drawn_as_of_the_pose_that_was_told() -> None:
+    poses = PoseSlot()
+    frames = source("face-to-face", poses, PlannedPlaces())
+    frames.open()
+    first = taken(frames, poses, 100.0)
+    second = taken(frames, poses, 100.2)
+    assert (first.captured_s, second.captured_s) == (100.0, 100.2)
+    assert second.number > first.number and first.image.shape == (400, 640, 3)
+    poses.record(100.4, LEFT, (0.0, 0.0, 0.1))
+    frames._due_s = 0.0
+    aside = frames.take(lambda: 100.4, threading.Event())
+    assert aside is not None
+    apart = [np.abs(one.image.astype(int) - first.image).mean() for one in (second, aside)]
+    assert apart[1] > 3.0 * apart[0]
+
+
+def test_a_source_that_is_told_nothing_waits_and_can_be_stopped() -> None:
+    stop = threading.Event()
+    stop.set()
+    assert source("face-to-face", PoseSlot(), PlannedPlaces()).take(lambda: 1.0, stop) is None
+
+
+def test_planned_places_reach_the_motion_finder_in_the_other_process() -> None:
+    poses, planned = PoseSlot(), PlannedPlaces()
+    rig = load_rig("desk")
+    made = (
+        partial(source, "boxing", poses),
+        partial(MotionBesidePlans, planned, rig.motion, None, 1.2, None),
+    )
+    # As both are handed to a process: one object stays one object.
+    both = pickle.loads(pickle.dumps((partial(PlannedPlaces), planned, partial(id, planned))))
+    assert both[2]() == id(both[1]) and callable(made[1])
+    frames, finds = source("boxing", poses, planned), made[1]()
+    named = set()
+    for k in range(60):
+        shot = taken(frames, poses, 10.0 + 0.5 * k)
+        named |= {blob.kind for blob in finds(shot)} & {blob.kind for blob in planned.blobs}
+        if named:
+            break
+    assert named
+
+
+def test_only_a_drawn_scene_in_real_time_has_a_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = load_rig("desk")
+    made = assemble(rig, RunOptions(mock=True, fast=True, pixels=True, scene="visitor"))
+    assert not isinstance(made.robot.camera, DrawnCamera)
+    made.close()
+    made = assemble(rig, RunOptions(mock=True, pixels=True, scene="visitor", bus="ideal"))
+    try:
+        camera = made.robot.camera
+        assert isinstance(camera, DrawnCamera)
+        asked: list[object] = []
+
+        def retune(*given: object) -> bool:
+            asked.append(given)
+            return True
+
+        monkeypatch.setattr(camera.process, "retune", retune)
+        changed = load_rig("desk", character="shy")
+        assert retune_camera(camera, rig, changed, rig.camera) == "" and not asked
+        slower = replace(rig, motion=replace(rig.motion, enabled=not rig.motion.enabled))
+        assert retune_camera(camera, rig, slower, rig.camera) == "" and len(asked) == 1
+    finally:
+        made.close()
