@@ -318,7 +318,7 @@ class Oculomotor:
         """Return the target where it is predicted to be now."""
         prediction = self._prediction
         prediction.see(target, p_head, self._pursuit.fastest_swing_rad_s)
-        moved, velocity = prediction.displacement(t_s), prediction.velocity(t_s)
+        moved, velocity = prediction.motion(t_s)
         p, centre = target.p_world_m, target.centre_world_m
         point = self._gaze.clear(add(p, moved), p_head)
         middle = prediction.to_middle

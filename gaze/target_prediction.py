@@ -45,6 +45,10 @@ _REMEMBERED_S = 2.0
 """A swing is remembered so long while something else is looked at."""
 
 
+_Seen = tuple[float, float, float, float, float, float, float]
+"""Time of a frame, and the target's place and velocity in it."""
+
+
 class Sine(NamedTuple):
     """A swing about a middle: p(t) = middle + c cos(w (t - at)) + s sin(w (t - at))."""
 
@@ -100,7 +104,7 @@ class TargetPrediction:
         """Forget what was seen."""
         self._id = ("", -1)
         self._at_s, self._p, self._v = 0.0, _STILL, _STILL
-        self._past: deque[tuple[float, Vec3, Vec3]] = deque()
+        self._past: deque[_Seen] = deque()
         self._bend, self._share = _STILL, 1.0
         self._fastest_m_s = self._most_m_s = 0.0
         self.sine: Sine | None = None
@@ -138,7 +142,7 @@ class TargetPrediction:
             self._bend, self.sine = _STILL, None
             return
         past = self._past
-        past.append((at_s, p, v))
+        past.append((at_s, *p, *v))
         while past[0][0] < at_s - _WINDOWS_S[-1]:
             past.popleft()
         self._bend = self._slope()
@@ -149,24 +153,18 @@ class TargetPrediction:
 
     def displacement(self, t_s: float) -> Vec3:
         """Return by how much the target has moved since its frame."""
-        if self._model == "none":
-            return _STILL
-        age_s = max(0.0, t_s - self._at_s)
-        known_s = min(age_s, self._horizon_s)
-        moved = self._moved(known_s)
-        if age_s > known_s:
-            left = exp(-(age_s - known_s) / self._fade_s)
-            moved = add(moved, scale(self._speed(known_s), self._fade_s * (1.0 - left)))
-        return moved
+        return self.motion(t_s)[0]
 
-    def velocity(self, t_s: float) -> Vec3:
-        """Return the target's velocity."""
+    def motion(self, t_s: float) -> tuple[Vec3, Vec3]:
+        """Return by how much the target has moved since its frame, and its velocity."""
         if self._model == "none":
-            return self._v
-        age_s = max(0.0, t_s - self._at_s)
-        known_s = min(age_s, self._horizon_s)
-        left = exp(-(age_s - known_s) / self._fade_s) if age_s > known_s else 1.0
-        return scale(self._speed(known_s), left)
+            return _STILL, self._v
+        age_s, known_s = max(0.0, t_s - self._at_s), self._horizon_s
+        if age_s <= known_s:
+            return self._moved(age_s), self._speed(age_s)
+        left, speed = exp(-(age_s - known_s) / self._fade_s), self._speed(known_s)
+        beyond = scale(speed, self._fade_s * (1.0 - left))
+        return add(self._moved(known_s), beyond), scale(speed, left)
 
     @property
     def to_middle(self) -> Vec3 | None:
@@ -203,12 +201,12 @@ class TargetPrediction:
         if len(past) < _SLOPE_FRAMES:
             return _STILL
         last = [past[k] for k in range(-_SLOPE_FRAMES, 0)]
-        mean_s = sum([t for t, _, _ in last]) / _SLOPE_FRAMES
-        weights = [t - mean_s for t, _, _ in last]
-        total = sum([w * w for w in weights])
-        x = y = z = 0.0
-        for w, (_, _, v) in zip(weights, last, strict=True):
-            x, y, z = x + w * v[0], y + w * v[1], z + w * v[2]
+        mean_s = sum([seen[0] for seen in last]) / _SLOPE_FRAMES
+        total = x = y = z = 0.0
+        for t, _, _, _, vx, vy, vz in last:
+            w = t - mean_s
+            total += w * w
+            x, y, z = x + w * vx, y + w * vy, z + w * vz
         return x / total, y / total, z / total
 
     def _recognised(self, p: Vec3, at_s: float) -> Sine | None:
@@ -229,13 +227,14 @@ class TargetPrediction:
             window_s = next((w for w in _WINDOWS_S if w >= period_s), _WINDOWS_S[-1])
         if at_s - self._past[0][0] < 0.95 * window_s:
             return sine
-        past = np.array([(t, *p, *v) for t, p, v in self._past if t > at_s - window_s])
+        since_s = at_s - window_s
+        past = np.array([seen for seen in self._past if seen[0] > since_s])
         return fitted(past, at_s, _FITS if sine is None else _STILL_FITS)
 
     def _past_m(self) -> float:
         """Return how far apart the target's places have been, along the axis of most."""
-        some = [p for _, p, _ in islice(self._past, 0, None, _SPARSE)]
-        spans: list[float] = [max(axis) - min(axis) for axis in zip(*some, strict=True)]
+        _, *axes = zip(*islice(self._past, 0, None, _SPARSE), strict=True)
+        spans: list[float] = [max(axis) - min(axis) for axis in axes[:3]]
         return max(spans)
 
 

@@ -80,9 +80,9 @@ def test_a_steady_motion_is_extrapolated_with_its_velocity_and_fades(model: str)
     prediction = shown(lambda t: 0.2 * t, 2.0, model)
     end_s = prediction._at_s
     assert y_of(prediction.displacement(end_s + 0.1)) == pytest.approx(0.02, abs=1e-4)
-    assert y_of(prediction.velocity(end_s + 0.1)) == pytest.approx(0.2, abs=1e-3)
+    assert y_of(prediction.motion(end_s + 0.1)[1]) == pytest.approx(0.2, abs=1e-3)
     # 0.12 s with all of it, then with what a time constant of 0.3 s leaves.
-    assert y_of(prediction.velocity(end_s + 0.42)) == pytest.approx(0.2 / np.e, rel=0.01)
+    assert y_of(prediction.motion(end_s + 0.42)[1]) == pytest.approx(0.2 / np.e, rel=0.01)
     assert y_of(prediction.displacement(end_s + 9.0)) == pytest.approx(0.2 * 0.42, rel=0.01)
 
 
@@ -166,7 +166,7 @@ def test_a_swing_faster_than_pursuit_is_followed_with_less_of_it() -> None:
     fastest = 0.6 * 2.0 * pi * hz * size / norm((1.0, 0.3, 0.2))
     prediction = shown(swing(hz, size), 3.0, fastest=fastest)
     end_s = prediction._at_s
-    speeds = [norm(prediction.velocity(end_s + s)) for s in np.linspace(0.0, 0.1, 30)]
+    speeds = [norm(prediction.motion(end_s + s)[1]) for s in np.linspace(0.0, 0.1, 30)]
     assert max(speeds) <= 0.6 * 2.0 * pi * hz * size * 1.02
     places = [
         prediction._p[1] + y_of(prediction.displacement(end_s)) - 0.3,
@@ -197,7 +197,7 @@ def test_whatever_is_seen_predictions_are_finite_and_bounded(
         prediction.see(at(y, v, k * gap_s), EYE, 1.2)
         for age_s in (0.0, 0.05, 0.3, 5.0):
             moved = prediction.displacement(k * gap_s + age_s)
-            assert np.isfinite([*moved, *prediction.velocity(k * gap_s + age_s)]).all()
+            assert np.isfinite([*moved, *prediction.motion(k * gap_s + age_s)[1]]).all()
             assert norm(sub(moved, (0.0, 0.0, 0.0))) < 10.0
 
 
