@@ -12,19 +12,21 @@ from shown_page import wait_for
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Detections
 from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.camera_factory import scene_start_s
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
 from gazerig.robot.control.tick_text import perception_text
 from gazerig.robot.dashboard.camera_overlay import draw_detections, ground
-from gazerig.robot.dashboard.live_feed import LiveFeed, LiveRig, RunState
+from gazerig.robot.dashboard.live_feed import LiveFeed, LiveRig, RunState, gaze_pixel
 from gazerig.robot.dashboard.page_feed import drain
 from gazerig.robot.dashboard.page_process import URL, PageProcess
 from gazerig.robot.dashboard.publisher import Publisher
 from gazerig.robot.dashboard.snapshot import SnapshotBuilder, SnapshotTexts
 from gazerig.robot.model.commands import Tune
 from gazerig.robot.model.types import Snapshot
+from gazerig.sim_mock.scenes.picture import ScenePicture
 
 
 class Run(NamedTuple):
@@ -54,6 +56,7 @@ class Page:
         self.said: list[str] = []
         self.state = RunState({"lost": 3}, "wait", "talking", "shy", (None, None, 0))
         self.rigs = 0
+        self.picture: ScenePicture | None = None
         self.publisher = Publisher(
             self.page, lambda: self._rig(made), lambda: self.state, None, self.said.append
         )
@@ -63,7 +66,7 @@ class Page:
 
     def _rig(self, made: Assembly) -> LiveRig:
         self.rigs += 1
-        return LiveRig(200.0, made.shown())
+        return LiveRig(200.0, made.shown(), picture=self.picture)
 
     def comes_up(self) -> None:
         before = self.page.started
@@ -153,11 +156,12 @@ def test_the_image_is_drawn_as_the_camera_gave_it(ran: Run, page: Page, depth: b
     page.stream.update(tick._replace(detections=found))
     news = drain(page.feed, page.live)
     assert news.image is not None
-    shown = ran.made.shown()
     assert found.located is not None
-    lens = found.located.intrinsics
-    for gaze_px in (None, page.live._gaze_px(tick, shown, found, lens)):
-        drawn = draw_detections(ground(found, depth), found, gaze_px, lens)
+    lens, poses = found.located.intrinsics, page.live._poses
+    assert poses is not None
+    R, p_m = ran.made.shown().mount.pose(*poses.head_pose(found.captured_s))
+    for gaze_px in (None, gaze_pixel(tick, R, p_m, lens)):
+        drawn = draw_detections(ground(found, depth), found, gaze_px, lens, faces=False)
         if np.array_equal(drawn, news.image):
             break
     else:
@@ -165,8 +169,46 @@ def test_the_image_is_drawn_as_the_camera_gave_it(ran: Run, page: Page, depth: b
     assert drain(page.feed, page.live).image is None
 
 
+def test_a_simulated_scene_is_drawn_as_its_camera_sees_it(ran: Run, page: Page) -> None:
+    page.comes_up()
+    page.live.choices.gaze = False
+    start_s = scene_start_s(ran.made.robot.camera)
+    assert start_s is not None and ran.made.scene is not None
+    page.picture = ScenePicture(ran.made.scene)
+    page.state = page.state._replace(scene_start_s=start_s)
+    page.stream.update(ran.ticks[-1])
+    image = drain(page.feed, page.live).image
+    assert image is not None and image.shape == (400, 640, 3)
+    assert len(np.unique(image.reshape(-1, 3), axis=0)) > 500  # a picture, and no dark ground
+    # Who is found is where somebody is drawn: hair and skin differ from the wall behind.
+    found = ran.ticks[-1].detections
+    assert found is not None and found.faces
+    x, y = found.faces[0].landmarks_px[2]
+    face = image[int(y) - 8 : int(y) + 8, int(x) - 8 : int(x) + 8].reshape(-1, 3).mean(axis=0)
+    assert face[2] > face[0] + 20  # red above blue: skin
+    plain = image.copy()
+    for name in ("faces", "gaze", "heat"):
+        setattr(page.live.choices, name, True)
+        page.live._new_frame = True
+        with_it = page.live.image()
+        assert with_it is not None and not np.array_equal(with_it, plain), name
+        setattr(page.live.choices, name, False)
+
+
+def test_without_anyone_who_looks_no_image_is_drawn_until_somebody_does(
+    ran: Run, page: Page
+) -> None:
+    page.comes_up()
+    page.live.watched = False
+    page.stream.update(ran.ticks[-1])
+    assert drain(page.feed, page.live).image is None
+    page.live.watched = True
+    assert page.live.image() is not None
+
+
 def test_a_camera_without_images_and_depth_says_so(ran: Run, page: Page) -> None:
     page.comes_up()
+    page.live.choices.gaze = False
     page.publisher.depth = True
     page.stream.update(ran.ticks[-1]._replace(detections=Detections(0.0, 1, 640, 400)))
     with_words = drain(page.feed, page.live).image

@@ -16,7 +16,8 @@ from gazerig.robot.dashboard.commanded_pose import CommandedPoseView
 from gazerig.robot.dashboard.head_view import FLOOR_M, LEAST_M, HeadView
 from gazerig.robot.dashboard.joint_charts import JointCharts, JointSeries
 from gazerig.robot.dashboard.outbox import Outbox
-from gazerig.robot.dashboard.overlays import OverlayChoices, OverlayPanel
+from gazerig.robot.dashboard.overlay_choices import OverlayChoices
+from gazerig.robot.dashboard.overlays import OverlayPanel
 from gazerig.robot.dashboard.page_feed import News
 from gazerig.robot.dashboard.page_view import PageView
 from gazerig.robot.dashboard.panel import PanelView

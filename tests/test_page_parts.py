@@ -257,14 +257,14 @@ def test_detections_are_drawn_small_and_into_a_copy() -> None:
     picture, detections = camera_picture()
     before = picture.copy()
     drawn = draw_detections(picture, detections, (500.0, 100.0), lens=LENS)
-    assert drawn.shape == (240, IMAGE_WIDTH_PX, 3)
+    assert drawn.shape == (480, IMAGE_WIDTH_PX, 3)
     assert np.array_equal(picture, before)
     plain = draw_detections(picture, Detections(1.0, 1, 640, 480), None, lens=LENS)
     changed = np.abs(drawn.astype(int) - plain).sum(axis=2) > 60
     # Face box, left edge; a landmark; the blob at 320 + 300 * 0.35 / 0.8; the gaze point.
-    for x_px, y_px in ((129, 110), (150, 97), (226, 150), (250, 50)):
-        assert changed[y_px - 12 : y_px + 13, x_px - 12 : x_px + 13].any()
-    assert not changed[200:, :].any()
+    for x_px, y_px in ((258, 220), (300, 194), (452, 300), (500, 100)):
+        assert changed[y_px - 18 : y_px + 19, x_px - 18 : x_px + 19].any()
+    assert not changed[400:, :].any()
 
 
 def test_no_picture_is_a_dark_ground_and_what_is_behind_is_not_drawn() -> None:
@@ -289,8 +289,8 @@ def test_depth_is_shown_in_colours_near_red_far_blue_unknown_dark() -> None:
     depth_m = np.full((480, 640), 1.0, np.float32)
     depth_m[:, :160], depth_m[:, 160:320], depth_m[:, 480:] = NEAREST_M / 2, np.nan, 2 * FARTHEST_M
     drawn = depth_image(depth_m)
-    assert drawn.shape == (240, IMAGE_WIDTH_PX, 3)
-    near, unknown, middle, far = (drawn[100, x].astype(int) for x in (40, 120, 200, 300))
+    assert drawn.shape == (480, IMAGE_WIDTH_PX, 3)
+    near, unknown, middle, far = (drawn[200, x].astype(int) for x in (80, 240, 400, 600))
     assert near[2] > near[0] + 60 and far[0] > far[2] - 5
     assert len(set(unknown.tolist())) == 1 and unknown[0] < 60
     assert not np.array_equal(middle, near) and not np.array_equal(middle, far)
@@ -300,9 +300,9 @@ def test_depth_is_drawn_on_only_where_it_is_wanted_and_there() -> None:
     picture, found = camera_picture()
     assert ground(found, depth=False) is picture
     reported = ground(found, depth=True)
-    assert reported is not None and reported.shape == (240, IMAGE_WIDTH_PX, 3)
-    assert (np.abs(reported.astype(int) - 90).max(axis=2) > 60)[215:].any()  # words at the foot
-    assert not (np.abs(reported.astype(int) - 90).max(axis=2) > 60)[:200].any()
+    assert reported is not None and reported.shape == (480, IMAGE_WIDTH_PX, 3)
+    assert (np.abs(reported.astype(int) - 90).max(axis=2) > 60)[450:].any()  # words at the foot
+    assert not (np.abs(reported.astype(int) - 90).max(axis=2) > 60)[:430].any()
     deep = replace(found, depth_m=np.full((480, 640), 1.0, np.float32))
     shown = ground(deep, depth=True)
-    assert shown is not None and len(np.unique(shown[:200].reshape(-1, 3), axis=0)) == 1
+    assert shown is not None and len(np.unique(shown[:430].reshape(-1, 3), axis=0)) == 1

@@ -80,6 +80,11 @@ def scene_camera(
     return PixelCamera(drawn, scene, mount, where, own.find_faces(rig), rng, motion, locate)
 
 
+def scene_start_s(camera: Camera) -> float | None:
+    """Return when the scene of a camera without images began, None before that or without one."""
+    return camera.start_s if isinstance(camera, SceneCamera) else None
+
+
 def real_camera(
     rig: Rig,
     options: RunOptions,

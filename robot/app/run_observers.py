@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from gazerig.config.faults import ConfigError
 from gazerig.robot.app.assemble import Assembly
+from gazerig.robot.app.camera_factory import scene_start_s
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.control.loop import LoopCount
@@ -31,6 +32,7 @@ from gazerig.robot.model.commands import Command, Resume, Stop, Tune
 from gazerig.robot.model.reply import CommandTaker, Ticket
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
 from gazerig.robot.remote.live_server import LiveServer
+from gazerig.sim_mock.scenes.picture import ScenePicture
 
 if TYPE_CHECKING:
     from gazerig.robot.recording.recorder import Recorder
@@ -133,13 +135,16 @@ class RunObservers:
         return Publisher(page, self._live_rig, self._run_state, feed, self._say, self._browse)
 
     def _live_rig(self) -> LiveRig:
-        return LiveRig(self._made.loop.rate_hz, self._made.shown(), self._emulated)
+        made = self._made
+        picture = ScenePicture(made.scene) if made.scene is not None else None
+        return LiveRig(made.loop.rate_hz, made.shown(), self._emulated, picture)
 
     def _run_state(self) -> RunState:
         """Return what the page shows and ticks do not tell."""
         robot = self._made.robot
         errors = {kind: n for kind, n in robot.body.bus.health().errors.items() if n}
-        return RunState(errors, *self._in_force(), robot.perception.residual())
+        start_s = scene_start_s(robot.camera)
+        return RunState(errors, *self._in_force(), robot.perception.residual(), start_s)
 
     def join(self, observers: Observers) -> None:
         """Let all of them observe the ticks; each is left out by itself where it fails."""

@@ -7,9 +7,11 @@ import numpy as np
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import Depth, DetectedFace, Detections, ImageArray, MovingBlob
+from gazerig.gaze.types import Floats
+from gazerig.robot.dashboard.gaze_heat import draw_heat
 from gazerig.robot.model.intrinsics import project
 
-IMAGE_WIDTH_PX = 320
+IMAGE_WIDTH_PX = 640
 NEAREST_M, FARTHEST_M = 0.3, 6.0
 """Ends of the colour scale of the depth image: an arm's reach and the end of a room."""
 
@@ -17,7 +19,7 @@ _JPEG_QUALITY = 80
 _FACE = (120, 220, 90)  # BGR
 _LANDMARK = (255, 255, 255)
 _BLOB = (255, 170, 60)
-_GAZE = (40, 130, 255)
+_GAZE, _GAZE_EDGE = (40, 130, 255), (250, 250, 250)
 _DARK_GROUND = 38
 _SCALE_PX = 12
 
@@ -29,19 +31,26 @@ def draw_detections(
     detections: Detections,
     gaze_px: tuple[float, float] | None,
     lens: Intrinsics,
+    *,
+    faces: bool = True,
+    heat_px: Floats | None = None,
 ) -> ImageArray:
-    """Draw faces, landmarks, moving blobs and the gaze point into a small copy.
+    """Draw faces, landmarks, moving blobs and the gaze point into a copy.
 
     image: the camera's image, or None where the source has none: a dark ground
     gaze_px: where the rig looks, pixels of the full image; None draws none
     lens: of the full image; it places the blobs
+    faces: whether faces, landmarks and blobs are drawn
+    heat_px: points (n, 2) of the full image that the gaze has been on; None draws none
     Returns an image of at most IMAGE_WIDTH_PX; the one given is left as it is.
     """
     scale = min(1.0, IMAGE_WIDTH_PX / detections.width_px)
     drawn = _small(image, detections, scale)
-    for face in detections.faces:
+    if heat_px is not None:
+        draw_heat(drawn, scale * heat_px)
+    for face in detections.faces if faces else ():
         _draw_face(drawn, face, scale)
-    for blob in detections.blobs:
+    for blob in detections.blobs if faces else ():
         _draw_blob(drawn, blob, lens, scale)
     if gaze_px is not None:
         _draw_gaze(drawn, _pixel(gaze_px[0], gaze_px[1], scale))
@@ -115,7 +124,7 @@ def _small(image: ImageArray | None, detections: Detections, scale: float) -> Im
 def _draw_face(drawn: ImageArray, face: DetectedFace, scale: float) -> None:
     x, y, width, height = face.box_px
     corner = _pixel(x, y, scale)
-    cv2.rectangle(drawn, corner, _pixel(x + width, y + height, scale), _FACE, 1, cv2.LINE_AA)
+    cv2.rectangle(drawn, corner, _pixel(x + width, y + height, scale), _FACE, 2, cv2.LINE_AA)
     _write(drawn, f"{face.confidence:.2f}", corner, _FACE)
     for landmark_x, landmark_y in face.landmarks_px:
         cv2.circle(drawn, _pixel(landmark_x, landmark_y, scale), 2, _LANDMARK, -1, cv2.LINE_AA)
@@ -133,13 +142,13 @@ def _draw_blob(drawn: ImageArray, blob: MovingBlob, lens: Intrinsics, scale: flo
 
 
 def _draw_gaze(drawn: ImageArray, at: Point) -> None:
-    cv2.circle(drawn, at, 7, _GAZE, 2, cv2.LINE_AA)
-    cv2.circle(drawn, at, 2, _GAZE, -1, cv2.LINE_AA)
+    for radius, thick, colour in ((14, 5, _GAZE_EDGE), (14, 3, _GAZE), (3, -1, _GAZE)):
+        cv2.circle(drawn, at, radius, colour, thick, cv2.LINE_AA)
 
 
 def _write(drawn: ImageArray, text: str, at: Point, colour: tuple[int, int, int]) -> None:
-    above = (at[0], max(9, at[1] - 3))
-    cv2.putText(drawn, text, above, cv2.FONT_HERSHEY_SIMPLEX, 0.35, colour, 1, cv2.LINE_AA)
+    above = (at[0], max(12, at[1] - 4))
+    cv2.putText(drawn, text, above, cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, 1, cv2.LINE_AA)
 
 
 def _pixel(x: float, y: float, scale: float) -> Point:

@@ -8,18 +8,19 @@ ticks, and what they do not tell (``RunState``) when it has changed.
 import pickle
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.passed_image import PassedImage, taken
 from gazerig.drivers.types import BusHealth, DetectedFace, Detections, ImageArray, MovingBlob
-from gazerig.gaze.angles import rotate_back, sub
-from gazerig.gaze.types import Percept
+from gazerig.gaze.types import Floats, Mat3, Percept, Vec3
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickRow, decode_plain, decode_rows, encode
 from gazerig.robot.control.tick_text import health_text, perception_text
+from gazerig.robot.dashboard.gaze_trail import GazeTrail
+from gazerig.robot.dashboard.overlay_choices import OverlayChoices
 from gazerig.robot.dashboard.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
@@ -33,15 +34,35 @@ _NEAREST_M = 0.05
 """What is nearer to the plane of the camera, or behind it, has no place in the image."""
 
 
+class DrawPicture(Protocol):
+    """Draws what a camera in a simulated scene sees; it is sent to the page's process."""
+
+    def draw(
+        self, scene_s: float, lens: Intrinsics, size_px: tuple[int, int], R: Mat3, p_m: Vec3
+    ) -> ImageArray:
+        """Return a BGR image.
+
+        Args:
+            scene_s: time since the scene began, seconds.
+            lens: of the camera, for images of this size.
+            size_px: width and height.
+            R: rotation of the camera in the world, its axes optical.
+            p_m: position of the camera in the world.
+        """
+        ...
+
+
 class LiveRig(NamedTuple):
     """A running rig: the rate of its loop, and how it is built.
 
     emulated: its servos are, and nobody calibrates them
+    picture: draws what a simulated camera sees; None where there is none, or it gives images
     """
 
     rate_hz: float
     shown: ShownRig
     emulated: bool = False
+    picture: "DrawPicture | None" = None
 
 
 class RunState(NamedTuple):
@@ -49,6 +70,7 @@ class RunState(NamedTuple):
 
     errors: of the bus, by kind; behaviour, conversation, character: those in force
     residual: see ``ResidualFigures``
+    scene_start_s: when a simulated scene began, None before that and without one
     """
 
     errors: dict[str, int]
@@ -56,6 +78,7 @@ class RunState(NamedTuple):
     conversation: str
     character: str
     residual: tuple[float | None, float | None, int]
+    scene_start_s: float | None = None
 
 
 class FrameHead(NamedTuple):
@@ -116,10 +139,16 @@ class LiveFeed:
     """Takes what the rig's side sends; returns what there is to show.
 
     emulated: the servos are; False before the rig has said so
+    choices: what is wanted in the camera's image
+    watched: someone sees the images; otherwise none is drawn
     """
 
     def __init__(self) -> None:
         self.emulated = False
+        self.choices = OverlayChoices()
+        self.watched = True
+        self._picture: DrawPicture | None = None
+        self._trail = GazeTrail()
         self._builder: SnapshotBuilder | None = None
         self._poses: PoseHistory | None = None
         self._percept: Percept | None = None
@@ -161,18 +190,39 @@ class LiveFeed:
 
     def image(self) -> ImageArray | None:
         """Return the newest frame with what was found in it; None without a new one."""
-        tick, found, builder = self._newest, self._found, self._builder
-        if not self._new_frame or tick is None or found is None or builder is None:
+        tick, found, builder, poses = self._newest, self._found, self._builder, self._poses
+        if not (self._new_frame and self.watched):
+            return None
+        if tick is None or found is None or builder is None or poses is None:
             return None
         self._new_frame = False
         assert builder.rig is not None  # it came with the first message
         field_rad = builder.rig.horizontal_rad
         lens = intrinsics_of_lens(None, field_rad, found.width_px, found.height_px, found.lens)
-        gaze_px = self._gaze_px(tick, builder.rig, found, lens)
+        R, p_m = builder.rig.mount.pose(*poses.head_pose(found.captured_s))
+        found = self._pictured(found, lens, R, p_m)
         # The page's process draws; the control loop's imports this module too, without OpenCV.
         from gazerig.robot.dashboard.camera_overlay import draw_detections, ground
 
-        return draw_detections(ground(found, self._wants_depth), found, gaze_px, lens)
+        points_m = self._trail.points() if self.choices.heat else None
+        return draw_detections(
+            ground(found, self._wants_depth),
+            found,
+            gaze_pixel(tick, R, p_m, lens) if self.choices.gaze else None,
+            lens,
+            # Where there is no image, what was found is all there is to see.
+            faces=self.choices.faces or _blank(found),
+            heat_px=None if points_m is None else pixels(points_m, R, p_m, lens),
+        )
+
+    def _pictured(self, found: Detections, lens: Intrinsics, R: Mat3, p_m: Vec3) -> Detections:
+        """Return detections with a picture of the simulated scene, where they have no image."""
+        start_s = self._state.scene_start_s
+        if not _blank(found) or self._picture is None or start_s is None:
+            return found
+        size_px = found.width_px, found.height_px
+        drawn = self._picture.draw(found.captured_s - start_s, lens, size_px, R, p_m)
+        return replace(found, image=drawn)
 
     def _take_rig(self, rig: LiveRig) -> None:
         if self._builder is None:
@@ -181,6 +231,7 @@ class LiveFeed:
         self._builder.rig = rig.shown
         self._builder.retune(rig.rate_hz)
         self.emulated = rig.emulated
+        self._picture = rig.picture
 
     def _take_ticks(self, data: bytes) -> None:
         if self._builder is None or self._poses is None:
@@ -191,6 +242,7 @@ class LiveFeed:
             self._builder.update(tick)
             self._poses.remember(tick.t_s, tick.pose.head_rad, tick.pose.base_rad)
             self._newest = tick
+            self._trail.add(tick.t_s, tick.gaze.gaze_point_world_m)
         self._new_ticks = True
 
     def _tick(self, row: TickRow, percepts: Mapping[int, Percept]) -> Tick:
@@ -218,18 +270,22 @@ class LiveFeed:
             found = replace(found, depth_m=array) if head.depth else replace(found, image=array)
         self._found, self._wants_depth, self._new_frame = found, head.wants_depth, True
 
-    def _gaze_px(
-        self, tick: Tick, rig: ShownRig, found: Detections, lens: Intrinsics
-    ) -> tuple[float, float] | None:
-        """Return where in the image the gaze goes, None when it is outside."""
-        if self._poses is None:
-            return None
-        R, p = rig.mount.pose(*self._poses.head_pose(found.captured_s))
-        x, y, z = rotate_back(R, sub(tick.gaze.gaze_point_world_m, p))
-        if z < _NEAREST_M:
-            return None
-        u, v = project(np.array([[x, y, z]]), lens)[0].tolist()
-        return (u, v)
+
+def _blank(found: Detections) -> bool:
+    """Return whether there is neither an image nor a depth image."""
+    return found.image is None and found.depth_m is None
+
+
+def gaze_pixel(tick: Tick, R: Mat3, p_m: Vec3, lens: Intrinsics) -> tuple[float, float] | None:
+    """Return where in the image of a camera at (R, p_m) the gaze goes, None when it is outside."""
+    found = pixels(np.array([tick.gaze.gaze_point_world_m]), R, p_m, lens).tolist()
+    return (found[0][0], found[0][1]) if found else None
+
+
+def pixels(points_world_m: Floats, R: Mat3, p_m: Vec3, lens: Intrinsics) -> Floats:
+    """Return where points (n, 3) are in the image of a camera at (R, p_m); without those behind."""
+    seen: Floats = (points_world_m - np.array(p_m)) @ np.array(R)
+    return np.asarray(project(seen[seen[:, 2] >= _NEAREST_M], lens), np.float64).reshape(-1, 2)
 
 
 def _intrinsics(

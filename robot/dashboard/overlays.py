@@ -1,32 +1,11 @@
 """What can be drawn into the page's scene beside the rig: desired pose, camera, eyes' field."""
 
-from dataclasses import dataclass
-from typing import ClassVar
-
 import viser
 
 from gazerig.robot.dashboard.commanded_pose import CommandedPoseView
+from gazerig.robot.dashboard.overlay_choices import OverlayChoices
 from gazerig.robot.dashboard.view_frusta import CameraField, EyeFields
 from gazerig.robot.model.types import Snapshot
-
-
-@dataclass
-class OverlayChoices:
-    """Which of them are wanted; changed by the users of the page."""
-
-    ghost: bool = False
-    sight: bool = False
-    camera: bool = False
-    eyes: bool = False
-    parts: bool = False
-
-    NAMES: ClassVar[dict[str, str]] = {
-        "ghost": "ghost of the desired pose",
-        "sight": "lines of sight",
-        "camera": "what the camera covers",
-        "eyes": "what the eyes can attend to",
-        "parts": "the eight parts of a face",
-    }
 
 
 class OverlayPanel:

@@ -137,11 +137,13 @@ def watch(feed: socket.socket, view: PageView, parent: int, served: Served) -> N
     """
     door, pointer = served.door, served.pointer
     pause, live = threading.Event(), LiveFeed()
+    live.choices = view.choices
     while True:
         if not door.is_open():
             raise RuntimeError("the page's door has closed by itself")
         readable, _, _ = select.select([feed], [], [], _SILENT_AFTER_S)
         if readable:
+            live.watched = view.watched()
             news = drain(feed, live)
             if news.ended:
                 return

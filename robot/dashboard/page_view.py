@@ -9,6 +9,7 @@ from gazerig.robot.dashboard.controls import Controls
 from gazerig.robot.dashboard.head_view import HeadView
 from gazerig.robot.dashboard.lights import furnish
 from gazerig.robot.dashboard.outbox import Outbox
+from gazerig.robot.dashboard.overlay_choices import OverlayChoices
 from gazerig.robot.dashboard.overlays import OverlayPanel
 from gazerig.robot.dashboard.page_feed import News
 from gazerig.robot.dashboard.page_process import ALL_USERS, CHOICES, MESSAGE, PARAMS, REPLAY, VALUES
@@ -64,6 +65,15 @@ class PageView:
         self._drawn = self._watched = False
         self._add_views()
 
+    @property
+    def choices(self) -> OverlayChoices:
+        """Return what the users want to see drawn; it changes as they choose."""
+        return self._panel.layers
+
+    def watched(self) -> bool:
+        """Return whether any browser shows the page."""
+        return self._widgets.watched or bool(self._server.get_clients())
+
     def _ask_depth(self, on: bool) -> None:
         self._outbox.ask({"show": {"depth": on}}, ALL_USERS)
 
@@ -88,7 +98,7 @@ class PageView:
             self._tell(self._stop_state())
         self._jpeg = news.jpeg or self._jpeg
         self._image = news.image if news.image is not None else self._image
-        watched = self._widgets.watched or bool(self._server.get_clients())
+        watched = self.watched()
         if watched and not self._watched:  # who comes late may find a rig that stands still
             self._panel.draw_all()
         self._watched = watched

@@ -16,7 +16,7 @@ from gazerig.robot.dashboard.gaze_map import GazeMap
 from gazerig.robot.dashboard.html import note
 from gazerig.robot.dashboard.joint_charts import JointCharts, JointSeries
 from gazerig.robot.dashboard.main_sequence_chart import MainSequenceChart
-from gazerig.robot.dashboard.overlays import OverlayChoices
+from gazerig.robot.dashboard.overlay_choices import OverlayChoices
 from gazerig.robot.dashboard.run_figures import HOW_TO, RunFigures
 from gazerig.robot.dashboard.servo_health import health
 from gazerig.robot.dashboard.status import alarms, silence

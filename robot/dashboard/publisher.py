@@ -23,7 +23,7 @@ from gazerig.robot.dashboard.page_process import PageProcess
 from gazerig.robot.dashboard.param_feed import ParamFeed, ParamThread
 from gazerig.robot.model.commands import Command, Tune
 
-_FRAME_S = 0.1
+_FRAME_S = 0.08
 _STATE_S = 0.3
 
 

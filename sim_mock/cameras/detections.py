@@ -72,15 +72,21 @@ class SceneCamera:
         self._head_pose = head_pose
         self._rng = rng
         self._locate = locate
+        self._start_s: float | None = None
         self._lens = intrinsics_of_view(
             radians(params.horizontal_field_deg), params.width_px, params.height_px
         )
+
+    @property
+    def start_s(self) -> float | None:
+        """Return when the scene began: at the first look; None before that."""
+        return self._start_s
 
     def open(self) -> None:
         """Start: the first frame is taken at the first look."""
         self._on_the_way: deque[Detections] = deque()
         self._arrived: Detections | None = None
-        self._start_s: float | None = None
+        self._start_s = None
         self._number = 0
         self._due_s = -inf
         self._arrives_s = inf

@@ -36,41 +36,32 @@ _TABLE_M = -0.55
 _BALL_BGR = (190, 150, 110)
 
 
-class ScenePicture(NamedTuple):
-    """Draws one scene; can be sent to another process."""
-
-    scene: Scene
-
-    def draw(
-        self, scene_s: float, lens: Intrinsics, size_px: tuple[int, int], R: Mat3, p_m: Vec3
-    ) -> ImageArray:
-        """Return what a camera sees, BGR.
-
-        Args:
-            scene_s: time since the scene began, seconds.
-            lens: of the camera, for pictures of this size.
-            size_px: width and height.
-            R: rotation of the camera in the world, its axes optical.
-            p_m: position of the camera in the world.
-        """
-        width, height = size_px
-        canvas = Canvas(width, height, lens, R, p_m)
-        _draw_room(canvas)
-        people = self.scene.people(scene_s)
-        solids = [solid for i, one in enumerate(people) for solid in _person(one, i, p_m)]
-        for thing in self.scene.things(scene_s):
-            if thing.kind in PLANNED_KINDS:
-                continue
-            if thing.person is not None and thing.person < len(people):
-                owner = people[thing.person]
-                solids += _arm(owner, thing.person, thing.p_world_m, p_m)
-            elif thing.kind == "hand":
-                solids.append(_hand(thing.p_world_m, 0, thing.radius_m, p_m))
-            else:
-                _draw_ball(canvas, thing.p_world_m, thing.radius_m)
-        for solid in sorted(solids, key=lambda one: -one.away_m):
-            _draw_solid(canvas, solid)
-        return np.asarray(cv2.GaussianBlur(canvas.image, (3, 3), 0.6), np.uint8)
+def draw_picture(
+    scene: Scene,
+    scene_s: float,
+    lens: Intrinsics,
+    size_px: tuple[int, int],
+    R: Mat3,
+    p_m: Vec3,
+) -> ImageArray:
+    """Return what a camera sees of a scene, BGR; see ``ScenePicture.draw`` for the arguments."""
+    width, height = size_px
+    canvas = Canvas(width, height, lens, R, p_m)
+    _draw_room(canvas)
+    people = scene.people(scene_s)
+    solids = [solid for i, one in enumerate(people) for solid in _person(one, i, p_m)]
+    for thing in scene.things(scene_s):
+        if thing.kind in PLANNED_KINDS:
+            continue
+        if thing.person is not None and thing.person < len(people):
+            solids += _arm(people[thing.person], thing.person, thing.p_world_m, p_m)
+        elif thing.kind == "hand":
+            solids.append(_hand(thing.p_world_m, 0, thing.radius_m, p_m))
+        else:
+            _draw_ball(canvas, thing.p_world_m, thing.radius_m)
+    for solid in sorted(solids, key=lambda one: -one.away_m):
+        _draw_solid(canvas, solid)
+    return np.asarray(cv2.GaussianBlur(canvas.image, (3, 3), 0.6), np.uint8)
 
 
 class _Placed(NamedTuple):

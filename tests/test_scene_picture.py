@@ -1,0 +1,80 @@
+"""A simulated scene is drawn for people: every scene, from any pose, in another process too."""
+
+import pickle
+import subprocess
+import sys
+from math import pi, radians
+
+import numpy as np
+import pytest
+
+from gazerig.drivers.camera.pinhole import intrinsics_of_view
+from gazerig.gaze.angles import rotation
+from gazerig.gaze.types import Mat3
+from gazerig.robot.dashboard.gaze_heat import draw_heat
+from gazerig.robot.dashboard.gaze_trail import GazeTrail
+from gazerig.sim_mock.scenes.picture import ScenePicture
+from gazerig.sim_mock.scenes.registry import scenes
+
+SIZE_PX = (640, 400)
+LENS = intrinsics_of_view(radians(69.0), *SIZE_PX)
+EYE_M = (0.05, 0.0, 0.16)
+
+
+def camera(yaw: float = 0.0, pitch: float = 0.0) -> Mat3:
+    """The optical axes of a camera that looks along x, turned."""
+    optical = np.array(((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0)))
+    turned = np.array(rotation((yaw, pitch, 0.0))) @ optical
+    (a, b, c), (d, e, f), (g, h, i) = turned.tolist()
+    return ((a, b, c), (d, e, f), (g, h, i))
+
+
+@pytest.mark.parametrize("name", sorted(scenes()))
+def test_every_scene_can_be_sent_and_drawn_at_any_time(name: str) -> None:
+    picture = pickle.loads(pickle.dumps(ScenePicture(scenes()[name])))
+    drawn = [picture.draw(t_s, LENS, SIZE_PX, camera(), EYE_M) for t_s in (0.0, 5.0, 17.9)]
+    assert all(image.shape == (400, 640, 3) and image.dtype == np.uint8 for image in drawn)
+    again = picture.draw(5.0, LENS, SIZE_PX, camera(), EYE_M)
+    assert np.array_equal(again, drawn[1])
+
+
+def test_the_picture_turns_with_the_camera() -> None:
+    picture = ScenePicture(scenes()["visitor"])
+
+    def middle(yaw: float) -> float:
+        """The column about which the visitor's blue shirt lies."""
+        image = picture.draw(2.0, LENS, SIZE_PX, camera(yaw), EYE_M).astype(int)
+        shirt = (image[..., 0] > image[..., 2] + 40) & (np.arange(400) > 260)[:, None]
+        return float(np.argwhere(shirt)[:, 1].mean())
+
+    assert middle(0.15) > middle(0.0) + 40  # to the left turned: the visitor is farther right
+
+
+def test_nothing_in_front_of_the_camera_and_a_face_at_the_lens_are_drawn_without_harm() -> None:
+    picture = ScenePicture(scenes()["visitor"])
+    for yaw, pitch in ((pi, 0.0), (0.0, 1.4), (0.0, -1.4)):
+        assert picture.draw(2.0, LENS, SIZE_PX, camera(yaw, pitch), EYE_M).any()
+    for at_m in ((0.97, -0.05, 0.24), (1.0, -0.05, 0.24), (0.9, -0.05, 0.2)):
+        assert picture.draw(2.0, LENS, SIZE_PX, camera(), at_m).any()
+
+
+def test_the_control_loop_need_not_load_opencv_to_name_a_picture() -> None:
+    script = (
+        "import sys, pickle; from gazerig.sim_mock.scenes.picture import ScenePicture;"
+        "from gazerig.sim_mock.scenes.registry import scenes;"
+        "pickle.dumps(ScenePicture(scenes()['visitor'])); sys.exit('cv2' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0
+
+
+def test_warmth_lies_where_the_gaze_has_been() -> None:
+    trail = GazeTrail()
+    for i in range(100):
+        trail.add(0.01 * i, (1.0, 0.0, 0.2))
+    assert 16 <= len(trail.points()) <= 20  # one every 50 ms
+    image = np.full((400, 640, 3), 120, np.uint8)
+    draw_heat(image, np.array([(320.0, 200.0)] * 40 + [(-50.0, 3000.0)]))
+    assert np.abs(image[200, 320].astype(int) - 120).max() > 40
+    assert (image[20:60, 20:60] == 120).all()
+    trail.add(0.0, (0.0, 0.0, 0.0))
+    assert len(trail.points()) == 1  # time went back: another run
