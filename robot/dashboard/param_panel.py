@@ -125,10 +125,9 @@ class ParamPanel:
         self._found = place.section("parameters", order=3)
         self._rest = place.html(order=4)
         self._words = place.html(note("nothing to tune has been named yet"), order=0)
-        file = place.section("file", order=5)
-        self._buttons = file.buttons("", (SAVE, REVERT), order=2)
-        self._file = file.text(
-            "save as", on="enter", hint="a new .yaml file in the rig's folder; Enter saves", order=3
+        self._buttons = place.buttons("", (SAVE, REVERT), order=0.5)
+        self._file = place.text(
+            "save as", on="enter", hint="a new .yaml file in the rig's folder; Enter saves", order=5
         )
 
     def _listen(self) -> None:

@@ -5,6 +5,7 @@ measures the same and more from every tick; its bands are used here.
 """
 
 from html import escape
+from math import sqrt
 from typing import NamedTuple
 
 from gazerig.robot.analysis import human_norms as human
@@ -19,6 +20,8 @@ LEAST_DEG = 1.0
 _SMALL_PEAK_DEG, _SMALL_DURATION_DEG, _LARGE_DEG = 8.0, 12.0, 15.0
 _SOON_S, _PAUSE_S = 0.1, 2.0
 _LEAST_RATE_S = 60.0
+_SURE = 1.96
+"""So many standard errors beyond a range are chance in one of twenty cases."""
 _TALKING = ("talk", "listen", "think")
 
 HOW_TO = note(
@@ -109,12 +112,26 @@ class RunFigures:
         )
 
 
+def judged(figure: Figure, band: NormBand) -> str:
+    """Return in words how a measure stands to the range of people.
+
+    As in the report nothing is called outside that so few events may have put there by chance.
+    """
+    if figure.events < band.least:
+        return f"too few: {figure.events} of {band.least}"
+    if band.low <= figure.value <= band.high:
+        return "inside"
+    if band.unit == "share":
+        spread = sqrt(max(figure.value * (1.0 - figure.value), 0.25 / figure.events))
+    else:
+        spread = figure.value
+    off = max(band.low - figure.value, figure.value - band.high)
+    return "may be chance" if off <= _SURE * spread / sqrt(figure.events) else "outside"
+
+
 def _row(figure: Figure, band: NormBand) -> str:
     """Return one measure, what is found here, and the range of people."""
-    if figure.events < band.least:
-        verdict = f"too few: {figure.events} of {band.least}"
-    else:
-        verdict = "inside" if band.low <= figure.value <= band.high else "outside"
+    verdict = judged(figure, band)
     kind = " class='near'" if verdict == "outside" else ""
     unit, factor = ("%", 100.0) if band.unit == "share" else (band.unit, 1.0)
     here, low, high = (f"{factor * value:.3g}" for value in (figure.value, band.low, band.high))

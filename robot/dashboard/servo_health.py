@@ -4,7 +4,7 @@ from html import escape
 from typing import Literal
 
 from gazerig.robot.dashboard.html import LEVELS, heading, note, pill
-from gazerig.robot.dashboard.status import OLD_FRAME_S, drawn_together, without_feedback
+from gazerig.robot.dashboard.status import OLD_FRAME_S, drawn_together, one_line, without_feedback
 from gazerig.robot.model.types import LoopFigures, Servos, Snapshot
 
 Strain = Literal["", "near", "over"]
@@ -38,13 +38,13 @@ def guard(snapshot: Snapshot) -> str:
     """Return what the guard does and why, in a place that does not grow when it limits a joint."""
     level = "stopped" if snapshot.stopped else snapshot.level
     if snapshot.stopped:
-        said = escape(snapshot.stopped)
+        said = f"<div>{escape(snapshot.stopped)}</div>"
     elif level in ("hold", "torque_off"):
         said = "".join(f"<div>{escape(reason)}</div>" for reason in snapshot.reasons)
     else:
-        said = escape(drawn_together(snapshot.reasons))
+        said = one_line(drawn_together(snapshot.reasons))
     words = f"guard: {level.replace('_', ' ')}"
-    return f"<div class='stay'>{pill(words, LEVELS[level])}<div>{said}</div></div>"
+    return f"<div class='stay'>{pill(words, LEVELS[level])}{said}</div>"
 
 
 def servo_table(servos: Servos, joints: tuple[str, ...], estimated: tuple[str, ...] = ()) -> str:

@@ -70,6 +70,22 @@ function seldom(does, ms) {
   };
 }
 
+/** Write a name that may be broken after its dots and underscores. */
+function name(label, text) {
+  if (label.textContent === text) return;
+  label.replaceChildren(...text.split(/(?<=[._])/).flatMap((part) => [part, make("wbr")]));
+}
+
+/** Where in the window an image is drawn: as large as fits into its element. */
+function drawnBox(image) {
+  const box = image.getBoundingClientRect();
+  const scale = Math.min(box.width / image.naturalWidth, box.height / image.naturalHeight);
+  const width = scale * image.naturalWidth, height = scale * image.naturalHeight;
+  return {
+    left: box.left + (box.width - width) / 2, top: box.top + (box.height - height) / 2, width, height,
+  };
+}
+
 /** A field's own text: whole numbers and decimals without the noise of binary fractions. */
 function written(value) {
   return typeof value === "number" ? String(Number(value.toPrecision(12))) : String(value);
@@ -112,9 +128,9 @@ const KINDS = {
     };
     image.addEventListener("click", (event) => {
       if (!pick) return;
-      const box = image.getBoundingClientRect();
+      const box = drawnBox(image);
       at = [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
-      ask();
+      if (at.every((place) => place >= 0 && place <= 1)) ask();
     });
     image.addEventListener("keydown", (event) => {
       const way = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
@@ -122,9 +138,10 @@ const KINDS = {
       event.preventDefault();
       if (!way) return ask();
       at = at.map((place, axis) => Math.min(1, Math.max(0, place + PICK_STEP * way[axis])));
+      const box = drawnBox(image), around = node.getBoundingClientRect();
       mark.hidden = false;
-      mark.style.left = `${100 * at[0]}%`;
-      mark.style.top = `${100 * at[1]}%`;
+      mark.style.left = `${box.left - around.left + at[0] * box.width}px`;
+      mark.style.top = `${box.top - around.top + at[1] * box.height}px`;
     });
     image.addEventListener("blur", () => { mark.hidden = true; });
     return {
@@ -185,7 +202,7 @@ const KINDS = {
     });
     field.addEventListener("blur", () => { if (on === "left") commit(); });
     return { node: make("div", { className: "field" }, label, field), show(props, changed) {
-      label.textContent = props.label;
+      name(label, props.label);
       describe(field, props.hint);
       on = props.on;
       if (changed.value === undefined) return;
@@ -233,7 +250,7 @@ const KINDS = {
     number.addEventListener("wheel", () => { number.blur(); }); // scrolling must not move a joint
     const both = make("div", { className: "both" }, range, number);
     return { node: make("div", { className: "field" }, label, both), show(props, changed) {
-      label.textContent = props.label;
+      name(label, props.label);
       number.setAttribute("aria-label", `${props.label}, as a number`);
       for (const field of [range, number]) {
         field.min = String(props.low);
@@ -252,7 +269,7 @@ const KINDS = {
     const label = make("label", { htmlFor: id });
     box.addEventListener("change", () => send(box.checked));
     return { node: make("div", { className: "tick" }, box, label), show(props, changed) {
-      label.textContent = props.label;
+      name(label, props.label);
       describe(box, props.hint);
       if (changed.value !== undefined) box.checked = props.value;
     } };
@@ -262,7 +279,7 @@ const KINDS = {
     const label = make("label", { htmlFor: id }), menu = make("select", { id });
     menu.addEventListener("change", () => send(menu.value));
     return { node: make("div", { className: "field" }, label, menu), show(props, changed) {
-      label.textContent = props.label;
+      name(label, props.label);
       describe(menu, props.hint);
       if (changed.options) {
         menu.replaceChildren(...props.options.map((one) => make("option", { value: one, textContent: one })));
