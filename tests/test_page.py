@@ -180,12 +180,18 @@ def test_page_shows_a_head_that_turns() -> None:
         browser.go(url)
         wait_for(lambda: reads("STOP"), "the page")
         browser.run(f"document.querySelector('#view').src = '/view/?{CLOSE_TO_THE_RIG}'")
-        wait_for(lambda: reads("nothing has come from the rig", "camera"), "the silence")
+        browser.run("document.querySelector('#tab-watch').click()")
+        wait_for(lambda: reads("nothing has come from the rig"), "the silence")
+        shown = "document.querySelector('[data-panel=camera] img').naturalWidth"
+        camera = browser.ask("Runtime.evaluate", expression=shown)["result"]
+        assert camera.get("value") == PICTURE.shape[1]
         before = wait_for(eyes, "the rig's eyes").mean(axis=0)
         there = looking(2.0, face_at((0.9, 0.6, 0.25)))
         with feeding(page, lambda _: there):
             wait_for(eyes_elsewhere, "the turn of the head")
-            wait_for(lambda: reads("face 3: left eye", "pulls with", "fixate", "bus:"), "the words")
+            wait_for(lambda: reads("face 3: left eye", "pulls with", "fixate"), "the words")
+            browser.run("document.querySelector('#tab-health').click()")
+            wait_for(lambda: reads("bus:", "guard: ok"), "the health")
         # Six servos that tell nothing: a person is told so before the torque comes on again.
         limp = replace(of_six(there), stopped="a test")
         with feeding(page, lambda t_s: replace(limp, t_s=3.0 + t_s)):

@@ -30,7 +30,7 @@ from gazerig.robot.dashboard.param_control import (
     step_of,
     written,
 )
-from gazerig.robot.dashboard.param_panel import found, group_of
+from gazerig.robot.dashboard.param_panel import ParamState, found, group_of
 from gazerig.robot.dashboard.widget import Slider, TextField
 from gazerig.robot.dashboard.widgets import Widgets
 from gazerig.robot.model.command_json import as_json, from_json
@@ -286,3 +286,26 @@ def test_orders_survive_the_way_of_the_page() -> None:
     )[1]
     assert from_json(json.loads(data)) == order
     assert News((), None, False).others == ()
+
+
+def test_who_searches_before_the_parameters_have_come_finds_them_then() -> None:
+    widgets, mouth = Widgets(), Mouth()
+    state = ParamState(widgets, widgets.panel("tune"), mouth)  # type: ignore[arg-type]
+    client = widgets.join("browser 1", lambda: None).name
+    find = next(one for one in widgets._widgets.values() if one.props.get("label") == "find")
+    find.arrived("how far", client)
+    assert sliders(widgets) == []
+    state.params([PARAM._asdict()])
+    state.values({"values": {"a.b": 3.0}, "unsaved": ["a.b"], "path": "/rigs/mine.yaml"})
+    (slider,) = sliders(widgets)
+    assert slider.value == 3.0 and slider.label == "● a.b (deg)"
+    slider.arrived(4.0, client)
+    assert mouth.parse_request == [({"do": "set", "changes": {"a.b": 4.0}}, f"{client}:tuning")]
+    state.values({"values": {"a.b": 3.5}, "unsaved": []})
+    assert slider.value == 4.0  # not yet answered: it stays where the hand has put it
+    state.answered(f"{client}:tuning")
+    assert slider.value == 3.5 and slider.label == "a.b (deg)"
+
+
+def sliders(widgets: Widgets) -> list[Slider]:
+    return [one for one in widgets._widgets.values() if isinstance(one, Slider)]

@@ -44,7 +44,7 @@ class PanelView:
         self.silence = widgets.panel("watch").html(order=0)
         self._begin()
         self.alarms = widgets.panel("headline").html()
-        self.image = widgets.panel("camera").image("camera", pick=True)
+        self.image = widgets.panel("camera").image("what the camera sees", pick=True)
         watch = widgets.panel("watch")
         self.winner = watch.html(note("waiting for the rig"), order=1)
         self.saliences = watch.html(order=2)

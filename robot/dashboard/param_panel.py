@@ -115,7 +115,7 @@ class ParamPanel:
         self._values: Mapping[str, object] = {}
         self._unsaved: frozenset[str] = frozenset()
         self._controls: dict[str, ParamControl] = {}
-        self._unanswered = 0
+        self._unanswered = self._known = 0
         self._build(place.own(client))
         self._listen()
 
@@ -155,6 +155,9 @@ class ParamPanel:
         self._words.content = (
             f"<div>{len(self._params)} parameters, {some}</div><div>{escape(path)}</div>"
         )
+        if len(values) != self._known:  # the first come after the browser
+            self._known = len(values)
+            self._show_chosen()
         if not self._unanswered:
             self._refresh()
 

@@ -14,6 +14,7 @@ goals on the bus. Last, what the page, a recording and both add to the loop's pr
 browsers, a recording, images and a camera's process that never waits, all at once.
 """
 
+import json
 import os
 import signal
 import subprocess
@@ -27,7 +28,6 @@ from math import radians
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
-import msgspec
 import numpy as np
 from websockets.sync.client import ClientConnection
 from websockets.sync.connection import Connection
@@ -45,22 +45,21 @@ TESTS = Path(__file__).parents[1]
 sys.path.insert(0, str(TESTS))
 import observer_cost  # noqa: E402
 from observer_cost import recorder_at  # noqa: E402
-from page_visitor import LOOKING, Visitor, unpacked  # noqa: E402
+from page_visitor import LOOKING, Visitor  # noqa: E402
 
 TRIES = 30
 
 
 def browser(url: str) -> ClientConnection:
-    """Connect as a browser does, with a camera, so that the page is drawn for it."""
+    """Connect to the panels as a browser does, so that they are drawn for it, all of them."""
+    return Visitor(url).open("/rig/panels")
+
+
+def view(url: str) -> ClientConnection:
+    """Connect to the view as a browser does, so that the head is drawn for it."""
     there = Visitor(url).open()
     there.send(LOOKING)
     return there
-
-
-def messages(data: bytes) -> list[dict[str, Any]]:
-    """Return the messages in what viser sent."""
-    found: list[dict[str, Any]] = unpacked(data)["messages"]
-    return found
 
 
 class Run(NamedTuple):
@@ -184,8 +183,8 @@ def cpu_s(pid: int | None) -> float:
 SPECTATORS = """
 import sys, threading
 sys.path.insert(0, {here!r})
-from bench_page import browser
-socks = [browser({url!r}) for _ in range({n})]
+from bench_page import browser, view
+socks = [way({url!r}) for _ in range({n}) for way in (browser, view)]
 def take(sock):
     for _ in sock: pass
 for sock in socks: threading.Thread(target=take, args=(sock,), daemon=True).start()
@@ -203,7 +202,7 @@ HANDS = {
     "no request": """
 import sys, time
 sys.path.insert(0, {tests!r})
-from page_visitor import Visitor
+from page_visitor import LOOKING, Visitor
 visitor = Visitor({url!r})
 while True:
     time.sleep(1 / 10)
@@ -212,7 +211,7 @@ while True:
     "drag": """
 import itertools, sys, time
 sys.path.insert(0, {tests!r})
-from page_visitor import Visitor
+from page_visitor import LOOKING, Visitor
 visitor = Visitor({url!r})
 for n in itertools.count():
     time.sleep(1 / 10)
@@ -303,34 +302,31 @@ def first_picture(url: str) -> tuple[float, float]:
     script_s = time.monotonic() - start_s
     with browser(url) as there:
         while True:
-            data = there.recv(timeout=30)
-            assert isinstance(data, bytes)
-            if any(m["type"] == "GuiImageMessage" for m in messages(data)):
+            if isinstance(there.recv(timeout=30), bytes):
                 return script_s, time.monotonic() - start_s
 
 
-def slider_uuid(there: Connection, label: str) -> str:
+def slider_number(there: Connection, label: str) -> int:
+    """Return the number of the slider of a joint."""
     while True:
         data = there.recv(timeout=30)
-        assert isinstance(data, bytes)
-        for message in messages(data):
-            if message["type"] == "GuiSliderMessage" and message["props"]["label"] == label:
-                return str(message["uuid"])
+        for number, props in json.loads(data).get("put", []) if isinstance(data, str) else ():
+            if (props.get("kind"), props.get("label")) == ("slider", label):
+                return int(number)
 
 
 def slider_ms(bench: Bench, url: str) -> np.ndarray:
     """From a slider's message at the door to the tick that has written its goal."""
     took = []
     with browser(url) as there:
-        uuid = slider_uuid(there, "neck yaw")
+        number = slider_number(there, "neck yaw")
         taking = threading.Thread(target=lambda: [None for _ in there], daemon=True)
         taking.start()
         for n in range(TRIES):
             angle = float(5 + n % 2)
             before = len(bench.obeyed)
-            update = {"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": angle}}
             start_s = time.monotonic()
-            there.send(msgspec.msgpack.encode(update))
+            there.send(json.dumps({"set": [number, angle]}))
             while len(bench.obeyed) == before:
                 time.sleep(0.0005)
             at_s, order = bench.obeyed[before]

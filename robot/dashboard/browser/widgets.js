@@ -239,13 +239,7 @@ const KINDS = {
         shown();
       }
     });
-    number.addEventListener("keyup", (event) => {
-      if (event.key === "ArrowUp" || event.key === "ArrowDown") commit();
-    });
-    number.addEventListener("pointerup", () => { // its own small arrows step at once
-      if (number.valueAsNumber !== force && document.activeElement === number
-        && Math.abs(Math.abs(number.valueAsNumber - force) - Number(number.step)) < 1e-9) commit();
-    });
+    number.addEventListener("change", commit); // by its arrows, or when it is left
     number.addEventListener("blur", commit);
     number.addEventListener("wheel", () => { number.blur(); }); // scrolling must not move a joint
     const both = make("div", { className: "both" }, range, number);
@@ -353,7 +347,7 @@ export function mount(page) {
     panels.set(String(node.dataset.panel), node);
   }
   notices = make("div", { className: "notices" });
-  page.body.append(notices);
+  (page.querySelector("#notices") ?? page.body).append(notices);
 
   /** @type {Map<number, {part: Part, props: Props}>} */
   const known = new Map();
