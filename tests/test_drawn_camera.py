@@ -12,6 +12,7 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.pose_slot import PoseSlot
 from gazerig.drivers.camera.source import Shot
 from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.camera_factory import retune_camera
 from gazerig.robot.app.drawn_camera import (
     DrawnCamera,
@@ -97,7 +98,9 @@ def test_only_a_drawn_scene_in_real_time_has_a_process(monkeypatch: pytest.Monke
     made.close()
     made = assemble(rig, RunOptions(mock=True, pixels=True, scene="visitor", bus="ideal"))
     try:
-        camera = made.robot.camera
+        lent = made.robot.camera
+        assert isinstance(lent, BorrowedCamera)
+        camera = lent.own
         assert isinstance(camera, DrawnCamera)
         asked: list[object] = []
 
@@ -107,8 +110,8 @@ def test_only_a_drawn_scene_in_real_time_has_a_process(monkeypatch: pytest.Monke
 
         monkeypatch.setattr(camera.process, "retune", retune)
         changed = load_rig("desk", character="shy")
-        assert retune_camera(camera, rig, changed, rig.camera) == "" and not asked
+        assert retune_camera(lent, rig, changed, rig.camera) == "" and not asked
         slower = replace(rig, motion=replace(rig.motion, enabled=not rig.motion.enabled))
-        assert retune_camera(camera, rig, slower, rig.camera) == "" and len(asked) == 1
+        assert retune_camera(lent, rig, slower, rig.camera) == "" and len(asked) == 1
     finally:
         made.close()

@@ -57,6 +57,8 @@ class CameraProcess:
         parts: how to make source and detectors; nothing starts yet.
         now_s: the host's monotonic clock, picklable; all processes share its zero.
         recovery: how a lost camera is reopened.
+        before: processes of other cameras that the same loop has looked through; what this one
+            finds is another scene than theirs.
 
     frames, frames_with_face: counts of frames looked at since open
     """
@@ -66,9 +68,10 @@ class CameraProcess:
         parts: CameraParts,
         now_s: Callable[[], float],
         recovery: CameraRecoveryParams | None = None,
+        before: int = 0,
     ) -> None:
         self._parts = parts
-        self._now_s = now_s
+        self._now_s, self._before = now_s, before
         self._recovery = recovery or CameraRecoveryParams()
         self._process: BaseProcess | None = None
         self._pipe: Connection | None = None
@@ -83,7 +86,8 @@ class CameraProcess:
     def _forget(self) -> None:
         """Begin to count at frame 1."""
         self.frames = self.frames_with_face = 0
-        self._starts = self._counted = self._number = 0
+        self._counted = self._number = 0
+        self._starts = self._before
         self._lost_s: float | None = None
         self._back_s = 0.0
         self._losses = 0  # without a sound time between them

@@ -23,7 +23,14 @@ from gazerig.gaze.scanpath import Scanpath, ScanpathParams, Walk, row_sums_note
 from gazerig.gaze.types import Mat3
 from gazerig.params import choices_of
 from gazerig.robot.app.animation_tables import animation_tables
-from gazerig.robot.app.camera_factory import locator_of, real_camera, scene_camera
+from gazerig.robot.app.borrowed_camera import BorrowedCamera
+from gazerig.robot.app.camera_factory import (
+    lendable,
+    locator_of,
+    placed_camera,
+    real_camera,
+    scene_camera,
+)
 from gazerig.robot.app.gaze_models import (
     chooser_of,
     deciders,
@@ -53,7 +60,6 @@ from gazerig.robot.model.frames import (
     CameraParams,
     NewestPose,
     PoseHistory,
-    standing_still,
 )
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.loop_params import LoopParams
@@ -159,7 +165,7 @@ def assemble(rig: Rig, options: RunOptions, substitutes: Substitutes = RIGS_OWN)
     random = _Generators(*map(np.random.default_rng, seeds))
     clock: Clock = SimulatedClock() if options.fast else RealClock()
     kinematics = kinematics_of(rig)
-    camera, notes = _camera_params(rig, options, kinematics)
+    camera, notes = placed_camera(rig, options, kinematics)
     walk = load_walk(rig.gaze.scanpath.transition_matrix)
     table = rig.gaze.scanpath.transition_matrix
     shipped = table in shipped_names("scanpaths") and not options.verbose
@@ -169,7 +175,7 @@ def assemble(rig: Rig, options: RunOptions, substitutes: Substitutes = RIGS_OWN)
     wires = run_bus(rig, options, clock)
     messages: list[str] = []
     try:
-        seen = (
+        seen: Camera = (
             scene_camera(
                 rig, options, scene, sight.mount, true_head(wires.true_steps, rig, sight.poses),
                 random.camera, locator_of(camera), substitutes.program, clock, sight.turns,
@@ -177,6 +183,8 @@ def assemble(rig: Rig, options: RunOptions, substitutes: Substitutes = RIGS_OWN)
             if scene is not None
             else real_camera(rig, options, clock, camera, sight.turns, substitutes.program)
         )  # fmt: skip
+        if options.mock and not options.fast:
+            seen = lendable(seen, rig, clock)
         parts = _components(
             rig,
             _body(rig, wires),
@@ -189,9 +197,11 @@ def assemble(rig: Rig, options: RunOptions, substitutes: Substitutes = RIGS_OWN)
             _gyro_fusion(options, messages.append),
         )
         placement = CameraPlacement(
-            lambda rig: _camera_params(rig, options, kinematics)[0], camera.mount
+            lambda rig: placed_camera(rig, options, kinematics, seen)[0], camera.mount
         )
         live = LiveParams(parts, rig, placement)
+        if isinstance(seen, BorrowedCamera):
+            seen.placed = lambda: sight.mount.retune(placement.camera(live.rig))
         robot = _robot(parts, sight.poses, live, substitutes, rig, options.fast, messages)
     except BaseException:
         wires.close()
@@ -364,19 +374,6 @@ def _scene(rig: Rig, name: str) -> Scene:
             "add it under gaze.top_down.rules"
         )
     return scene
-
-
-def _camera_params(
-    rig: Rig, options: RunOptions, kinematics: Kinematics
-) -> tuple[CameraParams, tuple[str, ...]]:
-    """Return the rig's camera, with mount base if its frames cannot turn with the head."""
-    what = options.looks_through
-    turns = options.video is None and options.replay is None and not options.mock
-    if what is None or turns or rig.camera.mount == "base":
-        return rig.camera, ()
-    beside = "" if options.video or options.replay else " beside an emulated head"
-    note = f"{what}{beside} does not turn with the head: the camera counts as standing still"
-    return standing_still(rig.camera, kinematics), (note,)
 
 
 def _turn_sender(

@@ -9,6 +9,7 @@ import numpy as np
 
 from gazerig.config.schema import Rig
 from gazerig.drivers.camera import sources
+from gazerig.drivers.camera.browser_source import FIELD_DEG
 from gazerig.drivers.camera.camera_plugins import camera_part, is_source, plugin_source
 from gazerig.drivers.camera.frame_analysis import Motion
 from gazerig.drivers.camera.guarded_camera import CLOSE_PROCESS_S, GuardedCamera
@@ -23,11 +24,13 @@ from gazerig.drivers.plugins import CAMERA, CameraPlugin, PluginError, find, is_
 from gazerig.drivers.types import Camera, FaceDetector
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.drawn_camera import DrawnCamera, MotionBesidePlans, drawn_camera
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts, program_camera, watched
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.frames import CameraMount, CameraParams
+from gazerig.robot.model.frames import CameraMount, CameraParams, standing_still
+from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.perception.frame_locator import FrameLocator
 from gazerig.robot.perception.motion_source import motion_finder, retuned
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
@@ -82,7 +85,41 @@ def scene_camera(
 
 def scene_start_s(camera: Camera) -> float | None:
     """Return when the scene of a camera without images began, None before that or without one."""
+    if isinstance(camera, BorrowedCamera):
+        return None if camera.lent else scene_start_s(camera.own)
     return camera.start_s if isinstance(camera, SceneCamera) else None
+
+
+def placed_camera(
+    rig: Rig, options: RunOptions, kinematics: Kinematics, seen: Camera | None = None
+) -> tuple[CameraParams, tuple[str, ...]]:
+    """Return the rig's camera, with mount base if its frames cannot turn with the head.
+
+    seen: the camera as it is now, in whose place that of a browser may stand
+    """
+    what = options.looks_through
+    if isinstance(seen, BorrowedCamera) and seen.lent:
+        return standing_still(rig.camera, kinematics), ()
+    turns = options.video is None and options.replay is None and not options.mock
+    if what is None or turns or rig.camera.mount == "base":
+        return rig.camera, ()
+    beside = "" if options.video or options.replay else " beside an emulated head"
+    note = f"{what}{beside} does not turn with the head: the camera counts as standing still"
+    return standing_still(rig.camera, kinematics), (note,)
+
+
+def lendable(own: Camera, rig: Rig, clock: Clock) -> BorrowedCamera:
+    """Return an emulated rig's camera, in whose place a browser's may stand."""
+    field_rad = radians(FIELD_DEG)
+    detector = partial(face_detector, rig.detector)
+    motion = partial(motion_finder, rig.motion, None, field_rad, None)
+    locate = FrameLocator(None, field_rad)
+
+    def process(source: Callable[[], FrameSource], before: int) -> CameraProcess:
+        parts = CameraParts(source, detector, motion, locate)
+        return CameraProcess(parts, clock.now_s, rig.camera_recovery, before)
+
+    return BorrowedCamera(own, process, clock.now_s)
 
 
 def real_camera(
@@ -174,6 +211,8 @@ def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams)
         match camera:
             case GuardedCamera():
                 return retune_camera(camera.camera, before, after, placed)
+            case BorrowedCamera():
+                return retune_camera(camera.own, before, after, placed)
             case DrawnCamera():
                 return retune_camera(camera.process, before, after, placed)
             case CameraProcess():

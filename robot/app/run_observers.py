@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from gazerig.config.faults import ConfigError
 from gazerig.robot.app.assemble import Assembly
+from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.camera_factory import scene_start_s
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.control.loop import LoopCount
-from gazerig.robot.control.loop_timing import LoopTiming
+from gazerig.robot.control.loop_timing import LoopTiming, busy_text
 from gazerig.robot.control.observers import Observers, left_out
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
@@ -82,7 +83,7 @@ class RunObservers:
         steer: SteeringButtons | None = None,
         browse: Callable[[str], object] | None = None,
     ) -> None:
-        self._steer, self._browse = steer, browse
+        self._steer, self._browse, self._lent = steer, browse, False
         self._made, self._fast, self._say = made, options.fast, say
         self._timing = LoopTiming(made.loop.rate_hz)
         self._emulated = options.mock and steer is None
@@ -127,7 +128,9 @@ class RunObservers:
             depth=self._show_depth,
             paths=self._tuning.confined if self._tuning is not None else None,
         )
-        return PageProcess(*address, page_requests)
+        camera = self._made.robot.camera
+        on_picture = camera.take if isinstance(camera, BorrowedCamera) else None
+        return PageProcess(*address, page_requests, on_picture)
 
     def _made_publisher(self, page: PageProcess) -> Publisher:
         tuning = self._tuning
@@ -164,6 +167,10 @@ class RunObservers:
     def update(self, tick: Tick) -> None:
         """Update all observers with a tick; called by a loop that does not update them itself."""
         self._observers.update(tick)
+
+    def busy(self) -> str:
+        """Return that the computer is too busy, "" where it is not or time is simulated."""
+        return busy_text(self._timing.figures())
 
     def parking(self, tick: Tick) -> None:
         """Show a tick of the way to the parking pose, which is no part of a recording."""
@@ -270,8 +277,13 @@ class RunObservers:
     def _follow(self, tick: Tick) -> None:
         """Keep what a click is placed by, and show the rig as it is after tuning."""
         self._picking.newest = tick
-        if tick.commands and self._publisher is not None:
+        if self._publisher is None:
+            return
+        if tick.commands:
             self._publisher.obeyed(tick.commands)
+        if self._lent != (lent := getattr(self._made.robot.camera, "lent", False)):
+            self._lent = lent
+            self._publisher.rebuilt()
 
 
 def only_stops(command: CommandTaker) -> CommandTaker:

@@ -140,7 +140,8 @@ class Session:
         self._run_observers = RunObservers(
             made, options, say, status, composed.tuning, composed.recorder, browse=browse
         )
-        self._summary, self._faults = Summary(), JointFaults(say)
+        self._summary = Summary()
+        self._faults = JointFaults(say, self._run_observers.busy)
         scene = made.scene
         self._score = BehaviourScore(scene.events(), scene.round_s) if scene is not None else None
         self._face_gaze = GazeOnFace() if options.heatmap is not None else None

@@ -13,6 +13,8 @@ FAULTS = frozenset(
 
 _PASSING_S = {"stale joints": 0.5, "torque off": 0.5}
 """A lost answer or a restart that is over sooner is no fault."""
+_BY_TIME = frozenset({"stale joints", "torque off"})
+"""Reasons that a computer that is late makes by itself."""
 _OVER_S = 1.0
 """A fault is over when the joint has not been held for so long; a retry alone does not end it."""
 
@@ -72,10 +74,12 @@ class JointFaults:
 
     Args:
         say: gets a line, with the time since the first tick, when a fault begins and ends.
+        busy: returns that the computer is too busy, "" where it is not; joints are old then
+            because of it.
     """
 
-    def __init__(self, say: Callable[[str], None]) -> None:
-        self._say = say
+    def __init__(self, say: Callable[[str], None], busy: Callable[[], str] = lambda: "") -> None:
+        self._say, self._busy = say, busy
         self._running: dict[tuple[str, str], _OpenFault] = {}
         self._counted: dict[tuple[str, str], tuple[int, float]] = {}
         self._first_s: float | None = None
@@ -94,7 +98,8 @@ class JointFaults:
             running.last_s = tick.t_s
             if not running.said and tick.t_s - running.from_s >= _PASSING_S.get(reason, 0.0):
                 running.said = True
-                lines.add(joint, running.from_s, f"{reason}: held")
+                busy = self._busy() if reason in _BY_TIME else ""
+                lines.add(joint, running.from_s, f"{reason}: held" + (f", as {busy}" * bool(busy)))
         for key, running in tuple(self._running.items()):
             if tick.t_s - running.last_s > _OVER_S:
                 self._end(key, running, lines)

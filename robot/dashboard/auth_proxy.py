@@ -17,15 +17,15 @@ import hmac
 import json
 import secrets
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from urllib.parse import urlsplit
 
 import aiohttp
 from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
+from gazerig.robot.dashboard.addresses import hostname, netloc
 from gazerig.robot.dashboard.browser_requests import ASKED_BYTES, compact, from_browser, leads
 from gazerig.robot.dashboard.browsers import Browsers, TabLimits
 from gazerig.robot.dashboard.connection_limits import Connections
@@ -33,6 +33,7 @@ from gazerig.robot.dashboard.page_files import PageFiles
 from gazerig.robot.dashboard.stop_sender import StopSender
 from gazerig.robot.dashboard.token_bucket import TokenBucket
 from gazerig.robot.dashboard.view_proxy import VIEW, ViewProxy
+from gazerig.robot.dashboard.webcam_socket import WebcamSocket
 from gazerig.robot.dashboard.websocket_relay import TAKES_S, until_one_ends
 from gazerig.robot.dashboard.widget_socket import WidgetSocket
 from gazerig.robot.dashboard.widgets import RECEIVED_BYTES, Widgets
@@ -64,6 +65,7 @@ Point = Callable[[object, str], bool]
 class AuthProxy:
     """Lets people in to the server behind it, from a thread of its own.
 
+    webcam: takes pictures of browsers' own cameras; its ``take`` is set before ``open``
     once: another token, which opens the page one time; "" for none
     point: takes where a browser's pointer is, which is not answered; set before ``open``
     """
@@ -99,6 +101,7 @@ class AuthProxy:
         self._news: set[asyncio.Event] = set()
         self._lines = TabLimits(MOST_LINES)
         self._loop = asyncio.new_event_loop()
+        self.webcam, self._webcams = WebcamSocket(self._loop.time), TabLimits(2)
         self._over = asyncio.Event()
         self._opened = threading.Event()
         self._failed: OSError | None = None
@@ -142,6 +145,7 @@ class AuthProxy:
         app = web.Application(middlewares=[self._doorkeeper()], client_max_size=ASKED_BYTES)
         app.router.add_get("/rig/line", self._line)
         app.router.add_get("/rig/panels", self._panels)
+        app.router.add_get("/rig/webcam", self._webcam)
         app.router.add_post("/rig/ask", self._asked)
         PageFiles(_HEADERS).add_to(app.router)
         app.router.add_get(VIEW, self._pass_on)
@@ -198,9 +202,9 @@ class AuthProxy:
         origin = request.headers.get("Origin")
         if origin is None and sends:
             return "refused: no Origin; only a browser with this page open may ask for anything"
-        if origin is not None and _netloc(origin) != request.host:
+        if origin is not None and netloc(origin) != request.host:
             return "refused: a page of another origin may not look or ask"
-        if self._host in LOOPBACK and _hostname(request.host) not in LOOPBACK:
+        if self._host in LOOPBACK and hostname(request.host) not in LOOPBACK:
             return f"refused: on this machine the page is at http://{self._host}:{self._port}"
         given = request.query.get("token") or request.cookies.get(self._cookie) or ""
         if hmac.compare_digest(given.encode(errors="replace"), self.token.encode()):
@@ -322,13 +326,28 @@ class AuthProxy:
     async def _panels(self, request: web.Request) -> web.StreamResponse:
         """Show the panels in a browser, as fast as it takes them."""
         socket = web.WebSocketResponse(max_msg_size=RECEIVED_BYTES, compress=False)
+        who = self._who(request)
+        return await self._last(
+            request, socket, self._panel_tabs, lambda: self._panel_socket.serve(socket, who)
+        )
+
+    async def _webcam(self, request: web.Request) -> web.StreamResponse:
+        """Take the pictures of a browser's own camera."""
+        socket = self.webcam.prepared()
+        return await self._last(request, socket, self._webcams, lambda: self.webcam.serve(socket))
+
+    async def _last(
+        self,
+        request: web.Request,
+        socket: web.WebSocketResponse,
+        tabs: TabLimits,
+        serve: Callable[[], Awaitable[object]],
+    ) -> web.StreamResponse:
+        """Keep a websocket until it, the page or its place is over."""
         await socket.prepare(request)
         self._connections.lasting(request)
-        who = self._who(request)
-        with self._panel_tabs.take(who) as leave:
-            await until_one_ends(
-                self._panel_socket.serve(socket, who), self._over.wait(), leave.wait()
-            )
+        with tabs.take(self._who(request)) as leave:
+            await until_one_ends(serve(), self._over.wait(), leave.wait())
         with suppress(TimeoutError, ConnectionError):
             async with asyncio.timeout(_BEAT_S):
                 await socket.close()
@@ -370,17 +389,3 @@ class AuthProxy:
 def _nowhere(asked: object, who: str) -> bool:
     """Take no pointer."""
     return False
-
-
-def _netloc(origin: str) -> str | None:
-    try:
-        return urlsplit(origin).netloc
-    except ValueError:
-        return None
-
-
-def _hostname(host: str) -> str | None:
-    try:
-        return urlsplit(f"//{host}").hostname
-    except ValueError:
-        return None

@@ -17,6 +17,8 @@ from gazerig.robot.model.commands import COMMANDS
 
 REQUEST = b"t"
 """First byte of a request of a user of the page."""
+PICTURE = b"j"
+"""First byte of a picture of a browser's own camera."""
 MESSAGE_BYTES = 200_000
 """No message is longer: a socket's default send buffer in Linux holds 212,992 bytes."""
 

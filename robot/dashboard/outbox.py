@@ -5,7 +5,7 @@ import socket
 import threading
 from collections.abc import Callable, Mapping
 
-from gazerig.robot.dashboard.inbox import MESSAGE_BYTES, request_message
+from gazerig.robot.dashboard.inbox import MESSAGE_BYTES, PICTURE, request_message
 from gazerig.robot.dashboard.token_bucket import TokenBucket
 from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.model.command_json import as_json
@@ -44,6 +44,14 @@ class Outbox:
     def ask(self, data: Mapping[str, object], who: str) -> bool:
         """Send a request; ``who`` is returned with the reply."""
         return self.hand_on(json.dumps(data, separators=(",", ":")).encode(), who)
+
+    def picture(self, jpeg: bytes) -> bool:
+        """Hand on a picture of a browser's own camera; False where the rig does not take it."""
+        try:
+            self._feed.send(PICTURE + jpeg, socket.MSG_DONTWAIT)
+        except OSError:  # full, gone, or too long
+            return False
+        return True
 
     def hand_on(self, data: bytes, who: str = DOOR) -> bool:
         """Hand on a compact JSON object."""

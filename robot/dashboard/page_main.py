@@ -114,6 +114,7 @@ def serve(
         lambda point, who: outbox.ask(as_json(LookAt(point, who, pointer=True)), DOOR),
     )
     door.point = pointer.take
+    door.webcam.take = outbox.picture
     door.open()
     text = []
     if port not in (0, open_port):  # 0 asks for any port

@@ -25,7 +25,7 @@ from urllib.parse import urlsplit
 
 from gazerig.drivers import child_process
 from gazerig.drivers.passed_image import send
-from gazerig.robot.dashboard.inbox import MESSAGE_BYTES, REQUEST, Inbox, parse_request
+from gazerig.robot.dashboard.inbox import MESSAGE_BYTES, PICTURE, REQUEST, Inbox, parse_request
 from gazerig.robot.dashboard.stop_channel import StopListener
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
@@ -105,11 +105,19 @@ class PageProcess:
     gone: it has ended and is not started again
     """
 
-    def __init__(self, host: str, port: int, on_request: OnRequest | None = None) -> None:
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        on_request: OnRequest | None = None,
+        on_picture: Callable[[bytes], None] | None = None,
+    ) -> None:
         """Prepare a page for this address and port; a busy port moves on to the next.
 
         on_request: called with each request of a user of the page; None: requests are dropped
+        on_picture: called with each picture of a browser's own camera; None: they are dropped
         """
+        self._on_picture = on_picture
         self._host = host
         self._port = port
         self._on_request = on_request
@@ -239,7 +247,10 @@ class PageProcess:
     def _take(self, message: bytes) -> None:
         """Do what a message of the page is for; called by the ear."""
         kind, body = message[:1], message[1:]
-        if kind == URL:
+        if kind == PICTURE:
+            if self._on_picture is not None:
+                self._on_picture(body)
+        elif kind == URL:
             self._take_url(body.decode())
         elif kind == NOTICE:
             self._notices.append(body.decode())

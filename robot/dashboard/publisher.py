@@ -65,7 +65,11 @@ class Publisher:
     def obeyed(self, commands: Iterable[Command]) -> None:
         """Note commands that the loop has obeyed: tuning may have changed how the rig is built."""
         if any(isinstance(command, Tune) for command in commands):
-            self._rig_sent = False
+            self.rebuilt()
+
+    def rebuilt(self) -> None:
+        """Show the rig as it is built now: its camera sits elsewhere, or it was tuned."""
+        self._rig_sent = False
 
     def take(self, batch: TickBatch) -> bool:
         """Send ticks and what is new; False where the page did not take the ticks."""

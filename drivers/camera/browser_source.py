@@ -1,0 +1,67 @@
+"""Frames of a browser's own camera, as its page sends them: JPEGs, a few a second."""
+
+import threading
+from collections.abc import Callable
+from math import radians
+
+import cv2
+import numpy as np
+
+from gazerig.drivers.camera.jpeg_slot import JpegSlot
+from gazerig.drivers.camera.pinhole import intrinsics_of_view
+from gazerig.drivers.camera.source import Shot, bgr
+
+FIELD_DEG = 60.0
+"""Horizontal field of view of a camera of which nothing is known."""
+LATENCY_S = 0.08
+"""From the exposure until the picture is here: camera, browser, encoding, the way."""
+_LOOK_S = 0.004
+_LARGEST_PX = 1920
+
+
+class BrowserSource:
+    """A source of the pictures in a slot.
+
+    Args:
+        pictures: where they come.
+    """
+
+    def __init__(self, pictures: JpegSlot) -> None:
+        self._pictures = pictures
+        self._number = 0
+        self._told = False
+        self._events: list[str] = []
+
+    def open(self) -> None:
+        """Begin with the next picture."""
+
+    def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
+        """Wait for the next picture; one that is none is left out."""
+        while not stop.is_set():
+            picture = self._pictures.newer(self._number)
+            if picture is None:
+                stop.wait(_LOOK_S)
+                continue
+            self._number = picture.number
+            found = cv2.imdecode(np.frombuffer(picture.data, np.uint8), cv2.IMREAD_COLOR)
+            image = bgr(found) if found is not None and max(found.shape) <= _LARGEST_PX else None
+            if image is None:
+                self._tell()
+                continue
+            height, width = image.shape[:2]
+            lens = intrinsics_of_view(radians(FIELD_DEG), width, height)
+            return Shot(picture.came_s - LATENCY_S, picture.number, image, lens=lens)
+        return None
+
+    def events(self) -> tuple[str, ...]:
+        """Return what happened since the last call, one line each."""
+        events, self._events = tuple(self._events), []
+        return events
+
+    def close(self) -> None:
+        """Stop; there is nothing to free."""
+
+    def _tell(self) -> None:
+        if not self._told:
+            self._told = True
+            self._events.append("a browser sends pictures that cannot be read: they are left out")

@@ -1,0 +1,86 @@
+// The browser's own camera as the eyes of an emulated rig.
+//
+// Pictures of 640 x 480 go as JPEGs to the door, the next when the last was taken, at most fifteen a
+// second. They end when the button is pressed again, the page is closed or the camera goes.
+
+const EVERY_MS = 1000 / 15;
+const WIDTH = 640, HEIGHT = 480, QUALITY = 0.8;
+const ELSEWHERE = "Browsers lend their camera only to pages of their own computer: on the rig's "
+  + "computer, start it with --camera 0.";
+
+const button = document.querySelector("#webcam");
+const said = document.querySelector("#said");
+let stream = null, socket = null, timer = 0, sentAt = 0;
+
+/** @param {string} text */
+function say(text) { if (said) said.textContent = text; }
+
+/** Whether this browser may lend its camera to this page: only where the address is secure. */
+export function mayAsk() {
+  return window.isSecureContext && Boolean(navigator.mediaDevices?.getUserMedia);
+}
+
+/** Ask for the camera and send its pictures. */
+export async function begin() {
+  if (!mayAsk()) { say(ELSEWHERE); return; }
+  button.disabled = true;
+  try {
+    stream = await navigator.mediaDevices.getUserMedia({
+      audio: false,
+      video: { width: { ideal: WIDTH }, height: { ideal: HEIGHT }, facingMode: "user" },
+    });
+  } catch (error) {
+    say(error.name === "NotAllowedError" ? "The browser was not allowed to use its camera."
+      : `No camera of this browser can be used (${error.name}).`);
+    return;
+  } finally {
+    button.disabled = false;
+  }
+  const video = document.createElement("video");
+  video.muted = video.playsInline = true;
+  video.srcObject = stream;
+  stream.getVideoTracks()[0].addEventListener("ended", end);
+  await video.play();
+  const scheme = location.protocol === "https:" ? "wss" : "ws";
+  socket = new WebSocket(`${scheme}://${location.host}/rig/webcam`);
+  const mine = socket;
+  const canvas = document.createElement("canvas");
+  const send = () => {
+    if (mine.readyState !== WebSocket.OPEN) return;
+    const scale = Math.min(1, WIDTH / (video.videoWidth || WIDTH));
+    canvas.width = Math.round((video.videoWidth || WIDTH) * scale);
+    canvas.height = Math.round((video.videoHeight || HEIGHT) * scale);
+    canvas.getContext("2d").drawImage(video, 0, 0, canvas.width, canvas.height);
+    sentAt = performance.now();
+    canvas.toBlob((blob) => {
+      if (blob && mine.readyState === WebSocket.OPEN) mine.send(blob);
+    }, "image/jpeg", QUALITY);
+  };
+  mine.onopen = send;
+  mine.onmessage = (event) => {
+    if (event.data !== "next") { say(event.data); end(); return; }
+    timer = setTimeout(send, Math.max(0, EVERY_MS - (performance.now() - sentAt)));
+  };
+  mine.onclose = () => { if (socket === mine) end(); };
+  button.setAttribute("aria-pressed", "true");
+  say("The head looks through this browser's camera.");
+}
+
+/** Stop the camera; the scene is there again. */
+export function end() {
+  clearTimeout(timer);
+  stream?.getTracks().forEach((track) => track.stop());
+  const last = socket;
+  stream = socket = null;
+  last?.close();
+  button.setAttribute("aria-pressed", "false");
+}
+
+if (button) {
+  button.addEventListener("click", () => (stream ? end() : begin()));
+  // A real rig has a camera of its own, which is where its eyes are.
+  window.addEventListener("rig-state", (event) => {
+    button.hidden = !event.detail.emulated || Boolean(event.detail.recording);
+    if (button.hidden && stream) end();
+  });
+}

@@ -1,0 +1,237 @@
+"""A browser's own camera in the place of an emulated rig's, while its pictures come."""
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from math import radians
+from typing import Any, cast
+
+import cv2
+import numpy as np
+import pytest
+from page_at_the_door import PATIENCE_S, Rig, opened
+from websockets.exceptions import ConnectionClosed
+
+from gazerig.config.schema import load_rig
+from gazerig.drivers.camera.browser_source import FIELD_DEG, LATENCY_S, BrowserSource
+from gazerig.drivers.camera.jpeg_slot import MOST_BYTES, JpegSlot
+from gazerig.drivers.camera.process import CameraProcess
+from gazerig.drivers.types import Camera, Detections
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.borrowed_camera import SILENT_S, BorrowedCamera
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.model.frames import CameraMount, standing_still
+
+
+def jpeg(grey: int = 90, size: tuple[int, int] = (48, 64)) -> bytes:
+    done, data = cv2.imencode(".jpg", np.full((*size, 3), grey, np.uint8))
+    assert done
+    return data.tobytes()
+
+
+# The pictures' way
+
+
+def test_the_newest_picture_is_read_and_none_twice() -> None:
+    slot = JpegSlot()
+    assert slot.newer(0) is None and slot.came_s == float("-inf")
+    assert slot.put(b"one", 1.0) and slot.put(b"another", 2.0)
+    assert slot.newer(0) == (2, 2.0, b"another") and slot.newer(2) is None
+    assert not slot.put(b"x" * (MOST_BYTES + 1), 3.0) and not slot.put(b"", 3.0)
+    assert slot.came_s == 2.0
+
+
+def test_pictures_become_frames_of_a_lens_that_is_taken_to_be_usual() -> None:
+    slot, stop = JpegSlot(), threading.Event()
+    source = BrowserSource(slot)
+    source.open()
+    slot.put(jpeg(), 10.0)
+    shot = source.take(lambda: 10.1, stop)
+    assert shot is not None and shot.image.shape == (48, 64, 3) and shot.lens is not None
+    assert shot.captured_s == 10.0 - LATENCY_S and not shot.image.flags.writeable
+    assert 2.0 * np.arctan(32.0 / shot.lens.fx_px) == pytest.approx(radians(FIELD_DEG), abs=0.02)
+
+
+def test_what_is_no_picture_is_left_out_and_told_once() -> None:
+    slot, stop = JpegSlot(), threading.Event()
+    source = BrowserSource(slot)
+    for k in range(3):
+        slot.put(b"\xff\xd8\xff and no more", float(k))
+        threading.Timer(0.05, stop.set).start()
+        assert source.take(lambda: 0.0, stop) is None
+        stop.clear()
+    assert len(source.events()) == 1 and source.events() == ()
+
+
+# Who is looked through
+
+
+class Looked:
+    """A camera that counts, in the place of one with a process."""
+
+    def __init__(self, name: str) -> None:
+        self.name, self.open_count, self.closed = name, 0, False
+        self.found: Detections | None = None
+        self.said: list[str] = []
+
+    def open(self) -> None:
+        self.open_count += 1
+
+    def latest(self, now_s: float) -> Detections | None:
+        return self.found
+
+    def events(self) -> tuple[str, ...]:
+        said, self.said = tuple(self.said), []
+        return said
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def found(number: int) -> Detections:
+    return Detections(0.0, number, 64, 48)
+
+
+class Lent:
+    """A borrowed camera with a clock that is set."""
+
+    def __init__(self) -> None:
+        self.now_s = 100.0
+        self.own, self.browsers = Looked("own"), Looked("browser")
+        self.own.found = found(1)
+        self.before: list[int] = []
+        self.placed: list[bool] = []
+        self.camera = BorrowedCamera(cast(Camera, self.own), self.make, lambda: self.now_s)
+        self.camera.placed = lambda: self.placed.append(self.camera.lent)
+
+    def make(self, source: Callable[[], Any], before: int) -> CameraProcess:
+        self.before.append(before)
+        return cast(CameraProcess, self.browsers)
+
+    def picture(self) -> None:
+        self.camera.take(jpeg())
+        if (starting := self.camera._starting) is not None:
+            starting.join()
+
+    def number(self) -> int:
+        seen = self.camera.latest(self.now_s)
+        assert seen is not None
+        return seen.number
+
+
+def test_the_browser_stands_in_from_its_first_frame_until_it_is_silent() -> None:
+    lent = Lent()
+    assert lent.number() == 1
+    lent.picture()
+    assert lent.number() == 1 and not lent.camera.lent  # the networks are being loaded
+    lent.browsers.found = found(7)
+    assert lent.number() == 7 and lent.camera.lent and lent.placed == [True]
+    assert "60 deg wide" in lent.camera.events()[0]
+    lent.now_s += SILENT_S + 0.1
+    assert lent.number() == 1 and lent.placed == [True, False]
+    assert lent.camera.events() == ("the browser's camera has ended: the scene is there again",)
+    for _ in range(400):
+        if lent.browsers.closed:
+            break
+        time.sleep(0.01)
+    assert lent.browsers.closed and not lent.own.closed
+    # And once more: another scene than that of the first time.
+    lent.picture()
+    assert lent.number() == 7 and lent.before == [1, 2]
+
+
+def test_an_end_of_a_browser_is_no_lost_camera() -> None:
+    lent = Lent()
+    lent.picture()
+    lent.browsers.said = ["camera lost (no new frame): waiting for it", "something else"]
+    assert lent.camera.events() == ("something else",)
+
+
+def test_closing_closes_both_and_takes_no_more() -> None:
+    lent = Lent()
+    lent.picture()
+    lent.camera.close()
+    assert lent.own.closed and lent.browsers.closed
+    lent.picture()
+    assert lent.before == [1]
+
+
+def test_an_emulated_rig_can_be_lent_a_camera_that_stands_still() -> None:
+    rig = load_rig("desk")
+    made = assemble(rig, RunOptions(mock=True, scene="visitor", bus="ideal"))
+    try:
+        camera = made.robot.camera
+        assert isinstance(camera, BorrowedCamera) and made.mount.on_head
+        camera.lent = True
+        camera.placed()
+        still = CameraMount(standing_still(rig.camera, made.shown().kinematics))
+        level = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+        assert not made.mount.on_head
+        assert made.mount.pose(level, (0.0, 0.0, 9.0)) == still.pose(level, (0.0, 0.0, 0.0))
+        camera.lent = False
+        camera.placed()
+        assert made.mount.on_head
+    finally:
+        made.close()
+    fast = assemble(rig, RunOptions(mock=True, fast=True, scene="visitor"))
+    assert not isinstance(fast.robot.camera, BorrowedCamera)
+    fast.close()
+
+
+# The door
+
+
+def taker(near: Rig) -> list[bytes]:
+    """Take all pictures that come in."""
+    taken: list[bytes] = []
+
+    def take(data: bytes) -> bool:
+        taken.append(data)
+        return True
+
+    near.door.webcam.take = take
+    return taken
+
+
+@pytest.fixture(scope="module")
+def near() -> Iterator[Rig]:
+    with opened("127.0.0.1") as rig:
+        yield rig
+
+
+def test_pictures_come_in_one_at_a_time(near: Rig) -> None:
+    taken = taker(near)
+    picture = jpeg()
+    with near.knock("/rig/webcam") as line:
+        for _ in range(3):
+            line.send(picture)
+            assert line.recv(timeout=PATIENCE_S) == "next"
+        assert taken == [picture] * 3
+        line.send(b"<svg>")
+        assert "only JPEG" in str(line.recv(timeout=PATIENCE_S))
+        with pytest.raises(ConnectionClosed):
+            line.recv(timeout=PATIENCE_S)
+    assert len(taken) == 3
+
+
+def test_a_flood_of_pictures_is_thinned(near: Rig) -> None:
+    taken = taker(near)
+    with near.knock("/rig/webcam") as line:
+        for _ in range(60):
+            line.send(jpeg(size=(8, 8)))
+            assert line.recv(timeout=PATIENCE_S) == "next"
+    assert 0 < len(taken) < 60
+
+
+def test_the_newest_browser_takes_over(near: Rig) -> None:
+    near.door.webcam.take = lambda data: True
+    with near.knock("/rig/webcam") as first, near.knock("/rig/webcam") as second:
+        second.send(jpeg())
+        assert second.recv(timeout=PATIENCE_S) == "next"
+        first.send(jpeg())
+        assert "taken over" in str(first.recv(timeout=PATIENCE_S))
+
+
+def test_without_the_token_no_picture_comes_in(near: Rig) -> None:
+    with pytest.raises(Exception, match="403"):
+        near.knock("/rig/webcam", Cookie=None)
