@@ -108,27 +108,38 @@ def test_storeys(tmp_path: Path) -> None:
     assert found.returncode == 0, found.stdout + found.stderr
 
 
-@pytest.mark.parametrize(
-    ("room", "wrong"),
-    [
-        ("gaze", "gazerig.robot.control.loop"),
-        ("drivers/camera", "gazerig.gaze.types"),
-        ("drivers/servo_bus", "gazerig.drivers.dynamixel.family"),
-        ("config", "gazerig.robot.control.loop"),
-        ("sim_mock/scenes", "gazerig.robot.safety.guard"),
-        ("robot/control", "gazerig.config.schema"),
-        ("robot/control", "gazerig.robot.dashboard.snapshot"),
-        ("robot/dashboard", "gazerig.robot.recording.read"),
-    ],
+WRONG = (
+    ("gaze", "gazerig.robot.control.loop"),
+    ("drivers/camera", "gazerig.gaze.types"),
+    ("drivers/servo_bus", "gazerig.drivers.dynamixel.family"),
+    ("config", "gazerig.robot.control.loop"),
+    ("sim_mock/scenes", "gazerig.robot.safety.guard"),
+    ("robot/control", "gazerig.config.schema"),
+    ("robot/control", "gazerig.robot.dashboard.snapshot"),
+    ("robot/dashboard", "gazerig.robot.recording.read"),
 )
-def test_a_wrong_arrow_is_found(tmp_path: Path, room: str, wrong: str) -> None:
-    top = package(tmp_path)
-    first = room.split("/")[0]
-    (top / first).unlink()
-    shutil.copytree(ROOT / first, top / first, ignore=shutil.ignore_patterns("__pycache__"))
-    (top / room / "stray.py").write_text(f"import {wrong}\n", encoding="utf-8")
-    found = linted(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def found_wrong(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """What is said of a package with all of the wrong arrows, each in a module of its own."""
+    folder = tmp_path_factory.mktemp("wrong")
+    top = package(folder)
+    for room in ROOMS:
+        (top / room).unlink()
+        shutil.copytree(ROOT / room, top / room, ignore=shutil.ignore_patterns("__pycache__"))
+    for number, (room, wrong) in enumerate(WRONG):
+        (top / room / f"stray_{number}.py").write_text(f"import {wrong}\n", encoding="utf-8")
+    found = linted(folder)
     assert found.returncode == 1 and "BROKEN" in found.stdout, found.stdout + found.stderr
+    return found.stdout
+
+
+@pytest.mark.parametrize("number", range(len(WRONG)), ids=[" ".join(one) for one in WRONG])
+def test_a_wrong_arrow_is_found(found_wrong: str, number: int) -> None:
+    room, wrong = WRONG[number]
+    arrow = f"gazerig.{room.replace('/', '.')}.stray_{number} -> {wrong} (l.1)"
+    assert arrow in found_wrong, found_wrong
 
 
 def test_every_room_of_the_robot_has_its_storey() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from commanded_robot import YAW, Running
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.config.schema import load_rig
@@ -109,6 +109,7 @@ def test_what_is_no_order_is_refused_with_the_rule(data: object, words: str) -> 
         max_leaves=8,
     )
 )
+@settings(max_examples=40)
 def test_rubbish_is_refused_and_nothing_else_happens(data: Any) -> None:
     try:
         order = from_json(data)

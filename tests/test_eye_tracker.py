@@ -10,7 +10,7 @@ from human.measured_run import measured_run
 from human.row_07_judges import measure
 from human.saccade_judges import JUDGES, Exported, exported, marks
 
-SECONDS = 33.0
+SECONDS = 24.0
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 
 FILM = Path(__file__).parents[2] / "shared" / "media" / "vtest.avi"
-SECONDS, BEGIN_S, RATE_HZ = 24.0, 1.0, 10.0
+SECONDS, BEGIN_S, RATE_HZ = 18.0, 1.0, 10.0
 WIDTH, HEIGHT = 768, 576
 SHRINK = 2
 DIFFERS = 25  # grey levels
@@ -134,7 +134,7 @@ def test_the_gaze_lies_on_what_moves(fixations: list[Fixation]) -> None:
     assert np.mean(pictures) >= 0.8, f"{sum(pictures)} of {len(pictures)} pictures"
     shown = [fixation for fixation in fixations if fixation.on and fixation.seconds > CORRECTED_S]
     good = [2 * sum(fixation.on) >= len(fixation.on) for fixation in shown]
-    assert len(good) >= 20
+    assert len(good) >= 15
     assert np.mean(good) >= 0.9, f"{sum(good)} of {len(good)} fixations"
 
 

@@ -14,6 +14,8 @@ from gazerig.robot.model.commands import LookAt, Play
 from gazerig.robot.model.gaze_error import gaze_error
 from gazerig.robot.model.reply import CommandReply
 
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
 DT = 0.005
 POINT = (1.0, 0.0, 0.25)
 

@@ -20,6 +20,8 @@ from gazerig.robot.model.command_json import as_json, as_recorded, from_json, fr
 from gazerig.robot.model.commands import Ask, Command, Jog, Play, Resume, Stop
 from gazerig.robot.remote.client import RequestRejected, RobotClient
 
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
 
 @pytest.fixture
 def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[TickedRig]:

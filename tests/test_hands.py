@@ -172,7 +172,7 @@ def test_e91_a_rule_that_names_a_hand_matches_one_that_is_seen() -> None:
 
 @pytest.mark.parametrize(("scene", "start_s"), [("walks-past", 5.2), ("sits-still", 0.0)])
 def test_e92_who_walks_by_or_sits_still_has_no_hands(scene: str, start_s: float) -> None:
-    for frame in frames(scenes()[scene], start_s, start_s + 3.0):
+    for frame in frames(scenes()[scene], start_s, start_s + 2.0):
         assert frame.seen(HAND) == []
 
 

@@ -45,8 +45,8 @@ def test_a_photo_is_looked_at_and_gives_the_same_bytes_twice(tmp_path: Path) -> 
 def test_a_film_of_two_talking_people(network: str, tmp_path: Path) -> None:
     # The detector's own test looks all through the film; a quarter of it shows the way to the gaze.
     rig = faces_alone(tmp_path / "rig.yaml", network)
-    run = figures(rig, "--video", str(MEDIA / "Megamind.avi"), "--seconds", "3")
-    assert run["pictures"] >= 68
+    run = figures(rig, "--video", str(MEDIA / "Megamind.avi"), "--seconds", "2")
+    assert run["pictures"] >= 45
     assert run["faces_seen"] >= 0.95 * run["pictures"]
     assert run["target_share"]["face"] > 0.75
 

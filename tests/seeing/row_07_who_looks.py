@@ -82,7 +82,7 @@ def off_deg(direction: np.ndarray, p_m: np.ndarray) -> float:
 
 def measure(full: bool) -> dict[str, float]:
     """Return the figures."""
-    rows = people(400 if full else 48, 5)
+    rows = people(400 if full else 36, 5)
     looks = np.array([row.looks for row in rows])
     five, eyes, turns, seen = [], [], [], []
     for row in rows:
