@@ -4,6 +4,7 @@ A frame tells of the moment of its exposure. Placing it with the head's pose of 
 throws targets off by the head's motion in between, so poses are remembered.
 """
 
+from bisect import bisect_left
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -120,10 +121,7 @@ class PoseHistory:
             raise LookupError("no pose has been remembered yet")
         if t_s > times[-1]:
             return angles[-1]
-        # A frame is some ticks old: the search from the newest is the shorter one.
-        after = len(times) - 1
-        while after > 0 and times[after - 1] >= t_s:
-            after -= 1
+        after = bisect_left(times, t_s)
         if after == 0:
             return angles[0]
         t0, t1 = times[after - 1], times[after]
