@@ -1,5 +1,6 @@
 """The page in every state on a desk, a laptop and a phone: all in sight, nothing cut off."""
 
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
@@ -8,10 +9,11 @@ import numpy as np
 import pytest
 from browser import RARE_DRAWING, Browser, browsing
 from page_layout import boxes, faults, value, violations
+from present import present
 from shown_page import SNAPSHOT, running_page, wait_for
 
 from gazerig.robot.dashboard.camera_overlay import encode
-from gazerig.robot.dashboard.page_process import PageProcess
+from gazerig.robot.dashboard.page_process import REPLAY, PageProcess
 from gazerig.robot.model.leader import Leader, sentence
 from gazerig.robot.model.types import Snapshot
 
@@ -93,7 +95,7 @@ def shown() -> Iterator[Shown]:
         page.show_frame(encode(np.full((400, 640, 3), (140, 120, 100), np.uint8)))
         browser.go(url)
         shown = Shown(browser, page)
-        wait_for(lambda: value(browser, "document.querySelector('#headline') !== null"), "it")
+        wait_for(lambda: value(browser, "document.querySelector('#camera img') !== null"), "it")
         yield shown
 
 
@@ -134,6 +136,47 @@ def test_a_drawer_leaves_head_stop_and_buttons_in_sight(shown: Shown, tab: str, 
             assert right - left >= 0.6 * width and bottom - top > 0.6 * height
     finally:
         shown.tab(tab)
+
+
+def test_on_a_phone_the_head_is_on_top_then_stop_then_the_buttons(shown: Shown) -> None:
+    shown.size("phone")
+    shown.state("awake")
+    found = {name: box or (0.0,) * 4 for name, box in boxes(shown.browser).items()}
+    order = ("stage", "rig-stop", "moves", "extras", "camera", "tabs")
+    for upper, lower in zip(order[:-1], order[1:], strict=True):
+        assert found[upper][3] <= found[lower][1] + 1, (upper, lower)
+    share = (found["stage"][3] - found["stage"][1]) / SIZES["phone"][1]
+    assert 0.4 <= share <= 0.5
+
+
+@pytest.mark.parametrize("size", ["desk", "laptop"])
+def test_the_camera_picture_is_large_and_leaves_the_head_free(shown: Shown, size: str) -> None:
+    shown.size(size)
+    shown.state("awake")
+    found = {name: box or (0.0,) * 4 for name, box in boxes(shown.browser).items()}
+    stage, camera = found["stage"], found["camera"]
+    assert camera[2] - camera[0] >= 320.0
+    middle, high = 0.5 * (stage[0] + stage[2]), stage[3] - stage[1]
+    assert camera[0] > middle + 0.35 * high  # a head of two thirds of the height is half as wide
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_picture_and_head_change_places_with_one_click(shown: Shown, size: str) -> None:
+    shown.size(size)
+    shown.state("awake")
+    before = boxes(shown.browser)
+    swap = "document.querySelector('#swap').click()"
+    shown.browser.run(swap)
+    try:
+        after = boxes(shown.browser)
+        for part, other in (("camera", "stage"), ("stage", "camera")):
+            one, two = after[part] or (0.0,) * 4, before[other] or (0.0,) * 4
+            near = np.abs(np.array(one[:2] + one[2:]) - two)
+            assert near[[0, 2, 3]].max() <= 0.1 * SIZES[size][0], (part, one, two)
+        # The head, small now, lies on a corner of the large picture.
+        assert [fault for fault in faults(shown.browser) if "covered by iframe" not in fault] == []
+    finally:
+        shown.browser.run(swap)
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
@@ -182,3 +225,19 @@ def test_what_is_measured_finds_faults_that_are_there(shown: Shown) -> None:
         assert "button-name" in serious and "color-contrast" in serious
     finally:
         shown.browser.run("document.querySelector('#bad').remove()")
+
+
+# The last: a page that has shown a recording shows no rig any more.
+@pytest.mark.parametrize("size", SIZES)
+def test_a_recording_has_its_controls_and_no_stop(shown: Shown, size: str) -> None:
+    shown.size(size)
+    state = {"at_s": 2.5, "duration_s": 60.0, "playing": True, "speed": 1.0, "sought_s": None}
+    shown.page.send(REPLAY + json.dumps(state).encode())
+    hidden = "document.querySelector('#rig-stop').hidden"
+    wait_for(lambda: value(shown.browser, hidden) is True, "the recording")
+    slider = "document.querySelector('[data-panel=replay] input[type=range]') !== null"
+    wait_for(lambda: value(shown.browser, slider) is True, "its controls")
+    assert faults(shown.browser) == []
+    assert violations(shown.browser) == []
+    stage = present(boxes(shown.browser)["stage"])
+    assert stage[3] - stage[1] > 0.25 * SIZES[size][1]

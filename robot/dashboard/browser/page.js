@@ -42,6 +42,7 @@ function show(now) {
   $("#busy").hidden = !state.busy;
   document.title = `${state.stopped ? "■ stopped - " : state.silent ? "! silent - " : ""}gazerig`;
   $("#dock").hidden = Boolean(state.recording);
+  document.body.classList.toggle("recording", Boolean(state.recording));
   followUnasked();
   for (const button of moves) {
     const why = state.refused?.[button.textContent.trim()];
@@ -125,6 +126,14 @@ function watchPointer() {
 }
 $("#view").addEventListener("load", watchPointer);
 if ($("#view").contentDocument?.readyState === "complete") watchPointer();
+
+// --- picture and head -----------------------------------------------------------------
+
+$("#camera").addEventListener("load", ({ target }) => { // a picture's does not rise
+  if (target.naturalHeight) {
+    $("#camera").style.setProperty("--aspect", target.naturalWidth / target.naturalHeight);
+  }
+}, true);
 
 // --- drawers --------------------------------------------------------------------------
 
