@@ -26,9 +26,12 @@ Were every pair preferred, somebody new would push others on, each to the place 
 # Above this, costs approach that limit more and more slowly.
 _NEARLY_UNPAIRED = 25.0
 _SLOWLY = _NEARLY_UNPAIRED * (UNPAIRED - _NEARLY_UNPAIRED)
-# What people do that no filter expects, a lunge or a jump of the detector, happens in one frame of
-# twenty; as a cost: minus twice the logarithm.
-_SURPRISE = 6.0
+# What people do that no filter expects, a lunge, a turn about or a jump of the detector, happens
+# in one frame of five; as a cost: minus twice the logarithm.
+_SURPRISE = 3.0
+# Who was seen in the last frame is seen again in nineteen frames of twenty, who was not comes back
+# in one of twenty: so much more it costs to take somebody for the latter.
+_UNSEEN = 6.0
 # Of two about as far away each may hide the other.
 _NEARER = 1.1
 # Nothing is measured better than this.
@@ -130,6 +133,7 @@ def _all_pairs(
     surprising = far + np.log(across_sum * across_sum * along_sum / exact) + _SURPRISE
     hidden = _hidden(t[:, :, 0])[:, None] & ((t[1] != d[1]) | (t[1] == NO_MARK))
     costs = np.where(hidden, expected, np.minimum(expected, surprising)) + _OTHER_MARK * other
+    costs += _UNSEEN * ((t[10] > 0.0) | (t[11] == 0.0))
     unlikely = hidden & (costs > UNPAIRED)
     costs = np.minimum(costs, UNPAIRED - _SLOWLY / np.maximum(costs, _NEARLY_UNPAIRED))
     reach = wide_m + t[10]
@@ -159,7 +163,7 @@ def _hidden(t: Floats) -> NDArray[np.bool_]:
 
 def _pair_cost(k: int, found: DetectionRow, tracks: Sequence[TrackRow], par: TrackParams) -> float:
     """Return what ``_all_pairs`` does, for track k and one detection."""
-    kind, mark, x, y, z, range_m, across_m2, along_m2, radius_m, size, moved_m, _ = tracks[k]
+    kind, mark, x, y, z, range_m, across_m2, along_m2, radius_m, size, moved_m, in_sight = tracks[k]
     its_kind, its_mark, its_x, its_y, its_z, its_m, across_sd, along_sd, its_radius_m, sized = found
     if kind != its_kind:
         return FORBIDDEN
@@ -194,6 +198,8 @@ def _pair_cost(k: int, found: DetectionRow, tracks: Sequence[TrackRow], par: Tra
         cost = min(cost, surprising)
     if other:
         cost += _OTHER_MARK
+    if moved_m > 0.0 or not in_sight:
+        cost += _UNSEEN
     if hidden and cost > UNPAIRED:
         return FORBIDDEN
     return min(cost, UNPAIRED - _SLOWLY / max(cost, _NEARLY_UNPAIRED))
