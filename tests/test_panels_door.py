@@ -13,7 +13,7 @@ from page_at_the_door import ELSEWHERE, PATIENCE_S, Rig, opened
 from page_person import Person, beside
 from shown_page import wait_for
 from websockets.exceptions import ConnectionClosed, InvalidStatus
-from websockets.sync.client import ClientConnection
+from websockets.sync.connection import Connection
 
 from gazerig.robot.dashboard.widgets import RECEIVED_BYTES
 
@@ -28,7 +28,7 @@ def near() -> Iterator[Rig]:
         yield rig
 
 
-def said(there: ClientConnection) -> dict[str, Any]:
+def said(there: Connection) -> dict[str, Any]:
     """The next message of text."""
     while True:
         message = there.recv(timeout=PATIENCE_S)
@@ -47,7 +47,8 @@ def test_the_panels_are_for_those_who_may_come_in(near: Rig, wrong: dict[str, st
 
 
 def test_what_is_shown_comes_and_what_is_done_is_heard(near: Rig) -> None:
-    widgets, heard = near.door.widgets, []
+    widgets = near.door.widgets
+    heard: list[object] = []
     panel = widgets.panel("report")
     slider = panel.slider("neck", (-10.0, 10.0), 0.1, 0.0)
     slider.on_change(lambda value, client: heard.append((value, widgets.browser(client))))
@@ -93,7 +94,8 @@ def test_a_flood_of_one_browser_does_not_hold_up_a_stop(near: Rig) -> None:
 
 
 def test_who_leaves_is_forgotten(near: Rig) -> None:
-    widgets, gone = near.door.widgets, []
+    widgets = near.door.widgets
+    gone: list[str] = []
     widgets.on_leave(gone.append)
     with near.knock(PANELS):
         wait_for(lambda: widgets.watched, "the browser")
