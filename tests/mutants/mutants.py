@@ -23,7 +23,7 @@ MUTANTS = (
            "eq 1 without its third term, spin", ("attention", "attention_choice")),
     Mutant("gaze/bottom_up.py", "            spin / par.rotation_reference_rad_s,\n", "            0.0,\n",
            "eq 1 of few bodies without its third term", ("group_scenes", "attention")),
-    Mutant("robot/perception/perception.py", "view * table[:, 9:10],", "0.0 * view,",
+    Mutant("robot/perception/perception.py", "scale(known.view, found.spin_rad_s)", "scale(known.view, 0.0)",
            "what spins is not perceived to", ("group_scenes",)),
     Mutant("sim_mock/cameras/detections.py", "thing.radius_m, thing.spin_rad_s),)", "thing.radius_m),)",
            "the camera of a scene does not see a spin", ("group_scenes",)),
