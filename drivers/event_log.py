@@ -52,7 +52,8 @@ class RateLimitedLog:
             return
         self._said_s[kind] = now_s
         often = self._since.pop(kind, 0)
-        self._log.add(f"{text} ({often} more times since it was said last)" if often else text)
+        times = "once more" if often == 1 else f"{often} more times"
+        self._log.add(f"{text} ({times} since it was said last)" if often else text)
 
 
 def servo_label(setup: "ServoConfig", noun: str = "servo") -> str:

@@ -9,7 +9,9 @@ from typing import Any, cast
 import cv2
 import numpy as np
 import pytest
-from page_at_the_door import PATIENCE_S, Rig, opened
+from browser import browsing
+from page_at_the_door import PATIENCE_S, TOKEN, Rig, opened
+from shown_page import wait_for
 from websockets.exceptions import ConnectionClosed
 
 from gazerig.config.schema import load_rig
@@ -230,6 +232,51 @@ def test_the_newest_browser_takes_over(near: Rig) -> None:
         assert second.recv(timeout=PATIENCE_S) == "next"
         first.send(jpeg())
         assert "taken over" in str(first.recv(timeout=PATIENCE_S))
+
+
+CAMERA = """
+const drawn = document.createElement('canvas'); drawn.width = 640; drawn.height = 480;
+const brush = drawn.getContext('2d'); let step = 0;
+setInterval(() => { brush.fillStyle = `rgb(${step++ % 255},99,99)`; brush.fillRect(0, 0, 640, 480) }, 40);
+navigator.mediaDevices.getUserMedia = async () => drawn.captureStream(25);
+"""
+REFUSED = """
+navigator.mediaDevices.getUserMedia = async () => { throw new DOMException('no', 'NotAllowedError') };
+"""
+
+
+@pytest.mark.own_timeouts
+def test_the_button_sends_the_browsers_own_pictures_until_it_is_pressed_again(near: Rig) -> None:
+    taken = taker(near)
+    with browsing(drawing="0") as tab:
+
+        def of_button(attribute: str) -> str:
+            script = f"String(document.querySelector('#webcam')?.{attribute})"
+            return str(tab.ask("Runtime.evaluate", expression=script)["result"]["value"])
+
+        def pressed(on: str) -> bool:
+            return of_button("getAttribute('aria-pressed')") == on
+
+        press = "document.querySelector('#webcam').click();"
+        near.door.tell({"emulated": False})
+        tab.go(f"{near.url}/?token={TOKEN}")
+        wait_for(lambda: "gazerig" in tab.words(), "the page")
+        assert of_button("hidden") == "true"  # a real rig has a camera of its own
+        near.door.tell({"emulated": True})
+        wait_for(lambda: of_button("hidden") == "false", "the button")
+        tab.run(REFUSED + press)
+        wait_for(lambda: "not allowed to use its camera" in tab.words(), "the refusal")
+        tab.run(CAMERA + press)
+        wait_for(lambda: len(taken) > 3, "pictures")
+        found = cv2.imdecode(np.frombuffer(taken[-1], np.uint8), cv2.IMREAD_COLOR)
+        assert found is not None and found.shape == (480, 640, 3)
+        assert pressed("true")
+        tab.run(press)
+        wait_for(lambda: pressed("false"), "the end")
+        time.sleep(0.5)
+        count = len(taken)
+        time.sleep(0.5)
+        assert len(taken) == count
 
 
 def test_without_the_token_no_picture_comes_in(near: Rig) -> None:

@@ -90,3 +90,5 @@ def test_a_fault_of_many_joints_is_told_once() -> None:
     figures = {"joint_faults": dict.fromkeys("abcdefghi", stale), "stopped_by": "seconds"}
     assert had_faults(figures, said.append)
     assert said == ["the run had faults: 9 joints stale joints (1.6 s, 3 times)"]
+    assert had_faults({**figures, "ticks": 900, "overruns": 300}, said.append)
+    assert said[1] == f"{said[0]}; the computer was too busy: 25% of ticks came late"

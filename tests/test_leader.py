@@ -14,7 +14,7 @@ from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import doing, leader
 from gazerig.robot.dashboard.attention_panel import saliences, winner
 from gazerig.robot.dashboard.servo_health import health
-from gazerig.robot.dashboard.snapshot import snapshot
+from gazerig.robot.dashboard.snapshot import SnapshotBuilder, SnapshotTexts, snapshot
 from gazerig.robot.model.commands import Jog, LookAt, LookAtPerson, Play, Resume, Stop
 from gazerig.robot.model.leader import Leader, sentence
 from gazerig.robot.model.types import Snapshot
@@ -173,3 +173,18 @@ def test_what_holds_all_joints_at_once_is_one_line(running: Running) -> None:
     for k in range(500, 700):
         faults.update(tick._replace(t_s=0.005 * k, guard_result=held))
     assert said[2].endswith(f"stale joints: held, as {busy[0]}")
+
+
+def test_old_joints_of_a_busy_computer_are_put_down_to_it(running: Running) -> None:
+    tick = running.go(0.1)[-1]
+    reasons = ("neck_yaw: stale joints", "neck_pitch: stale joints", "jaw: too fast")
+    held = tick.guard_result._replace(level="hold", reasons=reasons)
+    shown_s = [0.005 * k for k in range(600)]
+    for late, last in ((False, reasons), (True, ("jaw: too fast",))):
+        builder = SnapshotBuilder(200.0)
+        for k, t_s in enumerate(shown_s):
+            if not late or k % 4:
+                builder.update(tick._replace(t_s=t_s, guard_result=held))
+        shot = builder.take(SnapshotTexts())
+        assert shot is not None and bool(shot.busy) is late
+        assert shot.reasons == (*last, *([shot.busy] if late else []))

@@ -13,7 +13,7 @@ FAULTS = frozenset(
 
 _PASSING_S = {"stale joints": 0.5, "torque off": 0.5}
 """A lost answer or a restart that is over sooner is no fault."""
-_BY_TIME = frozenset({"stale joints", "torque off"})
+_BY_TIME = frozenset({"stale joints", "torque off", "not moving"})
 """Reasons that a computer that is late makes by itself."""
 _OVER_S = 1.0
 """A fault is over when the joint has not been held for so long; a retry alone does not end it."""

@@ -116,6 +116,7 @@ class SnapshotBuilder:
         if self._newest is None:
             return None
         timing = self._timed(self._newest.t_s)
+        busy = busy_text(timing)
         plain = snapshot(
             self._newest, timing.rate_hz if timing else 0.0, said.health, said.behaviour,
             said.perception, self.rig,
@@ -128,7 +129,8 @@ class SnapshotBuilder:
                 unanswered=tuple([self._unanswered[name] for name in plain.joints])
             ),
             timing=timing,
-            busy=busy_text(timing),
+            busy=busy,
+            reasons=_by_time(plain.reasons, busy),
             worst=worst,
             trail=tuple(trail),
             events=tuple(events),
@@ -204,6 +206,12 @@ def snapshot(
         lower_lids=_lower_lids(pose, joints),
         p_world_pivot_m=_pivot(pose, rig),
     )
+
+
+def _by_time(reasons: tuple[str, ...], busy: str) -> tuple[str, ...]:
+    """Return why joints are limited; a busy computer is named in place of joints that are old."""
+    others = tuple([reason for reason in reasons if not reason.endswith(": stale joints")])
+    return (*others, busy) if busy and len(others) < len(reasons) else reasons
 
 
 def joint_names(tick: Tick, rig: ShownRig | None = None) -> tuple[str, ...]:
