@@ -175,6 +175,12 @@ class _Teller:
     listens: bool = False
     """Not while it is registered: pytest repeats then what it warned of before the fork."""
 
+    @property
+    def _all_of_them(self) -> bool:
+        """Whether somebody asks how a test was set up and taken down though all went well."""
+        option = self.config.option
+        return option.durations is not None or option.xmlpath is not None
+
     def pytest_runtest_logstart(self, nodeid: str, location: object) -> None:
         self.line.send((START, {"nodeid": nodeid, "location": location}))
 
@@ -182,6 +188,8 @@ class _Teller:
         self.line.send((FINISH, {"nodeid": nodeid, "location": location}))
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.passed and report.when != "call" and not self._all_of_them:
+            return
         data = self.config.hook.pytest_report_to_serializable(config=self.config, report=report)
         self.line.send((REPORT, data))
 

@@ -33,6 +33,8 @@ from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo
 
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
 NAMES = (
     "eyes_pan", "eyes_tilt", "left_upper_lid", "right_upper_lid", "neck_yaw", "neck_pitch", "jaw",
     "left_brow", "right_brow",

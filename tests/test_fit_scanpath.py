@@ -120,13 +120,13 @@ def test_labelled_fixations_of_a_known_walk_give_it_back(tmp_path: Path) -> None
 
 def test_samples_of_a_known_walk_give_it_back(tmp_path: Path, boxes: PartBoxes) -> None:
     # Looks of a fifth of a second: shorter ones than 60 ms no detector can be asked for.
-    recording = as_csv(tmp_path / "gaze.csv", samples(boxes, walked(1500, 2, 0.2), 3))
+    recording = as_csv(tmp_path / "gaze.csv", samples(boxes, walked(1000, 2, 0.2), 3))
     out = tmp_path / "mine.yaml"
     report = fit(recording, boxes, out, "none")
     walk = load(out, Walk)
     wanted, found = normalised(WALK.matrix), normalised(walk.matrix)
     for i, share in enumerate((0.0607, 0.0842, 0.0931, 0.0999, 0.2217, 0.0946, 0.2550, 0.0907)):
-        n = 1500 * share * 0.85
+        n = 1000 * share * 0.85
         assert np.abs(found[i] - wanted[i]).max() < 4.0 * np.sqrt(0.25 / n), PARTS[i]
         assert walk.dwell_mean_s[i] == pytest.approx(0.2, abs=0.015), PARTS[i]
     assert "at 250 Hz" in report and "% lost; column time is in s" in report
