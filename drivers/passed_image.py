@@ -13,6 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.drivers.message_link import MessageLink
+
 _FD_BYTES = 4  # a C int
 CAN_PASS = hasattr(os, "memfd_create") and hasattr(socket, "SCM_RIGHTS")
 """Whether this system has memory without a name, and passes it on: Linux."""
@@ -57,24 +59,26 @@ def taken(image: PassedImage) -> NDArray[Any]:
     return np.frombuffer(held, np.dtype(image.dtype)).reshape(image.shape)
 
 
-def send(link: socket.socket, message: bytes, fd: int = -1) -> None:
+def send(link: MessageLink, message: bytes, fd: int = -1) -> None:
     """Send a message, with a file descriptor unless it is -1.
 
     Raises:
         OSError: as ``socket.send``.
     """
-    if fd < 0:
+    if fd < 0 or not isinstance(link, socket.socket):
         link.send(message)
     else:
         socket.send_fds(link, [message], [fd])
 
 
-def receive(link: socket.socket, most: int, flags: int = 0) -> tuple[bytes, int]:
+def receive(link: MessageLink, most: int, flags: int = 0) -> tuple[bytes, int]:
     """Return a message and the file descriptor that came with it, -1 without one.
 
     Raises:
         OSError: as ``socket.recv``.
     """
+    if not isinstance(link, socket.socket):
+        return link.recv(most, flags), -1
     # socket.recv_fds of Python 3.11 leaves the flags out.
     message, beside, _, _ = link.recvmsg(most, _FD_ROOM, flags)
     for level, kind, data in beside:

@@ -65,12 +65,12 @@ class Rig:
         with socket.socket() as trial:
             trial.bind((host, 0))
             port = trial.getsockname()[1]
-        self.server = open_server(folder / "page.sock")
+        self.server, inside = open_server(folder / "page.sock")
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._listener = StopListener(ours, self.stop)
         self._sender = theirs
         self.door = AuthProxy(
-            host, port, folder / "page.sock", self.take, StopSender(theirs), TOKEN
+            host, port, inside, self.take, StopSender(theirs), TOKEN
         )  # fmt: skip
         self.points: list[tuple[object, str]] = []
         self.door.point = self.point

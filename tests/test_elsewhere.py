@@ -5,16 +5,26 @@ tests/elsewhere/sitecustomize.py hides it from gazerig's modules, in every proce
 
 import json
 import os
+import re
 import socket
 import subprocess
 import sys
+import urllib.error
+import urllib.request
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
+from shown_page import free_port
 
+from gazerig.drivers import message_link
 from gazerig.drivers.errors import PortError
+from gazerig.drivers.message_link import MessageLink
 from gazerig.drivers.serial import port as serial_port
+from gazerig.drivers.types import Detections
+from gazerig.robot.dashboard import viser_server
+from gazerig.robot.dashboard.live_feed import LiveFeed, frame_with_pixels
 from gazerig.robot.remote import socket_io
 
 HIDING = Path(__file__).parent / "elsewhere"
@@ -48,9 +58,8 @@ def test_the_hiding_hides_and_only_from_us(tmp_path: Path) -> None:
     assert done.returncode == 0
 
 
-@pytest.mark.parametrize("rig", ["desk", "six_hobby"])
-def test_an_emulated_head_runs_in_real_time(rig: str, tmp_path: Path) -> None:
-    words = ("run", rig, "--mock", "--no-page", "--seconds", "1", "--summary", "-")
+def test_an_emulated_head_runs_in_real_time(tmp_path: Path) -> None:
+    words = ("run", "six_hobby", "--mock", "--no-page", "--seconds", "1", "--summary", "-")
     out, said = elsewhere(*words, folder=tmp_path).communicate()
     assert '"stopped_by"' in out, said
     figures = json.loads(out)
@@ -101,3 +110,138 @@ def test_a_real_port_says_what_it_needs(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr(serial_port, "termios", None)
     with pytest.raises(PortError, match="COM3: real servos need Linux; here there is --mock"):
         serial_port.BlockingPort("COM3").setBaudRate(57600)
+
+
+# ---- the page
+
+
+def told(process: subprocess.Popen[str], pattern: str) -> re.Match[str]:
+    """Wait for a line on standard error."""
+    assert process.stderr is not None
+    lines: list[str] = []
+    while line := process.stderr.readline():
+        lines.append(line)
+        if found := re.search(pattern, line):
+            return found
+    raise AssertionError(f"{pattern} was not said: {''.join(lines)}")
+
+
+def test_the_page_shows_an_emulated_head_and_stops_it(tmp_path: Path) -> None:
+    running = elsewhere(
+        *("run", "--mock", "--seconds", "60", "--page", f"127.0.0.1:{free_port()}"), folder=tmp_path
+    )
+    try:
+        url, address = told(running, r"(http://([\d.:]+)/\?token=\S+)").groups()
+        asking = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
+        assert b"<title>gazerig" in asking.open(url, timeout=20).read()
+        assert b"viser" in asking.open(f"http://{address}/view/", timeout=20).read().lower()
+        stop = urllib.request.Request(
+            f"http://{address}/rig/ask",
+            data=json.dumps({"do": "stop", "why": "a test"}).encode(),
+            headers={"Origin": f"http://{address}", "Content-Type": "application/json"},
+        )
+        asking.open(stop, timeout=20).read()
+        told(running, "a test")
+    finally:
+        running.terminate()
+        running.communicate()
+    assert running.returncode == 0
+
+
+@pytest.fixture
+def links(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[MessageLink, MessageLink]]:
+    """Both ends of a link over the loopback, as parent and child have them."""
+    monkeypatch.setattr(message_link, "HAS_PAIRS", False)
+    offered = message_link.offer(1)
+    [ours], [word] = offered.ours, offered.words
+    ours.setblocking(False)
+    theirs = message_link.open_link(word, offered.variables[message_link.TOKEN_VARIABLE])
+    yield ours, theirs
+    ours.close()
+    theirs.close()
+
+
+def arrived(link: MessageLink) -> bytes:
+    """Return the next message of a link that does not wait."""
+    while True:
+        message_link.wait_readable(link)
+        try:
+            return link.recv(1)  # of any length
+        except BlockingIOError:
+            continue
+
+
+def test_messages_stay_whole_and_in_order(links: tuple[MessageLink, MessageLink]) -> None:
+    ours, theirs = links
+    large = os.urandom(900_000)
+    for message in (b"a", large, b"bc"):
+        ours.send(message)  # the first before the other end was let in
+    with pytest.raises(BlockingIOError):
+        while True:
+            ours.recv(1)
+    assert [theirs.recv(1) for _ in range(3)] == [b"a", large, b"bc"]
+    with pytest.raises(BlockingIOError):
+        theirs.recv(1, message_link.DONT_WAIT)
+    theirs.send(b"back")
+    theirs.send(large)
+    assert (arrived(ours), arrived(ours)) == (b"back", large)
+
+
+def test_the_end_is_told_at_either_end(links: tuple[MessageLink, MessageLink]) -> None:
+    ours, theirs = links
+    theirs.send(b"last")
+    assert arrived(ours) == b"last"
+    ours.close()
+    assert theirs.recv(1) == b""
+    with pytest.raises(OSError):
+        ours.send(b"x")
+
+
+def test_a_link_that_is_not_read_refuses_and_never_waits(
+    links: tuple[MessageLink, MessageLink],
+) -> None:
+    ours, _ = links
+    with pytest.raises(BlockingIOError):
+        for _ in range(100):
+            ours.send(bytes(1 << 20))
+
+
+def test_a_stranger_is_not_let_in_and_keeps_nobody_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(message_link, "HAS_PAIRS", False)
+    offered = message_link.offer(1)
+    [ours], [word] = offered.ours, offered.words
+    with socket.create_connection(("127.0.0.1", int(word[5:]))) as stranger:
+        stranger.sendall(b"0" * 32)
+        child = message_link.open_link(word, offered.variables[message_link.TOKEN_VARIABLE])
+        child.send(b"it is me")
+        assert ours.recv(1) == b"it is me"
+        assert stranger.recv(1) == b""
+    child.close()
+    ours.close()
+
+
+def test_a_view_on_a_port_answers_only_who_shows_the_key(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(viser_server, "HAS_SOCKET_FILES", False)
+    server, inside = viser_server.open_server(tmp_path / "page.sock")
+    try:
+        assert inside.path is None and len(inside.key) == 32
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            urllib.request.urlopen(f"http://127.0.0.1:{inside.port}/")
+        shown = urllib.request.Request(
+            f"http://127.0.0.1:{inside.port}/", headers={viser_server.KEY_HEADER: inside.key}
+        )
+        assert urllib.request.urlopen(shown).status == 200
+    finally:
+        server.stop()
+
+
+def test_a_frame_goes_along_with_its_pixels_where_memory_cannot() -> None:
+    image = np.arange(24, dtype=np.uint8).reshape(2, 4, 3)
+    found = Detections(1.0, 7, 4, 2, (), image=image)
+    feed = LiveFeed()
+    assert feed.take(frame_with_pixels(found, image, depth=False, wants_depth=False))
+    shown = feed._found
+    assert shown is not None and shown.image is not None
+    assert np.array_equal(shown.image, image)

@@ -101,6 +101,8 @@ class LineWriter:
     def _reader_gone(self) -> bool:
         """Return whether a pipe has lost its reader, which else only the next line would find."""
         try:
+            if not hasattr(select, "poll"):  # Windows: the next line finds it
+                return False
             if not stat.S_ISFIFO(os.fstat(self._fd).st_mode):
                 return False
             poll = select.poll()

@@ -19,7 +19,6 @@ import secrets
 import threading
 from collections.abc import Awaitable, Callable, Mapping
 from contextlib import suppress
-from pathlib import Path
 
 import aiohttp
 from aiohttp import web
@@ -32,7 +31,8 @@ from gazerig.robot.dashboard.connection_limits import Connections
 from gazerig.robot.dashboard.page_files import PageFiles
 from gazerig.robot.dashboard.stop_sender import StopSender
 from gazerig.robot.dashboard.token_bucket import TokenBucket
-from gazerig.robot.dashboard.view_proxy import VIEW, ViewProxy
+from gazerig.robot.dashboard.view_proxy import VIEW, ViewProxy, client_of
+from gazerig.robot.dashboard.viser_server import ViewAddress
 from gazerig.robot.dashboard.webcam_socket import WebcamSocket
 from gazerig.robot.dashboard.websocket_relay import TAKES_S, until_one_ends
 from gazerig.robot.dashboard.widget_socket import WidgetSocket
@@ -71,21 +71,21 @@ class AuthProxy:
     """
 
     def __init__(
-        self, host: str, port: int, inside: Path, ask: Ask, stop: StopSender, token: str
+        self, host: str, port: int, inside: ViewAddress, ask: Ask, stop: StopSender, token: str
     ) -> None:
         """Prepare to listen.
 
         Args:
             host: the address
             port: a free port of it
-            inside: the Unix socket of the server
+            inside: where the server is
             ask: called in the door's thread with what is sent to the rig
             stop: takes stops, beside and before all else
             token: what a client must show
         """
         self._host = host
         self._port = port
-        self._inside = str(inside)
+        self._inside = inside
         self._ask = ask
         self._stop = stop
         self.token = token
@@ -100,7 +100,7 @@ class AuthProxy:
         self._asked_rate = TokenBucket(_ASKED_PER_S, _ASKED_BURST)
         self._news: set[asyncio.Event] = set()
         self._lines = TabLimits(MOST_LINES)
-        self._loop = asyncio.new_event_loop()
+        self._loop = asyncio.SelectorEventLoop()  # Windows' usual one waits for no socket
         self.webcam, self._webcams = WebcamSocket(self._loop.time), TabLimits(2)
         self._over = asyncio.Event()
         self._opened = threading.Event()
@@ -157,8 +157,7 @@ class AuthProxy:
         await runner.setup()
         assert runner.server is not None
         self._connections = Connections(runner.server)
-        connector = aiohttp.UnixConnector(self._inside, limit=0)
-        async with aiohttp.ClientSession(connector=connector, auto_decompress=True) as client:
+        async with client_of(self._inside) as client:
             self._view = ViewProxy(client, self._connections, _HEADERS)
             try:
                 listener = await self._loop.create_server(

@@ -8,11 +8,11 @@ handled by a second thread, and a stop never waits behind it.
 import contextlib
 import json
 import queue
-import select
 import socket
 import threading
 from collections.abc import Callable
 
+from gazerig.drivers.message_link import MessageLink, wait_readable
 from gazerig.robot.model.commands import COMMANDS
 
 REQUEST = b"t"
@@ -67,7 +67,7 @@ class Inbox:
 
     def __init__(
         self,
-        link: socket.socket,
+        link: MessageLink,
         take: Callable[[bytes], None],
         lost: Callable[[], None],
         refuse: Callable[[bytes], None] | None = None,
@@ -92,10 +92,8 @@ class Inbox:
             thread.start()
 
     def _listen(self) -> None:
-        waiting = select.poll()
-        waiting.register(self._link, select.POLLIN)
         while True:
-            waiting.poll()
+            wait_readable(self._link)
             try:
                 message = self._link.recv(MESSAGE_BYTES)
             except BlockingIOError:

@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.passed_image import PassedImage, taken
@@ -27,8 +28,9 @@ from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
 from gazerig.robot.model.types import Snapshot
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
-TICKS, RIG, STATE, DETECTED = b"t", b"g", b"a", b"d"
-"""First bytes of the messages: a ``TickBatch``, a ``LiveRig``, a ``RunState``, a frame."""
+TICKS, RIG, STATE, DETECTED, PIXELS = b"t", b"g", b"a", b"d", b"i"
+"""First bytes of messages: a ``TickBatch``, a ``LiveRig``, a ``RunState``, a frame, one with
+its pixels."""
 
 _NEAREST_M = 0.05
 """What is nearer to the plane of the camera, or behind it, has no place in the image."""
@@ -135,6 +137,15 @@ def frame_message(
     return DETECTED + encode(head)
 
 
+def frame_with_pixels(
+    found: Detections, array: NDArray[Any], depth: bool, wants_depth: bool
+) -> bytes:
+    """Return a message like ``frame_message`` with the pixels in it: no memory goes along."""
+    image = PassedImage(-1, array.shape, array.dtype.str)
+    head = frame_message(found, image, depth, wants_depth)[1:]
+    return PIXELS + len(head).to_bytes(4, "little") + head + np.ascontiguousarray(array).tobytes()
+
+
 class LiveFeed:
     """Takes what the rig's side sends; returns what there is to show.
 
@@ -172,6 +183,9 @@ class LiveFeed:
             self._take_rig(LiveRig(*pickle.loads(body)))
         elif kind == DETECTED:
             self._take_frame(FrameHead(*decode_plain(body)), fd)
+        elif kind == PIXELS:
+            end = 4 + int.from_bytes(body[:4], "little")
+            self._take_frame(FrameHead(*decode_plain(body[4:end])), -1, body[end:])
         else:
             return False
         return True
@@ -255,7 +269,7 @@ class LiveFeed:
             row.gesture, row.parking,
         )  # fmt: skip
 
-    def _take_frame(self, head: FrameHead, fd: int) -> None:
+    def _take_frame(self, head: FrameHead, fd: int, pixels: bytes | None = None) -> None:
         found = Detections(
             head.captured_s,
             head.number,
@@ -265,8 +279,11 @@ class LiveFeed:
             tuple([MovingBlob(*blob) for blob in head.blobs]),
             lens=None if head.lens is None else _intrinsics(*head.lens),
         )
-        if fd >= 0 and head.shape is not None:
-            array = taken(PassedImage(fd, tuple(head.shape), head.dtype))
+        if head.shape is not None and (fd >= 0 or pixels is not None):
+            if pixels is None:
+                array = taken(PassedImage(fd, tuple(head.shape), head.dtype))
+            else:
+                array = np.frombuffer(pixels, np.dtype(head.dtype)).reshape(head.shape)
             found = replace(found, depth_m=array) if head.depth else replace(found, image=array)
         self._found, self._wants_depth, self._new_frame = found, head.wants_depth, True
 

@@ -1,10 +1,10 @@
 """The page's voice: what people do in their browsers goes to the rig from here."""
 
 import json
-import socket
 import threading
 from collections.abc import Callable, Mapping
 
+from gazerig.drivers.message_link import DONT_WAIT, MessageLink
 from gazerig.robot.dashboard.inbox import MESSAGE_BYTES, PICTURE, request_message
 from gazerig.robot.dashboard.token_bucket import TokenBucket
 from gazerig.robot.model.clock import Clock, RealClock
@@ -26,7 +26,7 @@ class Outbox:
     that leads the head now
     """
 
-    def __init__(self, feed: socket.socket, clock: Clock | None = None) -> None:
+    def __init__(self, feed: MessageLink, clock: Clock | None = None) -> None:
         self._feed = feed
         self._clock = clock if clock is not None else RealClock()
         self._rate = TokenBucket(_PER_S, _BURST)
@@ -48,7 +48,7 @@ class Outbox:
     def picture(self, jpeg: bytes) -> bool:
         """Hand on a picture of a browser's own camera; False where the rig does not take it."""
         try:
-            self._feed.send(PICTURE + jpeg, socket.MSG_DONTWAIT)
+            self._feed.send(PICTURE + jpeg, DONT_WAIT)
         except OSError:  # full, gone, or too long
             return False
         return True
@@ -61,7 +61,7 @@ class Outbox:
                 return False
         try:
             # A rig that takes nothing must not hold up the others who ask.
-            self._feed.send(message, socket.MSG_DONTWAIT)
+            self._feed.send(message, DONT_WAIT)
         except OSError:  # full, or gone: then the page ends by itself
             return False
         return True

@@ -1,9 +1,9 @@
 """What the rig sends to the page's process, received from the socket."""
 
 import json
-import socket
 from typing import NamedTuple
 
+from gazerig.drivers.message_link import DONT_WAIT, MessageLink
 from gazerig.drivers.passed_image import receive
 from gazerig.drivers.types import ImageArray
 from gazerig.robot.dashboard.inbox import MESSAGE_BYTES
@@ -35,7 +35,7 @@ class News(NamedTuple):
     image: ImageArray | None = None
 
 
-def drain(feed: socket.socket, live: LiveFeed) -> News:
+def drain(feed: MessageLink, live: LiveFeed) -> News:
     """Return everything that waits, without waiting for more.
 
     live: takes what a running rig sends
@@ -45,7 +45,7 @@ def drain(feed: socket.socket, live: LiveFeed) -> News:
     jpeg, ended = None, False
     while not ended:
         try:
-            message, fd = receive(feed, MESSAGE_BYTES, socket.MSG_DONTWAIT)
+            message, fd = receive(feed, MESSAGE_BYTES, DONT_WAIT)
         except BlockingIOError:
             break
         except ConnectionResetError:

@@ -9,10 +9,10 @@ by ``gazerig.robot.dashboard.auth_proxy``; what people do there goes to the rig 
 socket.
 """
 
+import contextlib
 import errno
 import logging
 import os
-import resource
 import select
 import shutil
 import signal
@@ -24,6 +24,8 @@ from typing import NamedTuple
 
 import viser
 
+from gazerig.drivers import message_link
+from gazerig.drivers.message_link import MessageLink
 from gazerig.robot.dashboard.auth_proxy import AuthProxy
 from gazerig.robot.dashboard.live_feed import LiveFeed
 from gazerig.robot.dashboard.outbox import DOOR, Outbox
@@ -104,8 +106,8 @@ def serve(
         OSError: see ``free_port``.
     """
     open_port = free_port(host, port)
-    server = open_server(folder / "page.sock")
-    door = AuthProxy(host, open_port, folder / "page.sock", outbox.hand_on, stop, token)
+    server, inside = open_server(folder / "page.sock")
+    door = AuthProxy(host, open_port, inside, outbox.hand_on, stop, token)
     outbox.name = lambda client: door.widgets.browser(client) or _browser(server, client)
     outbox.leads = door.browsers.led_by
     pointer = PointerToLook(
@@ -130,7 +132,7 @@ def _browser(server: viser.ViserServer, client: str) -> str:
     return browser_of(server, int(number)) if number.isdecimal() else ""
 
 
-def watch(feed: socket.socket, view: PageView, parent: int, served: Served) -> None:
+def watch(feed: MessageLink, view: PageView, parent: int, served: Served) -> None:
     """Draw what comes until the other side is gone.
 
     Raises:
@@ -162,9 +164,13 @@ def watch(feed: socket.socket, view: PageView, parent: int, served: Served) -> N
 
 def _limit_process() -> None:
     """Lower the priority of this process below the loop, and limit the cost of bad input."""
-    os.nice(_NICENESS)
-    least, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (max(least, min(_MOST_FILES, most)), most))
+    if hasattr(os, "nice"):  # Windows has priorities of another kind
+        os.nice(_NICENESS)
+    with contextlib.suppress(ImportError):  # nor does it bound the files of a process
+        import resource
+
+        least, most = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (max(least, min(_MOST_FILES, most)), most))
     # Standard error is kept in memory, and a client that sends rubbish fills it with complaints.
     logging.disable(logging.CRITICAL)
 
@@ -177,8 +183,9 @@ def main(arguments: list[str]) -> int:
     token = os.environ.pop(TOKEN_VARIABLE)
     # Not closed by hand: its end tells the other side to read this process's last words,
     # and those of an exception are written only after a ``with`` has been left.
-    feed = socket.socket(fileno=int(fd))
-    outbox, stop = Outbox(feed), StopSender(socket.socket(fileno=int(stop_fd)))
+    shown = os.environ.pop(message_link.TOKEN_VARIABLE, "")
+    feed = message_link.open_link(fd, shown)
+    outbox, stop = Outbox(feed), StopSender(message_link.open_link(stop_fd, shown))
     folder = Path(os.environ.pop(FOLDER_VARIABLE))
     try:
         return _show(feed, outbox, stop, (host, int(port)), token, folder, int(parent))
@@ -187,7 +194,7 @@ def main(arguments: list[str]) -> int:
 
 
 def _show(
-    feed: socket.socket,
+    feed: MessageLink,
     outbox: Outbox,
     stop: StopSender,
     address: tuple[str, int],

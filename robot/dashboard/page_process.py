@@ -12,7 +12,6 @@ import os
 import pickle
 import secrets
 import shutil
-import socket
 import subprocess
 import tempfile
 import threading
@@ -21,10 +20,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from math import nan
 from operator import attrgetter
+from typing import BinaryIO
 from urllib.parse import urlsplit
 
-from gazerig.drivers import child_process
-from gazerig.drivers.passed_image import send
+from gazerig.drivers import child_process, message_link
+from gazerig.drivers.message_link import MessageLink
+from gazerig.drivers.passed_image import CAN_PASS, send
 from gazerig.robot.dashboard.inbox import MESSAGE_BYTES, PICTURE, REQUEST, Inbox, parse_request
 from gazerig.robot.dashboard.stop_channel import StopListener
 from gazerig.robot.model.clock import RealClock
@@ -56,6 +57,7 @@ OnRequest = Callable[[dict[str, object]], str | None]
 
 _CLOSE_TIMEOUT_S = 2.0
 _LAST_LINES_BYTES = 4096
+_MOST_PIXELS = 1 << 23  # of a message, where images go along in it
 _MOST_WORDS = 20_000  # of one answer, in characters
 _MOST_OWED = 100  # answers to a page that takes none
 _AGAIN_AFTER_S = 0.5
@@ -123,7 +125,7 @@ class PageProcess:
         self._on_request = on_request
         self._token = secrets.token_urlsafe(_TOKEN_BYTES)
         self._once = secrets.token_urlsafe(_TOKEN_BYTES)
-        self._socket: socket.socket | None = None
+        self._socket: MessageLink | None = None
         self._process: subprocess.Popen[bytes] | None = None
         self._inbox: Inbox | None = None
         self._stops: StopListener | None = None
@@ -136,7 +138,7 @@ class PageProcess:
         self._mourned = self._welcomed = False
         self.started = 0
         self.gone = False
-        self._errors_fd = -1
+        self._errors: BinaryIO | None = None
         self._folder = ""
         self._url: str | None = None
         self._notices: deque[str] = deque()
@@ -153,31 +155,32 @@ class PageProcess:
 
     def _begin(self) -> None:
         """Start a process, and talk to it."""
-        ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        stops, their_stops = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        links = message_link.offer(2)
         # The page's own words are of interest only if it dies, and a pipe without a reader fills.
-        self._errors_fd = os.memfd_create("page_errors")
+        self._errors = _errors_file()
         self._folder = tempfile.mkdtemp(prefix="gazerig-page-")
-        with theirs, their_stops:
-            fds = theirs.fileno(), their_stops.fileno()
+        try:
             self._process = child_process.start(
                 "gazerig.robot.dashboard.page_main",
-                *self._arguments(*fds),
-                stderr=self._errors_fd,
-                pass_fds=fds,
+                *links.words,
+                *(str(os.getpid()), self._host, str(self._port)),
+                stderr=self._errors.fileno(),
+                pass_fds=links.fds,
                 variables={
                     TOKEN_VARIABLE: self._token,
                     ONCE_VARIABLE: self._once if self.started == 0 else "",
                     FOLDER_VARIABLE: self._folder,
+                    **links.variables,
                 },
             )
+        finally:
+            for theirs in links.theirs:
+                theirs.close()
+        ours, stops = links.ours
         self._began_s = self._clock.now_s()
         self.join(ours, stops)
 
-    def _arguments(self, fd: int, stop_fd: int) -> list[str]:
-        return [str(fd), str(stop_fd), str(os.getpid()), self._host, str(self._port)]
-
-    def join(self, link: socket.socket, stops: socket.socket | None = None) -> None:
+    def join(self, link: MessageLink, stops: MessageLink | None = None) -> None:
         """Talk over these from now on; ``open`` makes them with a process at the other ends.
 
         stops: for stops alone
@@ -221,7 +224,7 @@ class PageProcess:
         fd: goes along, unless it is -1; it stays the caller's
         """
         page = self._socket
-        if page is None or len(message) > MESSAGE_BYTES:
+        if page is None or len(message) > (MESSAGE_BYTES if CAN_PASS else _MOST_PIXELS):
             return False
         try:
             send(page, message, fd)
@@ -325,16 +328,10 @@ class PageProcess:
                 self._notices.append(f"the page cannot be started again: {error.strerror}")
 
     def _last_lines(self) -> str:
-        if self._errors_fd < 0:
+        if self._errors is None:
             return "it gave no reason"
-        text = os.pread(self._errors_fd, _LAST_LINES_BYTES, self._errors_from()).decode(
-            errors="replace"
-        )
-        lines = text.strip().splitlines()
+        lines = _end_of(self._errors).decode(errors="replace").strip().splitlines()
         return lines[-1].strip() if lines else "it gave no reason"
-
-    def _errors_from(self) -> int:
-        return max(0, os.fstat(self._errors_fd).st_size - _LAST_LINES_BYTES)
 
     def _hang_up(self) -> None:
         link, self._socket = self._socket, None
@@ -364,9 +361,26 @@ class PageProcess:
             self._process.kill()
             self._process.wait()
         self._process = None
-        os.close(self._errors_fd)
-        self._errors_fd = -1
+        if self._errors is not None:
+            self._errors.close()
+            self._errors = None
         shutil.rmtree(self._folder, ignore_errors=True)  # it may have been killed
+
+
+def _errors_file() -> BinaryIO:
+    """Return a file without a name: in memory, where the system has such files."""
+    if hasattr(os, "memfd_create"):
+        return os.fdopen(os.memfd_create("page_errors"), "w+b", buffering=0)
+    return tempfile.TemporaryFile(buffering=0)
+
+
+def _end_of(file: BinaryIO) -> bytes:
+    """Return the last bytes of a file that another process may still write to."""
+    start = max(0, os.fstat(file.fileno()).st_size - _LAST_LINES_BYTES)
+    if hasattr(os, "pread"):  # leaves alone where the other process writes
+        return os.pread(file.fileno(), _LAST_LINES_BYTES, start)
+    file.seek(start)
+    return file.read(_LAST_LINES_BYTES)
 
 
 def _code(process: subprocess.Popen[bytes]) -> int | None:

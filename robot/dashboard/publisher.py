@@ -8,7 +8,7 @@ import os
 from collections.abc import Callable, Iterable
 from math import inf
 
-from gazerig.drivers.passed_image import copied
+from gazerig.drivers.passed_image import CAN_PASS, copied
 from gazerig.drivers.types import Detections
 from gazerig.robot.control.tick_stream import TickBatch
 from gazerig.robot.dashboard.live_feed import (
@@ -16,6 +16,7 @@ from gazerig.robot.dashboard.live_feed import (
     LiveRig,
     RunState,
     frame_message,
+    frame_with_pixels,
     rig_message,
     state_message,
 )
@@ -137,6 +138,9 @@ class Publisher:
             self._page.show_detections(frame_message(found, None, False, self.depth))
             return
         self._images = True
+        if not CAN_PASS:
+            self._page.show_detections(frame_with_pixels(found, array, depth, self.depth))
+            return
         image = copied(array)
         try:
             self._page.show_detections(frame_message(found, image, depth, self.depth), image.fd)

@@ -10,6 +10,8 @@ import socket
 import threading
 from collections.abc import Callable, Mapping
 
+from gazerig.drivers.message_link import DONT_WAIT, MessageLink
+
 MESSAGE_BYTES = 4096
 _CLOSE_TIMEOUT_S = 2.0
 WORDS = 150  # of who and why, in characters
@@ -18,7 +20,7 @@ WORDS = 150  # of who and why, in characters
 class StopListener:
     """The rig's end: a thread that waits for stops and for nothing else."""
 
-    def __init__(self, link: socket.socket, take: Callable[[Mapping[str, object]], str]) -> None:
+    def __init__(self, link: MessageLink, take: Callable[[Mapping[str, object]], str]) -> None:
         """Listen at once.
 
         take: obeys {"do": "stop", "why": words, "who": words}; what it returns is answered
@@ -39,7 +41,7 @@ class StopListener:
             asked = json.loads(data)
             answer = [asked.pop("number"), self._take(asked)[:WORDS]]
             try:
-                self._link.send(json.dumps(answer).encode(), socket.MSG_DONTWAIT)
+                self._link.send(json.dumps(answer).encode(), DONT_WAIT)
             except OSError:  # no client waits any more; the stop is obeyed
                 continue
 

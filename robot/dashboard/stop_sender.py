@@ -3,8 +3,8 @@
 import asyncio
 import contextlib
 import json
-import socket
 
+from gazerig.drivers.message_link import MessageLink
 from gazerig.robot.dashboard.stop_channel import MESSAGE_BYTES, WORDS
 
 _ANSWERED_WITHIN_S = 1.0
@@ -13,7 +13,7 @@ _ANSWERED_WITHIN_S = 1.0
 class StopSender:
     """The page's end, of the event loop that serves the browsers."""
 
-    def __init__(self, link: socket.socket) -> None:
+    def __init__(self, link: MessageLink) -> None:
         link.setblocking(False)
         self._link = link
         self._number = 0

@@ -1,11 +1,13 @@
 """Hands on what browsers ask of viser, which draws the 3-D view in a frame of the page."""
 
 import asyncio
+import socket
 from collections.abc import Awaitable, Mapping
 from contextlib import suppress
 
 import aiohttp
 from aiohttp import web
+from aiohttp.abc import AbstractResolver, ResolveResult
 from yarl import URL
 
 from gazerig.robot.dashboard.browsers import TabLimits
@@ -14,7 +16,9 @@ from gazerig.robot.dashboard.token_bucket import TokenBucket
 from gazerig.robot.dashboard.viser_server import (
     BROWSER_HEADER,
     FROM_BROWSER_BYTES,
+    KEY_HEADER,
     TO_BROWSER_BYTES,
+    ViewAddress,
 )
 from gazerig.robot.dashboard.websocket_relay import carry_in, carry_out, until_one_ends
 
@@ -35,6 +39,43 @@ _FRAMED = {
     "X-Frame-Options": "SAMEORIGIN",
     "Content-Security-Policy": "frame-ancestors 'self'",
 }
+
+
+class _OnlyInside(AbstractResolver):
+    """Knows one address, whatever is asked for."""
+
+    def __init__(self, port: int) -> None:
+        self._port = port
+
+    async def resolve(
+        self, host: str, port: int = 0, family: socket.AddressFamily = socket.AF_INET
+    ) -> list[ResolveResult]:
+        """Return the server's address."""
+        return [
+            ResolveResult(
+                hostname=host,
+                host="127.0.0.1",
+                port=self._port,
+                family=socket.AF_INET,
+                proto=0,
+                flags=socket.AI_NUMERICHOST,
+            )
+        ]
+
+    async def close(self) -> None:
+        """Need nothing."""
+
+
+def client_of(inside: ViewAddress) -> aiohttp.ClientSession:
+    """Return what asks the server behind the door; called in the door's event loop."""
+    connector: aiohttp.BaseConnector
+    if inside.path is not None:
+        connector = aiohttp.UnixConnector(str(inside.path), limit=0)
+    else:
+        connector = aiohttp.TCPConnector(limit=0, resolver=_OnlyInside(inside.port))
+    return aiohttp.ClientSession(
+        connector=connector, auto_decompress=True, headers={KEY_HEADER: inside.key}
+    )
 
 
 class ViewProxy:

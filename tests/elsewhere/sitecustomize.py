@@ -24,11 +24,11 @@ MODULES = {"fcntl", "grp", "pty", "pwd", "resource", "smbus2", "syslog", "termio
 ATTRIBUTES: dict[Any, str] = {
     os: "MFD_CLOEXEC O_CLOEXEC O_NONBLOCK chown fork forkpty getegid geteuid getgid getuid killpg "
     "memfd_create mkfifo nice openpty pread pwrite sched_getaffinity sched_setaffinity "
-    "sched_setscheduler set_blocking setsid statvfs ttyname",
+    "sched_setscheduler set_blocking setsid ttyname",
     select: "epoll poll",
-    signal: "SIGALRM SIGCHLD SIGHUP SIGKILL SIGQUIT SIGTTIN SIGTTOU SIGUSR1 SIGUSR2 "
+    signal: "SIGALRM SIGCHLD SIGHUP SIGQUIT SIGTTIN SIGTTOU SIGUSR1 SIGUSR2 "
     "pthread_sigmask setitimer",
-    socket: "AF_UNIX SCM_RIGHTS SOCK_SEQPACKET SO_PEERCRED CMSG_LEN CMSG_SPACE",
+    socket: "AF_UNIX MSG_DONTWAIT SCM_RIGHTS SOCK_SEQPACKET SO_PEERCRED CMSG_LEN CMSG_SPACE",
 }
 _import, _select = builtins.__import__, select.select
 
