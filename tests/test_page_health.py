@@ -19,6 +19,7 @@ from gazerig.robot.dashboard.outbox import Outbox
 from gazerig.robot.dashboard.overlay_choices import OverlayChoices
 from gazerig.robot.dashboard.overlays import OverlayPanel
 from gazerig.robot.dashboard.page_feed import News
+from gazerig.robot.dashboard.page_process import REPLAY
 from gazerig.robot.dashboard.page_view import PageView
 from gazerig.robot.dashboard.panel import PanelView
 from gazerig.robot.dashboard.servo_health import (
@@ -374,3 +375,12 @@ def test_layers_are_seen_where_they_are_wanted(server: viser.ViserServer) -> Non
         OverlayChoices(eyes=True),
     )
     assert seen() == set()
+
+
+def test_a_recording_that_stands_still_is_no_silent_rig(server: viser.ViserServer) -> None:
+    button = Nobody()
+    view = PageView(server, Widgets(), Outbox(None), button.tell)  # type: ignore[arg-type]
+    state = {"at_s": 1.0, "duration_s": 9.0, "playing": False, "speed": 1.0, "sought_s": None}
+    view.show(News((snapshot(),), None, ended=False, others=((REPLAY, state),)))
+    view.silent()
+    assert button.reported["recording"] is True and "silent" not in button.reported

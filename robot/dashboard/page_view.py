@@ -186,7 +186,7 @@ class PageView:
     def silent(self) -> None:
         """Show that no data arrives any more, with the last that arrived."""
         self.show(News((), None, ended=False))
-        if self._drawn:
+        if self._drawn and self._replay is None:  # a recording may stand still
             self._panel.silent()
             self._tell({"stopped": "", "silent": True})
 
