@@ -88,7 +88,7 @@ def test_it_is_tuned_stopped_and_goes_on(run: Run) -> None:
         assert rig.set(RATE, 150.0) == (f"{RATE} = 150.0",)
         assert [change.key for change in rig.unsaved()] == [RATE]
         rig.look_at(1.0, 0.3, 0.0)
-        assert rig.status()["why"] == "a user chose this point"
+        assert rig.status()["why"].endswith("makes it look at 1 0.3 0")
         rig.stop("finger")
         assert rig.status()["stopped"] == "finger"
         with pytest.raises(RequestRejected, match="holds at least 2 s"):
