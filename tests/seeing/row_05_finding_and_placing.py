@@ -58,7 +58,7 @@ def hard_faces(params: FaceDetectorParams) -> float:
 
 
 def hard_portraits() -> Iterator[ImageArray]:
-    """Yield the portraits made hard to find in twelve ways."""
+    """Yield the portraits made hard to find in twelve ways, and frames of the film in three."""
     rng = np.random.default_rng(0)
     changes: tuple[Callable[[ImageArray], np.ndarray], ...] = (
         lambda image: image * 0.2,
@@ -79,6 +79,24 @@ def hard_portraits() -> Iterator[ImageArray]:
         small = cv2.resize(image, (320, image.shape[0] * 320 // image.shape[1]))
         for change in changes:
             yield noisy(change(small.astype(np.uint8)), 2.0, rng)
+    poor: tuple[Callable[[ImageArray], np.ndarray], ...] = (
+        lambda image: 0.15 * image,
+        lambda image: 0.15 * image + rng.normal(0.0, 6.0, image.shape),
+        lambda image: 255.0 - (255.0 - image) * 0.15,
+    )
+    for frame in _frames(carphone(), (5, 40, 75, 110)):
+        for change in poor:
+            yield noisy(np.clip(change(frame), 0, 255).astype(np.uint8), 2.0, rng)
+
+
+def _frames(film: Path, numbers: tuple[int, ...]) -> list[ImageArray]:
+    """Return frames of a film by their numbers."""
+    video, found = cv2.VideoCapture(str(film)), []
+    for number in range(numbers[-1] + 1):
+        _, frame = video.read()
+        if number in numbers:
+            found.append(np.asarray(frame, np.uint8))
+    return found
 
 
 def placing_error(frames: int) -> float:

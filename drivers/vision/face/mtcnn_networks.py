@@ -19,6 +19,7 @@ from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import ImageArray
 from gazerig.drivers.vision.face.crops import cut_square
 from gazerig.drivers.vision.face.model_file import read_known
+from gazerig.drivers.vision.face.preprocess import grey_range
 
 Floats32 = NDArray[np.float32]
 Floats = NDArray[np.float64]
@@ -43,9 +44,10 @@ _STEP_PX, _REFINE_PX, _PLACE_PX = 2, 24, 48
 _REFINE_AT = 0.7
 # Shared part of their union above which two boxes are the same face.
 _SAME = 0.5
-# A part whose bright pixels (all but this share are darker) are darker than this is made brighter
-# before a network sees it, up to what is wanted there but by no more than the gain.
-_BRIGHT_SHARE, _DARK_GREY, _WANTED_GREY, _MOST_GAIN = 0.99, 90.0, 180.0, 8.0
+# A part whose bright pixels are darker than this is made brighter before a network sees it, up to
+# what is wanted there but by no more than the gain; one that is bright and pale, by less contrast
+# than this, gets as much contrast.
+_DARK_GREY, _PALE_GREY, _WANTED_GREY, _MOST_GAIN = 90.0, 45.0, 180.0, 8.0
 _SAMPLED = 3
 
 
@@ -162,11 +164,14 @@ def _run(network: cv2.dnn.Net, name: str, frames: NDArray[np.uint8]) -> tuple[Fl
     """Run a network on (n, x, y, RGB) bytes and return its outputs in the order of _OUTPUTS."""
     blob = frames.astype(np.float32, order="C")
     for part in blob:
-        samples = np.sort(part[::_SAMPLED, ::_SAMPLED, 1], axis=None)
-        bright = float(samples[int(_BRIGHT_SHARE * len(samples))])
+        dark, bright = grey_range(part[::_SAMPLED, ::_SAMPLED, 1])
         if bright < _DARK_GREY:
             part *= min(_WANTED_GREY / max(bright, 1.0), _MOST_GAIN)
             np.minimum(part, 255.0, out=part)
+        elif bright - dark < _PALE_GREY:
+            part -= dark
+            part *= min(_WANTED_GREY / max(bright - dark, 1.0), _MOST_GAIN)
+            np.clip(part, 0.0, 255.0, out=part)
     blob -= 127.5
     blob *= 1.0 / 128.0
     network.setInput(blob)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from gazerig.drivers.camera.quiet_opencv import quiet_opencv
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import DetectedFace, ImageArray
+from gazerig.drivers.vision.face.preprocess import with_contrast
 
 _CURE = (
     "get face_detection_yunet_2023mar.onnx or a later one from the OpenCV zoo"
@@ -53,7 +54,7 @@ class YunetNetwork:
             return np.zeros((0, 15))
         self._net.setInputSize((width, height))
         self._net.setScoreThreshold(least)
-        rows = self._net.detect(np.ascontiguousarray(scaled))[1]
+        rows = self._net.detect(np.ascontiguousarray(with_contrast(scaled)))[1]
         if rows is None:  # OpenCV's word for no face
             return np.zeros((0, 15))
         found = np.asarray(rows, dtype=np.float64)

@@ -1,0 +1,40 @@
+"""Dark and pale images get contrast before a network sees them; others are left as they are."""
+
+import numpy as np
+import pytest
+from seeing.material import noisy, portrait
+from seeing.row_05_finding_and_placing import after_frames
+
+from gazerig.drivers.types import ImageArray
+from gazerig.drivers.vision.face.detector import face_detector
+from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.drivers.vision.face.preprocess import grey_range, with_contrast
+
+PHOTO = portrait("astronaut").image[40:240, 100:340]
+
+
+def paled(share: float) -> ImageArray:
+    """Return the photo as through fog, with the noise of a sensor."""
+    pale = (255.0 - (255.0 - PHOTO) * share).astype(np.uint8)
+    return noisy(pale, 2.0, np.random.default_rng(0))
+
+
+def test_an_image_with_contrast_is_left_as_it_is() -> None:
+    assert with_contrast(PHOTO) is PHOTO
+
+
+@pytest.mark.parametrize("image", [paled(0.15), (0.12 * PHOTO).astype(np.uint8)])
+def test_a_pale_or_dark_one_gets_the_contrast_of_others(image: ImageArray) -> None:
+    dark, bright = grey_range(with_contrast(image)[..., 1])
+    assert dark < 25.0 and 150.0 < bright < 256.0
+
+
+def test_a_wall_stays_a_wall() -> None:
+    """Noise is raised by no more than the gain, and smoothed."""
+    wall = noisy(np.full((120, 160, 3), 200, np.uint8), 2.0, np.random.default_rng(1))
+    assert with_contrast(wall).std() < 8.0 * wall.std()
+    assert after_frames(face_detector(FaceDetectorParams()), wall) == 0
+
+
+def test_a_pale_face_is_found() -> None:
+    assert after_frames(face_detector(FaceDetectorParams()), paled(0.15)) == 1
