@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -167,14 +166,19 @@ def test_measures_follow_the_rig() -> None:
         assert -1e3 * found.pivot_m[2] == pytest.approx(rig.geometry.eyes_above_mm, abs=0.1)
 
 
-def test_a_glossy_eye_is_written_as_one(tmp_path: Path) -> None:
+def test_only_the_eyes_are_lit_by_the_browser() -> None:
     tree = _tree(glb(head_mesh.eye(), EYE))
-    assert "KHR_materials_clearcoat" in tree["materials"][0]["extensions"]
+    (material,) = tree["materials"]
+    assert "KHR_materials_unlit" not in material["extensions"]
+    assert material["pbrMetallicRoughness"]["roughnessFactor"] < 0.3
     assert tree["meshes"][0]["primitives"][0]["material"] == 0
     assert {"COLOR_0", "NORMAL", "POSITION"} <= set(
         tree["meshes"][0]["primitives"][0]["attributes"]
     )
     assert "alphaMode" not in tree["materials"][0]
+    brow = _tree(glb(head_mesh.brow(), SKIN))
+    assert "KHR_materials_unlit" in brow["materials"][0]["extensions"]
+    assert "NORMAL" not in brow["meshes"][0]["primitives"][0]["attributes"]
     plain: Painted = head_mesh.glow((0, 0, 0, 90))
     assert _tree(glb(plain, SKIN))["materials"][0]["alphaMode"] == "BLEND"
 

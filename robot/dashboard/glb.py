@@ -1,88 +1,146 @@
-"""Shapes with colours by vertex and a surface finish, as binary glTF that browsers draw."""
+"""Shapes with colours by vertex and a surface finish, as binary glTF that browsers draw.
+
+All but the eyes are lit here, once, as under the lights of the scene (lights.py): a browser without
+a graphics card then draws twice as many pictures a second as when it lights every pixel.
+"""
 
 from functools import partial
+from math import pi
 from typing import Any, NamedTuple
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 from trimesh.exchange.gltf import export_glb
 
-from gazerig.gaze.types import Floats
-from gazerig.robot.model.paint import Painted
+from gazerig.gaze.types import Floats, Vec3
+from gazerig.robot.model.paint import Colour, Painted
 
-Bytes = NDArray[np.uint8]
+
+class Light(NamedTuple):
+    """A light: where it comes from, its colour, and how strong it is."""
+
+    position: Vec3
+    colour: Colour
+    intensity: float
+
+
+SKY, GROUND, SKY_INTENSITY = (255, 250, 244), (186, 170, 166), 2.1
+"""Light from all round: colours from above and from below."""
+# The key light comes from above and the head's left, where a window would be; then there is a
+# fill from the right, and a light from behind.
+LIGHTS = (
+    Light((0.9, 0.75, 1.25), (255, 244, 228), 2.6),
+    Light((0.8, -1.2, 0.25), (214, 228, 255), 0.9),
+    Light((-1.2, -0.5, 1.0), (235, 242, 255), 1.4),
+)
+_TO_EYE = np.array((0.88, -0.47, 0.07))
+"""Where the scene is seen from at first: shine is where it would be from there."""
 
 
 class Finish(NamedTuple):
     """How a surface answers light.
 
-    roughness: 0 mirrors, 1 is chalk; gloss: share of a clear coat over it, which shows lights as
-    small bright spots; lit: False shows the colours as they are
+    shine: how bright its reflection of a light is; tight: how small that is, an exponent
+    roughness: below 1 the browser lights every pixel, and lights are seen in the surface the
+        smaller the less it is; 1: lit here
+    lit: False shows the colours as they are
     """
 
-    roughness: float = 0.65
-    gloss: float = 0.0
-    gloss_roughness: float = 0.12
+    shine: float = 0.0
+    tight: float = 12.0
+    roughness: float = 1.0
     lit: bool = True
 
 
-SKIN = Finish(0.62)
-CLOTH = Finish(0.9)
-PLASTIC = Finish(0.45)
-EYE = Finish(0.35, 1.0, 0.1)
+SKIN = Finish(0.06, 9.0)
+CLOTH = Finish()
+PLASTIC = Finish(0.22, 26.0)
+EYE = Finish(roughness=0.17)
 FLAT = Finish(lit=False)
 
 
-def glb(painted: Painted, finish: Finish) -> bytes:
-    """Return a painted mesh as a binary glTF file; colours with a fourth number are translucent."""
+def glb(painted: Painted, finish: Finish, pose: Floats | None = None) -> bytes:
+    """Return a painted mesh as a binary glTF file.
+
+    Args:
+        painted: the mesh; colours with a fourth number are translucent.
+        finish: how it answers light.
+        pose: rotation (3, 3) of the mesh in the scene in which it is lit; None: as it is.
+    """
     mesh, colours, normals = painted
-    rgba = np.full((len(mesh.vertices), 4), 255.0)
-    rgba[:, : colours.shape[1]] = colours
+    rgba = np.ones((len(mesh.vertices), 4))
+    rgba[:, : colours.shape[1]] = np.clip(colours / 255.0, 0.0, 1.0)
+    rgba[:, :3] = _linear(rgba[:, :3])
+    gain = 1.0
+    by_browser = finish.roughness < 1.0
+    if finish.lit and not by_browser and normals is not None:
+        rgba[:, :3] = lit(rgba[:, :3], normals if pose is None else normals @ pose.T, finish)
+        gain = float(rgba[:, :3].max())
+        rgba[:, :3] /= gain
     shape = trimesh.Trimesh(
         mesh.vertices,
         mesh.faces,
         vertex_normals=normals,
-        vertex_colors=_linear(rgba),
+        vertex_colors=np.rint(255.0 * rgba).astype(np.uint8),
         process=False,
     )
-    see_through = colours.shape[1] == 4
+    material = _material(finish, by_browser, gain, see_through=colours.shape[1] == 4)
     data: Any = export_glb(  # type: ignore[no-untyped-call]
-        shape,
-        include_normals=True,
-        tree_postprocessor=partial(_finish, finish=finish, see_through=see_through),
+        shape, include_normals=by_browser, tree_postprocessor=partial(_finish, material=material)
     )
     return bytes(data)
 
 
-def _linear(rgba: Floats) -> Bytes:
+def lit(colours: Floats, normals: Floats, finish: Finish) -> Floats:
+    """Return what surfaces send to the eye under the scene's lights.
+
+    Args:
+        colours: (n, 3), what they reflect, 0..1 in proportion to light.
+        normals: (n, 3) out of them.
+        finish: how they shine.
+
+    Returns:
+        (n, 3); may exceed 1.
+    """
+    up = 0.5 + 0.5 * normals[:, 2:]
+    around = up * _of(SKY) + (1.0 - up) * _of(GROUND)
+    found = colours * around * (SKY_INTENSITY / pi)
+    for light in LIGHTS:
+        way = np.array(light.position) / np.linalg.norm(light.position)
+        facing = np.clip(normals @ way, 0.0, None)[:, None]
+        half = (way + _TO_EYE) / np.linalg.norm(way + _TO_EYE)
+        gleam = finish.shine * np.clip(normals @ half, 0.0, 1.0)[:, None] ** finish.tight
+        found = found + light.intensity * _of(light.colour) * (colours * facing / pi + gleam)
+    return np.asarray(found)
+
+
+def _of(colour: Colour) -> Floats:
+    return _linear(np.array(colour) / 255.0)
+
+
+def _linear(share: Floats) -> Floats:
     """Return colours as glTF wants those of vertices: in proportion to light, not as on screens."""
-    share = np.clip(rgba / 255.0, 0.0, 1.0)
-    share[:, :3] = np.where(
-        share[:, :3] <= 0.04045, share[:, :3] / 12.92, ((share[:, :3] + 0.055) / 1.055) ** 2.4
-    )
-    return np.asarray(np.rint(255.0 * share), np.uint8)
+    return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
 
 
-def _finish(tree: dict[str, Any], finish: Finish, see_through: bool) -> None:
-    """Write the material into a glTF tree: trimesh itself knows no clear coat."""
+def _material(finish: Finish, by_browser: bool, gain: float, see_through: bool) -> dict[str, Any]:
+    """Return a glTF material; trimesh itself does not know unlit surfaces."""
+    plain = {"metallicFactor": 0.0, "roughnessFactor": finish.roughness}
     material: dict[str, Any] = {
-        "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": finish.roughness},
-        "doubleSided": True,
+        "pbrMetallicRoughness": plain | {"baseColorFactor": [gain, gain, gain, 1.0]},
+        "doubleSided": not see_through,
+        "extensions": {"KHR_materials_unlit": {}},
     }
-    extensions: dict[str, Any] = {}
-    if finish.gloss > 0.0:
-        extensions["KHR_materials_clearcoat"] = {
-            "clearcoatFactor": finish.gloss,
-            "clearcoatRoughnessFactor": finish.gloss_roughness,
-        }
-    if not finish.lit:
-        extensions["KHR_materials_unlit"] = {}
-    if extensions:
-        material["extensions"] = extensions
-        tree["extensionsUsed"] = sorted({*tree.get("extensionsUsed", ()), *extensions})
+    if by_browser:
+        material["extensions"] = {}
     if see_through:
         material["alphaMode"] = "BLEND"
+    return material
+
+
+def _finish(tree: dict[str, Any], material: dict[str, Any]) -> None:
+    """Write a material into a glTF tree."""
+    tree["extensionsUsed"] = sorted({*tree.get("extensionsUsed", ()), *material["extensions"]})
     tree["materials"] = [material]
     for mesh in tree["meshes"]:
         for primitive in mesh["primitives"]:

@@ -72,7 +72,7 @@ def _used(
 
 def cap() -> Painted:
     """Return the cap over the back of the head, in distances between the eyes."""
-    points, normals = HEAD.beyond(_CAP_NORMAL, _CAP_LINE, 40, 84, _CAP_OUT)
+    points, normals = HEAD.beyond(_CAP_NORMAL, _CAP_LINE, 24, 60, _CAP_OUT)
     # Its edge is rounded down to the skin and a little below it.
     rim = [points[0] - out * normals[0] for out in (0.10, 0.03, 0.012)]
     lifted = np.concatenate((np.stack(rim), points[1:]))
@@ -110,15 +110,15 @@ def eye() -> Painted:
     """Return an eyeball of radius 1 that looks along x: white, iris, pupil under the cornea."""
     angles = np.concatenate(
         (
-            np.linspace(pi, radians(60.0), 12, endpoint=False),
-            np.linspace(radians(60.0), radians(34.0), 9, endpoint=False),
-            np.linspace(radians(34.0), 0.0, 44),
+            np.linspace(radians(130.0), radians(60.0), 7, endpoint=False),
+            np.linspace(radians(60.0), radians(34.0), 6, endpoint=False),
+            np.linspace(radians(34.0), 0.0, 32),
         )
     )
     inside = np.clip(1.0 - (angles / LIMBUS_RAD) ** 2, 0.0, 1.0)
     radius = 1.0 + _CORNEA * inside**1.25
     profile = list(zip(radius * np.sin(angles), radius * np.cos(angles), strict=True))
-    columns = 96
+    columns = 64
     dome = turned([(r, h) for r, h in profile], around=columns)
     mesh = Mesh(dome.vertices[:, (2, 0, 1)], dome.faces)
     colours = np.repeat(_eye_colours(angles, columns).reshape(-1, 3), 1, axis=0)
@@ -152,9 +152,9 @@ def eyelid(upper: bool) -> Painted:
     The edge is dark and has a lip, as lashes do.
     """
     side = 1.0 if upper else -1.0
-    sweep = np.concatenate(((0.0, 0.0), np.radians((1.6, 3.2, 4.0)), np.linspace(0.09, 2.1, 22)))
-    reach = np.concatenate(((0.955, 1.028 if upper else 1.01), (1.022, 1.006, 1.0), np.ones(22)))
-    across = np.linspace(pi, 0.0, 40)
+    sweep = np.concatenate(((0.0, 0.0), np.radians((1.6, 3.2, 4.0)), np.linspace(0.09, 2.1, 14)))
+    reach = np.concatenate(((0.955, 1.028 if upper else 1.01), (1.022, 1.006, 1.0), np.ones(14)))
+    across = np.linspace(pi, 0.0, 30)
     ring = reach[:, None] * np.sin(across)
     points = np.stack(
         (
@@ -165,7 +165,7 @@ def eyelid(upper: bool) -> Painted:
         axis=-1,
     )
     mesh = grid(points if upper else points[:, ::-1], closed=False)
-    lash = np.array((1.0, 1.0, 1.0, 0.85, 0.25, *np.zeros(22))) * (1.0 if upper else 0.62)
+    lash = np.array((1.0, 1.0, 1.0, 0.85, 0.25, *np.zeros(14))) * (1.0 if upper else 0.62)
     colours = np.broadcast_to(np.array(LID, float), points.shape)
     fold = np.exp(-(((sweep - 0.62) / 0.10) ** 2)) * 0.30 + np.clip(sweep - 0.9, 0.0, 0.2)
     colours = mix(colours, _SHADE, np.broadcast_to(fold[:, None], points.shape[:2]))

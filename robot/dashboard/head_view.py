@@ -12,7 +12,7 @@ import viser
 from viser import transforms
 
 from gazerig.gaze.angles import add, norm, rotate, rotate_back, sub
-from gazerig.gaze.types import Vec3
+from gazerig.gaze.types import Floats, Vec3
 from gazerig.robot.dashboard import head_mesh
 from gazerig.robot.dashboard.glb import CLOTH, EYE, FLAT, PLASTIC, SKIN, Finish, glb
 from gazerig.robot.dashboard.scene_node import Turn, along, put, turn_to, turned_up, upright_along
@@ -64,7 +64,7 @@ class HeadView:
         self._scene = scene
         self._joints: tuple[str, ...] = ()
         self.measures = HeadMeasures()
-        self._shade = self._add("/shade", head_mesh.glow((20, 24, 34, 120)), FLAT)
+        self._shade = self._add("/shade", head_mesh.glow((20, 24, 34, 140), 10), FLAT)
         self._shade.position = (0.0, 0.0, FLOOR_M + 0.001)
         self._bust = self._add("/bust", head_mesh.bust(), CLOTH)
         self._neck = self._add("/neck", head_mesh.neck(), PLASTIC)
@@ -82,15 +82,19 @@ class HeadView:
         self._necked = True
         self._fit(self.measures)
 
-    def _add(self, name: str, painted: Painted, finish: Finish) -> viser.GlbHandle:
+    def _add(
+        self, name: str, painted: Painted, finish: Finish, pose: Floats | None = None
+    ) -> viser.GlbHandle:
         return self._scene.add_glb(
-            name, glb(painted, finish), cast_shadow=False, receive_shadow=False
+            name, glb(painted, finish, pose), cast_shadow=False, receive_shadow=False
         )
 
     def _add_ear(self, side: str) -> viser.GlbHandle:
-        ear = self._add(f"/head/ear_{side}", head_mesh.ear(), PLASTIC)
-        turn = radians(-84.0) if side == "left" else radians(84.0)
-        ear.wxyz = transforms.SO3.from_x_radians(turn).wxyz
+        turn = transforms.SO3.from_x_radians(radians(-84.0 if side == "left" else 84.0))
+        ear = self._add(
+            f"/head/ear_{side}", head_mesh.ear(), PLASTIC, np.asarray(turn.as_matrix(), np.float64)
+        )
+        ear.wxyz = turn.wxyz
         return ear
 
     def _add_eye(self, side: str) -> _EyeModel:
@@ -100,9 +104,15 @@ class HeadView:
             f"/head/sight_{side}", _AHEAD, _SIGHT["fixate"], thickness=2.0, thickness_units="screen"
         )
         sight.visible = False
+        # Lit as they stand most of the time; the lower ones a little higher, or they look tired.
         upper, lower = (
-            self._add(f"/head/lids_{side}/{part}", head_mesh.eyelid(part == "upper"), SKIN)
-            for part in ("upper", "lower")
+            self._add(
+                f"/head/lids_{side}/{part}",
+                head_mesh.eyelid(part == "upper"),
+                SKIN,
+                np.asarray(transforms.SO3(np.array(turn)).as_matrix(), np.float64),
+            )
+            for part, turn in (("upper", lid_turn(0.7)), ("lower", turned_up(radians(12.0))))
         )
         brow = head_mesh.brow()
         brow = brow if side == "left" else mirrored(brow)
@@ -124,7 +134,7 @@ class HeadView:
             eye.ball.scale = measures.eye_radius_m
             eye.upper.scale = UPPER_LID * measures.eye_radius_m
             eye.lower.scale = LOWER_LID * measures.eye_radius_m
-        self._shade.scale = 5.2 * unit
+        self._shade.scale = 4.4 * unit
 
     def show(self, snapshot: Snapshot, *, sight: bool = False) -> None:
         """Move everything to where it was measured; ``sight``: with the lines of sight."""

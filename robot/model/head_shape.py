@@ -19,7 +19,7 @@ EYE_RADIUS = 0.335
 """Radius of an eyeball, in distances between the eyes."""
 TOP, CHIN = 1.80, -1.62
 """Height of the head's top and of the chin, in distances between the eyes."""
-_ROWS, _COLUMNS = 112, 116
+_ROWS, _COLUMNS = 84, 84
 _SOLIDS: tuple[tuple[Field, float], ...] = (
     (ellipsoid((-1.10, 0.0, 0.50), (1.30, 1.20, 1.30)), 0.1),  # skull
     (ellipsoid((-0.66, 0.0, -0.36), (0.84, 1.00, 1.00)), 0.45),  # face
