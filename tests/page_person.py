@@ -180,8 +180,14 @@ class Person:
     def open(self, drawer: str) -> None:
         """Open a drawer by its tab, unless it is open."""
         tab = saying(drawer, "[role=tab]")
-        if self.run(f"{tab}.getAttribute('aria-selected')") != "true":
-            self.click(tab)
+
+        def is_open() -> bool:  # a tab that is clicked before its script has come stays shut
+            if self.run(f"{tab}?.getAttribute('aria-selected')") == "true":
+                return True
+            self.clicked(tab)
+            return False
+
+        wait_for(is_open, f"the drawer {drawer}")
 
     def press(self, key: str, code: str, number: int) -> None:
         text = {"text": key} if len(key) == 1 else {}  # others write nothing

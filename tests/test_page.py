@@ -19,6 +19,7 @@ import cv2
 import numpy as np
 from browser import Browser, browsing
 from desk import GAZE_JOINTS
+from page_person import Person
 from present import present
 from shown_page import running_page, wait_for
 from six_joints import of_six
@@ -180,7 +181,7 @@ def test_page_shows_a_head_that_turns() -> None:
         browser.go(url)
         wait_for(lambda: reads("STOP"), "the page")
         browser.run(f"document.querySelector('#view').src = '/view/?{CLOSE_TO_THE_RIG}'")
-        browser.run("document.querySelector('#tab-watch').click()")
+        Person(browser).open("Watch")
         wait_for(lambda: reads("nothing has come from the rig"), "the silence")
         shown = "document.querySelector('[data-panel=camera] img').naturalWidth"
         camera = browser.ask("Runtime.evaluate", expression=shown)["result"]
@@ -190,7 +191,7 @@ def test_page_shows_a_head_that_turns() -> None:
         with feeding(page, lambda _: there):
             wait_for(eyes_elsewhere, "the turn of the head")
             wait_for(lambda: reads("face 3: left eye", "pulls with", "fixate"), "the words")
-            browser.run("document.querySelector('#tab-health').click()")
+            Person(browser).open("Health")
             wait_for(lambda: reads("bus:", "guard: ok"), "the health")
         # Six servos that tell nothing: a person is told so before the torque comes on again.
         limp = replace(of_six(there), stopped="a test")
