@@ -161,6 +161,11 @@ class Listener:
         self._end = end
         self._token = token
 
+    @property
+    def waits_for_token(self) -> bool:
+        """Return whether ``admitted`` waits for the caller to show a token."""
+        return bool(self._token)
+
     def accept(self) -> socket.socket:
         """Wait for a caller, who is not yet known.
 

@@ -93,11 +93,13 @@ class RemoteServer:
                 end = listener.accept()
             except OSError:  # closed
                 return
-            if not self._start(self._admit, end, listener):
+            if not listener.waits_for_token:  # in the order in which they come
+                self._admit(end, listener)
+            elif not self._start(self._admit, end, listener):
                 end.close()
 
     def _admit(self, end: socket.socket, listener: Listener) -> None:
-        """Answer a program if it is one of this user."""
+        """Let a program in if it is one of this user."""
         try:
             caller = listener.admitted(end)
         except OSError:  # gone already
@@ -116,7 +118,8 @@ class RemoteServer:
                 del self._wires[quietest]
                 quietest.close()
             self._wires[wire] = None
-        self._serve(wire, f"process {caller.pid}" if caller.pid else "another program")
+        peer = f"process {caller.pid}" if caller.pid else "another program"
+        self._start(self._serve, wire, peer)
 
     def _serve(self, wire: Wire, peer: str) -> None:
         """Answer one program until it hangs up or cannot be understood any more."""
