@@ -16,7 +16,6 @@ from gazerig.robot.cli.browser import desktop_here, open_page
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
 from gazerig.robot.control.joint_faults import JointFault, named
-from gazerig.robot.control.loop_timing import BUSY_SHARE
 
 app = typer.Typer()
 
@@ -93,6 +92,8 @@ def had_faults(figures: Mapping[str, Any], say: Callable[[str], None]) -> bool:
             alike.setdefault(key, []).append(joint)
     held = [str(JointFault(named(joints), *key)) for key, joints in alike.items()]
     if held:
+        from gazerig.robot.control.loop_timing import BUSY_SHARE  # with NumPy
+
         late, ticks = figures.get("overruns", 0), figures.get("ticks", 0)
         share = late / (late + ticks) if late else 0.0
         busy = f"; the computer was too busy: {share:.0%} of ticks came late"
