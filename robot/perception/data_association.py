@@ -26,11 +26,13 @@ Were every pair preferred, somebody new would push others on, each to the place 
 # Above this, costs approach that limit more and more slowly.
 _NEARLY_UNPAIRED = 25.0
 _SLOWLY = _NEARLY_UNPAIRED * (UNPAIRED - _NEARLY_UNPAIRED)
-# What people do that no filter expects, a lunge, a turn about or a jump of the detector, happens
-# in one frame of five; as a cost: minus twice the logarithm.
-_SURPRISE = 3.0
+# What people do that no filter expects, a lunge or a jump of the detector, happens in one frame of
+# twenty; as a cost: minus twice the logarithm. Where a distance is not measured it happens in one
+# of five.
+_SURPRISE, _SURPRISE_BY_SIZE = 6.0, 3.0
 # Who was seen in the last frame is seen again in nineteen frames of twenty, who was not comes back
-# in one of twenty: so much more it costs to take somebody for the latter.
+# in one of twenty: so much more it costs to take somebody for the latter, where no distance was
+# measured that tells them apart.
 _UNSEEN = 6.0
 # Of two about as far away each may hide the other.
 _NEARER = 1.1
@@ -130,10 +132,11 @@ def _all_pairs(
     surprise = ratio * (wide_m / par.gate_sigma) ** 2
     across_sum, along_sum = across_sum + surprise, along_sum + surprise
     far = aside / across_sum + deep / along_sum
-    surprising = far + np.log(across_sum * across_sum * along_sum / exact) + _SURPRISE
+    surprising = far + np.log(across_sum * across_sum * along_sum / exact)
+    surprising += np.where(d[9] > 0.0, _SURPRISE_BY_SIZE, _SURPRISE)
     hidden = _hidden(t[:, :, 0])[:, None] & ((t[1] != d[1]) | (t[1] == NO_MARK))
     costs = np.where(hidden, expected, np.minimum(expected, surprising)) + _OTHER_MARK * other
-    costs += _UNSEEN * ((t[10] > 0.0) | (t[11] == 0.0))
+    costs += _UNSEEN * (d[9] * ((t[10] > 0.0) | (t[11] == 0.0)))
     unlikely = hidden & (costs > UNPAIRED)
     costs = np.minimum(costs, UNPAIRED - _SLOWLY / np.maximum(costs, _NEARLY_UNPAIRED))
     reach = wide_m + t[10]
@@ -194,11 +197,12 @@ def _pair_cost(k: int, found: DetectionRow, tracks: Sequence[TrackRow], par: Tra
     cost = aside / across_sum + deep / along_sum + log(across_sum * across_sum * along_sum / exact)
     hidden = (mark != its_mark or mark == NO_MARK) and _is_hidden(k, tracks)
     if not hidden:
-        surprising = far + log(most_across * most_across * most_along / exact) + _SURPRISE
+        surprising = far + log(most_across * most_across * most_along / exact)
+        surprising += _SURPRISE_BY_SIZE if sized else _SURPRISE
         cost = min(cost, surprising)
     if other:
         cost += _OTHER_MARK
-    if moved_m > 0.0 or not in_sight:
+    if sized and (moved_m > 0.0 or not in_sight):
         cost += _UNSEEN
     if hidden and cost > UNPAIRED:
         return FORBIDDEN

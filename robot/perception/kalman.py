@@ -116,7 +116,13 @@ class TrackFilter:
         """Use another process noise; position and velocity stay."""
         self._noise = noise
 
-    def predict(self, dt_s: float, seen: bool = True, range_known: bool = True) -> None:
+    def predict(
+        self,
+        dt_s: float,
+        seen: bool = True,
+        range_known: bool = True,
+        range_measured: bool = False,
+    ) -> None:
         """Go on by a time; what is not seen slows down.
 
         Args:
@@ -124,10 +130,11 @@ class TrackFilter:
             seen: whether it was seen in the last frame.
             range_known: False where its range is only assumed: what crosses the view then
                 stays as far away, as neither a straight line nor its speed is known.
+            range_measured: True where it was measured by the camera, and not by a size.
         """
         if dt_s <= 0.0:
             return
-        if not seen and self._unseen_s >= _APPROACHES_S:
+        if not (seen or range_measured) and self._unseen_s >= _APPROACHES_S:
             self._stay_as_far()
         v = self.v_m_s
         if range_known:
