@@ -31,7 +31,7 @@ _LIMBUS: Colour = (8, 34, 82)
 _IRIS: Colour = (24, 122, 226)
 _IRIS_INNER: Colour = (150, 216, 250)
 LIMBUS_RAD, _PUPIL_RAD = radians(31.0), radians(12.5)
-_CORNEA = 0.09
+_CORNEA = 0.05
 """How far the cornea stands out of the eyeball, in its radii."""
 _CAP_NORMAL, _CAP_LINE, _CAP_OUT = (-1.0, 0.0, 0.55), 0.70, 0.035
 """The cap begins at this plane, and stands so far off the skin; in distances between the eyes."""

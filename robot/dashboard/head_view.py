@@ -36,7 +36,7 @@ _AHEAD = np.array((((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)),))
 _SHUT_RAD = radians(-24.0)
 _OPEN_RAD = radians(48.0)
 _LOWER_OPEN_RAD = radians(-46.0)
-UPPER_LID, LOWER_LID = 1.075, 1.06
+UPPER_LID, LOWER_LID = 1.085, 1.07
 """Radii of the lids, in those of the eyeball."""
 _NECK_RADIUS, _BUST, _BELOW_CHIN = 0.42, 1.45, 0.25  # in distances between the eyes
 LEAST_M = 0.01
