@@ -1,7 +1,7 @@
 """Shapes with colours by vertex and a surface finish, as binary glTF that browsers draw.
 
-All but the eyes are lit here, once, as under the lights of the scene (lights.py): a browser without
-a graphics card then draws twice as many pictures a second as when it lights every pixel.
+All but the eyes are lit here, once, as under the lights of the scene (lights.py), so that a browser
+without a graphics card need not light every pixel of every picture.
 """
 
 from functools import partial
