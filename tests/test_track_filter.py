@@ -105,9 +105,6 @@ class Textbook:
         self.r, self.v, self.P = grown * self.r, grown * self.v, grown**2 * self.P
 
     def predict(self, dt_s: float, seen: bool, quiet: float) -> None:
-        if not seen and self.unseen_s >= 0.1 and self.v[2] ** 2 < 4.0 * self.P[5, 5]:
-            self.v[2] = 0.0
-            self.P[5, :] = self.P[:, 5] = 0.0
         kept = 1.0 if seen else np.exp(-dt_s)
         self.moved(dt_s * self.v)
         F = np.block([[np.eye(3), dt_s * np.eye(3)], [np.zeros((3, 3)), kept * np.eye(3)]])

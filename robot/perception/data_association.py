@@ -27,13 +27,8 @@ Were every pair preferred, somebody new would push others on, each to the place 
 _NEARLY_UNPAIRED = 25.0
 _SLOWLY = _NEARLY_UNPAIRED * (UNPAIRED - _NEARLY_UNPAIRED)
 # What people do that no filter expects, a lunge or a jump of the detector, happens in one frame of
-# twenty; as a cost: minus twice the logarithm. Where a distance is not measured it happens in one
-# of five.
-_SURPRISE, _SURPRISE_BY_SIZE = 6.0, 3.0
-# Who was seen in the last frame is seen again in nineteen frames of twenty, who was not comes back
-# in one of twenty: so much more it costs to take somebody for the latter, where no distance was
-# measured that tells them apart.
-_UNSEEN = 6.0
+# twenty; as a cost: minus twice the logarithm.
+_SURPRISE = 6.0
 # Of two about as far away each may hide the other.
 _NEARER = 1.1
 # Nothing is measured better than this.
@@ -132,11 +127,9 @@ def _all_pairs(
     surprise = ratio * (wide_m / par.gate_sigma) ** 2
     across_sum, along_sum = across_sum + surprise, along_sum + surprise
     far = aside / across_sum + deep / along_sum
-    surprising = far + np.log(across_sum * across_sum * along_sum / exact)
-    surprising += np.where(d[9] > 0.0, _SURPRISE_BY_SIZE, _SURPRISE)
+    surprising = far + np.log(across_sum * across_sum * along_sum / exact) + _SURPRISE
     hidden = _hidden(t[:, :, 0])[:, None] & ((t[1] != d[1]) | (t[1] == NO_MARK))
     costs = np.where(hidden, expected, np.minimum(expected, surprising)) + _OTHER_MARK * other
-    costs += _UNSEEN * (d[9] * ((t[10] > 0.0) | (t[11] == 0.0)))
     unlikely = hidden & (costs > UNPAIRED)
     costs = np.minimum(costs, UNPAIRED - _SLOWLY / np.maximum(costs, _NEARLY_UNPAIRED))
     reach = wide_m + t[10]
@@ -166,7 +159,7 @@ def _hidden(t: Floats) -> NDArray[np.bool_]:
 
 def _pair_cost(k: int, found: DetectionRow, tracks: Sequence[TrackRow], par: TrackParams) -> float:
     """Return what ``_all_pairs`` does, for track k and one detection."""
-    kind, mark, x, y, z, range_m, across_m2, along_m2, radius_m, size, moved_m, in_sight = tracks[k]
+    kind, mark, x, y, z, range_m, across_m2, along_m2, radius_m, size, moved_m, _ = tracks[k]
     its_kind, its_mark, its_x, its_y, its_z, its_m, across_sd, along_sd, its_radius_m, sized = found
     if kind != its_kind:
         return FORBIDDEN
@@ -197,13 +190,10 @@ def _pair_cost(k: int, found: DetectionRow, tracks: Sequence[TrackRow], par: Tra
     cost = aside / across_sum + deep / along_sum + log(across_sum * across_sum * along_sum / exact)
     hidden = (mark != its_mark or mark == NO_MARK) and _is_hidden(k, tracks)
     if not hidden:
-        surprising = far + log(most_across * most_across * most_along / exact)
-        surprising += _SURPRISE_BY_SIZE if sized else _SURPRISE
+        surprising = far + log(most_across * most_across * most_along / exact) + _SURPRISE
         cost = min(cost, surprising)
     if other:
         cost += _OTHER_MARK
-    if sized and (moved_m > 0.0 or not in_sight):
-        cost += _UNSEEN
     if hidden and cost > UNPAIRED:
         return FORBIDDEN
     return min(cost, UNPAIRED - _SLOWLY / max(cost, _NEARLY_UNPAIRED))

@@ -34,9 +34,6 @@ _EXPECTED = 4.0
 _CHANGES_FOR_S = 0.5
 # What is not seen moves on, but less and less surely: people stop.
 _STOPS_WITHIN_S = 1.0
-# A track that is not seen for longer stays as far away as it was, which tells it from those behind
-# whom it is, unless it surely came nearer or went away: by more than so many standard deviations.
-_APPROACHES_S, _SURELY = 0.1, 2.0
 # And they turn and hurry, which is not seen either: noise of the acceleration.
 _UNSEEN_M_S2 = 1.0
 NEAREST_M = 0.05
@@ -116,13 +113,7 @@ class TrackFilter:
         """Use another process noise; position and velocity stay."""
         self._noise = noise
 
-    def predict(
-        self,
-        dt_s: float,
-        seen: bool = True,
-        range_known: bool = True,
-        range_measured: bool = False,
-    ) -> None:
+    def predict(self, dt_s: float, seen: bool = True, range_known: bool = True) -> None:
         """Go on by a time; what is not seen slows down.
 
         Args:
@@ -130,12 +121,9 @@ class TrackFilter:
             seen: whether it was seen in the last frame.
             range_known: False where its range is only assumed: what crosses the view then
                 stays as far away, as neither a straight line nor its speed is known.
-            range_measured: True where it was measured by the camera, and not by a size.
         """
         if dt_s <= 0.0:
             return
-        if not (seen or range_measured) and self._unseen_s >= _APPROACHES_S:
-            self._stay_as_far()
         v = self.v_m_s
         if range_known:
             self._place(add(self.p_m, scale(v, dt_s)))
@@ -149,13 +137,6 @@ class TrackFilter:
         accel = max(self._noise.quiet_m_s2, self._accel_m_s2, 0.0 if seen else _UNSEEN_M_S2)
         self.across = _wandered(_gone_on(self.across, dt_s, kept), accel, dt_s)
         self.along = _wandered(_gone_on(self.along, dt_s, kept), accel, dt_s)
-
-    def _stay_as_far(self) -> None:
-        """Drop a speed along the view that may be none."""
-        approach = dot(self.v_m_s, self.view)
-        if approach * approach < _SURELY * _SURELY * self.along.v:
-            self.v_m_s = sub(self.v_m_s, scale(self.view, approach))
-            self.along = Variances(self.along.p, 0.0, 0.0)
 
     def look_from(self, p_camera_m: Vec3) -> None:
         """See it from another place: what was along the view is partly across it now."""

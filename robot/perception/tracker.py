@@ -151,10 +151,7 @@ class Tracker:
         for track in self._tracks:
             if not self._remembered(track):
                 track.filter.predict(
-                    t_s - track.at_s,
-                    track.seen_s == track.at_s,
-                    track.depth_from != "assumed",
-                    track.depth_from == "camera",
+                    t_s - track.at_s, track.seen_s == track.at_s, track.depth_from != "assumed"
                 )
             track.filter.look_from(p_world_camera_m)
             track.at_s = t_s
