@@ -30,7 +30,7 @@ def rig_at(file: Path, rate_hz: float, give_up_s: float = 60.0) -> str:
 def begun(*words: str) -> "subprocess.Popen[str]":
     """Start a run in a process of its own; give it once torque is on."""
     process = Branch(
-        gazerig("run", *words, "--mock", "--no-page", "--summary", "-"),
+        gazerig("run", *words, "--mock", "--verbose", "--no-page", "--summary", "-"),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,

@@ -4,7 +4,6 @@ import threading
 from collections.abc import Callable
 from math import radians
 
-import cv2
 import numpy as np
 
 from gazerig.drivers.camera.jpeg_slot import JpegSlot
@@ -43,6 +42,8 @@ class BrowserSource:
                 stop.wait(_LOOK_S)
                 continue
             self._number = picture.number
+            import cv2  # in the camera's process, and not in that of the control loop
+
             found = cv2.imdecode(np.frombuffer(picture.data, np.uint8), cv2.IMREAD_COLOR)
             image = bgr(found) if found is not None and max(found.shape) <= _LARGEST_PX else None
             if image is None:

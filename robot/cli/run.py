@@ -60,20 +60,43 @@ def run(
         asked = asked.checked()
         refuse_existing(*asked.written_at_the_end, force=force)
         shows = status if not fast and sys.stderr.isatty() else None
-        if not fast:
-            say(what_runs(asked))
         if shows is not None:
             shows("loading: a few seconds ...")
         # Vision and emulator are heavy; `check` and `--help` do without them.
         from gazerig.robot.app import session
 
         composed = session.compose(asked)
+        opening = Opening("" if fast else what_runs(asked))
         browse = open_page if not no_browser and desktop_here() else None
         with signals() as stopped:
-            figures = session.run(composed, stopped, say, shows, browse=browse)
+            figures = session.run(
+                composed, stopped, opening.say, shows, watch=opening.saw, browse=browse
+            )
         _write_summary(figures, summary, force)
     if had_faults(figures, say) or "not_written" in figures:
         raise typer.Exit(FAULT)
+
+
+class Opening:
+    """Says in its first line what runs: before any other, and not for a run that is refused.
+
+    Args:
+        line: what runs; "" says nothing.
+    """
+
+    def __init__(self, line: str) -> None:
+        self._line = line
+
+    def say(self, line: str) -> None:
+        """Say a line, after the first."""
+        self.saw(None)
+        say(line)
+
+    def saw(self, tick: object) -> None:
+        """Say the first line once the head runs."""
+        if self._line:
+            line, self._line = self._line, ""
+            say(line)
 
 
 def what_runs(asked: RunOptions) -> str:
