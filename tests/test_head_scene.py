@@ -22,7 +22,14 @@ from gazerig.robot.dashboard.head_view import (
     shown_measures,
 )
 from gazerig.robot.dashboard.views import BOTH, FACE, SHOULDER, View, view
-from gazerig.robot.model.head_shape import EYE_RADIUS, field, measures_of, of_jaw, surface
+from gazerig.robot.model.head_shape import (
+    EYE_RADIUS,
+    eye_rim,
+    field,
+    measures_of,
+    of_jaw,
+    surface,
+)
 from gazerig.robot.model.mesh import Mesh
 from gazerig.robot.model.paint import Painted
 from gazerig.robot.model.types import JointState, Snapshot
@@ -140,6 +147,32 @@ def test_the_skin_leaves_the_eyes_free() -> None:
     for side in (0.5, -0.5):
         assert (field(eyes * front + (0.0, side, 0.0)) > 0.0).all()
         assert field(np.array(((0.0, side, 0.0),)))[0] < 0.0  # and hides what holds them
+
+
+def test_the_skin_about_an_eye_comes_from_the_lids_and_ends_in_the_face() -> None:
+    points, normals = eye_rim()
+    assert np.isfinite(points).all() and np.linalg.norm(normals, axis=-1) == pytest.approx(1.0)
+    off = points - (0.0, 0.5, 0.0)
+    # Its inmost edge is under the lids, the next just outside them, and all of it leaves the eye.
+    assert (np.linalg.norm(off[0], axis=1) < EYE_RADIUS * LOWER_LID).all()
+    assert (np.linalg.norm(off[1:], axis=2) > EYE_RADIUS * UPPER_LID).all()
+    from_axis = np.degrees(np.arctan2(np.hypot(off[..., 1], off[..., 2]), off[..., 0]))
+    assert from_axis[1:].min() > 50.0  # an upper lid opens to 48
+    # Nothing of it gapes: the skin goes on where it ends, and lies below it before.
+    assert (field(points[-1]) < 0.0).all() and (field(points[1:-1].reshape(-1, 3)) > 0.0).all()
+
+
+def test_the_head_is_as_wide_at_the_jaw_as_a_face_is() -> None:
+    # Half its width, at the eyes, at the mouth and at the chin, between the ears and the tip.
+    eyes, mouth, chin = (_half_width(z) for z in (0.0, -0.95, -1.45))
+    assert 0.70 * eyes < mouth < 0.95 * eyes and 0.3 * eyes < chin < 0.65 * eyes
+
+
+def _half_width(z: float) -> float:
+    """How far aside the head goes at a height, before its neck."""
+    x, y = np.meshgrid(np.linspace(-0.9, 0.3, 40), np.linspace(0.0, 1.4, 100))
+    at = np.stack((x.ravel(), y.ravel(), np.full(x.size, z)), axis=1)
+    return float(at[field(at) < 0.0, 1].max())
 
 
 def test_the_surface_is_closed_and_faces_outwards() -> None:

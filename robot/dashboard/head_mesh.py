@@ -9,9 +9,9 @@ import numpy as np
 from gazerig.gaze.types import Floats
 from gazerig.robot.model.face_features import brow as bow
 from gazerig.robot.model.face_features import lips
-from gazerig.robot.model.head_shape import HEAD, MOUTH, of_jaw, surface
+from gazerig.robot.model.head_shape import HEAD, MOUTH, eye_rim, of_jaw, surface
 from gazerig.robot.model.mesh import Mesh, grid, smooth_normals, turned
-from gazerig.robot.model.paint import Colour, Painted, merged, mix, plain, spot, step
+from gazerig.robot.model.paint import Colour, Painted, merged, mirrored, mix, plain, spot, step
 
 SKIN: Colour = (247, 206, 178)
 LID: Colour = (243, 198, 170)
@@ -58,7 +58,20 @@ def skin() -> HeadSkin:
         for which in (~moved, moved)
     )
     upper, lower, line = lips(HEAD, MOUTH, _LIPS, _MOUTH_LINE)
-    return HeadSkin(merged([head, upper, line]), merged([chin, lower]))
+    return HeadSkin(merged([head, *_rims(), upper, line]), merged([chin, lower]))
+
+
+def _rims() -> tuple[Painted, Painted]:
+    """Return the skin about the left and the right eye."""
+    points, normals = eye_rim()
+    # Lit as if it lay a little flatter and higher: bags below the eyes look tired.
+    normals = normals + np.linspace(1.0, 0.0, len(points))[:, None, None] * (0.5, 0.0, 0.4)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    mesh = grid(points, closed=True)
+    colours = _complexion(points, normals)
+    colours[0] = colours[1] = colours[1] * 0.82
+    left = Painted(mesh, colours.reshape(-1, 3), normals.reshape(-1, 3))
+    return left, mirrored(left)
 
 
 def _used(
@@ -93,7 +106,7 @@ def _complexion(points: Floats, normals: Floats) -> Floats:
     colours = mix(colours, _SHADE, 0.45 * below)
     colours = mix(colours, _BLUSH, 0.50 * spot(folded, (0.10, 0.62, -0.52), 0.30))
     colours = mix(colours, _BLUSH, 0.30 * spot(folded, (0.42, 0.0, -0.55), 0.14))
-    colours = mix(colours, _SHADE, 0.55 * spot(folded, (0.10, 0.5, 0.0), 0.46))
+    colours = mix(colours, _SHADE, 0.22 * spot(folded, (0.10, 0.5, 0.0), 0.46))
     colours = mix(colours, _HOLLOW, 0.8 * spot(folded, (0.33, 0.075, -0.655), 0.042))
     return colours
 

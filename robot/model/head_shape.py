@@ -6,28 +6,42 @@ right are alike; what leaves is in metres.
 """
 
 from functools import lru_cache
-from math import dist, radians
+from math import dist, pi, radians
 from typing import NamedTuple
 
 import numpy as np
 
 from gazerig.gaze.types import Floats, Vec3
 from gazerig.robot.model.face_features import Mouth
-from gazerig.robot.model.solid import Field, Solid, Surface, capsule, carve, ellipsoid, union
+from gazerig.robot.model.mesh import grid, smooth_normals
+from gazerig.robot.model.solid import (
+    Field,
+    Solid,
+    Surface,
+    capsule,
+    carve,
+    crossings,
+    ellipsoid,
+    normals,
+    union,
+)
 
 EYE_RADIUS = 0.335
 """Radius of an eyeball, in distances between the eyes."""
 TOP, CHIN = 1.80, -1.62
 """Height of the head's top and of the chin, in distances between the eyes."""
-_ROWS, _COLUMNS = 84, 84
+_ROWS, _COLUMNS = 60, 60
 _SOLIDS: tuple[tuple[Field, float], ...] = (
     (ellipsoid((-1.10, 0.0, 0.50), (1.30, 1.20, 1.30)), 0.1),  # skull
-    (ellipsoid((-0.66, 0.0, -0.36), (0.84, 1.00, 1.00)), 0.45),  # face
-    (ellipsoid((-0.42, 0.0, -1.08), (0.58, 0.66, 0.50)), 0.36),  # jaw
-    (ellipsoid((-0.02, 0.0, -1.42), (0.18, 0.24, 0.17)), 0.24),  # chin
-    (ellipsoid((-0.22, 0.54, -0.60), (0.38, 0.36, 0.30)), 0.28),  # cheeks
-    (ellipsoid((-0.06, 0.42, 0.44), (0.20, 0.40, 0.12)), 0.24),  # brow
-    (capsule((0.02, 0.0, 0.10), (0.25, 0.0, -0.50), 0.100, 0.120), 0.18),  # bridge of the nose
+    (ellipsoid((-0.66, 0.0, -0.30), (0.84, 1.04, 0.96)), 0.45),  # face
+    (ellipsoid((-0.44, 0.0, -1.02), (0.60, 0.70, 0.50)), 0.36),  # mouth and what is beside it
+    (capsule((-0.98, 0.70, -0.25), (-0.84, 0.55, -0.88), 0.30, 0.26), 0.36),  # jaw, up to the ear
+    (capsule((-0.84, 0.55, -0.88), (-0.14, 0.14, -1.32), 0.26, 0.26), 0.36),  # its lower edge
+    (ellipsoid((-0.02, 0.0, -1.42), (0.19, 0.26, 0.18)), 0.24),  # chin
+    (ellipsoid((-0.20, 0.58, -0.58), (0.38, 0.40, 0.32)), 0.28),  # cheeks
+    (ellipsoid((-0.24, 0.55, 0.0), (0.38, 0.50, 0.54)), 0.40),  # round the eyes
+    (ellipsoid((-0.03, 0.44, 0.44), (0.22, 0.44, 0.13)), 0.24),  # brow
+    (capsule((0.04, 0.0, 0.10), (0.25, 0.0, -0.50), 0.100, 0.120), 0.18),  # bridge of the nose
     (ellipsoid((0.275, 0.0, -0.54), (0.150, 0.145, 0.125)), 0.09),  # its tip
     (ellipsoid((0.190, 0.120, -0.580), (0.10, 0.075, 0.070)), 0.08),  # its wings
 )
@@ -35,8 +49,12 @@ _LIPS: tuple[tuple[Field, float], ...] = (
     (ellipsoid((0.060, 0.10, -0.965), (0.115, 0.26, 0.056)), 0.09),
     (ellipsoid((0.050, 0.0, -1.095), (0.130, 0.27, 0.070)), 0.09),
 )
-_DISH = ellipsoid((0.46, 0.5, 0.0), (0.27, 0.40, 0.33))
-_NECK = capsule((-0.80, 0.0, -0.9), (-0.72, 0.0, -1.55), 0.62, 0.44)
+_SOCKET = ellipsoid((0.33, 0.53, 0.0), (0.30, 0.46, 0.44))
+_NECK = capsule((-0.86, 0.0, -0.8), (-0.78, 0.0, -1.36), 0.54, 0.42)
+_EYE = np.array((0.0, 0.5, 0.0))
+_RIM_ROWS, _RIM_COLUMNS, _RIM_RADIUS = 8, 48, 0.372
+_RIM_OFF = 0.014
+_RIM_OUT = np.array((0.0, 0.50, 0.49))
 _SMILE = 0.85
 _MOUTH_Z, _MOUTH_HALF = -1.030, 0.32
 MOUTH = Mouth(_MOUTH_Z, 0.345, _SMILE, 0.088, 0.110)
@@ -93,17 +111,27 @@ def measures_of(left_m: Vec3, right_m: Vec3, pivot_m: Vec3 | None = None) -> Hea
 
 def field(points: Floats) -> Floats:
     """Return how far points (n, 3) are outside the head."""
-    folded = points * (1.0, 1.0, 1.0)
-    folded[:, 1] = np.abs(folded[:, 1])
-    solid = _SOLIDS[0][0](folded)
-    for part, round_by in _SOLIDS[1:]:
-        solid = union(solid, part(folded), round_by)
-    solid = union(solid, _NECK(folded), 0.30)
-    solid = carve(solid, _DISH(folded), 0.30)
+    folded = _folded(points)
+    solid = carve(_unopened(folded), _SOCKET(folded), 0.06)
     folded[:, 2] = smiling(folded[:, 1], folded[:, 2])
     for part, round_by in _LIPS:
         solid = union(solid, part(folded), round_by)
     return solid
+
+
+def _folded(points: Floats) -> Floats:
+    """Return points moved to the left half, which the right one mirrors."""
+    folded = points * (1.0, 1.0, 1.0)
+    folded[:, 1] = np.abs(folded[:, 1])
+    return folded
+
+
+def _unopened(points: Floats) -> Floats:
+    """Return how far points (n, 3) of the left half are outside a head without eyes and lips."""
+    solid = _SOLIDS[0][0](points)
+    for part, round_by in _SOLIDS[1:]:
+        solid = union(solid, part(points), round_by)
+    return union(solid, _NECK(points), 0.20)
 
 
 HEAD = Solid(field, (-0.80, 0.0, -0.02), 2.6)
@@ -114,6 +142,47 @@ HEAD = Solid(field, (-0.80, 0.0, -0.02), 2.6)
 def surface() -> Surface:
     """Return the head's surface; it is worked out once."""
     return HEAD.all_round(_ROWS, _COLUMNS, radians(-30.0), radians(30.0))
+
+
+def eye_rim() -> Surface:
+    """Return the left eye's surroundings: from where the lids come out to the skin about it.
+
+    Rows from within outwards, columns around the eye, closed.
+    """
+    around = np.linspace(0.0, 2.0 * pi, _RIM_COLUMNS, endpoint=False)
+    aside, up = np.cos(around), np.sin(around)
+    # As far from the eye's axis as leaves lids and iris free: farther to the temple, nearer above.
+    off = np.radians(60.0 + 12.0 * np.clip(aside, 0.0, 1.0) ** 2 - 4.0 * np.clip(up, 0.0, 1.0) ** 2)
+    out = np.stack((np.zeros_like(around), aside, up), axis=1)
+    spherical = np.cos(off)[:, None] * (1.0, 0.0, 0.0) + np.sin(off)[:, None] * out
+    edge = _RIM_RADIUS * spherical + _EYE
+    targets = _EYE + (0.05, 0.0, 0.0) + _RIM_OUT * out
+    rays = targets - np.array(HEAD.centre)
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    skin = crossings(field, HEAD.centre, rays, HEAD.farthest)
+    outwards = normals(field, skin)
+    away = skin - edge
+    # It leaves the eye aside and a little ahead, and comes to the skin as the skin lies.
+    begin = 0.45 * np.linalg.norm(away, axis=1, keepdims=True) * out + (0.05, 0.0, 0.0)
+    end = away - (away * outwards).sum(axis=1, keepdims=True) * outwards
+    share = np.linspace(0.0, 1.0, _RIM_ROWS)[:, None, None]
+    points = (
+        (1.0 - share) ** 3 * edge
+        + 3.0 * (1.0 - share) ** 2 * share * (edge + begin)
+        + 3.0 * (1.0 - share) * share**2 * (skin - end / 3.0)
+        + share**3 * skin
+    )
+    # Skin that was cut into triangles stays below it.
+    flat = points[1:].reshape(-1, 3)
+    flat += np.maximum(0.0, _RIM_OFF - _unopened(flat))[:, None] * normals(_unopened, flat)
+    points[1:] = flat.reshape(points[1:].shape)
+    points[-1] -= 2.0 * _RIM_OFF * outwards
+    points = np.concatenate((((edge - _EYE) * 0.90 + _EYE)[None], points))
+    found = smooth_normals(grid(points, closed=True)).reshape(points.shape)
+    as_skin = np.concatenate(((0.0,), np.linspace(0.0, 1.0, _RIM_ROWS) ** 0.8))[:, None, None]
+    skin_normals = normals(_unopened, points.reshape(-1, 3)).reshape(points.shape)
+    found = (1.0 - as_skin) * found + as_skin * skin_normals
+    return Surface(points, found / np.linalg.norm(found, axis=-1, keepdims=True))
 
 
 def of_jaw(points: Floats) -> Floats:
