@@ -12,15 +12,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from page_visitor import Visitor
-from shown_page import SNAPSHOT, wait_for
+from page_visitor import LOOKING, Visitor
+from shown_page import AHEAD, SNAPSHOT, wait_for
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
+from gazerig.gaze.types import PARTS
 from gazerig.robot.dashboard.camera_overlay import encode
 from gazerig.robot.dashboard.page_process import PageProcess
 from gazerig.robot.model.command_json import as_json
 from gazerig.robot.model.commands import Stop
+from gazerig.robot.model.types import SeenFace
 
 pytestmark = pytest.mark.usefixtures("branched_children")
 
@@ -28,17 +30,23 @@ OWED_BYTES = 6_000_000
 """More than Linux keeps for one connection."""
 
 
-def browser(visitor: Visitor, deaf: bool = False) -> ClientConnection:
+PANELS, VIEW = "/rig/panels", "/view"
+
+
+def browser(visitor: Visitor, path: str, deaf: bool = False) -> ClientConnection:
     """A browser without the drawing; a deaf one reads nothing."""
-    return visitor.open("/rig/panels", receive_bytes=4096 if deaf else None)
+    there = visitor.open(path, receive_bytes=4096 if deaf else None)
+    if path == VIEW:
+        there.send(LOOKING)
+    return there
 
 
 class Listener:
     """A browser that reads everything; without the drawing."""
 
-    def __init__(self, visitor: Visitor) -> None:
+    def __init__(self, visitor: Visitor, path: str = PANELS) -> None:
         self.bytes = 0
-        self._socket = browser(visitor)
+        self._socket = browser(visitor, path)
         self._words: set[str] = set()
         self.awaited = "the first target"
         self._thread = threading.Thread(target=self._read)
@@ -58,6 +66,12 @@ class Listener:
     def close(self) -> None:
         self._socket.close()
         self._thread.join()
+
+
+def person(number: int) -> SeenFace:
+    """One before the rig who has not been there before."""
+    parts_m = tuple((0.8, 0.01 * part, 0.15) for part in range(len(PARTS)))
+    return SeenFace(number, (0.85, 0.0, 0.15), AHEAD, parts_m)
 
 
 class Rig:
@@ -86,7 +100,8 @@ class Rig:
         jpegs = [encode(picture) for picture in noise]
         while not self._over.wait(0.02):
             self.rounds += 1
-            self.page.show(replace(self.snapshot, t_s=0.02 * self.rounds))
+            faces = (person(self.rounds // 3),)  # new ones again and again, with all their shapes
+            self.page.show(replace(self.snapshot, t_s=0.02 * self.rounds, faces=faces))
             self.page.show_frame(jpegs[self.rounds % len(jpegs)])
 
     def feed_no_more(self) -> None:
@@ -116,20 +131,25 @@ def drained(there: ClientConnection) -> int:
     return taken
 
 
-def test_who_reads_nothing_holds_up_neither_the_page_nor_the_rig(rig: Rig) -> None:
+@pytest.mark.parametrize("path", [PANELS, VIEW])
+def test_who_reads_nothing_holds_up_neither_the_page_nor_the_rig(rig: Rig, path: str) -> None:
     visitor = Visitor(rig.open())
-    deaf, listener = browser(visitor, deaf=True), Listener(visitor)
+    deaf = browser(visitor, path, deaf=True)
+    reads_all, listener = Listener(visitor, path), Listener(visitor)
     try:
-        wait_for(lambda: listener.bytes > OWED_BYTES, "what one who reads gets")
+        wait_for(lambda: reads_all.bytes > OWED_BYTES, "what one who reads gets")
         # Now as ever: others see the newest, a stop is heard, the button knows of it.
         rig.snapshot = replace(SNAPSHOT, target_name="the target of later", stopped="a test")
         wait_for(lambda: listener.reads("the target of later"), "the newest words")
+        seen = reads_all.bytes
+        wait_for(lambda: reads_all.bytes > seen, "more for who reads")
         assert visitor.ask(as_json(Stop("a test"))) == 204
         wait_for(lambda: [asked["do"] for asked in rig.heard] == ["stop"], "the stop")
         wait_for(lambda: visitor.state()["stopped"] == "a test", "the button's news")
         # It was deaf indeed: what it was owed was not all kept for it.
         rig.feed_no_more()
-        assert 0 < drained(deaf) < listener.bytes - 1_000_000
+        assert 0 < drained(deaf) < reads_all.bytes - 1_000_000
     finally:
-        listener.close()
+        for one in (reads_all, listener):
+            one.close()
         deaf.close()

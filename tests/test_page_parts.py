@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from html import escape
 
 import cv2
 import numpy as np
@@ -13,7 +14,8 @@ from six_joints import ESTIMATED_RAD, SIX, WISH_RAD, of_six
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.angles import rotation
-from gazerig.robot.dashboard.attention_panel import winner
+from gazerig.gaze.types import Salience
+from gazerig.robot.dashboard.attention_panel import reason, winner
 from gazerig.robot.dashboard.camera_overlay import (
     FARTHEST_M,
     IMAGE_WIDTH_PX,
@@ -36,11 +38,13 @@ from gazerig.robot.dashboard.people import fixated_part
 from gazerig.robot.dashboard.scene_node import along, quaternion, turned_up, upright_along
 from gazerig.robot.dashboard.servo_health import guard, health
 from gazerig.robot.dashboard.status import alarms, drawn_together, without_feedback
+from gazerig.robot.model.leader import Leader
 from gazerig.robot.model.mesh import Mesh, cap, ellipsoid, lid, ring, turned
 from gazerig.robot.model.types import GAZE_JOINTS as EVERY_JOINT
 from gazerig.robot.model.types import SeenFace, Snapshot, Trail
 
 LENS = Intrinsics(300.0, 300.0, 319.5, 239.5)
+Terms = tuple[float, float, float, float, float]
 AHEAD = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -87,6 +91,30 @@ def test_target_reason_and_guard_are_told_and_run_no_markup() -> None:
     for word in ("guard: limited", "3 lost", "too &lt;fast&gt; (joint 0, +5)"):
         assert word in health(shot)
     assert "too" not in health(snapshot()) and alarms(snapshot()) == ""
+
+
+@pytest.mark.parametrize(
+    ("terms", "said"),
+    [
+        ((0.38, 0.0, 0.0, 0.0, 0.0), "because it moves (translation 0.38)"),
+        (
+            (0.38, 0.0, 0.0, 0.0, 0.5),
+            "because it moves (translation 0.38), and the behaviour wait adds 0.50",
+        ),
+        (
+            (0.2, 0.3, 0.001, 0.0, 0.0),
+            "because it moves (translation 0.20), comes nearer or goes away (looming 0.30)",
+        ),
+        ((0.0, 0.0, 0.0, 0.0, 0.5), "because the behaviour wait asks for it (0.50)"),
+        ((0.0, 0.0, 0.0, 0.0, 0.0), "the rule 'person' pulls"),
+    ],
+)
+def test_why_it_won_is_said_in_a_plain_sentence(terms: Terms, said: str) -> None:
+    first = Salience(3, "face", *terms, 1.0, sum(terms))
+    shot = replace(snapshot(), saliences=(first,), behaviour="wait")
+    assert reason(shot) == said and escape(said) in winner(shot)
+    led = replace(shot, leader=Leader("person", "ann", "look at 1 0 0"))
+    assert reason(led) == shot.why
 
 
 def test_equal_reasons_are_said_once() -> None:

@@ -19,7 +19,7 @@ from gazerig.robot.dashboard.inbox import (
     parse_request,
     request_message,
 )
-from gazerig.robot.dashboard.jog_panel import ESTIMATED, MEASURED, JogPanel, measured_table
+from gazerig.robot.dashboard.jog_panel import ESTIMATED, JogPanel, not_measured
 from gazerig.robot.dashboard.page_feed import News
 from gazerig.robot.dashboard.param_control import (
     ParamControl,
@@ -140,22 +140,16 @@ def test_a_slider_jogs_and_then_follows_its_joint(place: Container) -> None:
     assert wished(5.9, 20.0, "a test") == pytest.approx(5.7)  # a stop lets go at once
 
 
-def test_the_table_shows_wish_and_measured() -> None:
-    table = measured_table(replace(SNAPSHOT, desired_rad=(radians(12.34),) * 9))
-    assert table.count("12.3") == 9 and table.count("5.7") == 9 and "neck yaw" in table
-
-
-def test_what_nobody_measured_has_a_column_of_its_own() -> None:
-    assert ESTIMATED not in measured_table(SNAPSHOT)
-    table = measured_table(of_six(SNAPSHOT))
-    assert f">{ESTIMATED}</th>" in table and f">{MEASURED}</th>" not in table
-    assert "eyes pan" in table and "20.0" in table and "neck" not in table
-    mixed = measured_table(of_six(SNAPSHOT, SIX[:1]))
-    lines = mixed.split("<tr>")
-    assert mixed.index(f">{MEASURED}<") < mixed.index(f">{ESTIMATED}<")
-    cells = [line.split("<td>")[1:] for line in lines[2:]]
-    assert [cell.partition("<")[0] for cell in cells[0]] == ["10.0", "", "20.0"]
-    assert [cell.partition("<")[0] for cell in cells[1]] == ["11.0", "21.0", ""]
+def test_angles_that_nobody_measured_are_called_so(place: Container) -> None:
+    assert not_measured(SNAPSHOT) == ""
+    assert f"all joints: {ESTIMATED}" in not_measured(of_six(SNAPSHOT))
+    one = not_measured(of_six(SNAPSHOT, SIX[1:2]))
+    assert f">{SIX[1].replace('_', ' ')}: {ESTIMATED}" in one
+    view, _ = jogging(place)
+    view.show(of_six(SNAPSHOT))
+    assert ESTIMATED in str(view.not_measured.content)
+    view.show(SNAPSHOT)
+    assert view.not_measured.content == ""
 
 
 def test_sliders_are_those_of_the_rig(place: Container) -> None:

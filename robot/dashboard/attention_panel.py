@@ -7,6 +7,15 @@ from gazerig.robot.dashboard.html import PHASES, chip, heading, note, pill
 from gazerig.robot.model.types import Snapshot
 
 _TERMS = ("translation", "looming", "rotation", "onset", "rule")
+_BECAUSE = {
+    "translation": "moves",
+    "looming": "comes nearer or goes away",
+    "rotation": "turns",
+    "onset": "has just come into view",
+}
+"""What each term of the salience says of a body."""
+_LEAST_TOLD, _SHARE_TOLD = 0.005, 0.1
+"""Terms are told from this salience on, and from this share of the largest."""
 _LEAST_FULL = 1.0
 """A bar as long as the panel stands for this salience, or for the highest where that is more."""
 
@@ -15,9 +24,32 @@ def winner(snapshot: Snapshot) -> str:
     """Return what is looked at, the reason, and what is in force."""
     return (
         f"<div class='big'>{escape(snapshot.target_name)}</div>"
-        f"<div class='tall'>{escape(snapshot.why)}</div>"
-        f"<div>{pill(snapshot.phase, PHASES.get(snapshot.phase, 'calm'))}{_in_force(snapshot)}</div>"
+        f"<div class='tall'>{escape(reason(snapshot))}</div>"
+        f"<div class='in-force'>{pill(snapshot.phase, PHASES.get(snapshot.phase, 'calm'))}"
+        f"{_in_force(snapshot)}</div>"
     )
+
+
+def reason(snapshot: Snapshot) -> str:
+    """Return why the target won in one plain sentence, e.g. "because it moves (translation 0.38)".
+
+    While somebody leads, or where nothing was compared, it is what the rig says.
+    """
+    if snapshot.leader.led or not snapshot.saliences:
+        return snapshot.why
+    first = snapshot.saliences[0]
+    most = max(first.translation, first.looming, first.rotation, first.onset)
+    moves = ", ".join(
+        f"{words} ({term} {getattr(first, term):.2f})"
+        for term, words in _BECAUSE.items()
+        if getattr(first, term) >= max(_LEAST_TOLD, _SHARE_TOLD * most)
+    )
+    behaviour = f"behaviour {snapshot.behaviour}" if snapshot.behaviour else "behaviour"
+    if first.rule < _LEAST_TOLD:
+        return f"because it {moves}" if moves else snapshot.why
+    if not moves:
+        return f"because the {behaviour} asks for it ({first.rule:.2f})"
+    return f"because it {moves}, and the {behaviour} adds {first.rule:.2f}"
 
 
 def saliences(snapshot: Snapshot) -> str:
@@ -44,7 +76,7 @@ def _saliences(rows: tuple[Salience, ...]) -> str:
     )
     return (
         heading("salience, term by term", "habituation  total")
-        + bars
+        + f"<div class='rows'>{bars}</div>"
         + f"<div class='key'>{keys}</div>"
         + note(
             "translation, looming and rotation are motion across, along and about the line of "

@@ -1,7 +1,6 @@
-"""Sliders that put joints at angles, each with the joint's limits and its measured angle."""
+"""Sliders that put joints at angles, each with the joint's limits; others follow their joints."""
 
-from collections.abc import Mapping, Sequence
-from html import escape
+from collections.abc import Mapping
 from math import degrees, radians
 
 from gazerig.robot.dashboard.container import Container
@@ -19,8 +18,7 @@ _FOLLOWS_DEG = 0.15
 _FREE_AFTER_S = 0.5
 """A jogged joint whose desired angle is another for this long is no longer jogged."""
 _SAME_DEG = 0.3
-MEASURED, ESTIMATED = "measured", "estimated (not measured)"
-_TABLE_EVERY = 5  # with every fifth frame, some 5 times a second: figures are to be read
+ESTIMATED = "estimated from what was asked for, not measured: the servos tell nothing"
 
 
 class JogPanel:
@@ -37,7 +35,6 @@ class JogPanel:
         # Joint -> angle asked for and the time of the last frame in which it was requested.
         self._held: dict[str, tuple[float, float]] = {}
         self._now_s = 0.0
-        self._table, self._shown = "", 0
         place.html(
             note(
                 "This moves the joint of the real head: slowly, inside the guard's limits. All "
@@ -45,7 +42,7 @@ class JogPanel:
             ),
             order=0,
         )
-        self.measured = place.html(order=_LAST)
+        self.not_measured = place.html(order=_LAST)
 
     def let_go(self) -> None:
         """Forget which joints were moved here: their sliders follow them again."""
@@ -84,7 +81,7 @@ class JogPanel:
         self._outbox.command(Jog(((joint, radians(angle_deg)),)), who)
 
     def show(self, snapshot: Snapshot) -> None:
-        """Write the measured angles; sliders that are not held follow them."""
+        """Let sliders that are not held follow their joints, and say which are not measured."""
         if snapshot.t_s < self._now_s:  # the rig's clock was started again
             self._held.clear()
         self._now_s = snapshot.t_s
@@ -97,11 +94,7 @@ class JogPanel:
             if joint not in self._held and abs(slider.value - angle_deg) > _FOLLOWS_DEG:
                 low, high = slider.ends
                 slider.value = round(min(max(angle_deg, low), high), 1)
-        self._shown += 1
-        if self._shown % _TABLE_EVERY == 1:
-            table = measured_table(snapshot)
-            if table != self._table:
-                self.measured.content = self._table = table
+        self.not_measured.content = not_measured(snapshot)
 
     def _note_held(self, joint: str, desired_deg: float, stopped: bool) -> None:
         """Forget a joint that was let go elsewhere, by a stop or another command."""
@@ -117,38 +110,10 @@ class JogPanel:
             del self._held[joint]
 
 
-def measured_table(snapshot: Snapshot) -> str:
-    """List every joint's desired and measured angle in degrees, as HTML.
-
-    What is not measured is in a column of its own: an estimated angle looks like any other.
-    """
-    estimated = frozenset(snapshot.estimated)
-    columns = ["desired"]
-    if not estimated.issuperset(snapshot.joints):
-        columns.append(MEASURED)
-    if estimated:
-        columns.append(ESTIMATED)
-    joints = zip(snapshot.joints, snapshot.desired_rad, snapshot.measured_rad, strict=True)
-    rows = "".join(
-        _row(
-            escape(joint.replace("_", " ")),
-            [degrees(desired), *_under(columns[1:], joint in estimated, degrees(now))],
-        )
-        for joint, desired, now in joints
-    )
-    head = "".join(f"<th scope='col'>{text}</th>" for text in columns)
-    return (
-        f"<div class='scroll'><table><thead><tr><th scope='col'>degrees</th>{head}</tr></thead>"
-        f"<tbody>{rows}</tbody></table></div>"
-    )
-
-
-def _under(columns: Sequence[str], estimated: bool, angle_deg: float) -> list[float | None]:
-    """Show an angle below the joint's present one."""
-    kind = ESTIMATED if estimated else MEASURED
-    return [angle_deg if column == kind else None for column in columns]
-
-
-def _row(name: str, angles_deg: Sequence[float | None]) -> str:
-    cells = "".join(f"<td>{'' if angle is None else f'{angle:.1f}'}</td>" for angle in angles_deg)
-    return f"<tr><th scope='row'>{name}</th>{cells}</tr>"
+def not_measured(snapshot: Snapshot) -> str:
+    """Return which joints' angles are estimated, as HTML, "" where all are measured."""
+    estimated = [joint for joint in snapshot.joints if joint in frozenset(snapshot.estimated)]
+    if not estimated:
+        return ""
+    names = "all joints" if len(estimated) == len(snapshot.joints) else ", ".join(estimated)
+    return note(f"{names.replace('_', ' ')}: {ESTIMATED}")

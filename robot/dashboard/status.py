@@ -6,6 +6,10 @@ from gazerig.robot.dashboard.html import LEVELS, banner, counted, note
 from gazerig.robot.model.types import Snapshot
 
 _REASONS_SHOWN = 4
+_STANDS_STILL = {
+    "hold": "guard: hold - joints are held where they are",
+    "torque_off": "guard: torque off - joints are let go",
+}
 OLD_FRAME_S = 0.5
 """From this age on a frame is called old: the guard stops the neck at three times that."""
 
@@ -17,8 +21,7 @@ def alarms(snapshot: Snapshot) -> str:
     """
     said, kind = "", LEVELS[snapshot.level]
     if not snapshot.stopped and snapshot.level in ("hold", "torque_off"):
-        words = "guard: " + snapshot.level.replace("_", " ")
-        said += banner(words, kind, _shown(snapshot.reasons))
+        said += banner(_STANDS_STILL[snapshot.level], kind, _shown(snapshot.reasons))
     if snapshot.frame_age_s is not None and snapshot.frame_age_s >= OLD_FRAME_S:
         said += banner(f"the frame is {snapshot.frame_age_s:.1f} s old", "hold")
     return said

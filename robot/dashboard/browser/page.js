@@ -25,18 +25,19 @@ function write(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
+const LASTING = /, for \d.*$/; // how long somebody has led
 let state = {};
 
 function show(now) {
   state = now;
   const led = state.leads && state.leads !== "gaze";
   const headline = state.silent ? "nothing comes from the rig"
-    : state.headline || state.leads_words || "awake";
+    : state.headline || state.leads_words || (state.recording ? "a recording is shown" : "awake");
   write($("#headline"), headline);
   // Who leads is read out when it changes; what is looked at changes three times a second.
-  write($("#leads"), state.leads_words && !headline.startsWith(state.leads_words)
-    ? state.leads_words : "");
-  write($("#announced"), led ? state.leads_words.replace(/, for \d.*$/, "") : "");
+  const leads = (state.leads_words ?? "").replace(LASTING, "");
+  write($("#leads"), headline.startsWith(leads) ? "" : state.leads_words);
+  write($("#announced"), led ? leads : "");
   document.body.dataset.leads = state.leads ?? "";
   write($("#busy"), state.busy || "");
   $("#busy").hidden = !state.busy;

@@ -186,28 +186,6 @@
     if (event.type === "keydown" && !event.repeat) halt("the space bar was pressed on the page");
   }
 
-  // The camera image is the one that is called so, in the panel or laid out large.
-  function isCamera(image) {
-    if (image.tagName !== "IMG") return false;
-    const title = image.closest(".mantine-Modal-content")?.querySelector(".mantine-Modal-title")
-      ?? image.parentElement?.previousElementSibling;
-    return /^camera\b/.test(title?.textContent?.trim() ?? "");
-  }
-
-  function pick(event) {
-    const image = event.target;
-    if (!isCamera(image)) return;
-    const box = image.getBoundingClientRect();
-    ask({ pick: {
-      x: (event.clientX - box.left) / box.width,
-      y: (event.clientY - box.top) / box.height,
-    } }).catch((error) => { failed = `the click did not reach the rig (${error.message})`; draw(); });
-  }
-
-  function hover(event) {
-    if (isCamera(event.target)) event.target.style.cursor = "crosshair";
-  }
-
   function tell(what) {
     if (line && line.readyState === WebSocket.OPEN) line.send(JSON.stringify(what));
   }
@@ -226,8 +204,6 @@
 
   function listenForKeys(where) {
     for (const type of ["keydown", "keyup", "keypress"]) where.addEventListener(type, key, true);
-    where.addEventListener("click", pick, true);
-    where.addEventListener("mouseover", hover, true);
   }
 
   window.rig = { ask, tell };

@@ -119,11 +119,7 @@ const KINDS = {
     const node = make("div", { className: "picture", hidden: true }, image, mark);
     let at = [0.5, 0.5], pick = false;
     const ask = () => {
-      fetch("/rig/ask", {
-        method: "POST",
-        headers: { "Content-Type": "application/json" },
-        body: JSON.stringify({ pick: { x: at[0], y: at[1] } }),
-      }).then(async (answer) => { if (!answer.ok) throw new Error(await answer.text()); })
+      window.rig.ask({ pick: { x: at[0], y: at[1] } })
         .catch((error) => say(`the click did not reach the rig: ${error.message.trim()}`, true));
     };
     image.addEventListener("click", (event) => {
