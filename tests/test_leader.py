@@ -128,6 +128,16 @@ def test_stopped_says_that_and_nothing_else(running: Running) -> None:
     assert leader(running.go(0.1)[-1]) == Leader()
 
 
+def test_a_head_without_torque_looks_at_nobody(running: Running) -> None:
+    tick = running.go(0.1)[-1]
+    hot = ("neck_yaw: hot", "neck_roll: hot")
+    found = tick.guard_result._replace(level="torque_off", critical_reasons=hot)
+    shot = shown(tick._replace(guard_result=found))
+    assert shot.headline == shot.why == "the torque is off: neck_yaw: hot"
+    stopped = tick._replace(guard_result=found, stopped="a test")
+    assert shown(stopped).headline.startswith("stopped: a test")
+
+
 def test_programs_are_told_the_same(running: Running) -> None:
     running.order(Jog((("neck_yaw", 0.3),), "ann"))
     tick = running.go(0.2)[-1]

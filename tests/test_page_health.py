@@ -8,6 +8,7 @@ from typing import TypeVar, cast
 import pytest
 import viser
 from desk import GAZE_JOINTS
+from shown_page import SNAPSHOT
 from six_joints import SIX, TELLS_NOTHING, of_six
 
 from gazerig.gaze.types import Salience
@@ -164,10 +165,10 @@ def test_the_winner_comes_first_term_by_term_and_runs_no_markup() -> None:
     assert "looming 0.00</div>" not in said
     assert "0.60 &times;&ensp;0.30" in said
     named = winner(shot)
-    for words in ("thing &lt;4&gt;", "slide &lt;0.4&gt;", "behaviour: wait", "character: shy",
+    for words in ("thing &lt;4&gt;", "because it moves", "behaviour: wait", "character: shy",
                   "conversation: listen"):  # fmt: skip
         assert words in named
-    assert "wanders" in saliences(snapshot())
+    assert "wanders" in saliences(snapshot()) and "slide &lt;0.4&gt;" in winner(snapshot())
 
 
 def as_it_is(shot: Snapshot) -> Snapshot:
@@ -384,3 +385,12 @@ def test_a_recording_that_stands_still_is_no_silent_rig(server: viser.ViserServe
     view.show(News((snapshot(),), None, ended=False, others=((REPLAY, state),)))
     view.silent()
     assert button.reported["recording"] is True and "silent" not in button.reported
+
+
+def test_the_age_of_the_frame_is_said_once() -> None:
+    shot = replace(SNAPSHOT, frame_age_s=0.073, perception="frame 73 ms old | face 1 at 0.94 m")
+    said = health(shot)
+    assert said.count("73 ms") == 1 and "<div>face 1 at 0.94 m</div>" in said
+    assert "<div>no face</div>" in health(replace(shot, perception="no face"))
+    blind = health(replace(shot, frame_age_s=None, perception="no frame yet"))
+    assert blind.count("no frame yet") == 1

@@ -37,6 +37,7 @@ CHANGES: dict[str, dict[str, Any]] = {
     "stopped": {"stopped": LEADS["stopped"].what, "level": "torque_off"},
     "hold": {"level": "hold", "reasons": ("neck_pitch: no feedback for 120 ms: all joints hold",)},
     "bus lost": {
+        "headline": "the torque is off: the servo bus is lost: /dev/ttyUSB0 is not there",
         "level": "torque_off",
         "reasons": ("the servo bus is lost: /dev/ttyUSB0 is not there",),
         "health": "bus lost: /dev/ttyUSB0 is not there, tried again every 0.5 s",
@@ -48,10 +49,8 @@ def snapshot(state: str) -> Snapshot:
     leader = LEADS[state]
     words = sentence(leader, 12.0)
     headline = words if leader.led else "looks at person 3 (left eye)"
-    changes = CHANGES.get(state, {})
-    return replace(
-        SNAPSHOT, t_s=12.0, leader=leader, leads_words=words, headline=headline, **changes
-    )
+    changes = {"headline": headline, **CHANGES.get(state, {})}
+    return replace(SNAPSHOT, t_s=12.0, leader=leader, leads_words=words, **changes)
 
 
 class Shown:

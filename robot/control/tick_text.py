@@ -69,6 +69,10 @@ def doing(tick: Tick) -> Doing:
     leads = leader(tick)
     phase: str = "blink" if tick.gaze.blink else tick.gaze.phase
     said = sentence(leads, tick.t_s)
+    found = tick.guard_result
+    if found.level == "torque_off" and leads.kind not in ("stopped", "parking"):
+        limp = f"the torque is off: {' and '.join(found.critical_reasons[:1]) or 'guard'}"
+        return Doing(limp, target_name(tick.target), limp, phase)
     if leads.led:
         phase = {"joint": "held", "stopped": "stopped", "parking": "parking"}.get(leads.kind, phase)
         beside = _beside(tick) if leads.kind in ("person", "pointer") else ""

@@ -25,7 +25,7 @@ def winner(snapshot: Snapshot) -> str:
     return (
         f"<div class='big'>{escape(snapshot.target_name)}</div>"
         f"<div class='tall'>{escape(reason(snapshot))}</div>"
-        f"<div class='in-force'>{pill(snapshot.phase, PHASES.get(snapshot.phase, 'calm'))}"
+        f"<div class='in-force'>{pill(snapshot.phase, PHASES.get(snapshot.phase, 'calm'))} "
         f"{_in_force(snapshot)}</div>"
     )
 
@@ -63,7 +63,7 @@ def _in_force(snapshot: Snapshot) -> str:
         ("character", snapshot.character),
         ("conversation", snapshot.conversation),
     )
-    return "".join(chip(f"{what}: {name}") for what, name in named if name)
+    return " ".join(chip(f"{what}: {name}") for what, name in named if name)
 
 
 def _saliences(rows: tuple[Salience, ...]) -> str:

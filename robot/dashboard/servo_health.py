@@ -30,7 +30,7 @@ def health(snapshot: Snapshot) -> str:
         + _timing(snapshot.timing)
         + heading("camera")
         + _frame(snapshot.frame_age_s)
-        + f"<div>{escape(snapshot.perception)}</div>"
+        + f"<div>{escape(_beside_age(snapshot.perception))}</div>"
     )
 
 
@@ -156,6 +156,12 @@ def _timing(timing: LoopFigures | None) -> str:
         f"<div class='scroll'><table><thead><tr>{head}</tr></thead>"
         f"<tbody><tr>{''.join(cells)}</tr></tbody></table></div>{note(said)}"
     )
+
+
+def _beside_age(perception: str) -> str:
+    """Return what is said of perception without the frame's age, which has a line of its own."""
+    first, _, others = perception.partition(" | ")
+    return others if first.startswith(("frame ", "no frame")) else perception
 
 
 def _frame(age_s: float | None) -> str:
