@@ -181,7 +181,9 @@ def test_a_target_is_dragged_through_the_scene(at_the_rig: tuple[Rig, Person]) -
         "the page knowing of the look",
     )
     person.click(beside("drag a target", "input"))
-    rect = f"(() => {{ const r = {everywhere('canvas')}[0].getBoundingClientRect();"
+    # Charts in the drawers are canvases too.
+    scene = f"{view}.document.querySelector('canvas[data-engine]')"
+    rect = f"(() => {{ const r = {scene}.getBoundingClientRect();"
     rect += "const f = document.querySelector('#view').getBoundingClientRect();"
     bounds: Any = person.run(rect + "return [f.x + r.x, f.y + r.y, r.width, r.height]; })()")
     x, y, width, height = bounds
