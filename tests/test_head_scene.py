@@ -30,8 +30,9 @@ from gazerig.robot.model.head_shape import (
     of_jaw,
     surface,
 )
-from gazerig.robot.model.mesh import Mesh
-from gazerig.robot.model.paint import Painted
+from gazerig.robot.model.mesh import Mesh, grid
+from gazerig.robot.model.paint import Painted, merged
+from gazerig.robot.model.person_shape import hand, head, torso
 from gazerig.robot.model.types import JointState, Snapshot
 
 RIGS = sorted(path.stem for path in shipped("rigs", "desk").parent.glob("*.yaml"))
@@ -44,7 +45,7 @@ def at_rest(name: str) -> Snapshot:
     kinematics = kinematics_of(rig)
     zero = (0.0,) * len(kinematics.names)
     pose = kinematics.forward(JointState(zero, zero, zero, ()))
-    head, _ = kinematics.own_parts(pose.R_world_head, pose.p_world_head_m)
+    own, _ = kinematics.own_parts(pose.R_world_head, pose.p_world_head_m)
     return replace(
         SNAPSHOT,
         joints=kinematics.names,
@@ -52,7 +53,7 @@ def at_rest(name: str) -> Snapshot:
         R_world_head=pose.R_world_head,
         p_world_head_m=pose.p_world_head_m,
         p_world_eyes_m=(pose.p_world_eye_left_m, pose.p_world_eye_right_m),
-        p_world_pivot_m=head.start_m,
+        p_world_pivot_m=own.start_m,
     )
 
 
@@ -196,6 +197,48 @@ def test_measures_follow_the_rig() -> None:
         found = shown_measures(at_rest(name))
         assert 1e3 * found.interocular_m == pytest.approx(rig.geometry.interocular_mm, abs=0.1)
         assert -1e3 * found.pivot_m[2] == pytest.approx(rig.geometry.eyes_above_mm, abs=0.1)
+
+
+WHOLE = {
+    "cap": head_mesh.cap,
+    "brow": head_mesh.brow,
+    "eye": head_mesh.eye,
+    "ear": head_mesh.ear,
+    "neck": head_mesh.neck,
+    "bust": head_mesh.bust,
+    "skin": lambda: merged([head_mesh.skin().head, head_mesh.skin().jaw]),
+    "person": lambda: head(0, 0.8),
+    "chest": lambda: torso(0, 0.34),
+    "hand": lambda: hand(0),
+}
+
+
+@pytest.mark.parametrize("part", WHOLE)
+def test_faces_are_turned_outwards_for_their_backs_are_not_drawn(part: str) -> None:
+    vertices, faces = WHOLE[part]().mesh
+    a, b, c = (vertices[faces[:, i]] - vertices.mean(axis=0) for i in range(3))
+    assert (a * np.cross(b, c)).sum() > 0.0  # six times the volume within
+
+
+def test_the_skin_about_the_eyes_faces_outwards() -> None:
+    points, outwards = eye_rim()
+    vertices, faces = grid(points, closed=True)
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    flat = np.cross(b - a, c - a)
+    assert ((flat * outwards.reshape(-1, 3)[faces[:, 0]]).sum(axis=1) > 0.0).mean() > 0.9
+
+
+def test_the_dark_of_a_mouth_is_hidden_by_the_skin_until_it_opens() -> None:
+    assert (field(head_mesh.mouth().mesh.vertices) < 0.03).all()
+
+
+def test_the_head_is_drawn_of_few_triangles() -> None:
+    one = ("cap", "brow", "eye", "ear", "neck", "bust", "skin")
+    drawn_faces = sum(
+        len(WHOLE[part]().mesh.faces) * (1 + (part in ("brow", "eye", "ear"))) for part in one
+    )
+    lids = 2 * sum(len(head_mesh.eyelid(upper).mesh.faces) for upper in (True, False))
+    assert drawn_faces + lids < 25_000
 
 
 def test_only_the_eyes_are_lit_by_the_browser() -> None:

@@ -128,7 +128,7 @@ def _material(finish: Finish, by_browser: bool, gain: float, see_through: bool) 
     plain = {"metallicFactor": 0.0, "roughnessFactor": finish.roughness}
     material: dict[str, Any] = {
         "pbrMetallicRoughness": plain | {"baseColorFactor": [gain, gain, gain, 1.0]},
-        "doubleSided": not see_through,
+        "doubleSided": False,
         "extensions": {"KHR_materials_unlit": {}},
     }
     if by_browser:

@@ -10,14 +10,25 @@ from gazerig.gaze.types import Floats
 from gazerig.robot.model.face_features import brow as bow
 from gazerig.robot.model.face_features import lips
 from gazerig.robot.model.head_shape import HEAD, MOUTH, eye_rim, of_jaw, surface
-from gazerig.robot.model.mesh import Mesh, grid, smooth_normals, turned
-from gazerig.robot.model.paint import Colour, Painted, merged, mirrored, mix, plain, spot, step
+from gazerig.robot.model.mesh import Mesh, ellipsoid, grid, smooth_normals, turned
+from gazerig.robot.model.paint import (
+    Colour,
+    Painted,
+    merged,
+    mirrored,
+    mix,
+    painted,
+    plain,
+    spot,
+    step,
+)
 
 SKIN: Colour = (247, 206, 178)
 LID: Colour = (243, 198, 170)
 _BLUSH: Colour = (240, 160, 140)
 _LIPS: Colour = (206, 106, 98)
 _MOUTH_LINE: Colour = (128, 58, 56)
+_MOUTH: Colour = (72, 26, 28)
 _SHADE: Colour = (222, 160, 130)
 _HOLLOW: Colour = (110, 66, 56)
 CAP: Colour = (58, 62, 74)
@@ -65,7 +76,7 @@ def _rims() -> tuple[Painted, Painted]:
     """Return the skin about the left and the right eye."""
     points, normals = eye_rim()
     # Lit as if it lay a little flatter and higher: bags below the eyes look tired.
-    normals = normals + np.linspace(1.0, 0.0, len(points))[:, None, None] * (0.5, 0.0, 0.4)
+    normals = normals + np.linspace(1.0, 0.0, len(points))[:, None, None] * (0.3, 0.0, 0.25)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     mesh = grid(points, closed=True)
     colours = _complexion(points, normals)
@@ -85,7 +96,7 @@ def _used(
 
 def cap() -> Painted:
     """Return the cap over the back of the head, in distances between the eyes."""
-    points, normals = HEAD.beyond(_CAP_NORMAL, _CAP_LINE, 24, 60, _CAP_OUT)
+    points, normals = HEAD.beyond(_CAP_NORMAL, _CAP_LINE, 15, 48, _CAP_OUT)
     # Its edge is rounded down to the skin and a little below it.
     rim = [points[0] - out * normals[0] for out in (0.10, 0.03, 0.012)]
     lifted = np.concatenate((np.stack(rim), points[1:]))
@@ -111,27 +122,36 @@ def _complexion(points: Floats, normals: Floats) -> Floats:
     return colours
 
 
+def mouth() -> Painted:
+    """Return the dark within an open mouth, in distances between the eyes.
+
+    A body that hides the neck, and the inside of the skin.
+    """
+    ball = ellipsoid((0.58, 0.76, 0.60))
+    body = Mesh(ball.vertices + (-0.74, 0.0, -0.76), ball.faces)
+    mesh, _, normals = skin().head
+    inside = Mesh(mesh.vertices - 0.03 * np.asarray(normals), mesh.faces[:, ::-1])
+    return merged([painted(body, _MOUTH), painted(inside, _MOUTH)])
+
+
 def brow() -> Painted:
     """Return the left brow, in distances between the eyes: a tapering bow on the forehead."""
-    share = np.linspace(0.0, 1.0, 28)
+    share = np.linspace(0.0, 1.0, 20)
     y = 0.20 + 0.68 * share
     z = 0.50 + 0.20 * np.sin(pi * (0.16 + 0.66 * share)) - 0.06 * share
-    return bow(HEAD, y, z, 0.052, _HAIR)
+    return bow(HEAD, y, z, 0.052, _HAIR, 9)
 
 
 def eye() -> Painted:
     """Return an eyeball of radius 1 that looks along x: white, iris, pupil under the cornea."""
-    angles = np.concatenate(
-        (
-            np.linspace(radians(130.0), radians(60.0), 7, endpoint=False),
-            np.linspace(radians(60.0), radians(34.0), 6, endpoint=False),
-            np.linspace(radians(34.0), 0.0, 32),
-        )
-    )
+    # Close together where a colour ends: at the white, at the limbus and at the pupil.
+    angles = np.radians(
+        (110, 80, 60, 46, 37, 33, 31.6, 30.6, 29.6, 28.4, 27, 24.5, 21.5, 18.5, 16, 14, 13, 12, 10, 5, 0)
+    )  # fmt: skip
     inside = np.clip(1.0 - (angles / LIMBUS_RAD) ** 2, 0.0, 1.0)
     radius = 1.0 + _CORNEA * inside**1.25
     profile = list(zip(radius * np.sin(angles), radius * np.cos(angles), strict=True))
-    columns = 64
+    columns = 48
     dome = turned([(r, h) for r, h in profile], around=columns)
     mesh = Mesh(dome.vertices[:, (2, 0, 1)], dome.faces)
     colours = np.repeat(_eye_colours(angles, columns).reshape(-1, 3), 1, axis=0)
@@ -142,7 +162,7 @@ def _eye_colours(angles: Floats, columns: int) -> Floats:
     """Return the eye's colours (rows, columns, 3) by the angle from its axis."""
     rng = np.random.default_rng(7)
     fibres = np.sin(
-        np.outer(np.arange(5, 45, 4), np.linspace(0.0, 2.0 * pi, columns, endpoint=False))
+        np.outer(np.arange(4, 24, 2), np.linspace(0.0, 2.0 * pi, columns, endpoint=False))
         + rng.uniform(0.0, 2.0 * pi, 10)[:, None]
     ).mean(axis=0) * 2.2  # fmt: skip
     a = np.degrees(angles)[:, None] + 0.0 * fibres
@@ -165,9 +185,9 @@ def eyelid(upper: bool) -> Painted:
     The edge is dark and has a lip, as lashes do.
     """
     side = 1.0 if upper else -1.0
-    sweep = np.concatenate(((0.0, 0.0), np.radians((1.6, 3.2, 4.0)), np.linspace(0.09, 2.1, 14)))
-    reach = np.concatenate(((0.955, 1.028 if upper else 1.01), (1.022, 1.006, 1.0), np.ones(14)))
-    across = np.linspace(pi, 0.0, 30)
+    sweep = np.concatenate(((0.0, 0.0), np.radians((1.6, 3.2, 4.0)), np.linspace(0.09, 2.1, 11)))
+    reach = np.concatenate(((0.955, 1.028 if upper else 1.01), (1.022, 1.006, 1.0), np.ones(11)))
+    across = np.linspace(pi, 0.0, 25)
     ring = reach[:, None] * np.sin(across)
     points = np.stack(
         (
@@ -178,7 +198,7 @@ def eyelid(upper: bool) -> Painted:
         axis=-1,
     )
     mesh = grid(points if upper else points[:, ::-1], closed=False)
-    lash = np.array((1.0, 1.0, 1.0, 0.85, 0.25, *np.zeros(14))) * (1.0 if upper else 0.62)
+    lash = np.array((1.0, 1.0, 1.0, 0.85, 0.25, *np.zeros(11))) * (1.0 if upper else 0.62)
     colours = np.broadcast_to(np.array(LID, float), points.shape)
     fold = np.exp(-(((sweep - 0.62) / 0.10) ** 2)) * 0.30 + np.clip(sweep - 0.9, 0.0, 0.2)
     colours = mix(colours, _SHADE, np.broadcast_to(fold[:, None], points.shape[:2]))
@@ -197,23 +217,23 @@ def ear() -> Painted:
 
 def neck() -> Painted:
     """Return a neck of length 1 along z and radius 1 of bellows."""
-    height = np.linspace(0.0, 1.0, 73)
+    height = np.linspace(0.0, 1.0, 55)
     profile = [(1.0 + 0.05 * cos(18.0 * pi * h), h) for h in height]
-    mesh = turned(profile)
-    groove = np.repeat(0.5 - 0.5 * np.cos(18.0 * pi * height), len(mesh.vertices) // 73)
+    mesh = turned(profile, around=28)
+    groove = np.repeat(0.5 - 0.5 * np.cos(18.0 * pi * height), len(mesh.vertices) // 55)
     return Painted(mesh, mix(plain(mesh, (104, 110, 124)), (44, 47, 56), groove * 0.8),
                    smooth_normals(mesh))  # fmt: skip
 
 
 def bust() -> Painted:
     """Return shoulders of height 1 below z = 0, with a collar, in units of their height."""
-    share = np.linspace(0.0, 1.0, 40)
+    share = np.linspace(0.0, 1.0, 24)
     slope = 1.0 / (1.0 + np.exp(-(share - 0.42) / 0.085))
     half_x = 0.42 + 0.44 * slope - 0.10 * np.clip(share - 0.75, 0.0, 1.0)
     half_y = 0.46 + 1.20 * slope
-    rows = [(0.40, 0.44, -0.12), (0.40, 0.44, -0.02), (0.46, 0.50, 0.0)]
+    rows = [(0.0, 0.0, -0.12), (0.40, 0.44, -0.12), (0.40, 0.44, -0.02), (0.46, 0.50, 0.0)]
     rows += [(float(x), float(y), -float(s)) for x, y, s in zip(half_x, half_y, share, strict=True)]
-    around = np.linspace(0.0, 2.0 * pi, 64, endpoint=False)
+    around = np.linspace(0.0, 2.0 * pi, 44, endpoint=False)
     points = np.array(
         [
             [(x * _super(cos(a)), y * _super(sin(a)), z) for a in around.tolist()]

@@ -39,6 +39,8 @@ _LOWER_OPEN_RAD = radians(-46.0)
 UPPER_LID, LOWER_LID = 1.085, 1.07
 """Radii of the lids, in those of the eyeball."""
 _NECK_RADIUS, _BUST, _BELOW_CHIN = 0.42, 1.45, 0.25  # in distances between the eyes
+_THROAT: Vec3 = (-0.72, 0.0, -0.90)
+"""Where a neck without joints ends, in distances between the eyes."""
 LEAST_M = 0.01
 """No part is drawn shorter."""
 _BROW_OUT = 0.35  # how far a brow's joint moves it up, in distances between the eyes a radian
@@ -76,6 +78,8 @@ class HeadView:
             self._add("/head/cap", head_mesh.cap(), PLASTIC),
         )
         self._jaw = self._skin[1]
+        self._mouth = self._add("/head/mouth", head_mesh.mouth(), FLAT)
+        self._mouth.visible = False
         self._ears = tuple(self._add_ear(side) for side in SIDES)
         self._eyes = tuple(self._add_eye(side) for side in SIDES)
         self._colour = _SIGHT["fixate"]
@@ -125,11 +129,11 @@ class HeadView:
         """Give every part the size that the rig's measures say."""
         self.measures = measures
         unit = measures.interocular_m
-        for part in (*self._skin, *(eye.brow for eye in self._eyes)):
+        for part in (*self._skin, self._mouth, *(eye.brow for eye in self._eyes)):
             part.scale = unit
         for ear, side in zip(self._ears, (1.0, -1.0), strict=True):
             ear.scale = 0.36 * unit
-            ear.position = measures.scaled((-1.12, 1.155 * side, -0.02))
+            ear.position = measures.scaled((-1.12, 1.185 * side, -0.02))
         for eye in self._eyes:
             eye.ball.scale = measures.eye_radius_m
             eye.upper.scale = UPPER_LID * measures.eye_radius_m
@@ -145,7 +149,8 @@ class HeadView:
         if measures != self.measures:
             self._fit(measures)
         put(self._head, p_world_head_m, quaternion_of(R_world_head))
-        self._hold_up(p_world_head_m, add(p_world_head_m, rotate(R_world_head, measures.pivot_m)))
+        pivot_m = measures.pivot_m if self._necked else measures.scaled(_THROAT)
+        self._hold_up(p_world_head_m, add(p_world_head_m, rotate(R_world_head, pivot_m)))
         if JAW in self._joints:
             turn_to(self._jaw, jaw_turn(snapshot.measured_rad[self._joints.index(JAW)]))
             put(self._jaw, _about(measures.hinge_m, self._jaw.wxyz))
@@ -190,6 +195,7 @@ class HeadView:
         """Draw what these joints move, and what stands still beside it."""
         self._joints = joints
         self._necked = any(joint.startswith("neck_") for joint in joints)
+        self._mouth.visible = JAW in joints
         if JAW not in joints:
             put(self._jaw, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
         for eye in self._eyes:

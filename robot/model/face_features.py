@@ -82,6 +82,6 @@ def brow(
     share = np.linspace(0.0, 1.0, len(y))
     middle = head.front(y, z) + (0.012, 0.0, 0.0)
     radius = thick * (1.0 - 0.70 * share**1.6) * np.sqrt(np.clip(share / 0.05, 0.25, 1.0))
-    turn = np.linspace(0.0, 2.0 * pi, around, endpoint=False)
+    turn = np.linspace(2.0 * pi, 0.0, around, endpoint=False)
     ring = np.stack((0.55 * np.cos(turn), np.zeros(around), np.sin(turn)), axis=1)
     return painted(grid(middle[:, None] + radius[:, None, None] * ring, closed=True), colour)

@@ -30,7 +30,7 @@ EYE_RADIUS = 0.335
 """Radius of an eyeball, in distances between the eyes."""
 TOP, CHIN = 1.80, -1.62
 """Height of the head's top and of the chin, in distances between the eyes."""
-_ROWS, _COLUMNS = 60, 60
+_ROWS, _COLUMNS = 52, 52
 _SOLIDS: tuple[tuple[Field, float], ...] = (
     (ellipsoid((-1.10, 0.0, 0.50), (1.30, 1.20, 1.30)), 0.1),  # skull
     (ellipsoid((-0.66, 0.0, -0.30), (0.84, 1.04, 0.96)), 0.45),  # face
@@ -52,7 +52,7 @@ _LIPS: tuple[tuple[Field, float], ...] = (
 _SOCKET = ellipsoid((0.33, 0.53, 0.0), (0.30, 0.46, 0.44))
 _NECK = capsule((-0.86, 0.0, -0.8), (-0.78, 0.0, -1.36), 0.54, 0.42)
 _EYE = np.array((0.0, 0.5, 0.0))
-_RIM_ROWS, _RIM_COLUMNS, _RIM_RADIUS = 8, 48, 0.372
+_RIM_ROWS, _RIM_COLUMNS, _RIM_RADIUS = 7, 36, 0.372
 _RIM_OFF = 0.014
 _RIM_OUT = np.array((0.0, 0.50, 0.49))
 _SMILE = 0.85
@@ -149,7 +149,7 @@ def eye_rim() -> Surface:
 
     Rows from within outwards, columns around the eye, closed.
     """
-    around = np.linspace(0.0, 2.0 * pi, _RIM_COLUMNS, endpoint=False)
+    around = np.linspace(2.0 * pi, 0.0, _RIM_COLUMNS, endpoint=False)
     aside, up = np.cos(around), np.sin(around)
     # As far from the eye's axis as leaves lids and iris free: farther to the temple, nearer above.
     off = np.radians(60.0 + 12.0 * np.clip(aside, 0.0, 1.0) ** 2 - 4.0 * np.clip(up, 0.0, 1.0) ** 2)
@@ -187,8 +187,8 @@ def eye_rim() -> Surface:
 
 def of_jaw(points: Floats) -> Floats:
     """Return which points (..., 3) of the surface a jaw would move."""
-    x, z = points[..., 0], points[..., 2]
+    x, y, z = points[..., 0], np.abs(points[..., 1]), points[..., 2]
     # From the line of the mouth back to the hinge, and down to where the throat begins.
     above = _MOUTH_Z + 0.42 * np.maximum(0.0, -0.16 - x)
-    z = smiling(np.minimum(np.abs(points[..., 1]), _MOUTH_HALF), z)
-    return np.asarray((z < above) & (z > -1.66 - 0.6 * x - 0.9) & (x > -0.62))
+    z = smiling(np.minimum(y, _MOUTH_HALF), z)
+    return np.asarray((z < above) & (z > -1.66 - 0.6 * x - 0.9) & (x > -0.45) & (y < 0.50))
