@@ -34,7 +34,7 @@ def desk() -> Iterator[Served]:
 @pytest.mark.pty
 def test_sigterm_while_jogging_parks_and_lets_go(desk: Served) -> None:
     path = desk.ports
-    process = start("jog", "neck_yaw", "60", "--speed", "60", "--port", path)
+    process = start("jog", "neck_yaw", "60", "--speed", "15", "--port", path)
     hear(process.stderr, "torque on")
     time.sleep(0.3)
     process.send_signal(signal.SIGTERM)
