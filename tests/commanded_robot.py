@@ -1,10 +1,14 @@
 """A robot that runs tick by tick and is given commands."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from desk import GAZE_JOINTS
 
-from gazerig.robot.app.assemble import Assembly
+from gazerig.config.schema import load_rig
+from gazerig.robot.app.assemble import Assembly, assemble
+from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.commands import Command
 
@@ -33,3 +37,19 @@ class Running:
     def order(self, order: Command) -> None:
         """Ask."""
         self.made.robot.command(order)
+
+
+@contextmanager
+def running_desk() -> Iterator[Running]:
+    """Run a desk rig face to face with a person, for two seconds as yet."""
+    made = assemble(
+        load_rig("desk"), RunOptions(mock=True, fast=True, seed=3, scene="face-to-face")
+    )
+    made.robot.start(made.clock)
+    try:
+        running = Running(made)
+        running.go(2.0)
+        yield running
+    finally:
+        made.robot.stop()
+        made.close()

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from commanded_robot import YAW, Running
+from commanded_robot import YAW, Running, running_desk
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -17,8 +17,6 @@ from gazerig.gaze.gesture import GestureParams
 from gazerig.gaze.gesture_player import GesturePlayer
 from gazerig.gaze.lids import LidParams, Lids
 from gazerig.gaze.top_down import TopDown, TopDownParams
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.session import leave
 from gazerig.robot.control.command_choices import Menus
 from gazerig.robot.control.gesture_choices import GestureChoices
@@ -31,17 +29,8 @@ pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 @pytest.fixture
 def running() -> Iterator[Running]:
-    made = assemble(
-        load_rig("desk"), RunOptions(mock=True, fast=True, seed=3, scene="face-to-face")
-    )
-    made.robot.start(made.clock)
-    try:
-        running = Running(made)
-        running.go(2.0)
+    with running_desk() as running:
         yield running
-    finally:
-        made.robot.stop()
-        made.close()
 
 
 ORDERS: list[Command] = [

@@ -3,11 +3,8 @@
 from collections.abc import Iterator
 
 import pytest
-from commanded_robot import Running
+from commanded_robot import Running, running_desk
 
-from gazerig.config.schema import load_rig
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.head_state import as_json, from_json, head_state
 from gazerig.robot.control.joint_faults import JointFaults
 from gazerig.robot.control.tick import Tick
@@ -24,17 +21,8 @@ pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 @pytest.fixture
 def running() -> Iterator[Running]:
-    made = assemble(
-        load_rig("desk"), RunOptions(mock=True, fast=True, seed=3, scene="face-to-face")
-    )
-    made.robot.start(made.clock)
-    try:
-        running = Running(made)
-        running.go(2.0)
+    with running_desk() as running:
         yield running
-    finally:
-        made.robot.stop()
-        made.close()
 
 
 def shown(tick: Tick) -> Snapshot:

@@ -15,7 +15,7 @@ from gazerig.robot.dashboard.dwell_chart import BIN_S, BINS, DwellChart
 from gazerig.robot.dashboard.event_timeline import STRIP_S, Timeline
 from gazerig.robot.dashboard.gaze_map import HIGH_PX, SHRINK, WIDE_PX, GazeMap, gaze_on_face
 from gazerig.robot.dashboard.main_sequence_chart import KEPT, MainSequenceChart
-from gazerig.robot.dashboard.run_figures import Figure, RunFigures, judged
+from gazerig.robot.dashboard.run_figures import RunFigure, RunFigures, judged
 from gazerig.robot.dashboard.view_frusta import field_edge
 from gazerig.robot.model.types import SeenBlink, SeenFace, SeenFixation, SeenSaccade, Snapshot
 
@@ -209,7 +209,7 @@ def test_the_edge_of_the_field_lies_at_its_limits() -> None:
 # --- the figures of the run -------------------------------------------------------------------
 
 
-def told(count: int, speed: float, seconds: float = 60.0) -> dict[str, Figure]:
+def told(count: int, speed: float, seconds: float = 60.0) -> dict[str, RunFigure]:
     """Figures of a minute with so many saccades of 5 deg, of so much of people's speed."""
     figures, dwell = RunFigures(), DwellChart()
     for k in range(count):
@@ -225,10 +225,10 @@ def told(count: int, speed: float, seconds: float = 60.0) -> dict[str, Figure]:
 def test_figures_are_those_of_the_report() -> None:
     found = told(150, 0.9)
     assert found["rate"].value == pytest.approx(2.5) and found["rate"].events == 150
-    assert found["peak_small"] == Figure("peak_small", 1.0, 150)
+    assert found["peak_small"] == RunFigure("peak_small", 1.0, 150)
     assert found["below_15"].value == 1.0 and found["duration_small"].value == 1.0
     assert found["eyes_share"].value == pytest.approx(0.5)
-    assert found["too_soon"] == Figure("too_soon", 0.0, 149)
+    assert found["too_soon"] == RunFigure("too_soon", 0.0, 149)
     assert found["blink_rate"].value == 0.0
     assert "peak_large" not in found
     assert told(150, 1.2)["peak_small"].value == 0.0
@@ -236,14 +236,14 @@ def test_figures_are_those_of_the_report() -> None:
 
 def test_few_events_never_judge_and_chance_is_called_so() -> None:
     band = BY_KEY["duration_small"]  # a share of .75 and more, of at least 30
-    assert judged(Figure(band.key, 0.0, 29), band) == "too few: 29 of 30"
-    assert judged(Figure(band.key, 0.8, 30), band) == "inside"
-    assert judged(Figure(band.key, 0.7, 40), band) == "may be chance"
-    assert judged(Figure(band.key, 0.7, 4000), band) == "outside"
-    assert judged(Figure(band.key, 0.0, 30), band) == "outside"
+    assert judged(RunFigure(band.key, 0.0, 29), band) == "too few: 29 of 30"
+    assert judged(RunFigure(band.key, 0.8, 30), band) == "inside"
+    assert judged(RunFigure(band.key, 0.7, 40), band) == "may be chance"
+    assert judged(RunFigure(band.key, 0.7, 4000), band) == "outside"
+    assert judged(RunFigure(band.key, 0.0, 30), band) == "outside"
     rate = BY_KEY["rate"]
-    assert judged(Figure("rate", 4.2, 100), rate) == "may be chance"
-    assert judged(Figure("rate", 6.0, 100), rate) == "outside"
+    assert judged(RunFigure("rate", 4.2, 100), rate) == "may be chance"
+    assert judged(RunFigure("rate", 6.0, 100), rate) == "outside"
 
 
 def test_the_table_shows_the_range_of_people_and_its_source() -> None:

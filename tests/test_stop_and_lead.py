@@ -4,11 +4,9 @@ from collections.abc import Iterator
 from math import radians
 
 import pytest
-from commanded_robot import YAW, Running
+from commanded_robot import YAW, Running, running_desk
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Renew, Resume, Stop
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
@@ -16,17 +14,8 @@ pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 @pytest.fixture
 def running() -> Iterator[Running]:
-    made = assemble(
-        load_rig("desk"), RunOptions(mock=True, fast=True, seed=3, scene="face-to-face")
-    )
-    made.robot.start(made.clock)
-    try:
-        running = Running(made)
-        running.go(2.0)
+    with running_desk() as running:
         yield running
-    finally:
-        made.robot.stop()
-        made.close()
 
 
 # Who may resume, and when

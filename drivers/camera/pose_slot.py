@@ -1,12 +1,12 @@
 """The newest pose of the head: written by the control loop, read by a process that draws its view.
 
-Shared memory without a lock: the loop writes the older of two entries and then counts it; the
-reader looks at the count before and after, and reads again what was overwritten meanwhile.
+No lock is needed (``TwoEntries``).
 """
 
-import multiprocessing
 from collections.abc import Sequence
 from typing import NamedTuple
+
+from gazerig.drivers.camera.two_entries import CONTEXT, TwoEntries
 
 _WIDTH = 13  # time, the nine numbers of the rotation, the place
 
@@ -28,22 +28,20 @@ class PoseSlot:
     """
 
     def __init__(self) -> None:
-        context = multiprocessing.get_context("spawn")
-        self._count = context.RawValue("q", 0)
-        self._first_s = context.RawValue("d", 0.0)
-        self._entries = context.RawArray("d", 2 * _WIDTH)
+        self._newest = TwoEntries()
+        self._first_s = CONTEXT.RawValue("d", 0.0)
+        self._entries = CONTEXT.RawArray("d", 2 * _WIDTH)
 
     def record(
         self, t_s: float, R_world_head: Sequence[Sequence[float]], p_world_head_m: Sequence[float]
     ) -> None:
         """Record a pose; only one process writes."""
-        count = self._count.value
-        if count == 0:
+        if self._newest.count == 0:
             self._first_s.value = t_s
         x, y, z = R_world_head
-        start = count % 2 * _WIDTH
+        start = self._newest.older * _WIDTH
         self._entries[start : start + _WIDTH] = [t_s, *x, *y, *z, *p_world_head_m]
-        self._count.value = count + 1
+        self._newest.filled()
 
     @property
     def first_s(self) -> float:
@@ -52,10 +50,13 @@ class PoseSlot:
 
     def newest(self) -> PoseAt | None:
         """Return the newest pose, None before the first."""
-        while count := self._count.value:
-            start = (count - 1) % 2 * _WIDTH
-            t_s, *v = self._entries[start : start + _WIDTH]
-            if self._count.value - count < 1:
-                rows = (v[0], v[1], v[2]), (v[3], v[4], v[5]), (v[6], v[7], v[8])
-                return PoseAt(t_s, rows, (v[9], v[10], v[11]))
-        return None
+        found = self._newest.read(self._copy)
+        if found is None:
+            return None
+        t_s, *v = found[1]
+        rows = (v[0], v[1], v[2]), (v[3], v[4], v[5]), (v[6], v[7], v[8])
+        return PoseAt(t_s, rows, (v[9], v[10], v[11]))
+
+    def _copy(self, entry: int) -> list[float]:
+        start = entry * _WIDTH
+        return list(self._entries[start : start + _WIDTH])

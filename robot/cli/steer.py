@@ -29,7 +29,7 @@ HELP = {
 }
 
 
-class Controls(Protocol):
+class SteeringInput(Protocol):
     """What a person steers with."""
 
     def update(self, steering: Steering, now_s: float) -> tuple[str, ...]:
@@ -69,7 +69,7 @@ def steer(
 
 def lead(
     rig: RobotClient,
-    controls: Controls,
+    controls: SteeringInput,
     steering: Steering,
     clock: Clock,
     show: Callable[[str], None],
@@ -129,7 +129,7 @@ class KeyControls:
         self._rest = ""
 
     def update(self, steering: Steering, now_s: float) -> tuple[str, ...]:
-        """Do what keys say; see Controls."""
+        """Do what keys say; see SteeringInput."""
         from gazerig.robot.cli.key_input import split_keys
 
         typed = self._text()
@@ -150,7 +150,7 @@ class KeyControls:
 
 
 @contextlib.contextmanager
-def _keyboard() -> Generator[Controls, None, None]:
+def _keyboard() -> Generator[SteeringInput, None, None]:
     from gazerig.robot.cli.key_input import TerminalKeys
 
     with TerminalKeys() as keys:
@@ -164,14 +164,14 @@ class GamepadControls:
         self._pad = pad
 
     def update(self, steering: Steering, now_s: float) -> tuple[str, ...]:
-        """Do what stick and buttons say; see Controls."""
+        """Do what stick and buttons say; see SteeringInput."""
         news = self._pad.news()
         steering.stick(news.stick)
         return news.pressed
 
 
 @contextlib.contextmanager
-def _gamepad(path: str | None) -> Generator[Controls, None, None]:
+def _gamepad(path: str | None) -> Generator[SteeringInput, None, None]:
     pad = open_gamepad(path)
     say(f"gamepad: {pad.name}")
     with contextlib.closing(pad):

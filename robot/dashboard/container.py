@@ -11,14 +11,14 @@ from gazerig.robot.dashboard.widget import (
     Html,
     Image,
     Place,
-    Publisher,
     Slider,
     TextField,
     Widget,
+    WidgetPublisher,
 )
 
 W = TypeVar("W", bound=Widget)
-Make = Callable[[Publisher, Place, str, dict[str, object]], W]
+Make = Callable[[WidgetPublisher, Place, str, dict[str, object]], W]
 """The constructor of a kind of element."""
 
 

@@ -31,7 +31,7 @@ HOW_TO = note(
 )
 
 
-class Figure(NamedTuple):
+class RunFigure(NamedTuple):
     """One measure: how much, and of how many events."""
 
     key: str
@@ -85,17 +85,17 @@ class RunFigures:
         counts[0] += bool(fits)
         counts[1] += 1
 
-    def figures(self, dwell: DwellChart) -> list[Figure]:
+    def figures(self, dwell: DwellChart) -> list[RunFigure]:
         """Return what there is to say; dwell: the rests on parts of faces."""
         seconds = self._now_s - self._first_s if self._first_s is not None else 0.0
-        found = [Figure(key, inside / n, n) for key, (inside, n) in self._inside.items()]
+        found = [RunFigure(key, inside / n, n) for key, (inside, n) in self._inside.items()]
         if seconds > 0.0:
-            found.append(Figure("rate", self._saccades / seconds, self._saccades))
+            found.append(RunFigure("rate", self._saccades / seconds, self._saccades))
         if seconds >= _LEAST_RATE_S:
             key = "blink_rate_talk" if self._talking else "blink_rate"
-            found.append(Figure(key, 60.0 * self._blinks / seconds, self._blinks))
+            found.append(RunFigure(key, 60.0 * self._blinks / seconds, self._blinks))
         if shares := dwell.shares():
-            found.append(Figure("eyes_share", shares["LE"] + shares["RE"], dwell.rests))
+            found.append(RunFigure("eyes_share", shares["LE"] + shares["RE"], dwell.rests))
         order = list(BY_KEY)
         return sorted(found, key=lambda figure: order.index(figure.key))
 
@@ -112,7 +112,7 @@ class RunFigures:
         )
 
 
-def judged(figure: Figure, band: NormBand) -> str:
+def judged(figure: RunFigure, band: NormBand) -> str:
     """Return in words how a measure stands to the range of people.
 
     As in the report nothing is called outside that so few events may have put there by chance.
@@ -129,7 +129,7 @@ def judged(figure: Figure, band: NormBand) -> str:
     return "may be chance" if off <= _SURE * spread / sqrt(figure.events) else "outside"
 
 
-def _row(figure: Figure, band: NormBand) -> str:
+def _row(figure: RunFigure, band: NormBand) -> str:
     """Return one measure, what is found here, and the range of people."""
     verdict = judged(figure, band)
     kind = " class='near'" if verdict == "outside" else ""

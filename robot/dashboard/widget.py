@@ -4,6 +4,7 @@ A change of an element goes to every browser that shows it. What a browser sends
 element before it counts.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from math import isfinite
 from typing import Generic, NamedTuple, Protocol, TypeVar
@@ -28,7 +29,7 @@ class Place(NamedTuple):
     owner: str = ""
 
 
-class Publisher(Protocol):
+class WidgetPublisher(Protocol):
     """Sends changes to the browsers; from any thread."""
 
     def changed(self, widget: "Widget", props: Mapping[str, object], but: str = "") -> None:
@@ -47,7 +48,9 @@ class Widget:
     place: where it stands; props: what browsers are told of it
     """
 
-    def __init__(self, page: Publisher, place: Place, kind: str, props: dict[str, object]) -> None:
+    def __init__(
+        self, page: WidgetPublisher, place: Place, kind: str, props: dict[str, object]
+    ) -> None:
         self._page, self.place = page, place
         self.props: dict[str, object] = {"kind": kind, "in": place.parent, **props}
         self.data = b""
@@ -58,6 +61,12 @@ class Widget:
         if new:
             self.props.update(new)
             self._page.changed(self, new, but)
+
+    def _words(self, prop: str) -> tuple[str, ...]:
+        """Return a property that is a list of words."""
+        words = self.props[prop]
+        assert isinstance(words, list)
+        return tuple(words)
 
     def remove(self) -> None:
         """Remove the element from the page."""
@@ -118,10 +127,12 @@ class Chart(Widget):
         return str(self.props["title"])
 
 
-class Field(Widget, Generic[T]):
+class Field(Widget, ABC, Generic[T]):
     """An element with a value that people can change."""
 
-    def __init__(self, page: Publisher, place: Place, kind: str, props: dict[str, object]) -> None:
+    def __init__(
+        self, page: WidgetPublisher, place: Place, kind: str, props: dict[str, object]
+    ) -> None:
         super().__init__(page, place, kind, props)
         self._handlers: list[Callable[[T, str], object]] = []
 
@@ -147,13 +158,13 @@ class Field(Widget, Generic[T]):
         """Call ``do`` with the value and the client whenever a person changes it."""
         self._handlers.append(do)
 
+    @abstractmethod
     def checked(self, value: object) -> T:
         """Return what a browser sent as a value of this field.
 
         Raises:
             ValueError: it is none.
         """
-        raise NotImplementedError
 
     def arrived(self, value: object, client: str) -> None:
         """Take a value from a browser, show it in the others and call the handlers."""
@@ -220,9 +231,7 @@ class Choice(Field[str]):
     @property
     def options(self) -> tuple[str, ...]:
         """What there is to choose from; a value that is no longer there becomes the first."""
-        options = self.props["options"]
-        assert isinstance(options, list)
-        return tuple(options)
+        return self._words("options")
 
     @options.setter
     def options(self, options: Sequence[str]) -> None:
@@ -239,16 +248,16 @@ class Choice(Field[str]):
 class Buttons(Widget):
     """A row of buttons; one of them may be marked as in force."""
 
-    def __init__(self, page: Publisher, place: Place, kind: str, props: dict[str, object]) -> None:
+    def __init__(
+        self, page: WidgetPublisher, place: Place, kind: str, props: dict[str, object]
+    ) -> None:
         super().__init__(page, place, kind, props)
         self._handlers: list[Callable[[str, str], object]] = []
 
     @property
     def options(self) -> tuple[str, ...]:
         """What the buttons say."""
-        options = self.props["options"]
-        assert isinstance(options, list)
-        return tuple(options)
+        return self._words("options")
 
     @options.setter
     def options(self, options: Sequence[str]) -> None:
