@@ -167,9 +167,6 @@ def assemble(rig: Rig, options: RunOptions, substitutes: Substitutes = RIGS_OWN)
     kinematics = kinematics_of(rig)
     camera, notes = placed_camera(rig, options, kinematics)
     walk = load_walk(rig.gaze.scanpath.transition_matrix)
-    table = rig.gaze.scanpath.transition_matrix
-    shipped = table in shipped_names("scanpaths") and not options.verbose
-    note = row_sums_note(walk) if not shipped else None
     in_process = scene is None or (options.pixels and not options.fast)
     sight = _sight(kinematics, camera, options, in_process)
     wires = run_bus(rig, options, clock)
@@ -206,10 +203,17 @@ def assemble(rig: Rig, options: RunOptions, substitutes: Substitutes = RIGS_OWN)
     except BaseException:
         wires.close()
         raise
-    notes = (*notes, note) if note is not None else notes
+    notes = (*notes, *_walk_notes(walk, rig, options))
     return Assembly(
         robot, clock, sight.mount, sight.poses, scene, wires.digest, wires.close, notes, live
     )
+
+
+def _walk_notes(walk: Walk, rig: Rig, options: RunOptions) -> tuple[str, ...]:
+    """Return what is odd about a walk of the user's own; of a shipped one only if asked for."""
+    shipped = rig.gaze.scanpath.transition_matrix in shipped_names("scanpaths")
+    note = row_sums_note(walk) if options.verbose or not shipped else None
+    return () if note is None else (note,)
 
 
 class _Generators(NamedTuple):

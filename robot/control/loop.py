@@ -34,7 +34,7 @@ from gazerig.robot.model.command_checks import check
 from gazerig.robot.model.commands import Ask, Command, Express, Jog, Play, SetLevel, Tune
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
-from gazerig.robot.model.lead import NO_GESTURE, NOBODY_LEADS, Lead
+from gazerig.robot.model.lead import Lead
 from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.reply import Ticket
 from gazerig.robot.model.types import JointAngles
@@ -292,11 +292,8 @@ class Robot:
             guard_result = self._guard.check(pose_rad, joints, 0.0, t_s)
             self.body.write(guard_result.command_rad)
             if watch is not None and isinstance(newest, Tick):
-                watch(newest._replace(
-                    t_s=t_s, joints=joints, pose=self._kinematics.forward(joints),
-                    desired_rad=pose_rad, guard_result=guard_result, events=(), commands=(),
-                    stopped="", led="", lead=NOBODY_LEADS, gesture=NO_GESTURE, parking=True,
-                ))  # fmt: skip
+                pose = self._kinematics.forward(joints)
+                watch(newest.while_parking(t_s, joints, pose, pose_rad, guard_result))
             errors = zip(pose_rad, joints.position_rad, strict=True)
             if max(abs(desired - now) for desired, now in errors) < radians(2.0):
                 return True

@@ -38,6 +38,20 @@ class Tick(NamedTuple):
     gesture: GestureState = NO_GESTURE
     parking: bool = False
 
+    def while_parking(
+        self,
+        t_s: float,
+        joints: JointState,
+        pose: GazeState,
+        desired_rad: JointAngles,
+        guard_result: GuardResult,
+    ) -> "Tick":
+        """Return a later tick of parking: what was seen is as here, and nobody leads."""
+        return Tick(
+            t_s, joints, pose, self.detections, self.percept, self.target, self.gaze,
+            desired_rad, guard_result, parking=True,
+        )  # fmt: skip
+
 
 def at_rest(
     joints: JointState, desired_rad: JointAngles, why: str, names: tuple[str, ...]
