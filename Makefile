@@ -10,8 +10,9 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .PHONY: run test check coverage docs package bench links figures clean
 
+# In a living room with physics, where its pictures can be rendered; else one line says what that needs.
 run: $(VENV)/.installed
-	$(BIN)/gazerig run --mock
+	$(BIN)/gazerig run --mock $$($(BIN)/python -m gazerig.robot.app.first_world)
 
 test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest --workers auto
@@ -51,6 +52,7 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python tests/bench/bench_recording.py
 	$(BIN)/python tests/bench/bench_api.py
 	$(BIN)/python tests/bench/bench_sweep.py
+	$(BIN)/python tests/bench/bench_world.py --quick
 
 # A folder with the packages under their import names, for what does not see through an install.
 links:
@@ -112,8 +114,15 @@ define meshes
 	  || echo "without $(MESHES): the tests of face meshes are skipped" >&2; }
 endef
 
+# The physics engine, which not every computer has a build of.
+define world
+	{ uv pip install -q --python $(BIN)/python -e '.[world]' 2>/dev/null \
+	  || $(BIN)/python -m pip install -q -e '.[world]' 2>/dev/null || true; }
+endef
+
 $(VENV)/.installed: pyproject.toml
 	$(call install,.)
+	@$(call world)
 
 $(VENV)/.installed-docs: pyproject.toml
 	$(call install,.[docs])

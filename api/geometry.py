@@ -135,10 +135,10 @@ def _loaded(rig: Rig | str) -> Rig:
 
 
 def _parts(rig: Rig) -> tuple[Kinematics, Oculomotor]:
-    return _made(_Held(rig))
+    return _made(_RigKey(rig))
 
 
-class _Held:
+class _RigKey:
     """A rig as part of a key: equal only to itself, as rigs hold mappings."""
 
     def __init__(self, rig: Rig) -> None:
@@ -148,9 +148,9 @@ class _Held:
         return id(self.rig)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Held) and other.rig is self.rig
+        return isinstance(other, _RigKey) and other.rig is self.rig
 
 
 @lru_cache(maxsize=8)
-def _made(held: _Held) -> tuple[Kinematics, Oculomotor]:
+def _made(held: _RigKey) -> tuple[Kinematics, Oculomotor]:
     return gaze_parts(held.rig, 0)

@@ -18,7 +18,7 @@ from gazerig.robot.recording.playback_devices import NoCamera
 def open(
     rig: str = "desk", *, fast: Literal[True], mock: bool = True,
     bus: Literal["emulated", "ideal"] | None = None, page: None = None,
-    scene: str | None = None, video: Path | str | None = None,
+    scene: str | None = None, world: str | None = None, video: Path | str | None = None,
     camera: Camera | None = None, detector: FaceDetector | None = None,
     attention: Chooser | None = None, character: str | None = None, profile: str | None = None,
     seed: int = 0, record: Path | str | None = None, say: Callable[[str], None] | None = None,
@@ -29,7 +29,7 @@ def open(
 def open(
     rig: str = "desk", *, fast: Literal[False] = False, mock: bool = False,
     bus: Literal["emulated", "ideal"] | None = None,
-    port: str | None = None, page: str | None = None, scene: str | None = None,
+    port: str | None = None, page: str | None = None, scene: str | None = None, world: str | None = None,
     video: Path | str | None = None, camera: int | str | Camera | FrameSource | None = None, oak: bool = False,
     detector: FaceDetector | None = None, attention: Chooser | None = None,
     character: str | None = None, profile: str | None = None, seed: int = 0,
@@ -39,20 +39,19 @@ def open(
 
 def open(
     rig: str = "desk", *, fast: bool = False, mock: bool = False, bus: str | None = None,
-    port: str | None = None,
-    page: str | None = None, scene: str | None = None, video: Path | str | None = None,
-    camera: int | str | Camera | FrameSource | None = None, oak: bool = False,
+    port: str | None = None, page: str | None = None, scene: str | None = None, world: str | None = None,
+    video: Path | str | None = None, camera: int | str | Camera | FrameSource | None = None, oak: bool = False,
     detector: FaceDetector | None = None, attention: Chooser | None = None,
-    character: str | None = None, profile: str | None = None, seed: int = 0, record: Path | str | None = None,
-    say: Callable[[str], None] | None = None,
+    character: str | None = None, profile: str | None = None, seed: int = 0,
+    record: Path | str | None = None, say: Callable[[str], None] | None = None,
 ) -> LocalHead:  # fmt: skip
     """Return a head; it starts with the ``with`` block, and parks and switches off at its end.
 
         with gazerig.open("desk", mock=True) as head:
             head.look_at(1.0, 0.2, 0.3).wait()
 
-    Without anything to look at (``camera``, ``oak``, ``video``, ``scene``) real servos look where
-    the program says, and emulated ones at a simulated visitor.
+    Without anything to look at (``camera``, ``oak``, ``video``, ``scene``, ``world``) real servos
+    look where the program says, and emulated ones at a simulated visitor.
 
     Args:
         rig: a shipped rig by name, or the path of a YAML file.
@@ -63,6 +62,7 @@ def open(
         port: serial port instead of the rig's.
         page: HOST:PORT of the live page; its address is told to ``say``.
         scene: simulated people, as of ``gazerig run --scene``.
+        world: a world with physics, by name or path, as of ``gazerig run --world``.
         video: a film or image to look at.
         camera: number of a webcam, name of another package's camera, or an object of one's own
             that gives frames (``gazerig.drivers.camera.source.FrameSource``) or detections
@@ -82,11 +82,11 @@ def open(
     """
     own = camera if not isinstance(camera, int | str) else None
     seen = camera if isinstance(camera, int | str) else None
-    sees = any(one is not None for one in (scene, video, seen)) or oak
+    sees = any(one is not None for one in (scene, world, video, seen)) or oak
     mock = mock or fast
     drawn = scene is not None or (mock and not sees and own is None)
     options = RunOptions(
-        rig=rig, mock=mock, fast=fast, bus=bus, port=port, page=page, scene=scene, video=_path(video),
+        rig=rig, mock=mock, fast=fast, bus=bus, port=port, page=page, scene=scene, world=world, video=_path(video),
         camera=seen, oak=oak, pixels=detector is not None and drawn,
         character=character, profile=profile, seed=seed, record=_path(record), seconds=_FOR_EVER_S,
     )  # fmt: skip

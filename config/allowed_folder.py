@@ -6,6 +6,7 @@ may be named.
 """
 
 import os
+import re
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -20,6 +21,7 @@ _KIND_OF_KEY = {
     "oak.face_model": "",
 }
 """Keys of a rig that hold a shipped name or a file, and the kind of the names; "": no names."""
+_MESH_FILE = re.compile(r"meshes\..+\.file")
 _YAML = (".yaml", ".yml")
 
 
@@ -67,12 +69,13 @@ class AllowedFolder:
         faults: list[ConfigFault] = []
         for key, value in _leaves("", renamed_changes(changes)):
             files = (value,) if isinstance(value, str) else value
-            if key not in _KIND_OF_KEY or not isinstance(files, list | tuple):
+            kind = "" if _MESH_FILE.fullmatch(key) else _KIND_OF_KEY.get(key)
+            if kind is None or not isinstance(files, list | tuple):
                 continue
             for file in files:
                 try:
                     if isinstance(file, str) and file:
-                        self.file(file, _KIND_OF_KEY[key], key, Path.cwd())
+                        self.file(file, kind, key, Path.cwd())
                 except ConfigError as error:
                     faults += error.faults
         if faults:

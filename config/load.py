@@ -32,8 +32,8 @@ RIGS_FOLDER, GESTURES_FOLDER = SHIPPED / "rigs", SHIPPED / "gestures"
 """What this package registers in the groups of rigs and gestures."""
 
 
-_FILES_BESIDE = "gesture_files"
-"""Key of a rig with paths of files, relative to the folder of the file that names them."""
+_FILES_BESIDE, _MESHES = "gesture_files", "meshes"
+"""Keys of a rig with paths of files, relative to the folder of the file that names them."""
 Check = Callable[[T], Iterable[tuple[str, str]]]
 """Returns (dotted key path, broken rule) for rules between several fields."""
 
@@ -175,16 +175,32 @@ def _steps(key: str) -> tuple[str, ...]:
 
 def _from_its_folder(layer: Entry) -> Entry:
     """Return a file's entries with the paths of files beside it as seen from the working folder."""
-    found = layer.value.get(_FILES_BESIDE) if isinstance(layer.value, dict) else None
-    if found is None or not isinstance(found.value, tuple):
+    if not isinstance(layer.value, dict):
         return layer
-    folder = Path(layer.file).parent
-    paths = tuple(
-        replace(one, value=str(folder / str(one.value))) if _is_relative(one.value) else one
-        for one in found.value
+    folder, found = Path(layer.file).parent, dict(layer.value)
+    gestures = found.get(_FILES_BESIDE)
+    if gestures is not None and isinstance(gestures.value, tuple):
+        paths = tuple(
+            replace(one, value=str(folder / str(one.value))) if _is_relative(one.value) else one
+            for one in gestures.value
+        )
+        found[_FILES_BESIDE] = replace(gestures, value=paths)
+    meshes = found.get(_MESHES)
+    if meshes is not None and isinstance(meshes.value, dict):
+        beside = {name: _beside(one, folder) for name, one in meshes.value.items()}
+        found[_MESHES] = replace(meshes, value=beside)
+    return replace(layer, value=found)
+
+
+def _beside(mesh: Entry, folder: Path) -> Entry:
+    """Return the entry of a mesh with its file as seen from the working folder."""
+    file = mesh.value.get("file") if isinstance(mesh.value, dict) else None
+    if file is None or not isinstance(file.value, str) or file.value.startswith("~"):
+        return mesh
+    assert isinstance(mesh.value, dict)
+    return replace(
+        mesh, value={**mesh.value, "file": replace(file, value=str(folder / file.value))}
     )
-    assert isinstance(layer.value, dict)
-    return replace(layer, value={**layer.value, _FILES_BESIDE: replace(found, value=paths)})
 
 
 def _is_relative(value: object) -> bool:

@@ -3,9 +3,8 @@
 A key is the dotted path of the YAML. A rig is changed by keys as a file would change it:
 errors have the same texts, and nothing is changed then. Pure.
 
-A changed rig shares with the one it was made of every section in which nothing changed, and
-only what is not shared is checked and compared: a slider that is dragged makes ten rigs a
-second beside a control loop that needs the same interpreter.
+A changed rig shares with the old one every section in which nothing changed, and only the others
+are checked and compared: a dragged slider makes ten rigs a second beside the control loop.
 """
 
 import dataclasses
@@ -42,6 +41,7 @@ _AT_START: dict[str, str] = {
     "joints.*.servo_speed_deg_s": "the servos' places are estimated from it after the first goal",
     "gesture_files": "gestures are read and checked when the rig is read",
     "couplings.*": "the servos' places are turned into angles with it from the first reading on",
+    "meshes.*": "meshes are read when the rig is drawn for the first time",
     "buses.*": "the servo buses are opened with it",
     "joints.*.gains": "servos are set up while their torque is off; a stop and a resume will do",
     "joints.*.torque_limit": "servos are set up while their torque is off; a stop and a resume will do",

@@ -38,6 +38,7 @@ from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS, GeometryParams
 from gazerig.robot.model.loop_params import LoopParams
+from gazerig.robot.model.mesh_params import MeshParams
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.model.types import in_order
 
@@ -161,6 +162,8 @@ class Rig:
     lid_joints: Annotated[LidJoints, "lid angles, of a rig that has lids"] = field(default_factory=LidJoints)
     couplings: Annotated[Mapping[str, CouplingParams],
         "pairs of joints that two servos move together, each under any name"] = field(default_factory=dict, kw_only=True)
+    meshes: Annotated[Mapping[str, MeshParams],
+        "mesh files shown instead of what the program makes, by the name of the link"] = field(default_factory=dict, kw_only=True)
     park_deg: Annotated[Mapping[str, float], Bounds(-180, 180),
         "pose to which the joints move before torque is switched off; joints left out go to 0"] = field(default_factory=dict)
     camera: Annotated[CameraParams, "where the camera sits"] = field(default_factory=CameraParams)

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from gazerig.config.bounds import shapes_of
-from gazerig.config.load import load, read_yaml, shipped
+from gazerig.config.load import Check, load, read_yaml, shipped
 from gazerig.config.rig import LidJoints as LidJoints
 from gazerig.config.rig import Rig as Rig
 from gazerig.config.rig_rules import RULES as RULES
@@ -22,6 +22,20 @@ def load_rig(name_or_path: str, character: str | None = None, profile: str | Non
     """
     layers = layers_of(name_or_path, character, profile)
     return load(layers[-1], Rig, defaults=layers[:-1], checks=RULES)
+
+
+def load_rig_and_check(name_or_path: str, *further: Check[Rig]) -> Rig:
+    """Return a rig by shipped name or path, with further rules checked besides its own.
+
+    Args:
+        name_or_path: of the rig.
+        further: such rules as read other files.
+
+    Raises:
+        gazerig.config.load.ConfigError: with every fault.
+    """
+    layers = layers_of(name_or_path)
+    return load(layers[-1], Rig, defaults=layers[:-1], checks=(*RULES, *further))
 
 
 def layers_of(

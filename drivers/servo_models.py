@@ -37,6 +37,7 @@ class ServoModelInfo(NamedTuple):
     family: of a smart servo of ours, by its name; "" for hobby servos and those of packages
     measured: whether it measures its position; without that it has no other feedback either
     hottest_c, lowest_v, highest_v: limits at which it switches itself off, if it does
+    stall_torque_nm: at its rated voltage; 0.2 of a small hobby servo with metal gears
     """
 
     bus: BusKind
@@ -51,6 +52,7 @@ class ServoModelInfo(NamedTuple):
     lowest_v: float = 0.0
     highest_v: float = inf
     family: str = ""
+    stall_torque_nm: float = 0.2
 
     def fits(self, kind: str) -> bool:
         """Return whether it can be on a bus of this kind: any board moves a hobby servo."""
@@ -71,6 +73,7 @@ def _smart(bus: BusKind, family: str, model: SmartModel, steps: int) -> ServoMod
         lowest_v=0.1 * model.min_voltage,
         highest_v=0.1 * model.max_voltage,
         family=family,
+        stall_torque_nm=model.stall_torque_nm,
     )
 
 

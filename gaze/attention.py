@@ -8,16 +8,16 @@ highest factor keeps the rule's whole constant, which the paper's comparison nee
 person alone is not left for habituation, and several people share the gaze.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf
 from operator import mul
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 
 from gazerig.gaze.angles import add, scale, sub
-from gazerig.gaze.bottom_up import BottomUp, SalienceRow
+from gazerig.gaze.bottom_up import BottomUp
+from gazerig.gaze.comparison import NO_BODY, TargetComparison
 from gazerig.gaze.face_memory import FaceMemory
 from gazerig.gaze.field_of_view import FieldOfView, line_of_sight
 from gazerig.gaze.habituation import Habituation, HabituationParams
@@ -25,13 +25,11 @@ from gazerig.gaze.idle import Idle
 from gazerig.gaze.persons import Persons
 from gazerig.gaze.reaction import Reaction, ReactionParams
 from gazerig.gaze.top_down import RuleTarget, TopDown
-from gazerig.gaze.types import Bodies, Floats, GazeState, Percept, Salience, Target, Vec3
+from gazerig.gaze.types import Bodies, GazeState, Percept, Target, Vec3, vec
 from gazerig.params import Bounds
 
 _STILL: Vec3 = (0.0, 0.0, 0.0)
-_POINT = ("point", -1)
 _NO_ONE: frozenset[int] = frozenset()
-_LISTED = 4
 _FEW = 24
 """So many bodies are computed one by one, which costs less than arrays do."""
 _SPEED_OVER_S = 0.2  # a speed of the head from positions farther apart says nothing
@@ -57,25 +55,6 @@ class AttentionParams:
     habituation: Annotated[HabituationParams, "habituation and inhibition of return"] = field(default_factory=HabituationParams)
     reaction: Annotated[ReactionParams, "reaction time"] = field(default_factory=ReactionParams)
     # fmt: on
-
-
-class _Choice(NamedTuple):
-    """Amounts of one decision.
-
-    motion:   returns the terms of one of the n bodies
-    rule, habituation, total: (n + 1,), the point that a rule may name coming after the
-        bodies; the rule's constant, the factor of habituation and of faces that look elsewhere,
-        and the amount compared, which is -inf where there is nothing
-    best: row of the largest total
-    """
-
-    bodies: Bodies
-    motion: Callable[[int], SalienceRow]
-    rule_target: RuleTarget | None
-    rule: Floats | list[float]
-    habituation: Floats | list[float]
-    total: Floats | list[float]
-    best: int
 
 
 class Attention:
@@ -184,6 +163,8 @@ class Attention:
         lasts_s = self._params.face_memory_s
         bodies = self._memory.step(percept.bodies, attended, percept.captured_s, lasts_s)
         self._persons.update(percept, state.p_world_head_m)
+        if self.top_down.plans:
+            self.top_down.plan(percept, state.p_world_head_m, t_s)
         trait = self.top_down.rule.person
         self.top_down.named_ids = self._persons.named(trait) if trait is not None else _NO_ONE
         compare = self._compare_few if len(bodies) <= _FEW else self._compare
@@ -194,7 +175,7 @@ class Attention:
         if self._unnoticed(made):
             self._reaction.drop()
             seen = [row for row in range(len(made.bodies)) if made.total[row] > -inf]
-            places = [_vec(made.bodies.p_world_m[row]) for row in seen]
+            places = [vec(made.bodies.p_world_m[row]) for row in seen]
             self._idle.see([made.bodies.ids[row] for row in seen], places, t_s)
             return None
         changed = self._behaviour != self.top_down.behaviour
@@ -205,16 +186,18 @@ class Attention:
         named = made.rule_target is not None and row in made.rule_target.rows
         if named:
             self._favoured_id = made.bodies.ids[row]
-        winner = _target(made, row, percept.captured_s)
+        winner = made.target(row, percept.captured_s)
         # A change of mind waits neither for a reaction nor for the end of a fixation.
         if row == present or changed or (named and t_s - self._changed_s <= _DECIDED_S):
             self._reaction.drop()
             return winner
         dwelt_s = -inf if present is None else self._since_s + self._params.min_dwell_ms / 1e3
         self._reaction.wait(winner, dwelt_s)
-        return self._target if present is None else _target(made, present, percept.captured_s)
+        if present is not None:
+            return made.target(present, percept.captured_s)
+        return self._target and self._target._replace(plan=made.plan)
 
-    def _unnoticed(self, made: _Choice) -> bool:
+    def _unnoticed(self, made: TargetComparison) -> bool:
         """Return whether there is nothing, or only things that are explored as anything else is."""
         best, most = made.best, made.total[made.best]
         if most == -inf or most >= self._params.least_salience:
@@ -223,7 +206,7 @@ class Attention:
 
     def _compare_few(
         self, bodies: Bodies, worth: list[float], state: GazeState, t_s: float
-    ) -> _Choice:
+    ) -> TargetComparison:
         """Return what ``_compare`` does, for few bodies."""
         n, eye, rows = len(bodies), state.p_world_head_m, bodies.rows()
         seen = self._field_of_view.visible_rows(bodies, rows, state)
@@ -250,9 +233,14 @@ class Attention:
             for one, factor, there in zip(amount, habituation, (*seen, point), strict=True)
         ]
         best = total.index(max(total))
-        return _Choice(bodies, motion.__getitem__, rule_target, rule, habituation, total, best)
+        plan = self.top_down.plan_text
+        return TargetComparison(
+            bodies, motion.__getitem__, rule_target, rule, habituation, total, best, plan
+        )
 
-    def _compare(self, bodies: Bodies, worth: list[float], state: GazeState, t_s: float) -> _Choice:
+    def _compare(
+        self, bodies: Bodies, worth: list[float], state: GazeState, t_s: float
+    ) -> TargetComparison:
         """Return everything that the decision rests on.
 
         worth: share of its salience that each body keeps besides
@@ -278,7 +266,10 @@ class Attention:
         if rule_target is None or rule_target.point_world_m is None:
             total[n] = -inf
         best = int(total.argmax())
-        return _Choice(bodies, motion.row, rule_target, rule, habituation, total, best)
+        plan = self.top_down.plan_text
+        return TargetComparison(
+            bodies, motion.row, rule_target, rule, habituation, total, best, plan
+        )
 
     def _shares(
         self,
@@ -314,87 +305,19 @@ class Attention:
             return _STILL
         return scale(sub(p_eye_m, before[0]), 1.0 / (t_s - before[1]))
 
-    def _winner(self, made: _Choice, present: int | None) -> int:
+    def _winner(self, made: TargetComparison, present: int | None) -> int:
         """Return the row of the strongest, the present one being favoured."""
         if present is None:
             return made.best
         stays = made.total[made.best] < made.total[present] * self._params.hysteresis_ratio
         return present if stays else made.best
 
-    def _present_row(self, made: _Choice) -> int | None:
+    def _present_row(self, made: TargetComparison) -> int | None:
         """Return the row of what is looked at now, None where it is no longer there."""
-        if self._identity == _POINT:
-            return len(made.bodies) if made.total[-1] > -inf else None
+        if self._identity is not None and self._identity[1] == NO_BODY:
+            there = made.total[-1] > -inf and made.point_kind == self._identity[0]
+            return len(made.bodies) if there else None
         if self._identity is None or self._identity[1] not in made.bodies.ids:
             return None
         row = made.bodies.ids.index(self._identity[1])
         return row if made.total[row] > -inf else None
-
-
-def _target(made: _Choice, row: int, captured_s: float) -> Target:
-    """Return the target of a row, with its reason."""
-    saliences = _strongest(made, row)
-    first, rule_target = saliences[0], made.rule_target
-    moving = first.translation + first.looming + first.rotation + first.onset
-    by_rule = rule_target is not None and first.rule > 0.0 and first.rule >= moving
-    name = first.kind if first.id < 0 else f"{first.kind} {first.id}"
-    if rule_target is not None and by_rule:
-        why = f"{name}: rule {rule_target.behaviour} {first.rule:.2f}"
-    else:
-        why = f"{name}: {_terms(first)}"
-    if (
-        rule_target is not None
-        and rule_target.point_world_m is not None
-        and row == len(made.bodies)
-    ):
-        p, v = rule_target.point_world_m, _STILL
-    else:
-        p, v = _vec(made.bodies.p_world_m[row]), _vec(made.bodies.v_world_m_s[row])
-    # How far the head goes follows from the amount itself; boredom moves no head.
-    amount = max(first.rule, moving)
-    return Target(
-        p, v, captured_s, first.kind, first.id, amount, by_rule, None, 0, why, saliences=saliences
-    )
-
-
-def _strongest(made: _Choice, row: int) -> tuple[Salience, ...]:
-    """Return the saliences of a row and of the highest others, term by term."""
-    total = made.total
-    if isinstance(total, list):
-        there = [each for each, one in enumerate(total) if one > -inf]
-        rows = sorted(there, key=lambda each: -total[each]) if len(there) > 1 else there
-    elif len(total) > 64:
-        some = np.argpartition(-total, _LISTED)[:_LISTED]
-        rows = some[np.argsort(-total[some], kind="stable")].tolist()
-    else:
-        rows = np.argsort(-total, kind="stable").tolist()
-    others = [other for other in rows[:_LISTED] if other != row and total[other] > -inf]
-    return tuple([_salience(made, each) for each in (row, *others[: _LISTED - 1])])
-
-
-def _salience(made: _Choice, row: int) -> Salience:
-    """Return the salience of one row, term by term."""
-    rule, habituation = float(made.rule[row]), float(made.habituation[row])
-    total = float(made.total[row])
-    if row == len(made.bodies):
-        return Salience(-1, "point", 0.0, 0.0, 0.0, 0.0, rule, habituation, total)
-    name, kind = made.bodies.ids[row], made.bodies.kinds[row]
-    translation, looming, rotation, onset = made.motion(row)
-    return Salience(name, kind, translation, looming, rotation, onset, rule, habituation, total)
-
-
-def _terms(salience: Salience) -> str:
-    """Return the largest term and all that are at least a tenth of it, as text."""
-    terms = {
-        "translation": salience.translation,
-        "looming": salience.looming,
-        "rotation": salience.rotation,
-        "onset": salience.onset,
-    }
-    most = max(terms.values())
-    return " + ".join(f"{name} {a:.2f}" for name, a in terms.items() if a >= 0.1 * most)
-
-
-def _vec(row: Floats) -> Vec3:
-    x, y, z = row.tolist()
-    return (x, y, z)

@@ -5,6 +5,9 @@ opponent's face, each with a constant amount of attention whose value it does no
 Here a rule may point at a kind of body, at persons by what they do (gazerig.gaze.persons), at one
 body by its id, or at a place. Where several bodies are of the wanted kind, each is wanted, the
 nearer the more. Where no person does what a rule names, it points at all faces.
+
+With an action planner (gazerig.gaze.action_planner) the behaviour follows from what is seen, unless
+the user has chosen one, until they give it back (``PLANNED``).
 """
 
 from collections.abc import Mapping, Sequence
@@ -16,14 +19,22 @@ from typing import Annotated, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.gaze.action_planner import ACTIONS, Action, ActionPlanner, ActionPlannerParams
 from gazerig.gaze.persons import TRAITS
-from gazerig.gaze.types import Bodies, BodyRows, Floats, Vec3
+from gazerig.gaze.types import Bodies, BodyRows, Floats, Percept, Vec3
 from gazerig.params import Bounds
 
 _BY_ID = "id:"
 _PERSON = "person:"
 _POINT = "point"
 _NO_ONE: frozenset[int] = frozenset()
+_STILL: Vec3 = (0.0, 0.0, 0.0)
+
+PLANNED = "planned"
+"""Choice of the menu of behaviours that leaves them to the action planner."""
+
+GUARD_TARGET, ATTACK_TARGET = "guard_target", "attack_target"
+"""What comes and the place to be hit: what a rule looks at that leaves it to the action planner."""
 
 
 @dataclass(frozen=True)
@@ -94,8 +105,8 @@ class Rule:
 def _shipped_rules() -> dict[str, Rule]:
     return {
         "wait": Rule("face", 0.5),
-        "guard": Rule("guard_target", 0.8),
-        "attack": Rule("attack_target", 0.9),
+        "guard": Rule(GUARD_TARGET, 0.8),
+        "attack": Rule(ATTACK_TARGET, 0.9),
     }
 
 
@@ -110,17 +121,22 @@ class TopDownParams:
         "the person looked at last is treated as this many times nearer than they are; larger: the gaze changes less often"] = 1.25
     nearness: Annotated[float, Bounds(0, 4),
         "exponent with which salience decreases with distance if several bodies match a rule; 0: distance has no effect"] = 0.5
+    planner: Annotated[ActionPlannerParams, "action planner of a boxing match"] = field(default_factory=ActionPlannerParams)
     # fmt: on
 
     def __post_init__(self) -> None:
-        """Check the start behaviour.
+        """Check the start behaviour and those of the planner.
 
         Raises:
-            ValueError: it is not among the rules.
+            ValueError: one is not among the rules.
         """
-        if self.behaviour not in self.rules:
-            known = ", ".join(sorted(self.rules))
-            raise ValueError(f"behaviour {self.behaviour!r} has no rule; rules: {known}")
+        wanted = (self.behaviour, *ACTIONS) if self.planner.enabled else (self.behaviour,)
+        for behaviour in wanted:
+            if behaviour not in self.rules:
+                known = ", ".join(sorted(self.rules))
+                raise ValueError(f"behaviour {behaviour!r} has no rule; rules: {known}")
+        if PLANNED in self.rules:
+            raise ValueError(f"no rule can be called {PLANNED!r}: that leaves it to the planner")
 
 
 class RuleTarget(NamedTuple):
@@ -131,6 +147,7 @@ class RuleTarget(NamedTuple):
     stay:     factor by which the body that was looked at last is preferred
     point_world_m: the place wanted, None for bodies
     salience, behaviour: the rule's constant and name
+    point_kind, point_world_m_s: what the place is called, and how fast it moves
     """
 
     rows: NDArray[np.intp] | list[int]
@@ -139,27 +156,34 @@ class RuleTarget(NamedTuple):
     point_world_m: Vec3 | None
     salience: float
     behaviour: str
+    point_kind: str = _POINT
+    point_world_m_s: Vec3 = _STILL
 
 
 class TopDown:
     """The rules, and the behaviour in force.
 
+    behaviour: in force
     named_ids: the people who do what the rule in force names, where it names persons; set by who
         knows them before each step
     """
 
     def __init__(self, params: TopDownParams) -> None:
         self._params = params
+        self._planner = ActionPlanner(params.planner)
         self.behaviour = params.behaviour
         self.reset(0.0)
 
     def retune(self, params: TopDownParams) -> None:
         """Change the rules; the behaviour in force stays unless its rule is gone.
 
-        Another behaviour of the start is in force at once: what was asked for is its rule.
+        Another behaviour of the start is in force at once: what was asked for is its rule. That of
+        the start also follows a planner that is switched off.
         """
         before, self._params = self._params, params
-        if params.behaviour != before.behaviour or self.behaviour not in params.rules:
+        self._planner.retune(params.planner)
+        ends = before.planner.enabled and not params.planner.enabled and not self._by_user
+        if ends or params.behaviour != before.behaviour or self.behaviour not in params.rules:
             self.behaviour = params.behaviour
 
     @property
@@ -169,26 +193,59 @@ class TopDown:
 
     @property
     def behaviours(self) -> tuple[str, ...]:
-        """Return the behaviours that have a rule, in the order of the rules."""
-        return tuple(self._params.rules)
+        """Return what can be chosen: the behaviours in the order of the rules, and the planner."""
+        rules = tuple(self._params.rules)
+        return (*rules, PLANNED) if self._params.planner.enabled else rules
+
+    @property
+    def chosen(self) -> str:
+        """Return which of ``behaviours`` is chosen."""
+        return PLANNED if self.plans and not self._by_user else self.behaviour
+
+    @property
+    def plans(self) -> bool:
+        """Return whether there is an action planner."""
+        return self._params.planner.enabled
+
+    @property
+    def plan_text(self) -> str:
+        """Return what the action planner means to do and why, "" without a planner."""
+        now = self._planner.plan
+        return now.text if self.plans and now.action == self.behaviour else ""
+
+    def plan(self, percept: Percept, p_eye: Vec3, t_s: float) -> None:
+        """Let the action planner choose the behaviour; once for each new percept.
+
+        Where the user has chosen one, it only finds what that is for.
+        """
+        asked: Action | None = None
+        if self._by_user:
+            asked = next((one for one in ACTIONS if one == self.behaviour), None)
+            if asked is None:  # a behaviour beside the match
+                return
+        self.behaviour = self._planner.step(percept, p_eye, t_s, asked).action
 
     def reset(self, t_s: float) -> None:
-        """Return to the behaviour of the start."""
+        """Return to the behaviour of the start, which the planner may change."""
         self.behaviour = self._params.behaviour
+        self._by_user = False
+        self._planner.reset()
         self.named_ids = _NO_ONE
         self._named: tuple[str, tuple[str, ...]] = ("", ())
         self._rows_named = np.zeros(0, dtype=np.intp)
 
     def behave(self, behaviour: str) -> None:
-        """Set the behaviour in force.
+        """Set the behaviour in force, or leave it to the planner again.
 
         Raises:
-            ValueError: there is no rule for it; the message lists the rules.
+            ValueError: there is no rule for it; the message lists what there is.
         """
-        if behaviour not in self._params.rules:
-            known = ", ".join(sorted(self._params.rules))
+        if behaviour not in self.behaviours:
+            known = ", ".join(sorted(self.behaviours))
             raise ValueError(f"no rule for behaviour {behaviour!r}; rules: {known}")
-        self.behaviour = behaviour
+        self._by_user = behaviour != PLANNED
+        if self._by_user:
+            self.behaviour = behaviour
 
     def step(
         self,
@@ -201,6 +258,8 @@ class TopDown:
         seen: (n,) which bodies are in view
         """
         rule = self._params.rules[self.behaviour]
+        if self.plans and (planned := self._planned(rule, bodies.ids, seen.tolist())):
+            return planned
         rows = self._rows(bodies, rule)
         rows = rows[seen[rows]]
         if self.named_ids:
@@ -220,6 +279,8 @@ class TopDown:
     ) -> RuleTarget | None:
         """Return what ``step`` does, for few bodies."""
         rule = self._params.rules[self.behaviour]
+        if self.plans and (planned := self._planned(rule, bodies.ids, seen)):
+            return planned
         if rule.point_world_m is not None:
             point = rule.point_world_m
             return RuleTarget([], [], self._stay, point, rule.salience, self.behaviour)
@@ -236,6 +297,20 @@ class TopDown:
             nearest, power = min(away), self._params.nearness
             near = [(nearest / one) ** power for one in away]
         return RuleTarget(rows, near, self._stay, None, rule.salience, self.behaviour)
+
+    def _planned(self, rule: Rule, ids: Sequence[int], seen: list[bool]) -> RuleTarget | None:
+        """Return what the plan looks at, where the rule leaves it to the planner."""
+        plan = self._planner.plan
+        if rule.look_at == GUARD_TARGET and plan.body_id in ids:
+            row = ids.index(plan.body_id)
+            if seen[row]:
+                return RuleTarget([row], [1.0], self._stay, None, rule.salience, self.behaviour)
+        if rule.look_at == ATTACK_TARGET and plan.p_world_m is not None:
+            return RuleTarget(
+                [], [], self._stay, plan.p_world_m, rule.salience, self.behaviour, ATTACK_TARGET,
+                plan.v_world_m_s,
+            )  # fmt: skip
+        return None
 
     @property
     def _stay(self) -> float:

@@ -21,6 +21,13 @@ from gazerig.gaze.vectors import Vec3 as Vec3
 
 Floats = NDArray[np.float64]
 
+
+def vec(row: Floats) -> Vec3:
+    """Return an array of three numbers as a tuple."""
+    x, y, z = row.tolist()
+    return (x, y, z)
+
+
 Phase = Literal["fixate", "saccade", "pursue"]
 
 # The eight face parts in the order of the transition matrix (Nakamoto & Tsuruno, eq 1);
@@ -173,6 +180,7 @@ class Target(NamedTuple):
     shift:    counts up whenever another object or part is chosen: the saccade's event flag
     why:      the reason in words
     centre_world_m: where the head turns to, e.g. the face's centre; None: the point itself
+    plan:     what the action planner (gazerig.gaze.action_planner) has chosen and why; "" without
     saliences: of the winner and of the next three, highest first
     """
 
@@ -187,6 +195,7 @@ class Target(NamedTuple):
     shift: int
     why: str
     centre_world_m: Vec3 | None = None
+    plan: str = ""
     saliences: tuple[Salience, ...] = ()
 
 

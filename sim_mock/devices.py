@@ -4,7 +4,7 @@ import base64
 import pickle
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from gazerig.drivers.dynamixel.control_table import BAUD_RATES as DYNAMIXEL_BAUDS
 from gazerig.drivers.feetech.memory_table import BAUD_RATES as FEETECH_BAUDS
@@ -14,7 +14,8 @@ from gazerig.drivers.plugins import BUS, BusPlugin, EmulatedJoint, PluginError, 
 from gazerig.drivers.servo_models import HOBBY_KINDS, BusKind
 from gazerig.params import choices_of
 from gazerig.sim_mock.device import Device
-from gazerig.sim_mock.hobby_servo import HobbySpec
+from gazerig.sim_mock.hobby_servo import HobbyMaker, HobbyServo, HobbySpec
+from gazerig.sim_mock.smart_servo.motor import ShaftMaker, own_shaft
 from gazerig.sim_mock.smart_servo.physics import Physics, Quirks, ServoSpec
 
 BAUDS: dict[BusKind, tuple[int, ...]] = {
@@ -116,8 +117,30 @@ _KINDS: dict[str, type[OurLine]] = {
 }
 
 
-def build(what: Emulated, now_s: Callable[[], float], seed: int = 0) -> Device:
-    """Build a device on a clock; ``seed``: of the random numbers that its faults draw.
+class ShaftMakers(NamedTuple):
+    """What makes the shafts of servos, smart ones and hobby servos."""
+
+    make_shaft: ShaftMaker = own_shaft
+    make_servo: HobbyMaker = HobbyServo
+
+
+OWN_SHAFTS = ShaftMakers()
+"""Each shaft by itself, without a world around it."""
+
+
+def build(
+    what: Emulated,
+    now_s: Callable[[], float],
+    seed: int = 0,
+    shafts: ShaftMakers = OWN_SHAFTS,
+) -> Device:
+    """Build a device.
+
+    Args:
+        what: to build.
+        now_s: its clock.
+        seed: of the random numbers that its faults draw.
+        shafts: make the shafts of its servos; a package's device has its own.
 
     Raises:
         ValueError: it cannot exist; names what is wrong and what would be right.
@@ -129,19 +152,28 @@ def build(what: Emulated, now_s: Callable[[], float], seed: int = 0) -> Device:
         from gazerig.sim_mock.maestro.board import build_board
 
         return build_board(
-            what.channels, now_s, what.device, what.crc, what.baud, seed, what.servos
+            what.channels,
+            now_s,
+            what.device,
+            what.crc,
+            what.baud,
+            seed,
+            what.servos,
+            shafts.make_servo,
         )
     if isinstance(what, Pca9685Line):
         from gazerig.sim_mock.pca9685.bridge import build_bridge
 
-        return build_bridge(what.addresses, now_s, what.oscillator_hz, seed, what.servos)
+        return build_bridge(
+            what.addresses, now_s, what.oscillator_hz, seed, what.servos, shafts.make_servo
+        )
     if isinstance(what, FeetechLine):
         from gazerig.sim_mock.feetech.chain import build_feetech
 
-        return build_feetech(what.servos, now_s, what.baud, seed=seed)
+        return build_feetech(what.servos, now_s, what.baud, seed=seed, make_shaft=shafts.make_shaft)
     from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 
-    return build_dynamixel(what.servos, now_s, baud=what.baud, seed=seed)
+    return build_dynamixel(what.servos, now_s, what.baud, seed=seed, make_shaft=shafts.make_shaft)
 
 
 def plugin_line(kind: BusKind, params: object, servos: tuple[EmulatedJoint, ...]) -> PluginLine:

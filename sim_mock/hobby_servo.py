@@ -6,7 +6,7 @@ as it can, with a lag near the end, and not at all within its dead band. Without
 has no torque and stays where friction leaves it. Inertia, load and noise are left out.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import exp
 from typing import NamedTuple
 
@@ -24,6 +24,8 @@ class HobbySpec(NamedTuple):
     stop_low_steps, stop_high_steps: hard stops of the shaft or of what it moves
     min_steps, max_steps: the board clips targets of this channel so; from the factory
         992..2000 us
+    stall_torque_nm: torque that holds it still; only a world with physics asks for it. 0.18 is
+        1.8 kg cm, from data sheets of SG90 and MG90S
     """
 
     channel: int
@@ -35,6 +37,7 @@ class HobbySpec(NamedTuple):
     stop_high_steps: float = 10_000.0
     min_steps: int = 992 * 4
     max_steps: int = 2000 * 4
+    stall_torque_nm: float = 0.18
 
 
 class HobbyServo:
@@ -113,7 +116,13 @@ def checked(spec: HobbySpec) -> HobbySpec:
     return spec
 
 
-def build_servos(specs: Sequence[HobbySpec | Sequence[float]], channels: int) -> list[HobbyServo]:
+HobbyMaker = Callable[[HobbySpec], HobbyServo]
+"""Makes a servo of its specification."""
+
+
+def build_servos(
+    specs: Sequence[HobbySpec | Sequence[float]], channels: int, make: HobbyMaker = HobbyServo
+) -> list[HobbyServo]:
     """Return one servo per channel of a board; channels without a spec have a default one.
 
     Raises:
@@ -130,7 +139,7 @@ def build_servos(specs: Sequence[HobbySpec | Sequence[float]], channels: int) ->
         if not 0 <= channel < channels:
             raise ValueError(f"servo on channel {channel}: there is 0 to {channels - 1}")
         given[channel] = HobbySpec(*spec)
-    return [HobbyServo(given.get(channel, HobbySpec(channel))) for channel in range(channels)]
+    return [make(given.get(channel, HobbySpec(channel))) for channel in range(channels)]
 
 
 _RANGES: dict[str, tuple[float, float]] = {
@@ -143,5 +152,6 @@ _RANGES: dict[str, tuple[float, float]] = {
     "stop_high_steps": (0.0, 16_383.0),
     "min_steps": (256, 13_120),
     "max_steps": (256, 13_120),
+    "stall_torque_nm": (0.01, 10.0),
 }
 """What a Maestro can be set to send: 64..3280 us, user's guide, section 4.b."""

@@ -63,7 +63,9 @@ def pytest_collection(session: pytest.Session) -> Iterator[None]:
     """Share compiling among processes, and let what is imported lie.
 
     It stays, and looking it through takes a third of the time. Garbage of the tests is looked for
-    less often than Python does by itself: that takes a twentieth of the time of them all.
+    less often than Python does by itself: that takes a twentieth of the time of them all. Nor
+    does a robot that starts in real time look through it all, half a second for each of them;
+    test_garbage.py has that done.
     """
     gc.disable()
     if worker := os.environ.get("PYTEST_XDIST_WORKER"):
@@ -72,8 +74,13 @@ def pytest_collection(session: pytest.Session) -> Iterator[None]:
         shared_compiling.compile_in_two(session.config)
     yield
     gc.freeze()
+    gc.unfreeze = _stays_frozen
     gc.set_threshold(50_000, 20, 50)
     gc.enable()
+
+
+def _stays_frozen() -> None:
+    """Stands for gc.unfreeze."""
 
 
 _PTY = {"PtyBus", "PtyBuses", "TerminalLine", "commands_started", "hear", "pty"}
@@ -166,13 +173,14 @@ def branched_children() -> Iterator[None]:
 
 @pytest.fixture
 def unlaid_figures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Draw figures without finding room for their labels, in less than half the time.
+    """Draw figures small and without finding room for their labels, in a third of the time.
 
     tests/test_report.py draws all of them as users see them.
     """
     from gazerig.robot.report import plotting
 
     monkeypatch.setattr(plotting, "_LAYOUT", None)
+    monkeypatch.setattr(plotting, "_DPI", 30)
 
 
 @pytest.fixture

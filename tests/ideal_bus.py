@@ -7,6 +7,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from typing import Any
 
 import pytest
 
@@ -17,10 +18,10 @@ from gazerig.robot.app.run_bus import RunBus, run_bus
 from gazerig.robot.model.clock import Clock
 
 
-def _ideal(rig: Rig, options: RunOptions, clock: Clock) -> RunBus:
-    if options.fast and options.bus is None:
+def _ideal(rig: Rig, options: RunOptions, clock: Clock, world: Any = None) -> RunBus:
+    if options.fast and options.bus is None and world is None:
         options = replace(options, bus="ideal")
-    return run_bus(rig, options, clock)
+    return run_bus(rig, options, clock, world)
 
 
 @contextmanager

@@ -13,10 +13,10 @@ from typing import Any
 import viser
 from websockets.sync.client import ClientConnection, connect
 
-from gazerig.robot.dashboard.auth_proxy import AuthProxy
-from gazerig.robot.dashboard.stop_channel import StopListener
-from gazerig.robot.dashboard.stop_sender import StopSender
-from gazerig.robot.dashboard.viser_server import open_server
+from gazerig.robot.dashboard.door.auth_proxy import AuthProxy
+from gazerig.robot.dashboard.door.viser_server import open_server
+from gazerig.robot.dashboard.requests.stop_channel import StopListener
+from gazerig.robot.dashboard.requests.stop_sender import StopSender
 
 PATIENCE_S = 20.0
 

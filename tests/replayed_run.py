@@ -7,7 +7,7 @@ from gazerig.config.schema import load_rig
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
-from gazerig.robot.dashboard.page_process import REPLAY, SNAPSHOT, unpack
+from gazerig.robot.dashboard.feed.page_process import REPLAY, SNAPSHOT, unpack
 from gazerig.robot.model.commands import Ask
 
 SECONDS = 6.0

@@ -9,7 +9,7 @@ from typing import TypeVar
 from desk import GAZE_JOINTS
 from page_visitor import PATIENCE_S
 
-from gazerig.robot.dashboard.page_process import PageProcess
+from gazerig.robot.dashboard.feed.page_process import PageProcess
 from gazerig.robot.model.types import Snapshot
 from gazerig.robot.remote.param_info import ParamInfo
 

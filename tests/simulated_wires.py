@@ -53,8 +53,11 @@ class _Wires:
         self._of: dict[_Served, dict[str, str]] = {}
         self._terminals: dict[str, tuple[int, int]] = {}
 
-    def start(self, server: _Served, buses: Sequence[Mapping[str, object]]) -> list[str]:
+    def start(
+        self, server: _Served, buses: Sequence[Mapping[str, object]], world: object = None
+    ) -> list[str]:
         """Stands for _Served._start."""
+        assert world is None  # a world's servos answer on terminals alone
         paths: dict[str, str] = {}
         for bus in buses:
             assert not bus.get("wire_time") and not bus.get("turnaround_us")
@@ -99,7 +102,7 @@ def simulated_wires() -> Iterator[SimulatedClock]:
     clock = SimulatedClock(START_S)
     with pytest.MonkeyPatch.context() as patch:
         wires = _Wires(clock)
-        patch.setattr(_Served, "_start", lambda server, buses: wires.start(server, buses))
+        patch.setattr(_Served, "_start", lambda server, *given: wires.start(server, *given))
         patch.setattr(
             _Served, "command", lambda server, text, bus="": wires.command(server, text, bus)
         )

@@ -12,6 +12,7 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Camera
 from gazerig.gaze.types import Target, Vec3
 from gazerig.robot.analysis.behaviour_score import BehaviourScore
+from gazerig.robot.analysis.planner_score import PlannerScore
 from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
@@ -106,9 +107,10 @@ class Lived:
 
     def __init__(self, made: Assembly, scene: Scene, seconds: float) -> None:
         self.score = BehaviourScore(scene.events(), scene.round_s)
+        self.planner = PlannerScore(scene.events(), scene.round_s)
         self.scene_s: list[float] = []
         self.ticks: list[Tick] = []
-        self._scene, self._top_down = scene, made.robot.attention.top_down
+        self._scene = scene
         made.robot.start(made.clock)
         count = run(
             made.robot,
@@ -122,10 +124,8 @@ class Lived:
     def _watch(self, new: Tick) -> None:
         self.ticks.append(new)
         self.scene_s.append(new.t_s - self.ticks[0].t_s)
-        wanted = self._scene.behaviour(self.scene_s[-1])
-        if wanted is not None and wanted != self._top_down.behaviour:
-            self._top_down.behave(wanted)
         self.score.update(new)
+        self.planner.update(new)
 
     def within(self, start_s: float, end_s: float) -> list[Tick]:
         pairs = zip(self.scene_s, self.ticks, strict=True)
@@ -152,40 +152,111 @@ def latency(figure: dict[str, float | int | None]) -> float:
     return figure["latency_s"]
 
 
-def test_e46_a_the_fist_of_a_punch_is_looked_at(boxing: Lived) -> None:
+def actions(lived: Lived, start_s: float, end_s: float) -> list[str]:
+    """Return what the planner chose in that time, one entry for each change."""
+    chosen = [each.target.plan.partition(":")[0] for each in lived.within(start_s, end_s)]
+    return [one for one, before in zip(chosen, ["", *chosen], strict=False) if one != before]
+
+
+def test_e46_a_the_fist_of_a_punch_is_looked_at_and_guarded_against(boxing: Lived) -> None:
     figure = boxing.score.figures()["punch"]
     assert figure["of"] == 4
     assert latency(figure) <= 0.4
     for event in boxing._scene.events():
         if event.name == "punch":
-            during = boxing.within(event.start_s, event.end_s)
-            first = next(each for each in during if each.target.kind == "hand")
-            assert not first.target.top_down  # its motion drew the gaze, not the guard's rule
+            arrives_s = event.start_s + 0.25
+            assert actions(boxing, event.start_s, arrives_s)[-1] == "guard"
+            at_contact = boxing.within(arrives_s, arrives_s + 0.02)[0].target
+            assert at_contact.kind == "hand"
+            assert "guard: hand" in at_contact.plan and "arrives in" in at_contact.plan
 
 
-def test_e46_a_without_the_pull_of_motion_no_fist_is_looked_at() -> None:
+def test_the_planner_guards_in_time_and_against_nothing_else_and_attacks_what_is_open(
+    boxing: Lived,
+) -> None:
+    figures = boxing.planner.figures()
+    assert (figures["guards_in_time"], figures["punches"]) == (4, 4)
+    assert figures["lead_ms"] is not None and figures["lead_ms"] > 30.0
+    assert figures["false_guards_per_min"] == 0.0
+    attacks, into_open, counters = (figures[name] for name in ("attacks", "open", "counters"))
+    assert into_open == 3 and attacks == figures["looked_at"]
+    assert counters is not None and attacks == into_open + counters
+
+
+def planned(actions: Callable[[float], str], seconds: float = 20.0) -> dict[str, Any]:
+    """Return the score of actions chosen by the time, of two rounds of a punch and an opening."""
+    punch = Event("punch", "look", "hand", 2.0, 2.6, HAND, 0.3, 2.25)
+    score = PlannerScore((punch, Event("attack", "look", "x", 5.0, 6.0, FACE, 0.6)), 10.0)
+    for slot in range(round(seconds * 100) + 1):
+        made = tick(3.0 + slot * 0.01, "attack_target" if slot % 100 < 50 else "face", FACE)
+        score.update(made._replace(target=made.target._replace(plan=f"{actions(slot * 0.01)}: x")))
+    return score.figures()
+
+
+@pytest.mark.parametrize(
+    ("start_s", "end_s", "in_time", "false_per_min"),
+    [(2.1, 2.5, 1, 0.0), (2.3, 2.6, 0, 0.0), (2.1, 2.15, 0, 0.0), (4.0, 4.3, 0, 3.0)],
+    ids=["in time", "late", "given up", "against nothing"],
+)
+def test_a_guard_counts_when_the_fist_arrives(
+    start_s: float, end_s: float, in_time: int, false_per_min: float
+) -> None:
+    found = planned(lambda t: "guard" if start_s <= t < end_s else "wait", 19.9)
+    assert (found["guards_in_time"], found["punches"]) == (in_time, 2)
+    assert found["false_guards_per_min"] == pytest.approx(false_per_min, abs=0.05)
+    assert found["lead_ms"] == (pytest.approx(150.0, abs=11.0) if in_time else None)
+
+
+def test_attacks_are_into_an_opening_or_after_a_punch_or_neither() -> None:
+    starts = (5.2, 12.65, 17.6)
+    found = planned(lambda t: "attack" if any(s <= t < s + 0.3 for s in starts) else "wait")
+    counts = [found[name] for name in ("attacks", "open", "counters", "looked_at")]
+    assert counts == [3, 1, 1, 1]
+    assert planned(lambda t: "wait") == {}
+
+
+def test_no_wave_no_feint_and_no_hand_from_aside_is_guarded_against(boxing: Lived) -> None:
+    for event in boxing._scene.events():
+        if event.name in ("wave", "return", "reach", "step"):
+            assert actions(boxing, event.start_s, event.end_s) == ["wait"], event
+
+
+@pytest.mark.parametrize("planned", [True, False])
+def test_without_the_pull_of_motion_the_planner_alone_brings_the_gaze_there(planned: bool) -> None:
     rig = load_rig("desk")
-    dull = replace(rig.gaze.bottom_up, translation_reference_rad_s=20.0, looming_reference_1_s=20.0)
+    dull = replace(
+        rig.gaze.bottom_up,
+        translation_reference_rad_s=20.0,
+        looming_reference_1_s=20.0,
+        rotation_reference_rad_s=100.0,
+    )
     rig = replace(
         rig, gaze=replace(rig.gaze, bottom_up=dull), loop=replace(rig.loop, rate_hz=100.0)
     )
     made = assemble(rig, RunOptions(mock=True, fast=True, seed=0, scene="boxing"))
-    lived = Lived(made, scenes()["boxing"], 7.0)
+    if not planned:
+        made.robot.ask("behaviour", "wait")
+    lived = Lived(made, scenes()["boxing"], 7.8)
     figures = lived.score.figures()
-    assert (figures["punch"]["seen"], figures["punch"]["of"]) == (0, 2)
-    assert (figures["attack"]["seen"], figures["attack"]["of"]) == (1, 1)
+    count = (2, 1) if planned else (0, 0)
+    assert (figures["punch"]["seen"], figures["attack"]["seen"]) == count
+    assert (figures["punch"]["of"], figures["attack"]["of"]) == (2, 1)
+    assert {each.target.plan for each in lived.ticks} >= {"wait: asked for"} or planned
 
 
 def test_e46_b_the_place_to_be_hit_is_looked_at_before_the_blow(boxing: Lived) -> None:
     figure = boxing.score.figures()["attack"]
     assert figure["of"] == 3
     assert latency(figure) < 0.6
+    hit = set()
     for event in boxing._scene.events():
         if event.name == "attack":
-            early = boxing.within(event.start_s - 1.0, event.start_s - 0.2)
-            assert "attack_target" not in {each.target.kind for each in early}
-            last = boxing.within(event.end_s - 0.1, event.end_s)
-            assert {each.target.kind for each in last} == {"attack_target"}
+            during = boxing.within(event.start_s - 1.0, event.end_s + 0.6)
+            attacks = [each.target for each in during if each.target.plan.startswith("attack")]
+            assert attacks and attacks[-1].kind == "attack_target"
+            face = boxing._scene.people(event.start_s)[0].p_world_face_m
+            hit.add(attacks[-1].p_world_m[2] < face[2] - 0.1)
+    assert hit == {True, False}  # at the chest and at the face's side
 
 
 def test_e46_c_the_face_otherwise(boxing: Lived) -> None:
@@ -238,9 +309,6 @@ class Distracted:
         moved = sum(there_and_back(t_s - start_s, 0.15, 0.0, 0.15) for start_s in self.starts_s)
         x, y, z = (a + moved * b for a, b in zip((0.8, 0.2, 0.05), self._way_m, strict=True))
         return (Thing(0, "hand", (x, y, z), 0.06),)
-
-    def behaviour(self, t_s: float) -> str | None:
-        return "wait"
 
     def events(self) -> tuple[Event, ...]:
         return tuple(

@@ -24,6 +24,8 @@ from gazerig.robot.app.borrowed_camera import SILENT_S, BorrowedCamera
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.frames import CameraMount, standing_still
 
+pytestmark = pytest.mark.usefixtures("branched_children")
+
 
 def jpeg(grey: int = 90, size: tuple[int, int] = (48, 64)) -> bytes:
     done, data = cv2.imencode(".jpg", np.full((*size, 3), grey, np.uint8))

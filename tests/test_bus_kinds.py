@@ -5,6 +5,8 @@ from bus_kinds import KINDS, TWINS, in_process, twin_of
 
 from gazerig.testing import BusSuite
 
+pytestmark = pytest.mark.usefixtures("branched_children")
+
 
 class TestEveryKind(BusSuite):
     @pytest.fixture(params=[(kind, place) for kind in KINDS for place in TWINS], ids="-".join)

@@ -24,6 +24,8 @@ from gazerig.robot.cli.key_input import BUTTONS, PageKeys, key_and_count, keys_o
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 
+pytestmark = pytest.mark.usefixtures("branched_children")
+
 
 def run(*words: str) -> Invoked:
     return invoked("calibrate", "face", *words)

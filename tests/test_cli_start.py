@@ -5,6 +5,7 @@ import logging
 import os
 import re
 import shlex
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -24,7 +25,7 @@ from gazerig.robot.cli.command_group import CommandsByName
 from gazerig.robot.cli.command_list import COMMANDS
 from gazerig.robot.cli.examples import EXAMPLES
 from gazerig.robot.cli.main import app
-from gazerig.robot.cli.terminal import DEBUG_LOGGER
+from gazerig.robot.cli.terminal import DEBUG_LOGGER, tidied_up
 from gazerig.robot.cli.welcome import next_steps
 
 ADAPTER = SerialPort("/dev/ttyUSB0", "U2D2", "0403:6014", "/dev/serial/by-id/usb-U2D2")
@@ -213,3 +214,19 @@ def test_what_nobody_thought_of_is_one_line_too() -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert done.returncode == 1 and len(done.stderr.strip().splitlines()) == 1
     assert "ZeroDivisionError" in done.stderr and "--debug" in done.stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_request_to_end_while_a_run_is_made_ends_it_in_order(number: signal.Signals) -> None:
+    before = signal.signal(number, signal.SIG_DFL)
+    tidied = False
+    try:
+        with pytest.raises(SystemExit) as end, tidied_up():
+            try:
+                signal.raise_signal(number)
+            finally:
+                tidied = True
+        assert (end.value.code, tidied) == (128 + number, True)
+        assert signal.getsignal(number) == signal.SIG_DFL
+    finally:
+        signal.signal(number, before)

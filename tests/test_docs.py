@@ -28,6 +28,16 @@ from gazerig.gaze.gesture import LID_GROUPS, Gesture, KeyFrame
 from gazerig.robot.cli.examples import EXAMPLES
 from gazerig.robot.model.joint import JointParams
 from gazerig.sim_mock.scenes.registry import scenes
+from gazerig.sim_mock.world.camera_params import WorldCameraParams
+from gazerig.sim_mock.world.script import (
+    HEAD,
+    Act,
+    Do,
+    PersonScript,
+    PlaceScript,
+    ThingScript,
+    WorldScript,
+)
 
 FOLDERS = ("api", "config", "drivers", "gaze", "robot", "sim_mock")
 RIGS = {name: load_rig(name) for name in shipped_names("rigs")}
@@ -126,6 +136,9 @@ def test_yaml_shown_has_keys_that_there_are() -> None:
     for data in shown:
         if set(data) <= set(shapes_of(Gesture)):
             _fits(Shape("params", params=Gesture), data, "gesture")
+            continue
+        if "people" in data:
+            _fits(Shape("params", params=WorldScript), data, "world")
             continue
         for key, value in data.items():
             if key in shapes_of(Rig):
@@ -268,12 +281,16 @@ def test_every_span_names_something_that_is_there(paper: Path) -> None:
     if paper == EMULATOR:
         return  # its tables are held against the emulator below
     words = {*keys(), *defined(), *SERVOS, *scenes(), *EXAMPLES, *_modes()}
+    words |= {field.name for field in fields(WorldCameraParams)}
     words |= {*RENAMED, *RENAMED.values(), "rules.*.pull"}
     words |= {field.name for field in (*fields(Family), *fields(BusPlugin))} | {
         *DYNAMIXEL.registers,
         *FEETECH.registers,
     }
     words |= {field.name for field in (*fields(KeyFrame), *fields(Gesture))} | {*LID_GROUPS}
+    scripts = (WorldScript, PersonScript, PlaceScript, ThingScript, Act)
+    words |= {field.name for script in scripts for field in fields(script)}
+    words |= {*get_args(Do), *shipped_names("worlds"), HEAD}
     for span in spans(paper):
         if span.startswith(("gazerig ", "--", "make ", "pip install ", "/dev/", "/etc/", "test_")):
             continue

@@ -1,6 +1,5 @@
 """A drawn scene in real time: the camera's process draws and looks, the loop says where it is."""
 
-import pickle
 import threading
 from dataclasses import replace
 from functools import partial
@@ -14,12 +13,7 @@ from gazerig.drivers.camera.source import Shot
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.camera_factory import retune_camera
-from gazerig.robot.app.drawn_camera import (
-    DrawnCamera,
-    DrawnSource,
-    MotionBesidePlans,
-    PlannedPlaces,
-)
+from gazerig.robot.app.drawn_camera import DrawnCamera, DrawnSource, scene_pixels
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.model.frames import CameraMount
 from gazerig.sim_mock.scenes.registry import scenes
@@ -36,9 +30,10 @@ def test_the_newest_pose_is_read_whole() -> None:
     assert poses.newest() == (2.5, LEFT, (0.1, 0.2, 0.3)) and poses.first_s == 2.0
 
 
-def source(scene: str, poses: PoseSlot, planned: PlannedPlaces) -> DrawnSource:
+def source(scene: str, poses: PoseSlot) -> DrawnSource:
     mount = CameraMount(load_rig("desk").camera)
-    return DrawnSource(scenes()[scene], mount, 69.0, poses, planned, np.random.default_rng(3))
+    make = partial(scene_pixels, scenes()[scene], mount, 69.0, np.random.default_rng(3))
+    return DrawnSource(make, poses)
 
 
 def taken(frames: DrawnSource, poses: PoseSlot, t_s: float) -> Shot:
@@ -51,7 +46,7 @@ def taken(frames: DrawnSource, poses: PoseSlot, t_s: float) -> Shot:
 
 def test_frames_are_drawn_as_of_the_pose_that_was_told() -> None:
     poses = PoseSlot()
-    frames = source("face-to-face", poses, PlannedPlaces())
+    frames = source("face-to-face", poses)
     frames.open()
     first = taken(frames, poses, 100.0)
     second = taken(frames, poses, 100.2)
@@ -68,27 +63,7 @@ def test_frames_are_drawn_as_of_the_pose_that_was_told() -> None:
 def test_a_source_that_is_told_nothing_waits_and_can_be_stopped() -> None:
     stop = threading.Event()
     stop.set()
-    assert source("face-to-face", PoseSlot(), PlannedPlaces()).take(lambda: 1.0, stop) is None
-
-
-def test_planned_places_reach_the_motion_finder_in_the_other_process() -> None:
-    poses, planned = PoseSlot(), PlannedPlaces()
-    rig = load_rig("desk")
-    made = (
-        partial(source, "boxing", poses),
-        partial(MotionBesidePlans, planned, rig.motion, None, 1.2, None),
-    )
-    # As both are handed to a process: one object stays one object.
-    both = pickle.loads(pickle.dumps((partial(PlannedPlaces), planned, partial(id, planned))))
-    assert both[2]() == id(both[1]) and callable(made[1])
-    frames, finds = source("boxing", poses, planned), made[1]()
-    named = set()
-    for k in range(60):
-        shot = taken(frames, poses, 10.0 + 0.5 * k)
-        named |= {blob.kind for blob in finds(shot)} & {blob.kind for blob in planned.blobs}
-        if named:
-            break
-    assert named
+    assert source("face-to-face", PoseSlot()).take(lambda: 1.0, stop) is None
 
 
 def test_only_a_drawn_scene_in_real_time_has_a_process(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -23,8 +23,8 @@ from gazerig.drivers.errors import PortError
 from gazerig.drivers.message_link import MessageLink
 from gazerig.drivers.serial import port as serial_port
 from gazerig.drivers.types import Detections
-from gazerig.robot.dashboard import viser_server
-from gazerig.robot.dashboard.live_feed import LiveFeed, frame_with_pixels
+from gazerig.robot.dashboard.door import viser_server
+from gazerig.robot.dashboard.feed.live_feed import LiveFeed, frame_with_pixels
 from gazerig.robot.remote import socket_io
 
 HIDING = Path(__file__).parent / "elsewhere"

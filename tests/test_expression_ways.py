@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import pytest
 from ticked_rig import TickedRig, connected, gazerig
 
-from gazerig.robot.dashboard.animation_panel import AnimationPanel
-from gazerig.robot.dashboard.widgets import Widgets
+from gazerig.robot.dashboard.panels.animation_panel import AnimationPanel
+from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.commands import Command, Express, SetLevel
 
 

@@ -1,17 +1,12 @@
 """The shipped rig with a jaw and brows goes through every part of the program."""
 
 import json
-from dataclasses import replace
 from math import degrees
 from pathlib import Path
 
-import numpy as np
 import pytest
-import viser
 from command_line import answers_in, invoked
 from expressive_rig import started
-from shown_page import SNAPSHOT
-from viser import transforms
 
 from gazerig.config.load import shipped
 from gazerig.config.parameters import changed, parameters
@@ -27,7 +22,6 @@ from gazerig.robot.calibration.joint_calibration import (
     ends_of,
 )
 from gazerig.robot.control.loop import Tick, run
-from gazerig.robot.dashboard.head_view import HeadView
 from gazerig.robot.model.commands import Command, Express, SetLevel, Value
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
@@ -145,26 +139,6 @@ def test_a_jaw_may_rest_at_its_stop_and_an_eye_may_not() -> None:
     assert made.max_deg == pytest.approx(29.0, abs=0.05)
     with pytest.raises(CalibrationRefused, match=r"straight ahead .* does not lie between"):
         calibration("neck_yaw", Marks(2400, 2047, 2045), joint, 2.0)
-
-
-def test_the_chin_on_the_page_opens_with_the_jaw() -> None:
-    server = viser.ViserServer(port=0, verbose=False)
-    try:
-        head = HeadView(server.scene)
-        head.show(SNAPSHOT)
-        rest = (0.0,) * len(NAMES)
-        head.show(replace(SNAPSHOT, joints=NAMES, measured_rad=rest))
-        shut = tuple(head._jaw.wxyz)
-        head.show(replace(SNAPSHOT, joints=NAMES, measured_rad=(*rest[:6], 0.2, 0.0, 0.0)))
-        assert tuple(head._jaw.wxyz) != shut
-        # It turns about its hinge, and a rig without a jaw keeps its mouth shut.
-        hinge = np.array(head.measures.hinge_m)
-        turned = transforms.SO3(head._jaw.wxyz).apply(hinge) + head._jaw.position
-        assert turned == pytest.approx(hinge)
-        head.show(SNAPSHOT)
-        assert tuple(head._jaw.wxyz) == shut == (1.0, 0.0, 0.0, 0.0)
-    finally:
-        server.stop()
 
 
 def test_every_joint_has_a_key_a_table_and_a_chart() -> None:

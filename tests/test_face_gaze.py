@@ -1,4 +1,4 @@
-"""Gaze points on the plane of a face, and the stand-in for an action planner."""
+"""Gaze points on the plane of a face."""
 
 from math import cos, radians, sin
 
@@ -6,7 +6,6 @@ import pytest
 
 from gazerig.gaze.angles import rotation, sub, unit
 from gazerig.robot.analysis.gaze_on_face import on_face
-from gazerig.robot.app.scripted_behaviour import ScriptedBehaviour
 
 NOSE = (1.0, 0.2, 0.25)
 TOWARDS = rotation((radians(180.0), 0.0, 0.0))
@@ -33,13 +32,3 @@ def test_a_turned_face_is_met_on_its_own_plane() -> None:
 def test_lines_along_the_plane_or_from_behind_meet_nothing() -> None:
     assert on_face((0.0, 0.0, 0.2), (0.0, 1.0, 0.0), NOSE, TOWARDS) is None
     assert on_face((2.0, 0.2, 0.25), (-1.0, 0.0, 0.0), NOSE, TOWARDS) is None
-
-
-def test_the_planner_asks_once_for_each_change() -> None:
-    asked: list[tuple[str, str]] = []
-    plan = ScriptedBehaviour(
-        lambda t: None if t < 1 else "guard" if t < 2 else "wait", lambda *a: asked.append(a)
-    )
-    for k in range(40):
-        plan.update(100.0 + 0.1 * k)
-    assert asked == [("behaviour", "guard"), ("behaviour", "wait")]

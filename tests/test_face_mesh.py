@@ -26,7 +26,7 @@ from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.gaze.types import Face, Percept
 from gazerig.robot.control.tick_stream import _percept, decode_plain, encode
-from gazerig.robot.dashboard.people import face_label
+from gazerig.robot.dashboard.view.people import face_label
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.model.types import SeenFace

@@ -2,6 +2,7 @@
 
 import gc
 import weakref
+from gc import unfreeze
 
 import pytest
 
@@ -22,7 +23,10 @@ class Head:
         self.itself = self
 
 
-def test_what_an_earlier_robot_left_is_let_go_at_the_next_start() -> None:
+def test_what_an_earlier_robot_left_is_let_go_at_the_next_start(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(gc, "unfreeze", unfreeze)  # of which tests are spared else
     head = Head()
     left = weakref.ref(head)
     set_aside()

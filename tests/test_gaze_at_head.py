@@ -16,7 +16,7 @@ from gazerig.drivers.types import DetectedFace, Detections
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import PARTS, Angles2, Angles3, Bodies, Face, Mat3, Percept, Vec3
 from gazerig.robot.control.tick_stream import _percept, decode_plain, encode
-from gazerig.robot.dashboard.people import face_label
+from gazerig.robot.dashboard.view.people import face_label
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.model.types import SeenFace
@@ -62,9 +62,6 @@ class Turning:
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
         return ()
-
-    def behaviour(self, t_s: float) -> str | None:
-        return None
 
     def events(self) -> tuple[Event, ...]:
         return ()

@@ -13,8 +13,8 @@ from gazerig.gaze.top_down import Rule
 from gazerig.gaze.types import Target
 from gazerig.robot.app import session
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.dashboard.animation_panel import AnimationPanel
-from gazerig.robot.dashboard.widgets import Widgets
+from gazerig.robot.dashboard.panels.animation_panel import AnimationPanel
+from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.command_checks import check
 from gazerig.robot.model.command_json import as_json, as_recorded, from_json, from_recording
 from gazerig.robot.model.commands import Ask, Command, Jog, Play, Resume, Stop

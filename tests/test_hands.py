@@ -129,7 +129,7 @@ def test_between_two_people_the_arm_tells_whose_hand_it_is_and_it_stays_theirs()
 def test_e91_a_waving_hand_is_found_from_pixels_and_whose_it_is() -> None:
     """The one on the right of three waves from 21.5 s on, the hand before the one in the middle."""
     persons, named, off, faces = Persons(), [], [], {}
-    for frame in frames(scenes()["three-people"], 21.0, 24.5):
+    for frame in frames(scenes()["three-people"], 21.2, 23.7):
         persons.update(frame.percept, HEAD_M)
         hands = frame.seen(HAND)
         if frame.t_s > 22.2:
@@ -174,6 +174,24 @@ def test_e91_a_rule_that_names_a_hand_matches_one_that_is_seen() -> None:
 def test_e92_who_walks_by_or_sits_still_has_no_hands(scene: str, start_s: float) -> None:
     for frame in frames(scenes()[scene], start_s, start_s + 2.0):
         assert frame.seen(HAND) == []
+
+
+def coming(growth_1_s: float, sd_1_s: float = 0.3, radius_m: float = 0.2) -> LocalisedDetection:
+    """Return a patch at 2 m that grows at this rate and hardly moves across the view."""
+    way = np.array(BESIDE)
+    far = float(np.linalg.norm(way))
+    x, y, z = (-growth_1_s * way).tolist()
+    return patch(v=(x, y, z), radius_m=radius_m, along_sd_m_s=sd_1_s * far)
+
+
+@pytest.mark.parametrize(
+    ("seen", "first"),
+    [(coming(5.0), HAND), (coming(2.0), "thing"), (coming(5.0, sd_1_s=2.0), "thing"),
+     (coming(5.0, radius_m=0.05), "thing")],
+    ids=["comes", "slowly", "uncertain", "too small"],
+)  # fmt: skip
+def test_what_comes_at_the_camera_is_a_hand_at_once(seen: LocalisedDetection, first: str) -> None:
+    assert kinds(Hands(), seen)[0] == first
 
 
 FIST: LocalisedDetection = patch(radius_m=0.13 * 2.0, compact=True)

@@ -1,10 +1,14 @@
 """The page opens on a face: how much of the canvas the head fills, and whether its lids shut."""
 
+import io
 import json
+from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
+import trimesh
 from shown_page import SNAPSHOT
 from viser import transforms
 
@@ -12,16 +16,16 @@ from gazerig.config.load import shipped
 from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Floats
 from gazerig.robot.app.gaze_models import kinematics_of
-from gazerig.robot.dashboard import head_mesh
-from gazerig.robot.dashboard.glb import EYE, SKIN, glb
-from gazerig.robot.dashboard.head_view import (
-    LOWER_LID,
-    UPPER_LID,
-    lid_turn,
-    lower_lid_turn,
-    shown_measures,
-)
-from gazerig.robot.dashboard.views import BOTH, FACE, SHOULDER, View, view
+from gazerig.robot.app.rig_description import shape_of
+from gazerig.robot.dashboard.view.glb import EYE, SKIN, Finish, glb
+from gazerig.robot.dashboard.view.glow import glow
+from gazerig.robot.dashboard.view.head_view import shown_measures
+from gazerig.robot.dashboard.view.lid_edges import lid_edges
+from gazerig.robot.dashboard.view.scene_node import turned_up
+from gazerig.robot.dashboard.view.snapshot_shape import wide_awake
+from gazerig.robot.dashboard.view.views import BOTH, FACE, SHOULDER, View, view
+from gazerig.robot.model.description import head_mesh
+from gazerig.robot.model.description.parts import LOWER_LID, UPPER_LID
 from gazerig.robot.model.head_shape import (
     EYE_RADIUS,
     eye_rim,
@@ -39,6 +43,7 @@ RIGS = sorted(path.stem for path in shipped("rigs", "desk").parent.glob("*.yaml"
 CANVASES = (1.6, 1280 / 720, 1.0, 0.9, 390 / 380)
 
 
+@cache
 def at_rest(name: str) -> Snapshot:
     """A snapshot of a shipped rig with all joints at 0."""
     rig = load_rig(name)
@@ -71,13 +76,19 @@ def drawn(seen: View, points_m: Floats, aspect: float) -> Floats:
     )
 
 
+@cache
+def skin_and_cap() -> Floats:
+    """Return all points of the head, in distances between the eyes."""
+    parts = (head_mesh.skin().head.mesh, head_mesh.cap().mesh)
+    return np.concatenate([part.vertices for part in parts])
+
+
 @pytest.mark.parametrize("name", RIGS)
 @pytest.mark.parametrize("aspect", CANVASES)
 def test_the_head_fills_most_of_the_canvas_and_is_all_in_sight(name: str, aspect: float) -> None:
     shot = at_rest(name)
     unit = shown_measures(shot).interocular_m
-    parts = (head_mesh.skin().head.mesh, head_mesh.cap().mesh)
-    points = np.concatenate([part.vertices for part in parts]) * unit + shot.p_world_head_m
+    points = skin_and_cap() * unit + shot.p_world_head_m
     on_canvas = drawn(view(FACE, shot), points, aspect)
     low, high = on_canvas.min(axis=0), on_canvas.max(axis=0)
     assert 0.60 <= 0.5 * (high[1] - low[1]) <= 0.8
@@ -122,9 +133,15 @@ def covered(opening: float, lower: float) -> Floats:
         (np.cos(up) * np.cos(aside), np.cos(up) * np.sin(aside), np.sin(up)), axis=-1
     ).reshape(-1, 3)
     hidden = np.zeros(len(rays), bool)
-    for upper, turn in ((True, lid_turn(opening)), (False, lower_lid_turn(lower))):
+    edges = lid_edges(wide_awake(shape_of(load_rig("maker"))))  # all lids move
+    for upper, edge_rad in (
+        (True, edges.elevation_rad("left_upper_lid", opening)),
+        (False, edges.elevation_rad("left_lower_lid", lower)),
+    ):
         painted = head_mesh.eyelid(upper)
-        into_lid = transforms.SO3(np.array(turn)).inverse().apply(rays).astype(np.float64)
+        into_lid = (
+            transforms.SO3(np.array(turned_up(edge_rad))).inverse().apply(rays).astype(np.float64)
+        )
         hidden |= met(painted.mesh, into_lid)
     return hidden
 
@@ -199,7 +216,7 @@ def test_measures_follow_the_rig() -> None:
         assert -1e3 * found.pivot_m[2] == pytest.approx(rig.geometry.eyes_above_mm, abs=0.1)
 
 
-WHOLE = {
+WHOLE: dict[str, Callable[[], Painted]] = {
     "cap": head_mesh.cap,
     "brow": head_mesh.brow,
     "eye": head_mesh.eye,
@@ -256,8 +273,29 @@ def test_only_the_eyes_are_lit_by_the_browser() -> None:
     brow = _tree(glb(head_mesh.brow(), SKIN))
     assert "KHR_materials_unlit" in brow["materials"][0]["extensions"]
     assert "NORMAL" not in brow["meshes"][0]["primitives"][0]["attributes"]
-    plain: Painted = head_mesh.glow((0, 0, 0, 90))
+    plain: Painted = glow((0, 0, 0, 90))
     assert _tree(glb(plain, SKIN))["materials"][0]["alphaMode"] == "BLEND"
+
+
+@pytest.mark.parametrize(
+    ("painted", "finish"), [(head_mesh.eye, EYE), (head_mesh.brow, SKIN)], ids=["eye", "brow"]
+)
+def test_another_reader_finds_the_mesh_in_the_file(
+    painted: Callable[[], Painted], finish: Finish
+) -> None:
+    mesh, colours, normals = painted()
+    data = glb(Painted(mesh, colours, normals), finish._replace(lit=False))
+    scene = trimesh.load_scene(io.BytesIO(data), "glb")
+    (found,) = scene.geometry.values()
+    assert np.asarray(found.vertices) == pytest.approx(mesh.vertices, abs=1e-6)
+    assert (np.asarray(found.faces) == mesh.faces).all()
+    on_screen = np.asarray(found.visual.vertex_attributes["color"], float)[:, :3] / 255.0
+    linear = np.where(
+        colours <= 10.31, colours / 255.0 / 12.92, ((colours / 255.0 + 0.055) / 1.055) ** 2.4
+    )
+    assert on_screen == pytest.approx(linear[:, :3], abs=0.003)
+    if finish is EYE:
+        assert np.asarray(found.vertex_normals) == pytest.approx(normals, abs=1e-6)
 
 
 def _tree(data: bytes) -> dict:

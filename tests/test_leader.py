@@ -9,9 +9,9 @@ from gazerig.robot.control.head_state import as_json, from_json, head_state
 from gazerig.robot.control.joint_faults import JointFaults
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import doing, leader
-from gazerig.robot.dashboard.attention_panel import saliences, winner
-from gazerig.robot.dashboard.servo_health import health
-from gazerig.robot.dashboard.snapshot import SnapshotBuilder, SnapshotTexts, snapshot
+from gazerig.robot.dashboard.feed.snapshot import SnapshotBuilder, SnapshotTexts, snapshot
+from gazerig.robot.dashboard.panels.attention_panel import saliences, winner
+from gazerig.robot.dashboard.panels.servo_health import health
 from gazerig.robot.model.commands import Jog, LookAt, LookAtPerson, Play, Resume, Stop
 from gazerig.robot.model.leader import Leader, sentence
 from gazerig.robot.model.types import Snapshot

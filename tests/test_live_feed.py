@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from shown_page import wait_for
+from world_shapes import SmallWorld
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Detections
@@ -18,12 +19,12 @@ from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
 from gazerig.robot.control.tick_text import perception_text
-from gazerig.robot.dashboard.camera_overlay import draw_detections, ground
-from gazerig.robot.dashboard.live_feed import LiveFeed, LiveRig, RunState, gaze_pixel
-from gazerig.robot.dashboard.page_feed import drain
-from gazerig.robot.dashboard.page_process import URL, PageProcess
-from gazerig.robot.dashboard.publisher import Publisher
-from gazerig.robot.dashboard.snapshot import SnapshotBuilder, SnapshotTexts
+from gazerig.robot.dashboard.feed.camera_overlay import draw_detections, ground
+from gazerig.robot.dashboard.feed.live_feed import LiveFeed, LiveRig, RunState, gaze_pixel
+from gazerig.robot.dashboard.feed.page_feed import drain
+from gazerig.robot.dashboard.feed.page_process import URL, PageProcess
+from gazerig.robot.dashboard.feed.publisher import Publisher
+from gazerig.robot.dashboard.feed.snapshot import SnapshotBuilder, SnapshotTexts
 from gazerig.robot.model.commands import Tune
 from gazerig.robot.model.types import Snapshot
 from gazerig.sim_mock.scenes.picture import ScenePicture
@@ -57,6 +58,7 @@ class Page:
         self.state = RunState({"lost": 3}, "wait", "talking", "shy", (None, None, 0))
         self.rigs = 0
         self.picture: ScenePicture | None = None
+        self.world: SmallWorld | None = None
         self.publisher = Publisher(
             self.page, lambda: self._rig(made), lambda: self.state, None, self.said.append
         )
@@ -66,7 +68,7 @@ class Page:
 
     def _rig(self, made: Assembly) -> LiveRig:
         self.rigs += 1
-        return LiveRig(200.0, made.shown(), picture=self.picture)
+        return LiveRig(200.0, made.shown(), picture=self.picture, world=self.world)
 
     def comes_up(self) -> None:
         before = self.page.started
@@ -105,7 +107,7 @@ def test_a_snapshot_is_that_of_the_ticks_themselves(ran: Run, page: Page) -> Non
     perception = perception_text(
         tick, ran.made.robot.perception.residual()._replace(speed_deg_s=None)
     )
-    whole = direct.take(SnapshotTexts("bus: 3 lost", "wait", perception, "shy", "talking"))
+    whole = direct.take(SnapshotTexts("bus: lost 3 times", "wait", perception, "shy", "talking"))
     assert whole is not None and len(whole.events) > 2
     assert events == whole.events and trail == whole.trail
     for field in fields(Snapshot):
@@ -128,7 +130,7 @@ def test_nothing_is_sent_before_the_page_is_there_and_everything_again_to_anothe
             page.stream.update(tick)
         (shot,) = page.shown()
         assert page.rigs == n
-        assert (shot.health, shot.behaviour) == ("bus: 3 lost", "wait")
+        assert (shot.health, shot.behaviour) == ("bus: lost 3 times", "wait")
         assert len(shot.faces) == 1, "the percept in force comes again"
 
 
@@ -230,3 +232,24 @@ def test_a_page_that_takes_nothing_delays_nothing_and_is_counted(ran: Run, page:
     page.stream.update(ran.ticks[-1]._replace(t_s=99.0))
     (newest,) = page.shown()
     assert shot.t_s < 3.0 and newest.t_s == 99.0 and newest.faces
+
+
+def test_a_world_goes_with_the_time_since_it_began(ran: Run, page: Page) -> None:
+    page.world = SmallWorld()
+    page.comes_up()
+    page.state = page.state._replace(scene_start_s=ran.ticks[0].t_s - 1.5)
+    for tick in ran.ticks[:60]:
+        page.stream.update(tick)
+    page.stream.flush()
+    news = drain(page.feed, page.live)
+    assert news.world is not None and news.world.shapes == SmallWorld()
+    assert news.world.world_s == pytest.approx(1.5 + ran.ticks[59].t_s - ran.ticks[0].t_s)
+
+
+def test_before_a_world_has_begun_there_is_none(ran: Run, page: Page) -> None:
+    page.world = SmallWorld()
+    page.comes_up()
+    page.stream.update(ran.ticks[0])
+    page.stream.flush()
+    news = drain(page.feed, page.live)
+    assert news.snapshots and news.world is None

@@ -25,8 +25,8 @@ from shown_page import running_page, wait_for
 from six_joints import of_six
 
 from gazerig.gaze.types import PART_NAMES, PARTS
-from gazerig.robot.dashboard.camera_overlay import encode
-from gazerig.robot.dashboard.page_process import PageProcess, pack, unpack
+from gazerig.robot.dashboard.feed.camera_overlay import encode
+from gazerig.robot.dashboard.feed.page_process import PageProcess, pack, unpack
 from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
 
 T = TypeVar("T")

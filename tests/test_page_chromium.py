@@ -30,7 +30,7 @@ from gazerig.config.load import shipped
 from gazerig.config.schema import load_rig
 from gazerig.robot.model.commands import Ask, LookAt, Stop
 
-pytestmark = pytest.mark.own_timeouts
+pytestmark = [pytest.mark.usefixtures("branched_children"), pytest.mark.own_timeouts]
 
 
 @pytest.fixture(scope="module")

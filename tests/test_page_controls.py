@@ -15,7 +15,18 @@ from shown_page import PARAM, wait_for
 from stand_in import StandIn
 
 from gazerig.gaze.types import Vec3
-from gazerig.robot.dashboard.inbox import (
+from gazerig.robot.dashboard.feed.live_feed import LiveFeed
+from gazerig.robot.dashboard.feed.page_feed import drain
+from gazerig.robot.dashboard.feed.page_process import (
+    ALL_USERS,
+    CHOICES,
+    MESSAGE,
+    PARAMS,
+    VALUES,
+    PageProcess,
+)
+from gazerig.robot.dashboard.feed.param_feed import ParamFeed
+from gazerig.robot.dashboard.requests.inbox import (
     MESSAGE_BYTES,
     REQUEST,
     Inbox,
@@ -24,19 +35,8 @@ from gazerig.robot.dashboard.inbox import (
     request_message,
     urgent,
 )
-from gazerig.robot.dashboard.live_feed import LiveFeed
-from gazerig.robot.dashboard.outbox import Outbox
-from gazerig.robot.dashboard.page_feed import drain
-from gazerig.robot.dashboard.page_process import (
-    ALL_USERS,
-    CHOICES,
-    MESSAGE,
-    PARAMS,
-    VALUES,
-    PageProcess,
-)
-from gazerig.robot.dashboard.param_feed import ParamFeed
-from gazerig.robot.dashboard.request_handler import PAGE, PageRequestHandler
+from gazerig.robot.dashboard.requests.outbox import Outbox
+from gazerig.robot.dashboard.requests.request_handler import PAGE, PageRequestHandler
 from gazerig.robot.model.command_json import as_json
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Stop, Value
 from gazerig.robot.remote.param_info import ParamInfo

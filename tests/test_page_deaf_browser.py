@@ -18,8 +18,8 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
 from gazerig.gaze.types import PARTS
-from gazerig.robot.dashboard.camera_overlay import encode
-from gazerig.robot.dashboard.page_process import PageProcess
+from gazerig.robot.dashboard.feed.camera_overlay import encode
+from gazerig.robot.dashboard.feed.page_process import PageProcess
 from gazerig.robot.model.command_json import as_json
 from gazerig.robot.model.commands import Stop
 from gazerig.robot.model.types import SeenFace

@@ -1,6 +1,5 @@
 """Only those come in who may: no other origin, nobody without the token, nobody by the back."""
 
-import asyncio
 import json
 import os
 import socket
@@ -9,9 +8,8 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
-from contextlib import ExitStack, suppress
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import pytest
@@ -21,15 +19,12 @@ from page_visitor import LOOKING
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
 
-from gazerig.robot.dashboard import auth_proxy
-from gazerig.robot.dashboard.auth_proxy import MOST_LINES
-from gazerig.robot.dashboard.browser_requests import from_browser
-from gazerig.robot.dashboard.browsers import TabLimits
-from gazerig.robot.dashboard.connection_limits import MOST as MOST_CONNECTIONS
-from gazerig.robot.dashboard.token_bucket import TokenBucket
-from gazerig.robot.dashboard.viser_server import FROM_BROWSER_BYTES, browser_of
+from gazerig.robot.dashboard.door import page_files
+from gazerig.robot.dashboard.door.auth_proxy import MOST_LINES
+from gazerig.robot.dashboard.door.connection_limits import MOST as MOST_CONNECTIONS
+from gazerig.robot.dashboard.door.viser_server import FROM_BROWSER_BYTES, browser_of
 
-BROWSER = Path(auth_proxy.__file__).with_name("browser")
+BROWSER = Path(page_files.__file__).parents[1] / "browser"
 
 
 @pytest.fixture(scope="module")
@@ -275,27 +270,6 @@ def test_a_stop_has_a_way_of_its_own_and_is_answered_by_the_rig(near: Rig) -> No
         near.takes, near.stop_answer = True, ""
 
 
-def test_a_stop_that_the_rig_does_not_answer_is_said_and_the_next_one_is_sent() -> None:
-    with opened("127.0.0.1") as rig:
-        stall = [True]
-
-        def stalls(asked: Any) -> str:
-            while stall[0]:
-                time.sleep(0.02)
-            return ""
-
-        rig.stop = stalls  # type: ignore[method-assign]
-        rig._listener._take = stalls
-        status, _, text = rig.post(b'{"do": "stop", "why": "x"}')
-        assert status == 503 and "does not answer" in text
-        stall[0] = False
-        for _ in range(100):
-            if rig.post(b'{"do": "stop", "why": "x"}')[0] == 204:
-                break
-        else:
-            raise AssertionError("no stop was taken")
-
-
 # --- limits -----------------------------------------------------------------------------------
 
 
@@ -328,25 +302,6 @@ def test_whoever_opens_too_much_loses_his_own(near: Rig) -> None:
             one.close()
         for line in greedy:
             line.close()
-
-
-def test_a_place_is_left_by_the_browser_with_the_most() -> None:
-    async def crowd() -> list[str]:
-        places, left = TabLimits(3), []
-        with ExitStack() as stack:
-            for name in ("a", "b", "b", "c", "d"):
-                leave = stack.enter_context(places.take(name))
-                left.append((name, leave))
-            return [name for name, leave in left if leave.is_set()]
-
-    assert asyncio.run(crowd()) == ["a", "b"] or asyncio.run(crowd()) == ["b", "a"]
-
-
-def test_a_rate_lets_a_burst_pass_and_then_so_many_a_second() -> None:
-    rate = TokenBucket(10.0, 5.0)
-    assert [rate.take(0.0) for _ in range(7)] == [True] * 5 + [False] * 2
-    assert sum(rate.take(0.001 * n) for n in range(1000)) == pytest.approx(10, abs=1)
-    assert rate.take(1e6) and rate.wait_s(1e6) == 0.0
 
 
 # --- by the back ----------------------------------------------------------------------------
@@ -429,11 +384,3 @@ def test_a_message_that_is_too_long_ends_its_connection_alone(near: Rig) -> None
 def test_a_browser_cannot_publish_the_page(near: Rig) -> None:
     handlers = near.server._websock_server._incoming_handlers
     assert not [kind.__name__ for kind in handlers if "ShareUrl" in kind.__name__]
-
-
-def test_only_small_objects_are_asked_for() -> None:
-    assert from_browser(b'{"a": [1, 2]}', "me") == {"a": [1, 2]}
-    assert from_browser(b"[]", "me") is None and from_browser(b"{", "me") is None
-    assert from_browser('{"do": "stop", "why": "x", "who": "you"}', "me") == {
-        "do": "stop", "why": "x", "who": "me",
-    }  # fmt: skip

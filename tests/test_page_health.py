@@ -2,28 +2,29 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from math import atan2, degrees
 from typing import TypeVar, cast
 
+import cv2
+import numpy as np
 import pytest
 import viser
 from desk import GAZE_JOINTS
 from shown_page import SNAPSHOT
 from six_joints import SIX, TELLS_NOTHING, of_six
 
+from gazerig.config.schema import load_rig
+from gazerig.drivers.types import BusHealth
 from gazerig.gaze.types import Salience
-from gazerig.robot.dashboard.attention_panel import saliences, winner
-from gazerig.robot.dashboard.commanded_pose import CommandedPoseView
-from gazerig.robot.dashboard.head_view import FLOOR_M, LEAST_M, HeadView
-from gazerig.robot.dashboard.joint_charts import JointCharts, JointSeries
-from gazerig.robot.dashboard.outbox import Outbox
-from gazerig.robot.dashboard.overlay_choices import OverlayChoices
-from gazerig.robot.dashboard.overlays import OverlayPanel
-from gazerig.robot.dashboard.page_feed import News
-from gazerig.robot.dashboard.page_process import REPLAY
+from gazerig.robot.app.rig_description import shape_of
+from gazerig.robot.control.tick_text import health_text
+from gazerig.robot.dashboard.feed.overlay_choices import OverlayChoices
+from gazerig.robot.dashboard.feed.page_feed import News
+from gazerig.robot.dashboard.feed.page_process import REPLAY
 from gazerig.robot.dashboard.page_view import PageView
-from gazerig.robot.dashboard.panel import PanelView
-from gazerig.robot.dashboard.servo_health import (
+from gazerig.robot.dashboard.panels.attention_panel import saliences, winner
+from gazerig.robot.dashboard.panels.joint_charts import JointCharts, JointSeries
+from gazerig.robot.dashboard.panels.panel import PanelView
+from gazerig.robot.dashboard.panels.servo_health import (
     NO_FEEDBACK,
     health,
     servo_table,
@@ -31,9 +32,11 @@ from gazerig.robot.dashboard.servo_health import (
     strain_of_load,
     strain_of_voltage,
 )
-from gazerig.robot.dashboard.widget import Html, Widget
-from gazerig.robot.dashboard.widgets import Widgets
-from gazerig.robot.model.head_shape import CHIN
+from gazerig.robot.dashboard.requests.outbox import Outbox
+from gazerig.robot.dashboard.view.lid_edges import lid_edges
+from gazerig.robot.dashboard.view.overlays import OverlayPanel
+from gazerig.robot.dashboard.widgets.widget import Html, Widget
+from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.types import (
     CommandedPose,
     LoopFigures,
@@ -304,61 +307,6 @@ def test_the_menu_of_traces_is_that_of_the_rig() -> None:
     assert "left upper lid" in titles and "left lower lid" in titles
 
 
-def test_the_head_has_the_lids_and_the_neck_that_the_rig_has(server: viser.ViserServer) -> None:
-    view, ghost = HeadView(server.scene), CommandedPoseView(server.scene)
-    handles = server.scene._handle_from_node_name
-
-    def drawn(shot: Snapshot) -> set[str]:
-        view.show(shot)
-        ghost.show(shot)
-        nodes = {
-            "upper": "/head/lids_left/upper", "lower": "/head/lids_left/lower",
-            "ghost's upper": "/ghost/lid_left",
-            "ghost's lower": "/ghost/lower_lid_left",
-        }  # fmt: skip
-        return {name for name, node in nodes.items() if handles[node].visible}
-
-    def edge_deg(part: str) -> float:
-        """How high a lid's edge stands above the eye's equator."""
-        w, _, y, _ = handles[f"/head/lids_{part}"].wxyz
-        return -2.0 * degrees(atan2(y, w))
-
-    assert drawn(snapshot()) == {"upper", "lower", "ghost's upper"}
-    still = edge_deg("left/lower")
-    assert drawn(of_six(snapshot())) == {
-        "upper", "lower", "ghost's upper", "ghost's lower",
-    }  # fmt: skip
-    assert edge_deg("left/lower") < edge_deg("right/lower") < still - 3.0
-    met = replace(of_six(snapshot()), lids=(0.0, 0.0), lower_lids=(0.0, 0.0))
-    drawn(met)
-    assert edge_deg("left/lower") == pytest.approx(still) == edge_deg("left/upper")
-    bare = replace(snapshot(), joints=("eyes_pan", "eyes_tilt", "neck_yaw"))
-    assert drawn(bare) == set()
-    lower_only = replace(bare, joints=("eyes_pan", "left_lower_lid"), lower_lids=(0.5, 1.0))
-    assert drawn(lower_only) == {"lower", "ghost's lower"}
-
-
-def test_a_head_without_a_neck_stands_on_a_base_below_it(server: viser.ViserServer) -> None:
-    view = HeadView(server.scene)
-
-    def stood() -> tuple[float, float]:
-        """Where the neck begins and ends; the base reaches from the table to its beginning."""
-        begins = view._neck.position[2]
-        base, neck = (cast(tuple[float, float, float], h.scale) for h in (view._bust, view._neck))
-        assert view._bust.position[2] == pytest.approx(begins)
-        assert begins - base[2] == pytest.approx(FLOOR_M, abs=2e-3) or base[2] == LEAST_M
-        return begins, begins + neck[2]
-
-    view.show(replace(of_six(snapshot()), p_world_head_m=(0.1, 0.05, 0.12)))
-    assert view._bust.position[1] == pytest.approx(0.05)
-    begins_m, ends_m = stood()
-    assert begins_m < 0.12 + CHIN * 0.062 and begins_m < ends_m < 0.12
-    view.show(replace(of_six(snapshot(2.0)), p_world_head_m=(0.0, 0.0, -0.3)))
-    assert cast(tuple[float, float, float], view._bust.scale)[2] == LEAST_M  # it lies on the table
-    view.show(snapshot(3.0))
-    assert tuple(view._bust.position[:2]) == (0.0, 0.0)
-
-
 def test_layers_are_seen_where_they_are_wanted(server: viser.ViserServer) -> None:
     view = OverlayPanel(server.scene)
 
@@ -367,15 +315,35 @@ def test_layers_are_seen_where_they_are_wanted(server: viser.ViserServer) -> Non
         handles = server.scene._handle_from_node_name
         return {name for name, node in nodes.items() if node in handles and handles[node].visible}
 
-    view.show(snapshot(), OverlayChoices(ghost=True, camera=True, eyes=True))
+    edges = lid_edges(shape_of(load_rig("desk")))
+    view.show(snapshot(), OverlayChoices(ghost=True, camera=True, eyes=True), edges)
     assert seen() == {"ghost", "camera", "eyes"}
-    view.show(snapshot(), OverlayChoices(ghost=False, camera=True, eyes=False))
+    view.show(snapshot(), OverlayChoices(ghost=False, camera=True, eyes=False), edges)
     assert seen() == {"camera"}
     view.show(
         replace(snapshot(), commanded_pose=None, camera=None, field_deg=None),
         OverlayChoices(eyes=True),
+        edges,
     )
     assert seen() == set()
+
+
+def test_a_recording_without_pictures_says_so(server: viser.ViserServer) -> None:
+    widgets = Widgets()
+    view = PageView(server, widgets, Outbox(None), Nobody().tell)  # type: ignore[arg-type]
+    state = {"at_s": 1.0, "duration_s": 9.0, "playing": False, "speed": 1.0, "sought_s": None}
+    assert view._panel.image.data == b""
+    without = {**state, "pictures": False}
+    view.show(News((snapshot(),), None, ended=False, others=((REPLAY, without),)))
+    shown = cv2.imdecode(np.frombuffer(view._panel.image.data, np.uint8), cv2.IMREAD_GRAYSCALE)
+    assert shown is not None and 0.01 < (shown > 180).mean() < 0.1  # words on a dark ground
+
+
+def test_bus_faults_are_told_in_plain_words() -> None:
+    errors = {"timeout": 74, "rearmed": 1, "late computer": 0, "pulse": 2}
+    said = health_text(BusHealth(0, 0, errors))
+    assert said == "bus: pulse 2 times, torque on again 1 time, no answer 74 times"
+    assert health_text(BusHealth(0, 0, {})) == "bus ok"
 
 
 def test_a_recording_that_stands_still_is_no_silent_rig(server: viser.ViserServer) -> None:

@@ -13,12 +13,12 @@ from page_layout import boxes, faults, value, violations
 from present import present
 from shown_page import SNAPSHOT, running_page, wait_for
 
-from gazerig.robot.dashboard.camera_overlay import encode
-from gazerig.robot.dashboard.page_process import REPLAY, PageProcess
+from gazerig.robot.dashboard.feed.camera_overlay import encode
+from gazerig.robot.dashboard.feed.page_process import REPLAY, PageProcess
 from gazerig.robot.model.leader import Leader, sentence
 from gazerig.robot.model.types import Snapshot
 
-pytestmark = pytest.mark.own_timeouts
+pytestmark = [pytest.mark.usefixtures("branched_children"), pytest.mark.own_timeouts]
 
 SIZES = {"desk": (1600, 1000), "laptop": (1280, 720), "phone": (390, 844)}
 TABS = ("watch", "steer", "tune", "health", "report")

@@ -15,8 +15,7 @@ from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Salience
-from gazerig.robot.dashboard.attention_panel import reason, winner
-from gazerig.robot.dashboard.camera_overlay import (
+from gazerig.robot.dashboard.feed.camera_overlay import (
     FARTHEST_M,
     IMAGE_WIDTH_PX,
     NEAREST_M,
@@ -25,7 +24,9 @@ from gazerig.robot.dashboard.camera_overlay import (
     encode,
     ground,
 )
-from gazerig.robot.dashboard.joint_charts import (
+from gazerig.robot.dashboard.feed.page_process import MESSAGE_BYTES
+from gazerig.robot.dashboard.panels.attention_panel import reason, winner
+from gazerig.robot.dashboard.panels.joint_charts import (
     GROUPS,
     MOST_POINTS,
     ChartGroup,
@@ -33,13 +34,13 @@ from gazerig.robot.dashboard.joint_charts import (
     groups_of,
     mean_deg,
 )
-from gazerig.robot.dashboard.page_process import MESSAGE_BYTES
-from gazerig.robot.dashboard.people import fixated_part
-from gazerig.robot.dashboard.scene_node import along, quaternion, turned_up, upright_along
-from gazerig.robot.dashboard.servo_health import guard, health
-from gazerig.robot.dashboard.status import alarms, drawn_together, without_feedback
+from gazerig.robot.dashboard.panels.servo_health import guard, health
+from gazerig.robot.dashboard.panels.status import alarms, drawn_together, without_feedback
+from gazerig.robot.dashboard.view.people import fixated_part
+from gazerig.robot.dashboard.view.scene_node import along, turned_up, upright_along
 from gazerig.robot.model.leader import Leader
 from gazerig.robot.model.mesh import Mesh, cap, ellipsoid, lid, ring, turned
+from gazerig.robot.model.quaternion import quaternion
 from gazerig.robot.model.types import GAZE_JOINTS as EVERY_JOINT
 from gazerig.robot.model.types import SeenFace, Snapshot, Trail
 
@@ -115,6 +116,17 @@ def test_why_it_won_is_said_in_a_plain_sentence(terms: Terms, said: str) -> None
     assert reason(shot) == said and escape(said) in winner(shot)
     led = replace(shot, leader=Leader("person", "ann", "look at 1 0 0"))
     assert reason(led) == shot.why
+
+
+def test_why_a_planner_chose_is_said_with_it() -> None:
+    first = Salience(3, "hand", 0.0, 0.0, 0.0, 0.0, 0.8, 1.0, 0.8)
+    shot = replace(
+        snapshot(), saliences=(first,), behaviour="planned", plan="guard: hand 3 arrives in 0.20 s"
+    )
+    assert (
+        reason(shot) == "because the behaviour guard asks for it (0.80): hand 3 arrives in 0.20 s"
+    )
+    assert "behaviour: planned" in winner(shot) and "plan: guard" in winner(shot)
 
 
 def test_equal_reasons_are_said_once() -> None:

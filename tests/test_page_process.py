@@ -17,8 +17,8 @@ import shown_page
 from page_visitor import PATIENCE_S, Visitor
 from shown_page import AHEAD, free_port, running_page, wait_for
 
+from gazerig.robot.dashboard.feed.page_process import PageProcess
 from gazerig.robot.dashboard.page_main import free_port as first_free_port
-from gazerig.robot.dashboard.page_process import PageProcess
 from gazerig.robot.model.types import SeenFace
 
 REPOSITORY = Path(__file__).parents[1]
@@ -68,7 +68,7 @@ def in_time(work: Callable[[], None]) -> bool:
 
 def test_sending_side_needs_no_viewer_and_no_opencv() -> None:
     check = (
-        "import gazerig.robot.dashboard.page_process, sys;"
+        "import gazerig.robot.dashboard.feed.page_process, sys;"
         "sys.exit(bool({'viser', 'cv2'} & set(sys.modules)))"
     )
     assert subprocess.run([sys.executable, "-c", check]).returncode == 0
@@ -214,7 +214,7 @@ def test_snapshot_that_cannot_be_drawn_ends_the_page_in_words() -> None:
 
 PARENT = """
 import os, sys, time
-from gazerig.robot.dashboard.page_process import PageProcess
+from gazerig.robot.dashboard.feed.page_process import PageProcess
 page = PageProcess("127.0.0.1", int(sys.argv[1]))
 page.open()
 while page.url() is None:

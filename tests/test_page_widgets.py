@@ -13,15 +13,10 @@ from six_joints import SIX, of_six
 from gazerig.config.parameters import parameters, values
 from gazerig.config.schema import load_rig
 from gazerig.robot.control.command_handler import plain
-from gazerig.robot.dashboard.container import Container
-from gazerig.robot.dashboard.controls import LeadPanel
-from gazerig.robot.dashboard.inbox import (
-    parse_request,
-    request_message,
-)
-from gazerig.robot.dashboard.jog_panel import ESTIMATED, JogPanel, not_measured
-from gazerig.robot.dashboard.page_feed import News
-from gazerig.robot.dashboard.param_control import (
+from gazerig.robot.dashboard.feed.page_feed import News
+from gazerig.robot.dashboard.panels.controls import LeadPanel
+from gazerig.robot.dashboard.panels.jog_panel import ESTIMATED, JogPanel, not_measured
+from gazerig.robot.dashboard.panels.param_control import (
     ParamControl,
     hint,
     label,
@@ -30,9 +25,14 @@ from gazerig.robot.dashboard.param_control import (
     step_of,
     written,
 )
-from gazerig.robot.dashboard.param_panel import ParamState, found, group_of
-from gazerig.robot.dashboard.widget import Slider, TextField
-from gazerig.robot.dashboard.widgets import Widgets
+from gazerig.robot.dashboard.panels.param_panel import ParamState, found, group_of
+from gazerig.robot.dashboard.requests.inbox import (
+    parse_request,
+    request_message,
+)
+from gazerig.robot.dashboard.widgets.container import Container
+from gazerig.robot.dashboard.widgets.widget import Slider, TextField
+from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.command_json import as_json, from_json
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt
 from gazerig.robot.remote.param_info import JsonValue, ParamInfo

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from gazerig.robot.dashboard.widgets import Client, Widgets
+from gazerig.robot.dashboard.widgets.widgets import Client, Widgets
 
 
 class Tab:

@@ -15,9 +15,9 @@ from shown_page import wait_for
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.connection import Connection
 
-from gazerig.robot.dashboard.widgets import RECEIVED_BYTES
+from gazerig.robot.dashboard.widgets.widgets import RECEIVED_BYTES
 
-pytestmark = pytest.mark.own_timeouts
+pytestmark = [pytest.mark.usefixtures("branched_children"), pytest.mark.own_timeouts]
 
 PANELS = "/rig/panels"
 

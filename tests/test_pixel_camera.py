@@ -30,12 +30,12 @@ from gazerig.sim_mock.cameras.draw_person import (
     draw_thing,
 )
 from gazerig.sim_mock.cameras.draw_room import draw_room
+from gazerig.sim_mock.cameras.optics import smeared
 from gazerig.sim_mock.cameras.rendered import (
     Exposure,
     PixelCamera,
     PixelCameraParams,
     draw_scene,
-    smeared,
 )
 from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 
@@ -75,9 +75,6 @@ class Still:
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
         return self._things
-
-    def behaviour(self, t_s: float) -> str | None:
-        return None
 
     def events(self) -> tuple[Event, ...]:
         return ()

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gazerig.robot.dashboard.page_process import SPEEDS
+from gazerig.robot.dashboard.feed.page_process import SPEEDS
 from gazerig.robot.recording.playback_clock import STEPS, Mark, PlaybackClock
 
 MARKS = (

@@ -36,6 +36,8 @@ from gazerig.robot.app.options import RunOptions, camera_of
 from gazerig.robot.cli import kinds
 from gazerig.robot.model.clock import RealClock
 
+pytestmark = pytest.mark.usefixtures("branched_children")
+
 DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
 
 RULE = """

@@ -7,7 +7,7 @@ from present import present
 
 from gazerig.gaze.angles import add, dot, rotate_back, scale, sub, unit
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.dashboard.pointer_to_look import (
+from gazerig.robot.dashboard.requests.pointer_to_look import (
     BURST,
     TOWARDS_HEAD,
     Pointer,

@@ -395,3 +395,23 @@ def test_a_bus_that_cannot_be_ends_the_others(capfd):
             }
         )
     assert "baud 12: xl330-m288 knows" in capfd.readouterr().err
+
+
+def test_a_server_ends_with_its_client_also_while_it_makes_a_world():
+    code = (
+        "import gazerig.sim_mock.pty.server as server, time\n"
+        "with server._ended_with_client(True):\n"
+        "    print('making', flush=True); time.sleep(600)"
+    )
+    server = subprocess.Popen(
+        [sys.executable, "-c", code], cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    try:
+        assert present(server.stdout).readline() == b"making\n"
+        assert server.poll() is None
+        present(server.stdin).close()
+        assert server.wait(60) == 0
+    finally:
+        server.kill()
+        server.wait()
+        present(server.stdout).close()

@@ -11,8 +11,8 @@ from replayed_run import RATE_HZ, SECONDS, Screen, ticks_of
 
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.dashboard.inbox import MESSAGE_BYTES
-from gazerig.robot.dashboard.page_process import FRAME, REPLAY, SNAPSHOT, unpack
+from gazerig.robot.dashboard.feed.page_process import FRAME, REPLAY, SNAPSHOT, unpack
+from gazerig.robot.dashboard.requests.inbox import MESSAGE_BYTES
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.commands import Ask
 from gazerig.robot.recording.playback_clock import PlaybackState
@@ -266,8 +266,9 @@ def test_the_page_is_told_once_what_there_is_and_in_one_message(frames: Snapshot
     shown(replay, screen, time_, 3.0)
     assert ["marks" in state for state in screen.states()].count(True) == 1
     first = screen.states()[0]
+    assert first["pictures"] is True
     assert sum(first["marks"]["saccade"]) == sum(m.kind == "saccade" for m in frames.marks)
-    crowded = SimpleNamespace(duration_s=600.0, marks=[frames.marks[0]._replace(
+    crowded = SimpleNamespace(duration_s=600.0, has_pictures=False, marks=[frames.marks[0]._replace(
         kind="event", words="x" * 500)] * 5000)  # fmt: skip
     assert len(json.dumps(introduction(crowded))) < 190_000  # type: ignore[arg-type]
 

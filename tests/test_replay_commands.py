@@ -14,7 +14,7 @@ from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.cli import replay as cli_replay
 from gazerig.robot.control.loop import run
-from gazerig.robot.dashboard.page_process import unpack
+from gazerig.robot.dashboard.feed.page_process import unpack
 from gazerig.robot.recording.gaze_angles import trace_of
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder

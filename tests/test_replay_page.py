@@ -7,8 +7,8 @@ import pytest
 from replayed_run import RATE_HZ, SECONDS, Screen, ticks_of
 
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.dashboard.replay import ReplayView, clock, event_list, strip
-from gazerig.robot.dashboard.widgets import Widgets
+from gazerig.robot.dashboard.panels.replay import ReplayView, clock, event_list, strip
+from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.commands import Ask
 from gazerig.robot.recording.replay import Replay

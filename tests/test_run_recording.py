@@ -32,7 +32,7 @@ from gazerig.drivers.types import Detections
 from gazerig.gaze.scanpath import Walk
 from gazerig.gaze.types import Bodies, Face, Percept
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.dashboard.camera_overlay import encode
+from gazerig.robot.dashboard.feed.camera_overlay import encode
 from gazerig.robot.model import stop_latch
 from gazerig.robot.model.commands import Ask, Jog, LookAt, Resume, Stop, Tune
 from gazerig.robot.recording import run_format as fmt
@@ -41,7 +41,7 @@ from gazerig.robot.recording.frame_picker import FramePicker
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text, end_of, info_of
-from gazerig.robot.recording.viewer_messages import quaternion
+from gazerig.robot.recording.viewer_messages import orientation
 from gazerig.robot.recording.writer_process import PIECE_BYTES
 
 pytestmark = pytest.mark.usefixtures("branched_children")
@@ -281,5 +281,5 @@ def test_info_of_another_version_is_read_as_far_as_it_is_known() -> None:
 
 
 def test_a_rotation_as_a_quaternion() -> None:
-    turned = quaternion(((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
+    turned = orientation(((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
     assert turned == pytest.approx({"x": 0.0, "y": 0.0, "z": 0.5**0.5, "w": 0.5**0.5})

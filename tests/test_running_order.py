@@ -1,24 +1,37 @@
-"""Long test files come early, each between short ones, and none is lost or torn apart."""
+"""Costly test files come early, each between others, and none is lost or torn apart."""
 
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from running_order import spread
+from running_order import COSTS_S, spread
 from shared_compiling import order_of
 
 
 def item(file: str, *marks: str) -> Any:
     named = [SimpleNamespace(name=mark) for mark in marks]
-    return SimpleNamespace(location=(file, 1, "test"), iter_markers=lambda: named)
+    return SimpleNamespace(nodeid=f"{file}::test", iter_markers=lambda: named)
 
 
 def order(*items: Any) -> str:
-    return "".join(one.location[0] for one in spread(items))
+    return "".join(one.nodeid[0] for one in spread(items))
 
 
-def test_every_other_file_is_a_long_one_until_there_are_none() -> None:
-    assert order(item("a"), item("b"), item("c"), item("d", "pty"), item("e", "slow")) == "daebc"
+def test_files_that_wait_costly_ones_and_others_take_turns() -> None:
+    given = [item("a"), item("b"), item("c"), item("d", "pty"), item("e", "slow"), item("f", "pty")]
+    assert order(*given) == "deafbc"
+
+
+def test_the_costliest_come_first() -> None:
+    files = [f"tests/test_{name}.py" for name in reversed(COSTS_S)]
+    found = [one.nodeid.partition("::")[0] for one in spread([item(file) for file in files])]
+    costs = [COSTS_S[file[11:-3]] for file in found]
+    assert costs == sorted(COSTS_S.values(), reverse=True)
+
+
+def test_every_file_with_a_cost_is_there() -> None:
+    here = Path(__file__).parent
+    assert [name for name in COSTS_S if not (here / f"test_{name}.py").is_file()] == []
 
 
 def test_a_file_with_one_long_test_is_long_and_stays_together() -> None:

@@ -30,9 +30,6 @@ class Still:
     def things(self, t_s: float) -> tuple[Thing, ...]:
         return self._things if t_s < 0.5 else self._later + self._things
 
-    def behaviour(self, t_s: float) -> str | None:
-        return None
-
     def events(self) -> tuple[Event, ...]:
         return ()
 

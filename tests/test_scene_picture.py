@@ -11,8 +11,8 @@ import pytest
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Mat3
-from gazerig.robot.dashboard.gaze_heat import draw_heat
-from gazerig.robot.dashboard.gaze_trail import GazeTrail
+from gazerig.robot.dashboard.feed.gaze_heat import draw_heat
+from gazerig.robot.dashboard.feed.gaze_trail import GazeTrail
 from gazerig.sim_mock.scenes.picture import ScenePicture
 from gazerig.sim_mock.scenes.registry import scenes
 

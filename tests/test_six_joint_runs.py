@@ -26,7 +26,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.app.session import leave
 from gazerig.robot.control.loop import Tick, run
-from gazerig.robot.dashboard.page_process import unpack
+from gazerig.robot.dashboard.feed.page_process import unpack
 from gazerig.robot.recording.export_bids import DatasetDescription as Subject
 from gazerig.robot.recording.export_bids import write_bids
 from gazerig.robot.recording.export_csv import columns, write_csv

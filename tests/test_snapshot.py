@@ -17,8 +17,8 @@ from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.gaze_models import gaze_parts
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
-from gazerig.robot.dashboard.page_process import MESSAGE_BYTES, pack, unpack
-from gazerig.robot.dashboard.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts, snapshot
+from gazerig.robot.dashboard.feed.page_process import MESSAGE_BYTES, pack, unpack
+from gazerig.robot.dashboard.feed.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts, snapshot
 from gazerig.robot.model.types import SeenBlink, SeenFixation, SeenSaccade, Snapshot
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from gazerig.config.schema import load_rig
-from gazerig.robot.app import assemble as assembling
+from gazerig.robot.app import run_scene
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
@@ -33,16 +33,13 @@ class Room:
         place = (1.5, 0.5 * float(np.sin(2.0 * t_s)), 0.25)
         return (Thing(1, "ball", place, 0.1),) if self._ball else ()
 
-    def behaviour(self, t_s: float) -> str | None:
-        return None
-
     def events(self) -> tuple[Event, ...]:
         return ()
 
 
 def watched(room: Room, patch: pytest.MonkeyPatch, seconds: float) -> list[Tick]:
     """Run a rig that hardly rests between glances around, with all of the head in each."""
-    patch.setattr(assembling, "scenes", lambda: {room.name: room})
+    patch.setattr(run_scene, "scenes", lambda: {room.name: room})
     rig = load_rig("desk")
     idle = replace(rig.gaze.idle, rest_ms=400.0, glance_ms=500.0, rest_salience=1.0)
     head = replace(rig.gaze.head, eye_only_range_deg=6.0, head_slope=1.0)

@@ -1,7 +1,7 @@
 """A running rig in another process, to be tuned from a shell.
 
-``python tests/tuned_rig.py RIG`` is that process: a loop before an emulated bus, in simulated
-time that passes slower than real, so that it leaves the processor to the commands.
+That process is a branch of this one: a loop before an emulated bus, in simulated time that passes
+slower than real, so that it leaves the processor to the commands.
 """
 
 import contextlib
@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from branch import Branch
 from ideal_bus import ideal_buses
 
 from gazerig.config.load import ConfigError
@@ -98,8 +99,8 @@ def a_rig() -> Iterator[Running]:
     folder = Path(tempfile.mkdtemp(prefix="gz-", dir="/tmp"))
     path, log = copy_shipped("desk", folder / "my.yaml"), folder / "log"
     with log.open("w") as said:
-        process = subprocess.Popen(
-            [sys.executable, __file__, str(path)],
+        process = Branch(
+            lambda: serve(path),
             stdout=subprocess.PIPE,
             stderr=said,
             text=True,
@@ -118,9 +119,9 @@ def a_rig() -> Iterator[Running]:
 @contextlib.contextmanager
 def a_rig_beside() -> Iterator[subprocess.Popen[str]]:
     """A second one whose sockets are in the same folder."""
-    folder = os.environ["XDG_RUNTIME_DIR"]
-    process = subprocess.Popen(
-        [sys.executable, __file__, str(Path(folder) / "my.yaml")],
+    path = Path(os.environ["XDG_RUNTIME_DIR"]) / "my.yaml"
+    process = Branch(
+        lambda: serve(path),
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         text=True,
@@ -132,7 +133,3 @@ def a_rig_beside() -> Iterator[subprocess.Popen[str]]:
     finally:
         process.terminate()
         process.communicate(timeout=20.0)
-
-
-if __name__ == "__main__":
-    serve(Path(sys.argv[1]))

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from math import radians
-from typing import NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -11,7 +11,6 @@ from gazerig.config.gestures import gestures_of
 from gazerig.config.schema import Rig, load_rules, load_walk
 from gazerig.config.shipped import shipped_names
 from gazerig.drivers.camera.depth_roi import depth_at
-from gazerig.drivers.camera.pose_buffer import PoseBuffer
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import Camera
 from gazerig.gaze.animation import Animation
@@ -20,16 +19,12 @@ from gazerig.gaze.aversion import Aversion
 from gazerig.gaze.lids import Lids
 from gazerig.gaze.saccade import SaccadeParams
 from gazerig.gaze.scanpath import Scanpath, ScanpathParams, Walk, row_sums_note
-from gazerig.gaze.types import Mat3
 from gazerig.params import choices_of
 from gazerig.robot.app.animation_tables import animation_tables
 from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.camera_factory import (
     lendable,
-    locator_of,
     placed_camera,
-    real_camera,
-    scene_camera,
 )
 from gazerig.robot.app.gaze_models import (
     chooser_of,
@@ -41,36 +36,41 @@ from gazerig.robot.app.gaze_models import (
 from gazerig.robot.app.live_params import CameraPlacement, Components, LiveParams
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts
+from gazerig.robot.app.rig_description import shape_of
 from gazerig.robot.app.rig_limits import (
     lid_spans,
     limits,
     own_parts,
     park_rad,
 )
-from gazerig.robot.app.run_bus import RunBus, run_bus, true_head
+from gazerig.robot.app.run_bus import RunBus, run_bus
+from gazerig.robot.app.run_camera import run_camera, sight_of
+from gazerig.robot.app.run_scene import for_surroundings, scene_of
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import TargetChooser
 from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.control.loop import Robot
-from gazerig.robot.dashboard.snapshot import ShownRig
+from gazerig.robot.dashboard.feed.snapshot import ShownRig
 from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
 from gazerig.robot.model.coupling_params import pairs_of
 from gazerig.robot.model.frames import (
     CameraMount,
     CameraParams,
-    NewestPose,
     PoseHistory,
 )
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.types import JointAngles, further
+from gazerig.robot.model.world_shapes import WorldShapes
 from gazerig.robot.perception.gyro_fusion import GyroFusion
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
 from gazerig.robot.perception.tracker import Tracker
 from gazerig.robot.safety.guard import Guard
-from gazerig.sim_mock.scenes.registry import scenes
 from gazerig.sim_mock.scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from gazerig.robot.app.run_world import RunWorld
 
 P = TypeVar("P", ScanpathParams, SaccadeParams)
 T = TypeVar("T")
@@ -86,6 +86,9 @@ class Assembly(NamedTuple):
     sent_digest: gives the SHA-256 of all bytes sent to the emulated bus, None elsewhere
     close: ends what was started for it; notes: what a person should know
     live: holds the rig in force and puts changes into the running parts
+    fault: carries out a fault command of the emulated servos, None where they are real or ideal
+    world: how the world with physics looks, None without one
+    world_start_s: gives when the script of its people began, None before that and without one
     """
 
     robot: Robot
@@ -97,6 +100,9 @@ class Assembly(NamedTuple):
     close: Callable[[], None]
     notes: tuple[str, ...]
     live: LiveParams
+    fault: Callable[[str], str] | None = None
+    world: WorldShapes | None = None
+    world_start_s: Callable[[], float | None] = lambda: None
 
     def shown(self) -> ShownRig:
         """Return how the rig is built now, as far as people are shown it."""
@@ -108,6 +114,7 @@ class Assembly(NamedTuple):
             self.mount,
             radians(self.horizontal_field_deg),
             rig.gaze.field_of_view,
+            shape_of(rig),
         )
 
     def camera(self) -> CameraParams:
@@ -146,7 +153,23 @@ class Substitutes(NamedTuple):
 RIGS_OWN = Substitutes()
 
 
-def assemble(rig: Rig, options: RunOptions, substitutes: Substitutes = RIGS_OWN) -> Assembly:
+class SharedPlace(NamedTuple):
+    """A place in a world with several robots: the world as this robot sees it, and their time.
+
+    stands: where it stands there, as a recording holds it
+    """
+
+    world: "RunWorld"
+    clock: Clock
+    stands: tuple[float, ...] = ()
+
+
+def assemble(
+    rig: Rig,
+    options: RunOptions,
+    substitutes: Substitutes = RIGS_OWN,
+    shared: "SharedPlace | None" = None,
+) -> Assembly:
     """Build the robot of a rig, once and whole; nothing is opened but the emulated bus.
 
     Args:
@@ -154,31 +177,28 @@ def assemble(rig: Rig, options: RunOptions, substitutes: Substitutes = RIGS_OWN)
         options: what to run.
         substitutes: what a recording, a replay or a calibration puts around or in the place
             of the rig's own parts.
+        shared: the rig's place in a world with other robots, None for a world of its own or none.
 
     Raises:
         gazerig.config.load.ConfigError: the profile or walk that the rig names is at fault.
         SetupError: a film or model file cannot be used.
     """
     rig = with_options(rig, options)
-    scene = _scene(rig, options.scene) if options.scene is not None else None
+    world, scene, clock = _surroundings(rig, options, shared)
     seeds = np.random.SeedSequence(options.seed).spawn(len(_Generators._fields))
     random = _Generators(*map(np.random.default_rng, seeds))
-    clock: Clock = SimulatedClock() if options.fast else RealClock()
     kinematics = kinematics_of(rig)
     camera, notes = placed_camera(rig, options, kinematics)
     walk = load_walk(rig.gaze.scanpath.transition_matrix)
-    in_process = scene is None or (options.pixels and not options.fast)
-    sight = _sight(kinematics, camera, options, in_process)
-    wires = run_bus(rig, options, clock)
+    drawn = options.pixels or (world is not None and not options.no_pictures)
+    in_process = scene is None or (drawn and not options.fast)
+    sight = sight_of(kinematics, camera, options, in_process)
+    wires = run_bus(rig, options, clock, world)
     messages: list[str] = []
     try:
-        seen: Camera = (
-            scene_camera(
-                rig, options, scene, sight.mount, true_head(wires.true_steps, rig, sight.poses),
-                random.camera, locator_of(camera), substitutes.program, clock, sight.turns,
-            )
-            if scene is not None
-            else real_camera(rig, options, clock, camera, sight.turns, substitutes.program)
+        seen = run_camera(
+            rig, options, scene, world, sight, wires, random.camera, camera, clock,
+            substitutes.program, messages.append,
         )  # fmt: skip
         if options.mock and not options.fast:
             seen = lendable(seen, rig, clock)
@@ -203,10 +223,31 @@ def assemble(rig: Rig, options: RunOptions, substitutes: Substitutes = RIGS_OWN)
     except BaseException:
         wires.close()
         raise
-    notes = (*notes, *_walk_notes(walk, rig, options))
     return Assembly(
-        robot, clock, sight.mount, sight.poses, scene, wires.digest, wires.close, notes, live
-    )
+        robot, clock, sight.mount, sight.poses, scene, wires.digest, wires.close,
+        (*notes, *_walk_notes(walk, rig, options)), live,
+        wires.fault, None if world is None else world.shapes(), wires.world_start_s,
+    )  # fmt: skip
+
+
+def _surroundings(
+    rig: Rig, options: RunOptions, shared: SharedPlace | None
+) -> tuple["RunWorld | None", Scene | None, Clock]:
+    """Return the world with physics, what is before the camera, and the time; None without one."""
+    if shared is not None:
+        return shared.world, shared.world.scene, shared.clock
+    world = _world(rig, options)
+    scene = scene_of(rig, options) if world is None else world.scene
+    return world, scene, SimulatedClock() if options.fast else RealClock()
+
+
+def _world(rig: Rig, options: RunOptions) -> "RunWorld | None":
+    """Return the world that was asked for, None without one."""
+    if options.world is None:
+        return None
+    from gazerig.robot.app.run_world import world_of  # with the people in it
+
+    return world_of(rig, options)
 
 
 def _walk_notes(walk: Walk, rig: Rig, options: RunOptions) -> tuple[str, ...]:
@@ -226,21 +267,6 @@ class _Generators(NamedTuple):
     aversion: np.random.Generator
     endpoint: np.random.Generator
     reaction: np.random.Generator
-
-
-class _Sight(NamedTuple):
-    """Where the camera sits, where the head was when, and who else receives it."""
-
-    mount: CameraMount
-    poses: PoseHistory
-    turns: PoseBuffer | None
-
-
-def _sight(kinematics: Kinematics, camera: CameraParams, options: RunOptions, real: bool) -> _Sight:
-    mount = CameraMount(camera)
-    turns = PoseBuffer() if real and mount.on_head else None
-    history = PoseHistory if options.placed_by == "capture" else NewestPose
-    return _Sight(mount, history(kinematics, tell=_turn_sender(mount, turns)), turns)
 
 
 def _components(
@@ -362,31 +388,7 @@ def with_options(rig: Rig, options: RunOptions) -> Rig:
     if options.saccade is not None:
         saccade = _chosen(gaze.saccade, "profile", options.saccade, "--saccade")
         gaze = replace(gaze, saccade=saccade)
-    return replace(rig, gaze=gaze)
-
-
-def _scene(rig: Rig, name: str) -> Scene:
-    """Find a scene, and see that the rig has a rule for all that it makes the robot do."""
-    known = scenes()
-    if name not in known:
-        raise SetupError(f"--scene {name}: unknown; scenes: {', '.join(sorted(known))}")
-    scene = known[name]
-    missing = [b for b in scene.behaviours if b not in rig.gaze.top_down.rules]
-    if missing:
-        raise SetupError(
-            f"--scene {name}: the rig has no rule for {', '.join(missing)}; "
-            "add it under gaze.top_down.rules"
-        )
-    return scene
-
-
-def _turn_sender(
-    mount: CameraMount, turns: PoseBuffer | None
-) -> Callable[[float, Mat3], None] | None:
-    """Return what tells the camera's process how its camera is turned, None if it is not needed."""
-    if turns is None:
-        return None
-    return lambda t_s, R_world_head: turns.record(t_s, mount.rotation(R_world_head))
+    return for_surroundings(replace(rig, gaze=gaze), options)
 
 
 def _chosen(params: P, key: str, value: str, option: str) -> P:

@@ -25,9 +25,10 @@ from gazerig.drivers.types import Camera, FaceDetector
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.app.borrowed_camera import BorrowedCamera
-from gazerig.robot.app.drawn_camera import DrawnCamera, MotionBesidePlans, drawn_camera
+from gazerig.robot.app.drawn_camera import DrawnCamera, drawn_camera
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts, program_camera, watched
+from gazerig.robot.app.world_camera import WorldCamera
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraMount, CameraParams, standing_still
 from gazerig.robot.model.kinematics import Kinematics
@@ -69,10 +70,7 @@ def scene_camera(
         field_rad, lens = radians(field_deg), rig.camera.lens
         return drawn_camera(
             rig, scene, mount, where, rng, clock, partial(face_detector, rig.detector),
-            lambda planned: partial(
-                MotionBesidePlans, planned, rig.motion, lens, field_rad, turns
-            ),
-            locate,
+            partial(motion_finder, rig.motion, lens, field_rad, turns), locate,
         )  # fmt: skip
     # Drawing and detecting, with OpenCV.
     from gazerig.robot.app.drawn_motion import MotionOfDrawn
@@ -87,7 +85,7 @@ def scene_start_s(camera: Camera) -> float | None:
     """Return when the scene of a camera without images began, None before that or without one."""
     if isinstance(camera, BorrowedCamera):
         return None if camera.lent else scene_start_s(camera.own)
-    return camera.start_s if isinstance(camera, SceneCamera) else None
+    return camera.start_s if isinstance(camera, SceneCamera | WorldCamera) else None
 
 
 def placed_camera(
@@ -215,6 +213,8 @@ def retune_camera(camera: Camera, before: Rig, after: Rig, placed: CameraParams)
                 return retune_camera(camera.own, before, after, placed)
             case DrawnCamera():
                 return retune_camera(camera.process, before, after, placed)
+            case WorldCamera():
+                return retune_camera(camera.seeing, before, after, placed) if camera.seeing else ""
             case CameraProcess():
                 motion = partial(retuned, after.motion, placed.lens, field_rad)
                 done = camera.retune(detector, motion if moves else None, locate)

@@ -7,61 +7,61 @@ for faces and motion in it, so that neither can delay a tick.
 import threading
 from collections.abc import Callable
 from functools import partial
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from gazerig.config.schema import Rig
 from gazerig.drivers.camera.frame_analysis import Locate, Motion
-from gazerig.drivers.camera.pose_buffer import PoseBuffer
-from gazerig.drivers.camera.pose_slot import PoseSlot
+from gazerig.drivers.camera.pose_slot import PoseAt, PoseSlot
 from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.source import FrameSource, Shot
 from gazerig.drivers.camera.worker import CameraParts
-from gazerig.drivers.types import DetectedFace, Detections, FaceDetector, ImageArray, MovingBlob
-from gazerig.drivers.vision.motion.params import MotionParams
+from gazerig.drivers.types import DetectedFace, Detections, FaceDetector, ImageArray
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.frames import CameraMount, LensParams
-from gazerig.robot.perception.motion_source import MotionSource
+from gazerig.robot.model.frames import CameraMount
 from gazerig.sim_mock.scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from gazerig.sim_mock.cameras.rendered import PixelCamera
 
 _LOOK_S = 0.002
 
+HeadPose = Callable[[float], tuple[Mat3, Vec3]]
+"""Returns rotation and place [m] of the head in the world at a time [s]."""
 
-class PlannedPlaces:
-    """What the scene's planner names in the newest frame; shared by source and motion finder."""
 
-    def __init__(self) -> None:
-        self.blobs: tuple[MovingBlob, ...] = ()
+class NewestHead(Protocol):
+    """Where the head is now, as the camera's process knows it."""
+
+    @property
+    def first_s(self) -> float:
+        """Return the time at which the scene begins."""
+        ...
+
+    def newest(self) -> PoseAt | None:
+        """Return the newest pose, None before the first."""
+        ...
 
 
 class DrawnSource:
     """Frames of a scene, drawn from where the head is.
 
     Args:
-        scene: what is before the camera.
-        mount: where it sits on the head.
-        field_deg: its horizontal field of view.
-        poses: where the head is; the scene begins with the first.
-        planned: takes what the scene's planner names.
-        rng: for the noise of the frames.
+        make: returns the camera that draws, on a head whose pose it is given.
+        poses: where the head is.
     """
 
     def __init__(
         self,
-        scene: Scene,
-        mount: CameraMount,
-        field_deg: float,
-        poses: PoseSlot,
-        planned: PlannedPlaces,
-        rng: np.random.Generator,
+        make: "Callable[[HeadPose], PixelCamera]",
+        poses: NewestHead,
     ) -> None:
-        from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
-
-        params = PixelCameraParams(horizontal_field_deg=field_deg, latency_ms=0.0)
-        self._period_s = 1.0 / params.rate_hz
-        self._camera = PixelCamera(params, scene, mount, self._head, _NoFaces(), rng)
-        self._poses, self._planned = poses, planned
+        self._camera = make(self._head)
+        self._period_s = 1.0 / self._camera.rate_hz
+        self._poses = poses
+        self._now: PoseAt | None = None
         self._number = 0
         self._due_s = 0.0
 
@@ -77,6 +77,7 @@ class DrawnSource:
             if newest is None or wait_s > 0.0:
                 stop.wait(max(wait_s, _LOOK_S))
                 continue
+            self._now = newest
             if self._number == 0:
                 self._camera.latest(self._poses.first_s)  # the scene's own time begins here
             found = self._camera.latest(newest.t_s)
@@ -92,45 +93,44 @@ class DrawnSource:
         return ()
 
     def close(self) -> None:
-        """Stop; there is nothing to free."""
+        """Free what draws; safe to call twice."""
+        self._camera.close()
 
     def _head(self, t_s: float) -> tuple[Mat3, Vec3]:
-        newest = self._poses.newest()
-        assert newest is not None  # ``take`` waits for the first
-        return newest.R_world_head, newest.p_world_head_m
+        assert self._now is not None  # ``take`` waits for the first
+        return self._now.R_world_head, self._now.p_world_head_m
 
     def _shot(self, found: Detections) -> Shot:
         image = found.image
         assert image is not None
-        self._number, self._planned.blobs = found.number, tuple(found.blobs)
+        self._number = found.number
         return Shot(found.captured_s, found.number, image, found.depth_m)
 
 
-class _NoFaces:
+def scene_pixels(
+    scene: Scene, mount: CameraMount, field_deg: float, rng: np.random.Generator, head: HeadPose
+) -> "PixelCamera":
+    """Return the camera that draws a scene, for its own process.
+
+    Args:
+        scene: what is before the camera.
+        mount: where it sits on the head.
+        field_deg: its horizontal field of view.
+        rng: for the noise of the frames.
+        head: where the head is.
+    """
+    from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
+
+    params = PixelCameraParams(horizontal_field_deg=field_deg, latency_ms=0.0)
+    return PixelCamera(params, scene, mount, head, NoFaces(), rng)
+
+
+class NoFaces:
     """Finds none: the process looks for faces afterwards, as in every camera's frames."""
 
     def find(self, bgr: ImageArray) -> tuple[DetectedFace, ...]:
         """Return none."""
         return ()
-
-
-class MotionBesidePlans(MotionSource):
-    """What moves in the frames, and the places that the scene's planner names."""
-
-    def __init__(
-        self,
-        planned: PlannedPlaces,
-        params: MotionParams,
-        lens: LensParams | None,
-        field_rad: float,
-        turns: PoseBuffer | None,
-    ) -> None:
-        super().__init__(params, lens, field_rad, turns)
-        self._planned = planned
-
-    def __call__(self, shot: Shot) -> tuple[MovingBlob, ...]:
-        """Find what has moved since the frame before; planned places come along."""
-        return (*super().__call__(shot), *self._planned.blobs)
 
 
 class DrawnCamera:
@@ -142,9 +142,7 @@ class DrawnCamera:
         where: returns rotation and place of the head in the world at a time.
     """
 
-    def __init__(
-        self, process: CameraProcess, poses: PoseSlot, where: Callable[[float], tuple[Mat3, Vec3]]
-    ) -> None:
+    def __init__(self, process: CameraProcess, poses: PoseSlot, where: HeadPose) -> None:
         self.process = process
         self._poses, self._where = poses, where
 
@@ -180,11 +178,11 @@ def drawn_camera(
     rig: Rig,
     scene: Scene,
     mount: CameraMount,
-    where: Callable[[float], tuple[Mat3, Vec3]],
+    where: HeadPose,
     rng: np.random.Generator,
     clock: Clock,
     detector: Callable[[], FaceDetector],
-    motion: Callable[[PlannedPlaces], Callable[[], Motion]],
+    motion: Callable[[], Motion],
     locate: Locate,
 ) -> DrawnCamera:
     """Return a camera on a drawn scene in real time.
@@ -197,12 +195,11 @@ def drawn_camera(
         rng: for the noise.
         clock: the host's.
         detector: makes what finds faces.
-        motion: returns what makes the motion finder that lets planned places pass.
+        motion: makes what finds motion.
         locate: locates what is found in the camera's axes.
     """
-    poses, planned = PoseSlot(), PlannedPlaces()
-    source: Callable[[], FrameSource] = partial(
-        DrawnSource, scene, mount, rig.camera.horizontal_field_deg, poses, planned, rng
-    )
-    parts = CameraParts(source, detector, motion(planned), locate)
+    poses = PoseSlot()
+    make = partial(scene_pixels, scene, mount, rig.camera.horizontal_field_deg, rng)
+    source: Callable[[], FrameSource] = partial(DrawnSource, make, poses)
+    parts = CameraParts(source, detector, motion, locate)
     return DrawnCamera(CameraProcess(parts, clock.now_s, rig.camera_recovery), poses, where)

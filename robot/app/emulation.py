@@ -9,6 +9,7 @@ from gazerig.drivers.plugins import EmulatedJoint
 from gazerig.drivers.servo_models import HOBBY_KINDS
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, rig_setups
 from gazerig.robot.model.coupling_params import pair_setups, pairs_of
+from gazerig.robot.model.description.mass import HEAD_LOAD_KG_M2
 from gazerig.robot.model.joint import JointParams
 from gazerig.sim_mock.devices import (
     DynamixelLine,
@@ -25,11 +26,12 @@ from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 _CROOKED_DEG = {"left_eye_pan": 6.0, "right_eye_pan": -4.0, "neck_yaw": -12.0, "neck_pitch": -8.0}
 """Emulated joints start a little crooked, as a head that was moved by hand does."""
 
-_STOP_BEYOND_DEG = 4.0
+STOP_BEYOND_DEG = 4.0
 """Emulated joints have mechanical stops so far beyond their configured range."""
 
-_LOAD_KG_M2 = {"neck_yaw": 2.0e-3, "neck_pitch": 3.0e-3, "neck_roll": 3.0e-3}
-"""Inertia of a balanced head of 0.6 kg about its axes; eyes and lids weigh next to nothing."""
+
+_NECK_SERVO_NM = 1.0
+"""A hobby servo that turns a head is of standard size, 10 kg cm; eyes and lids have small ones."""
 
 
 def emulated_lines(rig: Rig) -> dict[str, Emulated]:
@@ -47,7 +49,7 @@ def emulated_servo(rig: Rig, name: str) -> ServoSpec:
     """Return the smart servo of one joint."""
     joint = rig.joints[name]
     start, (low, high) = _start(rig, name), _stops(rig, name)
-    load = _LOAD_KG_M2.get(name, 0.0) * (_steps_per_rad(joint) / joint.made().steepest) ** 2
+    load = HEAD_LOAD_KG_M2.get(name, 0.0) * (_steps_per_rad(joint) / joint.made().steepest) ** 2
     physics = Physics(load_kg_m2=load, stop_low_steps=low, stop_high_steps=high)
     return ServoSpec(joint.id, joint.model, start, physics=physics)
 
@@ -93,6 +95,8 @@ def _hobby(rig: Rig, name: str) -> HobbySpec:
     facts, spec = joint.facts, HobbySpec(joint.id)
     if joint.servo_speed_deg_s is not None:
         spec = spec._replace(speed_steps_s=joint.servo_speed_deg_s * facts.steps_per_turn / 360.0)
+    if "neck" in name:
+        spec = spec._replace(stall_torque_nm=_NECK_SERVO_NM)
     # The board's own range of the channel is set as wide as such servos go.
     return spec._replace(
         start_steps=_start(rig, name),
@@ -108,18 +112,21 @@ def _plain(rig: Rig, name: str) -> EmulatedJoint:
     return EmulatedJoint(joint.id, joint.model, _start(rig, name), *_stops(rig, name))
 
 
-def _start(rig: Rig, name: str) -> int:
+def crooked_rad(rig: Rig) -> dict[str, float]:
+    """Return the joint angles at which the emulated joints of a rig start."""
     crooked = {name: radians(_CROOKED_DEG.get(name, 0.0)) for name in rig.joints}
-    for first, second, coupling in pairs_of(rig.couplings):
+    for first, second, _ in pairs_of(rig.couplings):
         # Push rods know no angles far outside the range.
-        one, other = (
-            min(
-                max(crooked[joint], rig.joints[joint].limit().low_rad),
-                rig.joints[joint].limit().high_rad,
-            )
-            for joint in (first, second)
-        )
-        crooked[first], crooked[second] = coupling.servo_rad((one, other))
+        for name in (first, second):
+            limit = rig.joints[name].limit()
+            crooked[name] = min(max(crooked[name], limit.low_rad), limit.high_rad)
+    return crooked
+
+
+def _start(rig: Rig, name: str) -> int:
+    crooked = crooked_rad(rig)
+    for first, second, coupling in pairs_of(rig.couplings):
+        crooked[first], crooked[second] = coupling.servo_rad((crooked[first], crooked[second]))
     return round(rig.joints[name].steps(crooked[name]))
 
 
@@ -129,9 +136,9 @@ def _stops(rig: Rig, name: str) -> tuple[float, float]:
     for pair in pairs_of(rig.couplings):
         if name in pair[:2]:
             own = pair_setups(pair, rig.joints, {})[name]
-            beyond = joint.made().steepest * radians(_STOP_BEYOND_DEG)
+            beyond = joint.made().steepest * radians(STOP_BEYOND_DEG)
             return own.min_steps - beyond, own.max_steps + beyond
-    ends = (joint.min_deg - _STOP_BEYOND_DEG, joint.max_deg + _STOP_BEYOND_DEG)
+    ends = (joint.min_deg - STOP_BEYOND_DEG, joint.max_deg + STOP_BEYOND_DEG)
     low, high = sorted(joint.steps(radians(end)) for end in ends)
     return low, high
 

@@ -19,8 +19,11 @@ class RunOptions:
         mock: emulated servos instead of the rig's.
         fast: simulated time.
         seed: of all random generators.
-        scene, video, camera, oak, replay: what to look at; one of them (see ``checked``); a camera
-            is the number of a webcam or the name of another package's.
+        scene, video, camera, oak, replay, world: what to look at; one of them (see ``checked``); a
+            camera is the number of a webcam or the name of another package's.
+        world: a world with physics, by name or path; its camera's pictures are rendered and looked
+            at by the real detectors.
+        no_pictures: of a world nothing is rendered: detections are computed, as of a scene.
         pixels: the scene is drawn and looked at by the real detectors.
         scanpath, saccade: models instead of the rig's; rules: a rule set instead of the rig's.
         port: serial port instead of the rig's.
@@ -48,6 +51,8 @@ class RunOptions:
     camera: int | str | None = None
     oak: bool = False
     replay: Path | None = None
+    world: str | None = None
+    no_pictures: bool = False
     pixels: bool = False
     scanpath: str | None = None
     saccade: str | None = None
@@ -83,6 +88,11 @@ class RunOptions:
         if self.camera is not None:
             return "a webcam" if isinstance(self.camera, int) else f"the camera {self.camera!r}"
         return "an OAK-D" if self.oak else None
+
+    @property
+    def world_name(self) -> str | None:
+        """Return the name of the world without folder and ending, None without one."""
+        return None if self.world is None else Path(self.world).stem
 
     @property
     def page_address(self) -> tuple[str, int] | None:
@@ -121,7 +131,7 @@ class RunOptions:
         self._refuse_bus()
         asked = [
             name
-            for name in ("scene", "video", "camera", "oak", "replay")
+            for name in ("scene", "video", "camera", "oak", "replay", "world")
             # By identity: webcam 0 is a choice.
             if getattr(self, name) is not None and getattr(self, name) is not False
         ]
@@ -177,11 +187,27 @@ class RunOptions:
                 "--fast needs a scene, a film or a recording: a camera has real time",
             ),
             (
+                self.world is not None and not self.mock,
+                "--world needs --mock: real servos are in the real world",
+            ),
+            (
+                self.world is not None and self.bus == "ideal" and not self.fast,
+                "--world with --bus ideal needs --fast: in real time servos have bytes",
+            ),
+            (
+                self.world is not None and self.pixels,
+                "--world and --pixels exclude each other: a world is rendered in any case",
+            ),
+            (
+                self.no_pictures and self.world is None,
+                "--no-pictures needs --world: of a scene pictures are drawn with --pixels alone",
+            ),
+            (
                 self.pixels and scene is None,
                 "--pixels draws a scene: it cannot be used with a film or a camera",
             ),
             (
-                self.fast and self.seconds is None and scene is None,
+                self.fast and self.seconds is None and scene is None and self.world is None,
                 "--fast needs --seconds S with a film: it would never end",
             ),
         )

@@ -22,13 +22,13 @@ from gazerig.robot.control.loop_timing import LoopTiming, busy_text
 from gazerig.robot.control.observers import Observers, left_out
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
-from gazerig.robot.dashboard.click_to_look import ClickToLook
-from gazerig.robot.dashboard.live_feed import LiveRig, RunState
-from gazerig.robot.dashboard.page_process import PageProcess
-from gazerig.robot.dashboard.param_feed import ParamFeed
-from gazerig.robot.dashboard.publisher import Publisher
-from gazerig.robot.dashboard.request_handler import PageRequestHandler
-from gazerig.robot.dashboard.status_line import StatusLine
+from gazerig.robot.dashboard.feed.live_feed import LiveRig, RunState
+from gazerig.robot.dashboard.feed.page_process import PageProcess
+from gazerig.robot.dashboard.feed.param_feed import ParamFeed
+from gazerig.robot.dashboard.feed.publisher import Publisher
+from gazerig.robot.dashboard.feed.status_line import StatusLine
+from gazerig.robot.dashboard.requests.click_to_look import ClickToLook
+from gazerig.robot.dashboard.requests.request_handler import PageRequestHandler
 from gazerig.robot.model.commands import Command, Resume, Stop, Tune
 from gazerig.robot.model.reply import CommandTaker, Ticket
 from gazerig.robot.perception.pixel_to_world import PixelToWorld
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 _SWITCH_S = 0.0003
 
 STEER = "steer"
-"""The menu of this name is the page's steps of a calibration (dashboard/controls.py)."""
+"""The menu of this name is the page's steps of a calibration (dashboard/panels/controls.py)."""
 
 
 class SteeringButtons(NamedTuple):
@@ -91,8 +91,15 @@ class RunObservers:
         about = {"rig": options.rig, "pid": os.getpid()}
         self._live = (
             LiveServer(
-                made.robot, tuning, (ConfigError,), made.clock, about, say, self._timing.figures
-            )
+                made.robot,
+                tuning,
+                (ConfigError,),
+                made.clock,
+                about,
+                say,
+                self._timing.figures,
+                made.fault,
+            )  # fmt: skip
             if tuning is not None and not options.fast
             else None
         )
@@ -140,13 +147,13 @@ class RunObservers:
     def _live_rig(self) -> LiveRig:
         made = self._made
         picture = ScenePicture(made.scene) if made.scene is not None else None
-        return LiveRig(made.loop.rate_hz, made.shown(), self._emulated, picture)
+        return LiveRig(made.loop.rate_hz, made.shown(), self._emulated, picture, made.world)
 
     def _run_state(self) -> RunState:
         """Return what the page shows and ticks do not tell."""
         robot = self._made.robot
         errors = {kind: n for kind, n in robot.body.bus.health().errors.items() if n}
-        start_s = scene_start_s(robot.camera)
+        start_s = scene_start_s(robot.camera) or self._made.world_start_s()
         return RunState(errors, *self._in_force(), robot.perception.residual(), start_s)
 
     def join(self, observers: Observers) -> None:

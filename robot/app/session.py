@@ -13,12 +13,19 @@ from gazerig.config.text import gestures_text, rig_text, walk_text
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.analysis.behaviour_score import BehaviourScore
 from gazerig.robot.analysis.gaze_on_face import GazeOnFace
+from gazerig.robot.analysis.planner_score import PlannerScore
 from gazerig.robot.analysis.summary import Summary
-from gazerig.robot.app.assemble import RIGS_OWN, Assembly, Substitutes, assemble, with_options
+from gazerig.robot.app.assemble import (
+    RIGS_OWN,
+    Assembly,
+    SharedPlace,
+    Substitutes,
+    assemble,
+    with_options,
+)
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.app.run_observers import RunObservers
-from gazerig.robot.app.scripted_behaviour import ScriptedBehaviour
 from gazerig.robot.control.event_text import drawn_together, is_register_change
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.joint_faults import JointFaults
@@ -27,6 +34,7 @@ from gazerig.robot.control.observers import Observers
 from gazerig.robot.control.power_down import Again, PowerDown
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.recording.run_info import RunInfo, versions
+from gazerig.sim_mock.scenes.scene import Scene
 
 if TYPE_CHECKING:
     from gazerig.robot.recording.recorder import Recorder
@@ -44,12 +52,15 @@ class ComposedRun(NamedTuple):
     recorder: "Recorder | None"
 
 
-def compose(options: RunOptions, substitutes: Substitutes = RIGS_OWN) -> ComposedRun:
+def compose(
+    options: RunOptions, substitutes: Substitutes = RIGS_OWN, shared: SharedPlace | None = None
+) -> ComposedRun:
     """Assemble one run; nothing moves.
 
     Args:
         options: what to run.
         substitutes: parts of a program's own; a recording goes around the body.
+        shared: its place in a world with other robots; None: it is alone.
 
     Raises:
         gazerig.config.load.ConfigError: the rig, character, profile or walk is at fault.
@@ -62,15 +73,15 @@ def compose(options: RunOptions, substitutes: Substitutes = RIGS_OWN) -> Compose
     else:
         from gazerig.robot.recording.recorder import Recorder  # with what writes and packs files
 
-        info = run_info(rig, options)
+        info = run_info(rig, options, () if shared is None else shared.stands)
         recorder = Recorder(options.record, info, options.force, patient=options.fast)
         substitutes = substitutes._replace(body=recorder.recorded)
-    made = assemble(rig, options, substitutes)
+    made = assemble(rig, options, substitutes, shared)
     names = (options.rig, options.character, options.profile)
     return ComposedRun(options, made, ParamStore(made.live, made.robot.command, *names), recorder)
 
 
-def run_info(rig: Rig, options: RunOptions) -> RunInfo:
+def run_info(rig: Rig, options: RunOptions, stands: tuple[float, ...] = ()) -> RunInfo:
     """Return what a recording says of its run."""
     return RunInfo(
         rig=options.rig,
@@ -82,14 +93,21 @@ def run_info(rig: Rig, options: RunOptions) -> RunInfo:
         seed=options.seed,
         rate_hz=rig.loop.rate_hz,
         started_utc=datetime.now(UTC).isoformat(),
-        scene=options.scene,
-        eyes=options.looks_through or f"scene {options.scene}",
+        scene=options.scene or options.world_name,
+        eyes=options.looks_through or _surroundings(options),
         mock=options.mock,
         fast=options.fast,
         bus=options.bus or "emulated",
         pictures_hz=options.record_pictures,
         versions=versions(),
+        stands=stands,
     )
+
+
+def _surroundings(options: RunOptions) -> str:
+    if options.world is None:
+        return f"scene {options.scene}"
+    return f"world {options.world_name}{', no pictures' if options.no_pictures else ''}"
 
 
 def run(
@@ -119,6 +137,19 @@ def run(
         composed.made.close()
 
 
+class _SceneScore(NamedTuple):
+    """How a scene's events were answered, by the gaze and by the action planner."""
+
+    behaviours: BehaviourScore
+    planner: PlannerScore
+
+    @classmethod
+    def of(cls, scene: Scene) -> "_SceneScore":
+        """Return the score of a scene before its first tick."""
+        events = scene.events()
+        return cls(BehaviourScore(events, scene.round_s), PlannerScore(events, scene.round_s))
+
+
 class Session:
     """One run, with everything that watches it; arguments as of ``run``.
 
@@ -143,7 +174,7 @@ class Session:
         self._summary = Summary()
         self._faults = JointFaults(say, self._run_observers.busy)
         scene = made.scene
-        self._score = BehaviourScore(scene.events(), scene.round_s) if scene is not None else None
+        self._score = _SceneScore.of(scene) if scene is not None else None
         self._face_gaze = GazeOnFace() if options.heatmap is not None else None
         self._start_s = 0.0
         self.stopped_by = "fault: unexpected error"
@@ -250,13 +281,12 @@ class Session:
 
 
 def _observe_scene(
-    observers: Observers, made: Assembly, score: BehaviourScore | None, face_gaze: GazeOnFace | None
+    observers: Observers, made: Assembly, score: _SceneScore | None, face_gaze: GazeOnFace | None
 ) -> None:
-    """Add what a scene plans and scores, and the heat map, where there are any."""
-    if made.scene is not None and score is not None:
-        planner = ScriptedBehaviour(made.scene.behaviour, made.robot.ask)
-        observers.add("the scene's planner", lambda tick: planner.update(tick.t_s))
-        observers.add("the scene's score", score.update)
+    """Add the score of a scene and the heat map, where there are any."""
+    if score is not None:
+        observers.add("the scene's score", score.behaviours.update)
+        observers.add("the planner's score", score.planner.update)
     if face_gaze is not None:
         observers.add("the heat map", face_gaze.update)
 
@@ -336,7 +366,7 @@ def parked(made: Assembly, again: Again, watch: Callable[[Tick], object] | None 
 def _figures(
     made: Assembly,
     summary: Summary,
-    score: BehaviourScore | None,
+    score: _SceneScore | None,
     count: LoopCount,
     wall_s: float,
     faults: JointFaults,
@@ -353,8 +383,10 @@ def _figures(
     if digest is not None:
         bus["tx_sha256"] = digest
     ticks = summary.figures()
-    if score is not None and (behaviours := score.figures()):
+    if score is not None and (behaviours := score.behaviours.figures()):
         ticks["behaviours"] = behaviours
+    if score is not None and (planner := score.planner.figures()):
+        ticks["planner"] = planner
     return {
         "seconds": ticks.pop("seconds"),
         "wall_seconds": round(wall_s, 3),

@@ -100,6 +100,10 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
             "rig_check",
             "Check a rig's YAML and nothing else: all faults at once, no servo is touched.",
         ),
+        "describe": CommandEntry(
+            "describe",
+            "Write a rig as a robot description: MJCF, URDF and glTF with meshes, or one of them.",
+        ),
         "kinds": CommandEntry(
             "kinds",
             "List buses, cameras, detectors, rules, gestures and rigs, of this program and of "

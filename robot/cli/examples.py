@@ -10,6 +10,7 @@ from gazerig.robot.cli.command_list import PANELS
 EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "run": (
         ("run --mock", "no hardware: a visitor comes, the page shows what the head does"),
+        ("run --mock --world living-room", "a room with physics, seen through a rendered camera"),
         ("run my.yaml --oak", "the real rig looks through its OAK-D"),
         ("run --mock --video party.mp4", "an emulated rig before a film"),
         ("run --mock --fast --seconds 60 --seed 7 --summary -", "figures of a simulated minute"),
@@ -21,6 +22,10 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("new eyes.yaml --board pca9685 --joints eyes-lids --camera webcam", "without questions"),
     ),
     "check": (("check my.yaml", "all faults of a file at once; no servo is touched"),),
+    "describe": (
+        ("describe my.yaml", "MJCF, URDF and glTF with meshes, in a folder named as the rig"),
+        ("describe my.yaml --urdf out/", "URDF alone, in a folder of your choice"),
+    ),
     "schema": (("schema rig.schema.json", "let an editor complete and check rig files"),),
     "kinds": (
         ("kinds", "what buses, cameras, detectors and rules there are, and from which package"),
@@ -120,6 +125,10 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "look": (
         ("ctl look 1 0.2 0.3", "the running head looks there"),
         ("ctl look free", "and freely again"),
+    ),
+    "fault": (
+        ("ctl fault lose 3 for 2", "an emulated servo of the running rig is silent for 2 s"),
+        ("ctl fault help", "all there are"),
     ),
     "replay": (
         ("replay evening.mcap", "on the page, with a time slider"),

@@ -29,7 +29,7 @@ from gazerig.robot.cli.terminal import (
 if TYPE_CHECKING:
     from gazerig.robot.app.resimulate import Resimulation
     from gazerig.robot.control.loop import Tick
-    from gazerig.robot.dashboard.snapshot import ShownRig
+    from gazerig.robot.dashboard.feed.snapshot import ShownRig
 
 app = typer.Typer(add_completion=False)
 
@@ -162,7 +162,8 @@ def _show(
     stopped: Callable[[], str | None],
 ) -> bool:
     """Serve the page until told to stop; False where it cannot be had."""
-    from gazerig.robot.dashboard.page_process import PageProcess
+    from gazerig.robot.dashboard.feed.live_feed import LiveRig, rig_message
+    from gazerig.robot.dashboard.feed.page_process import PageProcess
     from gazerig.robot.model.clock import RealClock
     from gazerig.robot.recording.playback_clock import PlaybackState
     from gazerig.robot.recording.read import RunRecording, used
@@ -171,13 +172,14 @@ def _show(
 
     recording, clock = RunRecording(file), RealClock()
     _warn(recording.note)
+    built, rate_hz = _built(recording.info.config_yaml), recording.info.rate_hz
     with used(file), _progress("reading", recording.duration_s) as read:
         frames = SnapshotIndex(
             recording.ticks(),
             recording.frames(),
-            recording.info.rate_hz,
+            rate_hz,
             recording.info.character or "",
-            _built(recording.info.config_yaml),
+            built,
             read,
         )
     replaying = Replay(frames, clock)
@@ -190,6 +192,8 @@ def _show(
         url = page.url()
         if page.started != starts[-1]:
             starts.append(page.started)
+            if built is not None:
+                page.send(rig_message(LiveRig(rate_hz, built)))
             replaying.begin_anew()
         if url is not None and url != urls[-1]:
             urls.append(url)
@@ -213,7 +217,8 @@ def _built(config_yaml: str) -> "ShownRig | None":
     from gazerig.config.load import ConfigError, load
     from gazerig.config.schema import Rig
     from gazerig.robot.app.gaze_models import gaze_parts
-    from gazerig.robot.dashboard.snapshot import ShownRig
+    from gazerig.robot.app.rig_description import shape_of
+    from gazerig.robot.dashboard.feed.snapshot import ShownRig
     from gazerig.robot.model.frames import CameraMount
 
     with TemporaryDirectory() as folder:
@@ -234,6 +239,7 @@ def _built(config_yaml: str) -> "ShownRig | None":
         CameraMount(rig.camera),
         radians(rig.camera.horizontal_field_deg),
         rig.gaze.field_of_view,
+        shape_of(rig, without_lost_meshes=True),
     )
 
 

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from gazerig.robot.app.options import RunOptions
     from gazerig.robot.recording.read import RunRecording
     from gazerig.robot.report.gaze_trace import GazeTrace
+    from gazerig.robot.report.heads import MutualGazeReport
     from gazerig.robot.report.run_header import RunHeader
     from gazerig.robot.report.statistics import MeasureResult
 
@@ -55,6 +56,12 @@ def report(
     out: Annotated[
         Path | None, typer.Option(help="The page to write; .html is added where it is missing.")
     ] = None,
+    other: Annotated[
+        Path | None,
+        typer.Option(
+            "--with", help="The recording of another head of that run: a section on mutual gaze."
+        ),
+    ] = None,
     force: ForceOption = False,
 ) -> None:
     """Report how human a run's gaze was: gazerig report run.mcap, then open report.html."""
@@ -66,6 +73,8 @@ def report(
             raise SetupError("report takes a recording, or --scene NAME: one of them")
         if file is not None and bus is not None:
             raise SetupError("--bus needs --scene: a recording was made on the bus it names")
+        if file is None and other is not None:
+            raise SetupError("--with takes the recording of another head: give both recordings")
         # Drawing and models are heavy; `--help` does without them.
         from gazerig.robot.report.files import files_of, refuse_foreign
         from gazerig.robot.report.page import banner
@@ -85,7 +94,8 @@ def report(
                     seconds=seconds,
                 ).checked()  # fmt: skip
                 about, run = _simulated(options, tell)
-            made = report_of(run, about, target, tell, force)
+            gaze = None if file is None or other is None else _mutual_gaze(file, other)
+            made = report_of(run, about, target, tell, force, gaze)
         if text := banner(run.joints):
             say(text)
         _tell_findings(made.findings)
@@ -139,6 +149,23 @@ def _recorded(file: Path, name: str, tell: Steps) -> "tuple[RunHeader, GazeTrace
     about = _about(recording, name)
     with used(file):
         return about, read(recording.ticks(), about, tell)
+
+
+def _mutual_gaze(first: Path, second: Path) -> "MutualGazeReport":
+    """Read how two heads of one run looked at each other."""
+    from gazerig.robot.recording.read import RunRecording, used
+    from gazerig.robot.report.heads import mutual_gaze_report
+
+    a, b = RunRecording(first), RunRecording(second)
+    if a.info.scene != b.info.scene:
+        raise SetupError(
+            f"{first} is of the world {a.info.scene}, {second} of {b.info.scene}: --with takes the "
+            "recording of another head of the same run"
+        )
+    with used(Path(f"{first} or {second}")):
+        return mutual_gaze_report(
+            (a.ticks(), b.ticks()), (a.info.stands, b.info.stands), _names(first, second)
+        )
 
 
 def _simulated(options: "RunOptions", tell: Steps) -> "tuple[RunHeader, GazeTrace]":

@@ -17,6 +17,8 @@ def check(rig: RigArgument = "desk") -> None:
     """Check a rig's YAML and nothing else: all faults at once, no servo is touched."""
     with clear_errors(rig):
         say(checked_line(rig))
+        for line in collision_lines(rig):
+            say(line)
 
 
 def checked_line(rig: str) -> str:
@@ -25,10 +27,23 @@ def checked_line(rig: str) -> str:
     Raises:
         ConfigError: with every fault of its files.
     """
-    from gazerig.config.schema import Rig, load_rig
+    from gazerig.config.schema import Rig, load_rig_and_check
+    from gazerig.robot.app.rig_description import mesh_faults
 
-    found: Rig = load_rig(rig)
+    found: Rig = load_rig_and_check(rig, mesh_faults)
     return f"{rig}: good: rig {found.name!r}, {len(found.joints)} joints, profile {found.profile}"
+
+
+def collision_lines(rig: str) -> list[str]:
+    """Return where parts of a good rig's model meet within the joints' limits.
+
+    Raises:
+        ConfigError: the rig is not good.
+    """
+    from gazerig.config.schema import load_rig
+    from gazerig.robot.app.rig_description import collision_hints
+
+    return [f"{rig}: in its model, at {hint}" for hint in collision_hints(load_rig(rig))]
 
 
 @app.command()

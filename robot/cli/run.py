@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -14,8 +14,19 @@ from gazerig.robot.app.options import RunOptions, camera_of
 from gazerig.robot.cli import run_options as options
 from gazerig.robot.cli.browser import desktop_here, open_page
 from gazerig.robot.cli.rig_command import RigCommand
-from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
+from gazerig.robot.cli.terminal import (
+    FAULT,
+    RigArgument,
+    clear_errors,
+    say,
+    signals,
+    status,
+    tidied_up,
+)
 from gazerig.robot.control.joint_faults import JointFault, named
+
+if TYPE_CHECKING:
+    from gazerig.robot.app.head_group import HeadGroup
 
 app = typer.Typer()
 
@@ -26,6 +37,8 @@ def run(
     mock: options.Mock = False,
     port: options.Port = None,
     scene: options.Scene = None,
+    world: options.World = None,
+    no_pictures: options.NoPictures = False,
     video: options.Video = None,
     camera: options.Camera = None,
     oak: options.Oak = False,
@@ -65,16 +78,31 @@ def run(
         # Vision and emulator are heavy; `check` and `--help` do without them.
         from gazerig.robot.app import session
 
-        composed = session.compose(asked)
-        opening = Opening("" if fast else what_runs(asked))
         browse = open_page if not no_browser and desktop_here() else None
-        with signals() as stopped:
-            figures = session.run(
-                composed, stopped, opening.say, shows, watch=opening.saw, browse=browse
-            )
+        opening = Opening("" if fast else what_runs(asked))
+        group = _group(asked)
+        if group is not None:
+            with signals() as stopped:
+                figures = group.run(stopped, opening.say)
+        else:
+            with tidied_up():
+                composed = session.compose(asked)
+            with signals() as stopped:
+                figures = session.run(
+                    composed, stopped, opening.say, shows, watch=opening.saw, browse=browse
+                )
         _write_summary(figures, summary, force)
     if had_faults(figures, say) or "not_written" in figures:
         raise typer.Exit(FAULT)
+
+
+def _group(asked: RunOptions) -> "HeadGroup | None":
+    """Return the heads of a world that has several, None without."""
+    if asked.world is None:
+        return None
+    from gazerig.robot.app.head_group import compose_group, has_other_heads
+
+    return compose_group(asked) if has_other_heads(asked) else None
 
 
 class Opening:
@@ -102,8 +130,10 @@ class Opening:
 def what_runs(asked: RunOptions) -> str:
     """Return what is started, and how it is ended, in one line."""
     servos = "emulated servos" if asked.mock else "its servos"
-    sight = asked.looks_through or f"a simulated scene, {asked.scene}"
-    return f"{asked.rig}: {servos}; it looks at {sight}. Ctrl-C parks the head and ends."
+    sight = f"it looks at {asked.looks_through or f'a simulated scene, {asked.scene}'}"
+    if asked.world is not None:
+        sight = f"it is in a world, {asked.world}"
+    return f"{asked.rig}: {servos}; {sight}. Ctrl-C parks the head and ends."
 
 
 def had_faults(figures: Mapping[str, Any], say: Callable[[str], None]) -> bool:

@@ -16,6 +16,22 @@ Scene = Annotated[
         autocompletion=complete_scene,
     ),
 ]
+World = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME|FILE",
+        help="Be in a world with physics, seen through a rendered camera (needs --mock): "
+        "living-room, boxing, conversation, crowd, or a file of one's own (YAML, MJCF).",
+        autocompletion=complete_shipped("worlds"),
+    ),
+]
+NoPictures = Annotated[
+    bool,
+    typer.Option(
+        "--no-pictures",
+        help="Render nothing of the world: detections are computed, as of a scene.",
+    ),
+]
 Video = Annotated[Path | None, typer.Option(help="Look at a film or frame, looped.")]
 Camera = Annotated[
     str | None,

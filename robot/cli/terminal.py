@@ -20,7 +20,7 @@ from gazerig.config.shipped import shipped_names
 from gazerig.drivers.errors import DriverError, ServoFault, ServoMissing, SetupError
 from gazerig.robot.cli.line_writer import LineWriter
 from gazerig.robot.cli.suggestions import completed, speaking_of, with_doctor
-from gazerig.robot.control.interrupts import Interrupts
+from gazerig.robot.control.interrupts import ENDING, Interrupts
 
 BAD_INPUT = 2
 """Exit code: something asked for or configured is wrong."""
@@ -165,6 +165,24 @@ def _thread_failed(args: threading.ExceptHookArgs) -> None:
 def signals() -> Interrupts:
     """Return a block in which Ctrl-C and other requests to end are only noted, by name."""
     return Interrupts(also=_writer.unread)
+
+
+@contextlib.contextmanager
+def tidied_up() -> Iterator[None]:
+    """Let a request to end that comes while a run is made end it as Ctrl-C does, files and all."""
+
+    def end(number: int, frame: object) -> None:
+        raise SystemExit(128 + number)
+
+    here = threading.current_thread() is threading.main_thread()
+    numbers = [one for one in ENDING if signal.getsignal(one) == signal.SIG_DFL] if here else []
+    for number in numbers:
+        signal.signal(number, end)
+    try:
+        yield
+    finally:
+        for number in numbers:
+            signal.signal(number, signal.SIG_DFL)
 
 
 def say(line: str) -> None:

@@ -12,6 +12,7 @@ from gazerig.config.faults import ConfigError
 from gazerig.config.shipped import shipped_names
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.robot.cli import animation as cli_animation
+from gazerig.robot.cli import fault as cli_fault
 from gazerig.robot.cli import lead as cli_lead
 from gazerig.robot.cli import steer as cli_steer
 from gazerig.robot.cli.lead import PidOption
@@ -27,6 +28,7 @@ ctl = typer.Typer(
 ctl.add_typer(cli_lead.app)
 ctl.add_typer(cli_animation.app)
 ctl.add_typer(cli_steer.app)
+ctl.add_typer(cli_fault.app)
 app = typer.Typer()
 app.add_typer(ctl)
 app.command()(cli_lead.stop)

@@ -3,12 +3,13 @@
 from collections.abc import Callable, Mapping, Sequence
 from math import degrees, radians
 
+from gazerig.gaze.animation import Animation
 from gazerig.gaze.aversion import MODES, Aversion
 from gazerig.gaze.expression import Expressions
 from gazerig.gaze.lids import Lids
 from gazerig.gaze.top_down import TopDown
 from gazerig.robot.control.gesture_choices import GestureChoices
-from gazerig.robot.model.commands import NO_GESTURE, Ask, Jog
+from gazerig.robot.model.commands import NO_GESTURE, Ask, Command, Express, Jog, Play, SetLevel
 from gazerig.robot.model.joint_limit import JointLimit
 
 _NEAR_END_RAD = radians(0.05)
@@ -37,7 +38,7 @@ class Menus:
     def offered(self, top_down: TopDown) -> dict[str, tuple[str, ...]]:
         """Return menu -> choices, the present one first."""
         menus = {
-            "behaviour": _first(top_down.behaviour, top_down.behaviours),
+            "behaviour": _first(top_down.chosen, top_down.behaviours),
             "conversation": _first(self._aversion.mode, MODES),
             "lids": tuple(LID_COMMANDS),
         }
@@ -60,6 +61,37 @@ class Menus:
             self._expressions.express(command.choice)
         else:
             LID_COMMANDS[command.choice](self._lids, t_s)
+
+
+def refuse_impossible(
+    command: Command,
+    menus: Callable[[], Mapping[str, Sequence[str]]],
+    joints: Sequence[str],
+    animation: Animation,
+    gestures: GestureChoices,
+) -> None:
+    """Refuse a command that names what this robot does not have.
+
+    Args:
+        command: checked by itself already.
+        menus: returns what can be chosen.
+        joints: of the rig.
+        animation: its expressions and levels.
+        gestures: that can be played.
+
+    Raises:
+        ValueError: with what there is.
+    """
+    if isinstance(command, Ask):
+        refuse_unknown(command, menus())
+    elif isinstance(command, Jog):
+        refuse_absent(command, joints)
+    elif isinstance(command, Express):
+        animation.expressions.require(command.expression)
+    elif isinstance(command, SetLevel):
+        animation.levels.require(command.level)
+    elif isinstance(command, Play):
+        gestures.require(command)
 
 
 def refuse_unknown(command: Ask, menus: Mapping[str, Sequence[str]]) -> None:

@@ -29,10 +29,12 @@ QUESTIONS = (
 )
 CHANGES = (
     'set, "changes": {key: value}', 'save, "path": absolute path or null', "revert",
-    'character, "name"',
+    'character, "name"', 'fault, "text": as of gazerig emulate',
 )  # fmt: skip
 REQUESTS = (*QUESTIONS, *CHANGES, *(name for name in COMMANDS if name != "tune"))
 """All that can be asked for, in words."""
+
+REAL = "these servos are real: only emulated ones have faults to order (gazerig run --mock)"
 
 FIXED = "these parameters cannot be changed while the rig runs"
 
@@ -200,6 +202,8 @@ class CommandHandler:
         paths: which files may be named; None: any.
         fixed: why parameters cannot be changed, if they cannot.
         state: returns the newest tick and the events above a number, as plain values.
+        fault: carries out a fault command of the emulated servos and returns what was done; None:
+            the servos are real.
     """
 
     def __init__(
@@ -212,7 +216,9 @@ class CommandHandler:
         paths: PathGuard | None = None,
         fixed: str = FIXED,
         state: Callable[[int], object] = lambda after: {},
+        fault: Callable[[str], str] | None = None,
     ) -> None:
+        self._fault = fault
         self._state = state
         self._robot, self._params, self._status = robot, params, status
         self._saved, self._paths, self._fixed = saved, paths, fixed
@@ -242,6 +248,10 @@ class CommandHandler:
                 return Answered({menu: list(them) for menu, them in self._robot.menus().items()})
             case {"do": "gestures", **rest} if not rest:
                 return Answered([plain(one._asdict()) for one in self._robot.gestures()])
+            case {"do": "fault", "text": str(text), **rest} if not rest:
+                if self._fault is None:
+                    raise ValueError(REAL)
+                return Answered(self._fault(text))
             case {"do": str(name)} if name in COMMANDS:
                 return self.give(sign(from_json(request)))
             case {"do": "order", "order": dict(command), **rest} if not rest:

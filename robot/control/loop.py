@@ -17,9 +17,8 @@ from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import TargetChooser
 from gazerig.robot.control.command_choices import (
     Menus,
-    refuse_absent,
+    refuse_impossible,
     refuse_out_of_range,
-    refuse_unknown,
 )
 from gazerig.robot.control.command_executor import CommandExecutor
 from gazerig.robot.control.command_queue import CommandQueue
@@ -31,7 +30,7 @@ from gazerig.robot.control.tick import Tick as Tick
 from gazerig.robot.control.tick import at_rest
 from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.model.command_checks import check
-from gazerig.robot.model.commands import Ask, Command, Express, Jog, Play, SetLevel, Tune
+from gazerig.robot.model.commands import Ask, Command, Jog, Tune
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.lead import Lead
@@ -143,16 +142,7 @@ class Robot:
             ValueError: as ``command``.
         """
         check(command)
-        if isinstance(command, Ask):
-            refuse_unknown(command, self.menus())
-        if isinstance(command, Jog):
-            refuse_absent(command, self.body.names)
-        if isinstance(command, Express):
-            self._animation.expressions.require(command.expression)
-        if isinstance(command, SetLevel):
-            self._animation.levels.require(command.level)
-        if isinstance(command, Play):
-            self._gestures.require(command)
+        refuse_impossible(command, self.menus, self.body.names, self._animation, self._gestures)
         return self._commands.add(command)
 
     def ask(self, menu: str, choice: str) -> None:

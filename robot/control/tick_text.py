@@ -125,6 +125,21 @@ def _beside(tick: Tick) -> str:
     return f"; {error:.0f} deg beside it: {', '.join(ends)}"
 
 
+_IN_WORDS = {
+    "timeout": "no answer",
+    "damaged": "answer damaged",
+    "corrupt": "answer damaged on the way",
+    "incomplete": "answer incomplete",
+    "implausible": "answer not believed",
+    "refused": "order refused",
+    "unconfirmed": "order not confirmed",
+    "rearmed": "torque on again",
+    "restarted": "servo restarted",
+    "alert": "servo reported a fault",
+}
+"""What people are told of kinds of faults on a bus; others speak for themselves."""
+
+
 def guard_text(guard_result: GuardResult) -> str:
     """Return what the guard did to the desired angles, e.g. "limited (neck_yaw: too fast, +2)"."""
     if not guard_result.reasons:
@@ -134,6 +149,10 @@ def guard_text(guard_result: GuardResult) -> str:
 
 
 def health_text(health: BusHealth) -> str:
-    """Return the state of the bus, e.g. "bus: 3 timeout"; what a late computer did is no fault."""
-    errors = [(n, kind) for kind, n in sorted(health.errors.items()) if n and kind != LATE_COMPUTER]
-    return "bus: " + ", ".join(f"{n} {kind}" for n, kind in errors) if errors else "bus ok"
+    """Return the state of the bus, e.g. "bus: no answer 3 times"; a late computer is no fault."""
+    errors = [
+        f"{_IN_WORDS.get(kind, kind)} {n} time{'s' if n > 1 else ''}"
+        for kind, n in sorted(health.errors.items())
+        if n and kind != LATE_COMPUTER
+    ]
+    return f"bus: {', '.join(errors)}" if errors else "bus ok"

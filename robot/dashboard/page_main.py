@@ -1,11 +1,11 @@
 """The page's own process: take the newest snapshot off the socket and draw it.
 
-Started by ``gazerig.robot.dashboard.page_process.PageProcess`` as ``python -m
+Started by ``gazerig.robot.dashboard.feed.page_process.PageProcess`` as ``python -m
 gazerig.robot.dashboard.page_main FD STOP_FD PARENT HOST PORT``, with the token and a folder of its
 own in its environment, which other users cannot read as they can its arguments. It
 ends when the other side of the socket closes. Nothing is fetched from anywhere: the
 page's script comes from the viser package and all shapes are made here. Browsers come in
-by ``gazerig.robot.dashboard.auth_proxy``; what people do there goes to the rig over the same
+by ``gazerig.robot.dashboard.door.auth_proxy``; what people do there goes to the rig over the same
 socket.
 """
 
@@ -26,11 +26,11 @@ import viser
 
 from gazerig.drivers import message_link
 from gazerig.drivers.message_link import MessageLink
-from gazerig.robot.dashboard.auth_proxy import AuthProxy
-from gazerig.robot.dashboard.live_feed import LiveFeed
-from gazerig.robot.dashboard.outbox import DOOR, Outbox
-from gazerig.robot.dashboard.page_feed import drain
-from gazerig.robot.dashboard.page_process import (
+from gazerig.robot.dashboard.door.auth_proxy import AuthProxy
+from gazerig.robot.dashboard.door.viser_server import browser_of, camera_of, open_server
+from gazerig.robot.dashboard.feed.live_feed import LiveFeed
+from gazerig.robot.dashboard.feed.page_feed import drain
+from gazerig.robot.dashboard.feed.page_process import (
     CANNOT_OPEN,
     FOLDER_VARIABLE,
     NOTICE,
@@ -39,9 +39,9 @@ from gazerig.robot.dashboard.page_process import (
     URL,
 )
 from gazerig.robot.dashboard.page_view import PageView
-from gazerig.robot.dashboard.pointer_to_look import PointerToLook
-from gazerig.robot.dashboard.stop_sender import StopSender
-from gazerig.robot.dashboard.viser_server import browser_of, camera_of, open_server
+from gazerig.robot.dashboard.requests.outbox import DOOR, Outbox
+from gazerig.robot.dashboard.requests.pointer_to_look import PointerToLook
+from gazerig.robot.dashboard.requests.stop_sender import StopSender
 from gazerig.robot.model.command_json import as_json
 from gazerig.robot.model.commands import LookAt
 

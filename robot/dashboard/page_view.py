@@ -5,22 +5,32 @@ from collections.abc import Callable, Mapping, Sequence
 import viser
 
 from gazerig.drivers.types import ImageArray
-from gazerig.robot.dashboard.controls import Controls
-from gazerig.robot.dashboard.head_view import HeadView
-from gazerig.robot.dashboard.lights import furnish
-from gazerig.robot.dashboard.outbox import Outbox
-from gazerig.robot.dashboard.overlay_choices import OverlayChoices
-from gazerig.robot.dashboard.overlays import OverlayPanel
-from gazerig.robot.dashboard.page_feed import News
-from gazerig.robot.dashboard.page_process import ALL_USERS, CHOICES, MESSAGE, PARAMS, REPLAY, VALUES
-from gazerig.robot.dashboard.panel import PanelView
-from gazerig.robot.dashboard.people import PeopleView
-from gazerig.robot.dashboard.quick_moves import refused_moves
-from gazerig.robot.dashboard.replay import ReplayView
-from gazerig.robot.dashboard.viewpoints import Viewpoints
-from gazerig.robot.dashboard.views import NAMES
-from gazerig.robot.dashboard.viser_server import browser_of
-from gazerig.robot.dashboard.widgets import Widgets
+from gazerig.robot.dashboard.door.viser_server import browser_of
+from gazerig.robot.dashboard.feed.camera_overlay import without_pictures
+from gazerig.robot.dashboard.feed.live_feed import WorldNow
+from gazerig.robot.dashboard.feed.overlay_choices import OverlayChoices
+from gazerig.robot.dashboard.feed.page_feed import News
+from gazerig.robot.dashboard.feed.page_process import (
+    ALL_USERS,
+    CHOICES,
+    MESSAGE,
+    PARAMS,
+    REPLAY,
+    VALUES,
+)
+from gazerig.robot.dashboard.panels.controls import Controls
+from gazerig.robot.dashboard.panels.panel import PanelView
+from gazerig.robot.dashboard.panels.quick_moves import refused_moves
+from gazerig.robot.dashboard.panels.replay import ReplayView
+from gazerig.robot.dashboard.requests.outbox import Outbox
+from gazerig.robot.dashboard.view.head_view import HeadView
+from gazerig.robot.dashboard.view.lights import furnish
+from gazerig.robot.dashboard.view.overlays import OverlayPanel
+from gazerig.robot.dashboard.view.people import PeopleView
+from gazerig.robot.dashboard.view.viewpoints import Viewpoints
+from gazerig.robot.dashboard.view.views import NAMES
+from gazerig.robot.dashboard.view.world_view import WorldView
+from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.leader import Leader, sentence
 from gazerig.robot.model.types import Snapshot
 
@@ -52,6 +62,7 @@ class PageView:
         _arrange(server)
         self._head = HeadView(server.scene)
         self._people = PeopleView(server.scene)
+        self._world = WorldView(server.scene)
         self._panel = PanelView(widgets)
         self._layers = OverlayPanel(server.scene)
         self._panel.depth = self._ask_depth
@@ -62,6 +73,7 @@ class PageView:
         self.emulated = False
         self._jpeg: bytes | None = None
         self._image: ImageArray | None = None
+        self._world_now: WorldNow | None = None
         self._drawn = self._watched = False
         self._add_views()
 
@@ -98,6 +110,8 @@ class PageView:
             self._tell(self._stop_state())
         self._jpeg = news.jpeg or self._jpeg
         self._image = news.image if news.image is not None else self._image
+        self._world_now = news.world
+        self._head.shape = news.shape or self._head.shape
         watched = self.watched()
         if watched and not self._watched:  # who comes late may find a rig that stands still
             self._panel.draw_all()
@@ -162,6 +176,8 @@ class PageView:
             self._replay = ReplayView(
                 self._widgets.panel("replay"), self._ask_replay, float(duration_s)
             )
+        if state.get("pictures") is False:
+            self._image = without_pictures()
         self._replay.show(state)
 
     def _ask_replay(self, client: str, asked: Mapping[str, object]) -> None:
@@ -170,9 +186,11 @@ class PageView:
     def _draw(self) -> None:
         if self._newest is not None:
             self._viewpoints.fit(self._newest)
-            self._head.show(self._newest, sight=self._panel.layers.sight)
-            self._people.show(self._newest, parts=self._panel.layers.parts)
-            self._layers.show(self._newest, self._panel.layers)
+            self._show_world()
+            layers = self._panel.layers
+            self._head.show(self._newest, sight=layers.sight, camera=layers.camera)
+            self._people.show(self._newest, parts=layers.parts)
+            self._layers.show(self._newest, layers, self._head.lid_edges)
             if self._replay is None:
                 self._controls.show(self._newest)
             self._drawn = True
@@ -182,6 +200,14 @@ class PageView:
         if self._image is not None:
             self._panel.show_image(self._image)
         self._newest = self._jpeg = self._image = None
+
+    def _show_world(self) -> None:
+        """Draw the room and the people that there are; what the rig believes is only marked."""
+        there = self._world_now is not None
+        if self._world_now is not None:
+            self._world.show(*self._world_now)
+        self._head.on_table = there
+        self._people.mark_only(there)
 
     def silent(self) -> None:
         """Show that no data arrives any more, with the last that arrived."""

@@ -15,7 +15,7 @@ from gazerig.gaze.angles import add, angles_of, compose, rotate, rotation
 from gazerig.gaze.types import Angles2, Angles3, HeadGeometry, Mat3, Vec3
 from gazerig.params import Bounds
 
-_OPTICAL: Mat3 = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
+OPTICAL: Mat3 = ((0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, -1.0, 0.0))
 """Maps camera optical axes (x right, y down, z forward) to x forward, y left, z up."""
 
 
@@ -170,7 +170,7 @@ class CameraMount:
         turn = rotation(
             (radians(params.yaw_deg), radians(params.pitch_deg), radians(params.roll_deg))
         )
-        self._R = compose(turn, _OPTICAL)
+        self._R = compose(turn, OPTICAL)
 
     def rotation(self, R_world_head: Mat3) -> Mat3:
         """Return R_world_camera for an orientation of the head."""

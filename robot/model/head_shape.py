@@ -59,6 +59,7 @@ _SMILE = 0.85
 _MOUTH_Z, _MOUTH_HALF = -1.030, 0.32
 MOUTH = Mouth(_MOUTH_Z, 0.345, _SMILE, 0.088, 0.110)
 """Where the lips lie, in distances between the eyes."""
+_NOSE_TIP: Vec3 = (0.425, 0.0, -0.54)
 _HINGE: Vec3 = (-0.85, 0.0, -0.55)
 
 
@@ -91,6 +92,11 @@ class HeadMeasures(NamedTuple):
         """Return a point of this module's unit in metres."""
         x, y, z = point
         return x * self.interocular_m, y * self.interocular_m, z * self.interocular_m
+
+    @property
+    def nose_m(self) -> Vec3:
+        """Return the tip of the nose."""
+        return self.scaled(_NOSE_TIP)
 
     @property
     def hinge_m(self) -> Vec3:

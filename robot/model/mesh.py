@@ -34,13 +34,13 @@ def turned(profile: Sequence[tuple[float, float]], around: int = _AROUND) -> Mes
         ),
         axis=-1,
     )
-    return Mesh(rings.reshape(-1, 3), _quads(len(radius), around, closed=True))
+    return Mesh(rings.reshape(-1, 3), quads(len(radius), around, closed=True))
 
 
-def cap(radius_m: float, half_angle_rad: float, rings: int = 12) -> Mesh:
+def cap(radius_m: float, half_angle_rad: float, rings: int = 12, around: int = _AROUND) -> Mesh:
     """Return the part of a sphere within an angle of its x axis; pi is the whole sphere."""
     angles = np.linspace(half_angle_rad, 0.0, rings)
-    dome = turned([(radius_m * sin(a), radius_m * cos(a)) for a in angles])
+    dome = turned([(radius_m * sin(a), radius_m * cos(a)) for a in angles], around)
     return Mesh(dome.vertices[:, (2, 0, 1)], dome.faces)
 
 
@@ -69,7 +69,7 @@ def lid(radius_m: float, sweep_rad: float) -> Mesh:
         ),
         axis=-1,
     )
-    return Mesh(radius_m * points.reshape(-1, 3), _quads(24, 32, closed=False))
+    return Mesh(radius_m * points.reshape(-1, 3), quads(24, 32, closed=False))
 
 
 def ring(radius_m: float, thickness_m: float) -> Mesh:
@@ -82,7 +82,7 @@ def ring(radius_m: float, thickness_m: float) -> Mesh:
 def grid(points: Floats, *, closed: bool) -> Mesh:
     """Return the surface through points (rows, columns, 3); ``closed`` joins a row's ends."""
     rows, columns = points.shape[:2]
-    return Mesh(points.reshape(-1, 3), _quads(rows, columns, closed=closed))
+    return Mesh(points.reshape(-1, 3), quads(rows, columns, closed=closed))
 
 
 def smooth_normals(mesh: Mesh) -> Floats:
@@ -95,7 +95,7 @@ def smooth_normals(mesh: Mesh) -> Floats:
     return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12))
 
 
-def _quads(rows: int, columns: int, *, closed: bool) -> NDArray[np.uint32]:
+def quads(rows: int, columns: int, *, closed: bool) -> NDArray[np.uint32]:
     """Join a grid of points, row after row, to triangles; ``closed`` joins its ends."""
     row, column = np.mgrid[0 : rows - 1, 0 : columns if closed else columns - 1]
     right = (column + 1) % columns

@@ -27,7 +27,7 @@ from gazerig.robot.model.paint import (
     spot,
     step,
 )
-from gazerig.robot.model.solid import Field, Solid, capsule, carve, ellipsoid, union
+from gazerig.robot.model.solid import Field, Solid, Surface, capsule, carve, ellipsoid, union
 
 
 class PersonLook(NamedTuple):
@@ -38,6 +38,9 @@ class PersonLook(NamedTuple):
     shirt: Colour
     iris: Colour
     long_hair: bool
+    trousers: Colour = (52, 60, 82)
+    shoes: Colour = (58, 50, 46)
+    short_sleeves: bool = False
 
 
 LOOKS = (
@@ -46,6 +49,27 @@ LOOKS = (
     PersonLook((246, 208, 184), (196, 142, 78), (104, 148, 116), (84, 124, 150), True),
     PersonLook((206, 156, 118), (44, 36, 36), (122, 100, 156), (62, 44, 34), False),
 )
+WORLD_LOOKS = (
+    *LOOKS,
+    PersonLook(
+        (108, 72, 54), (26, 22, 22), (196, 172, 88), (48, 34, 26), False, (74, 74, 78), (40, 36, 36)
+    ),
+    PersonLook(
+        (240, 198, 170), (150, 146, 142), (146, 62, 66), (92, 112, 120), False, (88, 80, 70)
+    ),
+    PersonLook((220, 172, 138), (120, 60, 34), (68, 132, 140), (92, 110, 66), True, (46, 46, 54)),
+    PersonLook(
+        (190, 140, 106),
+        (30, 26, 26),
+        (232, 228, 220),
+        (52, 38, 30),
+        False,
+        (64, 84, 120),
+        (210, 206, 198),
+    ),
+)
+"""Looks of the people of a world: the same four, and more."""
+
 
 _EYE_RADIUS = 0.21
 _EYE: Vec3 = (-0.665, 0.5, 0.565)
@@ -100,19 +124,69 @@ def head_parts(number: int, fineness: float = 1.0) -> HeadParts:
     fineness: 1 for a close look, less for fewer triangles
     """
     look = LOOKS[number % len(LOOKS)]
-    skin = _HEAD.all_round(round(84 * fineness), round(84 * fineness), radians(-4.0), radians(34.0))
-    mesh = grid(skin.points, closed=True)
-    plain = Painted(
-        mesh, _complexion(skin.points, look).reshape(-1, 3), skin.normals.reshape(-1, 3)
-    )
+    solid = _head_solid(look, fineness)
     red, dark = _toward(look.skin, (186, 62, 66), 0.55), _toward(look.skin, (70, 24, 24), 0.8)
     return HeadParts(
-        moved(merged([plain, *_hair(look, fineness)]), (0.0, 0.0, 0.0), PUPIL_DISTANCE_M),
+        solid,
         moved(
             merged([*_eyes(look, fineness), *lips(_HEAD, _MOUTH, red, dark)]),
             (0.0, 0.0, 0.0),
             PUPIL_DISTANCE_M,
         ),
+    )
+
+
+def _head_solid(look: PersonLook, fineness: float) -> Painted:
+    """Return skin and hair of a head."""
+    skin = _skin(fineness)
+    mesh = grid(skin.points, closed=True)
+    plain = Painted(
+        mesh, _complexion(skin.points, look).reshape(-1, 3), skin.normals.reshape(-1, 3)
+    )
+    return moved(merged([plain, *_hair(look, fineness)]), (0.0, 0.0, 0.0), PUPIL_DISTANCE_M)
+
+
+class HeadSegments(NamedTuple):
+    """A head in parts that move against each other, each in a frame of its own.
+
+    head: skin, hair, brows, lower lids and upper lip, in the face frame
+    lips: the lower lip, about the middle of the mouth
+    eye, lid: an eyeball and an upper lid, about the eyeball's centre; both eyes are alike
+    """
+
+    head: Painted
+    lips: Painted
+    eye: Painted
+    lid: Painted
+
+
+EYE_FACE_M: Vec3 = tuple(PUPIL_DISTANCE_M * one for one in _EYE)  # type: ignore[assignment]
+"""Centre of the left eyeball in the face frame."""
+MOUTH_FACE_M: Vec3 = (-0.34 * PUPIL_DISTANCE_M, 0.0, _MOUTH.z * PUPIL_DISTANCE_M)
+"""Middle of the mouth in the face frame."""
+
+
+@lru_cache(maxsize=8)
+def head_segments(look: PersonLook, fineness: float = 1.0) -> HeadSegments:
+    """Return the head of a person in parts."""
+    red, dark = _toward(look.skin, (186, 62, 66), 0.55), _toward(look.skin, (40, 12, 14), 0.92)
+    mouth = lips(_HEAD, _MOUTH, red, dark)
+    inside = _MOUTH._replace(upper=0.03, lower=_MOUTH.lower + 0.045, half_width=0.30)
+    open_mouth = moved(lips(_HEAD, inside, dark, dark).lower, (-0.004, 0.0, 0.0))
+    eye, glint, lid, still = _eye_parts(look, fineness, 20)
+    # The glint lies flat on the eyeball, so that the lid goes over it.
+    flat = moved(glint, (-0.52 * _EYE_RADIUS, 0.022, 0.024), 0.52)
+    solid = _head_solid(look, fineness)
+    features = [*still, *(mirrored(part) for part in still), mouth.upper, mouth.line, open_mouth]
+    back = tuple(-one / PUPIL_DISTANCE_M for one in MOUTH_FACE_M)
+    size, here = PUPIL_DISTANCE_M, (0.0, 0.0, 0.0)
+    # The lower lip lies on the open mouth, which it covers while it is up.
+    lower = moved(mouth.lower, (back[0] + 0.035, back[1], back[2]))
+    return HeadSegments(
+        merged([solid, moved(merged(features), here, size)]),
+        moved(lower, here, size),
+        moved(merged([*eye, flat]), here, size),
+        moved(lid, here, size),
     )
 
 
@@ -136,27 +210,45 @@ def _complexion(points: Floats, look: PersonLook) -> Floats:
 
 def _eyes(look: PersonLook, fineness: float) -> list[Painted]:
     """Return both eyes with their lids' edges, and the brows."""
+    eye, glint, lid, still = _eye_parts(look, fineness)
+    parts = [*(moved(part, _EYE) for part in (*eye, glint, lid)), *still]
+    return [*parts, *(mirrored(part) for part in parts)]
+
+
+class _EyeParts(NamedTuple):
+    """An eyeball's layers, its glint and its upper lid about its centre; lower lid and brow."""
+
+    eye: list[Painted]
+    glint: Painted
+    lid: Painted
+    still: list[Painted]
+
+
+def _eye_parts(look: PersonLook, fineness: float, around: int = 48) -> _EyeParts:
+    """Return the parts of a left eye."""
     rings = 5 if fineness < 1.0 else 9
+    around = 18 if fineness < 0.5 else 48
     balls = (
         (1.0, 66.0, (250, 249, 247)),
         (1.02, 31.0, look.iris),
         (1.04, 14.0, (14, 12, 14)),
     )
     parts = [
-        moved(painted(cap(size * _EYE_RADIUS, radians(deg), rings), colour), _EYE)
+        painted(cap(size * _EYE_RADIUS, radians(deg), rings, around), colour)
         for size, deg, colour in balls
     ]
-    glint = painted(cap(0.035, pi, 4), (255, 255, 255))
-    parts.append(moved(glint, (_EYE[0] + 1.02 * _EYE_RADIUS, _EYE[1] + 0.045, _EYE[2] + 0.05)))
+    glint = painted(cap(0.035, pi, 4, around), (255, 255, 255))
+    glint = moved(glint, (1.02 * _EYE_RADIUS, 0.045, 0.05))
     tone = _toward(look.skin, (120, 60, 44), 0.12)
-    for edge_deg, end_deg, dark in ((20.0, 84.0, 1.0), (-25.0, -84.0, 0.35)):
+    lids = []
+    for edge_deg, end_deg, dark in ((20.0, 118.0, 1.0), (-25.0, -84.0, 0.35)):
         lid = painted(_shell(1.09 * _EYE_RADIUS, edge_deg, end_deg), tone)
         edge = step(0.05 - np.abs(_lift(lid.mesh.vertices) - radians(edge_deg)), 0.05)
-        parts.append(moved(lid._replace(colours=mix(lid.colours, (40, 28, 26), dark * edge)), _EYE))
+        lids.append(lid._replace(colours=mix(lid.colours, (40, 28, 26), dark * edge)))
     share = np.linspace(0.0, 1.0, 12)
     y, z = 0.20 + 0.62 * share, 0.90 + 0.13 * np.sin(pi * (0.2 + 0.6 * share))
-    parts.append(brow(_HEAD, y, z, 0.052, look.hair, 8))
-    return [*parts, *(mirrored(part) for part in parts)]
+    hair = brow(_HEAD, y, z, 0.052, look.hair, 8)
+    return _EyeParts(parts, glint, lids[0], [moved(lids[1], _EYE), hair])
 
 
 def _shell(radius: float, edge_deg: float, end_deg: float) -> Mesh:
@@ -180,11 +272,23 @@ def _lift(points: Floats) -> Floats:
     return np.asarray(np.arctan2(points[:, 2], points[:, 0]))
 
 
+@lru_cache(maxsize=4)
+def _skin(fineness: float) -> Surface:
+    """Return the surface of a head, alike for all people."""
+    rows = round(84 * fineness)
+    return _HEAD.all_round(rows, rows, radians(-4.0), radians(34.0))
+
+
+@lru_cache(maxsize=4)
+def _crown(fineness: float, around: int) -> Surface:
+    """Return where hair grows: it ends behind the ears, and stands off the skull."""
+    return _HEAD.beyond((-1.0, 0.0, 0.62), 1.42, round(22 * fineness), around, 0.10)
+
+
 def _hair(look: PersonLook, fineness: float) -> list[Painted]:
     """Return a cap of hair, and where it is long two falls of it beside the neck."""
     around = round(56 * fineness)
-    # Short hair ends behind the ears; the parting stands off the skull.
-    found = _HEAD.beyond((-1.0, 0.0, 0.62), 1.42, round(22 * fineness), around, 0.10)
+    found = _crown(fineness, around)
     points = found.points.copy()
     rim = found.points[0] - 0.22 * found.normals[0]
     wave = 0.02 * np.sin(9.0 * np.linspace(0.0, 2.0 * pi, around))
@@ -230,12 +334,16 @@ def torso(number: int, length_m: float) -> Painted:
     return moved(merged([shirt, neck]), (0.0, 0.0, 0.0), PUPIL_DISTANCE_M)
 
 
-@lru_cache(maxsize=8)
 def hand(number: int) -> Painted:
-    """Return an open hand of radius 1 m: x out of the palm, z along the fingers."""
-    look = LOOKS[number % len(LOOKS)]
+    """Return an open right hand of radius 1 m: x out of the palm, z along the fingers."""
+    return hand_of(LOOKS[number % len(LOOKS)])
+
+
+@lru_cache(maxsize=8)
+def hand_of(look: PersonLook, rows: int = 34) -> Painted:
+    """Return the open right hand of a look; fewer rows are fewer triangles."""
     mitten = Solid(_mitten, (0.0, 0.0, -0.1), 2.2)
-    found = mitten.all_round(34, 34)
+    found = mitten.all_round(rows, rows)
     points, normals = found.points.reshape(-1, 3), found.normals.reshape(-1, 3)
     colours = np.broadcast_to(np.array(look.skin, float), points.shape)
     y, z = points[:, 1], points[:, 2]

@@ -305,6 +305,7 @@ class Snapshot:
     worst: the guard's gravest level since the last snapshot
     trail, events: joints, and eye movements that ended, since the last snapshot, oldest first
     p_world_pivot_m: where the pitch and roll axes of the neck meet, None where it is not known
+    plan: what the action planner has chosen and why, "" without one and while somebody leads
     """
 
     t_s: float
@@ -353,3 +354,4 @@ class Snapshot:
     estimated: tuple[str, ...] = ()
     lower_lids: tuple[float, float] | None = None
     p_world_pivot_m: Vec3 | None = None
+    plan: str = ""

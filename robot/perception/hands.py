@@ -35,6 +35,9 @@ _HEAD_M = 0.25
 _SHOULDER_ASIDE_M, _SHOULDER_BELOW_M = 0.19, 0.17
 _SAME_M = 0.3
 """A face so near to where one was a frame ago is the same."""
+# What is as large as a hand and surely grows in the image at this rate comes at the camera: a hand
+# from the first frame on, as nothing else of a person in view comes nearer so fast.
+_COMES_1_S, _SURE_SD = 2.5, 2.0
 # Seen to move so in so many frames within the time for which a rest is bridged.
 _FRAMES, _RESTS_S = 2, 0.4
 # A hand that was last seen slower than this has come to rest, and is there for so long; what moves
@@ -153,12 +156,13 @@ class Hands:
         named = known is not None and known.frames >= _FRAMES
         begins = _BEFORE_HEAD_M_S if hypot(*_off(arm.tip_m, p_face)) < _HEAD_M else _BEGINS_M_S
         # Legs and parts of the trunk of somebody who walks are no faster than that, seen from them.
-        if speed > (_STAYS_M_S if named else max(begins, norm(v_face))):
+        comes = arm.ratio * thing.radius_m >= _ALONE_M and _comes(thing, p_camera)
+        if comes or speed > (_STAYS_M_S if named else max(begins, norm(v_face))):
             known = self._moving.setdefault(thing.mark, _Moving(t_s, p_face, thing))
             known.sized(thing, arm.ratio * thing.radius_m)
             known.at_s, known.p_face = t_s, p_face
             known.hand = _as_hand(thing, arm, known.nearer, p_camera)
-            known.frames += 1
+            known.frames += _FRAMES if comes else 1
         if known is None or known.frames < _FRAMES:
             return thing
         if speed >= _AT_REST_M_S:
@@ -275,6 +279,15 @@ def _off(p_m: Vec3, p_face: Vec3) -> tuple[float, float]:
     """Return how far aside of and above a face a place is."""
     x, y, z = sub(p_m, p_face)
     return hypot(x, y), z
+
+
+def _comes(thing: LocalisedDetection, p_camera: Vec3) -> bool:
+    """Return whether a patch surely grows as what comes at the camera does."""
+    if thing.v_world_m_s is None:
+        return False
+    way = sub(thing.p_world_m, p_camera)
+    closing_m_s = -dot(thing.v_world_m_s, unit(way)) - _SURE_SD * thing.along_sd_m_s
+    return closing_m_s > _COMES_1_S * norm(way)
 
 
 def _across(arm: _Arm, v_face: Vec3, p_camera: Vec3) -> float:

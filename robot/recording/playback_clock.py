@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import NamedTuple
 
-from gazerig.robot.dashboard.page_process import MARK_KINDS, SPEEDS
+from gazerig.robot.dashboard.feed.page_process import MARK_KINDS, SPEEDS
 
 _SAME_S = 1e-6
 

@@ -65,7 +65,7 @@ class RecordRouter:
 
     def frame(self, captured_s: float, image: ImageArray) -> None:
         """Write an image of the camera as JPEG."""
-        from gazerig.robot.dashboard.camera_overlay import encode  # loads OpenCV
+        from gazerig.robot.dashboard.feed.camera_overlay import encode  # loads OpenCV
 
         first_s = self._first_s if self._first_s is not None else captured_s
         exposed_ns = self._writer.time_ns(captured_s - first_s)

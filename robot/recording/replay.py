@@ -5,7 +5,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
-from gazerig.robot.dashboard.page_process import FRAME, MARK_KINDS, REPLAY
+from gazerig.robot.dashboard.feed.page_process import FRAME, MARK_KINDS, REPLAY
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.recording.playback_clock import Mark, PlaybackClock, PlaybackState
 from gazerig.robot.recording.snapshot_index import SnapshotIndex
@@ -23,7 +23,7 @@ _MOST_WORDS = 150
 
 
 class Screen(Protocol):
-    """What shows the messages, as gazerig.robot.dashboard.page_process.PageProcess does."""
+    """What shows the messages, as gazerig.robot.dashboard.feed.page_process.PageProcess does."""
 
     def send(self, message: bytes) -> bool:
         """Hand over a message; False where it is not taken now."""
@@ -141,7 +141,7 @@ class Replay:
 
 
 def introduction(frames: SnapshotIndex) -> dict[str, object]:
-    """Return what a page needs to know of a recording once: marks along it, and its events."""
+    """Return what a page needs to know of a recording once: marks, events, if it has pictures."""
     events = [m for m in frames.marks if m.kind == "event"]
     return {
         "marks": {
@@ -149,6 +149,7 @@ def introduction(frames: SnapshotIndex) -> dict[str, object]:
             for kind in MARK_KINDS
         },
         "events": [(round(m.at_s, 3), m.words[:_MOST_WORDS]) for m in events[:_MOST_EVENTS]],
+        "pictures": frames.has_pictures,
     }
 
 

@@ -69,6 +69,7 @@ _TARGET = _object(
     p_world_m=_NUMBERS, v_world_m_s=_NUMBERS, at_s=_NUMBER, kind=_TEXT, id=_WHOLE, salience=_NUMBER,
     top_down=_YES, part={"type": ["string", "null"]}, shift=_WHOLE, why=_TEXT,
     centre_world_m={"type": ["array", "null"], "items": _NUMBER}, saliences=_list(_SALIENCE),
+    plan=_says(_TEXT, "what the action planner has chosen and why; left out without a planner"),
 )  # fmt: skip
 _GAZE_STATE = _object(
     head_rad=_NUMBERS, head_rate_rad_s=_NUMBERS, eye_left_rad=_NUMBERS, eye_right_rad=_NUMBERS,

@@ -27,6 +27,8 @@ class RunInfo:
     rate_hz: control rate at the start; pictures_hz: rate of the recorded frames
     started_utc: wall clock at the start, ISO 8601
     versions: name -> version of the packages whose arithmetic counts
+    stands: of a head in a world with others, where its neck base stands there: place (3, metres),
+        then the rows of its rotation (9); () for a head that is alone
     """
 
     rig: str
@@ -45,6 +47,7 @@ class RunInfo:
     bus: str = "emulated"
     pictures_hz: float = 0.0
     versions: Mapping[str, str] = field(default_factory=dict)
+    stands: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,8 +98,11 @@ def info_of(text: Mapping[str, str]) -> RunInfo:
     Raises:
         ValueError: something is missing or no JSON.
     """
+    found = _read(text, {f.name for f in fields(RunInfo)})
+    if isinstance(found.get("stands"), list):
+        found["stands"] = tuple(found["stands"])
     try:
-        info = RunInfo(**_read(text, {f.name for f in fields(RunInfo)}))
+        info = RunInfo(**found)
     except TypeError as error:
         raise ValueError(str(error)) from None
     _refuse_nonsense(info)
@@ -125,7 +131,16 @@ def _refuse_nonsense(info: RunInfo) -> None:
         raise ValueError("neither real nor emulated")
     if not isinstance(info.versions, dict):
         raise ValueError("no versions")
+    if not _is_place(info.stands):
+        raise ValueError("a place that is none")
     started_ns(info)
+
+
+def _is_place(stands: object) -> bool:
+    """Return whether these are the numbers of ``RunInfo.stands``."""
+    if not isinstance(stands, tuple) or len(stands) not in (0, 12):
+        return False
+    return all(_within(number, -1000.0, 1000.0) for number in stands)
 
 
 def _within(value: object, low: float, high: float) -> bool:

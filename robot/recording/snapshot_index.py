@@ -15,8 +15,8 @@ from gazerig.drivers.errors import SetupError
 from gazerig.robot.control.event_text import drawn_together
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import guard_text, perception_text
-from gazerig.robot.dashboard.page_process import pack, unpack
-from gazerig.robot.dashboard.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts
+from gazerig.robot.dashboard.feed.page_process import pack, unpack
+from gazerig.robot.dashboard.feed.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts
 from gazerig.robot.model.commands import REPEATED, Ask
 from gazerig.robot.model.types import SeenEvent, Trail
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
@@ -107,6 +107,11 @@ class SnapshotIndex:
         events = self._events[max(since, until - _MOST_EVENTS) : until]
         shown = replace(unpack(self.message(number)), trail=tuple(trail), events=tuple(events))
         return pack(shown)
+
+    @property
+    def has_pictures(self) -> bool:
+        """Return whether images of the camera were recorded."""
+        return len(self._frame_times) > 0
 
     def frame_at(self, at_s: float) -> int | None:
         """Return the number of the frame in force at a time, None before the first."""

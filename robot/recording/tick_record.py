@@ -124,6 +124,8 @@ def as_json(row: Sequence[Any], finite: bool = False) -> Json:
         "stopped": stopped,
         "led": led,
     }
+    if not data["target"]["plan"]:
+        del data["target"]["plan"]
     if lead != _NO_LEAD:
         data["lead"] = _named(LeadState, lead)
     if gesture != _NO_GESTURE:

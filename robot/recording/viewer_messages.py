@@ -6,11 +6,11 @@ and right_eye with x along the line of sight.
 
 import base64
 from collections.abc import Sequence
-from math import copysign, sqrt
 from typing import Any
 
 from gazerig.gaze.angles import add, compose, norm, rotate, rotation, sub
 from gazerig.gaze.types import Angles2, GazeState, Mat3, Vec3
+from gazerig.robot.model.quaternion import quaternion
 from gazerig.robot.model.types import JointState
 from gazerig.robot.recording.run_format import UNUSED
 
@@ -99,21 +99,16 @@ def scene(pose: GazeState, point_m: Vec3, faces: list[Vec3], at_ns: int) -> Json
     return {"deletions": [], "entities": [entity]}
 
 
-def quaternion(R: Mat3) -> dict[str, float]:
-    """Return a rotation matrix as a unit quaternion with w >= 0 (Shepperd's signs by halves)."""
-    (a, b, c), (d, e, f), (g, h, i) = R
-    return {
-        "x": copysign(0.5 * sqrt(max(0.0, 1.0 + a - e - i)), h - f),
-        "y": copysign(0.5 * sqrt(max(0.0, 1.0 - a + e - i)), c - g),
-        "z": copysign(0.5 * sqrt(max(0.0, 1.0 - a - e + i)), d - b),
-        "w": 0.5 * sqrt(max(0.0, 1.0 + a + e + i)),
-    }
+def orientation(R: Mat3) -> dict[str, float]:
+    """Return a rotation matrix as the quaternion of a viewer's message."""
+    w, x, y, z = quaternion(R)
+    return {"x": x, "y": y, "z": z, "w": w}
 
 
 def _transform(parent: str, child: str, p: Vec3, R: Mat3, at_ns: int) -> Json:
     return {
         "timestamp": stamp(at_ns), "parent_frame_id": parent, "child_frame_id": child,
-        "translation": _xyz(p), "rotation": quaternion(R),
+        "translation": _xyz(p), "rotation": orientation(R),
     }  # fmt: skip
 
 

@@ -263,6 +263,16 @@ class RobotClient:
         """
         return self.give(LookAt((x_m, y_m, z_m), self.who, stay))
 
+    def fault(self, text: str) -> str:
+        """Carry out a fault command of the emulated servos; return what was done.
+
+        text: as ``gazerig emulate`` takes it, e.g. "lose 3 count 2" or "push head 5 left"
+
+        Raises:
+            RequestRejected: it is no such command, or the servos are real.
+        """
+        return str(self._connection.ask("fault", text=text))
+
     def look_freely(self) -> None:
         """Let the head choose its targets again."""
         self.give(LookAt(None, self.who))

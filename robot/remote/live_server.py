@@ -38,6 +38,7 @@ class LiveServer:
         about: what does not change, as {"rig": name, "pid": process}.
         say: prints a line on the terminal.
         timing: returns how the loop keeps its time.
+        fault: carries out a fault command of emulated servos; None: the servos are real.
     """
 
     def __init__(
@@ -49,6 +50,7 @@ class LiveServer:
         about: Mapping[str, object],
         say: Callable[[str], None],
         timing: Callable[[], LoopFigures | None] = lambda: None,
+        fault: Callable[[str], str] | None = None,
     ) -> None:
         self._tuning = tuning
         self._refusals: tuple[type[Exception], ...] = (OSError, ValueError, *refusals)
@@ -56,7 +58,9 @@ class LiveServer:
         self._pulse = Pulse(clock, timing)
         self._in_use: tuple[int, tuple[Path, ...]] = (-1, ())
         self._watch = FileWatch(self._files, self._read_again)
-        requests = RequestHandler(robot, tuning, self._pulse, about, refusals, self._watch.saved)
+        requests = RequestHandler(
+            robot, tuning, self._pulse, about, refusals, self._watch.saved, fault=fault
+        )
         self._server = RemoteServer(requests, say)
 
     def open(self) -> None:

@@ -144,6 +144,7 @@ class RequestHandler:
         refusals: what ``params`` raises if a value breaks a rule, besides ValueError.
         saved: called with each file that was written.
         fixed: why parameters cannot be changed, if they cannot.
+        fault: carries out a fault command of emulated servos; None: the servos are real.
     """
 
     def __init__(
@@ -155,12 +156,20 @@ class RequestHandler:
         refusals: tuple[type[Exception], ...] = (),
         saved: Callable[[Path], None] | None = None,
         fixed: str = FIXED,
+        fault: Callable[[str], str] | None = None,
     ) -> None:
         self._params = params
         self._pulse = pulse
         self._about = dict(about)
         self._handler = CommandHandler(
-            robot, params, self._status, refusals, saved, fixed=fixed, state=pulse.state
+            robot,
+            params,
+            self._status,
+            refusals,
+            saved,
+            fixed=fixed,
+            state=pulse.state,
+            fault=fault,
         )
         self._unsaved = -1, 0
 

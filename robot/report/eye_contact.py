@@ -4,21 +4,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
+from gazerig.robot.analysis.mutual_gaze import BRIDGED_S, HALF_HIGH_M, HALF_WIDE_M
 from gazerig.robot.report.gaze_trace import GazeTrace
 from gazerig.robot.report.statistics import MeasuredValue, longest, mean, median
-
-_HALF_WIDE_M, _HALF_HIGH_M = 0.085, 0.125
-"""The oval of a face, a little larger than an adult's."""
-
-_BRIDGED_S = 0.15
-"""Shorter looks away are noise, or a blink of the detector."""
 
 _FACING_DEG = 12.0
 
 
 def on_face(run: GazeTrace) -> NDArray[np.bool_]:
     """Return (n,) whether the gaze is inside the oval of a face."""
-    y, z = run.column("face_y") / _HALF_WIDE_M, run.column("face_z") / _HALF_HIGH_M
+    y, z = run.column("face_y") / HALF_WIDE_M, run.column("face_z") / HALF_HIGH_M
     inside: NDArray[np.bool_] = np.nan_to_num(y * y + z * z, nan=9.0) <= 1.0
     return inside
 
@@ -33,12 +28,12 @@ def bouts(run: GazeTrace, mask: NDArray[np.bool_]) -> Floats:
     for first, last in edges:
         begin, end = float(t[first]), float(t[min(last, len(t) - 1)])
         cut = float(first == 0 or last >= len(t))
-        if out and begin - out[-1][1] < _BRIDGED_S:
+        if out and begin - out[-1][1] < BRIDGED_S:
             out[-1][1:] = [end, max(cut, out[-1][2])]
         else:
             out.append([begin, end, cut])
     rows = np.array(out).reshape(-1, 3)
-    kept: Floats = rows[rows[:, 1] - rows[:, 0] >= _BRIDGED_S]
+    kept: Floats = rows[rows[:, 1] - rows[:, 0] >= BRIDGED_S]
     return kept
 
 

@@ -4,6 +4,7 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gazerig.gaze.types import PARTS, Floats
 from gazerig.robot.analysis import human_norms as human
@@ -105,11 +106,12 @@ def points(run: GazeTrace) -> Floats:
 
 def density(rows: Floats) -> Floats:
     """Spread (n, 3) y, z, seconds over the grid: (rows z, columns y)."""
-    time, _, _ = np.histogram2d(
-        rows[:, 1], rows[:, 0], bins=(_edges(_Z_M), _edges(_Y_M)), weights=rows[:, 2]
-    )
+    z, y = _cells(rows[:, 1], _Z_M), _cells(rows[:, 0], _Y_M)
+    on_grid = (z >= 0) & (z < len(_Z_M)) & (y >= 0) & (y < len(_Y_M))
+    cells = z[on_grid] * len(_Y_M) + y[on_grid]
+    time = np.bincount(cells, rows[on_grid, 2], len(_Z_M) * len(_Y_M))
     bell_z, bell_y = _bells()
-    out: Floats = bell_z @ time @ bell_y
+    out: Floats = bell_z @ time.reshape(len(_Z_M), len(_Y_M)) @ bell_y
     return out
 
 
@@ -196,14 +198,26 @@ def _weighted(rows: Floats) -> float:
 def _alike(rows: Floats) -> float:
     """Return the correlation of the heat map with that expected of people."""
     ours = density(rows).ravel()
-    if ours.std() == 0.0:  # all of it beside the face
+    ours = ours - ours.mean()
+    size = float(np.sqrt(ours @ ours))
+    if size == 0.0:  # all of it beside the face
         return 0.0
-    return float(np.corrcoef(ours, expected_density().ravel())[0, 1])
+    return float(ours @ _expected_unit()) / size
 
 
-def _edges(centres: Floats) -> Floats:
+@cache
+def _expected_unit() -> Floats:
+    """Return the heat map expected of people, less its mean, of length 1."""
+    expected = expected_density().ravel()
+    expected = expected - expected.mean()
+    out: Floats = expected / np.sqrt(expected @ expected)
+    return out
+
+
+def _cells(places: Floats, centres: Floats) -> NDArray[np.intp]:
+    """Return in which cell of an axis each place is; outside it, a number that no cell has."""
     step = centres[1] - centres[0]
-    out: Floats = np.append(centres - 0.5 * step, centres[-1] + 0.5 * step)
+    out: NDArray[np.intp] = np.floor((places - centres[0]) / step + 0.5).astype(np.intp)
     return out
 
 

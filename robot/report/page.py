@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import jinja2
 
@@ -16,6 +16,9 @@ from gazerig.robot.report.joint_basis import JointBasis
 from gazerig.robot.report.plotting import Drawing
 from gazerig.robot.report.run_header import RunHeader
 from gazerig.robot.report.statistics import MeasureResult
+
+if TYPE_CHECKING:
+    from gazerig.robot.report.heads import MutualGazeReport
 
 _CLASSES = {
     "pass": "pass", "uncertain": "uncertain", "outside": "outside", "too few events": "few",
@@ -75,7 +78,11 @@ class PageSection(NamedTuple):
 
 
 def report_page(
-    about: RunHeader, run: GazeTrace, findings: Sequence[MeasureResult], figures: Sequence[Figure]
+    about: RunHeader,
+    run: GazeTrace,
+    findings: Sequence[MeasureResult],
+    figures: Sequence[Figure],
+    gaze: "MutualGazeReport | None" = None,
 ) -> str:
     """Return the page of one run as HTML that needs no other file."""
     styles = about.styles | {f"conversation {run.mode}"} | run.joints.styles
@@ -96,6 +103,7 @@ def report_page(
         outside=[f.band.title for f in findings if f.verdict == "outside"],
         uncertain=[f.band.title for f in findings if f.verdict == "uncertain"],
         basis=run.joints.whole_basis, banner=banner(run.joints),
+        gaze=gaze,
     )  # fmt: skip
 
 

@@ -25,6 +25,7 @@ from gazerig.robot.report import (
 )
 from gazerig.robot.report.files import write_all
 from gazerig.robot.report.gaze_trace import GazeTrace, GazeTraceBuilder
+from gazerig.robot.report.heads import MutualGazeReport
 from gazerig.robot.report.page import Figure, report_page
 from gazerig.robot.report.plotting import COLOURS, Drawing, Shown, caption_of, png
 from gazerig.robot.report.run_header import RunHeader
@@ -70,17 +71,25 @@ def report(
 
 
 def report_of(
-    run: GazeTrace, about: RunHeader, out: Path, progress: Progress, force: bool = False
+    run: GazeTrace,
+    about: RunHeader,
+    out: Path,
+    progress: Progress,
+    force: bool = False,
+    gaze: MutualGazeReport | None = None,
 ) -> Report:
     """Do the same with a run that is gathered already.
+
+    gaze: how this head and another one looked at each other, None where there was no other
 
     Raises:
         SetupError: a file cannot be written.
     """
     findings = found(run)
     figures = drawn([Shown(about.name, run, COLOURS[0], about.model)], progress)
-    page = report_page(about, run, findings, figures)
-    written = write_all(out, page, figures, [_numbers(f, run) for f in findings], force)
+    page = report_page(about, run, findings, figures, gaze)
+    numbers = [_numbers(f, run) for f in findings] + ([gaze.as_json] if gaze else [])
+    written = write_all(out, page, figures, numbers, force)
     return Report(findings, out, *written)
 
 

@@ -55,6 +55,7 @@ class SceneCamera:
         head_pose: true rotation (3, 3) and position [m] of the head in the world at a time [s].
         rng: for the noise.
         locate: locates what is found in the camera's axes, None for none.
+        begins_s: when the scene begins; None: at the first look.
     """
 
     def __init__(
@@ -65,7 +66,9 @@ class SceneCamera:
         head_pose: Callable[[float], tuple[Mat3, Vec3]],
         rng: np.random.Generator,
         locate: Locate | None = None,
+        begins_s: float | None = None,
     ) -> None:
+        self._begins_s = begins_s
         self._params = params
         self._scene = scene
         self._mount = mount
@@ -79,14 +82,14 @@ class SceneCamera:
 
     @property
     def start_s(self) -> float | None:
-        """Return when the scene began: at the first look; None before that."""
+        """Return when the scene begins or began; None where that is at the first look to come."""
         return self._start_s
 
     def open(self) -> None:
         """Start: the first frame is taken at the first look."""
         self._on_the_way: deque[Detections] = deque()
         self._arrived: Detections | None = None
-        self._start_s = None
+        self._start_s = self._begins_s
         self._number = 0
         self._due_s = -inf
         self._arrives_s = inf

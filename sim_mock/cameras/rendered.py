@@ -3,40 +3,42 @@
 gazerig.sim_mock.cameras.detections simulates what a detector would find; here the real
 detectors work on pixels: a room with texture, people with faces and arms, things, distances.
 Frames come late, at their own rate, noisy, and smeared by the camera's turn during the
-exposure; a depth frame has the noise of stereo and holes at edges. Not modelled: lens
-distortion, rolling shutter, light, the smear of things that move themselves.
+exposure; a depth frame has the noise of stereo and holes at edges. What a lens and a sensor
+that is read row by row add is off unless asked for. A world with physics is drawn by another view.
 """
 
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import hypot, radians
+from math import radians
 from typing import Annotated, Any, NamedTuple
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera.frame_analysis import Locate
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.drivers.types import Detections, FaceDetector, ImageArray, MovingBlob
-from gazerig.gaze.angles import norm, rotate_back, sub
+from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.model.frames import CameraMount
 from gazerig.sim_mock.cameras.canvas import Canvas
 from gazerig.sim_mock.cameras.draw_person import draw_arm_of, draw_person, draw_thing
 from gazerig.sim_mock.cameras.draw_room import draw_room
-from gazerig.sim_mock.scenes.scene import PLANNED_KINDS, Scene, Thing
+from gazerig.sim_mock.cameras.optics import (
+    CameraMotion,
+    OpticsParams,
+    Rendered,
+    SceneView,
+    expose,
+)
+from gazerig.sim_mock.cameras.sensor import Sensor, SensorParams
+from gazerig.sim_mock.scenes.scene import Scene, Thing
 
 _HAND_RADIUS_M = 0.07
 _FIRST_THING_ID = 1000  # hands have the numbers of their people, from 0
-_FIRST_PLANNED_ID = 1_000_000  # beyond the numbers of the motion detector
 _BEHIND_HAND_M = 1e-3  # an arm is drawn right before its hand
-# A second of noise would cost more than the drawing; a piece of one stock is as good.
-_NOISE_STOCK = 1 << 21
-# Stereo is blind beside edges: over so many pixels, where the distance jumps by this share.
-_BLIND_PX, _JUMP = 5, 0.08
 
 
 class Exposure(NamedTuple):
@@ -59,7 +61,7 @@ FindMotion = Callable[[Exposure, Intrinsics], tuple[MovingBlob, ...]]
 
 
 @dataclass(frozen=True)
-class PixelCameraParams:
+class PixelCameraParams(SensorParams, OpticsParams):
     """How good the camera is."""
 
     width_px: Annotated[int, Bounds(32, 4096)] = 640
@@ -67,10 +69,7 @@ class PixelCameraParams:
     horizontal_field_deg: Annotated[float, Bounds(10, 150)] = 69.0
     rate_hz: Annotated[float, Bounds(1, 240)] = 30.0
     latency_ms: Annotated[float, Bounds(0, 1000)] = 60.0
-    exposure_ms: Annotated[float, Bounds(0, 100)] = 8.0
-    noise_grey: Annotated[float, Bounds(0, 60)] = 3.0
     depth: Annotated[bool, "it measures depth, too"] = False
-    depth_noise_1_m: Annotated[float, Bounds(0, 0.2)] = 0.004
     room_seed: Annotated[int, Bounds(0, 1 << 30)] = 0
 
 
@@ -86,6 +85,9 @@ class PixelCamera:
         rng: for the noise.
         find_motion: finds what moves, besides the faces.
         locate: locates what is found in the camera's axes, None for none.
+        view: draws the scene; None: as people, things and a room are drawn by hand.
+        lens: of the camera, for frames of its size; None: by its field of view.
+        begins_s: when the scene begins; None: at the first look.
     """
 
     def __init__(
@@ -98,28 +100,37 @@ class PixelCamera:
         rng: np.random.Generator,
         find_motion: FindMotion | None = None,
         locate: Locate | None = None,
+        view: SceneView | None = None,
+        lens: Intrinsics | None = None,
+        begins_s: float | None = None,
     ) -> None:
+        self._begins_s = begins_s
         self._params = params
         self._scene = scene
         self._mount = mount
         self._head_pose = head_pose
         self._detector = detector
-        self._rng = rng
         self._find_motion = find_motion
         self._locate = locate
-        self.lens = intrinsics_of_view(
+        self._view = view or DrawnScene(scene, params.room_seed)
+        self.lens = lens or intrinsics_of_view(
             radians(params.horizontal_field_deg), params.width_px, params.height_px
         )
-        self._noise = rng.standard_normal(_NOISE_STOCK, dtype=np.float32) * params.noise_grey
+        self._sensor = Sensor(params, rng)
         self.open()
 
     def open(self) -> None:
         """Start: the first frame is taken at the first look."""
         self._on_the_way: deque[Detections] = deque()
         self._arrived: Detections | None = None
-        self._start_s: float | None = None
+        self._start_s = self._begins_s
         self._number = 0
-        self._before: tuple[float, Mat3] | None = None
+        self._before: tuple[float, Mat3, Vec3] | None = None
+
+    @property
+    def rate_hz(self) -> float:
+        """Return how many frames it takes a second."""
+        return self._params.rate_hz
 
     def latest(self, now_s: float) -> Detections | None:
         """Return the newest detections that have arrived by ``now_s``."""
@@ -131,7 +142,7 @@ class PixelCamera:
             due = int((now_s - self._start_s) * self._params.rate_hz + 1e-6)
             self._number = max(self._number, due) + 1
             self._on_the_way.append(self._looked_at(self._expose(now_s, R, p)))
-        self._before = now_s, R
+        self._before = now_s, R, p
         late_s = self._params.latency_ms / 1e3
         while self._on_the_way and now_s >= self._on_the_way[0].captured_s + late_s - 1e-9:
             self._arrived = self._on_the_way.popleft()
@@ -167,12 +178,12 @@ class PixelCamera:
         return events() if events is not None else ()
 
     def close(self) -> None:
-        """Stop; there is nothing to free."""
+        """Stop, and free what draws."""
+        self._view.close()
 
     def _looked_at(self, shot: Exposure) -> Detections:
         """Return the detections in a frame."""
         blobs = self._find_motion(shot, self.lens) if self._find_motion is not None else ()
-        blobs = (*blobs, *self._planned(shot))
         height, width = shot.image.shape[:2]
         found = Detections(
             shot.captured_s,
@@ -186,75 +197,53 @@ class PixelCamera:
         )
         return found.located_by(self._locate)
 
-    def _planned(self, shot: Exposure) -> tuple[MovingBlob, ...]:
-        """Return the places that the scene's planner names, where they are in the frame.
-
-        The planner is the robot's own: what it means is known to it, not seen.
-        """
-        assert self._start_s is not None
-        height, width = shot.image.shape[:2]
-        found = []
-        for thing in self._scene.things(shot.captured_s - self._start_s):
-            if thing.kind not in PLANNED_KINDS:
-                continue
-            x, y, z = rotate_back(shot.R_world_camera, sub(thing.p_world_m, shot.p_world_camera_m))
-            lens = self.lens
-            inside = z > 0.1 and (
-                0.0 <= x / z * lens.fx_px + lens.cx_px <= width
-                and 0.0 <= y / z * lens.fy_px + lens.cy_px <= height
-            )
-            if inside:
-                number = _FIRST_PLANNED_ID + thing.id
-                found.append(MovingBlob(number, thing.kind, (x, y, z), thing.radius_m))
-        return tuple(found)
-
     def _expose(self, t_s: float, R: Mat3, p: Vec3) -> Exposure:
         """Render one frame from the camera's pose; its time is the middle of the exposure."""
         assert self._start_s is not None
         par = self._params
-        canvas = Canvas(par.width_px, par.height_px, self.lens, R, p)
-        draw_scene(canvas, self._scene, t_s - self._start_s, par.room_seed)
-        image = self._noisy(smeared(canvas.image, self._smear_px(t_s, R)))
+        size = par.width_px, par.height_px
+        motion = self._motion(t_s, R, p)
+        seen = expose(
+            self._view, par, t_s - self._start_s, self.lens, size, motion, depth=par.depth
+        )
+        image = self._sensor.image(seen.image)
         image.setflags(write=False)  # as those of real cameras
-        depth = self._stereo(canvas.depth_m) if par.depth else None
+        depth = None if seen.depth_m is None else self._sensor.stereo(seen.depth_m)
         return Exposure(t_s, self._number, image, depth, R, p)
 
-    def _smear_px(self, t_s: float, R: Mat3) -> tuple[float, float]:
-        """Return how far the frame's middle moves during the exposure."""
+    def _motion(self, t_s: float, R: Mat3, p: Vec3) -> CameraMotion:
+        """Return where the camera is and where it was at the look before."""
         if self._before is None or t_s <= self._before[0]:
-            return 0.0, 0.0
-        before_s, R_before = self._before
-        ahead = np.array(R_before).T @ np.array(R)[:, 2]
-        share = self._params.exposure_ms / 1e3 / (t_s - before_s)
-        lens = self.lens
-        return (
-            float(-ahead[0] / ahead[2]) * lens.fx_px * share,
-            float(-ahead[1] / ahead[2]) * lens.fy_px * share,
-        )
+            return CameraMotion(R, p, R, p, 0.0)
+        before_s, R_before, p_before = self._before
+        return CameraMotion(R, p, R_before, p_before, t_s - before_s)
 
-    def _noisy(self, image: NDArray[np.uint8]) -> ImageArray:
-        """Add the sensor's noise."""
-        if self._params.noise_grey <= 0.0:
-            return image
-        noise = self._piece(image.size).reshape(image.shape)
-        out: ImageArray = cv2.add(image, noise, dtype=cv2.CV_8U).astype(np.uint8, copy=False)
-        return out
 
-    def _stereo(self, depth_m: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Return distances as stereo measures them: error with the square, blind beside edges."""
-        noise = self._piece(depth_m.size).reshape(depth_m.shape)
-        noise = noise * (self._params.depth_noise_1_m / max(self._params.noise_grey, 1e-9))
-        seen = depth_m * (1.0 + depth_m * noise)
-        kernel = np.ones((_BLIND_PX, _BLIND_PX), np.uint8)
-        step = cv2.dilate(depth_m, kernel) - cv2.erode(depth_m, kernel)
-        blind = ~(step < _JUMP * depth_m)
-        out: NDArray[np.float32] = np.where(blind, np.float32(np.nan), seen).astype(np.float32)
-        return out
+class DrawnScene(NamedTuple):
+    """Draws a scene by hand: flat people and things in a room."""
 
-    def _piece(self, size: int) -> NDArray[np.float32]:
-        """Return a slice of the prepared noise, another one each time."""
-        start = int(self._rng.integers(0, _NOISE_STOCK))
-        return np.take(self._noise, np.arange(start, start + size), mode="wrap")
+    scene: Scene
+    room_seed: int = 0
+
+    def draw(
+        self,
+        t_s: float,
+        lens: Intrinsics,
+        size_px: tuple[int, int],
+        R: Mat3,
+        p_m: Vec3,
+        *,
+        depth: bool = False,
+        rows: tuple[int, int] | None = None,
+    ) -> Rendered:
+        """Return a picture; see ``SceneView.draw``."""
+        canvas = Canvas(*size_px, lens, R, p_m)
+        draw_scene(canvas, self.scene, t_s, self.room_seed)
+        wanted = slice(*(rows or (None,)))
+        return Rendered(canvas.image[wanted], canvas.depth_m[wanted] if depth else None)
+
+    def close(self) -> None:
+        """Do nothing: there is nothing to free."""
 
 
 def draw_scene(canvas: Canvas, scene: Scene, scene_s: float, room_seed: int = 0) -> None:
@@ -263,11 +252,7 @@ def draw_scene(canvas: Canvas, scene: Scene, scene_s: float, room_seed: int = 0)
     eye = (float(canvas.p_m[0]), float(canvas.p_m[1]), float(canvas.p_m[2]))
     drawn: list[tuple[float, Callable[[], None]]] = []
     people = scene.people(scene_s)
-    things = [
-        thing._replace(id=_FIRST_THING_ID + thing.id)
-        for thing in scene.things(scene_s)
-        if thing.kind not in PLANNED_KINDS
-    ]
+    things = [thing._replace(id=_FIRST_THING_ID + thing.id) for thing in scene.things(scene_s)]
     for number, person in enumerate(people):
         away = norm(sub(person.p_world_face_m, eye))
         drawn.append((away, _later(draw_person, canvas, person, number)))
@@ -281,25 +266,6 @@ def draw_scene(canvas: Canvas, scene: Scene, scene_s: float, room_seed: int = 0)
         drawn.append((away, _later(draw_thing, canvas, thing)))
     for _, draw in sorted(drawn, key=lambda item: -item[0]):
         draw()
-
-
-def smeared(image: NDArray[np.uint8], way_px: tuple[float, float]) -> NDArray[np.uint8]:
-    """Blur a frame evenly along a displacement (x, y) in pixels."""
-    length = hypot(*way_px)
-    if length < 1.0:
-        return image
-    half = int(np.ceil(0.5 * length))
-    kernel = np.zeros((2 * half + 1, 2 * half + 1), np.float32)
-    # Looks spread evenly over the way, each shared among the four pixels around it.
-    for share in np.linspace(-0.5, 0.5, 4 * half + 1).tolist():
-        x, y = half + share * way_px[0], half + share * way_px[1]
-        i, j = min(int(x), 2 * half - 1), min(int(y), 2 * half - 1)
-        u, v = x - i, y - j
-        kernel[j : j + 2, i : i + 2] += np.outer((1.0 - v, v), (1.0 - u, u))
-    out: NDArray[np.uint8] = cv2.filter2D(
-        image, -1, kernel / kernel.sum(), borderType=cv2.BORDER_REPLICATE
-    ).astype(np.uint8, copy=False)
-    return out
 
 
 def _later(draw: Callable[..., None], *what: Any) -> Callable[[], None]:

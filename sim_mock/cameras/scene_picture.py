@@ -20,7 +20,7 @@ from gazerig.robot.model.paint import Painted, painted
 from gazerig.robot.model.person_shape import LOOKS, hand, head_parts, torso
 from gazerig.sim_mock.cameras.canvas import Canvas
 from gazerig.sim_mock.cameras.draw_arm import elbow_m, shoulder_m
-from gazerig.sim_mock.scenes.scene import PLANNED_KINDS, Scene, ScenePerson
+from gazerig.sim_mock.scenes.scene import Scene, ScenePerson
 
 _FINENESS, _CHEST_M = 0.5, 0.75
 _HAND_M = 0.075
@@ -44,15 +44,13 @@ def draw_picture(
     R: Mat3,
     p_m: Vec3,
 ) -> ImageArray:
-    """Return what a camera sees of a scene, BGR; see ``ScenePicture.draw`` for the arguments."""
+    """Return what a camera sees of a scene, BGR; see ``DrawPicture.draw`` for the arguments."""
     width, height = size_px
     canvas = Canvas(width, height, lens, R, p_m)
     _draw_room(canvas)
     people = scene.people(scene_s)
     solids = [solid for i, one in enumerate(people) for solid in _person(one, i, p_m)]
     for thing in scene.things(scene_s):
-        if thing.kind in PLANNED_KINDS:
-            continue
         if thing.person is not None and thing.person < len(people):
             solids += _arm(people[thing.person], thing.person, thing.p_world_m, p_m)
         elif thing.kind == "hand":

@@ -24,6 +24,7 @@ from gazerig.sim_mock.dynamixel.modes import (
 )
 from gazerig.sim_mock.smart_servo.controller import DISABLED
 from gazerig.sim_mock.smart_servo.drive import Drive
+from gazerig.sim_mock.smart_servo.motor import ShaftMaker, own_shaft
 from gazerig.sim_mock.smart_servo.noise import LENGTH
 from gazerig.sim_mock.smart_servo.physics import Quirks, ServoSpec
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
@@ -58,14 +59,20 @@ class DynamixelDrive(Drive):
 
     memory: DynamixelMemory
 
-    def __init__(self, memory: DynamixelMemory, model: DynamixelModel, spec: ServoSpec) -> None:
+    def __init__(
+        self,
+        memory: DynamixelMemory,
+        model: DynamixelModel,
+        spec: ServoSpec,
+        make_shaft: ShaftMaker = own_shaft,
+    ) -> None:
         self._model = model
         self._quirks = Quirks(*spec.quirks)
         unit = model.current_unit_ma
         # Models without a current sensor report load in 0.1 %.
         self._current_full = model.stall_current_a * 1000.0 / unit if unit else 1000.0
         self._max_current = LARGEST if unit else 1000
-        super().__init__(memory, model, spec)
+        super().__init__(memory, model, spec, make_shaft=make_shaft)
 
     def boot(self) -> None:
         """Reset to power-on: torque off, position within one turn, goals at their start values."""

@@ -43,6 +43,7 @@ from gazerig.sim_mock.dynamixel.memory import (
 )
 from gazerig.sim_mock.dynamixel.modes import DRIVEN_BY, TORQUE_ON_BY_GOAL
 from gazerig.sim_mock.dynamixel.write_rules import GOALS, WATCHDOG_AT, WriteRules
+from gazerig.sim_mock.smart_servo.motor import ShaftMaker, own_shaft
 from gazerig.sim_mock.smart_servo.physics import Quirks, ServoSpec
 from gazerig.sim_mock.smart_servo.servo import EmulatedServo
 
@@ -74,14 +75,14 @@ class DynamixelServo(EmulatedServo):
     memory: DynamixelMemory
     drive: DynamixelDrive
 
-    def __init__(self, spec: ServoSpec, now_ms: int) -> None:
+    def __init__(self, spec: ServoSpec, now_ms: int, make_shaft: ShaftMaker = own_shaft) -> None:
         self.model = MODELS[spec.model]
         self.mute_reboot = Quirks(*spec.quirks).mute_reboot
         self.memory = DynamixelMemory(self.model, spec.firmware)
         self.memory.set("firmware_version", spec.firmware)
         self.memory.set("id", spec.id)
         self.baud_rates = BAUD_RATES[: (self.memory.named("baud_rate").high or 0) + 1]
-        self.drive = DynamixelDrive(self.memory, self.model, spec)
+        self.drive = DynamixelDrive(self.memory, self.model, spec, make_shaft)
         self._rules = WriteRules(self.memory, self.model, self.drive)
         self.fast_reads = spec.firmware >= FAST_READ_SINCE[self.model.family]
         self._new = spec.firmware >= BACKUP_SINCE[self.model.family]

@@ -22,6 +22,7 @@ from gazerig.sim_mock.feetech.packets import signed, unsigned
 from gazerig.sim_mock.feetech.tables import PWM, SERVO, STEP, WHEEL
 from gazerig.sim_mock.smart_servo.controller import DISABLED, Loop
 from gazerig.sim_mock.smart_servo.drive import Drive
+from gazerig.sim_mock.smart_servo.motor import ShaftMaker, own_shaft
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
 
@@ -62,7 +63,13 @@ class FeetechDrive(Drive):
 
     memory: FeetechMemory
 
-    def __init__(self, memory: FeetechMemory, model: FeetechModel, spec: ServoSpec) -> None:
+    def __init__(
+        self,
+        memory: FeetechMemory,
+        model: FeetechModel,
+        spec: ServoSpec,
+        make_shaft: ShaftMaker = own_shaft,
+    ) -> None:
         table = memory.table
         self._goals = GOALS[table.order]
         self._scale = table.turn_steps / TURN
@@ -73,7 +80,8 @@ class FeetechDrive(Drive):
         physics, scale = Physics(*spec.physics), self._scale
         steps = ("upright_steps", "stop_low_steps", "stop_high_steps")
         here = {name: getattr(physics, name) / scale for name in steps}
-        super().__init__(memory, model, spec._replace(physics=physics._replace(**here)), scale)
+        own = spec._replace(physics=physics._replace(**here))
+        super().__init__(memory, model, own, scale, make_shaft)
 
     def boot(self) -> None:
         """Reset to power-on: torque off, position within one turn."""

@@ -17,6 +17,7 @@ from gazerig.sim_mock.feetech.drive import CURRENT_UNIT_A, GOALS_AT, FeetechDriv
 from gazerig.sim_mock.feetech.memory import FeetechMemory
 from gazerig.sim_mock.feetech.quirks import FeetechQuirks
 from gazerig.sim_mock.feetech.tables import SERVO, model_and_table
+from gazerig.sim_mock.smart_servo.motor import ShaftMaker, own_shaft
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.sim_mock.smart_servo.protection import CURRENT, HEAT, OVERLOAD, VOLTAGE
 from gazerig.sim_mock.smart_servo.servo import EmulatedServo
@@ -53,11 +54,11 @@ class FeetechServo(EmulatedServo):
     memory: FeetechMemory
     drive: FeetechDrive
 
-    def __init__(self, spec: ServoSpec, now_ms: int) -> None:
+    def __init__(self, spec: ServoSpec, now_ms: int, make_shaft: ShaftMaker = own_shaft) -> None:
         self.model, self.table = model_and_table(spec.model)
         self.baud_rates = self.table.baud_rates
         self.memory = FeetechMemory(self.model, spec.id, spec.firmware, self.table)
-        self.drive = FeetechDrive(self.memory, self.model, spec)
+        self.drive = FeetechDrive(self.memory, self.model, spec, make_shaft)
         self._sensed = _SENSED[self.table.order]
         self._around = 0, 0
         self.apply_quirks(FeetechQuirks())

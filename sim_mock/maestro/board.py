@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.active import NO_DEVICE
-from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec, build_servos
+from gazerig.sim_mock.hobby_servo import HobbyMaker, HobbyServo, HobbySpec, build_servos
 from gazerig.sim_mock.maestro.body import MaestroBody
 from gazerig.sim_mock.maestro.channel import EmulatedChannel
 from gazerig.sim_mock.maestro.commands import (
@@ -266,6 +266,7 @@ def build_board(
     baud: int | None = None,
     seed: int = 0,
     servos: Sequence[HobbySpec | Sequence[float]] = (),
+    make_servo: HobbyMaker = HobbyServo,
 ) -> EmulatedMaestro:
     """Build a board; channels without a spec have a default servo.
 
@@ -279,6 +280,6 @@ def build_board(
         raise ValueError(f"{channels} channels: a Maestro has {', '.join(map(str, SIZES))}")
     if not 0 <= device <= 127:
         raise ValueError(f"device {device}: a Maestro's number is 0 to 127")
-    built = build_servos(servos, channels)
+    built = build_servos(servos, channels, make_servo)
     settings = Settings(crc=crc) if baud is None else Settings("uart-fixed", crc, baud=baud)
     return EmulatedMaestro(built, now_s, device, settings, seed)

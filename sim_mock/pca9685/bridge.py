@@ -12,7 +12,7 @@ from typing import NamedTuple
 from gazerig.sim_mock.device import DeviceReply
 from gazerig.sim_mock.faults.active import NO_DEVICE
 from gazerig.sim_mock.faults.hobby import HobbyFaults
-from gazerig.sim_mock.hobby_servo import HobbyServo, HobbySpec, build_servos
+from gazerig.sim_mock.hobby_servo import HobbyMaker, HobbyServo, HobbySpec, build_servos
 from gazerig.sim_mock.pca9685.body import BusStuck, NotAcknowledged, Pca9685Body
 from gazerig.sim_mock.pca9685.chip import CHANNELS, LED0, NOMINAL_HZ, Chip
 from gazerig.sim_mock.pca9685.faults import CASES, COMMANDS
@@ -220,6 +220,7 @@ def build_bridge(
     oscillator_hz: float = NOMINAL_HZ,
     seed: int = 0,
     servos: Sequence[HobbySpec | Sequence[float]] = (),
+    make_servo: HobbyMaker = HobbyServo,
 ) -> Bridge:
     """Build the boards of one bus; channels without a spec have a default servo.
 
@@ -232,5 +233,5 @@ def build_bridge(
         if not 0x40 <= address <= 0x7F:
             raise ValueError(f"address {address:#x}: a PCA9685 has one from 0x40 to 0x7f")
     count = CHANNELS * len(addresses)
-    built = build_servos(servos, count)
+    built = build_servos(servos, count, make_servo)
     return Bridge(built, now_s, addresses, oscillator_hz, seed)

@@ -4,13 +4,18 @@ import json
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 from gazerig.drivers import child_process
+from gazerig.drivers.errors import SetupError
 from gazerig.sim_mock.devices import DynamixelLine, Emulated, packed
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
+
+if TYPE_CHECKING:
+    from gazerig.sim_mock.world.world_spec import WorldSpec
 
 STOP_S = 2.0
 
@@ -30,13 +35,24 @@ class _Served:
     def __init__(self) -> None:
         self._server: subprocess.Popen[bytes] | None = None
         self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._asking = threading.Lock()
+        self.joints: dict[str, int] = {}
+        """Where the joints of the rig stand in the state of the world, where there is one."""
 
-    def _start(self, buses: Sequence[Mapping[str, object]]) -> list[str]:
-        """Start it for these settings of buses; return the path of each."""
+    def _start(
+        self, buses: Sequence[Mapping[str, object]], world: "WorldSpec | None" = None
+    ) -> list[str]:
+        """Start it for these settings of buses, in a world or without; return the path of each."""
         self._folder = tempfile.TemporaryDirectory(prefix="servo-bus-")
         links = [str(Path(self._folder.name) / f"tty{k or ''}") for k in range(len(buses))]
         linked = [{**bus, "link": link} for bus, link in zip(buses, links, strict=True)]
-        settings = json.dumps({"buses": linked, "until_eof": True})
+        more: dict[str, object] = {}
+        if world is not None:
+            if world.figures is not None:
+                world.figures.shared = Path(self._folder.name) / "people.npy"
+            world.write(spec := Path(self._folder.name) / "world")
+            more["world"] = {"spec": str(spec), "state": str(self.state)}
+        settings = json.dumps({"buses": linked, "until_eof": True, **more})
         self._server = child_process.start(
             # The servos must outlive their client's way out: they end when their input does.
             "gazerig.sim_mock.pty.server",
@@ -44,11 +60,24 @@ class _Served:
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
         )
-        lines = [self._read_line() for _ in buses]
-        if not all(lines):
+        lines = [self._read_line() for _ in range(len(buses) + (world is not None))]
+        said = [json.loads(line) for line in lines if line]
+        refused = next((one["error"] for one in said if "error" in one), None)
+        if refused is not None or not all(lines):
             self.stop()
+            if refused is not None:
+                raise SetupError(refused)
             raise RuntimeError("the emulated bus did not start: its message is above")
-        return [str(json.loads(line)["path"]) for line in lines]
+        if world is not None:
+            self.joints = said.pop(0)["joints"]
+        return [str(one["path"]) for one in said]
+
+    @property
+    def state(self) -> Path:
+        """Return the file with the newest state of the world, where there is a world."""
+        if self._folder is None:
+            raise RuntimeError("the emulated bus is not running: start it first")
+        return Path(self._folder.name) / "state"
 
     @property
     def pid(self) -> int:
@@ -60,6 +89,8 @@ class _Served:
     def command(self, text: str, bus: str = "") -> str:
         """Carry out a fault command in the server, on the bus of this name; return what it did.
 
+        May be called from any thread.
+
         Raises:
             ValueError: names the word that is wrong and what would be right.
             RuntimeError: the server is not running.
@@ -67,9 +98,10 @@ class _Served:
         if self._server is None or self._server.stdin is None:
             raise RuntimeError("the emulated bus is not running: start it first")
         line = f"{bus}: {text}" if bus else text
-        self._server.stdin.write(line.replace("\n", " ").encode() + b"\n")
-        self._server.stdin.flush()
-        answer = json.loads(self._read_line() or '{"error": "the emulated bus has ended"}')
+        with self._asking:
+            self._server.stdin.write(line.replace("\n", " ").encode() + b"\n")
+            self._server.stdin.flush()
+            answer = json.loads(self._read_line() or '{"error": "the emulated bus has ended"}')
         if "error" in answer:
             raise ValueError(answer["error"])
         answer.pop("bus", None)
@@ -152,11 +184,18 @@ class PtyBus(_Served):
 class PtyBuses(_Served):
     """All emulated buses of a rig in one process of their own, each on its terminal."""
 
-    def start(self, devices: Mapping[str, Emulated]) -> dict[str, str]:
+    def start(
+        self, devices: Mapping[str, Emulated], world: "WorldSpec | None" = None
+    ) -> dict[str, str]:
         """Start a server for what is on every bus; return the path of each, by the same names.
 
+        Args:
+            devices: by the name of their bus.
+            world: in which all their servos are; None: each has mechanics of its own.
+
         Raises:
+            SetupError: the world cannot be used; says why.
             RuntimeError: the server did not start; its message is on standard error.
         """
         buses = [{"name": name, "device": packed(device)} for name, device in devices.items()]
-        return dict(zip(devices, self._start(buses), strict=True))
+        return dict(zip(devices, self._start(buses, world), strict=True))

@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.device_cases import CASES
 from gazerig.sim_mock.devices import Emulated, build
 from gazerig.sim_mock.pty.terminal import Terminal
@@ -52,6 +53,7 @@ class TerminalLine:
         now_s: the clock of device and line.
         say: gets the bus's new path as JSON when it was plugged in again without a link.
         warn: called once for each wrong baud rate of a client.
+        device: built already; None: it is built of its specification, with mechanics of its own.
 
     Raises:
         ValueError, OSError: the settings cannot be met.
@@ -63,10 +65,11 @@ class TerminalLine:
         now_s: Callable[[], float],
         say: Callable[[str], None],
         warn: Callable[[str], None] | None = None,
+        device: Device | None = None,
     ) -> None:
         self.settings = settings
         self._now_s, self._say, self._warn = now_s, say, warn
-        self.device = build(settings.device, now_s, settings.seed)
+        self.device = device or build(settings.device, now_s, settings.seed)
         for case, value in {**_packet_gap(settings.device), **settings.choices}.items():
             self.device.choose(case, value)
         self.line = ServoLine(self.device, settings.wire_time, settings.turnaround_us * 1e-6)
@@ -74,6 +77,8 @@ class TerminalLine:
         self.terminal = Terminal(link, settings.device.baud)
         self._held = self._forbidden = False
         self._warned: int | None = None
+        self.heard = False
+        """Whether a client has sent anything yet."""
 
     def where(self) -> str:
         """Return as JSON the path to open, the baud rate, and the name where there is one."""
@@ -119,6 +124,7 @@ class TerminalLine:
     def _take_bytes(self, now_s: float) -> None:
         """Return the client's bytes to the line, and back what is answered at once."""
         data = self.terminal.read()
+        self.heard = self.heard or bool(data)
         careful = self.device.check_baud or self.line.wire_time
         baud = self.terminal.client_baud() if careful else 0
         answer = self.line.send(data, baud or 1, now_s)

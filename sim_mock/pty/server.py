@@ -5,7 +5,9 @@
 serves clients that come and go. It takes commands as lines on standard input and answers
 each with one JSON line: {"ok": ...} or {"error": ...}. Where there are several buses, a
 command begins with the name of its own: ``neck: lose 3``; without one it is for the bus
-that has none. Imports nothing heavy, so that it is up within a tenth of a second.
+that has none. Imports nothing heavy, so that it is up within a tenth of a second; with a "world"
+in its settings it computes a world with physics, which has all servos of all buses in it, and
+writes where everything is into a file for those who look at it.
 
 A server in a thread of the client's own process would fight it for the interpreter lock.
 """
@@ -15,22 +17,49 @@ import os
 import select
 import signal
 import sys
+import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from gazerig.drivers.errors import SetupError
 from gazerig.sim_mock.devices import unpacked
 from gazerig.sim_mock.pty.line import BusSettings, TerminalLine
+
+if TYPE_CHECKING:
+    from gazerig.sim_mock.world.served_world import ServedWorld
+
+
+_LOOK_MS = 200
+WORLD_COMMANDS = ("push",)
+"""Commands that are the world's, whatever bus; ``gazerig.sim_mock.world.commands`` has them."""
+
+
+@dataclass(frozen=True)
+class WorldFiles:
+    """Of what a world is made, as ``WorldSpec.write`` writes it, and where its state is written."""
+
+    spec: str
+    state: str
 
 
 @dataclass(frozen=True)
 class ServerSettings:
-    """Devices to emulate; until_eof: stop at the end of standard input."""
+    """Devices to emulate.
+
+    Attributes:
+        buses: each on a terminal of its own.
+        until_eof: stop at the end of standard input.
+        world: the world that all servos are in; None: each has mechanics of its own.
+    """
 
     buses: tuple[BusSettings, ...]
     until_eof: bool = False
+    world: WorldFiles | None = None
 
 
 class ServerStopped(Exception):
@@ -52,8 +81,15 @@ class Server:
         if not names or len(set(names)) < len(names):
             raise ValueError(f"every bus needs a name of its own; there is {names}")
         try:
+            self.world: ServedWorld | None = None
+            if settings.world is not None:
+                with _ended_with_client(settings.until_eof):
+                    self.world = _world(settings.world)
             for bus in settings.buses:
-                self.lines.append(TerminalLine(bus, time.monotonic, say, warn))
+                device = None
+                if self.world is not None:
+                    device = self.world.device(bus.device, bus.name or "", bus.seed)
+                self.lines.append(TerminalLine(bus, time.monotonic, say, warn, device))
         except BaseException:
             self.close()
             raise
@@ -71,6 +107,8 @@ class Server:
                 if commands is not None:
                     watched.append(commands)
                 wait_s = min([line.wait_s() for line in self.lines])
+                if self.world is not None:
+                    wait_s = min(wait_s, self.world.wait_s())
                 ready, _, _ = select.select(watched, (), (), wait_s)
                 now_s = time.monotonic()
                 if commands in ready and not self._take_commands(commands):
@@ -79,6 +117,8 @@ class Server:
                     commands = None
                 for line in self.lines:
                     line.serve(ready, now_s)
+                if self.world is not None:
+                    self.world.serve(any([line.heard for line in self.lines]))
         finally:
             self.close()
 
@@ -99,7 +139,9 @@ class Server:
         return bool(came)
 
     def _obey(self, text: str) -> str:
-        """Carry out a command on the bus it names, or on the one without a name."""
+        """Carry out a command on the bus it names, on the one without a name, or on the world."""
+        if self.world is not None and text.split()[0] in WORLD_COMMANDS:
+            return self.world.obey(text)
         named = {line.settings.name or "": line for line in self.lines}
         for name, line in named.items():
             if text.startswith(f"{name}:"):
@@ -113,6 +155,42 @@ class Server:
             hint = f"buses: {', '.join(filter(None, named))}; a command for one: {last}: {text}"
             answer = json.dumps({"ok": f"{json.loads(answer)['ok']}\n{hint}"})
         return answer
+
+
+@contextmanager
+def _ended_with_client(until_eof: bool) -> Iterator[None]:
+    """End this process with its client also while a world is made, which takes seconds."""
+    made = threading.Event()
+    number: int | None = None
+    if until_eof and sys.stdin is not None:
+        with suppress(OSError, ValueError):  # a program may have put something else in its place
+            number = sys.stdin.fileno()
+
+    def watch() -> None:
+        client = select.poll()
+        assert number is not None
+        client.register(number, 0)  # that it is gone is always told
+        while not made.is_set():
+            if client.poll(_LOOK_MS):
+                os._exit(0)
+
+    if number is not None:
+        threading.Thread(target=watch, daemon=True).start()
+    try:
+        yield
+    finally:
+        made.set()
+
+
+def _world(files: WorldFiles) -> "ServedWorld":
+    """Return the world that all servos are in."""
+    from gazerig.sim_mock.world.gl_context import import_mujoco
+
+    import_mujoco()
+    from gazerig.sim_mock.world.served_world import ServedWorld
+    from gazerig.sim_mock.world.world_spec import WorldSpec
+
+    return ServedWorld(WorldSpec.read(Path(files.spec)), Path(files.state), time.monotonic)
 
 
 def _warn(text: str) -> None:
@@ -136,8 +214,14 @@ def run(settings: ServerSettings, say: Callable[[str], None], heed_ctrl_c: bool)
     signal.signal(signal.SIGINT, stop if heed_ctrl_c else signal.SIG_IGN)
     signal.signal(signal.SIGTTIN, signal.SIG_IGN)
     try:
-        server = Server(settings, say)
+        try:
+            server = Server(settings, say)
+        except SetupError as error:
+            say(json.dumps({"error": str(error)}))
+            return
         servers.append(server)
+        if server.world is not None:
+            say(json.dumps({"joints": server.world.joints()}))
         for line in server.lines:
             say(line.where())
         server.serve(sys.stdin.fileno() if sys.stdin is not None else None)
@@ -158,7 +242,8 @@ def settings_of(settings: Mapping[str, Any]) -> ServerSettings:
         ValueError, TypeError: there is no such device, or it has no such setting.
     """
     buses = [BusSettings(**{**bus, "device": unpacked(bus["device"])}) for bus in settings["buses"]]
-    return ServerSettings(tuple(buses), settings.get("until_eof", False))
+    world = WorldFiles(**settings["world"]) if "world" in settings else None
+    return ServerSettings(tuple(buses), settings.get("until_eof", False), world)
 
 
 def main() -> None:

@@ -1,17 +1,14 @@
 """The scene ``boxing``: an opponent before the robot, for the five gazes of Mitake et al. 1.
 
-(a) the opponent punches and the robot guards: the hand is looked at; (b) the robot attacks:
-before the blow lands, the place to be hit is looked at; (c) otherwise the opponent's face,
-also while the opponent steps left and right (section 4); (d) a hand is waved: the hand;
-(e) a hand reaches in from outside the field of view: it is noticed as it enters, and the
-head turns. Besides, two feints that draw the gaze off the face for an instant (section 4:
-boxers return to the face at once).
+(a) the opponent punches and the robot guards: the hand is looked at; (b) the opponent opens the
+guard, which the robot attacks: before the blow lands, the place to be hit is looked at; (c)
+otherwise the opponent's face, also while the opponent steps left and right (section 4); (d) a
+hand is waved: the hand; (e) a hand reaches in from outside the field of view: it is noticed as it
+enters, and the head turns. Besides, two feints that draw the gaze off the face for an instant
+(section 4: boxers return to the face at once).
 
-The planner that chooses attack, guard and wait belongs to the scene, as the paper's
-belongs to the boxing game. It guards when a punch has been on its way for a reaction
-time, and its guard target is the fist that comes: so the first look at the fist is owed
-to the fist's motion alone, as the paper's list of bottom-up gazes has it (3.1), and the
-rule only keeps it there.
+What the robot does about it is for its action planner (gazerig.gaze.action_planner), which sees
+what the camera shows.
 
 The robot's eyes are taken to be at ``HEAD_M`` and to look straight ahead along the
 world's x; both hold for the desk rig within what the neck turns to follow the opponent.
@@ -44,18 +41,13 @@ _KEYS = (
     Key(_ROUND_S, _CORNER),
 )
 
-# A planner's target is there, for a camera that sees it late, before its behaviour is.
-_AIM_S = 0.1
-
 # Fists close before the chin, where stepping aside moves their image hardly more than the
 # face's; a punch stops a forearm's length before the robot.
 _FIST_M = 0.06
 _PUNCH_OUT_S, _PUNCH_HOLD_S, _PUNCH_BACK_S = 0.25, 0.05, 0.30
 _PUNCH_ENDS_M = 0.35
-_REACTION_S = 0.3
-_GUARD_S = 0.3
-
-_ATTACK_S = 0.6
+_STEP_S = 1e-4
+_PUNCH_TURN_RAD = 0.5 * pi  # the back of the hand comes up
 _WAVE_S = 2.2
 _FEINT_S = 0.3
 _RETURN_S = 1.3
@@ -79,12 +71,24 @@ _PUNCHES = (
 _WAVES = (_ArmMotion(16.5, _RIGHT), _ArmMotion(31.2, _LEFT))
 _FEINTS = (_ArmMotion(27.6, _RIGHT), _ArmMotion(41.8, _LEFT))
 _REACHES = (_ArmMotion(22.9, _LEFT), _ArmMotion(35.4, _RIGHT))
-# Blows at the chest and at the side of the face, as offsets from the opponent's face.
-_ATTACKS: tuple[tuple[float, Vec3], ...] = (
-    (6.2, (-0.10, 0.0, -0.30)),
-    (19.4, (-0.03, 0.09, -0.02)),
-    (29.6, (-0.10, 0.0, -0.30)),
+
+
+class _Opening(NamedTuple):
+    """Both fists leave their place for ``way_m``, aside for the left one."""
+
+    start_s: float
+    way_m: Vec3
+
+
+# Dropped fists leave the face open; raised and parted ones, the chest.
+_DROPPED, _PARTED = (0.05, 0.04, -0.32), (0.0, 0.10, 0.15)
+_OPENINGS = (
+    _Opening(6.1, _PARTED),
+    _Opening(19.2, _DROPPED),
+    _Opening(29.3, _PARTED),
 )
+_OPEN_OUT_S, _OPEN_HOLD_S, _OPEN_BACK_S = 0.4, 0.7, 0.3
+_OPEN_S = _OPEN_OUT_S + _OPEN_HOLD_S + _OPEN_BACK_S
 
 
 class Boxing:
@@ -100,41 +104,24 @@ class Boxing:
         return (ScenePerson(face, turn, None),)
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
-        """Return both fists, and the hand from aside and the planner's targets while they last."""
+        """Return both fists, and the hand from aside while it is there."""
         phase_s = t_s % _ROUND_S
         face, _ = _opponent(t_s)
-        fists = (_fist(_RIGHT, face, phase_s), _fist(_LEFT, face, phase_s))
-        things = [Thing(i, "hand", fist, _FIST_M, person=0) for i, fist in enumerate(fists)]
+        things = [
+            Thing(i, "hand", _fist(side, face, phase_s), _FIST_M, *_turn(side, phase_s), person=0)
+            for i, side in enumerate((_RIGHT, _LEFT))
+        ]
         for reach in _REACHES:
             if reach.start_s <= phase_s < reach.start_s + _REACH_S:
                 things.append(Thing(2, "hand", _reaching(reach, phase_s), _FIST_M))
-        for start_s, offset in _ATTACKS:
-            if start_s - _AIM_S <= phase_s < start_s + _ATTACK_S:
-                things.append(Thing(3, "attack_target", _plus(face, offset), 0.05))
-        for punch in _PUNCHES:
-            if _guards(punch, phase_s) or _guards(punch, phase_s + _AIM_S):
-                fist = fists[0 if punch.side == _RIGHT else 1]
-                things.append(Thing(4, "guard_target", fist, _FIST_M))
         return tuple(things)
-
-    def behaviour(self, t_s: float) -> str | None:
-        """Return what the robot's planner has chosen: attack, guard or wait."""
-        phase_s = t_s % _ROUND_S
-        if any(start_s <= phase_s < start_s + _ATTACK_S for start_s, _ in _ATTACKS):
-            return "attack"
-        if any(_guards(punch, phase_s) for punch in _PUNCHES):
-            return "guard"
-        return "wait"
 
     def events(self) -> tuple[Event, ...]:
         """Return the five behaviours, the steps and the feints; the rest is for the face."""
         chin = _plus(_CORNER, (-0.3, 0.0, -0.1))
         events = [
             *(_punch_event(punch) for punch in _PUNCHES),
-            *(
-                Event("attack", "look", "attack_target", s, s + _ATTACK_S, _CORNER, 0.6)
-                for s, _ in _ATTACKS
-            ),
+            *(_opening_event(opening) for opening in _OPENINGS),
             *(
                 Event("wave", "look", "hand", wave.start_s, wave.start_s + _WAVE_S, chin, 0.5)
                 for wave in _WAVES
@@ -165,6 +152,11 @@ def _fist(side: float, face: Vec3, phase_s: float) -> Vec3:
                 phase_s - punch.start_s, _PUNCH_OUT_S, _PUNCH_HOLD_S, _PUNCH_BACK_S
             )
             place = _towards(place, _punch_end(side), out)
+    for opening in _OPENINGS:
+        x, y, z = opening.way_m
+        since_s = phase_s - opening.start_s
+        out = there_and_back(since_s, _OPEN_OUT_S, _OPEN_HOLD_S, _OPEN_BACK_S)
+        place = _plus(place, (x * out, side * y * out, z * out))
     for wave in _WAVES:
         if wave.side == side:
             since_s = phase_s - wave.start_s
@@ -183,9 +175,19 @@ def _punch_end(side: float) -> Vec3:
     return _plus(HEAD_M, (_PUNCH_ENDS_M, side * 0.03, -0.02))
 
 
-def _guards(punch: _ArmMotion, phase_s: float) -> bool:
-    begin_s = punch.start_s + _REACTION_S
-    return begin_s <= phase_s < begin_s + _GUARD_S
+def _turn(side: float, phase_s: float) -> tuple[float, float]:
+    """Return how fast a fist turns about the line of sight, and how far it has turned."""
+
+    def turned_rad(at_s: float) -> float:
+        out = [
+            there_and_back(at_s - punch.start_s, _PUNCH_OUT_S, _PUNCH_HOLD_S, _PUNCH_BACK_S)
+            for punch in _PUNCHES
+            if punch.side == side
+        ]
+        return side * _PUNCH_TURN_RAD * sum(out)
+
+    spin_rad_s = (turned_rad(phase_s + _STEP_S) - turned_rad(phase_s - _STEP_S)) / (2.0 * _STEP_S)
+    return spin_rad_s, turned_rad(phase_s)
 
 
 def _reaching(reach: _ArmMotion, phase_s: float) -> Vec3:
@@ -204,7 +206,15 @@ def _punch_event(punch: _ArmMotion) -> Event:
     """Ask for the hand from the punch's beginning until it is back."""
     end_s = punch.start_s + _PUNCH_OUT_S + _PUNCH_HOLD_S + _PUNCH_BACK_S
     middle = _towards(_plus(_CORNER, (0.0, 0.0, -0.1)), _punch_end(punch.side), 0.5)
-    return Event("punch", "look", "hand", punch.start_s, end_s, middle, 0.5)
+    arrives_s = punch.start_s + _PUNCH_OUT_S
+    return Event("punch", "look", "hand", punch.start_s, end_s, middle, 0.5, arrives_s)
+
+
+def _opening_event(opening: _Opening) -> Event:
+    """Ask for the place to be hit from when the fists have left half of their way until then."""
+    start_s = opening.start_s + 0.5 * _OPEN_OUT_S
+    end_s = opening.start_s + _OPEN_S - 0.5 * _OPEN_BACK_S
+    return Event("attack", "look", "attack_target", start_s, end_s, _CORNER, 0.6)
 
 
 def _reach_event(reach: _ArmMotion) -> Event:

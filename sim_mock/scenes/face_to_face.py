@@ -79,10 +79,6 @@ class FaceToFace:
         """Return nothing: person and robot are by themselves."""
         return ()
 
-    def behaviour(self, t_s: float) -> str | None:
-        """Leave the behaviour to the rig."""
-        return None
-
     def events(self) -> tuple[Event, ...]:
         """Ask for the face, all the time."""
         return (Event("face", "look", "face", 0.0, _ROUND_S, (1.0, 0.0, 0.3), 1.0),)

@@ -1,4 +1,4 @@
-"""Interface of a simulated scene: people, things, the robot's behaviour, expected gaze.
+"""Interface of a simulated scene: people, things, expected gaze.
 
 Everything is a closed form of the time, so a scene needs no stepper and looks the same
 however often it is looked at. World frame (x forward, y left, z up), metres, seconds
@@ -29,7 +29,7 @@ class Thing(NamedTuple):
     """One thing at one instant.
 
     id:   the same for as long as the scene lasts
-    kind: "hand", "attack_target", ...
+    kind: "hand", "thing", ...
     spin_rad_s: rotation about the line of sight, clockwise as the robot sees it above 0
     turned_rad: how far it has turned so
     person: number of the person whose hand it is, None where it is nobody's
@@ -44,16 +44,13 @@ class Thing(NamedTuple):
     person: int | None = None
 
 
-PLANNED_KINDS = ("attack_target", "guard_target")
-"""Kinds of places that the robot's own planner names; there is nothing to be seen at them."""
-
-
 class Event(NamedTuple):
     """Something that happens in a round, and what a gaze like a person's does about it.
 
     asks: "look": be on it between start and end; "return": be on it again by the end
     kind: what must be looked at, within ``within_m`` of ``place_world_m``
     start_s, end_s: from the beginning of the round
+    due_s: when a punch arrives; None for everything else
     """
 
     name: str
@@ -63,13 +60,14 @@ class Event(NamedTuple):
     end_s: float
     place_world_m: Vec3
     within_m: float
+    due_s: float | None = None
 
 
 class Scene(Protocol):
     """The people and things at an instant; it repeats after every round.
 
-    behaviours: every behaviour that its planner may put in force, so that a rig without a
-        rule for one can be refused before it moves
+    behaviours: those between which the robot's action planner has to choose there, so that a rig
+        without a rule for one can be refused before it moves; none where it plans nothing
     """
 
     name: str
@@ -82,10 +80,6 @@ class Scene(Protocol):
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
         """Return everything else that can be looked at."""
-        ...
-
-    def behaviour(self, t_s: float) -> str | None:
-        """Return the behaviour that the robot's planner has in force, None: the rig's own."""
         ...
 
     def events(self) -> tuple[Event, ...]:

@@ -31,10 +31,6 @@ class SitsStill:
         """Return nothing."""
         return ()
 
-    def behaviour(self, t_s: float) -> str | None:
-        """Leave the behaviour to the rig."""
-        return None
-
     def events(self) -> tuple[Event, ...]:
         """Ask for the face, all the time."""
         return (Event("face", "look", "face", 0.0, _ROUND_S, FACE_M, 0.3),)

@@ -49,10 +49,6 @@ class StepsAside:
         """Return nothing."""
         return ()
 
-    def behaviour(self, t_s: float) -> str | None:
-        """Leave the behaviour to the rig."""
-        return None
-
     def events(self) -> tuple[Event, ...]:
         """Ask for the face wherever it has gone."""
         return (

@@ -71,10 +71,6 @@ class ThreePeople:
         """Return nothing: the hands belong to the people."""
         return ()
 
-    def behaviour(self, t_s: float) -> str | None:
-        """Leave the behaviour to the rig."""
-        return None
-
     def events(self) -> tuple[Event, ...]:
         """Ask for each of the faces, for the hand that waves and for who comes near."""
         stands_s = (ARRIVES_S, LEAVES_S)

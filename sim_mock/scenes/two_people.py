@@ -68,10 +68,6 @@ class TwoPeople:
             turned += _SPIN_RAD_S * lasts_s * (0.5 * share - sin(2 * pi * share) / (4 * pi))
         return (Thing(0, "pinwheel", PINWHEEL, _PINWHEEL_M, speed, turned),)
 
-    def behaviour(self, t_s: float) -> str | None:
-        """Leave the behaviour to the rig."""
-        return None
-
     def events(self) -> tuple[Event, ...]:
         """Ask for the pinwheel that turns, for the hand that waves and for a face otherwise."""
         face = (1.0, 0.0, 0.2)

@@ -50,10 +50,6 @@ class Visitor:
         """Return nothing: the visitor's own hand belongs to the visitor."""
         return ()
 
-    def behaviour(self, t_s: float) -> str | None:
-        """Leave the behaviour to the rig."""
-        return None
-
     def events(self) -> tuple[Event, ...]:
         """Return none: nothing in particular is asked of the gaze."""
         return ()

@@ -51,10 +51,6 @@ class WalksPast:
         """Return nothing."""
         return ()
 
-    def behaviour(self, t_s: float) -> str | None:
-        """Leave the behaviour to the rig."""
-        return None
-
     def events(self) -> tuple[Event, ...]:
         """Ask for the face where it passes before the robot."""
         middle: Vec3 = (_HEAD_AHEAD_M + FAR_M, 0.0, _UP_M)

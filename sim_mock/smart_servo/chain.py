@@ -21,9 +21,11 @@ from gazerig.sim_mock.smart_servo.framing import (
     Instruction,
 )
 from gazerig.sim_mock.smart_servo.instructions import GroupRead, GroupWrite, InstructionSet
+from gazerig.sim_mock.smart_servo.motor import ShaftMaker, own_shaft
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 from gazerig.sim_mock.smart_servo.quirks import ChainQuirks, decided
 from gazerig.sim_mock.smart_servo.servo import EmulatedServo
+from gazerig.sim_mock.smart_servo.span import whole_ms
 
 TWIN_AWAY_STEPS = 257
 """A second servo with a taken id stands so far from the first, so that they differ."""
@@ -364,6 +366,7 @@ def build_chain(
     baud: int | None = None,
     quirks: ChainQuirks | None = None,
     seed: int = 0,
+    make_shaft: ShaftMaker = own_shaft,
 ) -> C:
     """Build servos and their bus.
 
@@ -375,12 +378,13 @@ def build_chain(
             rate get answers; without one any rate works.
         quirks: what servos do where documents and devices differ.
         seed: of the random numbers that faults draw.
+        make_shaft: makes the shaft of each servo.
 
     Raises:
         ValueError: there is no such model, or it does not know this baud rate.
     """
     now_ms = whole_ms(now_s())
-    servos = [chain.servo_type(ServoSpec(*spec), now_ms) for spec in specs]
+    servos = [chain.servo_type(ServoSpec(*spec), now_ms, make_shaft) for spec in specs]
     if baud is not None:
         for servo in servos:
             servo.set_baud(baud)
@@ -392,8 +396,3 @@ def _both(one: Answer | None, other: Answer | None) -> Answer | None:
     if one is None or other is None:
         return other if one is None else one
     return one._replace(twin=_both(one.twin, other))
-
-
-def whole_ms(now_s: float) -> int:
-    """Return the whole milliseconds of a time; the margin keeps 0.005 s from being 4 ms."""
-    return int(now_s * 1000.0 + 1e-3)

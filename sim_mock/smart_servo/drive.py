@@ -5,7 +5,7 @@ from typing import Any
 
 from gazerig.sim_mock.smart_servo.controller import Motor
 from gazerig.sim_mock.smart_servo.memory import ServoMemory
-from gazerig.sim_mock.smart_servo.motor import Shaft
+from gazerig.sim_mock.smart_servo.motor import ShaftMaker, own_shaft
 from gazerig.sim_mock.smart_servo.noise import LENGTH, SEED_APART_MS, flicker
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 from gazerig.sim_mock.smart_servo.profile import PositionProfile, SpeedProfile
@@ -21,6 +21,7 @@ class Drive(ABC):
         model: of the servo.
         spec: of the servo.
         scale: steps of the registers for one of the 4096 steps of the shaft's turn.
+        make_shaft: makes its shaft.
 
     Attributes:
         torque: whether it is switched on.
@@ -34,11 +35,16 @@ class Drive(ABC):
     followed: tuple[int, bytes] | None = None
 
     def __init__(
-        self, memory: ServoMemory[Any], model: Motor, spec: ServoSpec, scale: float = 1.0
+        self,
+        memory: ServoMemory[Any],
+        model: Motor,
+        spec: ServoSpec,
+        scale: float = 1.0,
+        make_shaft: ShaftMaker = own_shaft,
     ) -> None:
         physics = Physics(*spec.physics)
         self.memory = memory
-        self.shaft = Shaft(model, physics, spec.start_steps / scale)
+        self.shaft = make_shaft(spec.id, model, physics, spec.start_steps / scale)
         seed = spec.id if spec.seed is None else spec.seed
         self._noise = flicker(physics.noise_current, physics.noise_velocity)
         self._noise_from_ms = seed * SEED_APART_MS

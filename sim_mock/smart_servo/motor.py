@@ -3,6 +3,8 @@
 What is read does not depend on how often it is read.
 """
 
+from collections.abc import Callable
+
 from gazerig.sim_mock.smart_servo.controller import (
     DISABLED,
     MS_S,
@@ -126,3 +128,12 @@ class Shaft(ShaftMotion):
     def speed_steps_s(self) -> float:
         """Return the speed of the shaft."""
         return self.v / MS_S
+
+
+ShaftMaker = Callable[[int, Motor, Physics, float], Shaft]
+"""Makes the shaft of a servo: of its id, motor, physics and first position in steps."""
+
+
+def own_shaft(servo_id: int, model: Motor, physics: Physics, position_steps: float) -> Shaft:
+    """Return a shaft with mechanics of its own: nothing but its own load acts on it."""
+    return Shaft(model, physics, position_steps)

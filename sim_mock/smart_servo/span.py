@@ -63,3 +63,8 @@ def span_weights(
     still = (*(one[0] for one in own), *(one[1] for one in own), own[2][2])
     led = tuple(one[part] for part in range(3) for one in moved)
     return still, led, push, divisor
+
+
+def whole_ms(now_s: float) -> int:
+    """Return the whole milliseconds of a time; the margin keeps 0.005 s from being 4 ms."""
+    return int(now_s * 1000.0 + 1e-3)

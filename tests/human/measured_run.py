@@ -16,7 +16,7 @@ import numpy as np
 from gazerig.config.parameters import changed
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import add, scale, sub, yaw_pitch
-from gazerig.robot.app import assemble
+from gazerig.robot.app import run_scene
 from gazerig.robot.app.assemble import with_options
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.simulated_run import simulate
@@ -153,13 +153,13 @@ def ideal_run(
 @contextmanager
 def _scenes(scene: str | Scene) -> Any:
     """Have a scene of a test's own among those that a run can be put into."""
-    shipped = assemble.scenes
+    shipped = run_scene.scenes
     if not isinstance(scene, str):
-        assemble.scenes = lambda: {**shipped(), scene.name: scene}
+        run_scene.scenes = lambda: {**shipped(), scene.name: scene}
     try:
         yield
     finally:
-        assemble.scenes = shipped
+        run_scene.scenes = shipped
 
 
 def _run(
@@ -177,7 +177,7 @@ def _run(
     rig = changed(
         with_options(load_rig(options.rig, options.character, options.profile), options), overrides
     )
-    columns, held = _Columns(), assemble.scenes()[scene]
+    columns, held = _Columns(), run_scene.scenes()[scene]
     made = simulate(rig, options, watch=columns.update)
     return columns.gathered(held, made.trace, made.figures)
 

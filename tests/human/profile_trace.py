@@ -1,18 +1,18 @@
 """Which functions of the gaze models run in a profile, and what docs/profiles.md says of it."""
 
 import re
-import sys
 from collections import Counter
 from collections.abc import Iterator
+from cProfile import Profile
 from functools import cache
 from math import atan2, pi
 from pathlib import Path
-from types import CodeType, FrameType
-from typing import Any, NamedTuple
+from types import CodeType
+from typing import NamedTuple
 
 from gazerig.config.parameters import changed, value_of
 from gazerig.config.schema import Rig, load_rig
-from gazerig.robot.app import assemble
+from gazerig.robot.app import run_scene
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.simulated_run import simulate
 from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
@@ -47,10 +47,6 @@ class EverythingOnce:
         if not 10.5 < t_s < 11.5:
             return ()
         return (Thing(9, "hand", (0.9, 0.5 - 0.2 * (t_s - 10.5), 0.2), 0.05),)
-
-    def behaviour(self, t_s: float) -> str | None:
-        """Leave the behaviour to the rig."""
-        return None
 
     def events(self) -> tuple[Event, ...]:
         """Return none."""
@@ -92,29 +88,23 @@ class Trace(NamedTuple):
 @cache
 def ran(profile: str, scanpath: str | None = None, seconds: float = SECONDS) -> Trace:
     """Return what runs in a profile, and what it looks at."""
-    calls: Counter[CodeType] = Counter()
-    kinds: set[str] = set()
-
-    def count(frame: FrameType, event: str, arg: Any) -> None:
-        calls[frame.f_code] += 1  # and nothing of what happens inside the call
-
+    calls, kinds = Profile(subcalls=False, builtins=False), set[str]()
     scene = EverythingOnce()
-    shipped = assemble.scenes
+    shipped = run_scene.scenes
     options = RunOptions(
         True, True, 0, scene.name, profile=profile, scanpath=scanpath, seconds=seconds, bus="ideal"
     )
     rig = changed(load_rig("desk", profile=profile), {"loop.rate_hz": 100.0})
-    assemble.scenes = lambda: {**shipped(), scene.name: scene}
-    before = sys.gettrace()
-    sys.settrace(count)
+    run_scene.scenes = lambda: {**shipped(), scene.name: scene}
+    calls.enable()
     try:
         simulate(rig, options, watch=lambda tick: kinds.add(tick.target.kind))
     finally:
-        sys.settrace(before)
-        assemble.scenes = shipped
+        calls.disable()
+        run_scene.scenes = shipped
     named: Counter[str] = Counter()
-    for code, times in calls.items():
-        if Path(code.co_filename).parent.name == "gaze":
+    for code, times, *_ in calls.getstats():
+        if isinstance(code, CodeType) and Path(code.co_filename).parent.name == "gaze":
             named[code.co_qualname] += times
     return Trace(named, frozenset(kinds))
 

@@ -49,10 +49,6 @@ class ThereAndBack:
         place = (x + 1.5 * cos(yaw), y + 1.5 * sin(yaw), z)
         return (Thing(10 * int(rounds) + number, "ball", place, 0.05),)
 
-    def behaviour(self, t_s: float) -> str | None:
-        """Leave the behaviour to the rig."""
-        return None
-
     def events(self) -> tuple[Event, ...]:
         """Return none."""
         return ()

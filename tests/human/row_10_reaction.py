@@ -71,10 +71,6 @@ class Appearing:
                 return (Thing(number, "hand", hand.place(t_s), 0.06),)
         return ()
 
-    def behaviour(self, t_s: float) -> str | None:
-        """Leave the behaviour to the rig."""
-        return None
-
     def events(self) -> tuple[Event, ...]:
         """Return none."""
         return ()

@@ -51,10 +51,6 @@ class Lights:
         x, y, z = _EYES_M
         return (Thing(number, "light", (x + 1.5 * cos(yaw), y + 1.5 * sin(yaw), z), 0.05),)
 
-    def behaviour(self, t_s: float) -> str | None:
-        """Leave the behaviour to the rig."""
-        return None
-
     def events(self) -> tuple[Event, ...]:
         """Return none."""
         return ()

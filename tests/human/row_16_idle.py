@@ -46,10 +46,6 @@ class Room:
         """Return what lies about."""
         return self._things
 
-    def behaviour(self, t_s: float) -> str | None:
-        """Leave the behaviour to the rig."""
-        return None
-
     def events(self) -> tuple[Event, ...]:
         """Return none."""
         return ()

@@ -31,10 +31,6 @@ class SwingingFace:
         """Return nothing."""
         return ()
 
-    def behaviour(self, t_s: float) -> str | None:
-        """Leave the behaviour to the rig."""
-        return None
-
     def events(self) -> tuple[Event, ...]:
         """Return none."""
         return ()

@@ -50,10 +50,6 @@ class _Later:
         """Return the things."""
         return self._scene.things(t_s + self._start_s)
 
-    def behaviour(self, t_s: float) -> str | None:
-        """Return the behaviour of its planner."""
-        return self._scene.behaviour(t_s + self._start_s)
-
     def events(self) -> tuple[Event, ...]:
         """Return none."""
         return ()

@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from gazerig.drivers.types import ImageArray, Pixels
 
@@ -125,7 +126,14 @@ def paste(
     return np.asarray(who.landmarks_px @ M[:, :2].T + M[:, 2])
 
 
-def noisy(image: ImageArray, grey: float, rng: np.random.Generator) -> ImageArray:
-    """Return an image with the noise of a sensor added."""
-    noise = rng.normal(0.0, grey, image.shape)
-    return np.clip(np.rint(image + noise), 0, 255).astype(np.uint8)
+def noisy(
+    image: ImageArray | NDArray[np.float32], grey: float, rng: np.random.Generator
+) -> ImageArray:
+    """Return an image with the noise of a sensor added, of a standard deviation in grey levels.
+
+    OpenCV's generator takes a tenth of the time of NumPy's.
+    """
+    cv2.setRNGSeed(int(rng.integers(2**31)))
+    noise = np.empty(image.shape, np.float32)
+    cv2.randn(noise, np.zeros(4), np.full(4, grey))
+    return np.asarray(cv2.add(image, noise, dtype=cv2.CV_8U), np.uint8)

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from seeing.material import noisy
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.uint8]
@@ -211,11 +212,10 @@ def frame(pose: Pose, t_s: float, boards: tuple[Board, ...], rng: np.random.Gene
             covers[behind] = covers[behind] & ~cover
         if board.figure:
             covers[board] = cover
-    noisy = image + rng.normal(0.0, _NOISE_LEVELS, image.shape)
     moves = {board: board.moves_px(t_s) > 0.75 for board in covers}
     return Seen(
         t_s,
-        np.clip(noisy, 0, 255).astype(np.uint8),
+        noisy(image, _NOISE_LEVELS, rng),
         tuple(cover for board, cover in covers.items() if moves[board]),
         tuple(cover for board, cover in covers.items() if not moves[board]),
     )

@@ -61,10 +61,6 @@ class StillPeople:
         """Return nothing."""
         return ()
 
-    def behaviour(self, t_s: float) -> str | None:
-        """Leave the behaviour to the rig."""
-        return None
-
     def events(self) -> tuple[Event, ...]:
         """Return none: all that is asked is measured here."""
         return ()

@@ -27,6 +27,7 @@ from gazerig.drivers.vision.motion.backprojection import (
 )
 from gazerig.drivers.vision.motion.clustering import Group, fastest, gathered
 from gazerig.drivers.vision.motion.ego_motion import Ego, own_motion, turn_rad
+from gazerig.drivers.vision.motion.gloves import GloveFinder, beside
 from gazerig.drivers.vision.motion.image import (
     Floats,
     Plane,
@@ -85,6 +86,7 @@ class MotionDetector:
         self._params = params
         self._search = FlowSearch(params.preset, params.finest_level)
         self._tracks = MotionTracks(params)
+        self._gloves = GloveFinder()
         self._before: SmallImage | None = None
         self._moved_s = -np.inf  # when the image alone told of a motion of the camera
         self.report = MotionReport()
@@ -127,12 +129,16 @@ class MotionDetector:
         now = made_small(image, self._params.work_px, lens, captured_s)
         before, self._before = self._before, now
         self.report = self._look(now, before, R_now_before, depth_m, t_now_before_m)
+        if self._params.gloves:
+            gloves = self._gloves.find(image, captured_s, lens, self._params.work_px)
+            self.report = self.report._replace(blobs=(*gloves, *beside(self.report.blobs, gloves)))
         return self.report.blobs
 
     def forget(self) -> None:
         """Forget the last image: the next one is the first of another scene."""
         self._before, self._moved_s = None, -np.inf
         self._tracks.forget()
+        self._gloves.forget()
 
     def _look(
         self,

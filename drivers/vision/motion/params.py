@@ -15,6 +15,7 @@ class MotionParams:
 
     # fmt: off
     enabled: Annotated[bool, "detect moving things besides faces"] = True
+    gloves: Annotated[bool, "red boxing gloves are found by their colour, also while they stand still"] = False
     work_px: Annotated[int, Bounds(64, 2048), "frames whose longer side exceeds this are scaled down to it"] = 320
     preset: Annotated[Literal["ultrafast", "fast", "medium"],
         "preset of the optical flow (DIS); the slower presets smooth the flow more, which loses small things"] = "ultrafast"

@@ -1,0 +1,260 @@
+"""Boxing gloves by their red: where they are and how far away, whether they move or stand still.
+
+Flow finds what moves, but a glove of one colour hardly tells how it grows, and one at rest is not
+found at all. A glove is about as round as a ball, so the largest circle within it gives its
+direction and, by its size, its distance. What is white or shines on it belongs to it; red ropes
+and posts do not. Of one glove before another both are found as long as enough of the farther one is
+seen, and one of which the image's edge, another glove or something else hides a part is taken to be
+as large as it was: it does not come nearer because more of it is seen.
+"""
+
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.types import ImageArray, MovingBlob
+
+KIND = "hand"
+RADIUS_M = 0.068
+"""Of the largest ball within a glove."""
+
+_FARTHEST_M = 1.3
+_FIRST_ID = 2_000_000  # beyond those of what moves
+_MOST = 4
+# Red as cameras show it in any light: half-degrees of hue, saturation and value.
+_LOW = ((0, 150, 50), (172, 150, 50))
+_HIGH = ((7, 255, 255), (179, 255, 255))
+# What is left of a glove around the largest circle in it is not another one.
+_TAKEN = 1.35
+# How far a glove moves from frame to frame at most, in its radii; how long its number is kept.
+_MOVES, _KEPT_S = 2.5, 0.5
+_EDGE_PX = 0.7
+"""How well the edge of a colour is known: standard deviation of the radius."""
+# White and pale red: least value, greatest saturation of white, greatest half-degrees off red.
+_PALE_VALUE, _WHITE_SATURATION, _PALE_HUE = 90, 80, 10
+_THIN = 0.25
+"""What is thinner than this share of the smallest glove's width is a rope or a seam."""
+_ROUND = 1.55
+"""A glove that is seen whole reaches at most so many radii of that circle from its middle."""
+
+
+# How much farther than the circle a glove reaches at most.
+_BEYOND = 1.2
+
+
+class Circle(NamedTuple):
+    """A circle within a glove, pixels of the frame that was searched.
+
+    radius: if the glove goes on beyond the edge of the image as it does within
+    sure: radius of the largest one there that lies within the image
+    """
+
+    x: float
+    y: float
+    radius: float
+    sure: float
+
+
+class _Glove(NamedTuple):
+    """A circle in the image, pixels of the frame that was searched."""
+
+    id: int
+    x: float
+    y: float
+    radius: float
+    seen_s: float
+
+
+class GloveFinder:
+    """Finds red gloves in one image after the other."""
+
+    def __init__(self) -> None:
+        self.forget()
+
+    def forget(self) -> None:
+        """Forget all gloves; numbers are not used again."""
+        self._known: list[_Glove] = []
+        self._next_id = getattr(self, "_next_id", _FIRST_ID)
+
+    def find(
+        self, bgr: ImageArray, captured_s: float, lens: Intrinsics, work_px: int
+    ) -> tuple[MovingBlob, ...]:
+        """Return the gloves in an image, the nearest first.
+
+        Args:
+            bgr: (h, w, 3); nothing is found in an image without colours.
+            captured_s: when it was taken.
+            lens: focal lengths and centre in its pixels.
+            work_px: an image whose longer side exceeds this is scaled down to it.
+        """
+        if bgr.ndim != 3 or bgr.shape[2] < 3:
+            return ()
+        share = min(1.0, work_px / max(bgr.shape[:2]))
+        small = bgr[:, :, :3]
+        if share < 1.0:
+            size = round(share * bgr.shape[1]), round(share * bgr.shape[0])
+            small = np.asarray(cv2.resize(small, size, interpolation=cv2.INTER_AREA), np.uint8)
+        least = share * lens.fx_px * RADIUS_M / _FARTHEST_M
+        mask = _glove_mask(small, least)
+        circles = _circles(mask.copy(), least)
+        gloves = []
+        for row, circle in enumerate(circles):
+            cut = _cut(circle, small.shape[1], small.shape[0])
+            covered = _touched(circle, circles[:row]) or not (cut or _whole(mask, row, circles))
+            glove = self._numbered(circle, cut, covered, captured_s)
+            if glove is not None:
+                gloves.append(glove)
+        found = {glove.id for glove in gloves}
+        rest = [
+            one for one in self._known if one.id not in found and captured_s - one.seen_s <= _KEPT_S
+        ]
+        self._known = [*gloves, *rest]
+        return tuple(_blob(glove, share, lens) for glove in gloves)
+
+    def _numbered(
+        self, circle: Circle, cut: bool, covered: bool, captured_s: float
+    ) -> _Glove | None:
+        """Return a circle with the number of the glove that was nearest to it.
+
+        One of which a part is hidden is as large as it was before, or as what is seen of it; None
+        if that is not known.
+
+        Args:
+            circle: the largest within the glove.
+            cut: the edge of the image hides a part of it.
+            covered: something before it does.
+            captured_s: when.
+        """
+        x, y, radius, sure = circle
+        near = [
+            (np.hypot(one.x - x, one.y - y), one)
+            for one in self._known
+            if np.hypot(one.x - x, one.y - y) < _MOVES * max(radius, one.radius)
+        ]
+        if near:
+            before = min(near)[1]
+            self._known.remove(before)
+            if cut or covered:
+                radius = max(sure, before.radius)
+            return _Glove(before.id, x, y, radius, captured_s)
+        if cut or covered:
+            return None
+        self._next_id += 1
+        return _Glove(self._next_id - 1, x, y, radius, captured_s)
+
+
+def _glove_mask(bgr: ImageArray, least_px: float) -> NDArray[np.uint8]:
+    """Return where an image shows gloves: red, and what is pale within the outline of the red."""
+    hsv = cv2.cvtColor(bgr, cv2.COLOR_BGR2HSV)
+    low, high = (
+        cv2.inRange(hsv, np.array(a), np.array(b)) for a, b in zip(_LOW, _HIGH, strict=True)
+    )
+    thin = 2 * round(_THIN * least_px) + 1
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (thin, thin))
+    calm = cv2.medianBlur(cv2.bitwise_or(low, high), 3)
+    red = np.asarray(cv2.morphologyEx(calm, cv2.MORPH_OPEN, disc), np.uint8)
+    outlines, _ = cv2.findContours(red, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    for outline in outlines:
+        if cv2.contourArea(outline) < np.pi * least_px**2:
+            continue
+        x, y, width, height = cv2.boundingRect(outline)
+        window = np.s_[y : y + height, x : x + width]
+        inside = np.zeros((height, width), np.uint8)
+        cv2.fillConvexPoly(inside, cv2.convexHull(outline) - (x, y), 255)
+        red[window] |= inside & _pale(hsv[window])
+    return red
+
+
+def _pale(hsv: NDArray[Any]) -> NDArray[np.uint8]:
+    """Return where an image is white or pale red."""
+    hue, saturation, value = cv2.split(hsv)
+    reddish = np.minimum(hue, 179 - hue) <= _PALE_HUE
+    pale = (value >= _PALE_VALUE) & (reddish | (saturation <= _WHITE_SATURATION))
+    return np.where(pale, np.uint8(255), np.uint8(0))
+
+
+def _circles(mask: NDArray[np.uint8], least_px: float) -> list[Circle]:
+    """Return the largest circles within a mask that do not overlap: x, y, radius."""
+    found: list[Circle] = []
+    # What lies beyond the edge of the image is not known to be a glove.
+    within = cv2.distanceTransform(np.pad(mask, 1), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)[1:-1, 1:-1]
+    while len(found) < _MOST:
+        inside = cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+        _, radius, _, (x, y) = cv2.minMaxLoc(inside)
+        if radius < least_px:
+            break
+        # The distance is to the middle of the nearest pixel outside, half a pixel beyond the edge.
+        reach = int(radius)
+        near = np.s_[max(0, y - reach) : y + reach + 1, max(0, x - reach) : x + reach + 1]
+        sure = min(float(radius), float(within[near].max())) - 0.5
+        found.append(Circle(float(x), float(y), float(radius) - 0.5, sure))
+        cv2.circle(mask, (x, y), int(np.ceil(_TAKEN * radius)), 0, -1)
+    return found
+
+
+def _cut(circle: Circle, width: int, height: int) -> bool:
+    """Return whether the edge of the image may hide a part of a glove."""
+    edge = _BEYOND * circle.radius
+    return not (edge < circle.x < width - edge and edge < circle.y < height - edge)
+
+
+def _touched(circle: Circle, nearer: list[Circle]) -> bool:
+    """Return whether a larger circle may hide a part of a glove."""
+    return any(
+        np.hypot(circle.x - one.x, circle.y - one.y) < _TAKEN * one.radius + _BEYOND * circle.radius
+        for one in nearer
+    )
+
+
+def _whole(mask: NDArray[np.uint8], row: int, circles: list[Circle]) -> bool:
+    """Return whether a glove is about round, so that nothing before it hides a part of it.
+
+    Args:
+        mask: where gloves are.
+        row: which of the circles it is.
+        circles: of all gloves; what is nearer to another of them, by its size, belongs to that.
+    """
+    x, y, radius, _ = circles[row]
+    far = 2.5 * radius
+    left, top = max(0, round(x - far)), max(0, round(y - far))
+    v, u = np.nonzero(mask[top : round(y + far) + 1, left : round(x + far) + 1])
+    off = [np.hypot(u + left - a, v + top - b) / size for a, b, size, _ in circles]
+    mine = off[row] <= np.min(off, axis=0)
+    points = np.column_stack((u[mine], v[mine])).astype(np.float32)
+    if not len(points):
+        return False
+    _, reach = cv2.minEnclosingCircle(points)
+    return bool(reach <= _ROUND * radius)
+
+
+def _blob(glove: _Glove, share: float, lens: Intrinsics) -> MovingBlob:
+    """Return a glove in the camera's axes."""
+    radius = glove.radius / share
+    u, v = (glove.x + 0.5) / share - 0.5, (glove.y + 0.5) / share - 0.5
+    z = lens.fx_px * RADIUS_M / radius
+    place = (z * (u - lens.cx_px) / lens.fx_px, z * (v - lens.cy_px) / lens.fy_px, z)
+    return MovingBlob(
+        glove.id,
+        KIND,
+        place,
+        RADIUS_M,
+        depth_sd_m=z * _EDGE_PX / glove.radius,
+        box_px=(u - radius, v - radius, 2.0 * radius, 2.0 * radius),
+        centre_px=(u, v),
+        area_px=float(np.pi) * radius**2,
+    )
+
+
+def beside(blobs: tuple[MovingBlob, ...], gloves: tuple[MovingBlob, ...]) -> tuple[MovingBlob, ...]:
+    """Return what moves that holds no glove: arm and trunk move with it."""
+    return tuple(blob for blob in blobs if not any(_holds(blob, glove) for glove in gloves))
+
+
+def _holds(blob: MovingBlob, glove: MovingBlob) -> bool:
+    if blob.box_px is None or glove.centre_px is None:
+        return False
+    (x, y, width, height), (u, v) = blob.box_px, glove.centre_px
+    return x <= u <= x + width and y <= v <= y + height

@@ -1,0 +1,97 @@
+"""The description of a rig as its YAML says, with the user's own meshes."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+from gazerig.config.schema import Rig
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.app.mesh_reader import MeshUnusable, read_mesh
+from gazerig.robot.app.rig_limits import lid_ends
+from gazerig.robot.model.description.build import RigShape, describe
+from gazerig.robot.model.description.clearance import collisions
+from gazerig.robot.model.description.links import Description
+from gazerig.robot.model.description.own_meshes import OwnMesh, unknown_links
+from gazerig.robot.model.forbidden_range import CollisionParams
+
+
+def description_of(rig: Rig, *, looks: bool = True) -> Description:
+    """Return the links, joints, shapes and looks of a rig.
+
+    Args:
+        rig: the rig.
+        looks: with what can be seen; without, the same mechanism is made in a moment.
+
+    Raises:
+        SetupError: a mesh of its own cannot be used.
+    """
+    return describe(shape_of(rig if looks else replace(rig, meshes={})), looks=looks)
+
+
+def shape_of(rig: Rig, *, without_lost_meshes: bool = False) -> RigShape:
+    """Return what a rig's description is made from.
+
+    Args:
+        rig: the rig.
+        without_lost_meshes: meshes that cannot be used are left out, as a recorded rig's may be.
+
+    Raises:
+        SetupError: a mesh of its own cannot be used.
+    """
+    shape = RigShape(
+        rig.name,
+        rig.geometry,
+        rig.joints,
+        lid_ends(rig),
+        rig.couplings,
+        rig.camera,
+        (rig.webcam.width_px, rig.webcam.height_px),
+    )
+    if not rig.meshes:
+        return shape
+    faults = dict(mesh_faults(rig))
+    if faults and not without_lost_meshes:
+        key, fault = next(iter(faults.items()))
+        raise SetupError(f"{key}: {fault}")
+    lost = {key.split(".")[1] for key in faults}
+    return shape._replace(
+        meshes=tuple(
+            OwnMesh(name, params, read_mesh(params))
+            for name, params in rig.meshes.items()
+            if name not in lost
+        )
+    )
+
+
+def collision_hints(rig: Rig) -> list[str]:
+    """Return where parts of the rig's model meet within the joints' limits, a line each.
+
+    What its guard forbids is left out. Shoulders are those of the model, so these are hints.
+    """
+    shape = shape_of(replace(rig, meshes={}))
+    return [
+        one.text()
+        for one in collisions(shape)
+        if not any(_forbids(two, one.angles_deg) for two in rig.guard.collisions)
+    ]
+
+
+def _forbids(pair: CollisionParams, angles_deg: Mapping[str, float]) -> bool:
+    first, second = angles_deg.get(pair.first, 0.0), angles_deg.get(pair.second, 0.0)
+    within = pair.first_min_deg <= first <= pair.first_max_deg
+    return within and pair.second_min_deg <= second <= pair.second_max_deg
+
+
+def mesh_faults(rig: Rig) -> Iterable[tuple[str, str]]:
+    """Find meshes of a rig's own that cannot be shown: key in its file, and what is wrong."""
+    if not rig.meshes:
+        return
+    made = describe(shape_of(replace(rig, meshes={})), looks=False)
+    unknown = unknown_links(made, rig.meshes)
+    for name, params in rig.meshes.items():
+        if name in unknown:
+            yield f"meshes.{name}", unknown[name]
+            continue
+        try:
+            read_mesh(params)
+        except MeshUnusable as error:
+            yield f"meshes.{name}.file", str(error)

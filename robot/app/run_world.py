@@ -1,0 +1,144 @@
+"""The world with physics that a run is in: who is there, and the rig among them."""
+
+from importlib.util import find_spec
+from math import radians
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from gazerig.config.load import load, shipped
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.extras import extra_hint
+from gazerig.robot.app.bus_wiring import bus_names
+from gazerig.robot.app.emulation import BOARDS, CHAINS
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.run_scene import refuse_unruled
+from gazerig.robot.app.world_rig import rig_in_world
+from gazerig.robot.model.clock import Clock
+from gazerig.robot.model.world_shapes import WorldShapes
+from gazerig.sim_mock.scenes.scene import Scene
+from gazerig.sim_mock.world.camera_params import WorldCameraParams
+from gazerig.sim_mock.world.rig_in_world import RigInWorld
+from gazerig.sim_mock.world.script import WorldScript
+from gazerig.sim_mock.world.script_faults import CHECKS
+from gazerig.sim_mock.world.shapes import shapes_of
+from gazerig.sim_mock.world.world_scene import WorldScene
+from gazerig.sim_mock.world.world_spec import WorldSpec
+
+if TYPE_CHECKING:
+    from gazerig.sim_mock.world.physics import World
+
+MJCF = (".xml", ".mjcf")
+"""Endings of the files that are MuJoCo's own worlds."""
+
+
+class RunWorld(NamedTuple):
+    """The world of a run.
+
+    Attributes:
+        spec: what it is made of, for the processes that compute and render it.
+        scene: the people in it, as a run and its score know them.
+        camera: how large, how fast and how true the pictures of cameras are.
+        number: which of its rigs is the run's.
+        shared: the world itself where several runs are in it, None for one of the run's own.
+    """
+
+    spec: WorldSpec
+    scene: Scene
+    camera: WorldCameraParams
+    number: int = 0
+    shared: "World | None" = None
+
+    def computed(self, clock: Clock) -> "World":
+        """Return the world in this process."""
+        if self.shared is not None:
+            return self.shared
+        model = self.spec.compiled()  # imports MuJoCo, whatever may render here
+        from gazerig.sim_mock.world.physics import World
+
+        return World(model, clock.now_s)
+
+    def shapes(self) -> WorldShapes:
+        """Return how the world looks."""
+        return shapes_of(self.spec)
+
+
+def world_of(rig: Rig, options: RunOptions) -> RunWorld | None:
+    """Return the world that was asked for, None without one.
+
+    Raises:
+        gazerig.config.load.ConfigError: its file is at fault, or there is none of that name.
+        SetupError: MuJoCo is not installed, or the rig has no rule for what the world asks for.
+    """
+    if options.world is None:
+        return None
+    if find_spec("mujoco") is None:
+        error = ModuleNotFoundError(name="mujoco")
+        raise SetupError(f"--world {options.world}: {extra_hint('mujoco', 'world', error)}")
+    for name in bus_names(rig):
+        if (kind := rig.bus_named(name).kind) not in (*CHAINS, *BOARDS):
+            raise SetupError(
+                f"--world {options.world}: a bus of kind {kind} has no servos that a world could "
+                "move: put its joints on one of our kinds, or use --scene"
+            )
+    scene, mjcf_file = world_scene(options.world, options.seed), mjcf_of(options.world)
+    refuse_unruled(rig, scene, f"--world {options.world}")
+    script = scene.figures.script
+    # Where nothing is rendered, nobody sees the rigs: the page draws them by itself.
+    looks = not options.no_pictures
+    rigs = (rig_in_world(rig, looks=looks), *other_rigs(rig, script, looks))
+    spec = WorldSpec(None if mjcf_file else scene.figures, rigs, mjcf_file)
+    return RunWorld(spec, scene, script.camera)
+
+
+def other_rigs(rig: Rig, script: WorldScript, looks: bool) -> tuple[RigInWorld, ...]:
+    """Return the rigs of the other heads of a script.
+
+    Args:
+        rig: of heads that name none.
+        script: with the heads.
+        looks: with what can be seen of them.
+
+    Raises:
+        gazerig.config.load.ConfigError: one of them is at fault.
+    """
+    return tuple(
+        rig_in_world(
+            load_rig(head.rig) if head.rig else rig,
+            f"{name}_",
+            (head.x_m, head.y_m, 0.0),
+            radians(head.facing_deg),
+            looks,
+        )
+        for name, head in script.heads.items()
+    )
+
+
+def world_scene(name_or_path: str, seed: int) -> WorldScene:
+    """Return the people of a world; a user's own MJCF has none.
+
+    Raises:
+        gazerig.config.load.ConfigError: the file is at fault, or there is none of that name.
+        SetupError: there is no such MJCF file.
+    """
+    name = Path(name_or_path).stem
+    if mjcf_of(name_or_path) is not None:
+        return WorldScene(name, WorldScript(people={}), seed)
+    path = Path(name_or_path)
+    if "/" not in name_or_path and path.suffix not in (".yaml", ".yml"):
+        path = shipped("worlds", name_or_path)
+    return WorldScene(name, load(path, WorldScript, checks=CHECKS), seed)
+
+
+def mjcf_of(name_or_path: str) -> Path | None:
+    """Return the user's own MJCF file, None where the world is a script.
+
+    Raises:
+        SetupError: there is no such file.
+    """
+    path = Path(name_or_path)
+    if path.suffix not in MJCF:
+        return None
+    if not path.is_file():
+        raise SetupError(f"--world {path}: there is no such file")
+    return path

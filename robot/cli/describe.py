@@ -1,0 +1,76 @@
+"""The command describe: a rig as files that robot simulators and viewers read."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.file_output import make_folder, refuse_existing, write_file
+from gazerig.robot.cli.rig_check import collision_lines
+from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say
+
+app = typer.Typer()
+
+
+@app.command()
+def describe(
+    rig: RigArgument = "desk",
+    out: Annotated[
+        Path | None,
+        typer.Argument(help="Folder to write to; default: the rig's name and _description, here."),
+    ] = None,
+    mjcf: Annotated[bool, typer.Option("--mjcf", help="Write MJCF, for MuJoCo.")] = False,
+    urdf: Annotated[
+        bool, typer.Option("--urdf", help="Write URDF, for ROS, Foxglove and most simulators.")
+    ] = False,
+    glb: Annotated[
+        bool, typer.Option("--glb", help="Write binary glTF, for browsers and Blender.")
+    ] = False,
+    force: ForceOption = False,
+) -> None:
+    """Write a rig as a robot description: MJCF, URDF and glTF with meshes, or one of them."""
+    with clear_errors(rig):
+        from gazerig.config.schema import load_rig_and_check
+        from gazerig.robot.app.rig_description import description_of, mesh_faults
+        from gazerig.robot.model.description.files import FORMATS, description_files, file_name
+
+        description = description_of(load_rig_and_check(rig, mesh_faults))
+        asked = dict(zip(FORMATS, (mjcf, urdf, glb), strict=True))
+        wanted = [name for name, one in asked.items() if one] or list(FORMATS)
+        folder = out or Path(f"{file_name(description.name)}_description")
+        if folder.exists() and not folder.is_dir():
+            raise SetupError(f"{folder} is a file: name a folder to write to")
+        make_folder(folder)
+        files = description_files(description, wanted)
+        paths = {folder / name: data for name, data in files.items()}
+        refuse_existing(*paths, force=force)
+        for path in {path.parent for path in paths}:
+            make_folder(path)
+        for path, data in paths.items():
+            write_file(path, data, force)
+        for line in (*_written(folder, files), *collision_lines(rig)):
+            say(line)
+
+
+def _written(folder: Path, files: dict[str, bytes]) -> list[str]:
+    """Return what was written, and how it is opened."""
+    lines = []
+    for name, data in files.items():
+        if "/" not in name:
+            hint = _OPENED.get(Path(name).suffix, "")
+            if name.startswith("scene"):
+                hint = f"the same on a table: python -m mujoco.viewer --mjcf={folder / name}"
+            lines.append(f"{folder / name}: {len(data) / 1000:.0f} kB; {hint}")
+    meshes = [data for name, data in files.items() if "/" in name]
+    if meshes:
+        size = sum(map(len, meshes)) / 1e6
+        lines.append(f"{folder / 'meshes'}: {len(meshes)} files, {size:.1f} MB")
+    return lines
+
+
+_OPENED = {
+    ".xml": "a MuJoCo model of its own, to be put into a world",
+    ".urdf": "for RViz, Foxglove and other simulators",
+    ".glb": "for browsers and Blender",
+}

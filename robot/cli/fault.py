@@ -1,0 +1,26 @@
+"""The command ``gazerig ctl fault``: what befalls the emulated servos of a running rig."""
+
+from typing import Annotated
+
+import typer
+
+from gazerig.robot.cli.lead import PidOption
+from gazerig.robot.cli.terminal import clear_errors
+from gazerig.robot.remote.client import RobotClient
+
+app = typer.Typer()
+_NEGATIVE = {"ignore_unknown_options": True}
+"""Click settings: -3 is a number, no option."""
+
+
+@app.command(context_settings=_NEGATIVE)
+def fault(
+    words: Annotated[
+        list[str],
+        typer.Argument(metavar="COMMAND", help="As of gazerig emulate; help lists them all."),
+    ],
+    pid: PidOption = None,
+) -> None:
+    """Order a fault of the emulated servos, or a push against the head in a world."""
+    with clear_errors(), RobotClient.connect(pid, "gazerig ctl fault") as rig:
+        print(rig.fault(" ".join(words)))

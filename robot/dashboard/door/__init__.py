@@ -1,0 +1,1 @@
+"""The way browsers come in: who may, how often, and where their connections lead."""

@@ -1,0 +1,391 @@
+"""The page's door: the only way in, at the asked address, for those who may come in.
+
+Viser itself listens where no other program can reach it
+(``gazerig.robot.dashboard.door.viser_server``). A client shows a token, once, in the query of
+the first address; a cookie takes its place. That holds on this machine as well, which may have
+other users. The Origin of every websocket and of everything that is sent must be the address of
+this page, and on the loopback that address must be a name of the loopback, or a foreign name
+made to point here would do (DNS rebinding).
+
+It serves the page itself (``gazerig.robot.dashboard.door.page_files``), so that the stop button and
+what it talks to work whatever viser does; viser draws the view in a frame of the page
+(``gazerig.robot.dashboard.door.view_proxy``).
+"""
+
+import asyncio
+import hmac
+import json
+import secrets
+import threading
+from collections.abc import Awaitable, Callable, Mapping
+from contextlib import suppress
+
+import aiohttp
+from aiohttp import web
+from aiohttp.typedefs import Handler, Middleware
+
+from gazerig.robot.dashboard.door.addresses import hostname, netloc
+from gazerig.robot.dashboard.door.browsers import Browsers, TabLimits
+from gazerig.robot.dashboard.door.connection_limits import Connections
+from gazerig.robot.dashboard.door.page_files import PageFiles
+from gazerig.robot.dashboard.door.view_proxy import VIEW, ViewProxy, client_of
+from gazerig.robot.dashboard.door.viser_server import ViewAddress
+from gazerig.robot.dashboard.door.webcam_socket import WebcamSocket
+from gazerig.robot.dashboard.door.websocket_relay import TAKES_S, close_socket, until_one_ends
+from gazerig.robot.dashboard.door.widget_socket import WidgetSocket
+from gazerig.robot.dashboard.requests.browser_requests import (
+    ASKED_BYTES,
+    compact,
+    from_browser,
+    leads,
+)
+from gazerig.robot.dashboard.requests.stop_sender import StopSender
+from gazerig.robot.dashboard.requests.token_bucket import TokenBucket
+from gazerig.robot.dashboard.widgets.widgets import RECEIVED_BYTES, Widgets
+
+LOOPBACK = ("127.0.0.1", "::1", "localhost")
+MOST_LINES = 32
+"""Tabs whose stop button receives the state of the rig."""
+
+_ASKED_PER_S, _ASKED_BURST = 20.0, 40.0  # clicks of all people together
+_READ_S = 5.0
+_BEAT_S = 1.0
+_RENEWED_EVERY_S = 0.25
+_OPEN_TIMEOUT_S = 20.0
+_CLOSE_TIMEOUT_S = 3.0
+_DAY_S = 86400
+_HEADERS = {
+    "X-Frame-Options": "DENY",  # no other page may lie over the buttons
+    "Referrer-Policy": "no-referrer",
+    "Cache-Control": "no-store",
+    "X-Content-Type-Options": "nosniff",
+}
+
+Ask = Callable[[bytes], bool]
+"""Hands a JSON object to the rig; False where the rig does not take it."""
+Point = Callable[[object, str], bool]
+"""Takes where a pointer is, as a browser sent it, and the name of the browser."""
+
+
+class AuthProxy:
+    """Lets people in to the server behind it, from a thread of its own.
+
+    webcam: takes pictures of browsers' own cameras; its ``take`` is set before ``open``
+    once: another token, which opens the page one time; "" for none
+    point: takes where a browser's pointer is, which is not answered; set before ``open``
+    """
+
+    def __init__(
+        self, host: str, port: int, inside: ViewAddress, ask: Ask, stop: StopSender, token: str
+    ) -> None:
+        """Prepare to listen.
+
+        Args:
+            host: the address
+            port: a free port of it
+            inside: where the server is
+            ask: called in the door's thread with what is sent to the rig
+            stop: takes stops, beside and before all else
+            token: what a client must show
+        """
+        self._host = host
+        self._port = port
+        self._inside = inside
+        self._ask = ask
+        self._stop = stop
+        self.token = token
+        self.once = ""
+        self.point: Point = _nowhere
+        self.browsers = Browsers(token)
+        self.widgets = Widgets()
+        self._panel_socket = WidgetSocket(self.widgets)
+        self._panel_tabs = TabLimits(MOST_LINES)
+        self._cookie = f"gazerig_{port}"  # cookies do not tell ports apart
+        self._state: Mapping[str, object] = {}
+        self._asked_rate = TokenBucket(_ASKED_PER_S, _ASKED_BURST)
+        self._news: set[asyncio.Event] = set()
+        self._lines = TabLimits(MOST_LINES)
+        self._loop = asyncio.SelectorEventLoop()  # Windows' usual one waits for no socket
+        self.webcam, self._webcams = WebcamSocket(self._loop.time), TabLimits(2)
+        self._over = asyncio.Event()
+        self._opened = threading.Event()
+        self._failed: OSError | None = None
+        self._thread = threading.Thread(target=self._run, name="page door", daemon=True)
+
+    def open(self) -> None:
+        """Listen.
+
+        Raises:
+            OSError: the address cannot be listened on.
+        """
+        self._thread.start()
+        if not self._opened.wait(_OPEN_TIMEOUT_S):
+            raise OSError("the page's door did not open in time")
+        if self._failed is not None:
+            raise self._failed
+
+    def is_open(self) -> bool:
+        """Return whether people can come in."""
+        return self._thread.is_alive()
+
+    def tell(self, state: Mapping[str, object]) -> None:
+        """Show this to all users of the stop button; from any thread."""
+        if state != self._state:
+            self._state = dict(state)
+            self._loop.call_soon_threadsafe(self._wake)
+
+    def close(self) -> None:
+        """Close all connections."""
+        if self._thread.is_alive():
+            self._loop.call_soon_threadsafe(self._over.set)
+            self._thread.join(_CLOSE_TIMEOUT_S)
+        self._panel_socket.close()
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        self._loop.run_until_complete(self._serve())
+        self._loop.close()
+
+    async def _serve(self) -> None:
+        app = web.Application(middlewares=[self._doorkeeper()], client_max_size=ASKED_BYTES)
+        app.router.add_get("/rig/line", self._line)
+        app.router.add_get("/rig/panels", self._panels)
+        app.router.add_get("/rig/webcam", self._webcam)
+        app.router.add_post("/rig/ask", self._asked)
+        PageFiles(_HEADERS).add_to(app.router)
+        app.router.add_get(VIEW, self._pass_on)
+        app.router.add_get(f"{VIEW}/{{path:.*}}", self._pass_on)
+        app.router.add_get("/{path:.*}", self._nothing)
+        runner = web.AppRunner(
+            app, access_log=None, shutdown_timeout=0.5, lingering_time=0.0, max_line_size=4096
+        )
+        await runner.setup()
+        assert runner.server is not None
+        self._connections = Connections(runner.server)
+        async with client_of(self._inside) as client:
+            self._view = ViewProxy(client, self._connections, _HEADERS)
+            try:
+                listener = await self._loop.create_server(
+                    self._connections.accept,
+                    self._host,
+                    self._port,
+                    reuse_address=True,
+                    backlog=512,
+                )
+            except OSError as error:
+                self._failed = error
+                return
+            finally:
+                self._opened.set()
+            self._stop.attach(self._loop)
+            await until_one_ends(self._over.wait(), self._connections.watch())
+            self._wake()
+            listener.close()
+            await runner.cleanup()
+
+    # --- who may come in ----------------------------------------------------------------
+
+    def _doorkeeper(self) -> Middleware:
+        """Accept a request, redirect it to an address without token, or refuse it in one line."""
+
+        @web.middleware
+        async def admit(request: web.Request, handler: Handler) -> web.StreamResponse:
+            with self._connections.busy(request):
+                why_not = self._refusal(request)
+                if why_not is not None:
+                    return web.Response(status=403, text=f"{why_not}\n", headers=_HEADERS)
+                if "token" in request.query:
+                    return self._with_cookie(request)
+                return await handler(request)
+
+        return admit
+
+    def _refusal(self, request: web.Request) -> str | None:
+        """Return the reason why a request is refused, None if it is accepted."""
+        sends = request.method not in ("GET", "HEAD") or "upgrade" in request.headers
+        origin = request.headers.get("Origin")
+        if origin is None and sends:
+            return "refused: no Origin; only a browser with this page open may ask for anything"
+        if origin is not None and netloc(origin) != request.host:
+            return "refused: a page of another origin may not look or ask"
+        if self._host in LOOPBACK and hostname(request.host) not in LOOPBACK:
+            return f"refused: on this machine the page is at http://{self._host}:{self._port}"
+        given = request.query.get("token") or request.cookies.get(self._cookie) or ""
+        if hmac.compare_digest(given.encode(errors="replace"), self.token.encode()):
+            return None
+        if self.once and hmac.compare_digest(given.encode(errors="replace"), self.once.encode()):
+            self.once = ""
+            return None
+        return (
+            "refused: open the address with the token that the rig's terminal shows; "
+            "there is a new one each time the rig is started"
+        )
+
+    def _with_cookie(self, request: web.Request) -> web.Response:
+        """Move the token from the address into a cookie, where it is not seen, kept or sent on."""
+        clean = request.rel_url.without_query_params("token").raw_path_qs
+        # "//elsewhere" is the address of another machine, and so is "/\elsewhere".
+        there = "/" + clean.lstrip("/\\")
+        answer = web.Response(status=302, headers={**_HEADERS, "Location": there})
+        answer.set_cookie(self._cookie, self.token, httponly=True, samesite="Strict", path="/")
+        if self._name_cookie not in request.cookies:
+            answer.set_cookie(
+                self._name_cookie,
+                secrets.token_urlsafe(9),
+                httponly=True,
+                samesite="Strict",
+                path="/",
+                max_age=_DAY_S,
+            )
+        return answer
+
+    @property
+    def _name_cookie(self) -> str:
+        return f"{self._cookie}_browser"
+
+    def _who(self, request: web.Request) -> str:
+        return self.browsers.name(request.cookies.get(self._name_cookie))
+
+    # --- the stop button ------------------------------------------------------------------
+
+    async def _asked(self, request: web.Request) -> web.Response:
+        """Hand what is asked for to the rig, and say whether it was taken."""
+        async with asyncio.timeout(_READ_S):
+            body = await request.read()
+        who = self._who(request)
+        status, text = await self._handle(from_browser(body, who), who)
+        return web.Response(status=status, text=f"{text}\n" if text else None, headers=_HEADERS)
+
+    async def _handle(self, asked: dict[str, object] | None, who: str) -> tuple[int, str]:
+        """Hand on what a browser asks; return an HTTP status, and words of a refusal."""
+        if asked is None:
+            return 400, "not a JSON object that can be asked for"
+        if asked.get("do") == "stop":
+            try:
+                text = await self._stop.send(f"{asked.get('why', '')!s:.100} ({who})", who)
+            except OSError as error:
+                return 503, str(error)
+            return (503, text) if text else (204, "")
+        if not self._asked_rate.take(self._loop.time()):
+            return 429, "too many requests; try again"
+        if leads(asked):
+            self.browsers.led_by(who)
+        return (204, "") if self._ask(compact(asked)) else (503, "the rig takes nothing now")
+
+    async def _line(self, request: web.Request) -> web.StreamResponse:
+        """Send the state whenever it changes, with heartbeats in between; receive stops.
+
+        A connection that stands already when STOP is pressed: a browser opens only six others.
+        """
+        line = web.WebSocketResponse(max_msg_size=ASKED_BYTES, compress=False, autoping=False)
+        await line.prepare(request)
+        self._connections.lasting(request)
+        who = self._who(request)
+        news = asyncio.Event()
+        self._news.add(news)
+        try:
+            with self.browsers.connected(who), self._lines.take(who) as leave:
+                await until_one_ends(
+                    self._send_state(line, news, who),
+                    self._receive_line(line, who),
+                    self._ping(line, who),
+                    self._over.wait(),
+                    leave.wait(),
+                )
+        finally:
+            self._news.discard(news)
+        with suppress(TimeoutError, ConnectionError):
+            async with asyncio.timeout(_BEAT_S):
+                await line.close()
+        return line
+
+    async def _send_state(self, line: web.WebSocketResponse, news: asyncio.Event, who: str) -> None:
+        while not line.closed:
+            news.clear()
+            async with asyncio.timeout(TAKES_S):
+                await line.send_str(json.dumps({"state": {**self._state, "you": who}}))
+            with suppress(TimeoutError):
+                await asyncio.wait_for(news.wait(), _BEAT_S)
+
+    async def _receive_line(self, line: web.WebSocketResponse, who: str) -> None:
+        async for message in line:
+            if message.type is aiohttp.WSMsgType.PING:
+                async with asyncio.timeout(TAKES_S):
+                    await line.pong(message.data)
+            elif message.type is aiohttp.WSMsgType.PONG and who == self.browsers.leading():
+                self._ask(compact({"do": "renew", "who": who}))
+            if message.type is not aiohttp.WSMsgType.TEXT:
+                continue
+            asked = from_browser(message.data, who)
+            if asked is not None and "point" in asked:
+                self.browsers.led_by("")  # nobody's lead is renewed while a pointer leads
+                self.point(asked["point"], who)
+                continue
+            status, text = await self._handle(asked, who)
+            async with asyncio.timeout(TAKES_S):
+                await line.send_str(json.dumps({"answer": status, "words": text}))
+
+    # --- the panels -----------------------------------------------------------------------
+
+    async def _panels(self, request: web.Request) -> web.StreamResponse:
+        """Show the panels in a browser, as fast as it takes them."""
+        socket = web.WebSocketResponse(max_msg_size=RECEIVED_BYTES, compress=False)
+        who = self._who(request)
+        return await self._last(
+            request, socket, self._panel_tabs, lambda: self._panel_socket.serve(socket, who)
+        )
+
+    async def _webcam(self, request: web.Request) -> web.StreamResponse:
+        """Take the pictures of a browser's own camera."""
+        socket = self.webcam.prepared()
+        return await self._last(request, socket, self._webcams, lambda: self.webcam.serve(socket))
+
+    async def _last(
+        self,
+        request: web.Request,
+        socket: web.WebSocketResponse,
+        tabs: TabLimits,
+        serve: Callable[[], Awaitable[object]],
+    ) -> web.StreamResponse:
+        """Keep a websocket until it, the page or its place is over."""
+        await socket.prepare(request)
+        self._connections.lasting(request)
+        with tabs.take(self._who(request)) as leave:
+            await until_one_ends(serve(), self._over.wait(), leave.wait())
+        await close_socket(socket, request, _BEAT_S)
+        return socket
+
+    # --- what is said to all --------------------------------------------------------------
+
+    def _wake(self) -> None:
+        for news in self._news:
+            news.set()
+
+    async def _ping(self, line: web.WebSocketResponse, who: str) -> None:
+        """Ask a browser that leads for signs of life; each of them renews its lead.
+
+        A connection that stands proves nothing: that of a computer that was shut or has lost its
+        network stands for minutes. Browsers answer also for pages in the background.
+        """
+        while True:
+            await asyncio.sleep(_RENEWED_EVERY_S)
+            if who == self.browsers.leading():
+                async with asyncio.timeout(TAKES_S):
+                    await line.ping()
+
+    # --- the server behind the door -------------------------------------------------------
+
+    async def _pass_on(self, request: web.Request) -> web.StreamResponse:
+        if "upgrade" in request.headers:
+            return await self._view.relay(request, self._who(request), self._over.wait())
+        if request.path == VIEW:  # what the document names is beside it
+            return web.Response(status=302, headers={**_HEADERS, "Location": f"{VIEW}/"})
+        return await self._view.get(request)
+
+    async def _nothing(self, request: web.Request) -> web.Response:
+        return web.Response(status=404, text="there is nothing at this address\n", headers=_HEADERS)
+
+
+def _nowhere(asked: object, who: str) -> bool:
+    """Take no pointer."""
+    return False

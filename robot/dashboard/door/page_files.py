@@ -1,0 +1,58 @@
+"""The page's own files: document, style, scripts and icon, as the door serves them."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from aiohttp import web
+
+_FOLDER = Path(__file__).parents[1] / "browser"
+_DOCUMENT = "index.html"
+_TYPES = {
+    ".html": "text/html",
+    ".css": "text/css",
+    ".js": "text/javascript",
+    ".svg": "image/svg+xml",
+}
+# Scripts and connections of this address alone; panels come with styles of their own, and the
+# picture of the camera and the icon of the tab are made here.
+_MAY = {
+    "Content-Security-Policy": (
+        "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
+        "media-src 'self' blob:; object-src 'none'; base-uri 'none'; form-action 'none'; "
+        "frame-ancestors 'none'"
+    ),
+}
+
+
+class PageFiles:
+    """What is in the folder ``browser``: the document at "/", the others at "/rig/NAME".
+
+    Args:
+        headers: of every answer.
+    """
+
+    def __init__(self, headers: Mapping[str, str]) -> None:
+        self._headers = {**headers, **_MAY}
+        self._files = {path.name: path for path in _FOLDER.iterdir() if path.suffix in _TYPES}
+
+    def add_to(self, router: web.UrlDispatcher) -> None:
+        """Add the addresses of all files."""
+        router.add_get("/", self._document)
+        for name in self._files:
+            if name != _DOCUMENT:
+                router.add_get(f"/rig/{name}", self._file)
+
+    async def _document(self, request: web.Request) -> web.Response:
+        return self._answer(self._files[_DOCUMENT])
+
+    async def _file(self, request: web.Request) -> web.Response:
+        return self._answer(self._files[request.path.rpartition("/")[2]])
+
+    def _answer(self, path: Path) -> web.Response:
+        """Return the file as it is now: they are small, and it may have been edited."""
+        return web.Response(
+            body=path.read_bytes(),
+            content_type=_TYPES[path.suffix],
+            charset="utf-8",
+            headers=self._headers,
+        )

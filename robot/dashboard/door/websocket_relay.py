@@ -1,0 +1,77 @@
+"""Carries a browser's websocket to the server behind the door and back."""
+
+import asyncio
+from collections.abc import Awaitable
+from contextlib import suppress
+
+import aiohttp
+from aiohttp import web
+
+from gazerig.robot.dashboard.requests.token_bucket import TokenBucket
+
+MESSAGES_PER_S, MESSAGES_BURST = 120.0, 240.0
+"""From one browser; a person who drags with two hands sends some 60 a second."""
+BYTES_PER_S, BYTES_BURST = 1e6, 4e6
+TAKES_S = 20.0
+"""A browser that takes nothing for so long is sent away; it comes again by itself."""
+
+Socket = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
+
+
+async def carry_in(browser: web.WebSocketResponse, inside: Socket) -> None:
+    """Carry what a browser sends, no faster than the server should have to read it."""
+    messages, size = (
+        TokenBucket(MESSAGES_PER_S, MESSAGES_BURST),
+        TokenBucket(BYTES_PER_S, BYTES_BURST),
+    )
+    loop = asyncio.get_running_loop()
+    async for message in browser:
+        if (wait_s := max(messages.wait_s(loop.time()), size.wait_s(loop.time()))) > 0.0:
+            await asyncio.sleep(wait_s)
+        messages.take(loop.time())
+        size.take(loop.time(), len(message.data or ""))
+        await _hand_on(message, inside)
+
+
+async def carry_out(inside: Socket, browser: web.WebSocketResponse) -> None:
+    """Carry what the server sends, as fast as the browser takes it.
+
+    Raises:
+        TimeoutError: it takes nothing any more.
+    """
+    async for message in inside:
+        async with asyncio.timeout(TAKES_S):
+            await _hand_on(message, browser)
+
+
+async def until_one_ends(*works: Awaitable[object]) -> None:
+    """Run all until one is over, and end the others."""
+    tasks = {asyncio.ensure_future(work) for work in works}
+    _, others = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+    for task in others:
+        task.cancel()
+    await asyncio.gather(*tasks, return_exceptions=True)
+
+
+async def close_socket(
+    socket: web.WebSocketResponse, request: web.Request, within_s: float
+) -> None:
+    """Close a browser's websocket; one who reads nothing does not read that it is over.
+
+    Args:
+        socket: to be closed.
+        request: by which it was opened.
+        within_s: how long the browser may take to answer, seconds.
+    """
+    with suppress(TimeoutError, ConnectionError):
+        async with asyncio.timeout(within_s):
+            await socket.close()
+    if request.transport is not None:
+        request.transport.abort()
+
+
+async def _hand_on(message: aiohttp.WSMessage, there: Socket) -> None:
+    if message.type is aiohttp.WSMsgType.BINARY:
+        await there.send_bytes(message.data)
+    elif message.type is aiohttp.WSMsgType.TEXT:
+        await there.send_str(message.data)

@@ -1,0 +1,172 @@
+"""Draw what was found into the camera image, small enough for the page."""
+
+from typing import cast
+
+import cv2
+import numpy as np
+
+from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.types import Depth, DetectedFace, Detections, ImageArray, MovingBlob
+from gazerig.gaze.types import Floats
+from gazerig.robot.dashboard.feed.gaze_heat import draw_heat
+from gazerig.robot.model.intrinsics import project
+
+IMAGE_WIDTH_PX = 640
+NEAREST_M, FARTHEST_M = 0.3, 6.0
+"""Ends of the colour scale of the depth image: an arm's reach and the end of a room."""
+
+_JPEG_QUALITY = 80
+_FACE = (120, 220, 90)  # BGR
+_LANDMARK = (255, 255, 255)
+_BLOB = (255, 170, 60)
+_GAZE, _GAZE_EDGE = (40, 130, 255), (250, 250, 250)
+_DARK_GROUND = 38
+_SCALE_PX = 12
+
+Point = tuple[int, int]
+
+
+def draw_detections(
+    image: ImageArray | None,
+    detections: Detections,
+    gaze_px: tuple[float, float] | None,
+    lens: Intrinsics,
+    *,
+    faces: bool = True,
+    heat_px: Floats | None = None,
+) -> ImageArray:
+    """Draw faces, landmarks, moving blobs and the gaze point into a copy.
+
+    image: the camera's image, or None where the source has none: a dark ground
+    gaze_px: where the rig looks, pixels of the full image; None draws none
+    lens: of the full image; it places the blobs
+    faces: whether faces, landmarks and blobs are drawn
+    heat_px: points (n, 2) of the full image that the gaze has been on; None draws none
+    Returns an image of at most IMAGE_WIDTH_PX; the one given is left as it is.
+    """
+    scale = min(1.0, IMAGE_WIDTH_PX / detections.width_px)
+    drawn = _small(image, detections, scale)
+    if heat_px is not None:
+        draw_heat(drawn, scale * heat_px)
+    for face in detections.faces if faces else ():
+        _draw_face(drawn, face, scale)
+    for blob in detections.blobs if faces else ():
+        _draw_blob(drawn, blob, lens, scale)
+    if gaze_px is not None:
+        _draw_gaze(drawn, _pixel(gaze_px[0], gaze_px[1], scale))
+    return drawn
+
+
+def ground(detections: Detections, depth: bool) -> ImageArray | None:
+    """Return what ``draw_detections`` is to draw on: the image, or the depth as asked for.
+
+    A camera that measures no depth gives its image with words that say so.
+    """
+    if not depth:
+        return detections.image
+    if detections.depth_m is not None:
+        return depth_image(detections.depth_m)
+    scale = min(1.0, IMAGE_WIDTH_PX / detections.width_px)
+    drawn = _small(detections.image, detections, scale)
+    _write(drawn, "this camera measures no depth", (6, drawn.shape[0] - 8), _LANDMARK)
+    return drawn
+
+
+def without_pictures() -> ImageArray:
+    """Return a dark image that says that no pictures were recorded."""
+    drawn = np.full((IMAGE_WIDTH_PX * 5 // 8, IMAGE_WIDTH_PX, 3), _DARK_GROUND, np.uint8)
+    words, size = "no pictures were recorded", 1.0
+    (width, height), _ = cv2.getTextSize(words, cv2.FONT_HERSHEY_SIMPLEX, size, 2)
+    at = ((drawn.shape[1] - width) // 2, (drawn.shape[0] + height) // 2)
+    cv2.putText(drawn, words, at, cv2.FONT_HERSHEY_SIMPLEX, size, _LANDMARK, 2, cv2.LINE_AA)
+    return drawn
+
+
+def depth_image(depth_m: Depth) -> ImageArray:
+    """Return distances as colours, at most IMAGE_WIDTH_PX wide, with their scale at the foot.
+
+    depth_m: (height, width), NaN where unknown, which is shown dark. Red is NEAREST_M or less,
+    blue FARTHEST_M or more; equal ratios of distance are equal steps of colour.
+    """
+    scale = min(1.0, IMAGE_WIDTH_PX / depth_m.shape[1])
+    size = (max(1, round(depth_m.shape[1] * scale)), max(1, round(depth_m.shape[0] * scale)))
+    # Not averaged: between a hand and the wall behind it there is nothing.
+    small = cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST)
+    known = np.isfinite(small)
+    metres = np.clip(np.where(known, small, FARTHEST_M), NEAREST_M, FARTHEST_M)
+    share = np.log(FARTHEST_M / metres) / np.log(FARTHEST_M / NEAREST_M)
+    drawn = cv2.applyColorMap((255.0 * share).astype(np.uint8), cv2.COLORMAP_TURBO)
+    drawn[~known] = _DARK_GROUND
+    _draw_scale(drawn)
+    return np.asarray(drawn, np.uint8)
+
+
+def _draw_scale(drawn: ImageArray) -> None:
+    height, width = drawn.shape[:2]
+    ramp = np.linspace(255, 0, width).astype(np.uint8)[None].repeat(_SCALE_PX, axis=0)
+    foot = drawn[max(0, height - _SCALE_PX) :]
+    foot[:] = cv2.applyColorMap(ramp, cv2.COLORMAP_TURBO)[: len(foot)]
+    for text, x in ((f"{NEAREST_M:g} m", 3), (f"{FARTHEST_M:g} m", width - 26)):
+        cv2.putText(
+            drawn, text, (x, height - 3), cv2.FONT_HERSHEY_SIMPLEX, 0.35, (255, 255, 255), 1,
+            cv2.LINE_AA,
+        )  # fmt: skip
+
+
+def encode(image: ImageArray) -> bytes:
+    """Encode a BGR image as JPEG."""
+    done, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+    if not done:
+        raise ValueError(f"an image of shape {image.shape} cannot be written as JPEG")
+    return jpeg.tobytes()
+
+
+def _small(image: ImageArray | None, detections: Detections, scale: float) -> ImageArray:
+    width = max(1, round(detections.width_px * scale))
+    height = max(1, round(detections.height_px * scale))
+    if image is None:
+        return np.full((height, width, 3), _DARK_GROUND, np.uint8)
+    if image.shape[:2] == (height, width):
+        return image.copy()
+    return cast(ImageArray, cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA))
+
+
+def _draw_face(drawn: ImageArray, face: DetectedFace, scale: float) -> None:
+    x, y, width, height = face.box_px
+    corner = _pixel(x, y, scale)
+    cv2.rectangle(drawn, corner, _pixel(x + width, y + height, scale), _FACE, 2, cv2.LINE_AA)
+    _write(drawn, f"{face.confidence:.2f}", corner, _FACE)
+    for landmark_x, landmark_y in face.landmarks_px:
+        cv2.circle(drawn, _pixel(landmark_x, landmark_y, scale), 2, _LANDMARK, -1, cv2.LINE_AA)
+
+
+def _draw_blob(drawn: ImageArray, blob: MovingBlob, lens: Intrinsics, scale: float) -> None:
+    z = blob.p_camera_m[2]
+    if z <= 0.0:  # behind the camera there is no pixel
+        return
+    u, v = project([blob.p_camera_m], lens)[0].tolist()
+    radius = max(2, _clipped(lens.fx_px * blob.radius_m / z * scale))
+    centre = _pixel(u, v, scale)
+    cv2.circle(drawn, centre, radius, _BLOB, 1, cv2.LINE_AA)
+    _write(drawn, blob.kind, (centre[0] - radius, centre[1] - radius), _BLOB)
+
+
+def _draw_gaze(drawn: ImageArray, at: Point) -> None:
+    share = drawn.shape[1] / IMAGE_WIDTH_PX  # small images are shown as large as others
+    ring, edge, line, dot = (max(2, round(share * px)) for px in (14, 5, 3, 3))
+    for radius, thick, colour in ((ring, edge, _GAZE_EDGE), (ring, line, _GAZE), (dot, -1, _GAZE)):
+        cv2.circle(drawn, at, radius, colour, thick, cv2.LINE_AA)
+
+
+def _write(drawn: ImageArray, text: str, at: Point, colour: tuple[int, int, int]) -> None:
+    above = (at[0], max(12, at[1] - 4))
+    cv2.putText(drawn, text, above, cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, 1, cv2.LINE_AA)
+
+
+def _pixel(x: float, y: float, scale: float) -> Point:
+    return _clipped(x * scale), _clipped(y * scale)
+
+
+def _clipped(value: float) -> int:
+    """Round; OpenCV draws nothing sensible at coordinates beyond 16 bits."""
+    return round(min(max(value, -30_000.0), 30_000.0))

@@ -1,0 +1,324 @@
+"""A running rig as the page shows it, made in the page's process of the ticks it is sent.
+
+Everything that is only shown is worked out here, at the page's rate: words, eye movements, the pose
+that was commanded, what was found drawn into the camera's image. The control loop sends plain
+ticks, and what they do not tell (``RunState``) when it has changed.
+"""
+
+import pickle
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.passed_image import PassedImage, taken
+from gazerig.drivers.types import BusHealth, DetectedFace, Detections, ImageArray, MovingBlob
+from gazerig.gaze.types import Floats, Mat3, Percept, Vec3
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.tick_stream import TickRow, decode_plain, decode_rows, encode
+from gazerig.robot.control.tick_text import health_text, perception_text
+from gazerig.robot.dashboard.feed.gaze_trail import GazeTrail
+from gazerig.robot.dashboard.feed.overlay_choices import OverlayChoices
+from gazerig.robot.dashboard.feed.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts
+from gazerig.robot.model.description.build import RigShape
+from gazerig.robot.model.draw_picture import DrawPicture
+from gazerig.robot.model.frames import PoseHistory
+from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
+from gazerig.robot.model.types import Snapshot
+from gazerig.robot.model.world_shapes import WorldShapes
+from gazerig.robot.perception.egomotion_residual import ResidualFigures
+
+TICKS, RIG, STATE, DETECTED, PIXELS = b"t", b"g", b"a", b"d", b"i"
+"""First bytes of messages: a ``TickBatch``, a ``LiveRig``, a ``RunState``, a frame, one with
+its pixels."""
+
+_NEAREST_M = 0.05
+"""What is nearer to the plane of the camera, or behind it, has no place in the image."""
+
+
+class LiveRig(NamedTuple):
+    """A running rig: the rate of its loop, and how it is built.
+
+    emulated: its servos are, and nobody calibrates them
+    picture: draws what a simulated camera sees; None where there is none, or it gives images
+    world: how the simulated world about the rig looks; None without one
+    """
+
+    rate_hz: float
+    shown: ShownRig
+    emulated: bool = False
+    picture: DrawPicture | None = None
+    world: WorldShapes | None = None
+
+
+class WorldNow(NamedTuple):
+    """A simulated world, and the time since it began, in seconds."""
+
+    shapes: WorldShapes
+    world_s: float
+
+
+class RunState(NamedTuple):
+    """What a tick does not tell.
+
+    errors: of the bus, by kind; behaviour, conversation, character: those in force
+    residual: see ``ResidualFigures``
+    scene_start_s: when a simulated scene or world began, None before that and without one
+    """
+
+    errors: dict[str, int]
+    behaviour: str
+    conversation: str
+    character: str
+    residual: tuple[float | None, float | None, int]
+    scene_start_s: float | None = None
+
+
+class FrameHead(NamedTuple):
+    """What was found in a frame, as far as it is drawn, and what goes along with it.
+
+    faces: box, landmarks and confidence; blobs: id, kind, position and radius
+    lens: by which the frame was located, else as the camera reports it: fx, fy, cx, cy in pixels
+        and five numbers of distortion
+    shape, dtype: of the array in the memory that goes along; None, "" without one
+    depth: that is the depth image; wants_depth: depth is to be shown
+    """
+
+    captured_s: float
+    number: int
+    width_px: int
+    height_px: int
+    faces: Sequence[tuple[Any, Any, float]]
+    blobs: Sequence[tuple[int, str, Any, float]]
+    lens: tuple[float, ...] | None
+    shape: tuple[int, ...] | None
+    dtype: str
+    depth: bool
+    wants_depth: bool
+
+
+def rig_message(rig: LiveRig) -> bytes:
+    """Return a message that tells the page how the rig is built."""
+    return RIG + pickle.dumps(tuple(rig), pickle.HIGHEST_PROTOCOL)
+
+
+def state_message(state: RunState) -> bytes:
+    """Return a message that tells the page what ticks do not."""
+    return STATE + encode(state)
+
+
+def frame_message(
+    found: Detections, image: PassedImage | None, depth: bool, wants_depth: bool
+) -> bytes:
+    """Return a message with what was found in a frame; see ``FrameHead``."""
+    lens = found.located.intrinsics if found.located is not None else found.lens
+    head = FrameHead(
+        found.captured_s,
+        found.number,
+        found.width_px,
+        found.height_px,
+        [(face.box_px, face.landmarks_px, face.confidence) for face in found.faces],
+        [(blob.id, blob.kind, blob.p_camera_m, blob.radius_m) for blob in found.blobs],
+        (lens.fx_px, lens.fy_px, lens.cx_px, lens.cy_px, *lens.distortion) if lens else None,
+        image.shape if image is not None else None,
+        image.dtype if image is not None else "",
+        depth,
+        wants_depth,
+    )
+    return DETECTED + encode(head)
+
+
+def frame_with_pixels(
+    found: Detections, array: NDArray[Any], depth: bool, wants_depth: bool
+) -> bytes:
+    """Return a message like ``frame_message`` with the pixels in it: no memory goes along."""
+    image = PassedImage(-1, array.shape, array.dtype.str)
+    head = frame_message(found, image, depth, wants_depth)[1:]
+    return PIXELS + len(head).to_bytes(4, "little") + head + np.ascontiguousarray(array).tobytes()
+
+
+class LiveFeed:
+    """Takes what the rig's side sends; returns what there is to show.
+
+    emulated: the servos are; False before the rig has said so
+    choices: what is wanted in the camera's image
+    watched: someone sees the images; otherwise none is drawn
+    """
+
+    def __init__(self) -> None:
+        self.emulated = False
+        self.choices = OverlayChoices()
+        self.watched = True
+        self._picture: DrawPicture | None = None
+        self._world: WorldShapes | None = None
+        self._trail = GazeTrail()
+        self._builder: SnapshotBuilder | None = None
+        self._poses: PoseHistory | None = None
+        self._percept: Percept | None = None
+        self._state = RunState({}, "", "", "", (None, None, 0))
+        self._found: Detections | None = None
+        self._wants_depth = False
+        self._newest: Tick | None = None
+        self._new_ticks = self._new_frame = False
+
+    def take(self, message: bytes, fd: int = -1) -> bool:
+        """Handle a message of one of the kinds above; False if it is none.
+
+        Only ever fed by the process that started this one.
+        """
+        kind, body = message[:1], message[1:]
+        if kind == TICKS:
+            self._take_ticks(body)
+        elif kind == STATE:
+            self._state = RunState(*decode_plain(body))
+        elif kind == RIG:
+            self._take_rig(LiveRig(*pickle.loads(body)))
+        elif kind == DETECTED:
+            self._take_frame(FrameHead(*decode_plain(body)), fd)
+        elif kind == PIXELS:
+            end = 4 + int.from_bytes(body[:4], "little")
+            self._take_frame(FrameHead(*decode_plain(body[4:end])), -1, body[end:])
+        else:
+            return False
+        return True
+
+    def snapshot(self) -> Snapshot | None:
+        """Return what the rig does now and has done since the last call; None without news."""
+        if not self._new_ticks or self._builder is None or self._newest is None:
+            return None
+        self._new_ticks = False
+        state, tick = self._state, self._newest
+        perception = perception_text(tick, ResidualFigures(*state.residual))
+        health = health_text(BusHealth(0, 0, state.errors))
+        return self._builder.take(
+            SnapshotTexts(health, state.behaviour, perception, state.character, state.conversation)
+        )
+
+    @property
+    def shape(self) -> RigShape | None:
+        """Return how the rig's parts are built; None where it is not known."""
+        rig = self._builder.rig if self._builder is not None else None
+        return rig.shape if rig is not None else None
+
+    def world(self) -> WorldNow | None:
+        """Return the world about the rig at the newest tick; None without one, or too early."""
+        start_s, tick = self._state.scene_start_s, self._newest
+        if self._world is None or start_s is None or tick is None:
+            return None
+        return WorldNow(self._world, tick.t_s - start_s)
+
+    def image(self) -> ImageArray | None:
+        """Return the newest frame with what was found in it; None without a new one."""
+        tick, found, builder, poses = self._newest, self._found, self._builder, self._poses
+        if not (self._new_frame and self.watched):
+            return None
+        if tick is None or found is None or builder is None or poses is None:
+            return None
+        self._new_frame = False
+        assert builder.rig is not None  # it came with the first message
+        field_rad = builder.rig.horizontal_rad
+        lens = intrinsics_of_lens(None, field_rad, found.width_px, found.height_px, found.lens)
+        R, p_m = builder.rig.mount.pose(*poses.head_pose(found.captured_s))
+        found = self._pictured(found, lens, R, p_m)
+        # The page's process draws; the control loop's imports this module too, without OpenCV.
+        from gazerig.robot.dashboard.feed.camera_overlay import draw_detections, ground
+
+        points_m = self._trail.points() if self.choices.heat else None
+        return draw_detections(
+            ground(found, self._wants_depth),
+            found,
+            gaze_pixel(tick, R, p_m, lens) if self.choices.gaze else None,
+            lens,
+            # Where there is no image, what was found is all there is to see.
+            faces=self.choices.faces or _blank(found),
+            heat_px=None if points_m is None else pixels(points_m, R, p_m, lens),
+        )
+
+    def _pictured(self, found: Detections, lens: Intrinsics, R: Mat3, p_m: Vec3) -> Detections:
+        """Return detections with a picture of the simulated scene, where they have no image."""
+        start_s = self._state.scene_start_s
+        if not _blank(found) or self._picture is None or start_s is None:
+            return found
+        size_px = found.width_px, found.height_px
+        drawn = self._picture.draw(found.captured_s - start_s, lens, size_px, R, p_m)
+        return replace(found, image=drawn)
+
+    def _take_rig(self, rig: LiveRig) -> None:
+        if self._builder is None:
+            self._builder = SnapshotBuilder(rig.rate_hz, rig.shown)
+            self._poses = PoseHistory(rig.shown.kinematics)
+        self._builder.rig = rig.shown
+        self._builder.retune(rig.rate_hz)
+        self.emulated = rig.emulated
+        self._picture = rig.picture
+        # Sent again with every change of the rig; what is equal stays, for it is drawn already.
+        if pickle.dumps(rig.world) != pickle.dumps(self._world):
+            self._world = rig.world
+
+    def _take_ticks(self, data: bytes) -> None:
+        if self._builder is None or self._poses is None:
+            return
+        percepts, rows = decode_rows(data)
+        for row in rows:
+            tick = self._tick(row, percepts)
+            self._builder.update(tick)
+            self._poses.remember(tick.t_s, tick.pose.head_rad, tick.pose.base_rad)
+            self._newest = tick
+            self._trail.add(tick.t_s, tick.gaze.gaze_point_world_m)
+        self._new_ticks = True
+
+    def _tick(self, row: TickRow, percepts: Mapping[int, Percept]) -> Tick:
+        """Return a tick; the percept before stands for one that was lost and comes again."""
+        number = row.percept
+        self._percept = None if number is None else percepts.get(number, self._percept)
+        return Tick(
+            row.t_s, row.joints, row.pose, self._found, self._percept, row.target, row.gaze,
+            row.desired_rad, row.guard_result, row.events, (), row.stopped, row.led, row.lead,
+            row.gesture, row.parking,
+        )  # fmt: skip
+
+    def _take_frame(self, head: FrameHead, fd: int, pixels: bytes | None = None) -> None:
+        found = Detections(
+            head.captured_s,
+            head.number,
+            head.width_px,
+            head.height_px,
+            tuple([DetectedFace(box, np.array(marks), sure) for box, marks, sure in head.faces]),
+            tuple([MovingBlob(*blob) for blob in head.blobs]),
+            lens=None if head.lens is None else _intrinsics(*head.lens),
+        )
+        if head.shape is not None and (fd >= 0 or pixels is not None):
+            if pixels is None:
+                array = taken(PassedImage(fd, tuple(head.shape), head.dtype))
+            else:
+                array = np.frombuffer(pixels, np.dtype(head.dtype)).reshape(head.shape)
+            found = replace(found, depth_m=array) if head.depth else replace(found, image=array)
+        self._found, self._wants_depth, self._new_frame = found, head.wants_depth, True
+
+
+def _blank(found: Detections) -> bool:
+    """Return whether there is neither an image nor a depth image."""
+    return found.image is None and found.depth_m is None
+
+
+def gaze_pixel(tick: Tick, R: Mat3, p_m: Vec3, lens: Intrinsics) -> tuple[float, float] | None:
+    """Return where in the image of a camera at (R, p_m) the gaze goes, None when it is outside."""
+    found = pixels(np.array([tick.gaze.gaze_point_world_m]), R, p_m, lens).tolist()
+    return (found[0][0], found[0][1]) if found else None
+
+
+def pixels(points_world_m: Floats, R: Mat3, p_m: Vec3, lens: Intrinsics) -> Floats:
+    """Return where points (n, 3) are in the image of a camera at (R, p_m); without those behind."""
+    seen: Floats = (points_world_m - np.array(p_m)) @ np.array(R)
+    return np.asarray(project(seen[seen[:, 2] >= _NEAREST_M], lens), np.float64).reshape(-1, 2)
+
+
+def _intrinsics(
+    fx_px: float, fy_px: float, cx_px: float, cy_px: float, *distortion: float
+) -> Intrinsics:
+    """Return a lens from the numbers that came with a frame."""
+    k1, k2, p1, p2, k3 = distortion
+    return Intrinsics(fx_px, fy_px, cx_px, cy_px, (k1, k2, p1, p2, k3))

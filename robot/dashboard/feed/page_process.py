@@ -1,0 +1,397 @@
+"""Show the running rig on a web page without ever making the control loop wait.
+
+The page is a process of its own (``gazerig.robot.dashboard.page_main``), fed through a socket pair
+with frozen values. Every call here returns at once: what the page cannot take is dropped and
+counted, and a page that is slow, stopped or dead changes nothing for the caller. The
+page ends when this side of the socket closes, so it never outlives the program, however
+that ends.
+"""
+
+import json
+import os
+import pickle
+import secrets
+import shutil
+import subprocess
+import tempfile
+import threading
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from math import nan
+from operator import attrgetter
+from typing import BinaryIO
+from urllib.parse import urlsplit
+
+from gazerig.drivers import child_process, message_link
+from gazerig.drivers.message_link import MessageLink
+from gazerig.drivers.passed_image import CAN_PASS, send
+from gazerig.robot.dashboard.requests.inbox import (
+    MESSAGE_BYTES,
+    PICTURE,
+    REQUEST,
+    Inbox,
+    parse_request,
+)
+from gazerig.robot.dashboard.requests.stop_channel import StopListener
+from gazerig.robot.model.clock import RealClock
+from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
+
+# The first byte of a message says what follows it. To the page: a snapshot and a frame of a
+# recording, menus, the parameters, their values, a reply or a message to all users, the position
+# of a replay; what a running rig sends is in live_feed.py.
+SNAPSHOT, FRAME, CHOICES, PARAMS, VALUES, MESSAGE, REPLAY = b"s", b"p", b"c", b"k", b"v", b"w", b"r"
+# From the page: its address, a message for the terminal, and REQUEST, a user's request.
+URL, NOTICE = b"u", b"n"
+TOKEN_VARIABLE = "GAZERIG_PAGE_TOKEN"
+"""Of the page's environment: what browsers must show."""
+ONCE_VARIABLE = "GAZERIG_PAGE_ONCE"
+"""Of the page's environment: a token that opens the page once, "" for none."""
+FOLDER_VARIABLE = "GAZERIG_PAGE_FOLDER"
+"""Of the page's environment: a folder of this user's alone, for its server's socket."""
+CANNOT_OPEN = 3
+"""Exit code of a page that cannot have its address: it need not be tried again."""
+ALL_USERS = "*"
+"""Takes the place of the user's name in messages to all users of the page."""
+SPEEDS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
+"""What the page offers; any speed between the ends can be asked for."""
+MARK_KINDS = ("saccade", "blink", "event")
+"""What a replay can be led to, one after the other."""
+
+OnRequest = Callable[[dict[str, object]], str | None]
+"""Carries out a request of a user of the page; returns the reply, or None."""
+
+_CLOSE_TIMEOUT_S = 2.0
+_LAST_LINES_BYTES = 4096
+_MOST_PIXELS = 1 << 23  # of a message, where images go along in it
+_MOST_WORDS = 20_000  # of one answer, in characters
+_MOST_OWED = 100  # answers to a page that takes none
+_AGAIN_AFTER_S = 0.5
+_AGAIN_LATEST_S = 30.0
+_WELL_AFTER_S = 60.0  # one that lived so long begins with a short wait again
+_TOKEN_BYTES = 16
+
+SHOWN_EVERY_S = 0.0095
+"""Snapshots closer together than some 10 ms are passed over: 100 a second show a saccade of
+40 ms as a slope. A little under 10 ms, so that rounding does not turn it into 15."""
+
+# A frozen dataclass with slots is pickled field by field in Python; taking all fields at
+# once, by names found ahead, costs a third of that.
+_PLAIN = tuple(field.name for field in fields(Snapshot) if field.name not in ("faces", "bodies"))
+_plain_values = attrgetter(*_PLAIN)
+_face_values = attrgetter(*(field.name for field in fields(SeenFace)))
+_body_values = attrgetter(*(field.name for field in fields(SeenBody)))
+
+
+def pack(snapshot: Snapshot) -> bytes:
+    """Write a snapshot as one message."""
+    faces = [_face_values(face) for face in snapshot.faces]
+    bodies = [_body_values(body) for body in snapshot.bodies]
+    values = (_plain_values(snapshot), faces, bodies)
+    return SNAPSHOT + pickle.dumps(values, pickle.HIGHEST_PROTOCOL)
+
+
+def unpack(message: bytes) -> Snapshot:
+    """Read a message that ``pack`` wrote; only ever fed by the process that started the page."""
+    values, faces, bodies = pickle.loads(memoryview(message)[1:])
+    return Snapshot(
+        **dict(zip(_PLAIN, values, strict=True)),
+        faces=tuple(SeenFace(*face) for face in faces),
+        bodies=tuple(SeenBody(*body) for body in bodies),
+    )
+
+
+class PageProcess:
+    """The live page as the control loop sees it.
+
+    ``show`` belongs to one thread; everything else may be called from any.
+
+    A page process that dies is started again, at the same address, after a while that grows.
+
+    dropped: snapshots and ticks the page did not take; frames_dropped: the same for frames
+    started: how often the page has come up; its feed starts again when this changes
+    gone: it has ended and is not started again
+    """
+
+    def __init__(
+        self,
+        host: str,
+        port: int,
+        on_request: OnRequest | None = None,
+        on_picture: Callable[[bytes], None] | None = None,
+    ) -> None:
+        """Prepare a page for this address and port; a busy port moves on to the next.
+
+        on_request: called with each request of a user of the page; None: requests are dropped
+        on_picture: called with each picture of a browser's own camera; None: they are dropped
+        """
+        self._on_picture = on_picture
+        self._host = host
+        self._port = port
+        self._on_request = on_request
+        self._token = secrets.token_urlsafe(_TOKEN_BYTES)
+        self._once = secrets.token_urlsafe(_TOKEN_BYTES)
+        self._socket: MessageLink | None = None
+        self._process: subprocess.Popen[bytes] | None = None
+        self._inbox: Inbox | None = None
+        self._stops: StopListener | None = None
+        self._choices: Mapping[str, tuple[str, ...]] = {}
+        self._over = threading.Event()
+        self._beginning = threading.Lock()
+        self._clock = RealClock()
+        self._began_s = 0.0
+        self._wait_s = _AGAIN_AFTER_S
+        self._mourned = self._welcomed = False
+        self.started = 0
+        self.gone = False
+        self._errors: BinaryIO | None = None
+        self._folder = ""
+        self._url: str | None = None
+        self._notices: deque[str] = deque()
+        self._owed: deque[bytes] = deque(maxlen=_MOST_OWED)
+        self._paying = threading.Lock()
+        self._shown_s = nan
+        self.dropped = 0
+        self.frames_dropped = 0
+
+    def open(self) -> str:
+        """Start the page and return at once, with the words to say meanwhile."""
+        self._begin()
+        return f"the page is starting on port {self._port}"
+
+    def _begin(self) -> None:
+        """Start a process, and talk to it."""
+        links = message_link.offer(2)
+        # The page's own words are of interest only if it dies, and a pipe without a reader fills.
+        self._errors = _errors_file()
+        self._folder = tempfile.mkdtemp(prefix="gazerig-page-")
+        try:
+            self._process = child_process.start(
+                "gazerig.robot.dashboard.page_main",
+                *links.words,
+                *(str(os.getpid()), self._host, str(self._port)),
+                stderr=self._errors.fileno(),
+                pass_fds=links.fds,
+                variables={
+                    TOKEN_VARIABLE: self._token,
+                    ONCE_VARIABLE: self._once if self.started == 0 else "",
+                    FOLDER_VARIABLE: self._folder,
+                    **links.variables,
+                },
+            )
+        finally:
+            for theirs in links.theirs:
+                theirs.close()
+        ours, stops = links.ours
+        self._began_s = self._clock.now_s()
+        self.join(ours, stops)
+
+    def join(self, link: MessageLink, stops: MessageLink | None = None) -> None:
+        """Talk over these from now on; ``open`` makes them with a process at the other ends.
+
+        stops: for stops alone
+        """
+        link.setblocking(False)
+        self._socket = link
+        self._inbox = Inbox(link, self._take, self._lose, self._refuse)
+        self._stops = StopListener(stops, self._stop) if stops is not None else None
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Hand over a snapshot; dropped and counted where the page does not take it."""
+        if abs(snapshot.t_s - self._shown_s) < SHOWN_EVERY_S:
+            return
+        self._shown_s = snapshot.t_s
+        self._pay()
+        if not self.send(pack(snapshot)):
+            self.dropped += 1
+
+    def show_frame(self, jpeg: bytes) -> None:
+        """Hand over an encoded camera image with what was found already drawn in."""
+        if not self.send(FRAME + jpeg):
+            self.frames_dropped += 1
+
+    def show_detections(self, message: bytes, fd: int = -1) -> None:
+        """Hand over what was found in a frame, with the memory of its image unless fd is -1."""
+        if not self.send(message, fd):
+            self.frames_dropped += 1
+
+    def offer(self, choices: Mapping[str, tuple[str, ...]]) -> None:
+        """Set the menus of the page: name of the menu -> choices, the present one first."""
+        self._choices = choices
+        self.send(CHOICES + json.dumps(choices).encode())
+
+    def say(self, text: str) -> None:
+        """Show a message to all users of the page."""
+        self._answer(ALL_USERS, text)
+
+    def send(self, message: bytes, fd: int = -1) -> bool:
+        """Hand over a message as it is; False where the page does not take it now.
+
+        fd: goes along, unless it is -1; it stays the caller's
+        """
+        page = self._socket
+        if page is None or len(message) > (MESSAGE_BYTES if CAN_PASS else _MOST_PIXELS):
+            return False
+        try:
+            send(page, message, fd)
+        except OSError:  # full, gone, or closed by close() in this very moment
+            return False
+        return True
+
+    def url(self) -> str | None:
+        """Return the page's address, token included, once it is there and as long as it is."""
+        return self._url
+
+    def url_once(self) -> str | None:
+        """Return an address that opens the page once, for a program that is handed it.
+
+        What a program is started with can be read by all users of this computer.
+        """
+        return self._url and self._url.replace(self._token, self._once)
+
+    def notice(self) -> str | None:
+        """Return the next line for the person in front of the rig, each one once."""
+        return self._notices.popleft() if self._notices else None
+
+    def _take(self, message: bytes) -> None:
+        """Do what a message of the page is for; called by the ear."""
+        kind, body = message[:1], message[1:]
+        if kind == PICTURE:
+            if self._on_picture is not None:
+                self._on_picture(body)
+        elif kind == URL:
+            self._take_url(body.decode())
+        elif kind == NOTICE:
+            self._notices.append(body.decode())
+        elif kind == REQUEST:
+            who, data = parse_request(message)
+            self._answer(who, self._handle(data))
+
+    def _take_url(self, url: str) -> None:
+        """Record that the page is ready; a restarted page is sent its initial state."""
+        self._url = url
+        self._port = int(urlsplit(url).port or self._port)
+        self.started += 1
+        if self.started > 1 and self._choices:
+            self.offer(self._choices)
+        if self._mourned and not self._welcomed:
+            self._welcomed = True
+            self._notices.append(f"the page is there again, at {url}")
+
+    def _refuse(self, message: bytes) -> None:
+        self._answer(parse_request(message)[0], "refused: too many requests at once; try again")
+
+    def _stop(self, asked: Mapping[str, object]) -> str:
+        """Execute a stop; return "" if it succeeded."""
+        return self._handle(json.dumps(asked).encode()) or ""
+
+    def _handle(self, data: bytes) -> str | None:
+        """Carry out a request; an error of it must not end the handling of requests."""
+        try:
+            asked = json.loads(data)
+            return self._on_request(asked) if self._on_request is not None else None
+        except Exception as error:  # a stop must still be obeyed after any fault
+            return f"the rig could not do that: {type(error).__name__}: {error}"
+
+    def _answer(self, who: str, text: str | None) -> None:
+        """Acknowledge a request, with the reply."""
+        text = text[:_MOST_WORDS] if text is not None else None
+        self._owed.append(MESSAGE + json.dumps((who, text)).encode())
+        self._pay()
+
+    def _pay(self) -> None:
+        """Send the answers that the page had no room for so far."""
+        with self._paying:
+            while self._owed and self.send(self._owed[0]):
+                self._owed.popleft()
+
+    def _lose(self) -> None:
+        """Report once that the page has died, and restart it if that can help."""
+        process = self._process
+        self._hang_up()
+        text = self._last_lines()
+        self.gone = process is None or _code(process) == CANNOT_OPEN
+        if self._clock.now_s() - self._began_s > _WELL_AFTER_S:
+            self._wait_s, self._mourned, self._welcomed = _AGAIN_AFTER_S, False, False
+        if not self._mourned:
+            then = "start it again to see the page" if self.gone else "it is started again"
+            self._notices.append(f"the page has stopped ({text}); the rig runs on, {then}")
+        self._mourned = True
+        if self.gone:
+            return
+        threading.Thread(target=self._begin_again, name="page start", daemon=True).start()
+
+    def _begin_again(self) -> None:
+        wait_s, self._wait_s = self._wait_s, min(2.0 * self._wait_s, _AGAIN_LATEST_S)
+        self._over.wait(wait_s)
+        with self._beginning:
+            if self._over.is_set():
+                return
+            self._end_process()
+            try:
+                self._begin()
+            except OSError as error:  # no memory, no processes, no files
+                self._notices.append(f"the page cannot be started again: {error.strerror}")
+
+    def _last_lines(self) -> str:
+        if self._errors is None:
+            return "it gave no reason"
+        lines = _end_of(self._errors).decode(errors="replace").strip().splitlines()
+        return lines[-1].strip() if lines else "it gave no reason"
+
+    def _hang_up(self) -> None:
+        link, self._socket = self._socket, None
+        if link is not None:
+            link.close()
+        stops, self._stops = self._stops, None
+        if stops is not None:
+            stops.close()
+        self._url = None
+
+    def close(self) -> None:
+        """End the page; safe to call twice."""
+        self._over.set()
+        with self._beginning:
+            ear, self._inbox = self._inbox, None
+            if ear is not None:
+                ear.close()
+            self._hang_up()
+            self._end_process()
+
+    def _end_process(self) -> None:
+        if self._process is None:
+            return
+        try:
+            self._process.wait(_CLOSE_TIMEOUT_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._process = None
+        if self._errors is not None:
+            self._errors.close()
+            self._errors = None
+        shutil.rmtree(self._folder, ignore_errors=True)  # it may have been killed
+
+
+def _errors_file() -> BinaryIO:
+    """Return a file without a name: in memory, where the system has such files."""
+    if hasattr(os, "memfd_create"):
+        return os.fdopen(os.memfd_create("page_errors"), "w+b", buffering=0)
+    return tempfile.TemporaryFile(buffering=0)
+
+
+def _end_of(file: BinaryIO) -> bytes:
+    """Return the last bytes of a file that another process may still write to."""
+    start = max(0, os.fstat(file.fileno()).st_size - _LAST_LINES_BYTES)
+    if hasattr(os, "pread"):  # leaves alone where the other process writes
+        return os.pread(file.fileno(), _LAST_LINES_BYTES, start)
+    file.seek(start)
+    return file.read(_LAST_LINES_BYTES)
+
+
+def _code(process: subprocess.Popen[bytes]) -> int | None:
+    """Return the exit code of a process that has hung up, None where it hangs."""
+    try:
+        return process.wait(_CLOSE_TIMEOUT_S)
+    except subprocess.TimeoutExpired:
+        return None

@@ -1,0 +1,354 @@
+"""One tick in the words and shapes that people are shown: the page's snapshot, status words."""
+
+from collections import Counter, deque
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from gazerig.gaze.field_of_view import FieldOfViewParams, line_of_sight
+from gazerig.gaze.types import GazeState, Vec3
+from gazerig.robot.analysis.blink_finder import BlinkEvent
+from gazerig.robot.analysis.event_detector import Event, EventDetector, FixationEvent, SaccadeEvent
+from gazerig.robot.control.loop_timing import LoopTiming, busy_text
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.control.tick_text import doing, lead_text, leader
+from gazerig.robot.model.description.build import RigShape
+from gazerig.robot.model.frames import CameraMount
+from gazerig.robot.model.guard_params import HealthParams
+from gazerig.robot.model.joint_limit import JointLimit
+from gazerig.robot.model.kinematics import Kinematics
+from gazerig.robot.model.leader import sentence
+from gazerig.robot.model.types import (
+    CommandedPose,
+    JointState,
+    Level,
+    LoopFigures,
+    SeenBlink,
+    SeenBody,
+    SeenCamera,
+    SeenEvent,
+    SeenFace,
+    SeenFixation,
+    SeenSaccade,
+    ServoLimits,
+    Servos,
+    Snapshot,
+    Trail,
+)
+
+_TICKS_KEPT = 600
+"""Ticks that wait at most: three seconds, should the one who looks be held up."""
+_TRAIL_S = 0.0095
+"""Joints are shown 100 times a second; a little less than 10 ms, for rounding's sake."""
+_TIMING_S = 0.5
+_LOWER_LIDS = frozenset(("left_lower_lid", "right_lower_lid"))
+_GRAVITY: dict[Level, int] = {"ok": 0, "limited": 1, "hold": 2, "torque_off": 3}
+
+
+class ShownRig(NamedTuple):
+    """How a rig is built, as far as people are shown it.
+
+    shape: of all its parts; None where only its kinematics are known
+    """
+
+    kinematics: Kinematics
+    limits: tuple[JointLimit, ...]
+    health: HealthParams
+    mount: CameraMount
+    horizontal_rad: float
+    field: FieldOfViewParams
+    shape: RigShape | None = None
+
+
+class SnapshotTexts(NamedTuple):
+    """What a tick does not tell: bus figures in words, what is seen, what is in force."""
+
+    health: str = ""
+    behaviour: str = ""
+    perception: str = ""
+    character: str = ""
+    conversation: str = ""
+
+
+class SnapshotBuilder:
+    """Makes snapshots of a running rig, with all that has happened since the one before.
+
+    ``update`` only keeps the tick; ``take`` does the work.
+    """
+
+    def __init__(self, rate_hz: float, rig: ShownRig | None = None) -> None:
+        self.rig = rig
+        self._rate_hz = rate_hz
+        self._ticks: deque[Tick] = deque(maxlen=_TICKS_KEPT)
+        self._newest: Tick | None = None
+        self._begin()
+
+    def _begin(self) -> None:
+        self._timing = LoopTiming(self._rate_hz)
+        self._figures: LoopFigures | None = None
+        self._figures_s = self._trail_s = -np.inf
+        self._events = EventDetector()
+        self._unanswered: Counter[str] = Counter()
+
+    def retune(self, rate_hz: float) -> None:
+        """Go on with a loop of another rate."""
+        if rate_hz != self._rate_hz:
+            self._rate_hz = rate_hz
+            self._timing.retune(rate_hz)
+
+    def update(self, tick: Tick) -> None:
+        """Add a tick."""
+        self._ticks.append(tick)
+
+    def take(self, said: SnapshotTexts) -> Snapshot | None:
+        """Return a snapshot of the newest tick, None before the first."""
+        trail: list[Trail] = []
+        events: list[SeenEvent] = []
+        worst: Level = "ok"
+        while self._ticks:
+            tick = self._ticks.popleft()
+            if self._newest is not None and tick.t_s < self._newest.t_s:
+                self._begin()
+            self._newest = tick
+            self._count(tick)
+            events += map(_seen, self._events.update(tick))
+            if tick.t_s - self._trail_s >= _TRAIL_S:
+                self._trail_s = tick.t_s
+                trail.append(_trail(tick))
+            if _GRAVITY[tick.guard_result.level] > _GRAVITY[worst]:
+                worst = tick.guard_result.level
+        if self._newest is None:
+            return None
+        timing = self._timed(self._newest.t_s)
+        busy = busy_text(timing)
+        plain = snapshot(
+            self._newest, timing.rate_hz if timing else 0.0, said.health, said.behaviour,
+            said.perception, self.rig,
+        )  # fmt: skip
+        return replace(
+            plain,
+            character=said.character,
+            conversation=said.conversation,
+            servos=plain.servos._replace(
+                unanswered=tuple([self._unanswered[name] for name in plain.joints])
+            ),
+            timing=timing,
+            busy=busy,
+            reasons=_by_time(plain.reasons, busy),
+            worst=worst,
+            trail=tuple(trail),
+            events=tuple(events),
+        )
+
+    def _count(self, tick: Tick) -> None:
+        self._timing.update(tick.t_s)
+        if tick.joints.missing:
+            self._unanswered.update(tick.joints.missing)
+
+    def _timed(self, t_s: float) -> LoopFigures | None:
+        """Return the loop's figures, worked out twice a second."""
+        if t_s - self._figures_s >= _TIMING_S:
+            self._figures, self._figures_s = self._timing.figures(), t_s
+        return self._figures
+
+
+def snapshot(
+    tick: Tick,
+    rate_hz: float,
+    health: str,
+    behaviour: str,
+    perception: str = "",
+    rig: ShownRig | None = None,
+) -> Snapshot:
+    """Return what the page is shown of a single tick.
+
+    rig: how it is built, for the commanded pose, the camera and the servos' limits
+    """
+    pose, percept, target = tick.pose, tick.percept, tick.target
+    does, leads = doing(tick), leader(tick)
+    joints = joint_names(tick, rig)
+    return Snapshot(
+        t_s=tick.t_s,
+        measured_rad=tick.joints.position_rad,
+        desired_rad=tick.desired_rad,
+        R_world_head=pose.R_world_head,
+        p_world_head_m=pose.p_world_head_m,
+        p_world_eyes_m=(pose.p_world_eye_left_m, pose.p_world_eye_right_m),
+        gaze_world=(line_of_sight(pose, True), line_of_sight(pose, False)),
+        lids=(pose.lid_left, pose.lid_right),
+        p_world_target_m=tick.gaze.gaze_point_world_m,
+        target_name=does.target,
+        why=does.reason,
+        phase=does.phase,
+        level=tick.guard_result.level,
+        reasons=tick.guard_result.reasons,
+        faces=_faces(tick),
+        bodies=_bodies(tick),
+        rate_hz=rate_hz,
+        health=health,
+        behaviour=behaviour,
+        saliences=() if leads.led else target.saliences,
+        plan="" if leads.led else target.plan,
+        perception=perception,
+        commanded_rad=tick.guard_result.command_rad,
+        target_kind=leads.kind if leads.led else target.kind,
+        target_id=-1 if leads.led else target.id,
+        target_part=None if leads.led else target.part,
+        stopped=tick.stopped,
+        led=lead_text(tick),
+        leader=leads,
+        leads_words=sentence(leads, tick.t_s),
+        headline=does.headline,
+        frame_age_s=percept.age_s(tick.t_s) if percept is not None else None,
+        commanded_pose=_commanded_pose(tick, rig) if rig is not None else None,
+        camera=_camera(tick, rig) if rig is not None else None,
+        field_deg=_field_deg(rig.field) if rig is not None else None,
+        servos=_servos(tick, rig),
+        worst=tick.guard_result.level,
+        trail=(_trail(tick),),
+        joints=joints,
+        estimated=_estimated(tick.joints, joints),
+        lower_lids=_lower_lids(pose, joints),
+        p_world_pivot_m=_pivot(pose, rig),
+    )
+
+
+def _by_time(reasons: tuple[str, ...], busy: str) -> tuple[str, ...]:
+    """Return why joints are limited; a busy computer is named in place of joints that are old."""
+    others = tuple([reason for reason in reasons if not reason.endswith(": stale joints")])
+    return (*others, busy) if busy and len(others) < len(reasons) else reasons
+
+
+def joint_names(tick: Tick, rig: ShownRig | None = None) -> tuple[str, ...]:
+    """Return a name a joint; a recording may know none, then they are numbered."""
+    names = tick.guard_result.joints or (rig.kinematics.names if rig is not None else ())
+    count = len(tick.joints.position_rad)
+    return names if len(names) == count else tuple(f"joint {i + 1}" for i in range(count))
+
+
+def _estimated(joints: JointState, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the joints whose position is not measured; where nothing is said of it, none."""
+    if not joints.measured:
+        return ()
+    pairs = zip(names, joints.measured, strict=True)
+    return tuple([name for name, measured in pairs if not measured])
+
+
+def _lower_lids(pose: GazeState, names: tuple[str, ...]) -> tuple[float, float] | None:
+    return None if _LOWER_LIDS.isdisjoint(names) else (pose.lower_left, pose.lower_right)
+
+
+def _pivot(pose: GazeState, rig: ShownRig | None) -> Vec3 | None:
+    """Return where in the world the neck turns the head."""
+    if rig is None:
+        return None
+    head, _ = rig.kinematics.own_parts(pose.R_world_head, pose.p_world_head_m)
+    return head.start_m
+
+
+def _faces(tick: Tick) -> tuple[SeenFace, ...]:
+    if tick.percept is None:
+        return ()
+    return tuple(
+        SeenFace(
+            face.id,
+            face.p_world_m,
+            face.R_world_face,
+            face.parts_world_m,
+            face.v_world_m_s,
+            face.looks_at_head,
+            face.speaks,
+        )
+        for face in tick.percept.faces
+    )
+
+
+def _bodies(tick: Tick) -> tuple[SeenBody, ...]:
+    """Return what moves and is no face."""
+    if tick.percept is None:
+        return ()
+    bodies = tick.percept.bodies
+    return tuple(
+        SeenBody(bodies.ids[i], kind, _vec(bodies.p_world_m[i]), float(bodies.radius_m[i]))
+        for i, kind in enumerate(bodies.kinds)
+        if kind != "face"
+    )
+
+
+def _commanded_pose(tick: Tick, rig: ShownRig) -> CommandedPose:
+    """Return the pose of head and eyes at the desired angles."""
+    at_rest = (0.0,) * len(tick.desired_rad)
+    pose: GazeState = rig.kinematics.forward(JointState(tick.desired_rad, at_rest, at_rest, ()))
+    return CommandedPose(
+        pose.R_world_head,
+        pose.p_world_head_m,
+        (pose.p_world_eye_left_m, pose.p_world_eye_right_m),
+        (line_of_sight(pose, True), line_of_sight(pose, False)),
+        (pose.lid_left, pose.lid_right),
+        _lower_lids(pose, rig.kinematics.names),
+    )
+
+
+def _camera(tick: Tick, rig: ShownRig) -> SeenCamera | None:
+    """Return where the camera is now, None before its first frame, whose shape it needs."""
+    found = tick.detections
+    if found is None:
+        return None
+    R, p = rig.mount.pose(tick.pose.R_world_head, tick.pose.p_world_head_m)
+    horizontal_rad = rig.horizontal_rad
+    if found.lens is not None:
+        horizontal_rad = float(2.0 * np.arctan(0.5 * found.width_px / found.lens.fx_px))
+    return SeenCamera(R, p, horizontal_rad, found.width_px / found.height_px)
+
+
+def _field_deg(field: FieldOfViewParams) -> tuple[float, float, float, float]:
+    return (field.temporal_deg, field.nasal_deg, field.up_deg, field.down_deg)
+
+
+def _servos(tick: Tick, rig: ShownRig | None) -> Servos:
+    joints = tick.joints
+    return Servos(
+        joints.temperature_c,
+        joints.voltage_v,
+        joints.load,
+        joints.torque,
+        joints.fault,
+        tuple([tick.t_s - at_s for at_s in joints.measured_s]),
+        (),
+        _limits(rig) if rig is not None else None,
+    )
+
+
+def _limits(rig: ShownRig) -> ServoLimits:
+    health = rig.health
+    return ServoLimits(
+        tuple([limit.hottest_c - health.warm_c for limit in rig.limits]),
+        tuple([limit.hottest_c - health.hot_c for limit in rig.limits]),
+        tuple([limit.lowest_v + health.voltage_margin_v for limit in rig.limits]),
+        tuple([limit.highest_v - health.voltage_margin_v for limit in rig.limits]),
+        (health.lasting_load,) * len(rig.limits),
+    )
+
+
+def _trail(tick: Tick) -> Trail:
+    return Trail(
+        tick.t_s, tick.desired_rad, tick.guard_result.command_rad, tick.joints.position_rad
+    )
+
+
+def _seen(event: Event) -> SeenEvent:
+    match event:
+        case SaccadeEvent():
+            return SeenSaccade(
+                event.onset_s, event.duration_s, event.amplitude_deg, event.peak_deg_s
+            )
+        case FixationEvent():
+            return SeenFixation(event.start_s, event.duration_s, event.part)
+        case BlinkEvent():
+            return SeenBlink(event.onset_s, event.duration_s)
+
+
+def _vec(row: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> Vec3:
+    x, y, z = row.tolist()
+    return (x, y, z)

@@ -1,0 +1,1 @@
+"""What is shown and tuned beside the view: charts, figures, controls, health."""

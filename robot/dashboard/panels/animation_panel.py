@@ -1,0 +1,73 @@
+"""What moves the face on the page: a button for each expression and for each gesture."""
+
+from collections.abc import Sequence
+
+from gazerig.gaze.expression import NEUTRAL
+from gazerig.robot.dashboard.requests.outbox import Outbox
+from gazerig.robot.dashboard.widgets.container import Container
+from gazerig.robot.dashboard.widgets.widget import Buttons, Slider
+from gazerig.robot.model.commands import NO_GESTURE, Express, Play
+
+EXPRESSION = "expression"
+GESTURE = "gesture"
+"""The menus of these names are shown here."""
+_SPEEDS, _SPEED_STEP = (0.5, 2.0), 0.1
+"""Slowest and fastest speed of gestures."""
+
+
+class AnimationPanel:
+    """A section of the controls; it appears when the rig offers something for it.
+
+    Args:
+        place: where the section is added.
+        outbox: takes commands for the rig.
+    """
+
+    def __init__(self, place: Container, outbox: Outbox) -> None:
+        self._place, self._outbox = place, outbox
+        self._section: Container | None = None
+        self.expressions: Buttons | None = None
+        self.strength: Slider | None = None
+        self.gestures: Buttons | None = None
+        self.speed: Slider | None = None
+
+    def offer(self, names: Sequence[str]) -> None:
+        """Show a button for each expression, in place of those before."""
+        options = tuple(sorted(names, key=lambda name: (name != NEUTRAL, name)))
+        if self.expressions is not None:
+            self.expressions.options = options
+            return
+        section = self._shown()
+        self.expressions = section.buttons(EXPRESSION, options, order=1)
+        strength = self.strength = section.slider("strength", (0.0, 1.0), 0.05, 1.0, order=2)
+
+        def express(name: str, client: str) -> None:
+            self._outbox.command(Express(name, float(strength.value)), client)
+
+        self.expressions.on_press(express)
+
+    def offer_gestures(self, names: Sequence[str]) -> None:
+        """Show a button for each gesture, in place of those before; the first ends them.
+
+        Args:
+            names: gestures that the rig can do, and the name that ends the one under way.
+        """
+        options = tuple(sorted(names, key=lambda name: (name != NO_GESTURE, name)))
+        if self.gestures is not None:
+            self.gestures.options = options
+            return
+        section = self._shown()
+        self.gestures = section.buttons(GESTURE, options, order=3)
+        speed = self.speed = section.slider("speed", _SPEEDS, _SPEED_STEP, 1.0, order=4)
+
+        def play(name: str, client: str) -> None:
+            gesture = "" if name == NO_GESTURE else name
+            self._outbox.command(Play(gesture, float(speed.value)), client)
+
+        self.gestures.on_press(play)
+
+    def _shown(self) -> Container:
+        """Return the section, which is there once something is offered."""
+        if self._section is None:
+            self._section = self._place.section("face", order=20)
+        return self._section

@@ -1,0 +1,119 @@
+"""HTML of why the gaze is where it is: the winner, its salience by term, and the runners-up."""
+
+from html import escape
+
+from gazerig.gaze.types import Salience
+from gazerig.robot.dashboard.widgets.html import PHASES, chip, heading, note, pill
+from gazerig.robot.model.types import Snapshot
+
+_TERMS = ("translation", "looming", "rotation", "onset", "rule")
+_BECAUSE = {
+    "translation": "moves",
+    "looming": "comes nearer or goes away",
+    "rotation": "turns",
+    "onset": "has just come into view",
+}
+"""What each term of the salience says of a body."""
+_LEAST_TOLD, _SHARE_TOLD = 0.005, 0.1
+"""Terms are told from this salience on, and from this share of the largest."""
+_LEAST_FULL = 1.0
+"""A bar as long as the panel stands for this salience, or for the highest where that is more."""
+
+
+def winner(snapshot: Snapshot) -> str:
+    """Return what is looked at, the reason, and what is in force."""
+    return (
+        f"<div class='big'>{escape(snapshot.target_name)}</div>"
+        f"<div class='tall'>{escape(reason(snapshot))}</div>"
+        f"<div class='in-force'>{pill(snapshot.phase, PHASES.get(snapshot.phase, 'calm'))} "
+        f"{_in_force(snapshot)}</div>"
+    )
+
+
+def reason(snapshot: Snapshot) -> str:
+    """Return why the target won in one plain sentence, e.g. "because it moves (translation 0.38)".
+
+    While somebody leads, or where nothing was compared, it is what the rig says.
+    """
+    if snapshot.leader.led or not snapshot.saliences:
+        return snapshot.why
+    first = snapshot.saliences[0]
+    most = max(first.translation, first.looming, first.rotation, first.onset)
+    moves = ", ".join(
+        f"{words} ({term} {getattr(first, term):.2f})"
+        for term, words in _BECAUSE.items()
+        if getattr(first, term) >= max(_LEAST_TOLD, _SHARE_TOLD * most)
+    )
+    action, _, because = snapshot.plan.partition(": ")
+    named = action or snapshot.behaviour
+    behaviour = f"behaviour {named}" if named else "behaviour"
+    if first.rule < _LEAST_TOLD:
+        return f"because it {moves}" if moves else snapshot.why
+    if not moves:
+        return f"because the {behaviour} asks for it ({first.rule:.2f}){_planned(because)}"
+    return f"because it {moves}, and the {behaviour} adds {first.rule:.2f}{_planned(because)}"
+
+
+def _planned(because: str) -> str:
+    """Return the planner's reason behind a sentence, where there is one."""
+    return f": {because}" if because else ""
+
+
+def saliences(snapshot: Snapshot) -> str:
+    """Return the saliences that were compared, term by term, the highest first."""
+    return "" if snapshot.leader.led else _saliences(snapshot.saliences)
+
+
+def _in_force(snapshot: Snapshot) -> str:
+    named = (
+        ("behaviour", snapshot.behaviour),
+        ("plan", snapshot.plan.partition(":")[0]),
+        ("character", snapshot.character),
+        ("conversation", snapshot.conversation),
+    )
+    return " ".join(chip(f"{what}: {name}") for what, name in named if name)
+
+
+def _saliences(rows: tuple[Salience, ...]) -> str:
+    if not rows:
+        return note("nothing is salient: the gaze wanders by itself")
+    full = max(_LEAST_FULL, *(_sum(one) for one in rows), rows[0].total)
+    bars = "".join(_row(one, full, winner=row == 0) for row, one in enumerate(rows))
+    keys = "".join(
+        f"<span><span class='swatch term-{term}'></span>{term}</span>" for term in _TERMS
+    )
+    return (
+        heading("salience, term by term", "habituation  total")
+        + f"<div class='rows'>{bars}</div>"
+        + f"<div class='key'>{keys}</div>"
+        + note(
+            "translation, looming and rotation are motion across, along and about the line of "
+            "sight (Mitake et al., eq 1); onset is having just come into view, rule the "
+            "behaviour's constant, habituation the share that it leaves"
+        )
+    )
+
+
+def _row(salience: Salience, full: float, *, winner: bool) -> str:
+    """Return one body: its name and figures above a bar of its terms."""
+    bars = "".join(
+        f"<div class='term-{term}' "
+        f"style='width:{100.0 * max(0.0, getattr(salience, term)) / full:.1f}%'></div>"
+        for term in _TERMS
+    )
+    figures = " ".join(
+        f"{term} {getattr(salience, term):.2f}"
+        for term in _TERMS
+        if abs(getattr(salience, term)) >= 0.005
+    )
+    return (
+        f"<div class='body{' first' if winner else ''}'>"
+        f"<div><span>{escape(salience.kind)} {salience.id}</span>"
+        f"<span>{salience.habituation:.2f} &times;&ensp;{salience.total:.2f}</span></div>"
+        f"<div class='bar' aria-hidden='true'>{bars}</div>"
+        f"<div class='small'>{figures}</div></div>"
+    )
+
+
+def _sum(salience: Salience) -> float:
+    return sum(max(0.0, term) for term in salience[2:7])

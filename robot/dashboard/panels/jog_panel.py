@@ -1,0 +1,119 @@
+"""Sliders that put joints at angles, each with the joint's limits; others follow their joints."""
+
+from collections.abc import Mapping
+from math import degrees, radians
+
+from gazerig.robot.dashboard.requests.outbox import Outbox
+from gazerig.robot.dashboard.widgets.container import Container
+from gazerig.robot.dashboard.widgets.html import note
+from gazerig.robot.dashboard.widgets.widget import Slider
+from gazerig.robot.model.commands import Jog
+from gazerig.robot.model.types import Snapshot, in_order
+
+_STEP_DEG = 0.1
+_FIRST, _LAST = 1, 100
+"""Order of the sliders, and of what stands below them."""
+_FOLLOWS_DEG = 0.15
+"""A slider that is not held follows its joint in steps of this."""
+_FREE_AFTER_S = 0.5
+"""A jogged joint whose desired angle is another for this long is no longer jogged."""
+_SAME_DEG = 0.3
+ESTIMATED = "estimated from what was asked for, not measured: the servos tell nothing"
+
+
+class JogPanel:
+    """One slider a joint; they come with the joints' limits.
+
+    Args:
+        place: where they stand.
+        outbox: takes commands for the rig.
+    """
+
+    def __init__(self, place: Container, outbox: Outbox) -> None:
+        self._place, self._outbox = place, outbox
+        self.sliders: dict[str, Slider] = {}
+        # Joint -> angle asked for and the time of the last frame in which it was requested.
+        self._held: dict[str, tuple[float, float]] = {}
+        self._now_s = 0.0
+        place.html(
+            note(
+                "This moves the joint of the real head: slowly, inside the guard's limits. All "
+                'others are held where they are until you let go with "look freely".'
+            ),
+            order=0,
+        )
+        self.not_measured = place.html(order=_LAST)
+
+    def let_go(self) -> None:
+        """Forget which joints were moved here: their sliders follow them again."""
+        self._held.clear()
+
+    def values(self, in_force: Mapping[str, object]) -> None:
+        """Create the sliders, and keep their ends at the joints' limits."""
+        keys = [key.split(".") for key in in_force if key.startswith("joints.")]
+        for joint in in_order(path[1] for path in keys if path[2:] == ["min_deg"]):
+            low, high = (in_force.get(f"joints.{joint}.{end}_deg") for end in ("min", "max"))
+            if not (isinstance(low, int | float) and isinstance(high, int | float)):
+                continue
+            slider = self.sliders.get(joint)
+            if slider is None:
+                self.sliders[joint] = self._add(joint, float(low), float(high))
+            else:
+                slider.ends = (float(low), float(high))
+
+    def _add(self, joint: str, low_deg: float, high_deg: float) -> Slider:
+        slider = self._place.slider(
+            joint.replace("_", " "),
+            (low_deg, high_deg),
+            _STEP_DEG,
+            min(max(0.0, low_deg), high_deg),
+            hint=(
+                f"moves the joint, slowly; {low_deg:g} to {high_deg:g} deg, + left, up, open, "
+                "right ear down"
+            ),
+            order=_FIRST + len(self.sliders),
+        )
+        slider.on_change(lambda angle_deg, client: self._jog(joint, angle_deg, client))
+        return slider
+
+    def _jog(self, joint: str, angle_deg: float, who: str) -> None:
+        self._held[joint] = (angle_deg, self._now_s)
+        self._outbox.command(Jog(((joint, radians(angle_deg)),)), who)
+
+    def show(self, snapshot: Snapshot) -> None:
+        """Let sliders that are not held follow their joints, and say which are not measured."""
+        if snapshot.t_s < self._now_s:  # the rig's clock was started again
+            self._held.clear()
+        self._now_s = snapshot.t_s
+        places = {joint: i for i, joint in enumerate(snapshot.joints)}
+        for joint, slider in self.sliders.items():
+            if (i := places.get(joint)) is None:
+                continue
+            self._note_held(joint, degrees(snapshot.desired_rad[i]), bool(snapshot.stopped))
+            angle_deg = degrees(snapshot.measured_rad[i])
+            if joint not in self._held and abs(slider.value - angle_deg) > _FOLLOWS_DEG:
+                low, high = slider.ends
+                slider.value = round(min(max(angle_deg, low), high), 1)
+        self.not_measured.content = not_measured(snapshot)
+
+    def _note_held(self, joint: str, desired_deg: float, stopped: bool) -> None:
+        """Forget a joint that was let go elsewhere, by a stop or another command."""
+        held = self._held.get(joint)
+        if held is None:
+            return
+        angle_deg, at_s = held
+        if stopped:
+            del self._held[joint]
+        elif abs(desired_deg - angle_deg) < _SAME_DEG:
+            self._held[joint] = (angle_deg, self._now_s)
+        elif self._now_s - at_s > _FREE_AFTER_S:
+            del self._held[joint]
+
+
+def not_measured(snapshot: Snapshot) -> str:
+    """Return which joints' angles are estimated, as HTML, "" where all are measured."""
+    estimated = [joint for joint in snapshot.joints if joint in frozenset(snapshot.estimated)]
+    if not estimated:
+        return ""
+    names = "all joints" if len(estimated) == len(snapshot.joints) else ", ".join(estimated)
+    return note(f"{names.replace('_', ' ')}: {ESTIMATED}")

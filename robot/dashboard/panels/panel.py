@@ -1,0 +1,175 @@
+"""What people see of the rig beside the view: camera, reasons, traces, figures and health."""
+
+from collections.abc import Callable
+from math import inf
+
+import cv2
+import numpy as np
+
+from gazerig.drivers.types import ImageArray
+from gazerig.robot.dashboard.feed.camera_overlay import encode
+from gazerig.robot.dashboard.feed.overlay_choices import OverlayChoices
+from gazerig.robot.dashboard.panels.attention_panel import saliences, winner
+from gazerig.robot.dashboard.panels.dwell_chart import DwellChart
+from gazerig.robot.dashboard.panels.event_timeline import Timeline
+from gazerig.robot.dashboard.panels.gaze_map import GazeMap
+from gazerig.robot.dashboard.panels.joint_charts import JointCharts, JointSeries
+from gazerig.robot.dashboard.panels.main_sequence_chart import MainSequenceChart
+from gazerig.robot.dashboard.panels.run_figures import HOW_TO, RunFigures
+from gazerig.robot.dashboard.panels.servo_health import health
+from gazerig.robot.dashboard.panels.status import alarms, silence
+from gazerig.robot.dashboard.widgets.container import Container
+from gazerig.robot.dashboard.widgets.html import note
+from gazerig.robot.dashboard.widgets.widgets import PANELS, Widgets
+from gazerig.robot.model.types import SeenFixation, SeenSaccade, Snapshot
+
+# What is shown by and by, in frames of the page, of which there are at most 25 a second.
+_WORDS_EVERY, _TRACES_EVERY, _STRIP_EVERY, _FIGURES_EVERY = 3, 4, 8, 25
+
+
+class PanelView:
+    """Camera image, alarms, and the drawers Watch, Health and Report.
+
+    A drawer that nobody has open is not drawn.
+
+    layers: what is to be drawn into the scene, as chosen by the users
+    depth: called whenever a user selects the depth image or the plain one
+    """
+
+    def __init__(self, widgets: Widgets) -> None:
+        self._widgets = widgets
+        self._shown = 0
+        self._open: frozenset[str] = frozenset()
+        self.depth: Callable[[bool], None] = _ignore
+        self.silence = widgets.panel("watch").html(order=0)
+        self._begin()
+        self.alarms = widgets.panel("headline").html()
+        self.image = widgets.panel("camera").image("what the camera sees", pick=True)
+        watch = widgets.panel("watch")
+        self.winner = watch.html(note("waiting for the rig"), order=1)
+        self.saliences = watch.html(order=2)
+        self.strip = watch.section("the last 30 seconds", order=3).html()
+        self.traces = JointCharts(watch.section("traces", order=4))
+        statistics = watch.section("statistics", is_open=False, order=5)
+        self.of_what = statistics.html(order=1)
+        self.saccades = statistics.html(order=2)
+        self.dwells = statistics.html(order=3)
+        heat = watch.section("heat map on the face", is_open=False, order=6)
+        heat.html(note("where on the face the gaze has been; yellow is where it was longest"))
+        self.map = heat.image("heat map: where on a face the gaze has been")
+        self.view = watch.section("view", is_open=False, order=7)
+        self.layers = self._add_layers(self.view)
+        self.health = widgets.panel("health").html(note("waiting for the rig"))
+        report = widgets.panel("report")
+        self.figures = report.html(order=1)
+        report.html(HOW_TO, order=2)
+
+    def _begin(self) -> None:
+        """Start all that is gathered from the snapshots."""
+        self._last_s = -inf
+        self._last: Snapshot | None = None
+        self._traces, self._timeline = JointSeries(), Timeline()
+        self._sequence, self._dwell = MainSequenceChart(), DwellChart()
+        self._map, self._figures = GazeMap(), RunFigures()
+
+    def update(self, snapshots: tuple[Snapshot, ...]) -> None:
+        """Remember every snapshot for traces and figures, also those that are not drawn.
+
+        One from before the last, of a rig or recording that starts again, resets all.
+        """
+        if snapshots:
+            self.silence.content = ""
+        for snapshot in snapshots:
+            if snapshot.t_s < self._last_s:
+                self._begin()
+            self._last_s, self._last = snapshot.t_s, snapshot
+            self._traces.add(snapshot)
+            self._timeline.update(snapshot)
+            self._map.update(snapshot)
+            self._figures.update(snapshot)
+            for event in snapshot.events:
+                if isinstance(event, SeenSaccade):
+                    self._sequence.update(event)
+                elif isinstance(event, SeenFixation):
+                    self._dwell.update(event)
+
+    def show(self) -> None:
+        """Draw the newest words and, less often, traces, strip and figures."""
+        if (snapshot := self._last) is None:
+            return
+        before, self._open = self._open, frozenset(filter(self._widgets.sees, PANELS))
+        if self._open - before:
+            self.draw_all()
+        if self._shown % _WORDS_EVERY == 0:
+            self.alarms.content = alarms(snapshot)
+            if "watch" in self._open:
+                self.winner.content = winner(snapshot)
+                self.saliences.content = saliences(snapshot)
+                self.of_what.content = of_what(snapshot)
+            if "health" in self._open:
+                self.health.content = health(snapshot)
+        if "watch" in self._open and self._shown % _TRACES_EVERY == 0:
+            self.traces.show(self._traces)
+        if "watch" in self._open and self._shown % _STRIP_EVERY == 0:
+            self.strip.content = self._timeline.drawing()
+        if self._shown % _FIGURES_EVERY == 0:
+            self._draw_figures()
+        self._shown += 1
+
+    def silent(self) -> None:
+        """Show that the rig sends nothing any more, until it does again."""
+        self.silence.content = silence()
+
+    def draw_all(self) -> None:
+        """Draw everything at the next frame, whichever element is due."""
+        self._shown = 0
+
+    def show_jpeg(self, jpeg: bytes) -> None:
+        """Show a recorded camera image."""
+        self.image.show(jpeg)
+
+    def show_image(self, bgr: ImageArray) -> None:
+        """Show the camera image."""
+        self.image.show(encode(bgr))
+
+    def _draw_figures(self) -> None:
+        """Draw what grows as the rig runs."""
+        if "report" in self._open:
+            self.figures.content = self._figures.table(self._dwell)
+        if "watch" not in self._open:
+            return
+        self.dwells.content = self._dwell.drawing()
+        self.saccades.content = self._sequence.drawing()
+        if self._map.seconds > 0.0:
+            bgr = cv2.cvtColor(self._map.image(), cv2.COLOR_RGB2BGR)
+            self.map.show(encode(np.asarray(bgr, np.uint8)))
+
+    def _add_layers(self, place: Container) -> OverlayChoices:
+        layers = OverlayChoices()
+        for order, (name, says) in enumerate(OverlayChoices.NAMES.items()):
+            box = place.checkbox(says, getattr(layers, name), order=order)
+            box.on_change(_setter(layers, name))
+        depth = place.checkbox("depth instead of the camera image", value=False, order=99)
+        depth.on_change(lambda on, _: self.depth(on))
+        return layers
+
+
+def of_what(snapshot: Snapshot) -> str:
+    """Return a remark that eye movements are estimated, "" if they are measured."""
+    if not any("eye" in joint for joint in snapshot.estimated):
+        return ""
+    return note(
+        "The eyes' servos give no feedback: these are the movements the eyes should make, "
+        "estimated from their goals, and no measurements."
+    )
+
+
+def _setter(layers: OverlayChoices, name: str) -> Callable[[bool, str], None]:
+    def put(wanted: bool, client: str) -> None:
+        setattr(layers, name, wanted)
+
+    return put
+
+
+def _ignore(wanted: bool) -> None:
+    """Do nothing: there is no receiver."""

@@ -1,0 +1,177 @@
+"""One parameter as a control: a slider, a tick box, a choice or a line of text."""
+
+import json
+from collections.abc import Callable
+from math import floor, isclose, log10
+from typing import cast
+
+from gazerig.robot.dashboard.widgets.container import Container
+from gazerig.robot.dashboard.widgets.widget import Checkbox, Choice, Slider, TextField
+from gazerig.robot.remote.param_info import ParamInfo
+
+Put = Callable[[str, object], None]
+"""Asks for another value: key, value."""
+
+_SLIDER_STEPS = 500
+_FAR = 20.0
+"""A range this many times wider than the value needs a number typed, not a slider."""
+
+
+def hint(param: ParamInfo) -> str:
+    """Return the tooltip of a parameter: description, range and default."""
+    parts = [f"{param.key}: {param.description}" if param.description else param.key]
+    unit = f" {param.unit}" if param.unit else ""
+    if param.low is not None and param.high is not None:
+        parts.append(f"from {param.low:g} to {param.high:g}{unit}")
+    if param.choices:
+        parts.append("one of " + ", ".join(map(str, param.choices)))
+    if param.default is not None or param.optional:  # else the shipped rig has no such joint or bus
+        parts.append(f"default {written(param, param.default)}{unit}")
+    parts.append(f"in force at the {param.live}")
+    return "; ".join(parts)
+
+
+def label(param: ParamInfo, unsaved: bool) -> str:
+    """Name a control: the last parts of the key, its unit, a mark where it is not saved."""
+    unit = f" ({param.unit})" if param.unit else ""
+    name = ".".join(param.key.split(".")[-2:])
+    return f"{'● ' if unsaved else ''}{name}{unit}"
+
+
+def step_of(low: float, high: float) -> float:
+    """Return a slider's step: 1, 2 or 5 times a power of ten, some hundreds to the range."""
+    fine = (high - low) / _SLIDER_STEPS
+    ten = 10.0 ** floor(log10(fine))
+    return next(n * ten for n in (1.0, 2.0, 5.0, 10.0) if n * ten >= fine * (1.0 - 1e-9))
+
+
+def slides(param: ParamInfo, value: object) -> bool:
+    """Return whether a slider can set a parameter finely enough."""
+    if param.kind not in ("number", "whole") or isinstance(value, bool):
+        return False
+    if param.optional and param.default is None:  # a slider cannot be put back to null
+        return False
+    low, high = param.low, param.high
+    if low is None or high is None or not low < high or not isinstance(value, int | float):
+        return False
+    usual = max(abs(v) for v in (value, param.default) if isinstance(v, int | float))
+    return low <= value <= high and (usual == 0.0 or high - low <= _FAR * usual)
+
+
+def written(param: ParamInfo, value: object) -> str:
+    """Write a value as a person types it: text as it is, everything else as in the file."""
+    if isinstance(value, str) and param.kind in ("text", "choice"):
+        return value
+    if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
+        return f"{value:.1f}"
+    return json.dumps(value)
+
+
+def read(param: ParamInfo, text: str) -> object:
+    """Read what a person typed.
+
+    Raises:
+        ValueError: it is nothing of the kind; the message says what would be.
+    """
+    text = text.strip()
+    if param.optional and text in ("null", ""):
+        return None
+    if param.kind in ("text", "choice"):
+        return text
+    try:
+        return json.loads(text)
+    except ValueError:
+        like = written(param, param.default)
+        raise ValueError(
+            f"{param.key}: {text!r} is no {param.kind}; write it like {like}"
+        ) from None
+
+
+class ParamControl:
+    """A parameter's control in one browser.
+
+    Args:
+        place: where it is added.
+        param: the parameter.
+        value: the one in force; unsaved: whether it differs from the file's.
+        put: called when a person asks for another value.
+        refuse: called with words when what was typed cannot be read.
+        order: its place among the others.
+    """
+
+    def __init__(
+        self,
+        place: Container,
+        param: ParamInfo,
+        value: object,
+        unsaved: bool,
+        put: Put,
+        refuse: Callable[[str], None],
+        order: float,
+    ) -> None:
+        self.param, self.order = param, order
+        self._put, self._refuse = put, refuse
+        self.field = self._add(place, label(param, unsaved), value, order)
+        self.field.on_change(lambda shown, _: self._asked(shown))
+
+    def _add(
+        self, place: Container, text: str, value: object, order: float
+    ) -> Checkbox | Choice | Slider | TextField:
+        param, tooltip = self.param, hint(self.param)
+        if param.kind == "bool" and not param.optional:
+            return place.checkbox(text, bool(value), hint=tooltip, order=order)
+        if param.choices and not param.optional and value in param.choices:
+            names = tuple(map(str, param.choices))
+            return place.choice(text, names, str(value), hint=tooltip, order=order)
+        if slides(param, value):
+            return self._slider(place, text, value, order)
+        shown = written(param, value)
+        return place.text(text, shown, hint=f"{tooltip}; Enter sets it", order=order)
+
+    def _slider(self, place: Container, text: str, value: object, order: float) -> Slider:
+        low, high = cast(float, self.param.low), cast(float, self.param.high)
+        now, whole, step = cast(float, value), self.param.kind == "whole", step_of(low, high)
+        if whole:
+            step = max(1, round(step)) if high - low > 500 else 1
+        return place.slider(
+            text, (low, high), step, now, hint=hint(self.param), whole=whole, order=order
+        )
+
+    def _asked(self, shown: object) -> None:
+        """Ask for what a person has set."""
+        try:
+            value = self._meant(shown)
+        except ValueError as error:
+            self._refuse(str(error))
+        else:
+            self._put(self.param.key, value)
+
+    def _meant(self, shown: object) -> object:
+        """Return the choice that a name stands for, what a text says, or the value itself.
+
+        Raises:
+            ValueError: the text cannot be read.
+        """
+        if isinstance(self.field, TextField):
+            return read(self.param, str(shown))
+        return next((c for c in self.param.choices if str(c) == shown), shown)
+
+    def show(self, value: object, unsaved: bool) -> None:
+        """Show the value in force."""
+        self.field.label = label(self.param, unsaved)
+        if isinstance(self.field, TextField):
+            self.field.value = written(self.param, value)
+        elif isinstance(self.field, Choice):
+            self.field.value = str(value)
+        elif isinstance(self.field, Checkbox):
+            self.field.value = bool(value)
+        elif isinstance(value, int | float) and not isclose(value, self.field.value, rel_tol=1e-12):
+            self.field.value = value
+
+    def can_show(self, value: object) -> bool:
+        """Return whether this control can show a value: a slider cannot show null."""
+        return isinstance(self.field, TextField) or value is not None
+
+    def remove(self) -> None:
+        """Remove the control."""
+        self.field.remove()

@@ -1,0 +1,160 @@
+"""The page's panel for a recording: a time slider, play and pause, speed, steps, what happened.
+
+What a person does is only told to the rig's side, which plays; what is shown here is what
+it says back, so that every browser shows the same.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from html import escape
+from typing import Any
+
+from gazerig.robot.dashboard.feed.page_process import MARK_KINDS, SPEEDS
+from gazerig.robot.dashboard.widgets.container import Container
+
+Tell = Callable[[str, Mapping[str, object]], None]
+"""Hands what a person asks for to the rig's side: the browser's tab, and the request."""
+
+_WIDTH, _HEIGHT = 340, 26
+_ROWS = (("saccade", "saccade", 0, 12), ("blink", "pursue", 13, 6), ("event", "alarm", 20, 6))
+"""Kind of mark, its colour, and where its row is."""
+_EVENTS_BEFORE, _EVENTS_AFTER = 2, 2
+_STEP_S = 0.005
+_WORDS = 90
+_PLAY, _PAUSE = "play", "pause"
+
+
+class ReplayView:
+    """The controls of a recording that is shown.
+
+    Args:
+        place: where they stand.
+        tell: takes what people ask for.
+        duration_s: length of the recording.
+    """
+
+    def __init__(self, place: Container, tell: Tell, duration_s: float) -> None:
+        self._tell = tell
+        self._asked_s: float | None = None
+        self._events: Sequence[tuple[float, str]] = ()
+        self._duration_s = max(duration_s, _STEP_S)
+        self.place = place.html(order=1)
+        self.slider = place.slider("time, s", (0.0, self._duration_s), _STEP_S, 0.0, order=2)
+        self.strip = place.html(order=3)
+        self.play = place.buttons("", (_PLAY,), order=4)
+        speeds = tuple(_speed_name(speed) for speed in SPEEDS)
+        self.speed = place.choice("speed", speeds, _speed_name(1.0), order=5)
+        self.steps = {
+            way: place.buttons(way, MARK_KINDS, hint=f"stand still at the {way} one", order=6)
+            for way in ("previous", "next")
+        }
+        self.events = place.section("events", order=7).html()
+        self._playing = False
+        self._listen()
+
+    def _listen(self) -> None:
+        self.slider.on_change(self._seek)
+        self.play.on_press(lambda _, client: self._ask(client, {"play": not self._playing}))
+        self.speed.on_change(
+            lambda speed, client: self._ask(client, {"speed": float(speed.removesuffix("x"))})
+        )
+        for way, group in self.steps.items():
+            group.on_press(self._stepper(way))
+
+    def _stepper(self, way: str) -> Callable[[str, str], None]:
+        def step(kind: str, client: str) -> None:
+            self._ask(client, {"step": f"{way} {kind}"})
+
+        return step
+
+    def _seek(self, at_s: float, client: str) -> None:
+        self._asked_s = at_s
+        self._ask(client, {"seek_s": at_s})
+
+    def _ask(self, client: str, asked: dict[str, object]) -> None:
+        self._tell(client, {"replay": asked})
+
+    def show(self, state: Mapping[str, Any]) -> None:
+        """Show where it stands, as gazerig.robot.recording.replay writes it: a player's State.
+
+        Once there are also marks, counts along the recording by kind, and events, (at_s, words).
+        """
+        if (marks := state.get("marks")) is not None:
+            self.strip.content = strip(marks)
+        if (events := state.get("events")) is not None:
+            self._events = [(float(at_s), str(text)) for at_s, text in events]
+        at_s, sought_s = float(state["at_s"]), state["sought_s"]
+        # While a hand moves the slider, what is played is behind it and must not pull it back.
+        if self._asked_s is None or sought_s == self._asked_s:
+            self._asked_s = None
+            self.slider.value = min(round(at_s, 3), self._duration_s)
+        self._show_playing(bool(state["playing"]), float(state["speed"]))
+        self.place.content = place_words(at_s, self._duration_s, self._playing)
+        self.events.content = event_list(self._events, at_s)
+
+    def _show_playing(self, playing: bool, speed: float) -> None:
+        if playing != self._playing:
+            self._playing = playing
+            self.play.options = (_PAUSE if playing else _PLAY,)
+        name = _speed_name(speed)
+        if name in self.speed.options:
+            self.speed.value = name
+
+
+def strip(marks: Mapping[str, Sequence[int]]) -> str:
+    """Draw how many saccades, blinks and events there are along the recording, as SVG.
+
+    marks: counts of equal shares of the recording, by kind
+    """
+    bars = "".join(
+        _bars(marks.get(kind, ()), colour, top, height) for kind, colour, top, height in _ROWS
+    )
+    legend = "".join(
+        f"<span><span class='swatch ground-{colour}'></span>{kind}s</span>"
+        for kind, colour, _, _ in _ROWS
+    )
+    said = ", ".join(f"{sum(marks.get(kind, ()))} {kind}s" for kind, *_ in _ROWS)
+    return (
+        f"<svg viewBox='0 0 {_WIDTH} {_HEIGHT}' preserveAspectRatio='none' class='strip' "
+        f"role='img' aria-label='{said}'>{bars}</svg><div class='key'>{legend}</div>"
+    )
+
+
+def _bars(counts: Sequence[int], colour: str, top: int, height: int) -> str:
+    """Draw one row: a bar a share of the recording, the darker the more happened in it."""
+    most, width = max(counts, default=0), _WIDTH / max(len(counts), 1)
+    return "".join(
+        f"<rect x='{i * width:.1f}' y='{top}' width='{width:.1f}' height='{height}' "
+        f"fill='var(--{colour})' fill-opacity='{0.25 + 0.75 * n / most:.2f}'/>"
+        for i, n in enumerate(counts)
+        if n
+    )
+
+
+def place_words(at_s: float, duration_s: float, playing: bool) -> str:
+    """Show the present position in the recording."""
+    word = "playing" if playing else "standing still"
+    return f"<div class='ends'><span>{word}</span><span>{clock(at_s)} / {clock(duration_s)}</span></div>"
+
+
+def clock(seconds: float) -> str:
+    """Write seconds as minutes and seconds, e.g. "1:02.345"."""
+    thousandths = round(seconds * 1e3)
+    return f"{thousandths // 60000}:{thousandths % 60000 / 1e3:06.3f}"
+
+
+def event_list(events: Sequence[tuple[float, str]], at_s: float) -> str:
+    """List the events about a time: the last two, and the next two paler."""
+    past = [e for e in events if e[0] <= at_s + 1e-6][-_EVENTS_BEFORE:]
+    coming = [e for e in events if e[0] > at_s + 1e-6][:_EVENTS_AFTER]
+    rows = [_event(*event, "past") for event in past]
+    rows += [_event(*event, "quiet") for event in coming]
+    return "".join(rows) or "no event"
+
+
+def _event(at_s: float, text: str, kind: str) -> str:
+    shown = text if len(text) <= _WORDS else f"{text[: _WORDS - 1]}…"
+    return f"<div class='{kind}'>{clock(at_s)} {escape(shown)}</div>"
+
+
+def _speed_name(speed: float) -> str:
+    return f"{speed:g}x"

@@ -1,0 +1,78 @@
+"""What is wrong with the rig, in a few words; where nothing is, nothing is said."""
+
+from html import escape
+
+from gazerig.robot.dashboard.widgets.html import LEVELS, banner, counted, note
+from gazerig.robot.model.types import Snapshot
+
+_REASONS_SHOWN = 4
+_STANDS_STILL = {
+    "hold": "guard: hold - joints are held where they are",
+    "torque_off": "guard: torque off - joints are let go",
+}
+OLD_FRAME_S = 0.5
+"""From this age on a frame is called old: the guard stops the neck at three times that."""
+
+
+def alarms(snapshot: Snapshot) -> str:
+    """Return banners for joints that are held and for an old frame, "" where all is well.
+
+    That the rig is stopped is said beside the stop button.
+    """
+    said, kind = "", LEVELS[snapshot.level]
+    if not snapshot.stopped and snapshot.level in ("hold", "torque_off"):
+        said += banner(_STANDS_STILL[snapshot.level], kind, _shown(snapshot.reasons))
+    if snapshot.frame_age_s is not None and snapshot.frame_age_s >= OLD_FRAME_S:
+        said += banner(f"the frame is {snapshot.frame_age_s:.1f} s old", "hold")
+    return said
+
+
+def silence() -> str:
+    """Return a message that the rig sends nothing any more."""
+    return note(
+        "silent: nothing has come from the rig for a second; what is shown is the last that was "
+        "seen"
+    )
+
+
+def drawn_together(reasons: tuple[str, ...]) -> str:
+    """Return each reason once, with its first joint and the number of others.
+
+    For example "too fast (neck_yaw, +2)": a limitation that lasts a moment must not move what is
+    below it under the user's finger.
+    """
+    joints: dict[str, list[str]] = {}
+    for reason in reasons:
+        joint, _, why = reason.partition(": ")
+        joints.setdefault(why, []).append(joint)
+    return ", ".join(
+        f"{why} ({named[0]}{f', +{len(named) - 1}' if len(named) > 1 else ''})"
+        for why, named in joints.items()
+    )
+
+
+def one_line(text: str) -> str:
+    """Cut words at the panel's edge; the mouse shows all of them."""
+    said = escape(text)
+    return f"<div class='line' title='{said}'>{said}</div>"
+
+
+def without_feedback(snapshot: Snapshot) -> str:
+    """Return the number of joints without position feedback, "" if all are measured."""
+    estimated = snapshot.estimated
+    if not estimated:
+        return ""
+    torque = dict(zip(snapshot.joints, snapshot.servos.torque, strict=False))
+    without_torque = sum(not torque.get(joint, True) for joint in estimated)
+    where = "shown where they should be"
+    if without_torque:  # a finger moves them, and no sensor sees it
+        where += f"; {'all' if without_torque == len(estimated) else without_torque} without torque: may be anywhere"
+    return (
+        f"<div class='warn'>{len(estimated)} of "
+        f"{counted(len(snapshot.joints), 'joint')} without feedback: {where}</div>"
+    )
+
+
+def _shown(reasons: tuple[str, ...]) -> tuple[str, ...]:
+    more = len(reasons) - _REASONS_SHOWN
+    return reasons[:_REASONS_SHOWN] + ((f"and {more} more",) if more > 0 else ())

@@ -1,0 +1,1 @@
+"""What people do at the page, checked and handed to the rig."""

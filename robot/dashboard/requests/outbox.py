@@ -1,0 +1,72 @@
+"""The page's voice: what people do in their browsers goes to the rig from here."""
+
+import json
+import threading
+from collections.abc import Callable, Mapping
+
+from gazerig.drivers.message_link import DONT_WAIT, MessageLink
+from gazerig.robot.dashboard.requests.inbox import MESSAGE_BYTES, PICTURE, request_message
+from gazerig.robot.dashboard.requests.token_bucket import TokenBucket
+from gazerig.robot.model.clock import Clock, RealClock
+from gazerig.robot.model.command_json import as_json
+from gazerig.robot.model.commands import Command, Leading
+
+DOOR = "door"
+"""Who asks where it is the stop button or a click in the image."""
+
+
+_PER_S, _BURST = 100.0, 200.0
+"""Requests of all browsers together; each drags one thing, at some 20 changes a second."""
+
+
+class Outbox:
+    """Sends requests over the page's socket; from any thread.
+
+    name: returns what the browser of a client of the page is called; leads: is told of one
+    that leads the head now
+    """
+
+    def __init__(self, feed: MessageLink, clock: Clock | None = None) -> None:
+        self._feed = feed
+        self._clock = clock if clock is not None else RealClock()
+        self._rate = TokenBucket(_PER_S, _BURST)
+        self._lock = threading.Lock()
+        self.name: Callable[[str], str] = _unnamed
+        self.leads: Callable[[str], object] = _unnamed
+
+    def command(self, command: Command, who: str) -> bool:
+        """Return a command; False where the rig does not take it now."""
+        if isinstance(command, Leading):
+            self.leads(self.name(who))
+            command = command._replace(who=self.name(who))
+        return self.ask(as_json(command), who)
+
+    def ask(self, data: Mapping[str, object], who: str) -> bool:
+        """Send a request; ``who`` is returned with the reply."""
+        return self.hand_on(json.dumps(data, separators=(",", ":")).encode(), who)
+
+    def picture(self, jpeg: bytes) -> bool:
+        """Hand on a picture of a browser's own camera; False where the rig does not take it."""
+        try:
+            self._feed.send(PICTURE + jpeg, DONT_WAIT)
+        except OSError:  # full, gone, or too long
+            return False
+        return True
+
+    def hand_on(self, data: bytes, who: str = DOOR) -> bool:
+        """Hand on a compact JSON object."""
+        message = request_message(who, data)
+        with self._lock:
+            if len(message) > MESSAGE_BYTES or not self._rate.take(self._clock.now_s()):
+                return False
+        try:
+            # A rig that takes nothing must not hold up the others who ask.
+            self._feed.send(message, DONT_WAIT)
+        except OSError:  # full, or gone: then the page ends by itself
+            return False
+        return True
+
+
+def _unnamed(client: str) -> str:
+    """Return no name: it is unknown which browser a client is."""
+    return ""

@@ -1,0 +1,114 @@
+"""A pointer over the view -> a point of the world between viewer and head, to be looked at.
+
+The eyes seem to look at the pointer because they look at a point of the line of sight on which
+the viewer sees it. A pointer leads only as long as its points come: without one for a second the
+gaze is free again.
+"""
+
+from collections.abc import Callable
+from math import isfinite, tan
+from typing import NamedTuple
+
+from gazerig.gaze.angles import add, dot, norm, scale, sub
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.dashboard.requests.token_bucket import TokenBucket
+from gazerig.robot.model.clock import Clock, RealClock
+
+PER_S, BURST = 40.0, 40.0
+"""Points of all browsers together; one sends 20 a second."""
+TOWARDS_HEAD = 0.6
+"""Where the plane stands on which the pointer moves: this share of the way to the head."""
+_NEAREST_M = 0.02
+_WIDEST, _NARROWEST = 10.0, 0.1  # width of the view by its height
+
+
+class ViewCamera(NamedTuple):
+    """From where a browser sees the scene.
+
+    R_world_camera: x right, y down, z ahead; fov_rad: from the upper to the lower edge
+    """
+
+    p_world_m: Vec3
+    R_world_camera: Mat3
+    fov_rad: float
+
+
+class Pointer(NamedTuple):
+    """A pointer over the view: 0..1 from the left and from the top, width by height of the view."""
+
+    x: float
+    y: float
+    aspect: float
+
+
+def pointer_of(asked: object) -> Pointer | None:
+    """Return the pointer that a browser sent, None where it is none."""
+    match asked:
+        case {"x": int() | float() as x, "y": int() | float() as y, "aspect": int() | float() as a}:
+            pointer = Pointer(float(x), float(y), float(a))
+        case _:
+            return None
+    inside = 0.0 <= pointer.x <= 1.0 and 0.0 <= pointer.y <= 1.0
+    return pointer if inside and _NARROWEST <= pointer.aspect <= _WIDEST else None
+
+
+def pointed_at(pointer: Pointer, camera: ViewCamera, p_world_eyes_m: Vec3) -> Vec3 | None:
+    """Return the point of the world, None where the viewer is inside the head.
+
+    Args:
+        pointer: over the view.
+        camera: from where the view is seen.
+        p_world_eyes_m: the middle between the eyes, world frame.
+    """
+    to_head = sub(p_world_eyes_m, camera.p_world_m)
+    if norm(to_head) < _NEAREST_M:
+        return None
+    half = tan(0.5 * camera.fov_rad)
+    right, down, ahead = zip(*camera.R_world_camera, strict=True)
+    across = scale(right, (2.0 * pointer.x - 1.0) * half * pointer.aspect)
+    ray = add(ahead, add(across, scale(down, (2.0 * pointer.y - 1.0) * half)))
+    towards = dot(ray, to_head)
+    if towards <= 0.0:  # the head is behind the viewer
+        return None
+    point = add(camera.p_world_m, scale(ray, TOWARDS_HEAD * dot(to_head, to_head) / towards))
+    return point if all(map(isfinite, point)) else None
+
+
+class PointerToLook:
+    """Turns pointers into what to look at; from any thread.
+
+    Args:
+        camera: returns from where a browser sees the scene, None where that is not known.
+        look: hands a point to the rig, with the name of the browser.
+        clock: limits how many are handed on.
+
+    p_world_eyes_m: the middle between the eyes, world frame; None before it is known
+    """
+
+    def __init__(
+        self,
+        camera: Callable[[str], ViewCamera | None],
+        look: Callable[[Vec3, str], object],
+        clock: Clock | None = None,
+    ) -> None:
+        self._camera, self._look = camera, look
+        self._clock = clock if clock is not None else RealClock()
+        self._rate = TokenBucket(PER_S, BURST)
+        self.p_world_eyes_m: Vec3 | None = None
+
+    def take(self, asked: object, who: str) -> bool:
+        """Hand on where a browser's pointer is; False where it leads nowhere.
+
+        Args:
+            asked: as the browser sent it.
+            who: the name of the browser.
+        """
+        pointer, eyes_m = pointer_of(asked), self.p_world_eyes_m
+        if pointer is None or eyes_m is None or not self._rate.take(self._clock.now_s()):
+            return False
+        camera = self._camera(who)
+        point = pointed_at(pointer, camera, eyes_m) if camera is not None else None
+        if point is None:
+            return False
+        self._look(point, who)
+        return True

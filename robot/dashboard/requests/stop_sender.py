@@ -1,0 +1,63 @@
+"""The page's end of the way of a STOP; see gazerig.robot.dashboard.requests.stop_channel."""
+
+import asyncio
+import contextlib
+import json
+
+from gazerig.drivers.message_link import MessageLink
+from gazerig.robot.dashboard.requests.stop_channel import MESSAGE_BYTES, WORDS
+
+_ANSWERED_WITHIN_S = 1.0
+
+
+class StopSender:
+    """The page's end, of the event loop that serves the browsers."""
+
+    def __init__(self, link: MessageLink) -> None:
+        link.setblocking(False)
+        self._link = link
+        self._number = 0
+        self._waiting: asyncio.Future[str] | None = None
+
+    async def send(self, why: str, who: str) -> str:
+        """Return what the rig says to a stop: "" where it is obeyed at the next tick.
+
+        Raises:
+            OSError: the rig is gone, or does not answer.
+        """
+        if self._waiting is None:
+            self._waiting = self._sent(why[:WORDS], who[:WORDS])
+        waiting = self._waiting
+        try:
+            return await asyncio.wait_for(asyncio.shield(waiting), _ANSWERED_WITHIN_S)
+        except TimeoutError:
+            if self._waiting is waiting:  # the next one sends again
+                self._waiting = None
+            raise OSError("the rig does not answer") from None
+
+    def attach(self, loop: asyncio.AbstractEventLoop) -> None:
+        """Receive the replies in this event loop."""
+        loop.add_reader(self._link.fileno(), self._receive)
+
+    def _sent(self, why: str, who: str) -> asyncio.Future[str]:
+        self._number += 1
+        stop = {"number": self._number, "do": "stop", "why": why, "who": who}
+        # It may be full of stops, which a rig that hangs will find when it wakes.
+        with contextlib.suppress(BlockingIOError):
+            self._link.send(json.dumps(stop).encode())
+        return asyncio.get_running_loop().create_future()
+
+    def _receive(self) -> None:
+        try:
+            data = self._link.recv(MESSAGE_BYTES)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if not data:
+            asyncio.get_running_loop().remove_reader(self._link.fileno())
+            return
+        number, text = json.loads(data)
+        if number == self._number and self._waiting is not None:
+            self._waiting.set_result(text)
+            self._waiting = None

@@ -1,0 +1,179 @@
+"""Shapes with colours by vertex and a surface finish, as binary glTF that browsers draw.
+
+All but the eyes are lit here, once, as under the lights of the scene (lights.py), so that a browser
+without a graphics card need not light every pixel of every picture.
+"""
+
+from math import pi
+from typing import Any, NamedTuple
+
+import numpy as np
+from PIL import Image
+
+from gazerig.gaze.types import Floats, Vec3
+from gazerig.robot.dashboard.view.glb_file import glb_file
+from gazerig.robot.model.description.texture import TexturedMesh
+from gazerig.robot.model.mesh import smooth_normals
+from gazerig.robot.model.paint import Colour, Painted
+
+
+class Light(NamedTuple):
+    """A light: where it comes from, its colour, and how strong it is."""
+
+    position: Vec3
+    colour: Colour
+    intensity: float
+
+
+SKY, GROUND, SKY_INTENSITY = (255, 250, 244), (186, 170, 166), 2.1
+"""Light from all round: colours from above and from below."""
+# The key light comes from above and the head's left, where a window would be; then there is a
+# fill from the right, and a light from behind.
+LIGHTS = (
+    Light((0.9, 0.75, 1.25), (255, 244, 228), 2.6),
+    Light((0.8, -1.2, 0.25), (214, 228, 255), 0.9),
+    Light((-1.2, -0.5, 1.0), (235, 242, 255), 1.4),
+)
+_TO_EYE = np.array((0.88, -0.47, 0.07))
+"""Where the scene is seen from at first: shine is where it would be from there."""
+
+
+class Finish(NamedTuple):
+    """How a surface answers light.
+
+    shine: how bright its reflection of a light is; tight: how small that is, an exponent
+    roughness: below 1 the browser lights every pixel, and lights are seen in the surface the
+        smaller the less it is; 1: lit here
+    lit: False shows the colours as they are
+    """
+
+    shine: float = 0.0
+    tight: float = 12.0
+    roughness: float = 1.0
+    lit: bool = True
+
+
+_SAMPLER = {"magFilter": 9729, "minFilter": 9985, "wrapS": 10497, "wrapT": 10497}
+"""Pictures are repeated, and smoothed between pixels, not between sizes: without a graphics card
+that would cost more than all else in the room."""
+SKIN = Finish(0.06, 9.0)
+CLOTH = Finish()
+PLASTIC = Finish(0.22, 26.0)
+EYE = Finish(roughness=0.17)
+FLAT = Finish(lit=False)
+
+
+def textured_glb(shape: TexturedMesh, finish: Finish) -> bytes:
+    """Return a mesh with a texture as a binary glTF file, lit here.
+
+    Args:
+        shape: the mesh as it stands in the scene.
+        finish: how it answers light.
+    """
+    # Only where a world is shown: it takes half a second of a processor.
+    import trimesh
+    from trimesh.exchange.gltf import export_glb
+
+    light = np.ones((len(shape.vertices), 3))
+    if finish.lit:
+        light = lit(light, shape.normals, finish)
+    gain = float(light.max())
+    colours = np.ones((len(light), 4))
+    colours[:, :3] = light / gain
+    # In glTF the first row of an image is its top, and v grows downwards; trimesh turns v over.
+    visual: Any = trimesh.visual.TextureVisuals(  # type: ignore[no-untyped-call]
+        uv=shape.uv * (1.0, -1.0) + (0.0, 1.0),
+        material=trimesh.visual.material.PBRMaterial(  # type: ignore[no-untyped-call]
+            baseColorTexture=Image.fromarray(shape.image),
+            baseColorFactor=(1.0, 1.0, 1.0, 1.0),
+            metallicFactor=0.0,
+            roughnessFactor=1.0,
+        ),
+    )
+    visual.vertex_attributes["color"] = np.rint(255.0 * colours).astype(np.uint8)
+    mesh = trimesh.Trimesh(shape.vertices, shape.faces, visual=visual, process=False)
+
+    def unlit(tree: dict[str, Any]) -> None:
+        tree["extensionsUsed"] = sorted({*tree.get("extensionsUsed", ()), "KHR_materials_unlit"})
+        for material in tree["materials"]:
+            material["extensions"] = {"KHR_materials_unlit": {}}
+            material["pbrMetallicRoughness"]["baseColorFactor"] = [gain, gain, gain, 1.0]
+        tree["samplers"] = [_SAMPLER]
+        for texture in tree["textures"]:
+            texture["sampler"] = 0
+
+    data: Any = export_glb(mesh, include_normals=False, tree_postprocessor=unlit)  # type: ignore[no-untyped-call]
+    return bytes(data)
+
+
+def glb(painted: Painted, finish: Finish, pose: Floats | None = None) -> bytes:
+    """Return a painted mesh as a binary glTF file.
+
+    Args:
+        painted: the mesh; colours with a fourth number are translucent.
+        finish: how it answers light.
+        pose: rotation (3, 3) of the mesh in the scene in which it is lit; None: as it is.
+    """
+    mesh, colours, normals = painted
+    rgba = np.ones((len(mesh.vertices), 4))
+    rgba[:, : colours.shape[1]] = np.clip(colours / 255.0, 0.0, 1.0)
+    rgba[:, :3] = _linear(rgba[:, :3])
+    gain = 1.0
+    by_browser = finish.roughness < 1.0
+    if finish.lit and not by_browser and normals is not None:
+        rgba[:, :3] = lit(rgba[:, :3], normals if pose is None else normals @ pose.T, finish)
+        gain = float(rgba[:, :3].max())
+        rgba[:, :3] /= gain
+    material = _material(finish, by_browser, gain, see_through=colours.shape[1] == 4)
+    if not by_browser:
+        normals = None
+    elif normals is None:
+        normals = smooth_normals(mesh)
+    return glb_file(mesh, np.rint(255.0 * rgba).astype(np.uint8), normals, material)
+
+
+def lit(colours: Floats, normals: Floats, finish: Finish) -> Floats:
+    """Return what surfaces send to the eye under the scene's lights.
+
+    Args:
+        colours: (n, 3), what they reflect, 0..1 in proportion to light.
+        normals: (n, 3) out of them.
+        finish: how they shine.
+
+    Returns:
+        (n, 3); may exceed 1.
+    """
+    up = 0.5 + 0.5 * normals[:, 2:]
+    around = up * _of(SKY) + (1.0 - up) * _of(GROUND)
+    found = colours * around * (SKY_INTENSITY / pi)
+    for light in LIGHTS:
+        way = np.array(light.position) / np.linalg.norm(light.position)
+        facing = np.clip(normals @ way, 0.0, None)[:, None]
+        half = (way + _TO_EYE) / np.linalg.norm(way + _TO_EYE)
+        gleam = finish.shine * np.clip(normals @ half, 0.0, 1.0)[:, None] ** finish.tight
+        found = found + light.intensity * _of(light.colour) * (colours * facing / pi + gleam)
+    return np.asarray(found)
+
+
+def _of(colour: Colour) -> Floats:
+    return _linear(np.array(colour) / 255.0)
+
+
+def _linear(share: Floats) -> Floats:
+    """Return colours as glTF wants those of vertices: in proportion to light, not as on screens."""
+    return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+
+
+def _material(finish: Finish, by_browser: bool, gain: float, see_through: bool) -> dict[str, Any]:
+    """Return a glTF material."""
+    plain = {"metallicFactor": 0.0, "roughnessFactor": finish.roughness}
+    material: dict[str, Any] = {
+        "pbrMetallicRoughness": plain | {"baseColorFactor": [gain, gain, gain, 1.0]},
+        "doubleSided": False,
+        "extensions": {"KHR_materials_unlit": {}},
+    }
+    if by_browser:
+        material["extensions"] = {}
+    if see_through:
+        material["alphaMode"] = "BLEND"
+    return material

@@ -1,0 +1,30 @@
+"""What can be drawn into the page's scene beside the rig: desired pose, camera, eyes' field."""
+
+import viser
+
+from gazerig.robot.dashboard.feed.overlay_choices import OverlayChoices
+from gazerig.robot.dashboard.view.commanded_pose import CommandedPoseView
+from gazerig.robot.dashboard.view.lid_edges import LidEdges
+from gazerig.robot.dashboard.view.view_frusta import CameraField, EyeFields
+from gazerig.robot.model.types import Snapshot
+
+
+class OverlayPanel:
+    """The layers in the scene."""
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        self._commanded_pose = CommandedPoseView(scene)
+        self._camera = CameraField(scene)
+        self._eyes = EyeFields(scene)
+
+    def show(self, snapshot: Snapshot, layers: OverlayChoices, edges: LidEdges) -> None:
+        """Draw what is wanted and take the rest away.
+
+        Args:
+            snapshot: of the rig.
+            layers: what is wanted.
+            edges: of the rig's lids.
+        """
+        self._commanded_pose.show(snapshot if layers.ghost else None, edges)
+        self._camera.show(snapshot if layers.camera else None)
+        self._eyes.show(snapshot if layers.eyes else None)

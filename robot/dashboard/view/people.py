@@ -1,0 +1,292 @@
+"""Draw who and what the rig has seen: faces with their eight parts, moving bodies, the target."""
+
+from functools import lru_cache
+
+import numpy as np
+import viser
+
+from gazerig.gaze.types import PARTS, Floats, Vec3
+from gazerig.robot.dashboard.view.glb import CLOTH, FLAT, SKIN, glb
+from gazerig.robot.dashboard.view.glow import glow
+from gazerig.robot.dashboard.view.scene_node import along, put, turn_to
+from gazerig.robot.model.description.parts import FLOOR_M
+from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
+from gazerig.robot.model.mesh import Mesh, cap, ring
+from gazerig.robot.model.paint import Colour
+from gazerig.robot.model.person_shape import LOOKS, hand, head, torso
+from gazerig.robot.model.quaternion import quaternion
+from gazerig.robot.model.types import SeenBody, SeenFace, Snapshot
+
+FIXATED_WITHIN_M = 0.02
+"""A face part this close to the target is the one looked at (parts are 3 cm apart or more)."""
+
+_BODY: Colour = (118, 146, 190)
+_TARGET: Colour = (255, 120, 40)
+_FOUND: Colour = (40, 120, 255)
+"""What marks faces and bodies that were found, on people who are drawn as they are."""
+_OUTLINE_M, _OUTLINE_MIDDLE_M = 0.115, np.array((-0.02, 0.0, 0.01))
+"""Radius of the line around a face, and its middle, from the nose."""
+_FINENESS = 0.8
+_CHEST_M = 0.34
+_LABEL_ABOVE_M, _BEHIND_M = 0.155, 0.11
+_LEFT_EYE, _RIGHT_EYE, _NOSE = (PARTS.index(part) for part in ("LE", "RE", "N"))
+
+
+@lru_cache(maxsize=len(LOOKS))
+def _person_glb(look: int) -> tuple[bytes, bytes]:
+    """Return head and chest of a person with a look as browsers draw them."""
+    return glb(head(look, _FINENESS), SKIN), glb(torso(look, _CHEST_M), CLOTH)
+
+
+def _look(number: int) -> int:
+    """Return the look of a face; the first face is the scene's first person."""
+    return (number - 1) % len(LOOKS)
+
+
+class _Shade:
+    """A dark spot on the floor, which tells where above it something is."""
+
+    def __init__(self, scene: viser.SceneApi, name: str, radius_m: float) -> None:
+        self._spot = scene.add_glb(
+            name,
+            glb(glow((20, 24, 34, 96), 8), FLAT),
+            scale=radius_m,
+            cast_shadow=False,
+            receive_shadow=False,
+        )
+
+    def below(self, p_world_m: Vec3) -> None:
+        put(self._spot, (p_world_m[0], p_world_m[1], FLOOR_M + 0.002))
+
+    def remove(self) -> None:
+        self._spot.remove()
+
+
+class _Person:
+    """Whom a face belongs to: a head in the face's frame, and a chest that stands upright."""
+
+    def __init__(self, scene: viser.SceneApi, frame: str, face: SeenFace) -> None:
+        self._shade = _Shade(scene, f"/shades/{face.id}", 0.3)
+        shown, chest = _person_glb(_look(face.id))
+        self._head = scene.add_glb(f"{frame}/head", shown, cast_shadow=False, receive_shadow=False)
+        self._chest = scene.add_glb(
+            f"/chests/{face.id}", chest, cast_shadow=False, receive_shadow=False
+        )
+
+    def show(self, face: SeenFace, nose_m: Floats) -> None:
+        """Move the person so that the nose is where it was found."""
+        (ahead, _, _), (aside, _, _), _ = face.R_world_face
+        x, y, z = face.p_world_m
+        self._shade.below((x - _BEHIND_M * ahead, y - _BEHIND_M * aside, z))
+        put(self._head, nose_m.tolist())
+        put(self._chest, face.p_world_m)
+        turn_to(self._chest, along((ahead, aside, 0.0)))
+
+    def fit(self, size: float) -> None:
+        """Make the person so many times as large as most people are."""
+        self._head.scale = self._chest.scale = size
+
+    def remove(self) -> None:
+        self._chest.remove()
+        self._shade.remove()
+
+
+class _Outline:
+    """A line around a face that was found, where the person is drawn anyway."""
+
+    def __init__(self, scene: viser.SceneApi, frame: str) -> None:
+        line = ring(_OUTLINE_M, 0.0025)
+        self._line = scene.add_mesh_simple(
+            f"{frame}/outline", line.vertices, line.faces, color=_FOUND, side="double"
+        )
+
+    def show(self, face: SeenFace, nose_m: Floats) -> None:
+        """Put the line around the face; it lies in the plane of the eyes."""
+        put(self._line, (nose_m + _OUTLINE_MIDDLE_M).tolist())
+
+    def fit(self, size: float) -> None:
+        """Make it as large as the face was measured."""
+        self._line.scale = (size, 0.8 * size, 1.12 * size)
+
+    def remove(self) -> None:
+        """Go with the frame of the face."""
+
+
+class _FaceView:
+    """One face in the scene, with its name and parts: a person, or marks on one.
+
+    marks: the person is drawn as it is, and the face only marked where it was found
+    """
+
+    def __init__(self, scene: viser.SceneApi, face: SeenFace, *, marks: bool) -> None:
+        self._scene = scene
+        self._name = f"/faces/{face.id}"
+        self._frame = scene.add_frame(self._name, show_axes=False)
+        self._shape = _Outline(scene, self._name) if marks else _Person(scene, self._name, face)
+        self._size = 0.0
+        self._parts: list[viser.FrameHandle] = []
+        self._halo = self._add("halo", ring(0.019, 0.0022), _TARGET)
+        self._label = scene.add_label(
+            f"{self._name}/label", face_label(face), anchor="bottom-center"
+        )
+
+    def _add(self, name: str, mesh: Mesh, colour: Colour) -> viser.MeshHandle:
+        return self._scene.add_mesh_simple(
+            f"{self._name}/{name}", mesh.vertices, mesh.faces, color=colour, side="double"
+        )
+
+    def _add_part(self, part: str) -> viser.FrameHandle:
+        frame = self._scene.add_frame(f"{self._name}/{part}", show_axes=False)
+        self._add(f"{part}/mark", cap(0.0042, np.pi, 8), _TARGET)
+        return frame
+
+    def show(self, face: SeenFace, p_world_target_m: Vec3, parts: bool) -> None:
+        """Move the person; ``parts``: with marks at the parts, a halo around the one looked at."""
+        put(self._frame, face.p_world_m, quaternion(face.R_world_face))
+        self._label.text = face_label(face)
+        parts_m = _parts_in_face(face)
+        size = float(np.linalg.norm(parts_m[_LEFT_EYE] - parts_m[_RIGHT_EYE])) / PUPIL_DISTANCE_M
+        self._shape.show(face, parts_m[_NOSE])
+        self._fit(round(size, 2))
+        self._show_parts(face, parts_m, p_world_target_m, parts)
+
+    def _fit(self, size: float) -> None:
+        """Make the face as large as it was measured."""
+        if self._size != size:
+            self._size = size
+            self._shape.fit(size)
+            self._label.position = (-0.09, 0.0, _LABEL_ABOVE_M * size)
+
+    def _show_parts(
+        self, face: SeenFace, parts_m: Floats, p_world_target_m: Vec3, wanted: bool
+    ) -> None:
+        looked_at = fixated_part(face, p_world_target_m) if wanted else None
+        if wanted and not self._parts:
+            self._parts = [self._add_part(part) for part in PARTS]
+        for handle, p_m in zip(self._parts, parts_m.tolist(), strict=False):
+            handle.visible = wanted
+            put(handle, p_m)
+        self._halo.visible = looked_at is not None
+        if looked_at is not None:
+            put(self._halo, parts_m[looked_at] + (0.006, 0.0, 0.0))
+
+    def remove(self) -> None:
+        self._shape.remove()
+        self._frame.remove()
+
+
+class _BodyView:
+    """One moving body in the scene: a hand, or a calm ball, and its kind.
+
+    marks: a hand or thing is drawn as it is, and only marked where it was found
+    """
+
+    def __init__(self, scene: viser.SceneApi, body: SeenBody, *, marks: bool) -> None:
+        name = f"/bodies/{body.id}"
+        self._frame = scene.add_frame(name, show_axes=False)
+        self._kind = body.kind
+        self._shape: viser.GlbHandle | viser.IcosphereHandle
+        if marks:
+            self._shape = scene.add_icosphere(
+                f"{name}/outline", radius=1.0, subdivisions=1, color=_FOUND, wireframe=True,
+                opacity=0.5, cast_shadow=False,
+            )  # fmt: skip
+        elif body.kind == "hand":
+            data = glb(hand(0), SKIN)
+            self._shape = scene.add_glb(
+                f"{name}/hand", data, cast_shadow=False, receive_shadow=False
+            )
+        else:
+            self._shape = scene.add_icosphere(
+                f"{name}/ball", radius=1.0, color=_BODY, opacity=0.85, cast_shadow=False
+            )
+        self._label = scene.add_label(f"{name}/label", body.kind, anchor="bottom-center")
+        self._shade = None if marks else _Shade(scene, f"/shades/{body.id}", 2.0 * body.radius_m)
+
+    def fits(self, body: SeenBody) -> bool:
+        """Return whether this is what shows such a body."""
+        return self._kind == body.kind
+
+    def show(self, body: SeenBody) -> None:
+        """Move it; a hand shows the rig its palm."""
+        x, y, z = body.p_world_m
+        put(self._frame, body.p_world_m)
+        turn_to(self._frame, along((-x, -y, 0.0)))
+        if self._shade is not None:
+            self._shade.below((x, y, z))
+        self._shape.scale = round(body.radius_m, 3)
+        put(self._label, (0.0, 0.0, 1.1 * body.radius_m + 0.02))
+        self._label.text = body.kind
+
+    def remove(self) -> None:
+        self._frame.remove()
+        if self._shade is not None:
+            self._shade.remove()
+
+
+class PeopleView:
+    """Everything seen, and the target."""
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        self._scene = scene
+        self._as_marks = False
+        self._faces: dict[int, _FaceView] = {}
+        self._bodies: dict[int, _BodyView] = {}
+        self._target = scene.add_frame("/target", show_axes=False)
+        scene.add_icosphere("/target/point", radius=0.0055, color=_TARGET)
+        self._label = scene.add_label(
+            "/target/label", "", position=(0.0, 0.0, -0.03), anchor="top-center"
+        )
+
+    def mark_only(self, on: bool) -> None:
+        """Draw only marks where faces and bodies were found, or people: others draw them or not."""
+        if on != self._as_marks:
+            self._as_marks = on
+            while self._faces:
+                self._faces.popitem()[1].remove()
+            while self._bodies:
+                self._bodies.popitem()[1].remove()
+
+    def show(self, snapshot: Snapshot, *, parts: bool = False) -> None:
+        """Draw what is there now, with the parts of faces if wanted; what has gone is removed."""
+        faces = {face.id: face for face in snapshot.faces}
+        # A face is drawn as a face, not once more as a ball.
+        bodies = {body.id: body for body in snapshot.bodies if body.id not in faces}
+        for gone in self._faces.keys() - faces.keys():
+            self._faces.pop(gone).remove()
+        for gone in self._bodies.keys() - bodies.keys():
+            self._bodies.pop(gone).remove()
+        for face in faces.values():
+            if face.id not in self._faces:
+                self._faces[face.id] = _FaceView(self._scene, face, marks=self._as_marks)
+            self._faces[face.id].show(face, snapshot.p_world_target_m, parts)
+        for body in bodies.values():
+            shown = self._bodies.get(body.id)
+            if shown is None or not shown.fits(body):
+                if shown is not None:
+                    shown.remove()
+                self._bodies[body.id] = _BodyView(self._scene, body, marks=self._as_marks)
+            self._bodies[body.id].show(body)
+        put(self._target, snapshot.p_world_target_m)
+        self._label.text = snapshot.target_name
+
+
+def face_label(face: SeenFace) -> str:
+    """Return what stands above a face, e.g. "face 3, looks at the head, speaks"."""
+    looks = ", looks at the head" if face.looks_at_head else ""
+    speaks = ", speaks" if face.speaks else ""
+    return f"face {face.id}{looks}{speaks}"
+
+
+def fixated_part(face: SeenFace, p_world_target_m: Vec3) -> int | None:
+    """Return the row of the part that the target lies on, or None where it lies on none."""
+    away_m = np.linalg.norm(np.array(face.parts_world_m) - p_world_target_m, axis=1)
+    nearest = int(away_m.argmin())
+    return nearest if away_m[nearest] < FIXATED_WITHIN_M else None
+
+
+def _parts_in_face(face: SeenFace) -> Floats:
+    """Return the parts (8, 3) in the face's frame, to the millimetre."""
+    from_centre_m = np.array(face.parts_world_m) - face.p_world_m
+    in_face_m: Floats = from_centre_m @ np.array(face.R_world_face)
+    return in_face_m.round(3)

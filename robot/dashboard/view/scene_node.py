@@ -1,0 +1,63 @@
+"""Place the objects of the page's 3-D scene, and send browsers only what has moved.
+
+Turns are quaternions (w, x, y, z).
+"""
+
+from collections.abc import Sequence
+from math import atan2, cos, hypot, sin
+from typing import Protocol
+
+from gazerig.gaze.types import Floats, Vec3
+from gazerig.robot.model.quaternion import Quaternion
+
+_STILL_M, _STILL = 1e-4, 3e-4
+"""What has moved less, in metres and in parts of a quaternion (0.04 deg), stays where it is:
+a servo's noise would otherwise be sent to every browser, part by part, 25 times a second."""
+
+
+class Placeable(Protocol):
+    """A handle of the scene."""
+
+    position: Floats
+    wxyz: Floats
+
+
+def put(thing: Placeable, p_m: Sequence[float], turn: Quaternion | None = None) -> None:
+    """Move a thing to a place, and turn it where a turn is given."""
+    if _off(thing.position.tolist(), p_m) > _STILL_M:
+        thing.position = p_m  # type: ignore[assignment]
+    if turn is not None:
+        turn_to(thing, turn)
+
+
+def turn_to(thing: Placeable, turn: Quaternion) -> None:
+    """Turn a thing."""
+    if _off(thing.wxyz.tolist(), turn) > _STILL:
+        thing.wxyz = turn  # type: ignore[assignment]
+
+
+def along(direction: Vec3) -> Quaternion:
+    """Return the turn that lays the x axis along a direction, without roll."""
+    x, y, z = direction
+    return _turned(atan2(y, x), -atan2(z, hypot(x, y)))
+
+
+def upright_along(direction: Vec3) -> Quaternion:
+    """Return the turn that lays the z axis along a direction."""
+    x, y, z = direction
+    return _turned(atan2(y, x), atan2(hypot(x, y), z))
+
+
+def turned_up(angle_rad: float) -> Quaternion:
+    """Return the turn that lifts the x axis by an angle."""
+    return _turned(0.0, -angle_rad)
+
+
+def _turned(about_z_rad: float, then_about_y_rad: float) -> Quaternion:
+    cz, sz = cos(0.5 * about_z_rad), sin(0.5 * about_z_rad)
+    cy, sy = cos(0.5 * then_about_y_rad), sin(0.5 * then_about_y_rad)
+    return cz * cy, -sz * sy, cz * sy, sz * cy
+
+
+def _off(now: Sequence[float], wanted: Sequence[float]) -> float:
+    return max(abs(a - b) for a, b in zip(now, wanted, strict=True))

@@ -1,0 +1,39 @@
+"""How a rig is shown: by how it is built, or as far as a snapshot tells."""
+
+from math import radians
+
+from gazerig.robot.model.description.build import RigShape
+from gazerig.robot.model.frames import CameraParams
+from gazerig.robot.model.head_shape import HeadMeasures
+from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.kinematics import LIDS, GeometryParams
+from gazerig.robot.model.types import Snapshot
+
+_LID_RAD = {"upper": radians(74.0), "lower": radians(22.0)}
+"""How far lids are shown to turn, from shut to open: as far as about a person's eyes. Servos of
+a small head move them by less, and would leave it sleepy at any opening."""
+_JOINT = JointParams(1, "xl330-m077", -90.0, 90.0, 600.0, 10_000.0)
+
+
+def shape_of(joints: tuple[str, ...], measures: HeadMeasures, snapshot: Snapshot) -> RigShape:
+    """Return a rig with the joints and the measures of a snapshot.
+
+    Args:
+        joints: their names.
+        measures: of the head.
+        snapshot: tells where the head is.
+    """
+    x, _, z = measures.pivot_m
+    pivot_m = snapshot.p_world_pivot_m
+    above_base_m = pivot_m[2] if pivot_m is not None else snapshot.p_world_head_m[2] + z
+    geometry = GeometryParams(
+        max(0.0, 1e3 * above_base_m), -1e3 * x, -1e3 * z, 1e3 * measures.interocular_m
+    )
+    lids = dict.fromkeys((name for name in LIDS if name in joints), (0.0, 0.0))
+    shape = RigShape("rig", geometry, dict.fromkeys(joints, _JOINT), lids, {}, CameraParams())
+    return wide_awake(shape)
+
+
+def wide_awake(shape: RigShape) -> RigShape:
+    """Return a rig whose lids open as wide as they are shown to."""
+    return shape._replace(lids={name: (0.0, _LID_RAD[name.split("_")[1]]) for name in shape.lids})

@@ -1,0 +1,79 @@
+"""From where the page's scene is seen: the face close up, both, over its shoulder, from above."""
+
+from math import atan, cos, radians, sin, tan
+from typing import NamedTuple
+
+from gazerig.gaze.angles import add, sub
+from gazerig.gaze.types import Vec3
+from gazerig.robot.dashboard.view.head_view import shown_measures
+from gazerig.robot.model.head_shape import CHIN, TOP, HeadMeasures
+from gazerig.robot.model.types import Snapshot
+
+FACE, BOTH, SHOULDER, ABOVE = "face", "both", "over its shoulder", "from above"
+HALF_WIDTH = 0.84
+"""Tangent of half the horizontal field of view that shows rig and visitor: 80 deg."""
+
+HEAD_SHARE = 0.64
+"""Share of the canvas's height that the head fills when it is seen close up."""
+_FACE_RAD, _FACE_UP_RAD = radians(-28.0), radians(4.0)
+"""From where the face is seen: so far to the head's right, and from so far above."""
+_FACE_AWAY = 10.5
+"""How far away, in distances between the eyes: near enough to look alive, not so near that the
+nose grows."""
+_FACE_WIDTH = 3.3
+"""What must be in sight from side to side, in distances between the eyes."""
+_FACE_MIDDLE: Vec3 = (-0.45, 0.0, 0.5 * (TOP + CHIN) - 0.30)
+"""What is in the middle: a little below the head's, so that the neck is in sight."""
+
+
+class View(NamedTuple):
+    """A place of the camera, and what it has in its middle.
+
+    vertical_rad: the vertical field of view, None where the horizontal one decides
+    least_width: tangent of half the horizontal field that must be in sight
+    """
+
+    position_m: Vec3
+    look_at_m: Vec3
+    vertical_rad: float | None = None
+    least_width: float = HALF_WIDTH
+
+    def field_rad(self, aspect: float) -> float:
+        """Return the vertical field of view for a canvas so many times as wide as high."""
+        across = self.least_width / max(aspect, 1e-3)
+        if self.vertical_rad is None:
+            return 2.0 * atan(across)
+        return 2.0 * atan(max(tan(0.5 * self.vertical_rad), across))
+
+
+_FIXED = {
+    BOTH: View((0.95, -1.42, 0.56), (0.76, 0.0, 0.16)),
+    SHOULDER: View((-0.56, -0.20, 0.42), (0.60, 0.06, 0.20)),
+    # Over the walls of a room, where there is one.
+    ABOVE: View((-1.5, -2.9, 2.5), (1.0, 0.05, -0.35), least_width=0.62),
+}
+NAMES = (FACE, *_FIXED)
+
+
+def view(name: str, snapshot: Snapshot | None = None) -> View:
+    """Return a view by its name; the face's is fitted to the head of a snapshot."""
+    return _FIXED[name] if name in _FIXED else _face(snapshot)
+
+
+def _face(snapshot: Snapshot | None) -> View:
+    """Return a close-up of the head as it stands when its neck is straight."""
+    measures, eyes_m = HeadMeasures(), (0.038, 0.0, 0.125)
+    if snapshot is not None:
+        measures = shown_measures(snapshot)
+        eyes_m = snapshot.p_world_head_m
+        if snapshot.p_world_pivot_m is not None:
+            eyes_m = sub(snapshot.p_world_pivot_m, measures.pivot_m)
+    unit = measures.interocular_m
+    middle = add(eyes_m, measures.scaled(_FACE_MIDDLE))
+    away = _FACE_AWAY * unit
+    level = away * cos(_FACE_UP_RAD)
+    off = (level * cos(_FACE_RAD), level * sin(_FACE_RAD), away * sin(_FACE_UP_RAD))
+    half_height = 0.5 * measures.height_m / HEAD_SHARE
+    return View(
+        add(middle, off), middle, 2.0 * atan(half_height / away), 0.5 * _FACE_WIDTH * unit / away
+    )

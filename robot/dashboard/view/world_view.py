@@ -1,0 +1,95 @@
+"""Draw a simulated world as it is: its room, and people where they are, not where they are seen."""
+
+from collections.abc import Iterable, Mapping
+from typing import Final
+
+import viser
+
+from gazerig.robot.dashboard.view.glb import CLOTH, FLAT, PLASTIC, SKIN, Finish, glb, textured_glb
+from gazerig.robot.dashboard.view.scene_node import put
+from gazerig.robot.model.mesh import smooth_normals
+from gazerig.robot.model.paint import Painted, merged
+from gazerig.robot.model.world_shapes import WorldFinish, WorldPart, WorldShapes
+
+_FINISHES: Mapping[WorldFinish, Finish] = {
+    "skin": SKIN,
+    "plastic": PLASTIC,
+    "cloth": CLOTH,
+    "flat": FLAT,
+}
+_FOG_M: Final = (1.2, 10.0)
+"""Where the room begins to fade and where it would have gone: the head stays what is looked at."""
+_FOG_COLOUR: Final = (233, 236, 240)
+
+
+class WorldView:
+    """The room in the scene, and all that moves in it."""
+
+    def __init__(self, scene: viser.SceneApi) -> None:
+        self._scene = scene
+        self._shapes: WorldShapes | None = None
+        self._still: list[viser.GlbHandle] = []
+        self._moving: dict[str, viser.GlbHandle] = {}
+
+    def show(self, shapes: WorldShapes, world_s: float) -> None:
+        """Move everything to where it is at a time; another world is drawn anew.
+
+        Args:
+            shapes: of the world.
+            world_s: time since it began, seconds.
+        """
+        if self._shapes is None or shapes != self._shapes:
+            self._build(shapes)
+        poses = shapes.poses(world_s)
+        for name, handle in self._moving.items():
+            pose = poses.get(name)
+            if handle.visible != (pose is not None):
+                handle.visible = pose is not None
+            if pose is not None:
+                turn, p_world_m = pose
+                put(handle, p_world_m, turn)
+
+    def _build(self, shapes: WorldShapes) -> None:
+        for handle in (*self._still, *self._moving.values()):
+            handle.remove()
+        self._shapes = shapes
+        parts = shapes.parts()
+        self._moving = {
+            part.name: self._add(f"/world/{part.name}", part_glb(part))
+            for part in parts
+            if part.moves
+        }
+        self._still = [
+            self._add(f"/room/{number}", data) for number, data in enumerate(room_glbs(parts))
+        ]
+        near_m, far_m = _FOG_M
+        self._scene.configure_fog(near_m, far_m, color=_FOG_COLOUR)
+
+    def _add(self, name: str, data: bytes) -> viser.GlbHandle:
+        return self._scene.add_glb(name, data, cast_shadow=False, receive_shadow=False)
+
+
+def room_glbs(parts: Iterable[WorldPart]) -> list[bytes]:
+    """Return what stands still as few files: one for each finish, and one for each texture."""
+    files: list[bytes] = []
+    plain: dict[WorldFinish, list[Painted]] = {}
+    for part in parts:
+        if part.moves:
+            continue
+        if isinstance(part.shape, Painted):
+            plain.setdefault(part.finish, []).append(_with_normals(part.shape))
+        else:
+            files.append(part_glb(part))
+    return [glb(merged(shapes), _FINISHES[finish]) for finish, shapes in plain.items()] + files
+
+
+def part_glb(part: WorldPart) -> bytes:
+    """Return one part as a binary glTF file."""
+    finish = _FINISHES[part.finish]
+    if isinstance(part.shape, Painted):
+        return glb(part.shape, finish)
+    return textured_glb(part.shape, finish)
+
+
+def _with_normals(shape: Painted) -> Painted:
+    return shape._replace(normals=smooth_normals(shape.mesh)) if shape.normals is None else shape

@@ -1,0 +1,1 @@
+"""The elements of the page's panels, as this program holds them."""

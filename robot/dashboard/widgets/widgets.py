@@ -1,0 +1,299 @@
+"""The page's panels: elements that are added here and drawn by browser/widgets.js there.
+
+Every browser is sent what changed since it took the last message, the newest of each element only:
+one that is slow misses what came in between and holds up nobody. A browser that shows only some
+panels is not sent the others.
+"""
+
+import json
+import threading
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import NamedTuple, NoReturn
+
+from gazerig.robot.dashboard.widgets.container import Container, Make, W
+from gazerig.robot.dashboard.widgets.widget import Widget, WidgetPlace
+
+PANELS = ("headline", "camera", "replay", "watch", "steer", "tune", "health", "report")
+"""Names of the places of the page that hold panels, as in browser/index.html."""
+RECEIVED_BYTES = 16_384
+"""The longest message of a browser."""
+_NOTICES = 8
+_NUMBER_BYTES = 4
+
+
+class Notice(NamedTuple):
+    """Words for a person that go away by themselves."""
+
+    text: str
+    refused: bool
+
+
+class Outgoing(NamedTuple):
+    """What a client is sent next: one message of text, and one of bytes for each image."""
+
+    text: str
+    images: tuple[bytes, ...]
+
+
+class Client:
+    """A browser's tab that shows panels.
+
+    name: e.g. "panels-3", unique; browser: the name of its browser
+    """
+
+    def __init__(self, name: str, browser: str, wake: Callable[[], None]) -> None:
+        self.name, self.browser = name, browser
+        self._wake = wake
+        self._awake = False
+        # Number of an element -> its changed properties, None where it was removed.
+        self.changes: dict[int, dict[str, object] | None] = {}
+        self.images: set[int] = set()
+        self.notices: deque[Notice] = deque(maxlen=_NOTICES)
+        self.seen: frozenset[str] = frozenset(PANELS)
+
+    def wake(self) -> None:
+        """Say that something waits, once until it is taken."""
+        if not self._awake:
+            self._awake = True
+            self._wake()
+
+    def taken(self) -> None:
+        """Note that what waited is being sent."""
+        self._awake = False
+
+
+class Widgets:
+    """All panels of a page, and the clients that show them; from any thread."""
+
+    def __init__(self) -> None:
+        self._lock = threading.RLock()
+        self._widgets: dict[int, Widget] = {}
+        self._clients: dict[str, Client] = {}
+        self._numbers = self._client_numbers = 0
+        self._held = 0
+        self._on_join: list[Callable[[str], object]] = []
+        self._on_leave: list[Callable[[str], object]] = []
+
+    # --- what is shown ---------------------------------------------------------------------
+
+    def panel(self, name: str) -> Container:
+        """Return the panel of a name, one of PANELS."""
+        if name not in PANELS:
+            raise ValueError(f"there is no panel {name}; there are {', '.join(PANELS)}")
+        return Container(self, name, name)
+
+    def add(
+        self, make: Make[W], kind: str, where: tuple[str | int, str, str], props: dict[str, object]
+    ) -> W:
+        """Add an element; where: its parent, its panel, and the client that alone sees it."""
+        with self._lock:
+            self._numbers += 1
+            widget = make(self, WidgetPlace(self._numbers, *where), kind, props)
+            self._widgets[self._numbers] = widget
+            self.changed(widget, widget.props)
+            return widget
+
+    def changed(self, widget: Widget, props: Mapping[str, object], but: str = "") -> None:
+        """Send changed properties to all that see an element, except one client."""
+        with self._lock:
+            if widget.place.number not in self._widgets:
+                return
+            for client in self._viewers(widget):
+                if client.name != but:
+                    waiting = client.changes.setdefault(widget.place.number, {})
+                    assert waiting is not None  # numbers are not used again
+                    waiting.update(props)
+            self._wake()
+
+    def removed(self, widget: Widget) -> None:
+        """Remove an element and what stands in it."""
+        with self._lock:
+            if self._widgets.pop(widget.place.number, None) is None:
+                return
+            for client in self._viewers(widget):
+                client.changes[widget.place.number] = None
+                client.images.discard(widget.place.number)
+            for one in [w for w in self._widgets.values() if w.place.parent == widget.place.number]:
+                self.removed(one)
+            self._wake()
+
+    def image_changed(self, widget: Widget) -> None:
+        """Send an element's new image."""
+        with self._lock:
+            for client in self._viewers(widget):
+                client.images.add(widget.place.number)
+            self._wake()
+
+    @contextmanager
+    def hold(self) -> Iterator[None]:
+        """Send nothing within the block: browsers see all that it changes at once."""
+        with self._lock:
+            self._held += 1
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._held -= 1
+                self._wake()
+
+    def clear(self, parent: str | int) -> None:
+        """Remove everything from a panel or section."""
+        with self._lock:
+            for one in [w for w in self._widgets.values() if w.place.parent == parent]:
+                self.removed(one)
+
+    def notify(
+        self, text: str, client: str = "", browser: str = "", *, refused: bool = False
+    ) -> None:
+        """Show words for some seconds to a client, else to a browser, else to all."""
+        with self._lock:
+            everyone = list(self._clients.values())
+            receivers = (
+                [one for one in everyone if one.name == client]
+                or [one for one in everyone if browser and one.browser == browser]
+                or everyone
+            )
+            for receiver in receivers:
+                receiver.notices.append(Notice(text, refused))
+            self._wake()
+
+    @property
+    def watched(self) -> bool:
+        """Whether any client is there."""
+        return bool(self._clients)
+
+    def _viewers(self, widget: Widget) -> list[Client]:
+        owner = widget.place.owner
+        return [client for client in self._clients.values() if owner in ("", client.name)]
+
+    def _wake(self) -> None:
+        if self._held:
+            return
+        for client in self._clients.values():
+            if client.changes or client.images or client.notices:
+                client.wake()
+
+    # --- who sees it -----------------------------------------------------------------------
+
+    def on_join(self, do: Callable[[str], object]) -> None:
+        """Call ``do`` with the name of every client that comes."""
+        self._on_join.append(do)
+
+    def on_leave(self, do: Callable[[str], object]) -> None:
+        """Call ``do`` with the name of every client that has gone."""
+        self._on_leave.append(do)
+
+    def join(self, browser: str, wake: Callable[[], None]) -> Client:
+        """Add a client, which is owed all that is shown; wake: called when something waits."""
+        with self._lock:
+            self._client_numbers += 1
+            client = Client(f"panels-{self._client_numbers}", browser, wake)
+            self._clients[client.name] = client
+            for number, widget in self._widgets.items():
+                if not widget.place.owner:
+                    client.changes[number] = dict(widget.props)
+                    if widget.data:
+                        client.images.add(number)
+        for do in self._on_join:
+            do(client.name)
+        with self._lock:
+            self._wake()
+        return client
+
+    def leave(self, client: Client) -> None:
+        """Remove a client and what was shown to it alone."""
+        with self._lock:
+            self._clients.pop(client.name, None)
+            for widget in list(self._widgets.values()):
+                if widget.place.owner == client.name:
+                    self._widgets.pop(widget.place.number, None)
+        for do in self._on_leave:
+            do(client.name)
+
+    def browser(self, client: str) -> str:
+        """Return the name of a client's browser, "" where the client is not there."""
+        with self._lock:
+            found = self._clients.get(client)
+            return found.browser if found is not None else ""
+
+    def sees(self, panel: str) -> bool:
+        """Return whether any client shows a panel now."""
+        with self._lock:
+            return any(panel in client.seen for client in self._clients.values())
+
+    # --- messages --------------------------------------------------------------------------
+
+    def outgoing(self, client: Client) -> Outgoing | None:
+        """Return what a client is sent now, None for nothing."""
+        with self._lock:
+            client.taken()
+            if self._held:  # the end of the block wakes it again
+                return None
+            put, gone = [], []
+            for number, props in list(client.changes.items()):
+                if props is None:
+                    gone.append(number)
+                elif (widget := self._widgets.get(number)) is None:
+                    pass
+                elif widget.place.panel in client.seen:
+                    put.append((number, props))
+                else:
+                    continue
+                del client.changes[number]
+            images = [
+                number.to_bytes(_NUMBER_BYTES, "big") + widget.data
+                for number in sorted(client.images)
+                if (widget := self._widgets.get(number)) and widget.place.panel in client.seen
+            ]
+            sent = {int.from_bytes(one[:_NUMBER_BYTES], "big") for one in images}
+            client.images = {n for n in client.images if n not in sent and n in self._widgets}
+            notices = [notice._asdict() for notice in client.notices]
+            client.notices.clear()
+        if not (put or gone or images or notices):
+            return None
+        message = {"put": put, "gone": gone, "say": notices}
+        text = json.dumps({name: part for name, part in message.items() if part})
+        return Outgoing(text if put or gone or notices else "", tuple(images))
+
+    def received(self, client: Client, text: str) -> None:
+        """Take a message of a client: {"set": [number, value]} or {"seen": [names of panels]}.
+
+        What cannot be taken is refused in words to that client.
+        """
+        try:
+            self._take(client, json.loads(text, parse_constant=_no_number))
+        except (ValueError, RecursionError) as error:
+            self.notify(str(error), client.name, refused=True)
+
+    def _take(self, client: Client, message: object) -> None:
+        match message:
+            case {"set": [int() as number, value]} if not isinstance(number, bool):
+                with self._lock:
+                    widget = self._widgets.get(number)
+                # One that was removed a moment ago is pressed in good faith.
+                if widget is None or widget.place.owner not in ("", client.name):
+                    return
+                try:
+                    widget.arrived(value, client.name)
+                except ValueError:
+                    self._send_again(client, widget)
+                    raise
+            case {"seen": list(names)} if all(name in PANELS for name in names):
+                with self._lock:
+                    client.seen = frozenset(names)
+                    client.wake()
+            case _:
+                raise ValueError("a browser sends the number of an element and its new value")
+
+    def _send_again(self, client: Client, widget: Widget) -> None:
+        """Send a client the value in force in place of one that was refused."""
+        with self._lock:
+            if (now := client.changes.setdefault(widget.place.number, {})) is not None:
+                now["value"] = widget.props.get("value")
+
+
+def _no_number(word: str) -> NoReturn:
+    """Refuse NaN and Infinity, which are no JSON."""
+    raise ValueError(f"{word} is no number of JSON")

@@ -1,0 +1,267 @@
+"""The description of a rig: a tree of links from the measures and joints of its YAML. Pure.
+
+The neck turns yaw, pitch, roll about axes through one point, on a lower neck where there is one;
+the head carries eyes that pan and tilt about their centres, lids that turn about an axis through
+both eyes' centres, and whatever other joints the rig has. Angles are those of the rig's joints,
+with their signs (robot/model/kinematics.py).
+"""
+
+from collections.abc import Mapping
+from itertools import combinations, product
+from math import radians
+from typing import NamedTuple
+
+from gazerig.gaze.angles import rotation
+from gazerig.gaze.types import Vec3
+from gazerig.robot.model.coupling_params import CouplingParams
+from gazerig.robot.model.description import mass, parts
+from gazerig.robot.model.description.links import (
+    CameraFrame,
+    Description,
+    Follows,
+    Inertia,
+    Link,
+    LinkJoint,
+)
+from gazerig.robot.model.description.own_meshes import OwnMesh, with_own_meshes
+from gazerig.robot.model.description.servo_limits import joint_torques_nm
+from gazerig.robot.model.frames import OPTICAL, CameraParams
+from gazerig.robot.model.head_shape import HeadMeasures
+from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.kinematics import LIDS, LOWER_NECK, NECK, GeometryParams, LidEnds
+from gazerig.robot.model.types import further
+
+BASE, HEAD = "base_link", "head"
+CAMERA, OPTICAL_FRAME = "camera_link", "camera_optical_frame"
+SIDES = ("left", "right")
+
+UP: Vec3 = (0.0, -1.0, 0.0)
+DOWN: Vec3 = (0.0, 1.0, 0.0)
+_AXES: dict[str, Vec3] = {"yaw": (0.0, 0.0, 1.0), "pitch": UP, "roll": (1.0, 0.0, 0.0)}
+_AXES |= {"pan": _AXES["yaw"], "tilt": UP}
+
+
+class RigShape(NamedTuple):
+    """What a description is made from: values of a rig's YAML.
+
+    lids: angles of the lid joints shut and open
+    image_px: width and height of the camera's frames
+    meshes: of the user's own
+    """
+
+    name: str
+    geometry: GeometryParams
+    joints: Mapping[str, JointParams]
+    lids: Mapping[str, LidEnds]
+    couplings: Mapping[str, CouplingParams]
+    camera: CameraParams
+    image_px: tuple[int, int] = (640, 480)
+    meshes: tuple[OwnMesh, ...] = ()
+
+
+def describe(rig: RigShape, *, looks: bool = True) -> Description:
+    """Return the description of a rig.
+
+    Args:
+        rig: the rig.
+        looks: with what can be seen; without, the same mechanism is made in a moment.
+    """
+    if not looks:
+        return _Builder(rig, looks=False).description().without_looks()
+    return with_own_meshes(_Builder(rig, looks=True).description(), rig.meshes)
+
+
+class _Builder:
+    def __init__(self, rig: RigShape, *, looks: bool) -> None:
+        self._rig, self._looks = rig, looks
+        self._torques = joint_torques_nm(rig.joints, rig.couplings)
+        geometry = rig.geometry
+        self._eyes_m: Vec3 = (geometry.eyes_ahead_mm / 1e3, 0.0, geometry.eyes_above_mm / 1e3)
+        self._measures = HeadMeasures(
+            geometry.interocular_mm / 1e3, (-self._eyes_m[0], 0.0, -self._eyes_m[2])
+        )
+        self._links: list[Link] = []
+
+    def description(self) -> Description:
+        rig = self._rig
+        neck = self._add_neck()
+        first = len(self._links)
+        for side in SIDES:
+            self._add_eye(side)
+        for name in LIDS:
+            if name in rig.joints and name in rig.lids:
+                self._add_lid(name)
+        for name in further(rig.joints):
+            if name not in LOWER_NECK:
+                self._add_further(name)
+        self._links.insert(first, self._head(neck, self._links[first:]))
+        camera = self._add_camera()
+        # The links of the neck lie in each other, in the shoulders and in the head.
+        necks = [link.name for link in self._links[1:first]]
+        inside = [HEAD, *(link.name for link in self._links if link.parent == HEAD)]
+        touching = [*combinations((BASE, *necks), 2), *product(necks, inside)]
+        if not necks:
+            touching += product((BASE,), inside)
+        return Description(rig.name, tuple(self._links), camera, tuple(touching))
+
+    def _joint(
+        self, name: str, axis: Vec3, of: str = "", follows: Follows | None = None
+    ) -> LinkJoint:
+        limit = self._rig.joints[of or name].limit()
+        return LinkJoint(
+            name,
+            axis,
+            limit.low_rad,
+            limit.high_rad,
+            limit.speed_rad_s,
+            self._torques[of or name],
+            follows,
+        )
+
+    def _add_neck(self) -> str:
+        """Add base and neck; return the link that carries the head."""
+        geometry, joints = self._rig.geometry, self._rig.joints
+        pivot = geometry.pitch_axis_height_mm / 1e3
+        lower = geometry.lower_pitch_axis_height_mm / 1e3
+        chain = [(name, lower) for name in LOWER_NECK if name in joints]
+        chain += [(name, pivot) for name in NECK if name in joints]
+        head_m = (self._eyes_m[0], 0.0, pivot + self._eyes_m[2])
+        first = chain[0][1] if chain else pivot
+        # A column about a yaw axis turns with it; any other stands still.
+        turns = bool(chain) and chain[0][0].endswith("yaw")
+        self._links.append(
+            parts.base(BASE, self._measures, head_m, 0.0 if turns else first, bool(chain))
+        )
+        below = first - parts.shoulders_m(self._measures, head_m) if turns else 0.0
+        parent, at = BASE, 0.0
+        heights = [height for _, height in chain[1:]] + [pivot]
+        for (name, height), following in zip(chain, heights, strict=False):
+            joint = self._joint(name, _AXES[name.rpartition("_")[2]])
+            place = (0.0, 0.0, height - at)
+            above = following - height
+            self._links.append(
+                parts.neck(link_of(name), parent, place, joint, self._measures, below, above)
+            )
+            parent, at, below = link_of(name), height, 0.0
+        self._pivot_m: Vec3 = (0.0, 0.0, pivot - at)
+        return parent
+
+    def _head(self, neck: str, carried: list[Link]) -> Link:
+        """Return the head, balanced with all it carries about the axes of the neck."""
+        x, y, z = self._pivot_m
+        ahead, _, above = self._eyes_m
+        rest = mass.joined(_in_head(carried))
+        whole = max(mass.head_mass_kg(self._measures.interocular_m), 2.0 * rest.mass_kg)
+        still = [
+            (side, self._meet_rad(side))
+            for side in SIDES
+            if f"{side}_upper_lid" in self._rig.lids and f"{side}_lower_lid" not in self._rig.lids
+        ]
+        return parts.head(
+            HEAD,
+            neck,
+            (x + ahead, y, z + above),
+            self._measures,
+            (whole - rest.mass_kg, _counter(rest, whole, self._measures.pivot_m)),
+            further(self._rig.joints),
+            still,
+            self._looks,
+        )
+
+    def _add_eye(self, side: str) -> None:
+        joints = self._rig.joints
+        parent, place = HEAD, parts.eye_m(side, self._measures.interocular_m)
+        for turn in ("pan", "tilt"):
+            own, both = f"{side}_eye_{turn}", f"eyes_{turn}"
+            if own in joints:
+                joint = self._joint(own, _AXES[turn])
+            elif both not in joints:
+                continue
+            elif any(link.joint and link.joint.name == both for link in self._links):
+                name = self._free(f"{side}_eyes_{turn}")
+                joint = self._joint(name, _AXES[turn], both, Follows(both))
+            else:
+                joint = self._joint(both, _AXES[turn])
+            name = link_of(joint.name)
+            ring = mass.gimbal(self._measures.eye_radius_m)
+            self._links.append(Link(name, parent, place, joint=joint, inertia=ring))
+            parent, place = name, (0.0, 0.0, 0.0)
+        self._links.append(parts.eye(f"{side}_eye", parent, place, self._measures))
+
+    def _free(self, name: str) -> str:
+        """Return a name that no joint of the rig has."""
+        while name in self._rig.joints:
+            name += "_"
+        return name
+
+    def _add_lid(self, name: str) -> None:
+        """Add a lid whose edge meets the other lid's where the rig says that it is shut."""
+        side, which, _ = name.split("_")
+        shut, wide = self._rig.lids[name]
+        opens = 1.0 if wide > shut else -1.0
+        up = opens if which == "upper" else -opens
+        meet = self._meet_rad(side)
+        # With the joint at 0 the edge is so far above the eye's equator.
+        edge = meet - up * shut
+        joint = self._joint(name, (0.0, -up, 0.0))
+        place = parts.eye_m(side, self._measures.interocular_m)
+        self._links.append(
+            parts.lid(link_of(name), HEAD, place, joint, self._measures, which == "upper", edge)
+        )
+
+    def _meet_rad(self, side: str) -> float:
+        """Return the elevation at which the lids of an eye meet."""
+        spans = [
+            abs(wide - shut)
+            for shut, wide in (
+                self._rig.lids.get(f"{side}_{which}_lid", (0.0, 0.0))
+                for which in ("upper", "lower")
+            )
+        ]
+        return parts.meeting_rad(spans[0], spans[1])
+
+    def _add_further(self, name: str) -> None:
+        place, axis = parts.further_axis(name, self._measures)
+        joint = self._joint(name, axis)
+        self._links.append(parts.further(link_of(name), HEAD, place, joint, self._measures))
+
+    def _add_camera(self) -> CameraFrame:
+        camera = self._rig.camera
+        x, y, z = camera.position_mm
+        angles = radians(camera.yaw_deg), radians(camera.pitch_deg), radians(camera.roll_deg)
+        parent = HEAD if camera.mount == "head" else BASE
+        place = (x / 1e3, y / 1e3, z / 1e3)
+        self._links.append(parts.camera(CAMERA, parent, place, rotation(angles)))
+        self._links.append(Link(OPTICAL_FRAME, CAMERA, R=OPTICAL))
+        width, height = self._rig.image_px
+        field = radians(camera.horizontal_field_deg)
+        return CameraFrame(CAMERA, OPTICAL_FRAME, field, width, height)
+
+
+def link_of(joint: str) -> str:
+    """Return the name of the link that a joint moves."""
+    name = f"{joint}_link"
+    # A joint may be called base or camera.
+    return f"{name}_" if name in (BASE, CAMERA) else name
+
+
+def _in_head(links: list[Link]) -> list[Inertia]:
+    """Return the inertias of links that the head carries, in its frame, all joints at 0."""
+    at: dict[str, Vec3] = {HEAD: (0.0, 0.0, 0.0)}
+    found = []
+    for link in links:
+        x, y, z = at[link.parent or HEAD]
+        px, py, pz = link.p_m
+        at[link.name] = x + px, y + py, z + pz
+        if link.inertia is not None:
+            cx, cy, cz = link.inertia.com_m
+            com = (x + px + cx, y + py + cy, z + pz + cz)
+            found.append(link.inertia._replace(com_m=com))
+    return found
+
+
+def _counter(rest: Inertia, whole_kg: float, at_m: Vec3) -> Vec3:
+    """Return where the rest of a mass must be, so that all of it is centred on a point."""
+    share = rest.mass_kg / (whole_kg - rest.mass_kg)
+    x, y, z = (place + share * (place - off) for place, off in zip(at_m, rest.com_m, strict=True))
+    return x, y, z

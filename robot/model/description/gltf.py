@@ -1,0 +1,121 @@
+"""A description as binary glTF: a tree of nodes with meshes, for browsers and modelling programs.
+
+A joint is a node of its own between a link and its parent: turned about the axis that stands in
+its extras, it moves what hangs on it. y is up, as glTF wants it, under a root that turns z up.
+"""
+
+from collections.abc import Collection
+from math import atan, tan
+from typing import Any
+
+import numpy as np
+import trimesh
+from PIL import Image
+from trimesh.exchange.gltf import export_glb
+from trimesh.visual.material import PBRMaterial
+
+from gazerig.gaze.types import Floats, Mat3, Vec3
+from gazerig.robot.model.description.links import IDENTITY, ORIGIN, Description, Finish, Visual
+from gazerig.robot.model.description.texture import textured
+
+_ROUGHNESS: dict[Finish, float] = {
+    "skin": 0.7, "plastic": 0.45, "cloth": 0.95, "eye": 0.12, "dark": 1.0,
+}  # fmt: skip
+_Y_UP: Mat3 = ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0))
+_ROOT = "world"
+_VERTICES, _FACES = 34962, 34963
+"""What a part of glTF's buffer is for."""
+
+
+def gltf(description: Description) -> bytes:
+    """Return a description as a binary glTF file, all joints at 0."""
+    scene: Any = trimesh.Scene(base_frame=_ROOT)
+    names = {_ROOT, *(link.name for link in description.links)}
+    names |= {f"{look.name}_mesh" for link in description.links for look in link.visuals}
+    joints: dict[str, dict[str, Any]] = {}
+    for link in description.links:
+        parent = link.parent or _ROOT
+        R, p = (link.R, link.p_m) if link.parent else (_Y_UP, ORIGIN)
+        if link.joint is not None:
+            node = _free(link.joint.name, {*names, *joints})
+            scene.graph.update(frame_from=parent, frame_to=node, matrix=_matrix(R, p))
+            joints[node] = {
+                "joint": link.joint.name,
+                "axis": list(link.joint.axis),
+                "low_rad": link.joint.low_rad,
+                "high_rad": link.joint.high_rad,
+            }
+            parent, R, p = node, IDENTITY, ORIGIN
+        scene.graph.update(frame_from=parent, frame_to=link.name, matrix=_matrix(R, p))
+        for visual in link.visuals:
+            scene.add_geometry(
+                _mesh(visual),
+                node_name=f"{visual.name}_mesh",
+                geom_name=visual.name,
+                parent_node_name=link.name,
+                transform=_matrix(visual.R, visual.p_m),
+            )
+
+    def complete(tree: dict[str, Any]) -> None:
+        for node in tree["nodes"]:
+            if node["name"] in joints:
+                node["extras"] = joints[node["name"]]
+        _add_camera(tree, description)
+        _mark_buffers(tree)
+
+    exported: Any = export_glb(  # type: ignore[no-untyped-call]
+        scene, include_normals=True, tree_postprocessor=complete
+    )
+    return bytes(exported)
+
+
+def _add_camera(tree: dict[str, Any], description: Description) -> None:
+    """Add the camera: glTF's looks along -z with y up, the optical frame along z with y down."""
+    camera = description.camera
+    share = camera.width_px / camera.height_px
+    field_y = 2.0 * atan(tan(0.5 * camera.horizontal_field_rad) / share)
+    perspective = {"aspectRatio": share, "yfov": field_y, "znear": 0.01}
+    tree["cameras"] = [{"name": "camera", "type": "perspective", "perspective": perspective}]
+    node = {"name": "camera_view", "camera": 0, "rotation": [1.0, 0.0, 0.0, 0.0]}
+    tree["nodes"].append(node)
+    (optical,) = (node for node in tree["nodes"] if node["name"] == camera.optical)
+    optical.setdefault("children", []).append(len(tree["nodes"]) - 1)
+
+
+def _mark_buffers(tree: dict[str, Any]) -> None:
+    """Say which parts of the buffer are vertices and which are faces; trimesh leaves that open."""
+    for mesh in tree["meshes"]:
+        for primitive in mesh["primitives"]:
+            for accessor in primitive["attributes"].values():
+                tree["bufferViews"][tree["accessors"][accessor]["bufferView"]]["target"] = _VERTICES
+            view = tree["accessors"][primitive["indices"]]["bufferView"]
+            tree["bufferViews"][view]["target"] = _FACES
+
+
+def _free(name: str, taken: Collection[str]) -> str:
+    """Return a node's name that is not taken; a joint may be called as a link is."""
+    while name in taken:
+        name += "_"
+    return name
+
+
+def _mesh(visual: Visual) -> Any:
+    mesh = textured(visual.painted)
+    material = PBRMaterial(  # type: ignore[no-untyped-call]
+        name=visual.name,
+        baseColorTexture=Image.fromarray(mesh.image),
+        metallicFactor=0.0,
+        roughnessFactor=_ROUGHNESS[visual.finish],
+    )
+    # trimesh counts v from below.
+    uv = mesh.uv * (1.0, -1.0) + (0.0, 1.0)
+    look = trimesh.visual.TextureVisuals(uv=uv, material=material)  # type: ignore[no-untyped-call]
+    return trimesh.Trimesh(
+        mesh.vertices, mesh.faces, vertex_normals=mesh.normals, visual=look, process=False
+    )
+
+
+def _matrix(R: Mat3, p: Vec3) -> Floats:
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = R, p
+    return matrix

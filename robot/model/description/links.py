@@ -1,0 +1,183 @@
+"""What a description of a rig consists of: links, joints, inertias, shapes. Values only.
+
+SI units. A link's frame is that of its joint: the joint turns it about an axis through its origin.
+World: origin at the neck base, x forward, y left, z up; all link frames are parallel to it while
+every joint is at 0, except those of the camera.
+"""
+
+from collections.abc import Mapping, Sequence
+from math import cos, sin
+from typing import Literal, NamedTuple
+
+from gazerig.gaze.angles import add, compose, rotate
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.model.paint import Painted
+
+IDENTITY: Mat3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+ORIGIN: Vec3 = (0.0, 0.0, 0.0)
+
+Pose = tuple[Mat3, Vec3]
+"""R_parent_child and p_parent_child_m."""
+Finish = Literal["skin", "plastic", "cloth", "eye", "dark"]
+"""What a surface is made of; each viewer shows it as well as it can."""
+Layer = Literal["body", "lid"]
+ShapeKind = Literal["sphere", "ellipsoid", "capsule", "box"]
+
+
+class Inertia(NamedTuple):
+    """Mass of a link, its centre in the link's frame, and the tensor about that centre."""
+
+    mass_kg: float
+    com_m: Vec3
+    tensor_kg_m2: Mat3
+
+
+class CollisionShape(NamedTuple):
+    """A plain body that stands for a link in collisions.
+
+    half_m: half axes of an ellipsoid or a box; radius of a sphere first; a capsule's radius and
+        half the length of its line, which lies along its z axis
+    layer: lids touch lids only, bodies everything else
+    """
+
+    kind: ShapeKind
+    half_m: Vec3
+    p_m: Vec3 = ORIGIN
+    R: Mat3 = IDENTITY
+    layer: Layer = "body"
+
+
+class Visual(NamedTuple):
+    """A painted mesh of a link; the name is unique in the description."""
+
+    name: str
+    painted: Painted
+    finish: Finish = "plastic"
+    p_m: Vec3 = ORIGIN
+    R: Mat3 = IDENTITY
+
+
+class Follows(NamedTuple):
+    """A joint that a linkage moves with another one: its angle is ``ratio`` times the other's."""
+
+    joint: str
+    ratio: float = 1.0
+
+
+class LinkJoint(NamedTuple):
+    """The hinge between a link and its parent.
+
+    name: as in the rig, or one of its own where it follows another joint
+    axis: unit vector in the link's frame; positive angles turn about it by the right-hand rule
+    max_torque_nm: of the servo at the joint
+    """
+
+    name: str
+    axis: Vec3
+    low_rad: float
+    high_rad: float
+    max_speed_rad_s: float
+    max_torque_nm: float
+    follows: Follows | None = None
+
+
+class Link(NamedTuple):
+    """A rigid part: its pose in its parent with the joint at 0, and what it consists of."""
+
+    name: str
+    parent: str | None
+    p_m: Vec3 = ORIGIN
+    R: Mat3 = IDENTITY
+    joint: LinkJoint | None = None
+    inertia: Inertia | None = None
+    visuals: tuple[Visual, ...] = ()
+    collisions: tuple[CollisionShape, ...] = ()
+
+
+class CameraFrame(NamedTuple):
+    """The camera: its links and its field of view.
+
+    link: x forward, y left, z up; optical: x right, y down, z forward (as in ROS)
+    """
+
+    link: str
+    optical: str
+    horizontal_field_rad: float
+    width_px: int
+    height_px: int
+
+
+class Description(NamedTuple):
+    """A rig as a tree of links, parents first.
+
+    may_touch: pairs of links whose shapes overlap by construction
+    """
+
+    name: str
+    links: tuple[Link, ...]
+    camera: CameraFrame
+    may_touch: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def joints(self) -> tuple[LinkJoint, ...]:
+        """Return all joints, also those that follow others."""
+        return tuple(link.joint for link in self.links if link.joint is not None)
+
+    def link(self, name: str) -> Link:
+        """Return a link by its name.
+
+        Raises:
+            KeyError: there is none of that name.
+        """
+        for link in self.links:
+            if link.name == name:
+                return link
+        raise KeyError(name)
+
+    def without_looks(self) -> "Description":
+        """Return the same mechanism without anything to see."""
+        return self._replace(links=tuple(link._replace(visuals=()) for link in self.links))
+
+    def angles(self, names: Sequence[str], position_rad: Sequence[float]) -> dict[str, float]:
+        """Return the angle of every joint, those that follow others included.
+
+        Args:
+            names: of joints of the rig.
+            position_rad: their angles; joints that are not named stand at 0.
+        """
+        known = dict(zip(names, position_rad, strict=True))
+        found = {}
+        for joint in self.joints:
+            if joint.follows is None:
+                found[joint.name] = known.get(joint.name, 0.0)
+            else:
+                found[joint.name] = joint.follows.ratio * known.get(joint.follows.joint, 0.0)
+        return found
+
+    def poses(self, angles_rad: Mapping[str, float]) -> dict[str, Pose]:
+        """Return R_world_link and p_world_link_m of every link.
+
+        Args:
+            angles_rad: of every joint, as ``angles`` returns them.
+        """
+        found: dict[str, Pose] = {}
+        for link in self.links:
+            R, p = (IDENTITY, ORIGIN) if link.parent is None else found[link.parent]
+            p = add(p, rotate(R, link.p_m))
+            R = compose(R, link.R)
+            if link.joint is not None:
+                R = compose(R, turn_about(link.joint.axis, angles_rad[link.joint.name]))
+            found[link.name] = R, p
+        return found
+
+
+def turn_about(axis: Vec3, angle_rad: float) -> Mat3:
+    """Return the rotation about a unit vector by an angle (Rodrigues' formula)."""
+    x, y, z = axis
+    c, s = cos(angle_rad), sin(angle_rad)
+    d = 1.0 - c
+    return (
+        (c + x * x * d, x * y * d - z * s, x * z * d + y * s),
+        (y * x * d + z * s, c + y * y * d, y * z * d - x * s),
+        (z * x * d - y * s, z * y * d + x * s, c + z * z * d),
+    )

@@ -1,0 +1,158 @@
+"""Masses and inertias of the parts of a head, from their shapes and what they are made of.
+
+Lengths in metres, tensors about the centre of mass.
+"""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from gazerig.gaze.types import Floats, Mat3, Vec3
+from gazerig.robot.model.description.links import Inertia
+
+_PRINTED_KG_M3 = 1050.0
+"""Density of printed PLA or PETG with the usual share of air."""
+SHELL_M, _GLOBE_M, _LID_M = 1.6e-3, 1.6e-3, 1.2e-3
+"""Thickness of the skull's shell, of an eyeball and of a lid."""
+HEAD_KG, _REFERENCE_M = 0.6, 0.0619
+"""Mass of a whole head (skull, servos, eyes, lids) whose eyes are so far apart."""
+SERVO_KG = 0.023
+"""Of an XC330 or an STS3215's smaller brothers."""
+_SERVO_HALF_M: Vec3 = (0.010, 0.013, 0.017)
+
+_CONTENT_HALF: Vec3 = (1.5, 1.1, 0.6)
+"""Half axes of what fills a head (servos, frame, counterweight), in distances between the eyes."""
+_CONTENT_REACH = 2.2
+"""How far its centre may be from the head's middle to balance it, in distances between the eyes."""
+
+_SKULL = (47.15, (-0.831, 0.0, 0.110), ((65.81, 0.0, 8.78), (0.0, 72.79, 0.0), (8.78, 0.0, 54.48)))
+"""Mass, centre and tensor of a head's shell with eyes 1 m apart, of the thickness above."""
+
+HEAD_LOAD_KG_M2 = {"neck_yaw": 2.0e-3, "neck_pitch": 3.0e-3, "neck_roll": 3.0e-3}
+"""Inertia of a balanced head of 0.6 kg about the axes of its neck, rounded."""
+
+
+def head_mass_kg(interocular_m: float) -> float:
+    """Return the mass of a head: its shell grows with its surface, its mechanism does not."""
+    share = interocular_m / _REFERENCE_M
+    return HEAD_KG * (0.5 + 0.5 * share * share)
+
+
+def servo(times: float = 1.0) -> Inertia:
+    """Return a servo with its bracket, as a box in the middle of its link."""
+    mass = times * (SERVO_KG + 0.012)
+    x, y, z = (half * half / 3.0 for half in _SERVO_HALF_M)
+    return Inertia(mass, (0.0, 0.0, 0.0), diagonal(mass * (y + z), mass * (x + z), mass * (x + y)))
+
+
+def skull(interocular_m: float) -> Inertia:
+    """Return the shell of a head, whose thickness stays the same, from between the eyes."""
+    mass, com, tensor = _SKULL
+    unit = interocular_m
+    return Inertia(
+        mass * unit**2, _vector(np.array(com) * unit), _matrix(np.array(tensor) * unit**4)
+    )
+
+
+def globe(radius_m: float) -> Inertia:
+    """Return a hollow eyeball about its centre."""
+    mass = 4.0 * np.pi * radius_m**2 * _GLOBE_M * _PRINTED_KG_M3
+    about = 2.0 / 3.0 * mass * radius_m**2
+    return Inertia(mass, (0.0, 0.0, 0.0), diagonal(about, about, about))
+
+
+def gimbal(radius_m: float) -> Inertia:
+    """Return the ring of wire and plastic that carries an eye, about its centre."""
+    mass = 0.15 * globe(radius_m).mass_kg
+    about = mass * radius_m**2
+    return Inertia(mass, (0.0, 0.0, 0.0), diagonal(0.5 * about, 0.5 * about, about))
+
+
+def sheet(vertices: Floats, faces: np.ndarray, thickness_m: float = _LID_M) -> Inertia:
+    """Return a thin plastic sheet, such as a lid or a skull's shell, by its triangles."""
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    masses = areas * thickness_m * _PRINTED_KG_M3
+    # Three points at the middles of its edges have the moments of a triangle.
+    points = np.concatenate(((a + b) / 2, (b + c) / 2, (c + a) / 2))
+    return _of_points(points, np.tile(masses / 3.0, 3))
+
+
+def balanced(shell: Inertia, mass_kg: float, unit_m: float, middle_m: Vec3, at_m: Vec3) -> Inertia:
+    """Return a shell with what fills it: an even ellipsoid that brings the whole into balance.
+
+    Args:
+        shell: the skull.
+        mass_kg: of both together.
+        unit_m: distance between the eyes, which scales the content.
+        middle_m: of the head; the content's centre stays near it, balanced or not.
+        at_m: where the centre of the whole should be: on the axes of the neck.
+    """
+    rest = mass_kg - shell.mass_kg
+    if rest <= 0.0:  # a very large head has a thinner shell
+        return scaled(shell, mass_kg)
+    middle = np.array(middle_m)
+    wanted = (mass_kg * np.array(at_m) - shell.mass_kg * np.array(shell.com_m)) / rest
+    off = wanted - middle
+    farthest = _CONTENT_REACH * unit_m
+    off *= min(1.0, farthest / max(float(np.linalg.norm(off)), 1e-9))
+    x, y, z = ((half * unit_m) ** 2 / 5.0 for half in _CONTENT_HALF)
+    tensor = diagonal(rest * (y + z), rest * (x + z), rest * (x + y))
+    return joined((shell, Inertia(rest, _vector(middle + off), tensor)))
+
+
+def scaled(one: Inertia, mass_kg: float) -> Inertia:
+    """Return the same shape of another mass."""
+    share = mass_kg / one.mass_kg
+    return Inertia(mass_kg, one.com_m, _matrix(np.array(one.tensor_kg_m2) * share))
+
+
+def joined(parts: Iterable[Inertia]) -> Inertia:
+    """Return several bodies as one, all in the same frame."""
+    bodies = tuple(parts)
+    mass = sum(body.mass_kg for body in bodies)
+    com = sum((body.mass_kg * np.array(body.com_m) for body in bodies), np.zeros(3)) / mass
+    tensor = np.zeros((3, 3))
+    for body in bodies:
+        tensor += np.array(body.tensor_kg_m2) + _steiner(np.array(body.com_m) - com, body.mass_kg)
+    return Inertia(mass, _vector(com), _matrix(tensor))
+
+
+def turned(one: Inertia, R: Mat3, p_m: Vec3) -> Inertia:
+    """Return a body as seen from a frame in which its own has this pose."""
+    turn = np.array(R)
+    com = turn @ np.array(one.com_m) + p_m
+    return Inertia(one.mass_kg, _vector(com), _matrix(turn @ np.array(one.tensor_kg_m2) @ turn.T))
+
+
+def about(one: Inertia, point_m: Vec3) -> Mat3:
+    """Return the tensor of a body about a point."""
+    off = np.array(one.com_m) - point_m
+    return _matrix(np.array(one.tensor_kg_m2) + _steiner(off, one.mass_kg))
+
+
+def diagonal(x: float, y: float, z: float) -> Mat3:
+    """Return a tensor with these moments."""
+    return ((x, 0.0, 0.0), (0.0, y, 0.0), (0.0, 0.0, z))
+
+
+def _of_points(points: Floats, masses: Floats) -> Inertia:
+    mass = float(masses.sum())
+    com = masses @ points / mass
+    off = points - com
+    second = (off * masses[:, None]).T @ off
+    return Inertia(mass, _vector(com), _matrix(np.trace(second) * np.eye(3) - second))
+
+
+def _steiner(off: Floats, mass_kg: float) -> Floats:
+    return np.asarray(mass_kg * ((off @ off) * np.eye(3) - np.outer(off, off)))
+
+
+def _vector(values: Floats) -> Vec3:
+    x, y, z = np.asarray(values, float).tolist()
+    return x, y, z
+
+
+def _matrix(values: Floats) -> Mat3:
+    a, b, c = np.asarray(values, float)
+    return _vector(a), _vector(b), _vector(c)

@@ -1,0 +1,64 @@
+"""A painted mesh as files that every program reads: Wavefront OBJ, its material and a PNG."""
+
+import cv2
+import numpy as np
+
+from gazerig.gaze.types import Floats
+from gazerig.robot.model.description.texture import TexturedMesh, textured
+from gazerig.robot.model.mesh import Mesh
+from gazerig.robot.model.paint import Painted
+
+
+def mesh_files(name: str, painted: Painted) -> dict[str, bytes]:
+    """Return the content of ``name``.obj, .mtl and .png by file name; lengths in metres."""
+    mesh = textured(painted)
+    return {
+        f"{name}.obj": _obj(name, mesh).encode(),
+        f"{name}.mtl": _material(name).encode(),
+        f"{name}.png": png(mesh.image),
+    }
+
+
+def plain_obj(name: str, mesh: Mesh) -> bytes:
+    """Return a mesh without colours as an OBJ file."""
+    vertices = _rows("v %.6f %.6f %.6f\n", mesh.vertices)
+    faces = _rows("f %d %d %d\n", mesh.faces + 1)
+    return f"o {name}\n{vertices}{faces}".encode()
+
+
+def png(image: np.ndarray) -> bytes:
+    """Return an image (rows, columns, 3 or 4), red first, as a PNG file."""
+    order = cv2.COLOR_RGB2BGR if image.shape[2] == 3 else cv2.COLOR_RGBA2BGRA
+    _, data = cv2.imencode(".png", cv2.cvtColor(image, order), [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    return bytes(data)
+
+
+def _obj(name: str, mesh: TexturedMesh) -> str:
+    """Return a mesh as text: points and normals that are the same are written once."""
+    points, point_of = _once(mesh.vertices, 6)
+    normals, normal_of = _once(mesh.normals, 3)
+    # In this format an image begins at its left lower corner.
+    corners, corner_of = _once(mesh.uv * (1.0, -1.0) + (0.0, 1.0), 5)
+    table = np.stack((point_of, corner_of, normal_of), axis=-1)[mesh.faces] + 1
+    return (
+        f"mtllib {name}.mtl\no {name}\n"
+        + _rows("v %.6f %.6f %.6f\n", points)
+        + _rows("vt %.5f %.5f\n", corners)
+        + _rows("vn %.3f %.3f %.3f\n", normals)
+        + f"usemtl {name}\n"
+        + _rows("f %d/%d/%d %d/%d/%d %d/%d/%d\n", table)
+    )
+
+
+def _once(values: Floats, digits: int) -> tuple[Floats, np.ndarray]:
+    found, index = np.unique(np.round(values, digits) + 0.0, axis=0, return_inverse=True)
+    return found, index.reshape(-1)
+
+
+def _rows(line: str, values: np.ndarray) -> str:
+    """Return a line for each row; all at once, which takes a third of the time of one by one."""
+    return (line * len(values)) % tuple(values.ravel().tolist())
+
+
+def _material(name: str) -> str:
+    return f"newmtl {name}\nKa 1 1 1\nKd 1 1 1\nKs 0.1 0.1 0.1\nNs 20\nillum 2\nmap_Kd {name}.png\n"

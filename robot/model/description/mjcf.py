@@ -1,0 +1,181 @@
+"""A description as MJCF, the format of MuJoCo: text, and the files that it names. Pure.
+
+The text is a model of its own, and can be attached to a world (``spec.attach``). Its only body
+under the world is the rig's base. Lids collide with lids, other parts with everything but lids.
+"""
+
+import xml.etree.ElementTree as ET
+from collections.abc import Iterator
+from math import atan, degrees, tan
+from typing import NamedTuple
+
+from gazerig.robot.model.description.links import (
+    IDENTITY,
+    CollisionShape,
+    Description,
+    Inertia,
+    Link,
+    LinkJoint,
+    Visual,
+)
+from gazerig.robot.model.description.mesh_files import mesh_files
+from gazerig.robot.model.description.numbers import numbers
+from gazerig.robot.model.quaternion import quaternion
+
+_LAYERS = {"body": "1", "lid": "2"}
+_MATERIALS = {
+    "skin": {"specular": "0.15", "shininess": "0.2"},
+    "plastic": {"specular": "0.4", "shininess": "0.5"},
+    "cloth": {"specular": "0", "shininess": "0"},
+    "eye": {"specular": "0.9", "shininess": "0.95"},
+    "dark": {"specular": "0", "shininess": "0"},
+}
+_LOOKS_GROUP, _COLLISIONS_GROUP = "2", "3"
+"""Groups of geoms as MuJoCo's own models have them: the viewer hides the second at first."""
+
+
+class Mjcf(NamedTuple):
+    """The text of a model, and the content of its files by name."""
+
+    xml: str
+    assets: dict[str, bytes]
+
+
+def mjcf(
+    description: Description, prefix: str = "", folder: str = "", *, looks: bool = True
+) -> Mjcf:
+    """Return a description as MJCF.
+
+    Args:
+        description: of the rig.
+        prefix: before the name of everything, so that two rigs fit in one world.
+        folder: of the meshes and textures, relative to the text.
+        looks: with what can be seen; without, it is the same mechanism without files.
+    """
+    if not looks:
+        description = description.without_looks()
+    root = ET.Element("mujoco", model=prefix + description.name)
+    compiler = ET.SubElement(root, "compiler", angle="radian", autolimits="true")
+    if folder:
+        compiler.set("meshdir", folder)
+        compiler.set("texturedir", folder)
+    assets: dict[str, bytes] = {}
+    _add_assets(ET.SubElement(root, "asset"), description, prefix, assets)
+    bodies = {"": ET.SubElement(root, "worldbody")}
+    for link in description.links:
+        body = ET.SubElement(bodies[link.parent or ""], "body", name=prefix + link.name)
+        bodies[link.name] = body
+        _fill(body, link, prefix)
+        if link.name == description.camera.optical:
+            _add_camera(body, description, prefix)
+    _add_contacts(ET.SubElement(root, "contact"), description, prefix)
+    _add_linkages(ET.SubElement(root, "equality"), description, prefix)
+    _add_motors(ET.SubElement(root, "actuator"), description, prefix)
+    ET.indent(root)
+    return Mjcf(ET.tostring(root, encoding="unicode") + "\n", assets)
+
+
+def _add_assets(
+    parent: ET.Element, description: Description, prefix: str, assets: dict[str, bytes]
+) -> None:
+    for visual in _visuals(description):
+        name = prefix + visual.name
+        files = mesh_files(name, visual.painted)
+        assets |= {file: data for file, data in files.items() if not file.endswith(".mtl")}
+        ET.SubElement(parent, "texture", name=name, type="2d", file=f"{name}.png")
+        material = {"name": name, "texture": name} | _MATERIALS[visual.finish]
+        ET.SubElement(parent, "material", material)
+        # A surface with holes has no inside; what it weighs stands with the body.
+        ET.SubElement(parent, "mesh", name=name, file=f"{name}.obj", inertia="shell")
+
+
+def _visuals(description: Description) -> Iterator[Visual]:
+    for link in description.links:
+        yield from link.visuals
+
+
+def _fill(body: ET.Element, link: Link, prefix: str) -> None:
+    """Write what a body consists of, its joint first."""
+    _place(body, link.p_m, link.R)
+    if link.inertia is not None:
+        _add_inertia(body, link.inertia)
+    if link.joint is not None:
+        _add_joint(body, link.joint, prefix)
+    for shape in link.collisions:
+        _add_shape(body, shape)
+    for visual in link.visuals:
+        geom = ET.SubElement(
+            body, "geom", name=f"{prefix}{visual.name}", type="mesh", mesh=prefix + visual.name,
+            material=prefix + visual.name, contype="0", conaffinity="0", group=_LOOKS_GROUP,
+            mass="0",
+        )  # fmt: skip
+        _place(geom, visual.p_m, visual.R)
+
+
+def _place(element: ET.Element, p_m: tuple[float, ...], R: object) -> None:
+    if any(p_m):
+        element.set("pos", numbers(p_m))
+    if R != IDENTITY:
+        element.set("quat", numbers(quaternion(R)))  # type: ignore[arg-type]
+
+
+def _add_inertia(body: ET.Element, inertia: Inertia) -> None:
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia.tensor_kg_m2
+    ET.SubElement(
+        body, "inertial", pos=numbers(inertia.com_m), mass=numbers((inertia.mass_kg,)),
+        fullinertia=numbers((xx, yy, zz, xy, xz, yz)),
+    )  # fmt: skip
+
+
+def _add_joint(body: ET.Element, joint: LinkJoint, prefix: str) -> None:
+    ET.SubElement(
+        body, "joint", name=prefix + joint.name, type="hinge", axis=numbers(joint.axis),
+        range=numbers((joint.low_rad, joint.high_rad)),
+    )  # fmt: skip
+
+
+def _add_shape(body: ET.Element, shape: CollisionShape) -> None:
+    layer = _LAYERS[shape.layer]
+    used = {"sphere": 1, "capsule": 2}.get(shape.kind, 3)
+    geom = ET.SubElement(
+        body, "geom", type=shape.kind, size=numbers(shape.half_m[:used]), contype=layer,
+        conaffinity=layer, group=_COLLISIONS_GROUP, rgba="0.8 0.4 0.2 0.4", mass="0",
+    )  # fmt: skip
+    _place(geom, shape.p_m, shape.R)
+
+
+def _add_camera(body: ET.Element, description: Description, prefix: str) -> None:
+    """Write the camera: MuJoCo's looks along -z with y up, the optical frame along z, y down."""
+    camera = description.camera
+    share = camera.height_px / camera.width_px
+    field_y = 2.0 * atan(tan(0.5 * camera.horizontal_field_rad) * share)
+    ET.SubElement(
+        body, "camera", name=f"{prefix}camera", fovy=numbers((degrees(field_y),)),
+        xyaxes="1 0 0 0 -1 0", resolution=f"{camera.width_px} {camera.height_px}",
+    )  # fmt: skip
+
+
+def _add_contacts(parent: ET.Element, description: Description, prefix: str) -> None:
+    for one, other in description.may_touch:
+        ET.SubElement(parent, "exclude", body1=prefix + one, body2=prefix + other)
+
+
+def _add_linkages(parent: ET.Element, description: Description, prefix: str) -> None:
+    for joint in description.joints:
+        if joint.follows is not None:
+            # As stiff as steps of 1 ms allow.
+            ET.SubElement(
+                parent, "joint", joint1=prefix + joint.name,
+                joint2=prefix + joint.follows.joint, solref="0.002 1",
+                polycoef=numbers((0.0, joint.follows.ratio, 0.0, 0.0, 0.0)),
+            )  # fmt: skip
+
+
+def _add_motors(parent: ET.Element, description: Description, prefix: str) -> None:
+    for joint in description.joints:
+        if joint.follows is None:
+            torque = joint.max_torque_nm
+            ET.SubElement(
+                parent, "motor", name=prefix + joint.name, joint=prefix + joint.name,
+                ctrlrange=numbers((-torque, torque)),
+            )  # fmt: skip

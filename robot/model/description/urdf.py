@@ -1,0 +1,129 @@
+"""A description as URDF, which ROS, Foxglove and most simulators read: text and its meshes. Pure.
+
+Ellipsoids are a ball of radius 1 with a scale, capsules a cylinder with a ball at either end: URDF
+knows neither. Meshes lie beside the text, their paths are relative, no package is needed.
+"""
+
+import xml.etree.ElementTree as ET
+from collections.abc import Collection, Iterator
+from typing import NamedTuple
+
+from gazerig.gaze.angles import add, rotate
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.model.description.links import (
+    IDENTITY,
+    ORIGIN,
+    CollisionShape,
+    Description,
+    Inertia,
+    Link,
+    LinkJoint,
+)
+from gazerig.robot.model.description.mesh_files import mesh_files, plain_obj
+from gazerig.robot.model.description.numbers import numbers, roll_pitch_yaw
+from gazerig.robot.model.mesh import ellipsoid
+
+_BALL = "ball_of_radius_1.obj"
+
+
+class Urdf(NamedTuple):
+    """The text of a description, and the content of its files by name."""
+
+    xml: str
+    assets: dict[str, bytes]
+
+
+def urdf(description: Description, folder: str = "meshes", *, looks: bool = True) -> Urdf:
+    """Return a description as URDF.
+
+    Args:
+        description: of the rig.
+        folder: of the meshes, relative to the text.
+        looks: with what can be seen.
+    """
+    root = ET.Element("robot", name=description.name)
+    # For MuJoCo, which otherwise drops what is only seen and looks for meshes beside the text.
+    extension = ET.SubElement(root, "mujoco")
+    ET.SubElement(
+        extension, "compiler", meshdir=folder, discardvisual="false", fusestatic="false",
+        strippath="true",
+    )  # fmt: skip
+    assets: dict[str, bytes] = {}
+    for link in description.links if looks else description.without_looks().links:
+        element = ET.SubElement(root, "link", name=link.name)
+        if link.inertia is not None:
+            _add_inertia(element, link.inertia)
+        for visual in link.visuals:
+            part = ET.SubElement(element, "visual", name=visual.name)
+            _place(part, visual.p_m, visual.R)
+            geometry = ET.SubElement(part, "geometry")
+            ET.SubElement(geometry, "mesh", filename=f"{folder}/{visual.name}.obj")
+            assets |= mesh_files(visual.name, visual.painted)
+        for shape in link.collisions:
+            for kind, sizes, p_m in _pieces(shape):
+                part = ET.SubElement(element, "collision")
+                _place(part, p_m, shape.R)
+                geometry = ET.SubElement(part, "geometry")
+                if kind == "mesh":
+                    sizes["filename"] = f"{folder}/{_BALL}"
+                    assets[_BALL] = plain_obj("ball", ellipsoid((1.0, 1.0, 1.0), rings=11))
+                ET.SubElement(geometry, kind, sizes)
+        if link.parent is not None:
+            _add_joint(root, link, link.parent, {joint.name for joint in description.joints})
+    ET.indent(root)
+    text = ET.tostring(root, encoding="unicode")
+    return Urdf(f'<?xml version="1.0"?>\n{text}\n', assets)
+
+
+def _place(element: ET.Element, p_m: Vec3, R: Mat3) -> None:
+    if p_m != ORIGIN or R != IDENTITY:
+        ET.SubElement(element, "origin", xyz=numbers(p_m), rpy=numbers(roll_pitch_yaw(R)))
+
+
+def _add_inertia(link: ET.Element, inertia: Inertia) -> None:
+    element = ET.SubElement(link, "inertial")
+    _place(element, inertia.com_m, IDENTITY)
+    ET.SubElement(element, "mass", value=numbers((inertia.mass_kg,)))
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia.tensor_kg_m2
+    moments = {"ixx": xx, "ixy": xy, "ixz": xz, "iyy": yy, "iyz": yz, "izz": zz}
+    ET.SubElement(element, "inertia", {key: numbers((m,)) for key, m in moments.items()})
+
+
+def _pieces(shape: CollisionShape) -> Iterator[tuple[str, dict[str, str], Vec3]]:
+    """Yield elements of URDF that make up a shape: name, sizes and place."""
+    a, b, _ = shape.half_m
+    if shape.kind == "box":
+        yield "box", {"size": numbers(2.0 * half for half in shape.half_m)}, shape.p_m
+    elif shape.kind == "sphere":
+        yield "sphere", {"radius": numbers((a,))}, shape.p_m
+    elif shape.kind == "ellipsoid":
+        yield "mesh", {"scale": numbers(shape.half_m)}, shape.p_m
+    else:
+        yield "cylinder", {"radius": numbers((a,)), "length": numbers((2.0 * b,))}, shape.p_m
+        for end in (-b, b):
+            place = add(shape.p_m, rotate(shape.R, (0.0, 0.0, end)))
+            yield "sphere", {"radius": numbers((a,))}, place
+
+
+def _add_joint(root: ET.Element, link: Link, parent: str, taken: Collection[str]) -> None:
+    joint = link.joint
+    name, kind = (f"{link.name}_fixed", "fixed") if joint is None else (joint.name, "revolute")
+    while joint is None and name in taken:
+        name += "_"
+    element = ET.SubElement(root, "joint", name=name, type=kind)
+    ET.SubElement(element, "parent", link=parent)
+    ET.SubElement(element, "child", link=link.name)
+    _place(element, link.p_m, link.R)
+    if joint is not None:
+        _add_hinge(element, joint)
+
+
+def _add_hinge(element: ET.Element, joint: LinkJoint) -> None:
+    ET.SubElement(element, "axis", xyz=numbers(joint.axis))
+    ET.SubElement(
+        element, "limit", lower=numbers((joint.low_rad,)), upper=numbers((joint.high_rad,)),
+        effort=numbers((joint.max_torque_nm,)), velocity=numbers((joint.max_speed_rad_s,)),
+    )  # fmt: skip
+    if joint.follows is not None:
+        leader, ratio = joint.follows
+        ET.SubElement(element, "mimic", joint=leader, multiplier=numbers((ratio,)), offset="0")

@@ -1,0 +1,278 @@
+"""What a lens and the time it takes make of an ideal picture: distortion, blur, slanting rows.
+
+A ``SceneView`` draws what a pinhole without faults sees at an instant. A real lens bends straight
+lines, the exposure lasts, and most sensors read one row after another while the head goes on
+turning. All of that is done here by drawing more than once, or more than is shown, whatever draws.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from math import ceil, hypot
+from typing import Annotated, NamedTuple, Protocol
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.types import ImageArray
+from gazerig.gaze.types import Mat3, Vec3
+from gazerig.params import Bounds
+from gazerig.robot.model.intrinsics import rays
+
+_BORDER_PX = 1.0
+_MOST_PIXELS = 4.0  # of an ideal picture, as a multiple of what the lens shows of it
+
+
+@dataclass(frozen=True)
+class OpticsParams:
+    """How long a picture takes, and how sharp the lens is."""
+
+    # fmt: off
+    exposure_ms: Annotated[float, Bounds(0, 100), "how long light is collected"] = 8.0
+    sub_exposures: Annotated[int, Bounds(1, 32),
+        "pictures that are averaged over the exposure; 1: one, smeared by the camera's turn alone"] = 1
+    read_out_ms: Annotated[float, Bounds(0, 100),
+        "time from the first row to the last (rolling shutter); 0: all rows at once"] = 0.0
+    blur_px: Annotated[float, Bounds(0, 10),
+        "blur of the lens: standard deviation in pixels; it softens jagged edges, too"] = 0.0
+    bands: Annotated[int, Bounds(2, 64), "bands of rows that are drawn one after another for a rolling shutter"] = 8
+    # fmt: on
+
+
+class Rendered(NamedTuple):
+    """A picture: image (h, w, 3) BGR; depth_m (h, w) along the axis, inf where nothing is."""
+
+    image: ImageArray
+    depth_m: NDArray[np.float32] | None
+
+
+class SceneView(Protocol):
+    """Draws what a pinhole camera sees at an instant."""
+
+    def draw(
+        self,
+        t_s: float,
+        lens: Intrinsics,
+        size_px: tuple[int, int],
+        R: Mat3,
+        p_m: Vec3,
+        *,
+        depth: bool = False,
+        rows: tuple[int, int] | None = None,
+    ) -> Rendered:
+        """Return a picture.
+
+        Args:
+            t_s: time since the scene began, seconds.
+            lens: of the camera, for pictures of this size; its distortion is not drawn.
+            size_px: width and height.
+            R: rotation of the camera in the world, its axes optical.
+            p_m: position of the camera in the world.
+            depth: with distances.
+            rows: the first row and the one after the last, where only these are wanted.
+        """
+        ...
+
+    def close(self) -> None:
+        """Free what drawing needs; safe to call twice."""
+        ...
+
+
+class CameraMotion(NamedTuple):
+    """A camera's pose at an instant, and where it was before.
+
+    R, R_before: rotation in the world, axes optical; span_s: time between, 0 where nothing is known
+    of before
+    """
+
+    R: Mat3
+    p_m: Vec3
+    R_before: Mat3
+    p_before_m: Vec3
+    span_s: float
+
+    def pose(self, after_s: float) -> tuple[Mat3, Vec3]:
+        """Return rotation and position some time later, or earlier below 0, moving on as it did."""
+        if after_s == 0.0 or self.span_s <= 0.0:
+            return self.R, self.p_m
+        share = after_s / self.span_s
+        turn = cv2.Rodrigues(np.array(self.R) @ np.array(self.R_before).T)[0]
+        turned = cv2.Rodrigues(turn * share)[0] @ np.array(self.R)
+        place = np.array(self.p_m) + share * np.subtract(self.p_m, self.p_before_m)
+        x, y, z = place.tolist()
+        a, b, c = (tuple(row) for row in turned.tolist())
+        return (a, b, c), (x, y, z)
+
+    def smear_px(self, exposure_s: float, lens: Intrinsics) -> tuple[float, float]:
+        """Return how far the frame's middle moves during an exposure."""
+        if self.span_s <= 0.0:
+            return 0.0, 0.0
+        ahead = np.array(self.R_before).T @ np.array(self.R)[:, 2]
+        share = exposure_s / self.span_s
+        return (
+            float(-ahead[0] / ahead[2]) * lens.fx_px * share,
+            float(-ahead[1] / ahead[2]) * lens.fy_px * share,
+        )
+
+
+def expose(
+    view: SceneView,
+    params: OpticsParams,
+    t_s: float,
+    lens: Intrinsics,
+    size_px: tuple[int, int],
+    motion: CameraMotion,
+    *,
+    depth: bool = False,
+) -> Rendered:
+    """Return a picture as a camera takes it; its time is the middle of its exposure.
+
+    Args:
+        view: draws the scene.
+        params: how long it takes.
+        t_s: time since the scene began, seconds.
+        lens: of the camera, for pictures of this size, with its distortion.
+        size_px: width and height.
+        motion: where the camera is at that time and how it moves.
+        depth: with distances, as of the middle of each row's exposure.
+    """
+    bands = [
+        _averaged(view, params, t_s, lens, size_px, motion, late_s, rows, depth)
+        for late_s, rows in _bands(params, size_px[1])
+    ]
+    image = np.concatenate([band.image for band in bands]) if len(bands) > 1 else bands[0].image
+    seen = [band.depth_m for band in bands if band.depth_m is not None]
+    if params.sub_exposures == 1:
+        image = smeared(image, motion.smear_px(params.exposure_ms / 1e3, lens))
+    return Rendered(_blurred(image, params.blur_px), np.concatenate(seen) if seen else None)
+
+
+def _blurred(image: ImageArray, blur_px: float) -> ImageArray:
+    """Blur a frame as a lens does that is not quite sharp."""
+    if blur_px <= 0.0:
+        return image
+    side = 2 * ceil(2.0 * blur_px) + 1 if blur_px > 0.8 else 3
+    out: ImageArray = cv2.GaussianBlur(image, (side, side), blur_px).astype(np.uint8, copy=False)
+    return out
+
+
+def _bands(params: OpticsParams, height: int) -> Iterator[tuple[float, tuple[int, int] | None]]:
+    """Yield how late bands of rows are exposed, and which rows; None: all."""
+    if params.read_out_ms <= 0.0:
+        yield 0.0, None
+        return
+    edges = [round(height * i / params.bands) for i in range(params.bands + 1)]
+    for top, bottom in zip(edges, edges[1:], strict=False):
+        if bottom > top:
+            middle = 0.5 * (top + bottom) / height - 0.5
+            yield middle * params.read_out_ms / 1e3, (top, bottom)
+
+
+def _averaged(
+    view: SceneView,
+    params: OpticsParams,
+    t_s: float,
+    lens: Intrinsics,
+    size_px: tuple[int, int],
+    motion: CameraMotion,
+    late_s: float,
+    rows: tuple[int, int] | None,
+    depth: bool,
+) -> Rendered:
+    """Return rows as the mean of what is seen during their exposure."""
+    count, exposure_s = params.sub_exposures, params.exposure_ms / 1e3
+    total: NDArray[np.float32] | None = None
+    seen = None
+    for i in range(count):
+        after_s = late_s + exposure_s * ((i + 0.5) / count - 0.5)
+        R, p_m = motion.pose(after_s)
+        middle = depth and i == count // 2
+        image, metres = through_lens(
+            view, t_s + after_s, lens, size_px, R, p_m, depth=middle, rows=rows
+        )
+        if count == 1:
+            return Rendered(image, metres)
+        seen = metres if middle else seen
+        total = np.zeros(image.shape, np.float32) if total is None else total
+        cv2.accumulate(image, total)
+    assert total is not None
+    return Rendered(np.rint(total / count).astype(np.uint8), seen)
+
+
+def through_lens(
+    view: SceneView,
+    t_s: float,
+    lens: Intrinsics,
+    size_px: tuple[int, int],
+    R: Mat3,
+    p_m: Vec3,
+    *,
+    depth: bool = False,
+    rows: tuple[int, int] | None = None,
+) -> Rendered:
+    """Return what is seen through a lens that may distort; see ``SceneView.draw``."""
+    if not lens.distorts:
+        return view.draw(t_s, lens, size_px, R, p_m, depth=depth, rows=rows)
+    ideal, ideal_px, columns, lines = _undistorting(lens, size_px)
+    top, bottom = rows or (0, size_px[1])
+    columns, lines = columns[top:bottom], lines[top:bottom]
+    first = max(0, int(lines.min()) - 1) if rows else 0
+    last = min(ideal_px[1], ceil(float(lines.max())) + 2) if rows else ideal_px[1]
+    drawn = view.draw(t_s, ideal, ideal_px, R, p_m, depth=depth, rows=(first, last))
+    lines = lines - np.float32(first)
+    edge = cv2.BORDER_REPLICATE
+    bent = cv2.remap(drawn.image, columns, lines, cv2.INTER_LINEAR, borderMode=edge)
+    image = bent.astype(np.uint8, copy=False)
+    if drawn.depth_m is None:
+        return Rendered(image, None)
+    # Distances are not mixed: between two things there is none.
+    metres = cv2.remap(drawn.depth_m, columns, lines, cv2.INTER_NEAREST, borderMode=edge)
+    return Rendered(image, metres.astype(np.float32, copy=False))
+
+
+def widest_px(lens: Intrinsics, size_px: tuple[int, int]) -> tuple[int, int]:
+    """Return width and height of what must be drawn for a picture through a lens."""
+    return _undistorting(lens, size_px)[1] if lens.distorts else size_px
+
+
+@lru_cache(maxsize=8)
+def _undistorting(
+    lens: Intrinsics, size_px: tuple[int, int]
+) -> tuple[Intrinsics, tuple[int, int], NDArray[np.float32], NDArray[np.float32]]:
+    """Return an ideal lens and its picture that hold all that a lens shows, and where.
+
+    The two arrays (h, w) are column and row in the ideal picture of every pixel.
+    """
+    width, height = size_px
+    rows, columns = np.mgrid[0:height, 0:width]
+    pixels = np.stack((columns.ravel(), rows.ravel()), axis=1)
+    plane = rays(pixels, lens)[:, :2] * (lens.fx_px, lens.fy_px)
+    low, high = plane.min(axis=0) - _BORDER_PX, plane.max(axis=0) + _BORDER_PX
+    span = high - low
+    share = min(1.0, (_MOST_PIXELS * width * height / float(span[0] * span[1])) ** 0.5)
+    cx, cy = (-low * share).tolist()
+    ideal = Intrinsics(lens.fx_px * share, lens.fy_px * share, cx, cy)
+    ideal_px = ceil(float(span[0]) * share), ceil(float(span[1]) * share)
+    places = ((plane - low) * share).astype(np.float32).reshape(height, width, 2)
+    return ideal, ideal_px, places[..., 0].copy(), places[..., 1].copy()
+
+
+def smeared(image: ImageArray, way_px: tuple[float, float]) -> ImageArray:
+    """Blur a frame evenly along a displacement (x, y) in pixels."""
+    length = hypot(*way_px)
+    if length < 1.0:
+        return image
+    half = int(np.ceil(0.5 * length))
+    kernel = np.zeros((2 * half + 1, 2 * half + 1), np.float32)
+    # Looks spread evenly over the way, each shared among the four pixels around it.
+    for share in np.linspace(-0.5, 0.5, 4 * half + 1).tolist():
+        x, y = half + share * way_px[0], half + share * way_px[1]
+        i, j = min(int(x), 2 * half - 1), min(int(y), 2 * half - 1)
+        u, v = x - i, y - j
+        kernel[j : j + 2, i : i + 2] += np.outer((1.0 - v, v), (1.0 - u, u))
+    out: ImageArray = cv2.filter2D(
+        image, -1, kernel / kernel.sum(), borderType=cv2.BORDER_REPLICATE
+    ).astype(np.uint8, copy=False)
+    return out

@@ -1,0 +1,170 @@
+"""OpenGL without a display: EGL or OSMesa, whichever works here.
+
+MuJoCo renders through one of three libraries. Which one is installed differs from machine to
+machine, and each fails in its own words, so all are tried and each failure is told.
+"""
+
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from types import ModuleType
+from typing import Any, Literal, Protocol, TypeVar
+
+from gazerig.drivers.errors import SetupError
+
+Backend = Literal["egl", "osmesa", "glfw"]
+
+_PACKAGES: dict[Backend, str] = {
+    "egl": "libegl1 libgl1-mesa-dri",
+    "osmesa": "libosmesa6",
+    "glfw": "a display: xvfb-run",
+}
+_OFF = ("disable", "disabled", "off", "false", "0")
+_chosen: Backend | None = None  # what worked in this process: OpenGL is loaded once in it
+
+Made = TypeVar("Made")
+
+
+class Context(Protocol):
+    """An OpenGL context as MuJoCo's Python package has them."""
+
+    def as_current(self) -> Any:
+        """Return a context manager in which it is this thread's."""
+        ...
+
+    def free(self) -> None:
+        """Free it."""
+        ...
+
+
+class NoRenderer(SetupError):
+    """Nothing here can render: the message says what was tried and why each failed."""
+
+
+def open_context(make: Callable[[], Made]) -> tuple[Backend, Context, Made]:
+    """Return the first context in which something can be made, the context being current.
+
+    MUJOCO_GL, where the user has set it, names the only one that is tried.
+
+    Args:
+        make: is called with a context current, and raises where that is not good enough.
+
+    Raises:
+        NoRenderer: none works.
+    """
+    global _chosen
+    why: dict[Backend, str] = {}
+    for backend in _candidates():
+        # MuJoCo reads it once more when it looks for the library's functions.
+        with _environment("MUJOCO_GL", backend):
+            try:
+                context = _context(backend)
+                try:
+                    with context.as_current():  # only meanwhile: another thread may render
+                        made = make()
+                except Exception:
+                    context.free()
+                    raise
+            except Exception as error:  # each library has errors of its own
+                why[backend] = _line(error)
+                _forget_opengl()
+                continue
+        _chosen = backend
+        return backend, context, made
+    raise NoRenderer(_message(why))
+
+
+def render_in_calling_thread() -> None:
+    """Have Mesa's llvmpipe render without threads of its own, unless the user has said how many.
+
+    To be called before this process's first context. The threads, one a core, wake on every core
+    at once for a few milliseconds of each picture, and what waits for servos is late then,
+    whatever their priority: on two cores 290 to 320 of 6,000 ticks of 200 Hz (133 of 4,000 with
+    one thread), in the calling thread 10 of 4,000; 28 pictures a second either way. On the
+    simulated clock nothing can be late.
+    """
+    os.environ.setdefault("LP_NUM_THREADS", "0")
+
+
+def import_mujoco() -> ModuleType:
+    """Return MuJoCo's module, imported without a look at what can render.
+
+    With MUJOCO_GL it fails to import where that library is missing, also where nothing is to be
+    rendered.
+
+    Raises:
+        SetupError: it is not installed.
+    """
+    with _environment("MUJOCO_GL", "off"):
+        try:
+            return import_module("mujoco")
+        except ImportError as error:
+            raise SetupError(
+                f"a world needs MuJoCo ({_line(error)}): pip install 'gazerig[world]'"
+            ) from error
+
+
+@contextmanager
+def _environment(name: str, value: str) -> Iterator[None]:
+    """Set a variable of the environment for a while."""
+    before = os.environ.get(name)
+    os.environ[name] = value
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before
+
+
+def _candidates() -> tuple[Backend, ...]:
+    """Return what is to be tried, best first."""
+    wanted = os.environ.get("MUJOCO_GL", "").strip().lower()
+    if wanted in _OFF:
+        raise NoRenderer(f"no pictures of a world: MUJOCO_GL={wanted} forbids to render")
+    if wanted in _PACKAGES:
+        return (wanted,)
+    if wanted:
+        raise NoRenderer(
+            f"no pictures of a world: MUJOCO_GL is egl, osmesa, glfw or off, not {wanted!r}"
+        )
+    return (_chosen,) if _chosen is not None else ("egl", "osmesa", "glfw")
+
+
+def _context(backend: Backend) -> Context:
+    if backend == "glfw" and not any(os.environ.get(x) for x in ("DISPLAY", "WAYLAND_DISPLAY")):
+        raise RuntimeError("there is no display")
+    context: Context = import_module(f"mujoco.{backend}").GLContext(64, 64)
+    return context
+
+
+def _forget_opengl() -> None:
+    """Unload PyOpenGL, which binds itself to the first library that it is asked for."""
+    for name in [*sys.modules]:
+        if name.split(".")[0] == "OpenGL" or name.startswith(("mujoco.egl", "mujoco.osmesa")):
+            del sys.modules[name]
+    if os.environ.get("PYOPENGL_PLATFORM") in ("egl", "osmesa") and not _OWN_PLATFORM:
+        del os.environ["PYOPENGL_PLATFORM"]
+
+
+_OWN_PLATFORM = "PYOPENGL_PLATFORM" in os.environ
+
+
+def _line(error: Exception) -> str:
+    """Return an error as one short line."""
+    if isinstance(error, AttributeError) and "NoneType" in str(error):
+        return "its library is not here"  # PyOpenGL's own words tell of neither
+    text = " ".join(str(error).split()) or type(error).__name__
+    return text if len(text) <= 160 else f"{text[:157]}..."
+
+
+def _message(why: dict[Backend, str]) -> str:
+    tried = "; ".join(f"{backend}: {reason}" for backend, reason in why.items())
+    cures = " or ".join(_PACKAGES[backend] for backend in why if backend != "glfw")
+    if not cures:
+        cures = _PACKAGES["glfw"]
+        return f"no pictures of a world: nothing here can render ({tried}); cure: {cures}"
+    return f"no pictures of a world: nothing here can render ({tried}); cure: apt install {cures}"

@@ -1,0 +1,75 @@
+"""How a world looks, for a process that draws it: every geom of its model, and people's segments.
+
+MuJoCo is loaded where the shapes are made, not where they are sent from.
+"""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from gazerig.gaze.types import Vec3
+from gazerig.robot.model.quaternion import Quaternion
+from gazerig.robot.model.world_shapes import WorldFinish, WorldPart
+from gazerig.sim_mock.world.rig_in_world import RigInWorld
+from gazerig.sim_mock.world.world_spec import WorldSpec
+
+_SKIN = ("head", "neck", "lips", "left_hand", "right_hand", "left_lid", "right_lid")
+
+_FINENESS = 0.6
+"""People on the page stand farther off than before the rig's camera."""
+
+
+class SpecShapes(NamedTuple):
+    """The shapes of a world without its rigs, which are drawn as they were measured.
+
+    spec: its rigs are places only
+    rig_joints: bodies of a user's world that one of these turns are the rig's
+    """
+
+    spec: WorldSpec
+    rig_joints: frozenset[str] = frozenset()
+
+    def parts(self) -> Sequence[WorldPart]:
+        """Return the room and all segments of all people; see ``WorldShapes.parts``."""
+        model = self.spec.compiled()
+        from gazerig.sim_mock.world.figure_model import figure_shapes
+        from gazerig.sim_mock.world.geom_shapes import still_parts
+
+        figures = self.spec.figures
+        moving = {} if figures is None else figure_shapes(figures, _FINENESS)
+        return (
+            *still_parts(model.mj, moving.keys(), self.rig_joints),
+            *(WorldPart(name, shape, _finish(name), moves=True) for name, shape in moving.items()),
+        )
+
+    def poses(self, world_s: float) -> Mapping[str, tuple[Quaternion, Vec3]]:
+        """Return where all segments are; see ``WorldShapes.poses``."""
+        figures = self.spec.figures
+        if figures is None:
+            return {}
+        now = figures.segments(world_s)
+        rows = zip(figures.names, now.quat.tolist(), now.p_m.tolist(), strict=True)
+        return {name: ((w, x, y, z), (p, q, r)) for name, (w, x, y, z), (p, q, r) in rows}
+
+
+def shapes_of(spec: WorldSpec) -> SpecShapes:
+    """Return the shapes of a world; they are small to send.
+
+    Args:
+        spec: of the world, with its rigs.
+    """
+    joints = {rig.prefix + name for rig in spec.rigs for name in rig.stops_rad}
+    places = tuple(_place(rig) for rig in spec.rigs)
+    return SpecShapes(spec._replace(rigs=places), frozenset(joints))
+
+
+def _place(rig: RigInWorld) -> RigInWorld:
+    """Return a rig of which nothing is left but where it stands."""
+    return RigInWorld(_no_body, {}, {}, (), rig.prefix, rig.p_m, rig.yaw_rad)
+
+
+def _no_body() -> tuple[str, Mapping[str, bytes]]:
+    return "<mujoco/>", {}
+
+
+def _finish(segment: str) -> WorldFinish:
+    return "skin" if segment.rpartition("/")[2] in _SKIN else "cloth"

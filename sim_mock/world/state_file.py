@@ -1,0 +1,101 @@
+"""The newest state of a world, from the process that computes it to those that look at it.
+
+A small file that both map into memory: its writer fills the older of two entries and then counts
+it, a reader looks at the count before and after. Processes find it by its path, so that one that is
+started again finds it as well; no lock can be left behind by one that was killed.
+"""
+
+import mmap
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from gazerig.gaze.types import Floats
+
+_HEADER = 3  # count of states, numbers in a state, host's time at which the world's began
+
+
+class HostState(NamedTuple):
+    """State of a world and when it was so.
+
+    Attributes:
+        host_s: the host's monotonic clock.
+        t_s: the world's own time, seconds from its beginning.
+        qpos: every coordinate of its joints, as MuJoCo orders them.
+    """
+
+    host_s: float
+    t_s: float
+    qpos: Floats
+
+
+class StateWriter:
+    """The one process that writes states.
+
+    Args:
+        path: the file, which is made.
+        size: how many coordinates a state has.
+    """
+
+    def __init__(self, path: Path, size: int) -> None:
+        self._numbers = _mapped(path, size)
+        self._rows = self._numbers[_HEADER:].reshape(2, size + 2)
+        self._count = 0
+
+    def write(self, host_s: float, t_s: float, qpos: Sequence[float] | Floats) -> None:
+        """Write the newest state."""
+        row = self._rows[self._count % 2]
+        row[0], row[1] = host_s, t_s
+        row[2:] = qpos
+        self._count += 1
+        self._numbers[2] = host_s - t_s
+        self._numbers[0] = self._count
+
+
+class StateReader:
+    """Reads the newest state; the file must have been made.
+
+    Args:
+        path: of the file.
+
+    Raises:
+        OSError: it is not there.
+    """
+
+    def __init__(self, path: Path) -> None:
+        with path.open("rb") as file:
+            whole = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        self._numbers = np.frombuffer(whole, np.float64)
+        self._rows = self._numbers[_HEADER:].reshape(2, int(self._numbers[1]) + 2)
+
+    @property
+    def count(self) -> int:
+        """Return how many states have been written."""
+        return int(self._numbers[0])
+
+    @property
+    def begin_s(self) -> float | None:
+        """Return the host's time at which the world's own began, None before the first state."""
+        return float(self._numbers[2]) if self.count else None
+
+    def newest(self) -> HostState | None:
+        """Return the newest state, None before the first."""
+        while count := self.count:
+            row = self._rows[(count - 1) % 2].copy()
+            # Whoever was overtaken by two states meanwhile may have copied of both.
+            if self.count <= count:
+                return HostState(float(row[0]), float(row[1]), row[2:])
+        return None
+
+
+def _mapped(path: Path, size: int) -> Floats:
+    """Return the numbers of a new file for states of so many coordinates."""
+    length = _HEADER + 2 * (size + 2)
+    with path.open("xb+") as file:
+        file.truncate(8 * length)
+        whole = mmap.mmap(file.fileno(), 0)
+    numbers: Floats = np.frombuffer(whole, np.float64)
+    numbers[1] = size
+    return numbers

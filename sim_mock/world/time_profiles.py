@@ -1,0 +1,59 @@
+"""How a motion goes over time, for whole arrays of times: from 0 to 1, there and back."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gazerig.gaze.types import Floats
+
+
+def rise(share: Floats) -> Floats:
+    """Return a minimum-jerk path from 0 to 1 for shares of its time, held before and after."""
+    s = np.clip(share, 0.0, 1.0)
+    return np.asarray(s * s * s * (10.0 + s * (6.0 * s - 15.0)))
+
+
+def there_and_back(
+    t_s: Floats, start_s: float, out_s: float, hold_s: float, back_s: float
+) -> Floats:
+    """Return 0, smoothly up to 1 within ``out_s`` of the start, held, and smoothly down again."""
+    down_s = start_s + out_s + hold_s
+    return np.asarray(rise((t_s - start_s) / out_s) - rise((t_s - down_s) / back_s))
+
+
+def hump(share: Floats) -> Floats:
+    """Return a smooth hump over shares 0..1: 0 at its ends with level slopes, 1 in its middle."""
+    s = np.clip(share, 0.0, 1.0)
+    return np.asarray(16.0 * s * s * (1.0 - s) ** 2)
+
+
+def smoothed(values: Floats, width: int) -> Floats:
+    """Return a row a time, averaged over ``width`` rows with a bell's weights; ends are held."""
+    if width < 2:
+        return values
+    bell = np.hanning(width + 2)[1:-1]
+    bell /= bell.sum()
+    half = width // 2
+    flat = values.reshape(len(values), -1)
+    padded = np.concatenate(
+        (np.repeat(flat[:1], half, 0), flat, np.repeat(flat[-1:], width - 1 - half, 0))
+    )
+    out = np.stack([np.convolve(column, bell, "valid") for column in padded.T], axis=1)
+    return np.asarray(out.reshape(values.shape))
+
+
+def blended(before: Floats, after: Floats, share: Floats) -> Floats:
+    """Return rows between two, by a share a row."""
+    part = share.reshape(-1, *([1] * (max(before.ndim, after.ndim) - 1)))
+    return np.asarray(before + part * (after - before))
+
+
+def periodic(
+    t_s: Floats, round_s: float, rates_hz: Sequence[float], phases: Sequence[float]
+) -> Floats:
+    """Return a sum of sines that repeats after the round, whose rates are moved to fit it."""
+    total = np.zeros_like(t_s)
+    for rate_hz, phase in zip(rates_hz, phases, strict=True):
+        turns = max(1, round(rate_hz * round_s))
+        total = total + np.sin(2.0 * np.pi * turns / round_s * t_s + phase)
+    return np.asarray(total / len(rates_hz))

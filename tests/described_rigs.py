@@ -1,0 +1,174 @@
+"""Rigs whose descriptions are compared with the program's own geometry, shipped and others."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import radians
+from typing import NamedTuple
+
+import numpy as np
+from hypothesis import strategies as st
+
+from gazerig.config.rig import LidJoints
+from gazerig.config.schema import Rig, load_rig
+from gazerig.gaze.types import Floats, GazeState
+from gazerig.robot.app.gaze_models import kinematics_of
+from gazerig.robot.app.rig_limits import lid_ends
+from gazerig.robot.model.coupling_params import CouplingParams
+from gazerig.robot.model.frames import CameraMount
+from gazerig.robot.model.kinematics import LIDS
+from gazerig.robot.model.types import JointState
+
+SHIPPED = (
+    "desk", "expressive", "feetech", "maker", "minimal", "six_hobby", "six_xl330", "nine_xl330",
+)  # fmt: skip
+ANGLE_RAD, PLACE_M = 1e-9, 1e-6
+"""How far a description may be from the program's own geometry."""
+
+
+class Expected(NamedTuple):
+    """Where the program has the parts of a rig: its own geometry, and the camera's pose."""
+
+    state: GazeState
+    camera: tuple[Floats, Floats]
+
+
+def expected(rig: Rig, angles: Mapping[str, float]) -> Expected:
+    """Return where everything is according to robot/model/kinematics.py."""
+    kinematics = kinematics_of(rig)
+    values = tuple(angles[name] for name in rig.names)
+    still = (0.0,) * len(values)
+    state = kinematics.forward(JointState(values, still, still, ()))
+    R, p = CameraMount(rig.camera).pose(state.R_world_head, state.p_world_head_m)
+    return Expected(state, (np.array(R), np.array(p)))
+
+
+Poses = Mapping[str, tuple[Floats, Floats]]
+"""R_world_link and p_world_link_m by the name of the link."""
+
+
+def compare(rig: Rig, angles: Mapping[str, float], poses: Poses) -> None:
+    """Assert that links are where the program has them.
+
+    Args:
+        rig: whose description it is.
+        angles: of its joints.
+        poses: of all links as somebody else works them out.
+    """
+    state, camera = expected(rig, angles)
+    _same(poses["head"], (np.array(state.R_world_head), np.array(state.p_world_head_m)))
+    _same(poses["camera_optical_frame"], camera)
+    for side, p_eye, (yaw, pitch) in (
+        ("left", state.p_world_eye_left_m, state.eye_left_rad),
+        ("right", state.p_world_eye_right_m, state.eye_right_rad),
+    ):
+        R, p = poses[f"{side}_eye"]
+        assert np.abs(p - p_eye).max() < PLACE_M
+        ahead = np.array((np.cos(pitch) * np.cos(yaw), np.cos(pitch) * np.sin(yaw), np.sin(pitch)))
+        sight = np.array(state.R_world_head) @ ahead
+        assert np.linalg.norm(np.cross(R[:, 0], sight)) < ANGLE_RAD and R[:, 0] @ sight > 0.0
+    openings = (state.lid_left, state.lid_right, state.lower_left, state.lower_right)
+    for name, opening in zip(LIDS, openings, strict=True):
+        if name in lid_ends(rig):
+            _compare_lid(rig, name, opening, angles[name], poses)
+
+
+def _compare_lid(rig: Rig, name: str, opening: float, angle: float, poses: Poses) -> None:
+    """Assert that a lid turned about its eye's centre as far as it is open."""
+    shut, wide = lid_ends(rig)[name]
+    R_head = poses["head"][0]
+    R, p = poses[f"{name}_link"]
+    turned = R_head.T @ R
+    up = np.arctan2(turned[2, 0], turned[0, 0])
+    assert np.abs(turned[:, 1] - (0.0, 1.0, 0.0)).max() < ANGLE_RAD
+    side = name.split("_")[0]
+    assert np.abs(p - poses[f"{side}_eye"][1]).max() < PLACE_M
+    opens_up = (1.0 if "upper" in name else -1.0) * (1.0 if wide > shut else -1.0)
+    assert abs(up - opens_up * angle) < ANGLE_RAD
+    share = min(1.0, max(0.0, (opens_up * up - shut) / (wide - shut)))
+    assert abs(share - opening) < 1e-8
+
+
+def _same(one: tuple[Floats, Floats], other: tuple[Floats, Floats]) -> None:
+    assert np.abs(one[0] - other[0]).max() < ANGLE_RAD
+    assert np.abs(one[1] - other[1]).max() < PLACE_M
+
+
+_NECKS = ("neck_yaw", "neck_pitch", "neck_roll", "lower_neck_yaw", "lower_neck_pitch")
+_OTHERS = (
+    "jaw",
+    "left_brow",
+    "right_brow",
+    "left_ear",
+    "right_ear",
+    "camera",
+    "base",
+    "right_eyes_pan",
+)
+
+
+@st.composite
+def rigs(draw: st.DrawFn) -> Rig:
+    """Draw a rig with any measures, any axes missing, linkages, couplings and further joints."""
+    desk, maker = _shipped("desk"), _shipped("maker")
+    model = desk.joints["neck_yaw"]
+    joints = {name: model for name in _NECKS + _OTHERS if draw(st.booleans(), name)}
+    for turn in ("pan", "tilt"):
+        kind = draw(st.sampled_from(("each", "both", "none")), turn)
+        names = [f"{side}_eye_{turn}" for side in ("left", "right")] if kind == "each" else []
+        joints |= {name: model for name in names or ([f"eyes_{turn}"] if kind == "both" else [])}
+    lids: dict[str, float] = {}
+    for name in LIDS:
+        if draw(st.booleans(), name):
+            joints[name] = model
+            ends = draw(st.sampled_from(((-25.0, 20.0), (30.0, -30.0), (-5.0, 60.0))))
+            lids |= dict(zip(LidJoints.keys(name), ends, strict=True))
+    couplings = {}
+    if {"neck_pitch", "neck_roll"} <= joints.keys() and draw(st.booleans(), "differential"):
+        couplings["neck"] = CouplingParams("differential", "neck_pitch", "neck_roll")
+    size = st.floats(0.0, 300.0)
+    geometry = replace(
+        desk.geometry,
+        pitch_axis_height_mm=draw(size),
+        eyes_ahead_mm=draw(st.floats(-100.0, 150.0)),
+        eyes_above_mm=draw(st.floats(-50.0, 200.0)),
+        interocular_mm=draw(st.floats(15.0, 200.0)),
+        lower_pitch_axis_height_mm=draw(size),
+    )
+    angle = st.floats(-90.0, 90.0)
+    camera = replace(
+        draw(st.sampled_from((desk.camera, maker.camera))),
+        position_mm=(draw(angle), draw(angle), draw(angle)),
+        yaw_deg=2.0 * draw(angle),
+        pitch_deg=draw(angle),
+        roll_deg=2.0 * draw(angle),
+    )
+    return replace(
+        desk,
+        geometry=geometry,
+        joints=joints,
+        lid_joints=LidJoints(**lids),
+        couplings=couplings,
+        camera=camera,
+    )
+
+
+_READ: dict[str, Rig] = {}
+
+
+def _shipped(name: str) -> Rig:
+    if name not in _READ:
+        _READ[name] = load_rig(name)
+    return _READ[name]
+
+
+def shipped(name: str) -> Rig:
+    """Return a shipped rig; it is read once."""
+    return _shipped(name)
+
+
+def random_angles(rig: Rig, rng: np.random.Generator) -> dict[str, float]:
+    """Return angles of all joints, each anywhere in its range."""
+    return {
+        name: radians(rng.uniform(joint.min_deg, joint.max_deg))
+        for name, joint in rig.joints.items()
+    }

@@ -1,0 +1,285 @@
+"""The action planner of a boxing match: guard, attack or wait, from what is seen."""
+
+from dataclasses import replace
+from math import hypot, inf
+
+import numpy as np
+import pytest
+from attention_scene import attention, body, looking, percept
+
+from gazerig.config.schema import load_rules
+from gazerig.gaze.action_planner import ActionPlanner, ActionPlannerParams, Plan
+from gazerig.gaze.attention import Attention
+from gazerig.gaze.opponent import SeenHand, approaches, places
+from gazerig.gaze.top_down import PLANNED, TopDown, TopDownParams
+from gazerig.gaze.types import Face, Percept, Target, Vec3
+
+Row = tuple[int, str, tuple[float, ...], tuple[float, ...]]
+
+EYE: Vec3 = (0.0, 0.0, 0.0)
+NOSE: Vec3 = (1.0, 0.0, 0.0)
+TOWARDS = ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0))
+LEFT, RIGHT = (0.88, 0.12, -0.13), (0.88, -0.12, -0.13)  # fists before the chin
+PARAMS = ActionPlannerParams(enabled=True)
+DT_S = 1.0 / 30.0
+
+
+def face(nose: Vec3 = NOSE) -> Face:
+    x, y, z = nose
+    places = {"DN": (0.0, -0.1), "FL": (0.06, 0.0), "LE": (0.03, 0.03), "M": (0.0, -0.06),
+              "N": (0.0, 0.0), "FR": (-0.06, 0.0), "RE": (-0.03, 0.03), "UP": (0.0, 0.1)}  # fmt: skip
+    parts = tuple((x, y + off_y, z + off_z) for off_y, off_z in places.values())
+    return Face(1, nose, (0.0, 0.0, 0.0), TOWARDS, parts, 0.98)
+
+
+def seen(t_s: float, *rows: Row, nose: Vec3 | None = NOSE) -> Percept:
+    faces = () if nose is None else (face(nose),)
+    found = percept(t_s, *rows)
+    return replace(found, faces=faces)
+
+
+def fist(id: int, p: Vec3, v: Vec3 = (0.0, 0.0, 0.0)) -> Row:
+    return body(id, "hand", p, v)
+
+
+def guarding(t_s: float) -> Percept:
+    return seen(t_s, fist(2, LEFT), fist(3, RIGHT))
+
+
+def punch(t_s: float, away_m: float = 0.8, speed_m_s: float = 2.5, aside_m: float = 0.0) -> Percept:
+    return seen(t_s, fist(2, LEFT), fist(3, (away_m, -0.02 + aside_m, 0.0), (-speed_m_s, 0.0, 0.0)))
+
+
+def stepped(planner: ActionPlanner, percepts: list[Percept], late_s: float = 0.0) -> list[Plan]:
+    return [planner.step(one, EYE, one.captured_s + late_s) for one in percepts]
+
+
+def test_time_to_contact_is_the_way_to_go_over_the_closing_speed() -> None:
+    (_, one) = approaches(punch(0.0).bodies, EYE, 0.3, 0.06)
+    assert (one.id, one.kind) == (3, "hand")
+    assert one.closing_m_s == pytest.approx(2.5, rel=1e-3)
+    assert one.contact_s == pytest.approx(0.5 / 2.5 - 0.06, abs=2e-3)
+    assert one.miss_m == pytest.approx(0.02, abs=1e-6)
+    (_, back) = approaches(punch(0.0, speed_m_s=-2.0).bodies, EYE, 0.3, 0.0)
+    assert (back.contact_s, back.miss_m) == (inf, inf) and back.closing_m_s < 0.0
+
+
+def test_a_punch_is_guarded_against_after_the_reaction_time_and_its_fist_is_named() -> None:
+    planner = ActionPlanner(replace(PARAMS, reaction_ms=60.0))
+    stepped(planner, [guarding(k * DT_S) for k in range(5)])
+    plans = stepped(planner, [punch((5 + k) * DT_S) for k in range(3)])
+    assert [plan.action for plan in plans] == ["wait", "wait", "guard"]
+    assert plans[-1].body_id == 3
+    assert plans[-1].text == "guard: hand 3 arrives in 0.20 s"
+
+
+def test_a_punch_whose_speed_is_certain_is_guarded_against_at_once() -> None:
+    for sd_m_s, action in ((0.3, "guard"), (1.2, "wait")):
+        one = punch(0.0)
+        cov = np.zeros((2, 6, 6))
+        cov[:, 3:, 3:] = np.eye(3) * sd_m_s**2
+        sure = replace(one, bodies=replace(one.bodies, pv_cov=cov))
+        assert ActionPlanner(PARAMS).step(sure, EYE, 0.0).action == action
+
+
+@pytest.mark.parametrize(
+    "comes",
+    [{"speed_m_s": 0.7}, {"speed_m_s": -2.5}, {"aside_m": 0.5}, {"away_m": 3.0, "speed_m_s": 2.5}],
+    ids=["slowly", "goes back", "passes beside", "from afar"],
+)
+def test_what_is_no_punch_is_not_guarded_against(comes: dict[str, float]) -> None:
+    planner = ActionPlanner(PARAMS)
+    plans = stepped(planner, [punch(k * DT_S, **comes) for k in range(10)])
+    assert {plan.action for plan in plans} == {"wait"}
+
+
+def test_one_frame_of_a_wrong_speed_is_no_punch() -> None:
+    planner = ActionPlanner(PARAMS)
+    jumps = [punch(k * DT_S) if k % 2 else guarding(k * DT_S) for k in range(10)]
+    assert {plan.action for plan in stepped(planner, jumps)} == {"wait"}
+
+
+def test_guard_lasts_its_shortest_time_and_a_slower_fist_does_not_end_it() -> None:
+    planner = ActionPlanner(replace(PARAMS, min_guard_ms=200.0, attack_reach_m=0.0))
+    plans = stepped(planner, [punch(k * DT_S) for k in range(3)])
+    slow = stepped(planner, [punch((3 + k) * DT_S, 0.5, 0.6) for k in range(20)])
+    assert {plan.action for plan in (plans[-1], *slow)} == {"guard"}  # 0.6 * 1.5 > 0.8
+    assert planner.step(guarding(23 * DT_S), EYE, 23 * DT_S).action == "wait"
+    stepped(planner, [punch((24 + k) * DT_S) for k in range(2)])
+    after = stepped(planner, [guarding((26 + k) * DT_S) for k in range(10)])
+    kept = sum(plan.action == "guard" for plan in after)
+    assert 0.2 - 2 * DT_S < kept * DT_S < 0.2 + DT_S
+
+
+def opened(t_s: float, *, parted: bool) -> Percept:
+    z, y = (0.05, 0.25) if parted else (-0.45, 0.16)
+    return seen(t_s, fist(2, (0.9, y, z)), fist(3, (0.9, -y, z)))
+
+
+@pytest.mark.parametrize("parted", [True, False])
+def test_an_open_place_is_attacked_once_and_again_after_a_rest(parted: bool) -> None:
+    planner = ActionPlanner(PARAMS)
+    assert {plan.action for plan in stepped(planner, [guarding(k * DT_S) for k in range(9)])} == {
+        "wait"
+    }
+    plans = stepped(planner, [opened((9 + k) * DT_S, parted=parted) for k in range(75)])
+    starts = [
+        k for k in range(1, 75) if plans[k].action == "attack" and plans[k - 1].action == "wait"
+    ]
+    assert starts[0] * DT_S == pytest.approx(0.2, abs=DT_S)
+    lasts = sum(plan.action == "attack" for plan in plans[: starts[1]])
+    assert lasts * DT_S == pytest.approx(0.6, abs=1.5 * DT_S)
+    assert (starts[1] - starts[0]) * DT_S == pytest.approx(0.6 + 0.8, abs=2 * DT_S)
+    place = plans[starts[0]].p_world_m
+    assert place is not None
+    assert (place[2] < -0.2) == parted  # the chest, or a side of the face
+    assert ("chest" in plans[starts[0]].why) == parted
+
+
+def test_nothing_is_open_before_both_hands_are_known() -> None:
+    for rows in ((), (fist(2, (0.9, 0.4, -0.2)),)):
+        plans = stepped(ActionPlanner(PARAMS), [seen(k * DT_S, *rows) for k in range(60)])
+        assert {plan.text for plan in plans} == {"wait: not both hands of the opponent are known"}
+    far = [seen(k * DT_S, fist(2, (2.9, 0.4, -0.6)), nose=(3.0, 0.0, 0.0)) for k in range(60)]
+    assert {plan.text for plan in stepped(ActionPlanner(PARAMS), far)} == {
+        "wait: no opponent within reach"
+    }
+
+
+def test_a_hand_that_is_not_seen_any_more_is_where_it_was_for_a_while() -> None:
+    planner = ActionPlanner(replace(PARAMS, hand_memory_ms=2000.0))
+    stepped(planner, [guarding(k * DT_S) for k in range(9)])
+    # One that is seen with another number is the one of those two that was nearer.
+    lone = [seen(t, fist(7, (0.9, 0.4, -0.2))) for t in (np.arange(9, 90) * DT_S).tolist()]
+    plans = stepped(planner, lone)
+    unknown = next(k for k, plan in enumerate(plans) if "not both hands" in plan.why)
+    assert unknown * DT_S == pytest.approx(2.0, abs=2 * DT_S)
+    assert all("guard is closed" in plan.why for plan in plans[:unknown])
+    assert all("not both hands" in plan.why for plan in plans[unknown:])
+
+
+def test_after_a_punch_less_room_will_do_for_a_moment() -> None:
+    narrow = seen(0.0, fist(2, (0.88, 0.12, -0.09)), fist(3, (0.88, -0.12, -0.09)))
+    room = places(face(), [SeenHand(2, (-0.12, 0.12, -0.09), 0.0)], EYE)[0].clear_m
+    assert PARAMS.counter_ratio * PARAMS.open_m < room < PARAMS.open_m
+    still = [replace(narrow, captured_s=k * DT_S) for k in range(30)]
+    assert {plan.action for plan in stepped(ActionPlanner(PARAMS), still)} == {"wait"}
+    planner = ActionPlanner(PARAMS)
+    stepped(planner, [punch(k * DT_S) for k in range(4)])
+    after = stepped(planner, [replace(narrow, captured_s=(4 + k) * DT_S) for k in range(20)])
+    actions = [plan.action for plan in after]
+    assert actions[0] == "guard" and "attack" in actions
+    assert "after a punch" in after[actions.index("attack")].why
+
+
+def test_a_punch_ends_an_attack() -> None:
+    planner = ActionPlanner(PARAMS)
+    stepped(planner, [guarding(0.0)])
+    plans = stepped(planner, [opened((1 + k) * DT_S, parted=True) for k in range(9)])
+    assert plans[-1].action == "attack"
+    plans = stepped(planner, [punch((10 + k) * DT_S) for k in range(2)])
+    assert plans[-1].action == "guard"
+
+
+def test_a_gap_without_frames_ends_what_was_under_way() -> None:
+    planner = ActionPlanner(PARAMS)
+    stepped(planner, [punch(k * DT_S) for k in range(3)])
+    assert planner.plan.action == "guard"
+    assert planner.step(seen(5.0), EYE, 5.0).action == "wait"
+
+
+# The same through attention.
+
+
+def planned_attention(**changes: float) -> Attention:
+    model = attention()
+    rules = load_rules("boxing")
+    rules = replace(rules, planner=replace(rules.planner, **changes))  # type: ignore[arg-type]
+    model.top_down = TopDown(rules)
+    return model
+
+
+def looks(model: Attention, percepts: list[Percept]) -> list[Target]:
+    return [model.choose(one, looking(), one.captured_s) for one in percepts]
+
+
+def with_face(found: Percept) -> Percept:
+    """Return the percept with the face among its bodies, too, as perception gives it."""
+    rows = [body(1, "face", NOSE)] + [
+        body(id, kind, (p[0], p[1], p[2]), (v[0], v[1], v[2]))
+        for id, kind, p, v in zip(
+            found.bodies.ids, found.bodies.kinds, found.bodies.p_world_m.tolist(),
+            found.bodies.v_world_m_s.tolist(), strict=True,
+        )
+    ]  # fmt: skip
+    return replace(percept(found.captured_s, *rows), faces=found.faces)
+
+
+def test_the_place_to_be_hit_is_a_target_of_its_own_that_moves_with_the_opponent() -> None:
+    model = planned_attention()
+    frames = [guarding(0.0), *(opened((1 + k) * DT_S, parted=True) for k in range(9))]
+    last = looks(model, [with_face(one) for one in frames])[-1]
+    assert (last.kind, last.id, last.salience, last.top_down) == ("attack_target", -1, 0.9, True)
+    assert last.p_world_m == pytest.approx((1.0, 0.0, -0.3))
+    assert last.plan.startswith("attack: chest is open")
+    moved = replace(opened(10 * DT_S, parted=True), faces=(face((0.95, 0.02, 0.0)),))
+    (then,) = looks(model, [with_face(moved)])
+    assert then.p_world_m == pytest.approx((0.95, 0.02, -0.3)) and then.shift == last.shift
+
+
+def test_a_choice_of_the_menu_overrules_the_planner_until_it_is_given_back() -> None:
+    model = planned_attention()
+    assert model.top_down.behaviours == ("attack", "guard", "wait", PLANNED)
+    assert model.top_down.chosen == PLANNED
+    frames = [with_face(guarding(k * DT_S)) for k in range(20)]
+    looks(model, frames[:2])
+    model.top_down.behave("attack")
+    target = looks(model, frames[2:4])[-1]
+    assert (target.kind, target.plan) == ("attack_target", "attack: asked for")
+    model.top_down.behave("guard")
+    target = looks(model, frames[4:6])[-1]
+    assert (target.kind, target.plan) == ("hand", "guard: asked for")
+    assert model.top_down.chosen == "guard"
+    model.top_down.behave("wait")
+    punched = [with_face(punch(k * DT_S)) for k in range(6, 12)]
+    assert {one.plan for one in looks(model, punched)} == {"wait: asked for"}
+    model.top_down.behave(PLANNED)
+    assert looks(model, [replace(punched[-1], captured_s=12 * DT_S)])[0].plan[:5] in (
+        "wait:",
+        "guard",
+    )
+    later = [with_face(punch(k * DT_S)) for k in range(13, 16)]
+    assert looks(model, later)[-1].plan.startswith("guard: hand 3 arrives")
+
+
+def test_without_a_planner_nothing_is_planned_and_planned_is_no_choice() -> None:
+    model = attention()
+    targets = looks(model, [with_face(punch(k * DT_S)) for k in range(6)])
+    assert {one.plan for one in targets} == {""} and model.top_down.behaviour == "wait"
+    with pytest.raises(ValueError, match="no rule for behaviour 'planned'"):
+        model.top_down.behave(PLANNED)
+
+
+def test_a_planner_needs_the_rules_it_chooses_between() -> None:
+    rules = {"wait": TopDownParams().rules["wait"]}
+    with pytest.raises(ValueError, match="behaviour 'guard' has no rule"):
+        TopDownParams(rules=rules, planner=PARAMS)
+    with pytest.raises(ValueError, match="no rule can be called 'planned'"):
+        TopDownParams(rules={**TopDownParams().rules, PLANNED: rules["wait"]})
+
+
+def test_the_planner_switched_off_leaves_the_behaviour_of_the_start() -> None:
+    model = planned_attention()
+    looks(model, [with_face(punch(k * DT_S)) for k in range(4)])
+    assert model.top_down.behaviour == "guard"
+    model.top_down.retune(TopDownParams())
+    assert model.top_down.behaviour == "wait" and not model.top_down.plans
+
+
+def test_the_line_to_the_chest_passes_below_fists_before_the_chin() -> None:
+    hands = [SeenHand(2, (-0.12, 0.12, -0.13), 0.0), SeenHand(3, (-0.12, -0.12, -0.13), 0.0)]
+    clear = {place.name: place.clear_m for place in places(face(), hands, EYE)}
+    # At 0.88 m the line to a chest 1 m away and 0.3 m below is 0.264 m below the eyes.
+    off = 0.13 - 0.264
+    assert clear["chest"] == pytest.approx(hypot(0.12, off / hypot(1.0, 0.3)), abs=0.01)
+    assert clear["left side of the face"] < clear["chest"] < PARAMS.open_m

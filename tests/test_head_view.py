@@ -1,0 +1,150 @@
+"""The page's head is the rig's description: its links, where its joints put them."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from math import atan2, degrees
+
+import numpy as np
+import pytest
+import viser
+from shown_page import SNAPSHOT as SHOT
+from six_joints import of_six
+from viser import transforms
+
+from gazerig.config.schema import load_rig
+from gazerig.robot.app.gaze_models import kinematics_of
+from gazerig.robot.app.rig_description import shape_of
+from gazerig.robot.dashboard.view.commanded_pose import CommandedPoseView
+from gazerig.robot.dashboard.view.head_view import HeadView
+from gazerig.robot.model.types import CommandedPose, JointState, Snapshot
+
+
+@pytest.fixture
+def server() -> Iterator[viser.ViserServer]:
+    made = viser.ViserServer(port=0, verbose=False)
+    yield made
+    made.stop()
+
+
+def test_the_head_has_the_lids_that_the_rig_has(server: viser.ViserServer) -> None:
+    view, ghost = HeadView(server.scene), CommandedPoseView(server.scene)
+    handles = server.scene._handle_from_node_name
+
+    def drawn(shot: Snapshot) -> set[str]:
+        shot = replace(shot, commanded_pose=_wanted(shot))
+        view.show(shot)
+        ghost.show(shot, view.lid_edges)
+        ghosts = {"ghost's upper": "/ghost/lid_left", "ghost's lower": "/ghost/lower_lid_left"}
+        found = {name for name, node in ghosts.items() if handles[node].visible}
+        head = {look.name.rpartition("/look_")[2] for look in view.links["head"].looks}
+        if "left_upper_lid_link" in view.links:
+            found.add("upper")
+        if "left_lower_lid_link" in view.links or "left_still_lid" in head:
+            found.add("lower")
+        return found
+
+    def edge_deg(lid: str) -> float:
+        """How high a lid's edge stands above the eye's equator, by the mesh as it is turned."""
+        frame, (look,) = view.links[f"{lid}_link"]
+        turn = transforms.SO3(np.array(frame.wxyz)) @ transforms.SO3(np.array(look.wxyz))
+        x, _, z = turn.apply(np.array((1.0, 0.0, 0.0)))
+        return degrees(atan2(z, x))
+
+    assert drawn(SHOT) == {"upper", "lower", "ghost's upper"}
+    assert drawn(of_six(SHOT)) == {
+        "upper", "lower", "ghost's upper", "ghost's lower",
+    }  # fmt: skip
+    drawn(replace(of_six(SHOT), lids=(0.0, 0.0), lower_lids=(0.0, 0.0)))
+    met = edge_deg("left_lower_lid")
+    assert met == pytest.approx(edge_deg("left_upper_lid"), abs=0.1)
+    drawn(replace(of_six(SHOT), lids=(0.5, 1.0), lower_lids=(1.0, 0.5)))
+    assert edge_deg("left_lower_lid") < edge_deg("right_lower_lid") - 3.0 < met - 6.0
+    assert met + 30.0 < edge_deg("left_upper_lid") < edge_deg("right_upper_lid") - 30.0
+    w, _, y, _ = handles["/ghost/lid_left"].wxyz
+    assert -2.0 * degrees(atan2(y, w)) == pytest.approx(edge_deg("left_upper_lid"), abs=0.1)
+    bare = replace(SHOT, joints=("eyes_pan", "eyes_tilt", "neck_yaw"), measured_rad=(0.0,) * 3)
+    assert drawn(bare) == set()
+
+
+def _wanted(shot: Snapshot) -> CommandedPose:
+    """The measured pose as the desired one."""
+    return CommandedPose(
+        shot.R_world_head, shot.p_world_head_m, shot.p_world_eyes_m, shot.gaze_world, shot.lids,
+        shot.lower_lids,
+    )  # fmt: skip
+
+
+def test_the_head_is_where_its_joints_put_it(server: viser.ViserServer) -> None:
+    """Every link stands in its parent as kinematics say, at any angles of a shipped rig."""
+    rig = load_rig("desk")
+    kinematics, view = kinematics_of(rig), HeadView(server.scene)
+    view.shape = shape_of(rig)
+    angles = tuple((0.3 * np.sin(np.arange(len(kinematics.names)))).tolist())
+    pose = kinematics.forward(JointState(angles, angles, angles, ()))
+    view.show(replace(SHOT, joints=kinematics.names, measured_rad=angles))
+    for link, p_world_m in (
+        ("head", pose.p_world_head_m),
+        ("left_eye", pose.p_world_eye_left_m),
+        ("right_eye", pose.p_world_eye_right_m),
+    ):
+        where = _in_world(view, link)
+        assert where.translation() == pytest.approx(p_world_m, abs=2e-4)
+    yaw, pitch = pose.eye_left_rad
+    in_head = (np.cos(yaw) * np.cos(pitch), np.sin(yaw) * np.cos(pitch), np.sin(pitch))
+    ahead = _in_world(view, "left_eye").rotation().apply(np.array((1.0, 0.0, 0.0)))
+    assert ahead == pytest.approx(np.array(pose.R_world_head) @ in_head, abs=2e-3)
+
+
+def _in_world(view: HeadView, link: str) -> transforms.SE3:
+    """Where a link is in the scene, through the frames that it is in."""
+    path = view.links[link].frame.name
+    found = transforms.SE3.identity()
+    for one in view.links.values():
+        if path == one.frame.name or path.startswith(one.frame.name + "/"):
+            turn = transforms.SO3(np.array(one.frame.wxyz))
+            found = found @ transforms.SE3.from_rotation_and_translation(
+                turn, np.array(one.frame.position)
+            )
+    return found
+
+
+def test_another_camera_is_drawn_without_the_head_anew(server: viser.ViserServer) -> None:
+    view, rig = HeadView(server.scene), load_rig("desk")
+    view.shape = shape_of(rig)
+    view.show(SHOT)
+    skin, before = view.links["head"].looks[0], view.links["camera_link"].frame.position[0]
+    assert not view.links["camera_link"].looks[0].visible
+    view.shape = shape_of(replace(rig, camera=replace(rig.camera, position_mm=(50.0, 0.0, 45.0))))
+    view.show(SHOT, camera=True)
+    assert view.links["head"].looks[0] is skin
+    assert view.links["camera_link"].frame.position[0] == pytest.approx(before + 0.03)
+    assert view.links["camera_link"].looks[0].visible
+    view.shape = shape_of(load_rig("expressive"))
+    view.show(replace(SHOT, joints=tuple(load_rig("expressive").names)))
+    assert view.links["head"].looks[0] is not skin and "jaw_link" in view.links
+
+
+def test_a_head_without_a_neck_stands_on_a_base_below_it(server: viser.ViserServer) -> None:
+    view = HeadView(server.scene)
+    view.show(replace(of_six(SHOT), p_world_head_m=(0.038, 0.0, 0.12)))
+    assert view.links["head"].frame.position[2] == pytest.approx(0.12, abs=1e-3)
+    assert {look.name.rpartition("_")[2] for look in view.links["base_link"].looks} == {
+        "bust", "column",
+    }  # fmt: skip
+    assert not any(name.startswith("neck") for name in view.links)
+
+
+def test_the_chin_opens_with_the_jaw_about_its_hinge(server: viser.ViserServer) -> None:
+    view, rig = HeadView(server.scene), load_rig("expressive")
+    view.show(SHOT)
+    assert "jaw_link" not in view.links  # and the mouth of such a rig stays shut
+    view.shape = shape_of(rig)
+    rest = replace(SHOT, joints=tuple(rig.names), measured_rad=(0.0,) * len(rig.names))
+    view.show(rest)
+    frame, (chin,) = view.links["jaw_link"]
+    hinge, shut = tuple(frame.position), _in_world(view, "jaw_link").rotation()
+    opened = tuple(0.2 if name == "jaw" else 0.0 for name in rig.names)
+    view.show(replace(rest, measured_rad=opened))
+    assert tuple(frame.position) == hinge and tuple(chin.position) == (0.0, 0.0, 0.0)
+    turned = shut.inverse() @ _in_world(view, "jaw_link").rotation()
+    assert turned.log() == pytest.approx((0.0, 0.2, 0.0), abs=1e-3)

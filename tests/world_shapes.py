@@ -1,0 +1,54 @@
+"""A small world for the page: a floor, a textured wall, and one person who comes and goes."""
+
+from dataclasses import dataclass
+from math import sin
+
+import numpy as np
+
+from gazerig.gaze.types import Vec3
+from gazerig.robot.model.description.texture import textured
+from gazerig.robot.model.mesh import Mesh, grid
+from gazerig.robot.model.paint import Painted, painted
+from gazerig.robot.model.person_shape import head, torso
+from gazerig.robot.model.quaternion import Quaternion
+from gazerig.robot.model.world_shapes import WorldPart
+
+LEAVES_S = 60.0
+
+
+def _plane(corner: Vec3, u: Vec3, v: Vec3) -> Mesh:
+    share = np.linspace(0.0, 1.0, 9)
+    points = np.array(corner) + share[:, None, None] * np.array(u) + share[:, None] * np.array(v)
+    return grid(points, closed=False)
+
+
+def _chequered(mesh: Mesh) -> Painted:
+    plain = painted(mesh, (150, 175, 210))
+    dark = 1.0 - 0.3 * (np.arange(len(mesh.vertices)) // 2 % 2)
+    return plain._replace(colours=plain.colours * dark[:, None])
+
+
+@dataclass(frozen=True)
+class SmallWorld:
+    """A floor, a wall behind the head, a stool, and a person who walks along the floor."""
+
+    colour: tuple[int, int, int] = (190, 160, 130)
+
+    def parts(self) -> list[WorldPart]:
+        floor = painted(_plane((-1.5, -2.0, -0.9), (0.0, 4.0, 0.0), (4.5, 0.0, 0.0)), self.colour)
+        wall = _chequered(_plane((-1.5, -2.0, -0.9), (0.0, 0.0, 2.4), (0.0, 4.0, 0.0)))
+        stool = painted(_plane((-0.3, -0.4, -0.09), (0.0, 0.8, 0.0), (0.6, 0.0, 0.0)), (90, 60, 40))
+        return [
+            WorldPart("floor", floor),
+            WorldPart("stool", stool._replace(normals=None)),
+            WorldPart("wall", textured(wall)),
+            WorldPart("ann/head", head(0, 0.8), "skin", moves=True),
+            WorldPart("ann/chest", torso(0, 0.34), "cloth", moves=True),
+        ]
+
+    def poses(self, world_s: float) -> dict[str, tuple[Quaternion, Vec3]]:
+        if world_s >= LEAVES_S:
+            return {}
+        round_about = (0.0, 0.0, 0.0, 1.0)
+        there = (1.1, 0.3 * sin(world_s), 0.25)
+        return {"ann/head": (round_about, there), "ann/chest": (round_about, there)}
