@@ -1,0 +1,115 @@
+"""What is known of one participant: one line a record, in the order in which it happened.
+
+A participant's journal (gazerig.robot.study.journal) holds these as JSON, each on disk before the
+next page is shown. Conditions are named by their keys in the design; what a browser is sent never
+comes from here.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+Outcome = Literal["complete", "head_lost", "interrupted", "withdrawn"]
+AnswerValue = int | str
+"""A rating 1..points, "first"/"second", or free text."""
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A session began or was resumed.
+
+    design_sha256: of the design's canonical text (gazerig.robot.study.preregistration)
+    order: condition keys of all trials in order, for pairs "a|b" as first and second
+    program: version; simulated: the participant is
+    """
+
+    participant: str
+    design_sha256: str
+    order: tuple[str, ...]
+    program: str
+    utc: str
+    simulated: bool = False
+
+
+@dataclass(frozen=True)
+class Consented:
+    """Consent to each use, as the consent page asked it."""
+
+    given: bool
+    pictures: bool
+    gaze: bool
+    utc: str
+
+
+@dataclass(frozen=True)
+class TrialBegan:
+    """A presentation began.
+
+    trial: 0-based row of the order, practice trials below 0; attempt: from 0
+    side: 0, or 1 for the second presentation of a pair
+    """
+
+    trial: int
+    attempt: int
+    condition: str
+    utc: str
+    side: int = 0
+
+
+@dataclass(frozen=True)
+class TrialEnded:
+    """A presentation ended.
+
+    recording: file beside the journal, "" without; reason: why it was not completed
+    largest_step_deg: of the head's commanded joints in the switch to the condition, nan with a film
+    """
+
+    trial: int
+    attempt: int
+    outcome: Outcome
+    seconds: float
+    utc: str
+    side: int = 0
+    recording: str = ""
+    reason: str = ""
+    largest_step_deg: float = float("nan")
+
+
+@dataclass(frozen=True)
+class Answered:
+    """One item was answered.
+
+    trial: None for what is asked once at the end; condition: "a|b" for a pair
+    ms: from the page's appearance to the answer, as the browser measured it
+    """
+
+    trial: int | None
+    condition: str
+    questionnaire: str
+    item: str
+    value: AnswerValue
+    ms: float
+    utc: str
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Objective measures of one presentation: name -> value."""
+
+    trial: int
+    condition: str
+    values: Mapping[str, float]
+    side: int = 0
+
+
+@dataclass(frozen=True)
+class Closed:
+    """The session ended: finished, withdrawn, or the experimenter excluded the participant."""
+
+    how: Literal["finished", "withdrawn", "excluded"]
+    reason: str
+    utc: str
+
+
+Record = Opened | Consented | TrialBegan | TrialEnded | Answered | Measured | Closed
+"""``kind`` in JSON is the class's name."""
