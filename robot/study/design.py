@@ -73,7 +73,7 @@ class Hypothesis:
 
 
 @dataclass(frozen=True)
-class Plan:
+class StatisticalPlan:
     """What a pre-registration states of the numbers."""
 
     participants: Annotated[int, Bounds(2, 1000), "how many are invited"] = 24
@@ -121,7 +121,7 @@ class StudyDesign:
     trials: Trials = field(default_factory=Trials)
     hypotheses: tuple[Hypothesis, ...] = ()
     objective: Annotated[tuple[str, ...], "measures beside the questions: mutual_gaze_share, first_look_s, keys of the report"] = ()
-    plan: Plan = field(default_factory=Plan)
+    plan: StatisticalPlan = field(default_factory=StatisticalPlan)
     exclusion: Exclusion = field(default_factory=Exclusion)
     privacy: Privacy = field(default_factory=Privacy)
 # fmt: on

@@ -76,7 +76,7 @@ class TrialEnded:
 
 
 @dataclass(frozen=True)
-class Answered:
+class ItemAnswered:
     """One item was answered.
 
     trial: None for what is asked once at the end; condition: "a|b" for a pair
@@ -111,5 +111,5 @@ class Closed:
     utc: str
 
 
-Record = Opened | Consented | TrialBegan | TrialEnded | Answered | Measured | Closed
+Record = Opened | Consented | TrialBegan | TrialEnded | ItemAnswered | Measured | Closed
 """``kind`` in JSON is the class's name."""
