@@ -1,5 +1,6 @@
 """Rigs, rule sets and face walks by name or path: read, merged and checked."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from gazerig.config.bounds import shapes_of
@@ -11,31 +12,34 @@ from gazerig.gaze.scanpath import Walk
 from gazerig.gaze.top_down import TopDownParams
 
 
-def load_rig(name_or_path: str, character: str | None = None, profile: str | None = None) -> Rig:
+def load_rig(
+    name_or_path: str,
+    character: str | None = None,
+    profile: str | None = None,
+    further: Sequence[Check[Rig]] = (),
+) -> Rig:
     """Return a rig by shipped name or path, with every rule checked.
 
-    profile: name or path of a style of gaze, instead of the one that the rig names
-    character: name or path of a file with differences, laid over both
+    Args:
+        name_or_path: of the rig.
+        character: name or path of a file with differences, laid over rig and profile.
+        profile: name or path of a style of gaze, instead of the one that the rig names.
+        further: rules besides a rig's own, such as read other files.
 
     Raises:
         gazerig.config.load.ConfigError: with every fault.
     """
     layers = layers_of(name_or_path, character, profile)
-    return load(layers[-1], Rig, defaults=layers[:-1], checks=RULES)
+    return load(layers[-1], Rig, defaults=layers[:-1], checks=(*RULES, *further))
 
 
-def load_rig_and_check(name_or_path: str, *further: Check[Rig]) -> Rig:
-    """Return a rig by shipped name or path, with further rules checked besides its own.
-
-    Args:
-        name_or_path: of the rig.
-        further: such rules as read other files.
+def rig_path(name_or_path: str) -> Path:
+    """Return the file of a rig by shipped name or path; a path need not exist.
 
     Raises:
-        gazerig.config.load.ConfigError: with every fault.
+        gazerig.config.load.ConfigError: none of that name is shipped.
     """
-    layers = layers_of(name_or_path)
-    return load(layers[-1], Rig, defaults=layers[:-1], checks=(*RULES, *further))
+    return _find("rigs", name_or_path)
 
 
 def layers_of(
@@ -46,7 +50,7 @@ def layers_of(
     Raises:
         gazerig.config.load.ConfigError: none of that name is shipped, or the rig cannot be read.
     """
-    layers = [_find("rigs", name_or_path)]
+    layers = [rig_path(name_or_path)]
     named = profile or read_yaml(layers[0], tuple(shapes_of(Rig))).data.get("profile")
     if isinstance(named, str):
         layers.append(_find("profiles", named))

@@ -3,15 +3,18 @@
 import importlib.util
 from dataclasses import fields, replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from gazerig.config.faults import ConfigError
+from gazerig.config.load import load, shipped
 from gazerig.config.schema import load_rig
 from gazerig.config.shipped import shipped_names
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.run_world import world_of
+from gazerig.robot.app.run_world import world_of, world_script
+from gazerig.robot.app.session import compose
 from gazerig.robot.cli.run import what_runs
 from gazerig.sim_mock.world.camera_params import WorldCameraParams
 
@@ -65,6 +68,60 @@ def test_a_script_at_fault_is_said_with_file_line_and_key(tmp_path: Path) -> Non
     with pytest.raises(ConfigError) as found:
         world_of(load_rig("desk"), replace(ASKED, world=str(file)))
     assert "mine.yaml:4" in str(found.value) and "people.anna.start" in str(found.value)
+
+
+TWO_HEADS = "room: living-room\npeople: {}\nheads:\n  other:\n    rig: RIG\n"
+
+
+@pytest.mark.parametrize(
+    ("rig", "why"), [("desc", "did you mean 'desk'"), ("sub/my.yaml", "sub/my.yaml: there is no")]
+)
+def test_a_head_of_an_unknown_rig_is_said_with_file_line_and_key(
+    tmp_path: Path, rig: str, why: str
+) -> None:
+    file = tmp_path / "mine.yaml"
+    file.write_text(TWO_HEADS.replace("RIG", rig))
+    with pytest.raises(ConfigError) as found:
+        world_script(str(file))
+    assert "mine.yaml:5" in str(found.value) and "heads.other.rig" in str(found.value)
+    assert why in str(found.value)
+
+
+def test_the_rig_of_a_head_lies_beside_its_world(tmp_path: Path) -> None:
+    file, rig = tmp_path / "mine.yaml", tmp_path / "my.yaml"
+    file.write_text(TWO_HEADS.replace("RIG", "./my.yaml"))
+    rig.touch()
+    assert world_script(str(file)).heads["other"].rig == str(rig)
+    file.write_text(TWO_HEADS.replace("RIG", "minimal"))
+    assert world_script(str(file)).heads["other"].rig == "minimal"
+
+
+def test_a_script_is_read_once_until_it_is_changed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, reads = tmp_path / "mine.yaml", list[Path]()
+
+    def counted(path: Path, *more: Any, **named: Any) -> Any:
+        reads.append(path)
+        return load(path, *more, **named)
+
+    monkeypatch.setattr("gazerig.robot.app.run_world.load", counted)
+    file.write_text("room: living-room\npeople: {}\n")
+    asked = replace(ASKED, world=str(file), no_pictures=True, fast=True, bus="ideal")
+    compose(asked).made.close()
+    assert reads == [file]
+    file.write_text("room: hall\npeople: {}\n")
+    assert world_script(str(file)).room == "hall"
+
+
+def test_a_mesh_that_is_lost_is_said_with_file_line_and_key(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    text = shipped("rigs", "minimal").read_text(encoding="utf-8")
+    file.write_text(text + "meshes:\n  head:\n    file: lost.stl\n")
+    with pytest.raises(ConfigError) as found:
+        compose(replace(ASKED, rig=str(file), world=None, scene="visitor", fast=True))
+    line = 3 + text.count("\n")
+    assert f"mine.yaml:{line}" in str(found.value) and "meshes.head.file" in str(found.value)
 
 
 def test_every_shipped_world_can_be_read() -> None:

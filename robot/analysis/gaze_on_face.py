@@ -9,6 +9,10 @@ _PLANE_M = -0.028
 """The plane between the nose tip and the eyes and mouth, along the face's own x axis."""
 
 
+_ALONG = 0.05
+"""Cosine of a line of sight to the way a face looks: from 87 deg on it runs along the face."""
+
+
 class GazeOnFace:
     """Gathers gaze points on the plane of the face that is looked at.
 
@@ -45,13 +49,14 @@ def on_face(
 ) -> tuple[float, float] | None:
     """Return where a line of sight meets the plane of a face: (y, z) in the face's frame.
 
-    None where the line runs along the plane or away from it.
+    None where the line runs along the plane or away from it, or the face is seen from behind.
     """
     out = (R_world_face[0][0], R_world_face[1][0], R_world_face[2][0])
     towards = dot(way_world, out)
-    if towards > -0.05:
+    before = dot(sub(p_world_eye_m, p_world_face_m), out)
+    if towards > -_ALONG or before <= 0.0:
         return None
-    distance = dot(sub(p_world_face_m, p_world_eye_m), out) / towards
+    distance = before / -towards
     meets = add(p_world_eye_m, scale(way_world, distance))
     _, y, z = rotate_back(R_world_face, sub(meets, p_world_face_m))
     return (y, z)

@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.gaze.angles import add, compose, dot, rotate, rotate_back, scale, sub
+from gazerig.gaze.angles import add, compose, rotate, scale
 from gazerig.gaze.types import Floats, Mat3, Vec3
+from gazerig.robot.analysis.gaze_on_face import on_face
 from gazerig.robot.analysis.summary import cyclopean
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
@@ -155,15 +156,10 @@ def _seen(place: HeadPlace, tick: Tick) -> _Seen:
 
 def _looks_at(one: _Seen, other: _Seen) -> bool:
     """Return whether a gaze passes through the oval of a face that it sees from before."""
-    ahead = rotate(other.R, (1.0, 0.0, 0.0))
-    closing = dot(one.gaze, ahead)
-    if closing >= -0.1:
+    point = on_face(one.eyes_m, one.gaze, other.nose_m, other.R)
+    if point is None:
         return False
-    way = dot(sub(other.nose_m, one.eyes_m), ahead) / closing
-    if way <= 0.0:
-        return False
-    hit = add(one.eyes_m, scale(one.gaze, way))
-    _, y, z = rotate_back(other.R, sub(hit, other.nose_m))
+    y, z = point
     size = other.size
     return (y / (size * HALF_WIDE_M)) ** 2 + (z / (size * HALF_HIGH_M)) ** 2 <= 1.0
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 import numpy as np
 
 from gazerig.config.gestures import gestures_of
-from gazerig.config.schema import Rig, load_rules, load_walk
+from gazerig.config.schema import Rig, load_rig, load_rules, load_walk
 from gazerig.config.shipped import shipped_names
 from gazerig.drivers.camera.depth_roi import depth_at
 from gazerig.drivers.errors import SetupError
@@ -36,7 +36,7 @@ from gazerig.robot.app.gaze_models import (
 from gazerig.robot.app.live_params import CameraPlacement, Components, LiveParams
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts
-from gazerig.robot.app.rig_description import shape_of
+from gazerig.robot.app.rig_description import mesh_faults, shape_of
 from gazerig.robot.app.rig_limits import (
     lid_spans,
     limits,
@@ -370,6 +370,17 @@ def _robot(
         PixelToWorld(parts.mount, poses, lambda: live.camera),
         messages,
     )
+
+
+def run_rig(options: RunOptions) -> Rig:
+    """Return the rig of a run, with the meshes that it names looked at, too.
+
+    Raises:
+        gazerig.config.load.ConfigError: rig, character, profile or rule set are at fault.
+        SetupError: there is no such model.
+    """
+    names = (options.rig, options.character, options.profile)
+    return with_options(load_rig(*names, further=[mesh_faults]), options)
 
 
 def with_options(rig: Rig, options: RunOptions) -> Rig:

@@ -1,17 +1,21 @@
 """The world with physics that a run is in: who is there, and the rig among them."""
 
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import lru_cache
 from importlib.util import find_spec
 from math import radians
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from gazerig.config.load import load, shipped
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.load import ConfigError, ConfigFault, load, shipped
+from gazerig.config.schema import Rig, load_rig, rig_path
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.extras import extra_hint
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.emulation import BOARDS, CHAINS
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.rig_description import mesh_faults
 from gazerig.robot.app.run_scene import refuse_unruled
 from gazerig.robot.app.world_rig import rig_in_world
 from gazerig.robot.model.clock import Clock
@@ -19,7 +23,7 @@ from gazerig.robot.model.world_shapes import WorldShapes
 from gazerig.sim_mock.scenes.scene import Scene
 from gazerig.sim_mock.world.camera_params import WorldCameraParams
 from gazerig.sim_mock.world.rig_in_world import RigInWorld
-from gazerig.sim_mock.world.script import WorldScript
+from gazerig.sim_mock.world.script import Fault, WorldScript
 from gazerig.sim_mock.world.script_faults import CHECKS
 from gazerig.sim_mock.world.shapes import shapes_of
 from gazerig.sim_mock.world.world_scene import WorldScene
@@ -104,7 +108,7 @@ def other_rigs(rig: Rig, script: WorldScript, looks: bool) -> tuple[RigInWorld, 
     """
     return tuple(
         rig_in_world(
-            load_rig(head.rig) if head.rig else rig,
+            load_rig(head.rig, further=[mesh_faults]) if head.rig else rig,
             f"{name}_",
             (head.x_m, head.y_m, 0.0),
             radians(head.facing_deg),
@@ -124,10 +128,59 @@ def world_scene(name_or_path: str, seed: int) -> WorldScene:
     name = Path(name_or_path).stem
     if mjcf_of(name_or_path) is not None:
         return WorldScene(name, WorldScript(people={}), seed)
+    return WorldScene(name, world_script(name_or_path), seed)
+
+
+def world_script(name_or_path: str) -> WorldScript:
+    """Return the script of a world; its heads' rigs as seen from the working folder.
+
+    Raises:
+        gazerig.config.load.ConfigError: the file is at fault, or there is none of that name.
+    """
     path = Path(name_or_path)
     if "/" not in name_or_path and path.suffix not in (".yaml", ".yml"):
         path = shipped("worlds", name_or_path)
-    return WorldScene(name, load(path, WorldScript, checks=CHECKS), seed)
+    try:
+        facts = path.stat()
+    except OSError:
+        return _read(path, None)  # says what is wrong
+    return _read(path, (facts.st_ino, facts.st_mtime_ns, facts.st_size))
+
+
+@lru_cache(maxsize=2)
+def _read(path: Path, version: tuple[int, int, int] | None) -> WorldScript:
+    """Return a script; a run asks for it several times, and reads it once."""
+
+    def unknown_rigs(script: WorldScript) -> Iterator[Fault]:
+        for name, head in script.heads.items():
+            try:
+                _rig_beside(path, head.rig)
+            except ConfigError as error:
+                yield f"heads.{name}.rig", error.faults[0].rule
+
+    script = load(path, WorldScript, checks=(*CHECKS, unknown_rigs))
+    heads = {
+        name: replace(head, rig=_rig_beside(path, head.rig)) for name, head in script.heads.items()
+    }
+    return replace(script, heads=heads)
+
+
+def _rig_beside(world: Path, rig: str) -> str:
+    """Return a rig that a world's file names, a path as seen from the working folder.
+
+    Raises:
+        gazerig.config.load.ConfigError: there is no such rig.
+    """
+    if not rig:
+        return rig
+    found = rig_path(rig)
+    if found != Path(rig):
+        return rig  # by its name
+    found = world.parent / found.expanduser()
+    if not found.is_file():
+        rule = f"{found}: there is no such file; correct the path, or give the name of a rig"
+        raise ConfigError([ConfigFault(str(found), None, "", rig, rule)])
+    return str(found)
 
 
 def mjcf_of(name_or_path: str) -> Path | None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.schema import Rig
 from gazerig.config.text import gestures_text, rig_text, walk_text
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.analysis.behaviour_score import BehaviourScore
@@ -21,7 +21,7 @@ from gazerig.robot.app.assemble import (
     SharedPlace,
     Substitutes,
     assemble,
-    with_options,
+    run_rig,
 )
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
@@ -66,8 +66,7 @@ def compose(
         gazerig.config.load.ConfigError: the rig, character, profile or walk is at fault.
         SetupError: a film or model file cannot be used.
     """
-    loaded = load_rig(options.rig, options.character, options.profile)
-    rig = with_options(loaded, options)
+    rig = run_rig(options)
     if options.record is None:
         recorder = None
     else:

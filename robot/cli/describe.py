@@ -31,11 +31,11 @@ def describe(
 ) -> None:
     """Write a rig as a robot description: MJCF, URDF and glTF with meshes, or one of them."""
     with clear_errors(rig):
-        from gazerig.config.schema import load_rig_and_check
+        from gazerig.config.schema import load_rig
         from gazerig.robot.app.rig_description import description_of, mesh_faults
         from gazerig.robot.model.description.files import FORMATS, description_files, file_name
 
-        description = description_of(load_rig_and_check(rig, mesh_faults))
+        description = description_of(load_rig(rig, further=[mesh_faults]))
         asked = dict(zip(FORMATS, (mjcf, urdf, glb), strict=True))
         wanted = [name for name, one in asked.items() if one] or list(FORMATS)
         folder = out or Path(f"{file_name(description.name)}_description")

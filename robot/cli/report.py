@@ -170,12 +170,12 @@ def _mutual_gaze(first: Path, second: Path) -> "MutualGazeReport":
 
 def _simulated(options: "RunOptions", tell: Steps) -> "tuple[RunHeader, GazeTrace]":
     """Run a scene in simulated time; Ctrl-C ends the run early."""
-    from gazerig.config.schema import load_rig, load_walk
-    from gazerig.robot.app.assemble import with_options
+    from gazerig.config.schema import load_walk
+    from gazerig.robot.app.assemble import run_rig
     from gazerig.robot.app.simulated_run import simulate
     from gazerig.robot.control.tick import Tick
 
-    rig = with_options(load_rig(options.rig, options.character, options.profile), options)
+    rig = run_rig(options)
     seconds, start_s = options.seconds or 0.0, list[float]()
     text = f"simulating {seconds:.0f} s"
 

@@ -27,10 +27,10 @@ def checked_line(rig: str) -> str:
     Raises:
         ConfigError: with every fault of its files.
     """
-    from gazerig.config.schema import Rig, load_rig_and_check
+    from gazerig.config.schema import Rig, load_rig
     from gazerig.robot.app.rig_description import mesh_faults
 
-    found: Rig = load_rig_and_check(rig, mesh_faults)
+    found: Rig = load_rig(rig, further=[mesh_faults])
     return f"{rig}: good: rig {found.name!r}, {len(found.joints)} joints, profile {found.profile}"
 
 

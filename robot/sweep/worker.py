@@ -14,10 +14,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from gazerig.config.parameters import changed
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.schema import Rig
 from gazerig.config.text import rig_text
 from gazerig.errors import Error
-from gazerig.robot.app.assemble import with_options
+from gazerig.robot.app.assemble import run_rig
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.simulated_run import simulate
 from gazerig.robot.sweep.axes import Point
@@ -40,16 +40,6 @@ class Job:
     config: str
 
 
-def rig_of(options: RunOptions) -> Rig:
-    """Return the rig that runs of these options vary.
-
-    Raises:
-        ConfigError: its files are at fault.
-        SetupError: the options do not fit it.
-    """
-    return with_options(load_rig(options.rig, options.character, options.profile), options)
-
-
 def figures_at(
     rig: Rig, options: RunOptions, point: Point, stopped: Callable[[], str | None]
 ) -> dict[str, Column]:
@@ -69,7 +59,7 @@ def main() -> None:
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a package prints is no answer
     job: Job = pickle.load(sys.stdin.buffer)
-    rig = rig_of(job.options)
+    rig = run_rig(job.options)
     changed_meanwhile = rig_text(rig) != job.config
 
     def stopped() -> str | None:

@@ -3,7 +3,6 @@
 import json
 import subprocess
 import sys
-import tempfile
 import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,6 +14,7 @@ from gazerig.sim_mock.devices import DynamixelLine, Emulated, packed
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 if TYPE_CHECKING:
+    from gazerig.sim_mock.pty.served_folder import ServedFolder
     from gazerig.sim_mock.world.world_spec import WorldSpec
 
 STOP_S = 2.0
@@ -34,7 +34,7 @@ class _Served:
 
     def __init__(self) -> None:
         self._server: subprocess.Popen[bytes] | None = None
-        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._folder: ServedFolder | None = None
         self._asking = threading.Lock()
         self.joints: dict[str, int] = {}
         """Where the joints of the rig stand in the state of the world, where there is one."""
@@ -43,14 +43,17 @@ class _Served:
         self, buses: Sequence[Mapping[str, object]], world: "WorldSpec | None" = None
     ) -> list[str]:
         """Start it for these settings of buses, in a world or without; return the path of each."""
-        self._folder = tempfile.TemporaryDirectory(prefix="servo-bus-")
-        links = [str(Path(self._folder.name) / f"tty{k or ''}") for k in range(len(buses))]
+        from gazerig.sim_mock.pty.served_folder import ServedFolder  # where there are terminals
+
+        self._folder = ServedFolder()
+        folder = self._folder.path
+        links = [str(folder / f"tty{k or ''}") for k in range(len(buses))]
         linked = [{**bus, "link": link} for bus, link in zip(buses, links, strict=True)]
         more: dict[str, object] = {}
         if world is not None:
             if world.figures is not None:
-                world.figures.shared = Path(self._folder.name) / "people.npy"
-            world.write(spec := Path(self._folder.name) / "world")
+                world.figures.shared = folder / "people.npy"
+            world.write(spec := folder / "world")
             more["world"] = {"spec": str(spec), "state": str(self.state)}
         settings = json.dumps({"buses": linked, "until_eof": True, **more})
         self._server = child_process.start(
@@ -77,7 +80,7 @@ class _Served:
         """Return the file with the newest state of the world, where there is a world."""
         if self._folder is None:
             raise RuntimeError("the emulated bus is not running: start it first")
-        return Path(self._folder.name) / "state"
+        return self._folder.path / "state"
 
     @property
     def pid(self) -> int:
@@ -124,7 +127,7 @@ class _Served:
                 server.kill()
                 server.wait()
         if self._folder is not None:
-            self._folder.cleanup()
+            self._folder.remove()
             self._folder = None
 
     def __enter__(self) -> Self:
