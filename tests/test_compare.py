@@ -19,9 +19,10 @@ from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo, versions
 from gazerig.robot.report import report as build
-from gazerig.robot.report.compare import chance, compare, corrected, differences_of
+from gazerig.robot.report.compare import chance, compare, differences_of
 from gazerig.robot.report.run_header import RunHeader
 from gazerig.robot.report.statistics import MeasuredValue, mean, median
+from gazerig.robot.study.statistics.multiplicity import corrected
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 

@@ -9,7 +9,7 @@ they are not quite, so a difference just above chance deserves another run.
 """
 
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from math import isfinite, nan
 from pathlib import Path
 from typing import NamedTuple
@@ -27,6 +27,7 @@ from gazerig.robot.report.report import Progress, drawn, measured, read
 from gazerig.robot.report.run_header import RunHeader
 from gazerig.robot.report.statistics import MeasuredValue, figure, figures, judged
 from gazerig.robot.report.statistics import drawn as resampled
+from gazerig.robot.study.statistics.multiplicity import corrected
 
 LEVEL = 0.05
 _DRAWS, _AT_ONCE = 2000, 100
@@ -118,16 +119,6 @@ def chance_of_shape(a: MeasuredValue, b: MeasuredValue) -> float:
         # Where the exact chance overflows, SciPy takes the asymptotic one by itself, and says so.
         warnings.simplefilter("ignore", RuntimeWarning)
         return float(stats.ks_2samp(a.rows, b.rows).pvalue)
-
-
-def corrected(chances: Mapping[str, float]) -> dict[str, float]:
-    """Correct chances for being many (Holm 1979)."""
-    ordered = sorted(chances.items(), key=lambda item: item[1])
-    out, least = {}, 0.0
-    for rank, (key, p) in enumerate(ordered):
-        least = max(least, min(1.0, (len(ordered) - rank) * p))
-        out[key] = least
-    return out
 
 
 def _difference(

@@ -1,0 +1,1 @@
+"""Tests, effect sizes and models for what participants answered; pure, by SciPy."""
