@@ -2,7 +2,6 @@
 
 import contextlib
 import logging
-import sys
 import threading
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
@@ -29,30 +28,6 @@ from gazerig.robot.model.commands import Command, Value
 _LOG = logging.getLogger("gazerig")
 _POLL_S = 0.004
 _ENDED = "the program"
-
-
-class _SwitchInterval:
-    """Restores how often threads take turns, which control loops shorten, after the last loop."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._running = 0
-        self._before_s = 0.0
-
-    def __enter__(self) -> None:
-        with self._lock:
-            if not self._running:
-                self._before_s = sys.getswitchinterval()
-            self._running += 1
-
-    def __exit__(self, *raised: object) -> None:
-        with self._lock:
-            self._running -= 1
-            if not self._running:
-                sys.setswitchinterval(self._before_s)
-
-
-_SWITCHING = _SwitchInterval()
 
 
 class LocalHead(Head):
@@ -234,8 +209,7 @@ class RunningHead(LocalHead):
         """Run from torque on to torque off; the thread of the loop."""
         ended = "fault: unexpected error"
         try:
-            with _SWITCHING:
-                figures = session.run(composed, self._interrupts, self._say, watch=self._update)
+            figures = session.run(composed, self._interrupts, self._say, watch=self._update)
             ended = str(figures["stopped_by"])
         except BaseException as error:
             self._failure = error

@@ -6,7 +6,6 @@ has its own thread or process, and receives a tick in next to no time.
 
 import contextlib
 import os
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -37,8 +36,6 @@ from gazerig.sim_mock.scenes.picture import ScenePicture
 
 if TYPE_CHECKING:
     from gazerig.robot.recording.recorder import Recorder
-
-_SWITCH_S = 0.0003
 
 STEER = "steer"
 """The menu of this name is the page's steps of a calibration (dashboard/panels/controls.py)."""
@@ -203,10 +200,6 @@ class RunObservers:
 
     def open(self) -> None:
         """Open the doors, once the robot has started; the robot goes on without what fails."""
-        if not self._fast:
-            # Who computes in another thread gives the interpreter back after so long, not the
-            # usual 5 ms, which is a whole slot of the loop.
-            sys.setswitchinterval(_SWITCH_S)
         with self._spared("the recording"):
             if self._recorder is not None:
                 self._recorder.begin()

@@ -32,6 +32,7 @@ from gazerig.robot.control.joint_faults import JointFaults
 from gazerig.robot.control.loop import LoopCount, Robot, Tick, TickLoop
 from gazerig.robot.control.observers import Observers
 from gazerig.robot.control.power_down import Again, PowerDown
+from gazerig.robot.control.switch_interval import SWITCH_INTERVAL
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.recording.run_info import RunInfo, versions
 from gazerig.sim_mock.scenes.scene import Scene
@@ -237,6 +238,7 @@ class Session:
         begun = False
         try:
             with (
+                contextlib.nullcontext() if self._options.fast else SWITCH_INTERVAL,
                 self._interrupts,
                 way_out(made, say, self._interrupts, run_observers.parking) as leaving,
             ):
