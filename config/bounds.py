@@ -28,9 +28,12 @@ from gazerig.params import Bounds, Declaration, declarations
 
 T = TypeVar("T")
 Step = str | int
-Form = Literal["number", "whole", "bool", "text", "choice", "list", "mapping", "params"]
+Form = Literal["number", "whole", "bool", "text", "choice", "list", "mapping", "params", "value"]
 
-_PLAIN: dict[object, Form] = {float: "number", int: "whole", bool: "bool", str: "text"}
+_PLAIN: dict[object, Form] = {
+    **{float: "number", int: "whole", bool: "bool", str: "text"},
+    object: "value",  # of another file's key, whose own rules it must keep
+}
 _LONGEST_TEXT = 400  # characters; names and paths
 _TURNS = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"  # left to right and back
 
@@ -176,6 +179,8 @@ def _annotation(shape: Shape) -> Any:
             kind = bool
         case Shape(form="text"):
             kind = Annotated[str, AfterValidator(_printable)]
+        case Shape(form="value"):
+            kind = Any
         case Shape(form="choice"):
             kind = Annotated[Literal[shape.choices], BeforeValidator(partial(_exact, shape))]
         case Shape(form="list", inner=Shape() as inner):

@@ -44,18 +44,28 @@ class Entry:
         return self.value
 
     def nearest(self, path: Sequence[Step]) -> "Entry":
-        """Return the entry at a path, or the last one there is on the way to it."""
-        entry = self
-        for step in path:
-            held: Entry | None = None
-            if isinstance(entry.value, dict):
-                held = entry.value.get(str(step))
-            elif isinstance(entry.value, tuple) and str(step).isdecimal():
-                held = dict(enumerate(entry.value)).get(int(step))
+        """Return the entry at a path, or the last one there is on the way to it.
+
+        A key of a file may be a dotted path itself, as those of a study's parameters are.
+        """
+        entry, at = self, 0
+        while at < len(path):
+            held, steps = entry._below(path[at:])
             if held is None:
                 break
-            entry = held
+            entry, at = held, at + steps
         return entry
+
+    def _below(self, path: Sequence[Step]) -> "tuple[Entry | None, int]":
+        """Return the entry that the first steps of a path name, and how many steps they are."""
+        if isinstance(self.value, dict):
+            for steps in range(1, len(path) + 1):
+                key = ".".join(map(str, path[:steps]))
+                if key in self.value:
+                    return self.value[key], steps
+        if isinstance(self.value, tuple) and str(path[0]).isdecimal():
+            return dict(enumerate(self.value)).get(int(path[0])), 1
+        return None, 0
 
 
 def read(

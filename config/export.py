@@ -62,6 +62,8 @@ def expected(shape: Shape) -> str:
             text = f"a whole number{_range(shape)}"
         case Shape(form="bool"):
             text = "true or false"
+        case Shape(form="value"):
+            text = "a value"
         case Shape(form="choice"):
             text = f"one of {', '.join(map(repr, shape.choices))}"
         case Shape(form="list", inner=Shape() as inner):

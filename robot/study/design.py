@@ -10,7 +10,6 @@ from typing import Annotated, Literal
 from gazerig.params import Bounds, Choices
 
 Language = Literal["en", "ja", "de"]
-ParamValue = float | int | bool | str | None
 Task = Literal["rating", "pairwise"]
 """rating: each condition is rated after it was seen; pairwise: two are seen, one is chosen."""
 Test = Literal[
@@ -30,7 +29,7 @@ class Condition:
     character: Annotated[str | None, "character by name or path"] = None
     scanpath: Annotated[Literal["markov", "simple", "face_tracking", "random"] | None, "face scanpath"] = None
     behaviour: Annotated[str | None, "behaviour chosen from the rules' menu"] = None
-    params: Annotated[Mapping[str, ParamValue], "dotted keys of the rig's YAML and their values"] = field(default_factory=dict)
+    params: Annotated[Mapping[str, object], "dotted keys of the rig's YAML and their values"] = field(default_factory=dict)
     recording: Annotated[str | None, "recorded run (.mcap) whose joint angles the head repeats"] = None
     film: Annotated[str | None, "film to show (.webm); null: rendered from the condition"] = None
     factors: Annotated[Mapping[str, str], "level of each factor, for designs with several"] = field(default_factory=dict)
@@ -64,7 +63,7 @@ class Trials:
 class Hypothesis:
     """What is expected, and the test that decides on it."""
 
-    measure: Annotated[str, "item, scale (questionnaire.scale) or objective measure"]
+    measure: Annotated[str, "questionnaire.item, questionnaire.scale or an objective measure"]
     better: Annotated[str, "condition for which more is expected"]
     than: Annotated[str, "condition that it is compared with"]
     test: Annotated[Test, "what decides"] = "signed_rank"
@@ -112,9 +111,9 @@ class StudyDesign:
     conditions: Annotated[Mapping[str, Condition], "two to six gazes"]
     questionnaires: Annotated[tuple[str, ...], "shipped names or paths, asked after each trial in this order"]
     after: Annotated[tuple[str, ...], "questionnaires asked once at the end"] = ()
-    description: Annotated[str, "what is studied, for the pre-registration"] = ""
-    welcome: Annotated[str, "what participants read before they consent; it must not name the difference"] = ""
-    debriefing: Annotated[str, "what participants read at the end"] = ""
+    description: Annotated[tuple[str, ...], "what is studied, in paragraphs, for the pre-registration"] = ()
+    welcome: Annotated[tuple[str, ...], "paragraphs that participants read before they consent; they must not name the difference"] = ()
+    debriefing: Annotated[tuple[str, ...], "paragraphs that participants read at the end"] = ()
     language: Annotated[Language, Choices("en", "ja", "de"), "of questions and pages"] = "en"
     task: Annotated[Task, "what participants do"] = "rating"
     presentation: Presentation = field(default_factory=Presentation)
