@@ -20,6 +20,7 @@ from gazerig.robot.app.world_poses import RigInState, WorldPoses
 from gazerig.robot.app.world_sight import RenderedWorld, served_pixels
 from gazerig.robot.model.frames import CameraMount
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
+from gazerig.sim_mock.pty.line import BusSettings
 from gazerig.sim_mock.world.camera_params import WorldCameraParams
 from gazerig.sim_mock.world.gl_context import NoRenderer
 from gazerig.sim_mock.world.served_world import PUBLISH_MS, ServedWorld
@@ -37,8 +38,8 @@ class Host:
         self.t_s = 100.0
         self.served = ServedWorld(world.spec, folder / "state", lambda: self.t_s)
         for name, line in emulated_lines(RIG).items():
-            self.served.device(line, name, 0)
-        joints = RigInState(kinematics_of(RIG), self.served.joints())
+            self.served.device(BusSettings(line, name))
+        joints = RigInState(kinematics_of(RIG), self.served.joints()[0])
         self.poses = WorldPoses(folder / "state", joints)
 
     def serve(self, seconds: float, heard: bool) -> None:
@@ -69,7 +70,7 @@ def test_the_state_is_that_of_physics(host: Host) -> None:
     host.serve(0.02, heard=True)
     assert host.poses.newest() is not None and host.poses.state is not None
     truly = host.served.world.joints_rad()
-    for name, at in host.served.joints().items():
+    for name, at in host.served.joints()[0].items():
         assert host.poses.state.qpos[at] == pytest.approx(truly[name], abs=1e-3)
     assert host.poses.head(0.0)[0] == pytest.approx(np.array(host.poses.head(0.0)[0]))
 

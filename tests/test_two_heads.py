@@ -15,9 +15,10 @@ from command_line import invoked
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.analysis.mutual_gaze import HeadPlace, mutual_gaze
 from gazerig.robot.app.first_world import what_it_needs
-from gazerig.robot.app.head_group import compose_group, has_other_heads
+from gazerig.robot.app.head_group import Following, compose_group, has_other_heads
 from gazerig.robot.app.lockstep import Lockstep
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.model.description.links import IDENTITY
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.report.heads import mutual_gaze_report
@@ -63,11 +64,6 @@ def test_a_world_with_one_head_is_no_group() -> None:
     assert not has_other_heads(RunOptions(mock=True, fast=True, world="living-room"))
 
 
-def test_several_heads_without_the_simulated_clock_are_refused_in_one_line() -> None:
-    with pytest.raises(SetupError, match=r"^--world two-heads has several heads.*--fast$"):
-        ran(fast=False)
-
-
 def test_the_command_runs_all_heads_once(tmp_path: Path) -> None:
     out = tmp_path / "figures.json"
     told = "run --mock --fast --world two-heads --no-pictures --bus ideal --seconds 1"
@@ -77,6 +73,16 @@ def test_the_command_runs_all_heads_once(tmp_path: Path) -> None:
         figures["seconds"] == figures["heads"]["other"]["seconds"] == pytest.approx(1.0, abs=0.02)
     )
     assert figures["mutual_gaze"]["other"]["seconds"] > 0.9
+
+
+def test_a_second_request_to_end_reaches_all_heads() -> None:
+    lead = Interrupts(signals=False)
+    other = Following(lead)
+    assert other() is None and other.requests == 0
+    lead.request("SIGINT")
+    assert other() == "SIGINT" and other.requests == 1
+    lead.request("SIGINT")
+    assert other.requests == 2
 
 
 def test_time_goes_on_when_all_wait_and_the_earliest_goes_first() -> None:

@@ -49,6 +49,7 @@ from gazerig.robot.app.run_scene import for_surroundings, scene_of
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import TargetChooser
 from gazerig.robot.control.gesture_choices import GestureChoices
+from gazerig.robot.control.heads_together import NamedRobot
 from gazerig.robot.control.loop import Robot
 from gazerig.robot.dashboard.feed.snapshot import ShownRig
 from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
@@ -89,6 +90,7 @@ class Assembly(NamedTuple):
     fault: carries out a fault command of the emulated servos, None where they are real or ideal
     world: how the world with physics looks, None without one
     world_start_s: gives when the script of its people began, None before that and without one
+    others: the other heads of the same world, which are stopped and resumed with it
     """
 
     robot: Robot
@@ -103,6 +105,7 @@ class Assembly(NamedTuple):
     fault: Callable[[str], str] | None = None
     world: WorldShapes | None = None
     world_start_s: Callable[[], float | None] = lambda: None
+    others: tuple[NamedRobot, ...] = ()
 
     def shown(self) -> ShownRig:
         """Return how the rig is built now, as far as people are shown it."""

@@ -1,32 +1,24 @@
 """Several heads in one world, each led by a robot of its own that sees only its own picture.
 
-In simulated time all of them run in this process, each in a thread, on one clock and in one world
-(gazerig.robot.app.lockstep): the same seed gives the same bytes on every bus.
+What ends one of them ends all: each parks and lets go.
 """
 
 import threading
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from gazerig.config.schema import load_rig
-from gazerig.drivers.errors import SetupError
-from gazerig.gaze.angles import add, rotate
 from gazerig.robot.analysis.mutual_gaze import HeadPlace, MutualGazeTrace
-from gazerig.robot.app.assemble import SharedPlace
-from gazerig.robot.app.gaze_models import kinematics_of
-from gazerig.robot.app.lockstep import Lockstep
+from gazerig.robot.app.assemble import SharedPlace, run_rig
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_world import RunWorld, world_of, world_scene
-from gazerig.robot.app.session import ComposedRun, compose, run
-from gazerig.robot.app.world_poses import RigInState, SimulatedPoses
+from gazerig.robot.app.session import SECONDS, ComposedRun, compose, run
+from gazerig.robot.app.shared_world import FaceNow, ServedWorld, SharedWorld, SimulatedWorld
+from gazerig.robot.control.heads_together import NamedRobot
+from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.head_shape import HeadMeasures
-from gazerig.sim_mock.world.heads_scene import HeadFace, HeadsScene, RigFrame
-
-if TYPE_CHECKING:
-    from gazerig.sim_mock.world.physics import World
+from gazerig.sim_mock.world.heads_scene import HeadsScene, RigFrame
 
 FIRST = "first"
 
@@ -64,41 +56,48 @@ def compose_group(options: RunOptions) -> "HeadGroup":
         gazerig.config.load.ConfigError: the world or one of the rigs is at fault.
         SetupError: they cannot be run as it was asked.
     """
-    if not options.fast:
-        raise SetupError(
-            f"--world {options.world} has several heads: they run on one simulated clock, with --fast"
-        )
-    from gazerig.sim_mock.world.physics import World
-
-    first = load_rig(options.rig, options.character, options.profile)
+    first = run_rig(options)
     found = world_of(first, options)
     assert found is not None  # a world was asked for
     assert found.spec.figures is not None  # heads stand in a script
-    script = found.spec.figures.script
-    each = (
-        options,
-        *(
-            _other(options, name, n, head.rig)
-            for n, (name, head) in enumerate(script.heads.items(), 1)
-        ),
-    )
-    lockstep = Lockstep(len(each))
-    world = World(found.spec.compiled(), lockstep.now_s)
-    frames = [RigFrame(rig.R_world_base, rig.p_world_base_m) for rig in world.model.rigs]
-    faces = [
-        _face(world, lockstep, number, frame, one.rig)
-        for number, (frame, one) in enumerate(zip(frames, each, strict=True))
-    ]
-    members = []
-    for number, (one, frame) in enumerate(zip(each, frames, strict=True)):
-        others = [face for n, face in enumerate(faces) if n != number]
-        scene = HeadsScene(found.scene, frame, others, number == 0)
-        seen = RunWorld(found.spec, scene, found.camera, number, world)
-        stands = HeadPlace(frame.R, frame.p_m).numbers
-        place = SharedPlace(seen, lockstep.clock(number), stands)
-        composed = compose(one, shared=place)
-        members.append(_Member((FIRST, *script.heads)[number], composed, frame))
-    return HeadGroup(members, lockstep)
+    heads = found.spec.figures.script.heads
+    others = [_other(options, name, n, heads[name].rig) for n, name in enumerate(heads, 1)]
+    each = (options, *others)
+    rigs = [(FIRST, first), *zip(heads, map(run_rig, others), strict=True)]
+    world = SimulatedWorld(found) if options.fast else ServedWorld(found, rigs)
+    members: list[_Member] = []
+    try:
+        faces = [world.face(number, rig) for number, (_, rig) in enumerate(rigs)]
+        for number, ((name, _), one) in enumerate(zip(rigs, each, strict=True)):
+            place = _place(world, found, number, faces)
+            members.append(_Member(name, compose(one, shared=place), world.frames[number]))
+    except BaseException:
+        for member in members:
+            member.composed.made.close()
+        world.close()
+        raise
+    return HeadGroup(_together(members), world)
+
+
+def _together(members: Sequence[_Member]) -> list[_Member]:
+    """Return the heads so that who commands the first, from the page too, can stop all."""
+    first, *others = members
+    robots = tuple(NamedRobot(one.name, one.composed.made.robot) for one in others)
+    made = first.composed.made._replace(others=robots)
+    # One parameter store and one remote control for the process: those of the first.
+    alone = [one._replace(composed=one.composed._replace(tuning=None)) for one in others]
+    return [first._replace(composed=first.composed._replace(made=made)), *alone]
+
+
+def _place(
+    world: SharedWorld, found: RunWorld, number: int, faces: Sequence[FaceNow]
+) -> SharedPlace:
+    """Return the place of a head in the world that it shares."""
+    frame = world.frames[number]
+    others = [face for n, face in enumerate(faces) if n != number]
+    scene = HeadsScene(found.scene, frame, others, number == 0)
+    stands = HeadPlace(frame.R, frame.p_m).numbers
+    return SharedPlace(world.seen(number, scene), world.clock(number), stands)
 
 
 def _other(options: RunOptions, name: str, number: int, rig: str) -> RunOptions:
@@ -119,96 +118,137 @@ def beside(path: Path, name: str) -> Path:
     return path.with_name(f"{path.stem}-{name}{path.suffix}")
 
 
-def _face(
-    world: "World", lockstep: Lockstep, number: int, frame: RigFrame, rig: str
-) -> Callable[[], HeadFace]:
-    """Return what gives the face of a head now."""
-    loaded = load_rig(rig)
-    joints = RigInState(kinematics_of(loaded), world.model.rigs[number].qpos)
-    poses = SimulatedPoses(world, lockstep.clock(number), joints)
-    nose_m = HeadMeasures(loaded.geometry.interocular_mm / 1e3).nose_m
+class Following(Interrupts):
+    """Requests to end a head that ends with another one: its own, and those to the other.
 
-    def now() -> HeadFace:
-        R, p_m = frame.in_world(*poses.head(lockstep.now_s()))
-        return HeadFace(R, add(p_m, rotate(R, nose_m)))
+    Args:
+        lead: requests to end the other one.
+    """
 
-    return now
+    def __init__(self, lead: Interrupts) -> None:
+        super().__init__(also=lead, signals=False)
+        self._lead = lead
+
+    @property
+    def requests(self) -> int:
+        """Return how often it was asked to end: the second time skips parking."""
+        return max(super().requests, self._lead.requests)
 
 
 class HeadGroup:
-    """Several heads that run together; the run is over when the first one's is."""
+    """Several heads that run together until one of them ends.
 
-    def __init__(self, members: Sequence[_Member], lockstep: Lockstep) -> None:
-        self._members, self._lockstep = tuple(members), lockstep
-        self._over = False
+    Args:
+        members: the heads, the first one first.
+        world: in which they are.
+
+    Attributes:
+        members: the heads.
+    """
+
+    def __init__(self, members: Sequence[_Member], world: SharedWorld) -> None:
+        self.members, self._world = tuple(members), world
         self._figures: list[dict[str, object] | None] = [None] * len(members)
         self._failures: list[BaseException] = []
+        self._saying = threading.Lock()
         places = [HeadPlace(member.frame.R, member.frame.p_m) for member in members]
         self._traces = [MutualGazeTrace(places[0], other) for other in places[1:]]
 
     def run(
-        self, stopped: Callable[[], str | None], say: Callable[[str], None]
+        self,
+        stopped: Callable[[], str | None],
+        say: Callable[[str], None],
+        status: Callable[[str], None] | None = None,
+        watch: Callable[[Tick], object] | None = None,
+        browse: Callable[[str], object] | None = None,
     ) -> dict[str, object]:
-        """Run until the first head's run ends; return its figures and those of the others.
+        """Run until one of them ends; return the first one's figures and those of the others.
 
-        Args:
-            stopped: returns the name of a signal that has come, None before.
-            say: writes a line.
+        Args: as of ``gazerig.robot.app.session.run``; status, watch and browse are of the first.
 
         Raises:
             SetupError: before anything moved.
         """
+        lead = stopped if isinstance(stopped, Interrupts) else Interrupts(also=stopped)
+        following = [Following(lead) for _ in self.members[1:]]
         threads = [
-            threading.Thread(target=self._follow, args=(number, say), name=member.name)
-            for number, member in enumerate(self._members)
-            if number
+            threading.Thread(target=self._follow, args=(number, lead, one, say), name=member.name)
+            for number, (member, one) in enumerate(zip(self.members[1:], following, strict=True), 1)
         ]
+
+        def end_all(reason: str) -> None:
+            for one in following:
+                if one.requests == 0:  # a second request would skip its parking
+                    one.request(f"the end of the first head{reason and f' ({reason})'}")
+
+        def ended(reason: str) -> None:
+            if reason != SECONDS:  # that comes for all of them
+                end_all(reason)
+
         for thread in threads:
             thread.start()
         try:
-            self._one(0, stopped, say)
+            self._world.enter(0)
+            self._figures[0] = run(
+                self.members[0].composed, lead, self._said(say), status,
+                lambda tick: self._watch_first(tick, watch), browse, ended,
+            )  # fmt: skip
+        except KeyboardInterrupt:  # it was asked to end before it began, maybe by one that failed
+            if not self._failures:
+                raise
         finally:
-            self._over = True
-            self._lockstep.leave(0)
+            lead.never_raise()  # the others are still to park
+            end_all("")
+            self._world.leave(0)
             for thread in threads:
                 thread.join()
+            self._world.close()
         if self._failures:
             raise self._failures[0]
         return self._joined()
 
-    def _follow(self, number: int, say: Callable[[str], None]) -> None:
+    def _follow(
+        self, number: int, lead: Interrupts, own: Interrupts, say: Callable[[str], None]
+    ) -> None:
         """Run another head than the first, in its thread."""
-        name = self._members[number].name
+        name = self.members[number].name
+
+        def ended(reason: str) -> None:
+            if own.requests == 0 and reason != SECONDS:
+                lead.request(f"the end of head {name} ({reason})")
+
         try:
-            self._one(number, self._ended, lambda line: say(f"{name}: {line}"))
+            self._world.enter(number)
+            self._figures[number] = run(
+                self.members[number].composed, own, self._said(say, f"{name}: "),
+                watch=lambda tick: self._traces[number - 1].update(1, tick), ends=ended,
+            )  # fmt: skip
+        except KeyboardInterrupt:  # it was asked to end before it began
+            lead.request(f"the end of head {name} before it began")
         except BaseException as error:
             self._failures.append(error)
+            lead.request(f"the end of head {name} ({type(error).__name__})")
         finally:
-            self._lockstep.leave(number)
+            self._world.leave(number)
 
-    def _one(
-        self, number: int, stopped: Callable[[], str | None], say: Callable[[str], None]
-    ) -> None:
-        self._lockstep.enter(number)
-        watch = self._watch(number)
-        self._figures[number] = run(self._members[number].composed, stopped, say, watch=watch)
+    def _said(self, say: Callable[[str], None], before: str = "") -> Callable[[str], None]:
+        """Return what says whole lines, whichever head's thread says them."""
 
-    def _watch(self, number: int) -> Callable[[Tick], None]:
-        if number:
-            return lambda tick: self._traces[number - 1].update(1, tick)
+        def one_by_one(line: str) -> None:
+            with self._saying:
+                say(before + line)
 
-        def first(tick: Tick) -> None:
-            for trace in self._traces:
-                trace.update(0, tick)
+        return one_by_one
 
-        return first
-
-    def _ended(self) -> str | None:
-        return "the first head ended" if self._over or self._failures else None
+    def _watch_first(self, tick: Tick, watch: Callable[[Tick], object] | None) -> None:
+        for trace in self._traces:
+            trace.update(0, tick)
+        if watch is not None:
+            watch(tick)
 
     def _joined(self) -> dict[str, object]:
         first, *others = self._figures
         assert first is not None
-        names = [member.name for member in self._members[1:]]
+        names = [member.name for member in self.members[1:]]
         gazes = dict(zip(names, (trace.figures() for trace in self._traces), strict=True))
         return {**first, "mutual_gaze": gazes, "heads": dict(zip(names, others, strict=True))}

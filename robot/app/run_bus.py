@@ -89,10 +89,7 @@ def run_bus(rig: Rig, options: RunOptions, clock: Clock, world: "RunWorld | None
         return RunBus(ideal, lambda: dict(zip(names, ideal.positions_steps(), strict=True)))
     lines = emulated_lines(rig)
     if not options.fast and has_terminals():
-        buses = PtyBuses()
-        bus = guarded_rig_bus(rig, buses.start(lines, None if world is None else world.spec))
-        head = None if world is None else _seen_from_here(rig, buses)
-        return RunBus(bus, close=buses.stop, fault=buses.command, head=head)
+        return _on_terminals(rig, lines, world)
     if world is not None:
         if not options.fast:
             raise SetupError("--world needs the pseudo-terminals of Linux, or --fast")
@@ -101,11 +98,24 @@ def run_bus(rig: Rig, options: RunOptions, clock: Clock, world: "RunWorld | None
     return _in_process(rig, devices)
 
 
-def _seen_from_here(rig: Rig, buses: PtyBuses) -> "WorldPoses":
-    """Return where the head is in the world of a server's process."""
+def _on_terminals(rig: Rig, lines: Mapping[str, Emulated], world: "RunWorld | None") -> RunBus:
+    """Return servos on terminals of another process, which is started unless others share it."""
+    if world is not None and world.served is not None:
+        buses, paths = world.served
+        close = _nothing
+    else:
+        buses = PtyBuses()
+        paths, close = buses.start(lines, None if world is None else world.spec), buses.stop
+    bus = guarded_rig_bus(rig, paths)
+    head = None if world is None else _seen_from_here(rig, buses, world.number)
+    return RunBus(bus, close=close, fault=buses.command, head=head)
+
+
+def _seen_from_here(rig: Rig, buses: PtyBuses, number: int) -> "WorldPoses":
+    """Return where the head of one of the rigs is in the world of a server's process."""
     from gazerig.robot.app.world_poses import RigInState, WorldPoses
 
-    return WorldPoses(buses.state, RigInState(kinematics_of(rig), buses.joints))
+    return WorldPoses(buses.state, RigInState(kinematics_of(rig), buses.joints[number]))
 
 
 def _in_world(rig: Rig, clock: Clock, lines: Mapping[str, Emulated], run: "RunWorld") -> RunBus:

@@ -16,6 +16,7 @@ from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.camera_factory import scene_start_s
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
+from gazerig.robot.control.heads_together import HeadsTogether
 from gazerig.robot.control.loop import LoopCount
 from gazerig.robot.control.loop_timing import LoopTiming, busy_text
 from gazerig.robot.control.observers import Observers, left_out
@@ -85,10 +86,11 @@ class RunObservers:
         self._timing = LoopTiming(made.loop.rate_hz)
         self._emulated = options.mock and steer is None
         self._tuning, self._recorder = tuning, recorder
+        self._commanded = HeadsTogether(made.robot, made.others)
         about = {"rig": options.rig, "pid": os.getpid()}
         self._live = (
             LiveServer(
-                made.robot,
+                self._commanded,
                 tuning,
                 (ConfigError,),
                 made.clock,
@@ -121,7 +123,7 @@ class RunObservers:
         self.join(self._observers)
 
     def _made_page(self, address: tuple[str, int]) -> PageProcess:
-        command, steer = self._made.robot.command, self._steer
+        command, steer = self._commanded.command, self._steer
         page_requests = PageRequestHandler(
             command if steer is None else only_stops(command),
             params=self._tuning,
@@ -151,7 +153,10 @@ class RunObservers:
         robot = self._made.robot
         errors = {kind: n for kind, n in robot.body.bus.health().errors.items() if n}
         start_s = scene_start_s(robot.camera) or self._made.world_start_s()
-        return RunState(errors, *self._in_force(), robot.perception.residual(), start_s)
+        return RunState(
+            errors, *self._in_force(), robot.perception.residual(), start_s,
+            [other.seen() for other in self._made.others],
+        )  # fmt: skip
 
     def join(self, observers: Observers) -> None:
         """Let all of them observe the ticks; each is left out by itself where it fails."""

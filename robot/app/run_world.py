@@ -1,6 +1,6 @@
 """The world with physics that a run is in: who is there, and the rig among them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
 from importlib.util import find_spec
@@ -30,10 +30,23 @@ from gazerig.sim_mock.world.world_scene import WorldScene
 from gazerig.sim_mock.world.world_spec import WorldSpec
 
 if TYPE_CHECKING:
+    from gazerig.sim_mock.pty.client import PtyBuses
     from gazerig.sim_mock.world.physics import World
 
 MJCF = (".xml", ".mjcf")
 """Endings of the files that are MuJoCo's own worlds."""
+
+
+class ServedRig(NamedTuple):
+    """The terminals of one of the rigs of a world that another process computes.
+
+    Attributes:
+        buses: of that process, which its owner stops.
+        paths: of this rig's terminals, by the names of its buses.
+    """
+
+    buses: "PtyBuses"
+    paths: Mapping[str, str]
 
 
 class RunWorld(NamedTuple):
@@ -44,7 +57,8 @@ class RunWorld(NamedTuple):
         scene: the people in it, as a run and its score know them.
         camera: how large, how fast and how true the pictures of cameras are.
         number: which of its rigs is the run's.
-        shared: the world itself where several runs are in it, None for one of the run's own.
+        shared: the world itself where several runs of this process are in it, else None.
+        served: the rig's terminals where several runs are in a world of another process, else None.
     """
 
     spec: WorldSpec
@@ -52,6 +66,7 @@ class RunWorld(NamedTuple):
     camera: WorldCameraParams
     number: int = 0
     shared: "World | None" = None
+    served: ServedRig | None = None
 
     def computed(self, clock: Clock) -> "World":
         """Return the world in this process."""

@@ -41,6 +41,10 @@ if TYPE_CHECKING:
     from gazerig.robot.recording.recorder import Recorder
 
 
+SECONDS = "seconds"
+"""Why a run ended whose time was over."""
+
+
 class ComposedRun(NamedTuple):
     """A robot put together for one run, with what reaches into it and what records it.
 
@@ -117,6 +121,7 @@ def run(
     status: Callable[[str], None] | None = None,
     watch: Callable[[Tick], object] | None = None,
     browse: Callable[[str], object] | None = None,
+    ends: Callable[[str], object] | None = None,
 ) -> dict[str, object]:
     """Run until the time is over, a signal comes or something fails; return the figures.
 
@@ -127,12 +132,13 @@ def run(
         status: rewrites the status line; None: there is none.
         watch: gets every tick.
         browse: opens the page in the user's browser; None: leaves that to the user.
+        ends: gets the reason as soon as it ends, before the head parks.
 
     Raises:
         SetupError: before anything moved.
     """
     try:
-        return Session(composed, stopped, say, status, watch, browse).whole()
+        return Session(composed, stopped, say, status, watch, browse).whole(ends)
     finally:
         composed.made.close()
 
@@ -206,16 +212,21 @@ class Session:
     def _stop(self, seconds: float) -> str | None:
         """Return why the run ends now, None while it goes on."""
         over = self._longest_s is not None and seconds >= self._longest_s - 1e-9
-        return self._stopped() or self._interrupts() or ("seconds" if over else None)
+        return self._stopped() or self._interrupts() or (SECONDS if over else None)
 
-    def whole(self) -> dict[str, object]:
-        """Run from torque on to torque off; return the figures."""
+    def whole(self, ends: Callable[[str], object] | None = None) -> dict[str, object]:
+        """Run from torque on to torque off; return the figures.
+
+        ends: gets why it ends, before the head parks
+        """
         wall = RealClock()
         began_s = wall.now_s()
         with self.powered() as loop:
             while (reason := loop.step()) is None:
                 pass
             self.stopped_by = reason
+            if ends is not None:
+                ends(reason)
         wall_s = wall.now_s() - began_s
         self._faults.close()
         figures = _figures(

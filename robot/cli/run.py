@@ -4,6 +4,7 @@ import json
 import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -80,17 +81,13 @@ def run(
 
         browse = open_page if not no_browser and desktop_here() else None
         opening = Opening("" if fast else what_runs(asked))
-        group = _group(asked)
-        if group is not None:
-            with signals() as stopped:
-                figures = group.run(stopped, opening.say)
-        else:
-            with tidied_up():
-                composed = session.compose(asked)
-            with signals() as stopped:
-                figures = session.run(
-                    composed, stopped, opening.say, shows, watch=opening.saw, browse=browse
-                )
+        with tidied_up():
+            group = _group(asked)
+            carry_out = (
+                group.run if group is not None else partial(session.run, session.compose(asked))
+            )
+        with signals() as stopped:
+            figures = carry_out(stopped, opening.say, shows, opening.saw, browse)
         _write_summary(figures, summary, force)
     if had_faults(figures, say) or "not_written" in figures:
         raise typer.Exit(FAULT)

@@ -120,6 +120,12 @@ class Robot:
         """Return why the robot was stopped, "" while it moves."""
         return self._stop.why
 
+    @property
+    def newest(self) -> Tick | None:
+        """Return the last tick, None before the first."""
+        known = self._looks.known
+        return known if isinstance(known, Tick) else None
+
     def command(self, command: Command) -> Ticket:
         """Queue a command for the next tick; may be called from any thread.
 

@@ -175,6 +175,18 @@ class CommandedPose(NamedTuple):
     lower_lids: tuple[float, float] | None = None
 
 
+class OtherHead(NamedTuple):
+    """Another head of the same world.
+
+    name: in the world's script; headline: what it does now, in one sentence
+    level: of its guard
+    """
+
+    name: str
+    headline: str
+    level: Level = "ok"
+
+
 class SeenCamera(NamedTuple):
     """Where the camera is (optical axes: x right, y down, z forward) and what it covers.
 
@@ -306,6 +318,7 @@ class Snapshot:
     trail, events: joints, and eye movements that ended, since the last snapshot, oldest first
     p_world_pivot_m: where the pitch and roll axes of the neck meet, None where it is not known
     plan: what the action planner has chosen and why, "" without one and while somebody leads
+    others: the other heads of the same world
     """
 
     t_s: float
@@ -355,3 +368,4 @@ class Snapshot:
     lower_lids: tuple[float, float] | None = None
     p_world_pivot_m: Vec3 | None = None
     plan: str = ""
+    others: tuple[OtherHead, ...] = ()

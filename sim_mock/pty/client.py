@@ -36,8 +36,8 @@ class _Served:
         self._server: subprocess.Popen[bytes] | None = None
         self._folder: ServedFolder | None = None
         self._asking = threading.Lock()
-        self.joints: dict[str, int] = {}
-        """Where the joints of the rig stand in the state of the world, where there is one."""
+        self.joints: list[dict[str, int]] = []
+        """Where the joints of each rig stand in the state of the world, where there is one."""
 
     def _start(
         self, buses: Sequence[Mapping[str, object]], world: "WorldSpec | None" = None
@@ -185,7 +185,7 @@ class PtyBus(_Served):
 
 
 class PtyBuses(_Served):
-    """All emulated buses of a rig in one process of their own, each on its terminal."""
+    """All emulated buses of a rig, or of several in one world, in one process of their own."""
 
     def start(
         self, devices: Mapping[str, Emulated], world: "WorldSpec | None" = None
@@ -200,5 +200,35 @@ class PtyBuses(_Served):
             SetupError: the world cannot be used; says why.
             RuntimeError: the server did not start; its message is on standard error.
         """
-        buses = [{"name": name, "device": packed(device)} for name, device in devices.items()]
-        return dict(zip(devices, self._start(buses, world), strict=True))
+        return self.start_rigs([("", devices)], world)[0]
+
+    def start_rigs(
+        self,
+        rigs: Sequence[tuple[str, Mapping[str, Emulated]]],
+        world: "WorldSpec | None" = None,
+    ) -> list[dict[str, str]]:
+        """Start a server for the buses of several rigs of one world; return the paths of each.
+
+        Args:
+            rigs: in the world's order: a name, "" for the first, which stands before the names of
+                its buses in commands, and what is on its buses.
+            world: as for ``start``.
+
+        Raises:
+            SetupError: as ``start``, or two buses would have one name.
+            RuntimeError: as ``start``.
+        """
+        places = [(number, bus) for number, (_, devices) in enumerate(rigs) for bus in devices]
+        names = ["_".join(filter(None, (rigs[number][0], bus))) for number, bus in places]
+        if twice := next((name for name in names if names.count(name) > 1), None):
+            raise SetupError(
+                f"two buses of this world are named {twice}: rename the head or its bus"
+            )
+        buses: list[dict[str, object]] = [
+            {"name": name, "device": packed(rigs[number][1][bus]), "rig": number, "rig_bus": bus}
+            for name, (number, bus) in zip(names, places, strict=True)
+        ]
+        found: list[dict[str, str]] = [{} for _ in rigs]
+        for (number, bus), path in zip(places, self._start(buses, world), strict=True):
+            found[number][bus] = path
+        return found

@@ -34,6 +34,7 @@ class BusSettings:
     link: name under which the terminal can be opened, also after it was unplugged
     choices: cases of the device by name
     seed: of the random numbers that faults draw
+    rig: which rig of a world it belongs to; rig_bus: its name there, None: the same name
     """
 
     device: Emulated
@@ -43,6 +44,8 @@ class BusSettings:
     link: str | None = None
     choices: Mapping[str, str] = field(default_factory=dict)
     seed: int = 0
+    rig: int = 0
+    rig_bus: str | None = None
 
 
 class TerminalLine:

@@ -88,7 +88,7 @@ class Server:
             for bus in settings.buses:
                 device = None
                 if self.world is not None:
-                    device = self.world.device(bus.device, bus.name or "", bus.seed)
+                    device = self.world.device(bus)
                 self.lines.append(TerminalLine(bus, time.monotonic, say, warn, device))
         except BaseException:
             self.close()

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from gazerig.sim_mock.device import Device
-from gazerig.sim_mock.devices import Emulated
+from gazerig.sim_mock.pty.line import BusSettings
 from gazerig.sim_mock.smart_servo.span import whole_ms
 from gazerig.sim_mock.world.commands import obey
 from gazerig.sim_mock.world.physics import World
@@ -41,13 +41,14 @@ class ServedWorld:
         self._due_ms = 0
         self._begun = False
 
-    def joints(self) -> dict[str, int]:
-        """Return where the joints of the first rig stand in a state."""
-        return self.world.model.rigs[0].qpos
+    def joints(self) -> list[dict[str, int]]:
+        """Return for each rig where its joints stand in a state."""
+        return [rig.qpos for rig in self.world.model.rigs]
 
-    def device(self, line: Emulated, bus: str, seed: int) -> Device:
-        """Return an emulated device whose servos move the world's joints."""
-        return self.world.device(line, bus, seed)
+    def device(self, bus: BusSettings) -> Device:
+        """Return an emulated device whose servos move the joints of one of the world's rigs."""
+        name = bus.rig_bus if bus.rig_bus is not None else bus.name or ""
+        return self.world.device(bus.device, name, bus.seed, bus.rig)
 
     def obey(self, text: str) -> str:
         """Carry out a command of the world; return {"ok": ...} or {"error": ...} as JSON."""

@@ -27,7 +27,7 @@ from gazerig.robot.model.description.build import RigShape
 from gazerig.robot.model.draw_picture import DrawPicture
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
-from gazerig.robot.model.types import Snapshot
+from gazerig.robot.model.types import Level, OtherHead, Snapshot
 from gazerig.robot.model.world_shapes import WorldShapes
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
@@ -67,6 +67,7 @@ class RunState(NamedTuple):
     errors: of the bus, by kind; behaviour, conversation, character: those in force
     residual: see ``ResidualFigures``
     scene_start_s: when a simulated scene or world began, None before that and without one
+    others: the other heads of the same world, as fields of ``OtherHead``
     """
 
     errors: dict[str, int]
@@ -75,6 +76,7 @@ class RunState(NamedTuple):
     character: str
     residual: tuple[float | None, float | None, int]
     scene_start_s: float | None = None
+    others: Sequence[tuple[str, str, Level]] = ()
 
 
 class FrameHead(NamedTuple):
@@ -194,7 +196,14 @@ class LiveFeed:
         perception = perception_text(tick, ResidualFigures(*state.residual))
         health = health_text(BusHealth(0, 0, state.errors))
         return self._builder.take(
-            SnapshotTexts(health, state.behaviour, perception, state.character, state.conversation)
+            SnapshotTexts(
+                health,
+                state.behaviour,
+                perception,
+                state.character,
+                state.conversation,
+                tuple(OtherHead(*other) for other in state.others),
+            )  # fmt: skip
         )
 
     @property

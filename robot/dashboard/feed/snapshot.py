@@ -24,6 +24,7 @@ from gazerig.robot.model.types import (
     JointState,
     Level,
     LoopFigures,
+    OtherHead,
     SeenBlink,
     SeenBody,
     SeenCamera,
@@ -62,13 +63,17 @@ class ShownRig(NamedTuple):
 
 
 class SnapshotTexts(NamedTuple):
-    """What a tick does not tell: bus figures in words, what is seen, what is in force."""
+    """What a tick does not tell: bus figures in words, what is seen, what is in force.
+
+    others: the other heads of the same world
+    """
 
     health: str = ""
     behaviour: str = ""
     perception: str = ""
     character: str = ""
     conversation: str = ""
+    others: tuple[OtherHead, ...] = ()
 
 
 class SnapshotBuilder:
@@ -139,6 +144,7 @@ class SnapshotBuilder:
             worst=worst,
             trail=tuple(trail),
             events=tuple(events),
+            others=said.others,
         )
 
     def _count(self, tick: Tick) -> None:

@@ -17,7 +17,7 @@ from gazerig.robot.dashboard.panels.joint_charts import JointCharts, JointSeries
 from gazerig.robot.dashboard.panels.main_sequence_chart import MainSequenceChart
 from gazerig.robot.dashboard.panels.run_figures import HOW_TO, RunFigures
 from gazerig.robot.dashboard.panels.servo_health import health
-from gazerig.robot.dashboard.panels.status import alarms, silence
+from gazerig.robot.dashboard.panels.status import alarms, other_heads, silence
 from gazerig.robot.dashboard.widgets.container import Container
 from gazerig.robot.dashboard.widgets.html import note
 from gazerig.robot.dashboard.widgets.widgets import PANELS, Widgets
@@ -103,7 +103,7 @@ class PanelView:
         if self._shown % _WORDS_EVERY == 0:
             self.alarms.content = alarms(snapshot)
             if "watch" in self._open:
-                self.winner.content = winner(snapshot)
+                self.winner.content = winner(snapshot) + other_heads(snapshot)
                 self.saliences.content = saliences(snapshot)
                 self.of_what.content = of_what(snapshot)
             if "health" in self._open:

@@ -24,7 +24,15 @@ def alarms(snapshot: Snapshot) -> str:
         said += banner(_STANDS_STILL[snapshot.level], kind, _shown(snapshot.reasons))
     if snapshot.frame_age_s is not None and snapshot.frame_age_s >= OLD_FRAME_S:
         said += banner(f"the frame is {snapshot.frame_age_s:.1f} s old", "hold")
+    for other in snapshot.others:
+        if other.level in _STANDS_STILL:
+            said += banner(f"{other.name}: {other.headline}", LEVELS[other.level])
     return said
+
+
+def other_heads(snapshot: Snapshot) -> str:
+    """Return what the other heads of the same world do, a line each, "" where there are none."""
+    return "".join(one_line(f"{other.name}: {other.headline}") for other in snapshot.others)
 
 
 def silence() -> str:

@@ -1,0 +1,142 @@
+"""Two heads in one world in real time: whatever ends one of them, both park and let go."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install -e '.[world]'")
+if sys.platform != "linux":
+    pytest.skip("terminals are emulated on Linux alone", allow_module_level=True)
+
+from gazerig.config.load import shipped
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.app.head_group import HeadGroup, compose_group
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.control.heads_together import HeadsTogether
+from gazerig.robot.control.interrupts import Interrupts
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.model.commands import Resume, Stop
+from gazerig.robot.model.stop_latch import MIN_HOLD_S
+
+pytestmark = [pytest.mark.pty, pytest.mark.slow]
+
+ASKED = RunOptions(mock=True, world="two-heads", no_pictures=True, rig="minimal", no_page=True)
+COMMAND = (
+    "-c", "from gazerig.robot.cli.entry_point import main; main()", "run", "minimal", "--mock",
+    "--world", "two-heads", "--no-pictures", "--no-page",
+)  # fmt: skip
+
+
+@pytest.fixture
+def group(tmp_path: Path) -> HeadGroup:
+    """Return two heads whose buses are given up after a second."""
+    file = tmp_path / "quick.yaml"
+    text = shipped("rigs", "minimal").read_text(encoding="utf-8")
+    file.write_text(
+        text.replace("kind: dynamixel,", "kind: dynamixel, dynamixel: {give_up_s: 1.0},")
+    )
+    return compose_group(replace(ASKED, rig=str(file)).checked())
+
+
+def test_a_fault_of_one_head_parks_the_other_and_both_let_go(group: HeadGroup) -> None:
+    fault = group.members[0].composed.made.fault
+    assert fault is not None
+    lines, ticks = list[str](), list[float]()
+
+    def watch(tick: Tick) -> None:
+        ticks.append(tick.t_s)
+        if len(ticks) == 40:
+            fault("other: unplug")
+
+    figures = group.run(lambda: None, lines.append, watch=watch)
+    heads = figures["heads"]
+    assert isinstance(heads, dict)
+    why = heads["other"]["stopped_by"]
+    assert why.startswith("fault")
+    assert figures["stopped_by"] == f"the end of head other ({why})"
+    assert f"stopped by the end of head other ({why}): parked, torque off" in lines
+    assert any(line.startswith(f"other: stopped by {why}: ") for line in lines)
+
+
+def test_a_stop_stops_both_and_a_resume_frees_both(group: HeadGroup) -> None:
+    first, other = (member.composed.made.robot for member in group.members)
+    together = HeadsTogether(first, group.members[0].composed.made.others)
+    asked, lines = Interrupts(signals=False), list[str]()
+    begun_s, seen = list[float](), list[tuple[bool, bool]]()
+
+    def watch(tick: Tick) -> None:
+        if not begun_s:
+            begun_s.append(tick.t_s)
+            together.command(Stop("too near", "a test"))
+        elif not seen and tick.t_s - begun_s[0] > MIN_HOLD_S + 0.1:
+            seen.append((bool(first.stopped), bool(other.stopped)))
+            together.command(Resume("a test"))
+        elif len(seen) == 1 and not first.stopped and not other.stopped:
+            seen.append((False, False))
+            asked.request("the test")
+
+    group.run(asked, lines.append, watch=watch)
+    assert seen == [(True, True), (False, False)]
+    ends = [line for line in lines if "stopped by the test: " in line]
+    assert len(ends) == 2 and all("parked, torque off" in line for line in ends)
+
+
+def test_a_head_that_cannot_start_ends_the_other(
+    group: HeadGroup, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def absent() -> None:
+        raise SetupError("no servo 3")
+
+    monkeypatch.setattr(group.members[1].composed.made.robot.body, "start", absent)
+    lines: list[str] = []
+    with pytest.raises(SetupError, match="no servo 3"):
+        group.run(lambda: None, lines.append)
+    assert all("torque off" in line for line in lines if line.startswith("stopped by"))
+
+
+@pytest.fixture
+def running(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
+    """Return a run of two heads whose heads move already."""
+    environment = {**os.environ, "TMPDIR": str(tmp_path), "PYTHONUNBUFFERED": "1"}
+    with subprocess.Popen(
+        [sys.executable, *COMMAND], stderr=subprocess.PIPE, text=True, env=environment
+    ) as process:
+        assert process.stderr is not None
+        assert "two-heads" in process.stderr.readline()  # said with the first tick
+        time.sleep(1.0)
+        yield process
+        process.kill()
+
+
+def children(pid: int) -> list[int]:
+    """Return the processes that one has started, and theirs."""
+    found = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+    own = [int(one) for one in found]
+    return own + [each for one in own for each in children(one)]
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_request_to_end_parks_both(running: subprocess.Popen[str], number: int) -> None:
+    running.send_signal(number)
+    _, said = running.communicate(timeout=30)
+    name = signal.Signals(number).name
+    assert f"\nstopped by {name}: parked, torque off" in f"\n{said}"
+    assert f"other: stopped by {name}: parked, torque off" in said
+
+
+def test_of_a_killed_run_nothing_goes_on(running: subprocess.Popen[str], tmp_path: Path) -> None:
+    started = children(running.pid)
+    assert started  # the emulator with the world and all servos
+    running.kill()
+    running.wait()
+    until_s = time.monotonic() + 20.0
+    while any(Path(f"/proc/{pid}").exists() for pid in started) and time.monotonic() < until_s:
+        time.sleep(0.05)
+    assert not [pid for pid in started if Path(f"/proc/{pid}").exists()]
