@@ -91,11 +91,11 @@ def signed_rank(
     d = np.asarray(differences, float)
     kept = int(np.count_nonzero(d))
     notes = _zero_notes(len(d) - kept, len(d), zeros)
-    least = min(1.0, (2.0 if two_sided else 1.0) * 0.5**kept)
+    least = min(1.0, (2.0 if two_sided else 1.0) * 0.5 ** len(d))
     if not kept:
         nothing = no_effect("matched rank-biserial correlation", "r")
         same = (*notes, "no participant answered differently")
-        return StatisticalTest("signed_rank", "T", 0.0, nan, 1.0, 1.0, 1.0, len(d), nothing, same)
+        return StatisticalTest("signed_rank", "T", 0.0, nan, 1.0, 1.0, least, len(d), nothing, same)
     found = stats.wilcoxon(
         d, zero_method=zeros, correction=True, alternative=_side(two_sided), method="asymptotic"
     )
