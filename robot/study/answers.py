@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from gazerig.robot.study.design import Exclusion, StudyDesign
 from gazerig.robot.study.questionnaire import Questionnaire
 from gazerig.robot.study.records import (
-    ItemAnswered,
     AnswerValue,
     Closed,
     Consented,
+    ItemAnswered,
     Measured,
     Opened,
     Record,
@@ -108,8 +108,7 @@ def participation(
         raise ValueError("a journal begins with what opened it")
     opened = records[0]
     trials = _trials(records)
-    rows = [row for row in _rows(opened.participant, records)]
-    rows = [_judged(row, design.exclusion, trials) for row in rows]
+    rows = [_judged(row, trials) for row in _rows(opened.participant, records)]
     rows = _without_hasty(rows, design.exclusion)
     closed = [r for r in records if isinstance(r, Closed)]
     how = closed[-1].how if closed else "unfinished"
@@ -153,7 +152,7 @@ def _trials(records: Iterable[Record]) -> tuple[TrialRow, ...]:
     return tuple(found.values())
 
 
-def _judged(row: AnswerRow, rules: Exclusion, trials: Sequence[TrialRow]) -> AnswerRow:
+def _judged(row: AnswerRow, trials: Sequence[TrialRow]) -> AnswerRow:
     """Leave out practice, and answers to a presentation that was not completed."""
     if row.trial is None:
         return row

@@ -29,8 +29,8 @@ BETWEEN_SD, TRIAL_SD, ITEM_SD = 0.8, 0.7, 0.7
 the last two, as a participant's level is in both conditions."""
 
 _TOTAL_SD = sqrt(BETWEEN_SD**2 + TRIAL_SD**2 + ITEM_SD**2)
-_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(31)
-_WEIGHTS = _WEIGHTS / float(_WEIGHTS.sum())
+_NODES, _RAW_WEIGHTS = np.polynomial.hermite_e.hermegauss(31)
+_WEIGHTS: Floats = np.asarray(_RAW_WEIGHTS / _RAW_WEIGHTS.sum(), np.float64)
 _LARGEST_SHIFT = 12.0
 _MEDIAN_MS, _HASTY_MS = 2600.0, 180.0
 _OBJECTIVE_MIDDLE, _OBJECTIVE_SD = 0.5, 0.1
@@ -127,8 +127,7 @@ def preference(effect: float) -> float:
 
 def rated(latent: Floats, points: int) -> Floats:
     """Return the ratings 1..points of latent values."""
-    found: Floats = 1.0 + np.digitize(latent, thresholds(points))
-    return found
+    return np.asarray(1.0 + np.digitize(latent, thresholds(points)), np.float64)
 
 
 def differences(

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from itertools import pairwise
-from math import comb, nan
+from math import nan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,8 +59,7 @@ def chi_square(
         )
     return StatisticalTest(
         "chi_square", "χ²", float(found.statistic), float(found.dof), float(found.pvalue),
-        exact_chance(kept),
-        least, n, cramers_v(float(found.statistic), n, kept.shape), tuple(notes),
+        exact_chance(kept), least, n, cramers_v(float(found.statistic), n, kept.shape), tuple(notes),
     )  # fmt: skip
 
 
@@ -68,7 +67,7 @@ def _least(rows: Counts) -> float:
     """Return the exact chance of rows that share no column, two columns in all."""
     n, first = int(rows.sum()), int(rows[0])
     # Of rows of one length the table turned round is as extreme.
-    return min(1.0, (2.0 if 2 * first == n else 1.0) / comb(n, first))
+    return min(1.0, (2.0 if 2 * first == n else 1.0) / float(special.binom(n, first)))
 
 
 def exact_chance(table: Counts) -> float:
