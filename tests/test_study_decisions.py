@@ -8,10 +8,10 @@ import pytest
 from scipy import stats
 from study_records import QUESTIONS, UTC, design, pairs, records
 
-from gazerig.robot.study.answers import Participation, participation
 from gazerig.robot.study.decisions import Decision, decisions
 from gazerig.robot.study.design import Exclusion, Hypothesis, StatisticalPlan, StudyDesign, Trials
 from gazerig.robot.study.measures import measures
+from gazerig.robot.study.participation import Participation, participation
 from gazerig.robot.study.records import (
     Closed,
     Consented,

@@ -7,9 +7,9 @@ import pytest
 from scipy import stats
 from study_records import QUESTIONS, design, pairs, records
 
-from gazerig.robot.study.answers import participation
 from gazerig.robot.study.design import Hypothesis, Trials
 from gazerig.robot.study.measures import measures
+from gazerig.robot.study.participation import participation
 from gazerig.robot.study.scores import scores, wins
 from gazerig.robot.study.simulation import (
     BETWEEN_SD,

@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.study.answers import Participation
 from gazerig.robot.study.design import Hypothesis, StudyDesign, Test
 from gazerig.robot.study.measures import Measure, measures
+from gazerig.robot.study.participation import Participation
 from gazerig.robot.study.questionnaire import Questionnaire
 from gazerig.robot.study.scores import Scores, scores, wins
 from gazerig.robot.study.statistics.assumptions import (

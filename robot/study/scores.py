@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.study.answers import AnswerRow, Participation
 from gazerig.robot.study.measures import Measure
 from gazerig.robot.study.order import PAIR
+from gazerig.robot.study.participation import AnswerRow, Participation
 from gazerig.robot.study.questionnaire import Questionnaire
 
 
