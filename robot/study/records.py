@@ -63,6 +63,8 @@ class TrialEnded:
 
     recording: file beside the journal, "" without; reason: why it was not completed
     from_s, to_s: when it began and ended in the recording's time, nan without one
+    largest_step_deg: from tick to tick, of any joint's goal, in the switch to the condition;
+        nan with a film
     """
 
     trial: int
@@ -75,6 +77,7 @@ class TrialEnded:
     reason: str = ""
     from_s: float = nan
     to_s: float = nan
+    largest_step_deg: float = nan
 
 
 @dataclass(frozen=True)

@@ -207,6 +207,7 @@ class StudySession:
         reason: str = "",
         recording: str = "",
         span_s: tuple[float, float] = (nan, nan),
+        largest_step_deg: float = nan,
     ) -> tuple[Record, ...]:
         """Return the record of the presentation that ends now.
 
@@ -217,12 +218,13 @@ class StudySession:
             reason: why it was not completed.
             recording: file beside the journal that holds it.
             span_s: its beginning and end in the recording's time.
+            largest_step_deg: of a joint's goal, from tick to tick, in the switch before it.
 
         Raises:
             WrongAnswer: none is under way.
         """
         self._require("presentation")
-        return self._cut(outcome, seconds, utc, reason, recording, span_s)
+        return self._cut(outcome, seconds, utc, reason, recording, span_s, largest_step_deg)
 
     def answer(
         self, values: Mapping[int, AnswerValue], ms: Mapping[int, float], utc: str
@@ -277,13 +279,14 @@ class StudySession:
         reason: str = "",
         recording: str = "",
         span_s: tuple[float, float] = (nan, nan),
+        largest_step_deg: float = nan,
     ) -> tuple[Record, ...]:
         """Return the record of the end of the presentation under way, none without one."""
         began = self._progress.began
         if began is None:
             return ()
-        at = (began.trial, began.attempt)
-        return (TrialEnded(*at, outcome, seconds, utc, began.side, recording, reason, *span_s),)
+        at, rest = (began.trial, began.attempt), (*span_s, largest_step_deg)
+        return (TrialEnded(*at, outcome, seconds, utc, began.side, recording, reason, *rest),)
 
     @property
     def _ending(self) -> Ending:
