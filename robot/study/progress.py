@@ -23,7 +23,7 @@ Step = Literal["consent", "instructions", "rest", "ready", "presentation", "ques
 
 
 @dataclass(frozen=True)
-class Place:
+class StudyPlace:
     """Where in a study a participant is.
 
     trial: practice trials below 0, None outside trials; side: 1 in the second half of a pair
@@ -37,7 +37,7 @@ class Place:
     questionnaire: str = ""
 
 
-class Progress:
+class StudyProgress:
     """What a participant has done, and what comes next.
 
     Attributes:
@@ -64,7 +64,7 @@ class Progress:
         self._lost: dict[int, int] = {}
         self._seen: set[tuple[int, int]] = set()
         self._answered: set[tuple[int | None, str]] = set()
-        self._passed: set[Place] = set()
+        self._passed: set[StudyPlace] = set()
 
     def add(self, records: Iterable[Record]) -> None:
         """Take up records that are on disk."""
@@ -82,26 +82,26 @@ class Progress:
                 case Closed():
                     self.closed = one
 
-    def pass_by(self, place: Place) -> None:
+    def pass_by(self, place: StudyPlace) -> None:
         """Leave a place of which nothing is recorded: the instructions, a rest."""
         self._passed.add(place)
 
     @property
-    def place(self) -> Place:
+    def place(self) -> StudyPlace:
         """Return where the participant is."""
         if self.closed is not None:
-            return Place("end")
+            return StudyPlace("end")
         if self.consented is None:
-            return Place("consent")
-        if (start := Place("instructions")) not in self._passed and not self._attempts:
+            return StudyPlace("consent")
+        if (start := StudyPlace("instructions")) not in self._passed and not self._attempts:
             return start
         for trial in self.trials:
             if place := self._in_trial(trial):
                 return place
         for key in self._design.after:
             if (None, key) not in self._answered:
-                return Place("questions", questionnaire=key)
-        return Place("end")
+                return StudyPlace("questions", questionnaire=key)
+        return StudyPlace("end")
 
     def _add_end(self, one: TrialEnded) -> None:
         self.began = None
@@ -117,21 +117,21 @@ class Progress:
         rule = self._design.exclusion
         return self._lost.get(trial, 0) > (rule.repeats if rule.lost_head == "repeat" else 0)
 
-    def _in_trial(self, trial: int) -> Place | None:
+    def _in_trial(self, trial: int) -> StudyPlace | None:
         """Return where in a trial the participant is, None if it is done."""
         if self._given_up(trial):
             return None
         every = self._design.trials.rest_every
         untouched = all((trial, side) not in self._attempts for side in range(self._sides))
         if every and trial > 0 and trial % every == 0 and untouched:
-            rest = Place("rest", trial)
+            rest = StudyPlace("rest", trial)
             if rest not in self._passed:
                 return rest
         for side in range(self._sides):
             if (trial, side) not in self._seen:
                 attempt = self._attempts.get((trial, side), 0)
-                return Place("presentation" if self.began else "ready", trial, side, attempt)
+                return StudyPlace("presentation" if self.began else "ready", trial, side, attempt)
         for key in self._design.questionnaires:
             if (trial, key) not in self._answered:
-                return Place("questions", trial, questionnaire=key)
+                return StudyPlace("questions", trial, questionnaire=key)
         return None

@@ -12,7 +12,7 @@ Ending = Literal["finished", "declined", "withdrawn", "excluded"]
 
 
 @dataclass(frozen=True)
-class Consent:
+class ConsentScreen:
     """What is kept, and whether the participant agrees.
 
     pictures, gaze: the use is asked for
@@ -23,7 +23,7 @@ class Consent:
 
 
 @dataclass(frozen=True)
-class Instructions:
+class InstructionsScreen:
     """What will happen."""
 
     trials: int
@@ -32,7 +32,7 @@ class Instructions:
 
 
 @dataclass(frozen=True)
-class Ready:
+class ReadyScreen:
     """Before a presentation: it begins when the participant says so.
 
     number: of the trial, from 1; among ``of`` trials, or practice trials
@@ -49,7 +49,7 @@ class Ready:
 
 
 @dataclass(frozen=True)
-class Presentation:
+class PresentationScreen:
     """A presentation.
 
     film: name under which the film is fetched, another one each time; "" for the head itself
@@ -73,7 +73,7 @@ class Question:
 
 
 @dataclass(frozen=True)
-class Questions:
+class QuestionsScreen:
     """One page of questions.
 
     instruction: what stands above them, in the study's language, "" for nothing
@@ -90,22 +90,31 @@ class Questions:
 
 
 @dataclass(frozen=True)
-class Rest:
+class RestScreen:
     """A rest of at least so many seconds."""
 
     seconds: float
 
 
 @dataclass(frozen=True)
-class Paused:
+class PausedScreen:
     """The experimenter has something to do first, e.g. the head is not ready."""
 
 
 @dataclass(frozen=True)
-class End:
+class EndScreen:
     """The last screen; after ``finished`` it tells what the study was about."""
 
     how: Ending
 
 
-Screen = Consent | Instructions | Ready | Presentation | Questions | Rest | Paused | End
+Screen = (
+    ConsentScreen
+    | InstructionsScreen
+    | ReadyScreen
+    | PresentationScreen
+    | QuestionsScreen
+    | RestScreen
+    | PausedScreen
+    | EndScreen
+)

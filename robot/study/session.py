@@ -14,7 +14,7 @@ import numpy as np
 from gazerig.robot.study.answers import WrongAnswer, checked
 from gazerig.robot.study.design import StudyDesign
 from gazerig.robot.study.order import PAIR
-from gazerig.robot.study.progress import Place, Progress, Step
+from gazerig.robot.study.progress import Step, StudyPlace, StudyProgress
 from gazerig.robot.study.questionnaire import Item, Questionnaire
 from gazerig.robot.study.records import (
     AnswerValue,
@@ -28,16 +28,16 @@ from gazerig.robot.study.records import (
     TrialEnded,
 )
 from gazerig.robot.study.screens import (
-    Consent,
-    End,
+    ConsentScreen,
     Ending,
-    Instructions,
-    Paused,
-    Presentation,
+    EndScreen,
+    InstructionsScreen,
+    PausedScreen,
+    PresentationScreen,
     Question,
-    Questions,
-    Ready,
-    Rest,
+    QuestionsScreen,
+    ReadyScreen,
+    RestScreen,
     Screen,
 )
 
@@ -81,7 +81,7 @@ class StudySession:
         self.design, self.participant = design, participant
         self.paused = False
         self._questionnaires, self._secret = questionnaires, secret
-        self._progress = Progress(design, participant)
+        self._progress = StudyProgress(design, participant)
         self.add(records)
 
     @property
@@ -94,28 +94,32 @@ class StudySession:
         """Return what the participant sees now."""
         place, design = self._progress.place, self.design
         if self.paused and place.step in ("ready", "presentation"):
-            return Paused()
+            return PausedScreen()
         match place.step:
             case "consent":
-                return Consent(design.privacy.pictures, design.privacy.gaze)
+                return ConsentScreen(design.privacy.pictures, design.privacy.gaze)
             case "instructions":
                 trials = design.trials
-                return Instructions(len(self.order), trials.practice, trials.seconds)
+                return InstructionsScreen(len(self.order), trials.practice, trials.seconds)
             case "rest":
-                return Rest(design.trials.rest_s)
+                return RestScreen(design.trials.rest_s)
             case "ready":
-                return Ready(*self._number(place), place.side, place.attempt > 0)
+                return ReadyScreen(*self._number(place), place.side, place.attempt > 0)
             case "presentation":
                 film = self._token("film", place) if design.presentation.on == "film" else ""
-                return Presentation(*self._number(place), place.side, design.trials.seconds, film)
+                return PresentationScreen(
+                    *self._number(place), place.side, design.trials.seconds, film
+                )
             case "questions":
                 return self._questions(place)
-        return End(self._ending)
+        return EndScreen(self._ending)
 
     @property
     def page(self) -> str:
         """Return the name of the present screen; the same screen has it again after a crash."""
-        return self._token("paused" if self.screen == Paused() else "page", self._progress.place)
+        return self._token(
+            "paused" if self.screen == PausedScreen() else "page", self._progress.place
+        )
 
     @property
     def shown(self) -> Shown | None:
@@ -295,7 +299,7 @@ class StudySession:
             return "finished"
         return "declined" if consented is not None and not consented.given else closed.how
 
-    def _number(self, place: Place) -> tuple[int, int, bool, bool]:
+    def _number(self, place: StudyPlace) -> tuple[int, int, bool, bool]:
         """Return the trial's number, of how many, whether it is practice, and of pairs."""
         pair = self.design.task == "pairwise"
         if place.trial is None:
@@ -305,7 +309,7 @@ class StudySession:
             return place.trial + warm_up + 1, warm_up, True, pair
         return place.trial + 1, len(self.order), False, pair
 
-    def _items(self, place: Place) -> list[tuple[str, Item]]:
+    def _items(self, place: StudyPlace) -> list[tuple[str, Item]]:
         """Return the items of a page in the order in which this participant gets them."""
         asked = self._questionnaires[place.questionnaire]
         items = list(asked.items.items())
@@ -318,13 +322,13 @@ class StudySession:
         key = (trials.seed, self.participant, _ITEMS, every.index(place.questionnaire), row)
         return [items[i] for i in np.random.default_rng(key).permutation(len(items))]
 
-    def _questions(self, place: Place) -> Questions:
+    def _questions(self, place: StudyPlace) -> QuestionsScreen:
         said = self._questionnaires[place.questionnaire].instruction
         instruction = said.get(self.design.language, said.get("en", ""))
         questions = tuple(Question(i, item) for i, (_, item) in enumerate(self._items(place)))
-        return Questions(*self._number(place), place.trial is None, instruction, questions)
+        return QuestionsScreen(*self._number(place), place.trial is None, instruction, questions)
 
-    def _token(self, kind: str, place: Place) -> str:
+    def _token(self, kind: str, place: StudyPlace) -> str:
         text = f"{kind} {self.participant} {place}"
         return hmac.new(self._secret, text.encode(), hashlib.sha256).hexdigest()[:20]
 
