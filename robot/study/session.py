@@ -47,7 +47,7 @@ _ITEMS = 2
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownTrial:
     """The presentation that comes or is under way; for the experimenter and the head alone."""
 
     trial: int
@@ -122,13 +122,13 @@ class StudySession:
         )
 
     @property
-    def shown(self) -> Shown | None:
+    def shown(self) -> ShownTrial | None:
         """Return the presentation that comes or is under way, None between them."""
         place = self._progress.place
         if place.step not in ("ready", "presentation") or place.trial is None:
             return None
         condition = self._progress.trials[place.trial].split(PAIR)[place.side]
-        return Shown(place.trial, place.attempt, place.side, condition)
+        return ShownTrial(place.trial, place.attempt, place.side, condition)
 
     @property
     def trial(self) -> int | None:
