@@ -228,7 +228,7 @@ class LoopbackLink:
             return True
 
     def _accepted(self) -> bool:
-        """Take a caller; False where none will come any more."""
+        """Accept a caller; return False where none will come any more."""
         assert self._listener is not None
         try:
             end, _ = self._listener.accept()

@@ -240,6 +240,28 @@ def seen_at(p_world_m: Vec3, canvas: tuple[float, float, float, float]) -> tuple
 STOP = "document.querySelector('#rig-stop')"
 
 
+def resumed(rig: Rig, person: Person, question: str = "Fingers out?") -> None:
+    """Switch a stopped rig on again by the page: asked once more, and until it goes on."""
+    assert rig.newest is not None
+    held_s = rig.newest.t_s + 2.1
+    rig.pace_s = 0.001
+    wait_for(lambda: present(rig.newest).t_s > held_s, "the time that a stop holds at least")
+    rig.pace_s = PACE_S
+    person.click(saying("Resume …"))
+    assert rig.robot.stopped  # not without being asked again
+    wait_for(lambda: person.reads(question), "the question")
+
+    # A stop that was sent twice holds for longer, and the rig refuses: then it is asked again.
+    def goes_on() -> bool:
+        if rig.robot.stopped and not person.clicked(saying("Yes, resume")):
+            person.clicked(saying("Resume …"))
+        person.wait_for_frames(UNHURRIED_FRAMES)
+        return not rig.robot.stopped
+
+    wait_for(goes_on, "the rig going on")
+    wait_for(lambda: not person.reads("Torque is off"), "the page going on")
+
+
 @contextmanager
 def running(host: str = "127.0.0.1") -> Iterator[tuple[Rig, str]]:
     rig = Rig(host)

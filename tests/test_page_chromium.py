@@ -18,6 +18,7 @@ from page_person import (
     Rig,
     beside,
     everywhere,
+    resumed,
     running,
     saying,
     seen_at,
@@ -49,27 +50,6 @@ def at_the_rig(tab: Browser) -> Iterator[tuple[Rig, Person]]:
         person.open("Steer")
         wait_for(lambda: person.reads("behaviour", "joints", "neck yaw"), "the controls")
         yield rig, person
-
-
-def resumed(rig: Rig, person: Person, question: str = "Fingers out?") -> None:
-    assert rig.newest is not None
-    held_s = rig.newest.t_s + 2.1
-    rig.pace_s = 0.001
-    wait_for(lambda: present(rig.newest).t_s > held_s, "the time that a stop holds at least")
-    rig.pace_s = PACE_S
-    person.click(saying("Resume …"))
-    assert rig.robot.stopped  # not without being asked again
-    wait_for(lambda: person.reads(question), "the question")
-
-    # A stop that was sent twice holds for longer, and the rig refuses: then it is asked again.
-    def goes_on() -> bool:
-        if rig.robot.stopped and not person.clicked(saying("Yes, resume")):
-            person.clicked(saying("Resume …"))
-        person.wait_for_frames(UNHURRIED_FRAMES)
-        return not rig.robot.stopped
-
-    wait_for(goes_on, "the rig going on")
-    wait_for(lambda: not person.reads("Torque is off"), "the page going on")
 
 
 def test_stop_takes_the_torque_off_until_it_is_asked_back(

@@ -15,9 +15,7 @@ from present import present
 from gazerig.drivers.errors import BusLost, PortError
 from gazerig.drivers.serial import port as serial_port
 from gazerig.drivers.serial.port import BlockingPort
-from gazerig.sim_mock.devices import DynamixelLine, FeetechLine, MaestroLine
-from gazerig.sim_mock.hobby_servo import HobbySpec
-from gazerig.sim_mock.pty.client import PtyBus, PtyBuses
+from gazerig.sim_mock.pty.client import PtyBus
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 SPECS = [(1, "xl330-m288", 2048), (2, "xl330-m288", 1000), (3, "xl330-m288", 3000)]
@@ -295,106 +293,6 @@ def test_with_wire_time_nothing_comes_before_it_is_due():
 def test_a_command_needs_a_server():
     with pytest.raises(RuntimeError, match="start it first"):
         PtyBus().command("status")
-
-
-# --- other kinds of devices, and several in one process
-
-
-def asked(path, data, length, baud=1_000_000):
-    """Send bytes to a path and give what is answered."""
-    port = BlockingPort(path)
-    port.setBaudRate(baud)
-    port.write(data)
-    answer = port.read_until(length, port.now_s() + 1.0)
-    port.closePort()
-    return answer
-
-
-def test_feetech_servos_answer_at_their_baud_rate_only():
-    with PtyBus() as bus:
-        path = bus.start_device(FeetechLine((ServoSpec(1, "sts3215"),), baud=500_000))
-        assert asked(path, STS_PING, 6, 500_000) == STS_PONG
-        port = BlockingPort(path)
-        port.setBaudRate(1_000_000)
-        port.write(STS_PING)
-        assert port.read_until(1, port.now_s() + 0.03) == b""
-        port.closePort()
-
-
-def test_a_board_tells_what_its_channels_send():
-    with PtyBus() as bus:
-        board = MaestroLine(12, servos=(HobbySpec(3, 5000.0),))
-        path = bus.start_device(board, choices={"max-us": "1400"})
-        assert asked(path, bytes.fromhex("9003"), 2, 115_200) == bytes(2)
-        assert asked(path, bytes.fromhex("8403702E9003"), 2, 9600) == (5600).to_bytes(2, "little")
-        assert asked(path, bytes.fromhex("AA0C21"), 2) == bytes(2)
-        status = json.loads(bus.command("status"))
-        assert len(status["servos"]) == 12
-
-
-def test_a_board_wants_a_crc_where_it_is_told_to():
-    with PtyBus() as bus:
-        path = bus.start_device(MaestroLine(6, crc=True))
-        assert asked(path, bytes.fromhex("84 00 70 2E 2B 90 00 65"), 2)
-        port = BlockingPort(path)
-        port.setBaudRate(9600)
-        port.write(bytes.fromhex("900000"))
-        assert port.read_until(1, port.now_s() + 0.03) == b""
-        port.closePort()
-
-
-def test_choices_and_faults_are_those_of_the_device():
-    with PtyBus() as bus:
-        path = bus.start_device(
-            FeetechLine((ServoSpec(1, "sts3215"),)), choices={"broadcast-ping": "silence"}
-        )
-        assert bus.command("lose 1 count 1") == "servo 1 does not answer 1 times"
-        assert asked(path, STS_PING + STS_PING, 6) == STS_PONG
-        assert "broadcast-ping" in bus.command("help")
-        assert json.loads(bus.command("status"))["servos"][0]["model"] == "sts3215"
-
-
-def test_the_buses_of_a_rig_live_in_one_process():
-    with PtyBuses() as buses:
-        paths = buses.start(
-            {
-                "": DynamixelLine((ServoSpec(1, "xl330-m288"),), baud=1_000_000),
-                "neck": FeetechLine((ServoSpec(1, "sts3215"),), baud=1_000_000),
-            }
-        )
-        assert list(paths) == ["", "neck"]
-        assert asked(paths["neck"], STS_PING, 6) == STS_PONG
-        assert len(asked(paths[""], bytes.fromhex("FFFFFD0001030001194E"), 14)) == 14
-        assert buses.command("lose 1 count 1", "neck") == "servo 1 does not answer 1 times"
-        assert json.loads(buses.command("status", "neck"))["faults"] == ["lose 1"]
-        assert json.loads(buses.command("status"))["faults"] == []
-        buses.command("unplug", "neck")
-        assert [Path(path).exists() for path in paths.values()] == [True, False]
-        buses.command("plug", "neck")
-        assert asked(paths["neck"], STS_PING + STS_PING, 6) == STS_PONG
-        pid = buses.pid
-    assert not Path(f"/proc/{pid}").exists()
-
-
-def test_a_command_for_no_bus_is_refused_with_the_names():
-    with PtyBuses() as buses:
-        line = DynamixelLine((ServoSpec(1, "xl330-m288"),))
-        buses.start({"eyes": line, "neck": line})
-        with pytest.raises(ValueError, match=r"name the bus first \(eyes, neck\): eyes: status"):
-            buses.command("status")
-        with pytest.raises(ValueError, match="name the bus first"):
-            buses.command("status", "tail")
-
-
-def test_a_bus_that_cannot_be_ends_the_others(capfd):
-    with PtyBuses() as buses, pytest.raises(RuntimeError, match="did not start"):
-        buses.start(
-            {
-                "eyes": DynamixelLine((ServoSpec(1, "xl330-m288"),)),
-                "neck": DynamixelLine((ServoSpec(1, "xl330-m288"),), baud=12),
-            }
-        )
-    assert "baud 12: xl330-m288 knows" in capfd.readouterr().err
 
 
 def test_a_server_ends_with_its_client_also_while_it_makes_a_world():

@@ -1,25 +1,21 @@
 """Real or simulated parts to one robot: the only room that sees config and sim_mock."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from math import radians
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
 
 from gazerig.config.gestures import gestures_of
-from gazerig.config.schema import Rig, load_rig, load_rules, load_walk
+from gazerig.config.schema import Rig, load_walk
 from gazerig.config.shipped import shipped_names
 from gazerig.drivers.camera.depth_roi import depth_at
-from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import Camera
 from gazerig.gaze.animation import Animation
 from gazerig.gaze.attention import Attention
 from gazerig.gaze.aversion import Aversion
 from gazerig.gaze.lids import Lids
-from gazerig.gaze.saccade import SaccadeParams
-from gazerig.gaze.scanpath import Scanpath, ScanpathParams, Walk, row_sums_note
-from gazerig.params import choices_of
+from gazerig.gaze.scanpath import Scanpath, Walk, row_sums_note
 from gazerig.robot.app.animation_tables import animation_tables
 from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.camera_factory import (
@@ -36,7 +32,7 @@ from gazerig.robot.app.gaze_models import (
 from gazerig.robot.app.live_params import CameraPlacement, Components, LiveParams
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts
-from gazerig.robot.app.rig_description import mesh_faults, shape_of
+from gazerig.robot.app.rig_description import shape_of
 from gazerig.robot.app.rig_limits import (
     lid_spans,
     limits,
@@ -45,7 +41,8 @@ from gazerig.robot.app.rig_limits import (
 )
 from gazerig.robot.app.run_bus import RunBus, run_bus
 from gazerig.robot.app.run_camera import run_camera, sight_of
-from gazerig.robot.app.run_scene import for_surroundings, scene_of
+from gazerig.robot.app.run_rig import with_options
+from gazerig.robot.app.run_scene import scene_of
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import TargetChooser
 from gazerig.robot.control.gesture_choices import GestureChoices
@@ -73,7 +70,6 @@ from gazerig.sim_mock.scenes.scene import Scene
 if TYPE_CHECKING:
     from gazerig.robot.app.run_world import RunWorld
 
-P = TypeVar("P", ScanpathParams, SaccadeParams)
 T = TypeVar("T")
 
 
@@ -206,16 +202,9 @@ def assemble(
         if options.mock and not options.fast:
             seen = lendable(seen, rig, clock)
         parts = _components(
-            rig,
-            _body(rig, wires),
-            kinematics,
-            seen,
-            sight.mount,
-            camera,
-            walk,
-            random,
+            rig, _body(rig, wires), kinematics, seen, sight.mount, camera, walk, random,
             _gyro_fusion(options, messages.append),
-        )
+        )  # fmt: skip
         placement = CameraPlacement(
             lambda rig: placed_camera(rig, options, kinematics, seen)[0], camera.mount
         )
@@ -373,45 +362,3 @@ def _robot(
         PixelToWorld(parts.mount, poses, lambda: live.camera),
         messages,
     )
-
-
-def run_rig(options: RunOptions) -> Rig:
-    """Return the rig of a run, with the meshes that it names looked at, too.
-
-    Raises:
-        gazerig.config.load.ConfigError: rig, character, profile or rule set are at fault.
-        SetupError: there is no such model.
-    """
-    names = (options.rig, options.character, options.profile)
-    return with_options(load_rig(*names, further=[mesh_faults]), options)
-
-
-def with_options(rig: Rig, options: RunOptions) -> Rig:
-    """Return the rig with what the command line says otherwise.
-
-    Raises:
-        gazerig.config.load.ConfigError: the rule set is at fault.
-        SetupError: there is no such model.
-    """
-    gaze = rig.gaze
-    if options.rules is not None:
-        gaze = replace(gaze, top_down=load_rules(options.rules))
-    if options.scanpath is not None:
-        scanpath = _chosen(gaze.scanpath, "model", options.scanpath, "--scanpath")
-        gaze = replace(gaze, scanpath=scanpath)
-    if options.saccade is not None:
-        saccade = _chosen(gaze.saccade, "profile", options.saccade, "--saccade")
-        gaze = replace(gaze, saccade=saccade)
-    return for_surroundings(replace(rig, gaze=gaze), options)
-
-
-def _chosen(params: P, key: str, value: str, option: str) -> P:
-    """Replace one key that has choices, as an option of the command line asks.
-
-    Raises:
-        SetupError: the value is none of the choices.
-    """
-    choices = choices_of(type(params), key)
-    if value not in choices:
-        raise SetupError(f"{option} {value}: unknown; there is {', '.join(choices)}")
-    return replace(params, **{key: value})  # type: ignore[arg-type]

@@ -61,7 +61,7 @@ class BorrowedCamera:
         self._events: list[str] = []
 
     def take(self, jpeg: bytes) -> None:
-        """Take a picture of a browser; from one thread, beside the loop."""
+        """Keep a picture of a browser; from one thread, beside the loop."""
         if self._closed or not self._pictures.put(jpeg, self._now_s()):
             return
         if self._process is None and (self._starting is None or not self._starting.is_alive()):

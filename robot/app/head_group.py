@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gazerig.robot.analysis.mutual_gaze import HeadPlace, MutualGazeTrace
-from gazerig.robot.app.assemble import SharedPlace, run_rig
+from gazerig.robot.app.assemble import SharedPlace
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.run_rig import run_rig
 from gazerig.robot.app.run_world import RunWorld, world_of, world_scene
 from gazerig.robot.app.session import SECONDS, ComposedRun, compose, run
 from gazerig.robot.app.shared_world import FaceNow, ServedWorld, SharedWorld, SimulatedWorld

@@ -11,9 +11,7 @@ import numpy as np
 from gazerig.config.schema import Rig
 from gazerig.config.text import gestures_text, rig_text, walk_text
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.analysis.behaviour_score import BehaviourScore
 from gazerig.robot.analysis.gaze_on_face import GazeOnFace
-from gazerig.robot.analysis.planner_score import PlannerScore
 from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app.assemble import (
     RIGS_OWN,
@@ -21,11 +19,12 @@ from gazerig.robot.app.assemble import (
     SharedPlace,
     Substitutes,
     assemble,
-    run_rig,
 )
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
+from gazerig.robot.app.run_figures import SceneScore, run_figures
 from gazerig.robot.app.run_observers import RunObservers
+from gazerig.robot.app.run_rig import run_rig
 from gazerig.robot.control.event_text import drawn_together, is_register_change
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.joint_faults import JointFaults
@@ -35,7 +34,6 @@ from gazerig.robot.control.power_down import Again, PowerDown
 from gazerig.robot.control.switch_interval import SWITCH_INTERVAL
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.recording.run_info import RunInfo, versions
-from gazerig.sim_mock.scenes.scene import Scene
 
 if TYPE_CHECKING:
     from gazerig.robot.recording.recorder import Recorder
@@ -143,19 +141,6 @@ def run(
         composed.made.close()
 
 
-class _SceneScore(NamedTuple):
-    """How a scene's events were answered, by the gaze and by the action planner."""
-
-    behaviours: BehaviourScore
-    planner: PlannerScore
-
-    @classmethod
-    def of(cls, scene: Scene) -> "_SceneScore":
-        """Return the score of a scene before its first tick."""
-        events = scene.events()
-        return cls(BehaviourScore(events, scene.round_s), PlannerScore(events, scene.round_s))
-
-
 class Session:
     """One run, with everything that watches it; arguments as of ``run``.
 
@@ -180,7 +165,7 @@ class Session:
         self._summary = Summary()
         self._faults = JointFaults(say, self._run_observers.busy)
         scene = made.scene
-        self._score = _SceneScore.of(scene) if scene is not None else None
+        self._score = SceneScore.of(scene) if scene is not None else None
         self._face_gaze = GazeOnFace() if options.heatmap is not None else None
         self._start_s = 0.0
         self.stopped_by = "fault: unexpected error"
@@ -229,7 +214,7 @@ class Session:
                 ends(reason)
         wall_s = wall.now_s() - began_s
         self._faults.close()
-        figures = _figures(
+        figures = run_figures(
             self._made, self._summary, self._score, self._count, wall_s, self._faults
         )
         unwritten = self._run_observers.unwritten() or self._unwritten_heatmap()
@@ -293,7 +278,7 @@ class Session:
 
 
 def _observe_scene(
-    observers: Observers, made: Assembly, score: _SceneScore | None, face_gaze: GazeOnFace | None
+    observers: Observers, made: Assembly, score: SceneScore | None, face_gaze: GazeOnFace | None
 ) -> None:
     """Add the score of a scene and the heat map, where there are any."""
     if score is not None:
@@ -373,42 +358,3 @@ def parked(made: Assembly, again: Again, watch: Callable[[Tick], object] | None 
     if robot.park(made.park_rad, made.clock, made.loop, again, watch):
         return "parked"
     return "not parked (interrupted)" if again() else "not parked"
-
-
-def _figures(
-    made: Assembly,
-    summary: Summary,
-    score: _SceneScore | None,
-    count: LoopCount,
-    wall_s: float,
-    faults: JointFaults,
-) -> dict[str, object]:
-    """Join the figures of the ticks, the loop, the frames and the bus."""
-    robot = made.robot
-    health = robot.body.bus.health()
-    bus: dict[str, object] = {
-        "tx_bytes": health.tx_bytes,
-        "rx_bytes": health.rx_bytes,
-        "errors": {kind: n for kind, n in sorted(health.errors.items()) if n},
-    }
-    digest = made.sent_digest()
-    if digest is not None:
-        bus["tx_sha256"] = digest
-    ticks = summary.figures()
-    if score is not None and (behaviours := score.behaviours.figures()):
-        ticks["behaviours"] = behaviours
-    if score is not None and (planner := score.planner.figures()):
-        ticks["planner"] = planner
-    return {
-        "seconds": ticks.pop("seconds"),
-        "wall_seconds": round(wall_s, 3),
-        "ticks": count.ticks,
-        "overruns": count.overruns,
-        "faces_seen": robot.perception.frames_with_face,
-        "pictures": robot.perception.frames,
-        "head_turn_residual": robot.perception.residual()._asdict(),
-        **ticks,
-        "joint_faults": faults.figures(),
-        "bus": bus,
-        "stopped_by": count.stopped_by,
-    }

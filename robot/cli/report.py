@@ -58,23 +58,13 @@ def report(
     ] = None,
     other: Annotated[
         Path | None,
-        typer.Option(
-            "--with", help="The recording of another head of that run: a section on mutual gaze."
-        ),
+        typer.Option("--with", help="The recording of the run's other head: mutual gaze, too."),
     ] = None,
     force: ForceOption = False,
 ) -> None:
     """Report how human a run's gaze was: gazerig report run.mcap, then open report.html."""
     with clear_errors():
-        rig = DEFAULT_RIG
-        if scene is not None and file is not None and file.suffix != ".mcap":
-            rig, file = str(file), None
-        if (file is None) == (scene is None):
-            raise SetupError("report takes a recording, or --scene NAME: one of them")
-        if file is not None and bus is not None:
-            raise SetupError("--bus needs --scene: a recording was made on the bus it names")
-        if file is None and other is not None:
-            raise SetupError("--with takes the recording of another head: give both recordings")
+        file, rig = _source(file, scene, bus, other)
         # Drawing and models are heavy; `--help` does without them.
         from gazerig.robot.report.files import files_of, refuse_foreign
         from gazerig.robot.report.page import banner
@@ -100,6 +90,26 @@ def report(
             say(text)
         _tell_findings(made.findings)
         say(f"{made.page}: the whole report; {len(made.figures)} figures beside it")
+
+
+def _source(
+    file: Path | None, scene: str | None, bus: str | None, other: Path | None
+) -> tuple[Path | None, str]:
+    """Return what to report of: a recording, or None for a scene; and the rig of that scene.
+
+    Raises:
+        SetupError: an option does not go with a recording, or not with a scene.
+    """
+    rig = DEFAULT_RIG
+    if scene is not None and file is not None and file.suffix != ".mcap":
+        rig, file = str(file), None
+    if (file is None) == (scene is None):
+        raise SetupError("report takes a recording, or --scene NAME: one of them")
+    if file is not None and bus is not None:
+        raise SetupError("--bus needs --scene: a recording was made on the bus it names")
+    if file is None and other is not None:
+        raise SetupError("--with takes the recording of another head: give both recordings")
+    return file, rig
 
 
 @app.command()
@@ -171,7 +181,7 @@ def _mutual_gaze(first: Path, second: Path) -> "MutualGazeReport":
 def _simulated(options: "RunOptions", tell: Steps) -> "tuple[RunHeader, GazeTrace]":
     """Run a scene in simulated time; Ctrl-C ends the run early."""
     from gazerig.config.schema import load_walk
-    from gazerig.robot.app.assemble import run_rig
+    from gazerig.robot.app.run_rig import run_rig
     from gazerig.robot.app.simulated_run import simulate
     from gazerig.robot.control.tick import Tick
 

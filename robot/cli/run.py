@@ -113,12 +113,12 @@ class Opening:
         self._line = line
 
     def say(self, line: str) -> None:
-        """Say a line, after the first."""
+        """Print a line, after the first."""
         self.saw(None)
         say(line)
 
     def saw(self, tick: object) -> None:
-        """Say the first line once the head runs."""
+        """Print the first line once the head runs."""
         if self._line:
             line, self._line = self._line, ""
             say(line)

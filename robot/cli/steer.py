@@ -33,7 +33,7 @@ class SteeringInput(Protocol):
     """What a person steers with."""
 
     def update(self, steering: Steering, now_s: float) -> tuple[str, ...]:
-        """Tell the steering what was moved, and return what was pressed: gestures, STOP, END."""
+        """Steer by what was moved, and return what was pressed: gestures, STOP, END."""
         ...
 
 

@@ -91,7 +91,7 @@ def _checked(
     # Models are heavy; `--help` does without them. What draws the picture is an extra, whose
     # absence is told before hours of runs and not after them.
     import gazerig.robot.sweep.response_figure  # noqa: F401
-    from gazerig.robot.app.assemble import run_rig
+    from gazerig.robot.app.run_rig import run_rig
     from gazerig.robot.app.simulated_run import refuse_unfit
     from gazerig.robot.sweep.axes import axes_of, checked, grid, latin_hypercube, one_by_one
     from gazerig.robot.sweep.sweep import SweepSpec

@@ -54,7 +54,7 @@ class _Lines:
         self._joints: dict[tuple[float, str], list[str]] = {}
 
     def add(self, joint: str, t_s: float, what: str) -> None:
-        """Say something of a joint, as at a time."""
+        """Report something of a joint, as at a time."""
         self._joints.setdefault((t_s, what), []).append(joint)
 
     def all(self, count: int) -> list[tuple[float, str]]:

@@ -10,6 +10,7 @@ Frame: of a camera that looks at the face with its eyes level; x right, y down, 
 are seen on the plane z = 1.
 """
 
+from collections.abc import Iterator
 from math import cos, hypot, radians, sin, sqrt
 from typing import NamedTuple
 
@@ -239,8 +240,6 @@ def _sums(
 ) -> _Sums:
     """Return the normal equations at a pose.
 
-    A point P turned by a small w moves by w x P; a row of the equations is how its picture moves.
-
     Args:
         nose: as seen.
         others: eyes and corners of the mouth as seen.
@@ -250,29 +249,17 @@ def _sums(
         p_m: its position.
         length: its length.
     """
-    (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = R
     px, py, pz = p_m
     q = 1.0 / pz
-    nx, u, v = q * q, px * q, py * q
-    ny = nx
+    nx, ny, u, v = q * q, q * q, px * q, py * q
     ex, ey = (nose[0] - u) * q, (nose[1] - v) * q
     x3, y3 = -nx * u, -nx * v
     a33, b3 = nx * (u * u + v * v), -u * ex - v * ey
     x0 = x1 = x2 = x4 = y0 = y1 = y2 = y4 = 0.0
     a00 = a01 = a02 = a03 = a04 = a11 = a12 = a13 = a14 = 0.0
     a22 = a23 = a24 = a34 = a44 = b0 = b1 = b2 = b4 = 0.0
-    weights = 1.0, 1.0, height_weight, height_weight
-    for (fx, fy, fz), (seen_u, seen_v), weight in zip(frontal, others, weights, strict=True):
-        tall = fy * length
-        x = r00 * fx + r01 * tall + r02 * fz
-        y = r10 * fx + r11 * tall + r12 * fz
-        z = r20 * fx + r21 * tall + r22 * fz
-        q = 1.0 / (pz + z)
-        k, u, v = q * q, (px + x) * q, (py + y) * q
-        c0, c1, c4 = -u * y, z + u * x, fy * (r01 - u * r21)
-        d0, d1, d4 = -z - v * y, v * x, fy * (r11 - v * r21)
-        h = weight * k
-        eu, ev = (seen_u - u) * q, weight * (seen_v - v) * q
+    rows = _rows(others, frontal, height_weight, R, p_m, length)
+    for k, h, x, y, u, v, c0, c1, c4, d0, d1, d4, eu, ev in rows:
         kc0, kc1, kc2, kc3, kc4 = k * c0, k * c1, -k * y, -k * u, k * c4
         kd0, kd1, kd2, kd3, kd4 = h * d0, h * d1, h * x, -h * v, h * d4
         nx, ny, ex, ey = nx + k, ny + h, ex + eu, ey + ev
@@ -301,6 +288,37 @@ def _sums(
     products = a00, a01, a02, a03, a04, a11, a12, a13, a14, a22, a23, a24, a33, a34, a44
     to_x, to_y = (x0, x1, x2, x3, x4), (y0, y1, y2, y3, y4)
     return _Sums(nx, ny, to_x, to_y, products, (b0, b1, b2, b3, b4), ex, ey)
+
+
+def _rows(
+    others: Points,
+    frontal: tuple[Vec3, ...],
+    height_weight: float,
+    R: Mat3,
+    p_m: Vec3,
+    length: float,
+) -> Iterator[tuple[float, ...]]:
+    """Yield the two equations of each point, one of x and one of y; arguments as of ``_sums``.
+
+    A point P turned by a small w moves by w x P; a row of the equations is how its picture moves.
+    Each: their weights k and h; the turned point's x and y; where it is seen, u and v; the
+    coefficients of the turn's first two components and the length, c0, c1, c4 of x and d0, d1, d4
+    of y (those of its third are -y and x, those of the distance -u and -v); the weighted errors.
+    """
+    (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = R
+    px, py, pz = p_m
+    weights = 1.0, 1.0, height_weight, height_weight
+    for (fx, fy, fz), (seen_u, seen_v), weight in zip(frontal, others, weights, strict=True):
+        tall = fy * length
+        x = r00 * fx + r01 * tall + r02 * fz
+        y = r10 * fx + r11 * tall + r12 * fz
+        z = r20 * fx + r21 * tall + r22 * fz
+        q = 1.0 / (pz + z)
+        k, u, v = q * q, (px + x) * q, (py + y) * q
+        c0, c1, c4 = -u * y, z + u * x, fy * (r01 - u * r21)
+        d0, d1, d4 = -z - v * y, v * x, fy * (r11 - v * r21)
+        eu, ev = (seen_u - u) * q, weight * (seen_v - v) * q
+        yield k, weight * k, x, y, u, v, c0, c1, c4, d0, d1, d4, eu, ev
 
 
 def _step(sums: _Sums, turn: Vec3, length: float, variance: float) -> Five | None:

@@ -199,7 +199,7 @@ class Listener:
         self.close()
 
     def close(self) -> None:
-        """Take no more callers; wakes who waits for one."""
+        """Stop accepting callers; wakes who waits for one."""
         with contextlib.suppress(OSError):
             self._end.shutdown(socket.SHUT_RDWR)
         self._end.close()

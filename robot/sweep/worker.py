@@ -17,8 +17,8 @@ from gazerig.config.parameters import changed
 from gazerig.config.schema import Rig
 from gazerig.config.text import rig_text
 from gazerig.errors import Error
-from gazerig.robot.app.assemble import run_rig
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.run_rig import run_rig
 from gazerig.robot.app.simulated_run import simulate
 from gazerig.robot.sweep.axes import Point
 from gazerig.robot.sweep.outcome import Column, figures_of

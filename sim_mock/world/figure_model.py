@@ -73,7 +73,7 @@ class PlacedPeople:
 
 
 def add_mesh(spec: Any, body: Any, name: str, shape: Painted) -> None:
-    """Give a body a painted mesh that collides with nothing."""
+    """Add a painted mesh that collides with nothing to a body."""
     mesh = spec.add_mesh(name=name, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL)
     material = spec.add_material(name=name, specular=_SPECULAR, shininess=_SHININESS)
     if np.ptp(shape.colours, axis=0).max() < 1.0:
@@ -122,7 +122,7 @@ def _head_parts(head: HeadSegments, body: Measures) -> dict[str, Painted]:
 
 
 def _add_solid(node: Any, segment: str, body: Measures, gloves: bool) -> None:
-    """Give a segment the shape that it collides with; small ones have none."""
+    """Add the shape that a segment collides with; small ones have none."""
     k = body.stature_m / 1.72
     part = segment.split("_", 1)[-1]
     capsules = {

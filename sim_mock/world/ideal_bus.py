@@ -54,7 +54,7 @@ class IdealShaft:
         return HOLD_NM_S * wanted / SPEED_UNIT, -HOLD_NM_S, -MOST_NM, MOST_NM
 
     def sense(self, x: float, v: float) -> None:
-        """Take over position in steps of 4096 a turn and speed in steps/ms."""
+        """Set position (4096 steps a turn) and speed (steps/ms) to what the world has made."""
         self._x, self._v = x, v
 
 

@@ -167,7 +167,7 @@ def _place_rig(spec: Any, rig: RigInWorld, mjcf_file: Path | None) -> str:
 
 
 def _free_joints(spec: Any, joints: Sequence[str]) -> None:
-    """Take away the actuators that a user's head has at its joints: servos turn them."""
+    """Remove the actuators that a user's head has at its joints: servos turn them."""
     for actuator in tuple(spec.actuators):
         if actuator.target in joints:
             spec.delete(actuator)
@@ -195,7 +195,7 @@ def mount_name(prefix: str) -> str:
 
 
 def _add_servos(spec: Any, rig: RigInWorld, prefix: str) -> None:
-    """Give joints their stops, and every servo a shaft: a tendon that turns with its joints."""
+    """Add the stops of joints, and a shaft for every servo: a tendon that turns with its joints."""
     for name in rig.stops_rad:
         joint = spec.joint(prefix + name)
         joint.limited = True

@@ -72,7 +72,7 @@ class MovingShaft(Protocol):
         ...
 
     def sense(self, x: float, v: float) -> None:
-        """Take over position in steps and speed in steps/ms."""
+        """Set position (steps) and speed (steps/ms) to what the world has made of them."""
         ...
 
 

@@ -74,7 +74,7 @@ class WorldShaft(Shaft):
         self._since_ms = 0
 
     def place(self, position_steps: float) -> None:
-        """Take the shaft to be where the world has it, whatever position is given."""
+        """Set the shaft to where the world has it, whatever position is given."""
         self.x = self.joint = self.axis.position()
         self.v = self._rv = self.u = self.effort = self._integral = 0.0
         if isinstance(self.profile, PositionProfile):
@@ -161,7 +161,7 @@ class WorldShaft(Shaft):
         return r - self.x
 
     def sense(self, x: float, v: float) -> None:
-        """Take over what the world has made of it: position in steps, speed in steps/ms."""
+        """Set position (steps) and speed (steps/ms) to what the world has made of them."""
         if -SLOWEST < v < SLOWEST:
             v = 0.0
         self.x = self.joint = x

@@ -17,8 +17,8 @@ from gazerig.config.parameters import changed
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import add, scale, sub, yaw_pitch
 from gazerig.robot.app import run_scene
-from gazerig.robot.app.assemble import with_options
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.run_rig import with_options
 from gazerig.robot.app.simulated_run import simulate
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Value

@@ -277,9 +277,7 @@ class AuthProxy:
                 )
         finally:
             self._news.discard(news)
-        with suppress(TimeoutError, ConnectionError):
-            async with asyncio.timeout(_BEAT_S):
-                await line.close()
+        await close_socket(line, request)
         return line
 
     async def _send_state(self, line: web.WebSocketResponse, news: asyncio.Event, who: str) -> None:
@@ -319,7 +317,7 @@ class AuthProxy:
         )
 
     async def _webcam(self, request: web.Request) -> web.StreamResponse:
-        """Take the pictures of a browser's own camera."""
+        """Receive the pictures of a browser's own camera."""
         socket = self.webcam.prepared()
         return await self._last(request, socket, self._webcams, lambda: self.webcam.serve(socket))
 
@@ -335,7 +333,7 @@ class AuthProxy:
         self._connections.lasting(request)
         with tabs.take(self._who(request)) as leave:
             await until_one_ends(serve(), self._over.wait(), leave.wait())
-        await close_socket(socket, request, _BEAT_S)
+        await close_socket(socket, request)
         return socket
 
     # --- what is said to all --------------------------------------------------------------
@@ -370,5 +368,5 @@ class AuthProxy:
 
 
 def _nowhere(asked: object, who: str) -> bool:
-    """Take no pointer."""
+    """Ignore a pointer."""
     return False

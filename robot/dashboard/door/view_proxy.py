@@ -34,7 +34,6 @@ MOST_TABS = 16
 _STYLE_TAG = b'<link rel="stylesheet" href="/rig/view.css">'
 _HEAD_END = b"</head>"
 _TABS_PER_S, _TABS_BURST = 2.0, 20.0  # each receives the whole state, which takes a moment
-_CLOSES_WITHIN_S = 1.0
 # What a proxy must not hand on: it is about one leg of the way (RFC 9110, 7.6.1).
 _ONE_LEG = {"connection", "transfer-encoding", "content-encoding", "content-length", "keep-alive"}
 _PLAIN = {"Accept-Encoding": "identity"}
@@ -145,7 +144,7 @@ class ViewProxy:
                 await until_one_ends(
                     carry_in(browser, inside), carry_out(inside, browser), over, leave.wait()
                 )
-        await close_socket(browser, request, _CLOSES_WITHIN_S)
+        await close_socket(browser, request)
         return browser
 
 

@@ -42,7 +42,7 @@ class WebcamSocket:
         return web.WebSocketResponse(max_msg_size=MOST_BYTES, compress=False)
 
     async def serve(self, socket: web.WebSocketResponse) -> None:
-        """Take pictures until the browser ends, sends something else, or another takes over."""
+        """Receive pictures until the browser ends, sends something else, or another takes over."""
         self._newest = socket
         async for message in socket:
             if self._newest is not socket:

@@ -14,6 +14,8 @@ MESSAGES_PER_S, MESSAGES_BURST = 120.0, 240.0
 BYTES_PER_S, BYTES_BURST = 1e6, 4e6
 TAKES_S = 20.0
 """A browser that takes nothing for so long is sent away; it comes again by itself."""
+_CLOSES_WITHIN_S = 1.0
+"""A browser that has not answered by then that it is over is not waited for."""
 
 Socket = web.WebSocketResponse | aiohttp.ClientWebSocketResponse
 
@@ -53,18 +55,15 @@ async def until_one_ends(*works: Awaitable[object]) -> None:
     await asyncio.gather(*tasks, return_exceptions=True)
 
 
-async def close_socket(
-    socket: web.WebSocketResponse, request: web.Request, within_s: float
-) -> None:
+async def close_socket(socket: web.WebSocketResponse, request: web.Request) -> None:
     """Close a browser's websocket; one who reads nothing does not read that it is over.
 
     Args:
         socket: to be closed.
         request: by which it was opened.
-        within_s: how long the browser may take to answer, seconds.
     """
     with suppress(TimeoutError, ConnectionError):
-        async with asyncio.timeout(within_s):
+        async with asyncio.timeout(_CLOSES_WITHIN_S):
             await socket.close()
     if request.transport is not None:
         request.transport.abort()

@@ -73,7 +73,7 @@ class Widget:
         self._page.removed(self)
 
     def arrived(self, value: object, client: str) -> None:
-        """Take what a browser sends for this element.
+        """Apply what a browser sends for this element.
 
         Raises:
             ValueError: nothing can be sent for it, or not this; the message says what can.
@@ -167,7 +167,7 @@ class Field(Widget, ABC, Generic[T]):
         """
 
     def arrived(self, value: object, client: str) -> None:
-        """Take a value from a browser, show it in the others and call the handlers."""
+        """Apply a value from a browser, show it in the others and call the handlers."""
         taken = self.checked(value)
         self._set(but=client, value=taken)
         for do in self._handlers:
@@ -277,7 +277,7 @@ class Buttons(Widget):
         self._handlers.append(do)
 
     def arrived(self, value: object, client: str) -> None:
-        """Take a press of one of the buttons."""
+        """Handle a press of one of the buttons."""
         if not isinstance(value, str) or value not in self.options:
             raise ValueError(f"there is a button for each of {', '.join(self.options)}")
         for do in self._handlers:

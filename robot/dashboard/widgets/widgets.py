@@ -54,7 +54,7 @@ class Client:
         self.seen: frozenset[str] = frozenset(PANELS)
 
     def wake(self) -> None:
-        """Say that something waits, once until it is taken."""
+        """Announce that something waits, once until it is taken."""
         if not self._awake:
             self._awake = True
             self._wake()
@@ -258,7 +258,7 @@ class Widgets:
         return Outgoing(text if put or gone or notices else "", tuple(images))
 
     def received(self, client: Client, text: str) -> None:
-        """Take a message of a client: {"set": [number, value]} or {"seen": [names of panels]}.
+        """Handle a message of a client: {"set": [number, value]} or {"seen": [names of panels]}.
 
         What cannot be taken is refused in words to that client.
         """

@@ -83,7 +83,7 @@ def _add_camera(tree: dict[str, Any], description: Description) -> None:
 
 
 def _mark_buffers(tree: dict[str, Any]) -> None:
-    """Say which parts of the buffer are vertices and which are faces; trimesh leaves that open."""
+    """Mark which parts of the buffer are vertices and which are faces; trimesh leaves that open."""
     for mesh in tree["meshes"]:
         for primitive in mesh["primitives"]:
             for accessor in primitive["attributes"].values():
