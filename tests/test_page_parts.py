@@ -24,7 +24,7 @@ from gazerig.robot.dashboard.feed.camera_overlay import (
     encode,
     ground,
 )
-from gazerig.robot.dashboard.feed.page_process import MESSAGE_BYTES
+from gazerig.robot.dashboard.feed.page_process import MESSAGE_BYTES, pack, unpack
 from gazerig.robot.dashboard.panels.attention_panel import reason, winner
 from gazerig.robot.dashboard.panels.joint_charts import (
     GROUPS,
@@ -35,14 +35,19 @@ from gazerig.robot.dashboard.panels.joint_charts import (
     mean_deg,
 )
 from gazerig.robot.dashboard.panels.servo_health import guard, health
-from gazerig.robot.dashboard.panels.status import alarms, drawn_together, without_feedback
+from gazerig.robot.dashboard.panels.status import (
+    alarms,
+    drawn_together,
+    other_heads,
+    without_feedback,
+)
 from gazerig.robot.dashboard.view.people import fixated_part
 from gazerig.robot.dashboard.view.scene_node import along, turned_up, upright_along
 from gazerig.robot.model.leader import Leader
 from gazerig.robot.model.mesh import Mesh, cap, ellipsoid, lid, ring, turned
 from gazerig.robot.model.quaternion import quaternion
 from gazerig.robot.model.types import GAZE_JOINTS as EVERY_JOINT
-from gazerig.robot.model.types import SeenFace, Snapshot, Trail
+from gazerig.robot.model.types import OtherHead, SeenFace, Snapshot, Trail
 
 LENS = Intrinsics(300.0, 300.0, 319.5, 239.5)
 Terms = tuple[float, float, float, float, float]
@@ -92,6 +97,17 @@ def test_target_reason_and_guard_are_told_and_run_no_markup() -> None:
     for word in ("guard: limited", "3 lost", "too &lt;fast&gt; (joint 0, +5)"):
         assert word in health(shot)
     assert "too" not in health(snapshot()) and alarms(snapshot()) == ""
+
+
+def test_what_the_other_heads_do_is_told_and_that_one_is_let_go_is_an_alarm() -> None:
+    well, limp = (
+        OtherHead("anna", "looks at <1>"),
+        OtherHead("bert", "the torque is off: hot", "torque_off"),
+    )
+    shot = replace(snapshot(), others=(well, limp))
+    assert "anna: looks at &lt;1&gt;" in other_heads(shot) and other_heads(snapshot()) == ""
+    assert "bert: the torque is off: hot" in alarms(shot) and "anna" not in alarms(shot)
+    assert unpack(pack(shot)).others == shot.others
 
 
 @pytest.mark.parametrize(

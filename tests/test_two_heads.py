@@ -15,7 +15,7 @@ from command_line import invoked
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.analysis.mutual_gaze import HeadPlace, mutual_gaze
 from gazerig.robot.app.first_world import what_it_needs
-from gazerig.robot.app.head_group import Following, compose_group, has_other_heads
+from gazerig.robot.app.head_group import Following, Kept, compose_group, has_other_heads
 from gazerig.robot.app.lockstep import Lockstep
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.interrupts import Interrupts
@@ -83,6 +83,18 @@ def test_a_second_request_to_end_reaches_all_heads() -> None:
     assert other() == "SIGINT" and other.requests == 1
     lead.request("SIGINT")
     assert other.requests == 2
+
+
+@pytest.mark.parametrize(
+    ("overruns", "pictures", "is_behind"), [(10, 290, False), (300, 290, True), (10, 200, True)]
+)
+def test_who_falls_behind_is_told(overruns: int, pictures: int, is_behind: bool) -> None:
+    figures = {"ticks": 2000, "overruns": overruns, "seconds": 10.0, "pictures": pictures}
+    kept = Kept.of(figures)
+    assert kept is not None and kept.is_behind(30.0) is is_behind
+    if overruns == 300:
+        assert kept.text(30.0) == "13% of ticks late, 29 of 30 pictures a second"
+    assert Kept.of({**figures, "seconds": 1.0}) is None
 
 
 def test_time_goes_on_when_all_wait_and_the_earliest_goes_first() -> None:

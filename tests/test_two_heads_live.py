@@ -1,6 +1,7 @@
 """Two heads in one world in real time: whatever ends one of them, both park and let go."""
 
 import os
+import pickle
 import signal
 import subprocess
 import sys
@@ -8,6 +9,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -86,6 +88,31 @@ def test_a_stop_stops_both_and_a_resume_frees_both(group: HeadGroup) -> None:
     assert seen == [(True, True), (False, False)]
     ends = [line for line in lines if "stopped by the test: " in line]
     assert len(ends) == 2 and all("parked, torque off" in line for line in ends)
+
+
+def test_the_page_is_shown_the_other_head_where_it_is(group: HeadGroup) -> None:
+    made = group.members[0].composed.made
+    shapes = pickle.loads(pickle.dumps(made.world))  # as to the page's process
+    parts = {part.name: part for part in shapes.parts()}
+    head = next(name for name in parts if name.startswith("other_") and "eye" in name)
+    assert parts[head].moves and not [name for name in parts if name.startswith("rig_")]
+    before, asked = shapes.poses(0.0)[head], Interrupts(signals=False)
+    seen, turned = list[Tick](), set[Any]()
+
+    def watch(tick: Tick) -> None:
+        seen.append(tick)
+        if len(seen) % 20 == 0:
+            turned.add(shapes.poses(0.0)[head])
+            [other] = made.others
+            assert other.seen().headline
+        if len(seen) == 200:
+            asked.request("the test")
+
+    group.run(asked, lambda line: None, watch=watch)
+    assert len(turned) > 5
+    for (w, *_), (x_m, _, _) in turned:
+        assert x_m == pytest.approx(before[1][0], abs=0.1) and abs(x_m - 0.9) < 0.2
+        assert abs(w) < 0.5  # it faces the first head
 
 
 def test_a_head_that_cannot_start_ends_the_other(

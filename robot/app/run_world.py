@@ -22,6 +22,7 @@ from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.world_shapes import WorldShapes
 from gazerig.sim_mock.scenes.scene import Scene
 from gazerig.sim_mock.world.camera_params import WorldCameraParams
+from gazerig.sim_mock.world.other_heads import HeadInState, OtherHeads
 from gazerig.sim_mock.world.rig_in_world import RigInWorld
 from gazerig.sim_mock.world.script import Fault, WorldScript
 from gazerig.sim_mock.world.script_faults import CHECKS
@@ -59,6 +60,7 @@ class RunWorld(NamedTuple):
         number: which of its rigs is the run's.
         shared: the world itself where several runs of this process are in it, else None.
         served: the rig's terminals where several runs are in a world of another process, else None.
+        others: the world's other rigs with all that can be seen of them.
     """
 
     spec: WorldSpec
@@ -67,6 +69,7 @@ class RunWorld(NamedTuple):
     number: int = 0
     shared: "World | None" = None
     served: ServedRig | None = None
+    others: tuple[RigInWorld, ...] = ()
 
     def computed(self, clock: Clock) -> "World":
         """Return the world in this process."""
@@ -78,8 +81,12 @@ class RunWorld(NamedTuple):
         return World(model, clock.now_s)
 
     def shapes(self) -> WorldShapes:
-        """Return how the world looks."""
-        return shapes_of(self.spec)
+        """Return how the world looks, with the other heads where another process has it."""
+        if self.served is None or self.number:
+            return shapes_of(self.spec)
+        buses = self.served.buses
+        heads = map(HeadInState, self.others, buses.joints[1:])
+        return shapes_of(self.spec, OtherHeads(buses.state, tuple(heads)))
 
 
 def world_of(rig: Rig, options: RunOptions) -> RunWorld | None:
@@ -105,29 +112,39 @@ def world_of(rig: Rig, options: RunOptions) -> RunWorld | None:
     script = scene.figures.script
     # Where nothing is rendered, nobody sees the rigs: the page draws them by itself.
     looks = not options.no_pictures
-    rigs = (rig_in_world(rig, looks=looks), *other_rigs(rig, script, looks))
+    others = other_rigs(rig, script)
+    rigs = (rig_in_world(rig, looks=looks), *standing(others, script, looks))
     spec = WorldSpec(None if mjcf_file else scene.figures, rigs, mjcf_file)
-    return RunWorld(spec, scene, script.camera)
+    return RunWorld(spec, scene, script.camera, others=standing(others, script, looks=True))
 
 
-def other_rigs(rig: Rig, script: WorldScript, looks: bool) -> tuple[RigInWorld, ...]:
-    """Return the rigs of the other heads of a script.
+def other_rigs(rig: Rig, script: WorldScript) -> dict[str, Rig]:
+    """Return the rigs of the other heads of a script, by the heads' names.
 
     Args:
         rig: of heads that name none.
         script: with the heads.
-        looks: with what can be seen of them.
 
     Raises:
         gazerig.config.load.ConfigError: one of them is at fault.
     """
+    return {
+        name: load_rig(head.rig, further=[mesh_faults]) if head.rig else rig
+        for name, head in script.heads.items()
+    }
+
+
+def standing(rigs: Mapping[str, Rig], script: WorldScript, looks: bool) -> tuple[RigInWorld, ...]:
+    """Return the rigs of a script's other heads where they stand.
+
+    Args:
+        rigs: by the heads' names.
+        script: with the heads.
+        looks: with what can be seen of them.
+    """
     return tuple(
         rig_in_world(
-            load_rig(head.rig, further=[mesh_faults]) if head.rig else rig,
-            f"{name}_",
-            (head.x_m, head.y_m, 0.0),
-            radians(head.facing_deg),
-            looks,
+            rigs[name], f"{name}_", (head.x_m, head.y_m, 0.0), radians(head.facing_deg), looks
         )
         for name, head in script.heads.items()
     )

@@ -1,6 +1,6 @@
 """The geoms of a compiled MuJoCo model as meshes with colours, where they stand at first."""
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from math import cos, pi, sin
 from typing import Any, NamedTuple
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from gazerig.gaze.types import Floats
 from gazerig.robot.model.description.texture import TexturedMesh
 from gazerig.robot.model.mesh import Mesh, ellipsoid, smooth_normals, turned
-from gazerig.robot.model.paint import Painted
+from gazerig.robot.model.paint import Painted, merged
 from gazerig.robot.model.world_shapes import WorldPart
 
 _SHOWN_GROUPS = 3
@@ -50,17 +50,46 @@ def still_parts(
     mujoco.mj_kinematics(model, data)
     left_out = _left_out(model, moving, rig_joints)
     for geom in range(model.ngeom):
-        colour = _rgba(model, geom)
-        if model.geom_bodyid[geom] in left_out or model.geom_group[geom] >= _SHOWN_GROUPS:
-            continue
-        make = _SURFACES.get(int(model.geom_type[geom]))
-        if make is None or colour[3] == 0.0:
+        if model.geom_bodyid[geom] in left_out or (made := _surface(model, geom)) is None:
             continue
         pose = data.geom_xpos[geom].copy(), data.geom_xmat[geom].reshape(3, 3).copy()
-        surface = _placed(make(model, geom), *pose)
+        surface = _placed(made, *pose)
         if _is_wall(model, geom):
             surface = _facing(surface, _ROOM_M)
-        yield WorldPart(f"geom{geom}", _coloured(model, geom, surface, colour), "cloth")
+        yield WorldPart(f"geom{geom}", _coloured(model, geom, surface), "cloth")
+
+
+def body_parts(model: Any, bodies: Iterable[int]) -> Iterator[tuple[int, WorldPart]]:
+    """Yield what moves with bodies, in the frame of its body, with the body's number.
+
+    Args:
+        model: mujoco.MjModel
+        bodies: their numbers; what has no picture on it is one part a body
+    """
+    for body in bodies:
+        plain: list[Painted] = []
+        name, first = model.body(body).name, int(model.body_geomadr[body])
+        for geom in range(first, first + int(model.body_geomnum[body])):
+            if (made := _surface(model, geom)) is None:
+                continue
+            R = np.empty(9)
+            mujoco.mju_quat2Mat(R, model.geom_quat[geom])
+            surface = _placed(made, model.geom_pos[geom].copy(), R.reshape(3, 3))
+            shape = _coloured(model, geom, surface)
+            if isinstance(shape, Painted):
+                plain.append(shape)
+            else:
+                yield body, WorldPart(f"{name}/{geom}", shape, "plastic", moves=True)
+        if plain:
+            yield body, WorldPart(name, merged(plain), "plastic", moves=True)
+
+
+def _surface(model: Any, geom: int) -> _Surface | None:
+    """Return the surface of a geom in its own frame, None where it is not shown."""
+    make = _SURFACES.get(int(model.geom_type[geom]))
+    if make is None or model.geom_group[geom] >= _SHOWN_GROUPS or _rgba(model, geom)[3] == 0.0:
+        return None
+    return make(model, geom)
 
 
 def _left_out(model: Any, moving: Collection[str], rig_joints: Collection[str]) -> set[int]:
@@ -80,8 +109,8 @@ def _rgba(model: Any, geom: int) -> Floats:
     return np.asarray(model.mat_rgba[material], float)
 
 
-def _coloured(model: Any, geom: int, surface: _Surface, rgba: Floats) -> Painted | TexturedMesh:
-    picture = _picture(model, geom)
+def _coloured(model: Any, geom: int, surface: _Surface) -> Painted | TexturedMesh:
+    picture, rgba = _picture(model, geom), _rgba(model, geom)
     if picture is None:
         colours = np.tile(255.0 * rgba[:3], (len(surface.mesh.vertices), 1))
         return Painted(surface.mesh, colours, surface.normals)

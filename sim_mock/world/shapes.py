@@ -9,6 +9,7 @@ from typing import NamedTuple
 from gazerig.gaze.types import Vec3
 from gazerig.robot.model.quaternion import Quaternion
 from gazerig.robot.model.world_shapes import WorldFinish, WorldPart
+from gazerig.sim_mock.world.other_heads import OtherHeads
 from gazerig.sim_mock.world.rig_in_world import RigInWorld
 from gazerig.sim_mock.world.world_spec import WorldSpec
 
@@ -19,47 +20,58 @@ _FINENESS = 0.6
 
 
 class SpecShapes(NamedTuple):
-    """The shapes of a world without its rigs, which are drawn as they were measured.
+    """The shapes of a world without its first rig, which is drawn as it was measured.
 
     spec: its rigs are places only
     rig_joints: bodies of a user's world that one of these turns are the rig's
+    others: the other heads in it, None where they are not shown
     """
 
     spec: WorldSpec
     rig_joints: frozenset[str] = frozenset()
+    others: OtherHeads | None = None
 
     def parts(self) -> Sequence[WorldPart]:
-        """Return the room and all segments of all people; see ``WorldShapes.parts``."""
-        model = self.spec.compiled()
+        """Return the room, other heads and all segments of people; see ``WorldShapes.parts``."""
+        own, rigs = self.spec.rigs, () if self.others is None else self.others.rigs
+        spec = self.spec if self.others is None else self.spec._replace(rigs=(own[0], *rigs))
+        model = spec.compiled()
         from gazerig.sim_mock.world.figure_model import figure_shapes
         from gazerig.sim_mock.world.geom_shapes import still_parts
 
         figures = self.spec.figures
         moving = {} if figures is None else figure_shapes(figures, _FINENESS)
+        heads = () if self.others is None else tuple(self.others.parts(model, 1))
+        bodies = [] if self.others is None else self.others.bodies(model, 1)
+        elsewhere = {*moving, *(model.mj.body(i).name for i in bodies)}
         return (
-            *still_parts(model.mj, moving.keys(), self.rig_joints),
+            *still_parts(model.mj, elsewhere, self.rig_joints),
+            *heads,
             *(WorldPart(name, shape, _finish(name), moves=True) for name, shape in moving.items()),
         )
 
     def poses(self, world_s: float) -> Mapping[str, tuple[Quaternion, Vec3]]:
-        """Return where all segments are; see ``WorldShapes.poses``."""
+        """Return where all that moves is; see ``WorldShapes.poses``."""
         figures = self.spec.figures
+        heads = {} if self.others is None else self.others.poses()
         if figures is None:
-            return {}
+            return heads
         now = figures.segments(world_s)
         rows = zip(figures.names, now.quat.tolist(), now.p_m.tolist(), strict=True)
-        return {name: ((w, x, y, z), (p, q, r)) for name, (w, x, y, z), (p, q, r) in rows}
+        people = {name: ((w, x, y, z), (p, q, r)) for name, (w, x, y, z), (p, q, r) in rows}
+        return {**people, **heads}
 
 
-def shapes_of(spec: WorldSpec) -> SpecShapes:
+def shapes_of(spec: WorldSpec, others: OtherHeads | None = None) -> SpecShapes:
     """Return the shapes of a world; they are small to send.
 
     Args:
         spec: of the world, with its rigs.
+        others: all of its rigs but the first, None where they are not shown.
     """
     joints = {rig.prefix + name for rig in spec.rigs for name in rig.stops_rad}
     places = tuple(_place(rig) for rig in spec.rigs)
-    return SpecShapes(spec._replace(rigs=places), frozenset(joints))
+    return SpecShapes(spec._replace(rigs=places), frozenset(joints), others)
 
 
 def _place(rig: RigInWorld) -> RigInWorld:
