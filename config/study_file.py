@@ -2,20 +2,26 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
+from hashlib import sha256
 from pathlib import Path
 from typing import cast
 
 from gazerig.config.load import Check, ConfigError, load, read_yaml, shipped
-from gazerig.config.parameters import NEXT_START, changed, differences, live
+from gazerig.config.parameters import NEXT_START, changed, differences, live, values
 from gazerig.config.schema import Rig, load_rig
 from gazerig.gaze.top_down import PLANNED
 from gazerig.robot.model.commands import Value
 from gazerig.robot.study.design import Condition, StudyDesign
+from gazerig.robot.study.preregistration import canonical, design_sha256
 from gazerig.robot.study.questionnaire import Questionnaire
 from gazerig.robot.study.rules import asked_rules, design_rules, questionnaire_rules
 
 _ENDS = {"recording": ".mcap", "film": ".webm"}
+_GAZE = ("gaze", "ranges", "expressions", "expression_blend_s", "levels")
+"""Sections of a rig that decide what is seen of it, whichever servos and camera it has."""
+_MACHINE = frozenset({"bus", "buses", "webcam", "oak", "camera", "camera_recovery"})
+"""Sections that may change between two participants, as a port or a calibration does."""
 _WHILE_READ = frozenset({"name", "profile"})
 """Keys of a rig that only say how it is called and which file was laid over it."""
 
@@ -54,6 +60,36 @@ class LoadedStudy:
         """
         there = self.rig if before is None else self.rigs[before]
         return _differing(there, self.rigs[after])
+
+    @cached_property
+    def canonical(self) -> bytes:
+        """Return what the data's hash is of: all that is shown and asked, defaults and all."""
+        shown = {key: self._shown(key) for key in self.design.conditions}
+        return canonical(self.design, self.questionnaires, shown)
+
+    @property
+    def sha256(self) -> str:
+        """Return the hash that the data carry."""
+        return design_sha256(self.canonical)
+
+    def _shown(self, condition: str) -> dict[str, object]:
+        """Return what a participant can see of a condition, by dotted key, and its files' hashes.
+
+        Raises:
+            OSError: a recording or a film is not there any more.
+        """
+        rig, one = self.rigs[condition], self.design.conditions[condition]
+        seen: dict[str, object] = {
+            key: value for key, value in values(rig).items() if _section(key) in _GAZE
+        }
+        for key, value in _differing(self.rig, rig).items():
+            if _section(key) not in _MACHINE:
+                seen[key] = value
+        for name in _ENDS:
+            file = getattr(one, name)
+            if file is not None:
+                seen[f"{name}_sha256"] = sha256(Path(file).read_bytes()).hexdigest()
+        return seen
 
 
 def load_study(name_or_path: str, *further: Check[StudyDesign]) -> LoadedStudy:
@@ -117,6 +153,10 @@ def _changes(condition: Condition) -> Iterator[tuple[str, Value]]:
 
 
 _SCANPATH, _BEHAVIOUR = "gaze.scanpath.model", "gaze.top_down.behaviour"
+
+
+def _section(key: str) -> str:
+    return key.partition(".")[0]
 
 
 def _differing(before: Rig, after: Rig) -> dict[str, Value]:

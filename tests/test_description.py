@@ -26,6 +26,7 @@ from gazerig.robot.model.description.mass import (
 )
 from gazerig.robot.model.description.mjcf import mjcf
 from gazerig.robot.model.description.urdf import urdf
+from gazerig.robot.model.head_shape import JAW_HALF
 from gazerig.robot.model.paint import merged
 
 
@@ -137,6 +138,9 @@ def test_the_head_is_balanced_and_weighs_what_its_emulated_servos_carry() -> Non
 def test_a_skull_weighs_as_its_mesh_does() -> None:
     skin = head_mesh.skin()
     mesh = merged([skin.head, skin.jaw]).mesh
+    # The walls beside the jaw are not of the shell.
+    walls = np.isclose(np.abs(mesh.vertices[:, 1]), JAW_HALF)[mesh.faces].all(axis=1)
+    mesh = mesh._replace(faces=mesh.faces[~walls])
     for unit in (0.03, 0.0619, 0.15):
         found, expected = skull(unit), sheet(mesh.vertices * unit, mesh.faces, SHELL_M)
         assert found.mass_kg == pytest.approx(expected.mass_kg, rel=1e-3)

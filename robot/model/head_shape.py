@@ -56,7 +56,9 @@ _RIM_ROWS, _RIM_COLUMNS, _RIM_RADIUS = 7, 36, 0.372
 _RIM_OFF = 0.014
 _RIM_OUT = np.array((0.0, 0.50, 0.49))
 _SMILE = 0.85
-_MOUTH_Z, _MOUTH_HALF = -1.030, 0.32
+_MOUTH_Z = -1.030
+JAW_HALF = 0.350
+"""Half the width of what a jaw moves, in distances between the eyes: about that of the lips."""
 MOUTH = Mouth(_MOUTH_Z, 0.345, _SMILE, 0.088, 0.110)
 """Where the lips lie, in distances between the eyes."""
 _NOSE_TIP: Vec3 = (0.425, 0.0, -0.54)
@@ -191,10 +193,18 @@ def eye_rim() -> Surface:
     return Surface(points, found / np.linalg.norm(found, axis=-1, keepdims=True))
 
 
-def of_jaw(points: Floats) -> Floats:
-    """Return which points (..., 3) of the surface a jaw would move."""
-    x, y, z = points[..., 0], np.abs(points[..., 1]), points[..., 2]
-    # From the line of the mouth back to the hinge, and down to where the throat begins.
-    above = _MOUTH_Z + 0.42 * np.maximum(0.0, -0.16 - x)
-    z = smiling(np.minimum(y, _MOUTH_HALF), z)
-    return np.asarray((z < above) & (z > -1.66 - 0.6 * x - 0.9) & (x > -0.45) & (y < 0.50))
+def _above_mouth(points: Floats) -> Floats:
+    """Return how far points (n, 3) are above the line between the lips, and on to the hinge."""
+    x, y, z = points.T
+    z = smiling(np.minimum(np.abs(y), JAW_HALF), z)
+    return np.asarray(z - _MOUTH_Z - 0.42 * np.maximum(0.0, -0.16 - x))
+
+
+JAW_BOUNDS: tuple[Field, ...] = (
+    lambda points: np.abs(points[:, 1]) - JAW_HALF,
+    _above_mouth,
+    lambda points: -2.56 - 0.6 * points[:, 0] - points[:, 2],  # where the throat begins
+    lambda points: -0.45 - points[:, 0],
+)
+"""A jaw moves what of the surface is below 0 in each of these. Its sides are planes across its
+axis: as it opens they slide along those that stay, so no gap appears beside the mouth."""

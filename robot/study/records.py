@@ -7,6 +7,7 @@ comes from here.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import nan
 from typing import Literal
 
 Outcome = Literal["complete", "head_lost", "interrupted", "withdrawn"]
@@ -61,7 +62,9 @@ class TrialEnded:
     """A presentation ended.
 
     recording: file beside the journal, "" without; reason: why it was not completed
-    largest_step_deg: of the head's commanded joints in the switch to the condition, nan with a film
+    from_s, to_s: when it began and ended in the recording's time, nan without one
+    largest_step_deg: from tick to tick, of any joint's goal, in the switch to the condition;
+        nan with a film
     """
 
     trial: int
@@ -72,7 +75,9 @@ class TrialEnded:
     side: int = 0
     recording: str = ""
     reason: str = ""
-    largest_step_deg: float = float("nan")
+    from_s: float = nan
+    to_s: float = nan
+    largest_step_deg: float = nan
 
 
 @dataclass(frozen=True)
@@ -100,6 +105,7 @@ class Measured:
     condition: str
     values: Mapping[str, float]
     side: int = 0
+    attempt: int = 0
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,8 @@
 """The page's door: the only way in, at the asked address, for those who may come in.
 
 Viser itself listens where no other program can reach it
-(``gazerig.robot.dashboard.door.viser_server``). A client shows a token, once, in the query of
-the first address; a cookie takes its place. That holds on this machine as well, which may have
-other users. The Origin of every websocket and of everything that is sent must be the address of
-this page, and on the loopback that address must be a name of the loopback, or a foreign name
-made to point here would do (DNS rebinding).
+(``gazerig.robot.dashboard.door.viser_server``). Who is let in:
+``gazerig.robot.dashboard.door.admission``.
 
 It serves the page itself (``gazerig.robot.dashboard.door.page_files``), so that the stop button and
 what it talks to work whatever viser does; viser draws the view in a frame of the page
@@ -13,7 +10,6 @@ what it talks to work whatever viser does; viser draws the view in a frame of th
 """
 
 import asyncio
-import hmac
 import json
 import secrets
 import threading
@@ -24,7 +20,7 @@ import aiohttp
 from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
-from gazerig.robot.dashboard.door.addresses import hostname, netloc
+from gazerig.robot.dashboard.door.admission import Admission
 from gazerig.robot.dashboard.door.browsers import Browsers, TabLimits
 from gazerig.robot.dashboard.door.connection_limits import Connections
 from gazerig.robot.dashboard.door.page_files import PageFiles
@@ -43,7 +39,6 @@ from gazerig.robot.dashboard.requests.stop_sender import StopSender
 from gazerig.robot.dashboard.requests.token_bucket import TokenBucket
 from gazerig.robot.dashboard.widgets.widgets import RECEIVED_BYTES, Widgets
 
-LOOPBACK = ("127.0.0.1", "::1", "localhost")
 MOST_LINES = 32
 """Tabs whose stop button receives the state of the rig."""
 
@@ -61,6 +56,11 @@ _HEADERS = {
     "X-Content-Type-Options": "nosniff",
 }
 
+_WHERE = (
+    "open the address with the token that the rig's terminal shows; "
+    "there is a new one each time the rig is started"
+)
+
 Ask = Callable[[bytes], bool]
 """Hands a JSON object to the rig; False where the rig does not take it."""
 Point = Callable[[object, str], bool]
@@ -71,7 +71,6 @@ class AuthProxy:
     """Lets people in to the server behind it, from a thread of its own.
 
     webcam: takes pictures of browsers' own cameras; its ``take`` is set before ``open``
-    once: another token, which opens the page one time; "" for none
     point: takes where a browser's pointer is, which is not answered; set before ``open``
     """
 
@@ -94,13 +93,13 @@ class AuthProxy:
         self._ask = ask
         self._stop = stop
         self.token = token
-        self.once = ""
         self.point: Point = _nowhere
         self.browsers = Browsers(token)
         self.widgets = Widgets()
         self._panel_socket = WidgetSocket(self.widgets)
         self._panel_tabs = TabLimits(MOST_LINES)
         self._cookie = f"gazerig_{port}"  # cookies do not tell ports apart
+        self._admission = Admission(host, port, token, self._cookie, _WHERE)
         self._state: Mapping[str, object] = {}
         self._asked_rate = TokenBucket(_ASKED_PER_S, _ASKED_BURST)
         self._news: set[asyncio.Event] = set()
@@ -111,6 +110,15 @@ class AuthProxy:
         self._opened = threading.Event()
         self._failed: OSError | None = None
         self._thread = threading.Thread(target=self._run, name="page door", daemon=True)
+
+    @property
+    def once(self) -> str:
+        """Return another token, which opens the page one time; "" for none."""
+        return self._admission.once
+
+    @once.setter
+    def once(self, token: str) -> None:
+        self._admission.once = token
 
     def open(self) -> None:
         """Listen.
@@ -191,7 +199,7 @@ class AuthProxy:
         @web.middleware
         async def admit(request: web.Request, handler: Handler) -> web.StreamResponse:
             with self._connections.busy(request):
-                why_not = self._refusal(request)
+                why_not = self._admission.refusal(request)
                 if why_not is not None:
                     return web.Response(status=403, text=f"{why_not}\n", headers=_HEADERS)
                 if "token" in request.query:
@@ -200,34 +208,9 @@ class AuthProxy:
 
         return admit
 
-    def _refusal(self, request: web.Request) -> str | None:
-        """Return the reason why a request is refused, None if it is accepted."""
-        sends = request.method not in ("GET", "HEAD") or "upgrade" in request.headers
-        origin = request.headers.get("Origin")
-        if origin is None and sends:
-            return "refused: no Origin; only a browser with this page open may ask for anything"
-        if origin is not None and netloc(origin) != request.host:
-            return "refused: a page of another origin may not look or ask"
-        if self._host in LOOPBACK and hostname(request.host) not in LOOPBACK:
-            return f"refused: on this machine the page is at http://{self._host}:{self._port}"
-        given = request.query.get("token") or request.cookies.get(self._cookie) or ""
-        if hmac.compare_digest(given.encode(errors="replace"), self.token.encode()):
-            return None
-        if self.once and hmac.compare_digest(given.encode(errors="replace"), self.once.encode()):
-            self.once = ""
-            return None
-        return (
-            "refused: open the address with the token that the rig's terminal shows; "
-            "there is a new one each time the rig is started"
-        )
-
     def _with_cookie(self, request: web.Request) -> web.Response:
-        """Move the token from the address into a cookie, where it is not seen, kept or sent on."""
-        clean = request.rel_url.without_query_params("token").raw_path_qs
-        # "//elsewhere" is the address of another machine, and so is "/\elsewhere".
-        there = "/" + clean.lstrip("/\\")
-        answer = web.Response(status=302, headers={**_HEADERS, "Location": there})
-        answer.set_cookie(self._cookie, self.token, httponly=True, samesite="Strict", path="/")
+        """Move the token into a cookie, and give the browser another one, which names it."""
+        answer = self._admission.with_cookie(request, _HEADERS)
         if self._name_cookie not in request.cookies:
             answer.set_cookie(
                 self._name_cookie,

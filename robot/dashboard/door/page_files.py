@@ -5,13 +5,14 @@ from pathlib import Path
 
 from aiohttp import web
 
-_FOLDER = Path(__file__).parents[1] / "browser"
+FOLDER = Path(__file__).parents[1] / "browser"
 _DOCUMENT = "index.html"
 _TYPES = {
     ".html": "text/html",
     ".css": "text/css",
     ".js": "text/javascript",
     ".svg": "image/svg+xml",
+    ".json": "application/json",
 }
 # Scripts and connections of this address alone; panels come with styles of their own, and the
 # picture of the camera and the icon of the tab are made here.
@@ -33,7 +34,7 @@ class PageFiles:
 
     def __init__(self, headers: Mapping[str, str]) -> None:
         self._headers = {**headers, **_MAY}
-        self._files = {path.name: path for path in _FOLDER.iterdir() if path.suffix in _TYPES}
+        self._files = {path.name: path for path in FOLDER.iterdir() if path.suffix in _TYPES}
 
     def add_to(self, router: web.UrlDispatcher) -> None:
         """Add the addresses of all files."""
@@ -43,16 +44,17 @@ class PageFiles:
                 router.add_get(f"/rig/{name}", self._file)
 
     async def _document(self, request: web.Request) -> web.Response:
-        return self._answer(self._files[_DOCUMENT])
+        return file_answer(self._files[_DOCUMENT], self._headers)
 
     async def _file(self, request: web.Request) -> web.Response:
-        return self._answer(self._files[request.path.rpartition("/")[2]])
+        return file_answer(self._files[request.path.rpartition("/")[2]], self._headers)
 
-    def _answer(self, path: Path) -> web.Response:
-        """Return the file as it is now: they are small, and it may have been edited."""
-        return web.Response(
-            body=path.read_bytes(),
-            content_type=_TYPES[path.suffix],
-            charset="utf-8",
-            headers=self._headers,
-        )
+
+def file_answer(path: Path, headers: Mapping[str, str]) -> web.Response:
+    """Return a file of a page as it is now: they are small, and it may have been edited."""
+    return web.Response(
+        body=path.read_bytes(),
+        content_type=_TYPES[path.suffix],
+        charset="utf-8",
+        headers=headers,
+    )

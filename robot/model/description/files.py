@@ -19,6 +19,7 @@ _SCENE = """<mujoco model="{name} on a table">
   <visual>
     <headlight ambient="0.35 0.35 0.35" diffuse="0.35 0.35 0.35" specular="0.1 0.1 0.1"/>
     <global offwidth="1280" offheight="960" azimuth="165" elevation="-8"/>
+    <map shadowscale="0.4"/>
   </visual>
   <statistic center="0 0 0.1" extent="0.5"/>
   <asset>
@@ -27,7 +28,7 @@ _SCENE = """<mujoco model="{name} on a table">
     <material name="table" rgba="0.72 0.62 0.5 1"/>
   </asset>
   <worldbody>
-    <light pos="0.9 0.75 1.25" dir="-0.54 -0.45 -0.7" diffuse="0.6 0.57 0.53"/>
+    <light pos="1.0 0.6 0.75" dir="-0.8 -0.48 -0.5" diffuse="0.6 0.57 0.53"/>
     <geom name="table" type="plane" pos="0 0 {floor}" size="1 1 0.05" material="table"/>
   </worldbody>
 </mujoco>

@@ -7,9 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.gaze.types import Floats
+from gazerig.robot.model.cut import cut
 from gazerig.robot.model.face_features import brow as bow
 from gazerig.robot.model.face_features import lips
-from gazerig.robot.model.head_shape import HEAD, MOUTH, eye_rim, of_jaw, surface
+from gazerig.robot.model.head_shape import HEAD, JAW_BOUNDS, JAW_HALF, MOUTH, eye_rim, surface
 from gazerig.robot.model.mesh import Mesh, ellipsoid, grid, smooth_normals, turned
 from gazerig.robot.model.paint import (
     Colour,
@@ -47,12 +48,19 @@ _CORNEA = 0.05
 _CAP_NORMAL, _CAP_LINE, _CAP_OUT = (-1.0, 0.0, 0.55), 0.70, 0.035
 """The cap begins at this plane, and stands so far off the skin; in distances between the eyes."""
 
+_JAW_MIDDLE = (-0.42, -1.10)
+"""Ahead and height of a point within the jaw, from which its sides are fans."""
+
 
 class HeadSkin(NamedTuple):
-    """The surface of the head in two pieces, of which a jaw moves the second."""
+    """The surface of the head in two pieces, of which a jaw moves the second.
+
+    cheeks: walls that stay on both sides of the jaw, and face it
+    """
 
     head: Painted
     jaw: Painted
+    cheeks: Painted
 
 
 @lru_cache(maxsize=1)
@@ -61,15 +69,17 @@ def skin() -> HeadSkin:
     points, normals = surface()
     colours = _complexion(points, normals)
     whole = grid(points, closed=True)
-    flat_normals = normals.reshape(-1, 3)
-    jaw = of_jaw(points).reshape(-1)
-    moved = jaw[whole.faces].all(axis=1)
-    head, chin = (
-        Painted(*_used(whole.vertices, whole.faces[which], colours.reshape(-1, 3), flat_normals))
-        for which in (~moved, moved)
-    )
+    jaw = Painted(whole, colours.reshape(-1, 3), normals.reshape(-1, 3))
+    stays = []
+    for bound in JAW_BOUNDS:
+        jaw, beyond = cut(jaw, bound(jaw.mesh.vertices))
+        stays.append(beyond)
     upper, lower, line = lips(HEAD, MOUTH, _LIPS, _MOUTH_LINE)
-    return HeadSkin(merged([head, *_rims(), upper, line]), merged([chin, lower]))
+    sides = [_jaw_side(jaw, sign, 0.8, SKIN) for sign in (1.0, -1.0)]
+    cheeks = [_turned_over(_jaw_side(jaw, sign, 0.4, _MOUTH)) for sign in (1.0, -1.0)]
+    return HeadSkin(
+        merged([*stays, *_rims(), upper, line]), merged([jaw, *sides, lower]), merged(cheeks)
+    )
 
 
 def _rims() -> tuple[Painted, Painted]:
@@ -85,13 +95,28 @@ def _rims() -> tuple[Painted, Painted]:
     return left, mirrored(left)
 
 
-def _used(
-    vertices: Floats, faces: np.ndarray, colours: Floats, normals: Floats
-) -> tuple[Mesh, Floats, Floats]:
-    """Return faces with those vertices only that they use."""
-    kept, renumbered = np.unique(faces, return_inverse=True)
-    mesh = Mesh(vertices[kept], renumbered.reshape(-1, 3).astype(np.uint32))
-    return mesh, colours[kept], normals[kept]
+def _jaw_side(jaw: Painted, sign: float, deep: float, within: Colour) -> Painted:
+    """Return the wall on one side of a jaw, which can be seen once it hangs below the head.
+
+    Args:
+        jaw: its skin.
+        sign: 1: the left side.
+        deep: share of the way from its edge to the jaw's middle.
+        within: colour of its inner end.
+    """
+    rim = jaw.mesh.vertices[np.isclose(jaw.mesh.vertices[:, 1], sign * JAW_HALF)]
+    middle = np.array((_JAW_MIDDLE[0], sign * JAW_HALF, _JAW_MIDDLE[1]))
+    rim = rim[np.argsort(-sign * np.arctan2(*(rim - middle)[:, (2, 0)].T))]
+    points = np.stack((rim, rim + deep * (middle - rim)))
+    colours = np.broadcast_to(np.array((SKIN, within), float)[:, None], points.shape)
+    mesh = grid(points, closed=False)
+    return Painted(mesh, colours.reshape(-1, 3), smooth_normals(mesh))
+
+
+def _turned_over(one: Painted) -> Painted:
+    """Return a surface that faces the other way."""
+    mesh = Mesh(one.mesh.vertices, one.mesh.faces[:, ::-1])
+    return Painted(mesh, one.colours, smooth_normals(mesh))
 
 
 @lru_cache(maxsize=1)
@@ -127,13 +152,13 @@ def _complexion(points: Floats, normals: Floats) -> Floats:
 def mouth() -> Painted:
     """Return the dark within an open mouth, in distances between the eyes.
 
-    A body that hides the neck, and the inside of the skin.
+    A body that hides the neck, the inside of the skin, and the cheeks beside the jaw.
     """
     ball = ellipsoid((0.52, 0.55, 0.62), 0.7)
     body = Mesh(ball.vertices + (-0.62, 0.0, -0.92), ball.faces)
     mesh, _, normals = skin().head
     inside = Mesh(mesh.vertices - 0.03 * np.asarray(normals), mesh.faces[:, ::-1])
-    return merged([painted(body, _MOUTH), painted(inside, _MOUTH)])
+    return merged([painted(body, _MOUTH), painted(inside, _MOUTH), skin().cheeks])
 
 
 @lru_cache(maxsize=1)
@@ -208,7 +233,12 @@ def eyelid(upper: bool) -> Painted:
     fold = np.exp(-(((sweep - 0.62) / 0.10) ** 2)) * 0.30 + np.clip(sweep - 0.9, 0.0, 0.2)
     colours = mix(colours, _SHADE, np.broadcast_to(fold[:, None], points.shape[:2]))
     colours = mix(colours, _LASH, np.broadcast_to(lash[:, None], points.shape[:2]))
-    return Painted(mesh, colours.reshape(-1, 3), smooth_normals(mesh))
+    normals = smooth_normals(mesh)
+    if not upper:
+        # Lit as if it faced up more, as the skin below it is.
+        normals = normals + (0.3, 0.0, 0.5)
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return Painted(mesh, colours.reshape(-1, 3), normals)
 
 
 @lru_cache(maxsize=1)

@@ -48,24 +48,30 @@ def chi_square(
     if dropped := table.shape[1] - kept.shape[1]:
         which = ", ".join(str(k + 1) for k in np.flatnonzero(table.sum(axis=0) == 0))
         notes.append(f"{dropped} of {table.shape[1]} columns are empty and dropped ({which})")
-    n = int(kept.sum())
+    n, least = int(kept.sum()), _least(table.sum(axis=1))
     if kept.shape[1] < 2:
         nothing, same = no_effect("Cramér's V", "V"), (*notes, "all answers are the same")
-        return StatisticalTest("chi_square", "χ²", 0.0, nan, 1.0, 1.0, 1.0, n, nothing, same)
+        return StatisticalTest("chi_square", "χ²", 0.0, nan, 1.0, 1.0, least, n, nothing, same)
     found = stats.chi2_contingency(kept, correction=False)
     if small := int((found.expected_freq < _LEAST_EXPECTED).sum()):
         notes.append(
             f"{small} of {kept.size} expected counts are below 5: believe the exact chance"
         )
-    exact, least = exact_chances(kept)
     return StatisticalTest(
-        "chi_square", "χ²", float(found.statistic), float(found.dof), float(found.pvalue), exact,
-        least, n, cramers_v(float(found.statistic), n, kept.shape), tuple(notes),
+        "chi_square", "χ²", float(found.statistic), float(found.dof), float(found.pvalue),
+        exact_chance(kept), least, n, cramers_v(float(found.statistic), n, kept.shape), tuple(notes),
     )  # fmt: skip
 
 
-def exact_chances(table: Counts) -> tuple[float, float]:
-    """Return the chance of tables at least as extreme with these margins, and the least there is.
+def _least(rows: Counts) -> float:
+    """Return the exact chance of rows that share no column, two columns in all."""
+    n, first = int(rows.sum()), int(rows[0])
+    # Of rows of one length the table turned round is as extreme.
+    return min(1.0, (2.0 if 2 * first == n else 1.0) / float(special.binom(n, first)))
+
+
+def exact_chance(table: Counts) -> float:
+    """Return the chance of tables at least as extreme with these margins.
 
     Extreme is what has a large chi-square. Tables of two rows are all enumerated while they are
     at most 200,000; of others 9999 are drawn.
@@ -78,15 +84,14 @@ def exact_chances(table: Counts) -> tuple[float, float]:
         distances = _distance(first, columns, int(table[0].sum()))
         seen = float(_distance(table[:1], columns, int(table[0].sum()))[0])
         extreme = distances >= seen * (1.0 - 1e-12) - 1e-12
-        furthest = distances >= distances.max() * (1.0 - 1e-12)
-        return min(1.0, float(chances[extreme].sum())), float(chances[furthest].sum())
+        return min(1.0, float(chances[extreme].sum()))
     drawn = stats.random_table(table.sum(axis=1), columns, seed=np.random.default_rng(_SEED))
     tables = drawn.rvs(size=_DRAWS)
     expected = np.outer(table.sum(axis=1), columns) / table.sum()
     seen = float((((table - expected) ** 2) / expected).sum())
     distances = (((tables - expected) ** 2) / expected).sum(axis=(1, 2))
     as_far = int(np.count_nonzero(distances >= seen * (1.0 - 1e-12)))
-    return (as_far + 1.0) / (_DRAWS + 1.0), 1.0 / (_DRAWS + 1.0)
+    return (as_far + 1.0) / (_DRAWS + 1.0)
 
 
 def _tables(columns: Counts, row: int) -> tuple[Counts, Floats]:

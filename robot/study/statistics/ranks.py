@@ -4,12 +4,12 @@ The chances of large samples are SciPy's, corrected for ties and for continuity;
 the permutations of the ranks that were seen, midranks and all (Streitberg & Roehmel 1986).
 """
 
-from math import comb, factorial, nan
+from math import factorial, nan
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special, stats
 
 from gazerig.gaze.types import Floats
 from gazerig.robot.study.statistics import effects
@@ -42,7 +42,7 @@ def rank_sum(a: Floats, b: Floats, two_sided: bool = True, paired: bool = False)
         raise ValueError("a rank-sum test needs answers on both sides")
     effect = effects.cliffs_delta(a, b, paired)
     sides = 2 if two_sided else 1
-    least = min(1.0, sides / comb(len(a) + len(b), len(a)))
+    least = min(1.0, sides / float(special.binom(len(a) + len(b), len(a))))
     notes = ("the same participants saw both: the test treats them as others",) if paired else ()
     if np.ptp(np.concatenate([a, b])) == 0.0:
         same = (*notes, "all answers are the same")
@@ -91,11 +91,11 @@ def signed_rank(
     d = np.asarray(differences, float)
     kept = int(np.count_nonzero(d))
     notes = _zero_notes(len(d) - kept, len(d), zeros)
-    least = min(1.0, (2.0 if two_sided else 1.0) * 0.5**kept)
+    least = min(1.0, (2.0 if two_sided else 1.0) * 0.5 ** len(d))
     if not kept:
         nothing = no_effect("matched rank-biserial correlation", "r")
         same = (*notes, "no participant answered differently")
-        return StatisticalTest("signed_rank", "T", 0.0, nan, 1.0, 1.0, 1.0, len(d), nothing, same)
+        return StatisticalTest("signed_rank", "T", 0.0, nan, 1.0, 1.0, least, len(d), nothing, same)
     found = stats.wilcoxon(
         d, zero_method=zeros, correction=True, alternative=_side(two_sided), method="asymptotic"
     )
@@ -154,7 +154,7 @@ def friedman(rows: Floats) -> StatisticalTest:
     if k < 3:
         raise ValueError(f"Friedman's test compares three conditions or more, not {k}")
     effect = effects.kendalls_w(rows)
-    least = max(1.0 / (_PERMUTATIONS + 1), float(factorial(k)) ** -max(0, n - 1))
+    least = max(1.0 / (_PERMUTATIONS + 1), float(factorial(k)) ** -(n - 1))
     if not np.ptp(rows, axis=1).any():
         same = ("every participant answered alike everywhere",)
         return StatisticalTest("friedman", "χ²", 0.0, k - 1, 1.0, 1.0, least, n, effect, same)

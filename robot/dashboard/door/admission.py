@@ -1,0 +1,65 @@
+"""Who may come in to a page, and ask something of it.
+
+A client shows a token, once, in the query of the first address; a cookie takes its place. That
+holds on this machine as well, which may have other users. The Origin of every websocket and of
+everything that is sent must be the address of the page, and on the loopback that address must be a
+name of the loopback, or a foreign name made to point here would do (DNS rebinding).
+"""
+
+import hmac
+from collections.abc import Mapping
+
+from aiohttp import web
+
+from gazerig.robot.dashboard.door.addresses import hostname, netloc
+
+LOOPBACK = ("127.0.0.1", "::1", "localhost")
+
+
+class Admission:
+    """Accepts or refuses requests by one token.
+
+    once: another token, which opens the page one time; "" for none
+    """
+
+    def __init__(self, host: str, port: int, token: str, cookie: str, otherwise: str) -> None:
+        """Know what a client must show.
+
+        Args:
+            host: the address that is listened on
+            port: its port
+            token: what a client must show
+            cookie: name of the cookie that takes its place
+            otherwise: what who is refused should do instead
+        """
+        self._host, self._port = host, port
+        self._token, self._cookie = token, cookie
+        self._otherwise = otherwise
+        self.once = ""
+
+    def refusal(self, request: web.Request) -> str | None:
+        """Return the reason why a request is refused, None if it is accepted."""
+        sends = request.method not in ("GET", "HEAD") or "upgrade" in request.headers
+        origin = request.headers.get("Origin")
+        if origin is None and sends:
+            return "refused: no Origin; only a browser with this page open may ask for anything"
+        if origin is not None and netloc(origin) != request.host:
+            return "refused: a page of another origin may not look or ask"
+        if self._host in LOOPBACK and hostname(request.host) not in LOOPBACK:
+            return f"refused: on this machine the page is at http://{self._host}:{self._port}"
+        given = request.query.get("token") or request.cookies.get(self._cookie) or ""
+        if hmac.compare_digest(given.encode(errors="replace"), self._token.encode()):
+            return None
+        if self.once and hmac.compare_digest(given.encode(errors="replace"), self.once.encode()):
+            self.once = ""
+            return None
+        return f"refused: {self._otherwise}"
+
+    def with_cookie(self, request: web.Request, headers: Mapping[str, str]) -> web.Response:
+        """Move the token from the address into a cookie, where it is not seen, kept or sent on."""
+        clean = request.rel_url.without_query_params("token").raw_path_qs
+        # "//elsewhere" is the address of another machine, and so is "/\elsewhere".
+        there = "/" + clean.lstrip("/\\")
+        answer = web.Response(status=302, headers={**headers, "Location": there})
+        answer.set_cookie(self._cookie, self._token, httponly=True, samesite="Strict", path="/")
+        return answer

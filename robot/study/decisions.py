@@ -1,0 +1,196 @@
+"""The hypotheses of a study, decided by the tests that were planned for them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import isfinite, nan
+from typing import Literal
+
+import numpy as np
+
+from gazerig.gaze.types import Floats
+from gazerig.robot.study.design import Hypothesis, StudyDesign, Test
+from gazerig.robot.study.measures import Measure, measures
+from gazerig.robot.study.participation import Participation
+from gazerig.robot.study.questionnaire import Questionnaire
+from gazerig.robot.study.scores import Scores, scores, wins
+from gazerig.robot.study.statistics.assumptions import (
+    AssumptionCheck,
+    difference_checks,
+    proportional_odds,
+    range_check,
+)
+from gazerig.robot.study.statistics.bradley_terry import preferred
+from gazerig.robot.study.statistics.contingency import chi_square, counts_of
+from gazerig.robot.study.statistics.effects import cohens_dz
+from gazerig.robot.study.statistics.mixed_ordinal import ordinal_mixed
+from gazerig.robot.study.statistics.multiplicity import corrected
+from gazerig.robot.study.statistics.ranks import friedman, rank_sum, signed_rank
+from gazerig.robot.study.statistics.results import EffectSize, StatisticalTest
+
+Verdict = Literal["supported", "not supported", "against", "too few"]
+"""against: a difference beyond chance, but of the other sign."""
+
+_LEAST_PEOPLE = 2
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What became of one hypothesis.
+
+    test: the one that was planned, None where nothing could be tested; also: further ones
+    corrected_p: of the planned test, over all hypotheses
+    n: participants with both conditions; standardised: d_z of their differences
+    medians, means: of the better and of the other condition, nan for choices
+    too_few: why no result could have been significant, "" where one could
+    """
+
+    hypothesis: Hypothesis
+    measure: Measure
+    test: StatisticalTest | None
+    also: tuple[StatisticalTest, ...]
+    corrected_p: float
+    verdict: Verdict
+    n: int
+    medians: tuple[float, float]
+    means: tuple[float, float]
+    standardised: EffectSize | None
+    checks: tuple[AssumptionCheck, ...]
+    too_few: str = ""
+
+
+def decisions(
+    design: StudyDesign,
+    questionnaires: Mapping[str, Questionnaire],
+    people: Sequence[Participation],
+) -> tuple[Decision, ...]:
+    """Decide on every hypothesis of a design, with the correction that it planned.
+
+    Args:
+        design: with its hypotheses.
+        questionnaires: by the keys in the design.
+        people: with what is left out marked.
+    """
+    known = measures(design, questionnaires)
+    found = [
+        _tested(design, one, known[one.measure], questionnaires, people)
+        for one in design.hypotheses
+    ]
+    chances = {
+        str(k): one.test.deciding_p
+        for k, one in enumerate(found)
+        if one.test is not None and isfinite(one.test.deciding_p)
+    }
+    many = corrected(chances, design.plan.correction)
+    out = [replace(one, corrected_p=many.get(str(k), nan)) for k, one in enumerate(found)]
+    return tuple(replace(one, verdict=_verdict(one, design.plan.alpha)) for one in out)
+
+
+def _verdict(one: Decision, alpha: float) -> Verdict:
+    if one.too_few or not isfinite(one.corrected_p):
+        return "too few"
+    if one.corrected_p > alpha:
+        return "not supported"
+    return "supported" if _above(one) else "against"
+
+
+def _above(one: Decision) -> bool:
+    """Whether the condition that was expected above lies there."""
+    if one.measure.kind == "choice":
+        effect = one.test.effect.value if one.test else nan
+        # Without finite scores one side was chosen always: by the direct choices.
+        return effect > 0.0 if isfinite(effect) else one.means[0] > one.means[1]
+    better, than = one.means
+    return better > than
+
+
+def _tested(
+    design: StudyDesign,
+    one: Hypothesis,
+    measure: Measure,
+    questionnaires: Mapping[str, Questionnaire],
+    people: Sequence[Participation],
+) -> Decision:
+    conditions = tuple(design.conditions)
+    if measure.kind == "choice":
+        return _chosen(design, one, measure, people)
+    found = scores(measure, people, conditions, questionnaires)
+    both = found.both(one.better, one.than)
+    better, than = found.column(one.better)[both], found.column(one.than)[both]
+    n = int(both.sum())
+    if n < _LEAST_PEOPLE:
+        why = f"{n} of {design.plan.participants} participants have both conditions"
+        nothing = (nan, nan)
+        return Decision(one, measure, None, (), nan, "too few", n, nothing, nothing, None, (), why)
+    tests = [_run(key, one, found, measure) for key in (one.test, *one.also)]
+    return Decision(
+        one, measure, tests[0], tuple(tests[1:]), nan, "not supported", n,
+        (float(np.median(better)), float(np.median(than))), (float(better.mean()),
+        float(than.mean())), cohens_dz(better - than), _checks(one, measure, found),
+        _too_few(tests[0], design.plan.alpha),
+    )  # fmt: skip
+
+
+def _run(key: Test, one: Hypothesis, found: Scores, measure: Measure) -> StatisticalTest:
+    both = found.both(one.better, one.than)
+    better, than = found.column(one.better)[both], found.column(one.than)[both]
+    if key == "signed_rank":
+        return signed_rank(better - than, one.two_sided)
+    if key == "rank_sum":
+        return rank_sum(than, better, one.two_sided, paired=True)
+    if key == "friedman":
+        return friedman(found.means[np.isfinite(found.means).all(axis=1)])
+    if key == "chi_square":
+        rows = [counts_of(found.answers(c), measure.points) for c in (one.better, one.than)]
+        return chi_square(rows, paired=True)
+    if key == "ordinal_mixed":
+        columns = [found.conditions.index(c) for c in (one.better, one.than)]
+        single = found.single[np.isin(found.single[:, 1], columns)]
+        return ordinal_mixed(
+            single[:, 2].astype(np.int64), single[:, 1] == columns[0],
+            single[:, 0].astype(np.int64), one.two_sided,
+        )  # fmt: skip
+    raise ValueError(f"{key} cannot decide on a rating")
+
+
+def _checks(one: Hypothesis, measure: Measure, found: Scores) -> tuple[AssumptionCheck, ...]:
+    both = found.both(one.better, one.than)
+    places = [found.places[both, found.conditions.index(c)] for c in (one.better, one.than)]
+    differences = (found.column(one.better) - found.column(one.than))[both]
+    checks = difference_checks(differences, places[0] < places[1])
+    answers: list[Floats] = [found.answers(c) for c in (one.than, one.better)]
+    if measure.kind in ("item", "scale"):
+        checks.append(range_check(np.concatenate(answers), measure.points))
+    if "ordinal_mixed" in (one.test, *one.also):
+        checks.append(proportional_odds(answers[0], answers[1], measure.points))
+    return tuple(checks)
+
+
+def _chosen(
+    design: StudyDesign, one: Hypothesis, measure: Measure, people: Sequence[Participation]
+) -> Decision:
+    """Decide on a choice between two."""
+    conditions = tuple(design.conditions)
+    table = wins(measure, people, conditions)
+    better, than = conditions.index(one.better), conditions.index(one.than)
+    direct = int(table[better, than] + table[than, better])
+    n = sum(any(r.item in measure.items for r in p.counted) for p in people)
+    if not table.any():
+        why = "nobody has chosen"
+        nothing = (nan, nan)
+        return Decision(one, measure, None, (), nan, "too few", 0, nothing, nothing, None, (), why)
+    test = preferred(table, better, than, one.two_sided)
+    shares = (table[better, than] / direct, table[than, better] / direct) if direct else (nan, nan)
+    return Decision(
+        one, measure, test, (), nan, "not supported", n, (nan, nan),
+        (float(shares[0]), float(shares[1])), None, (), _too_few(test, design.plan.alpha),
+    )  # fmt: skip
+
+
+def _too_few(test: StatisticalTest, alpha: float) -> str:
+    """Return why no result could have reached alpha, "" where one could."""
+    if test.least_p <= alpha:
+        return ""
+    return (
+        f"the most extreme answers that so few could give have p = {test.least_p:.3f}, "
+        f"which is above {alpha:g}"
+    )
