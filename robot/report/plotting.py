@@ -20,6 +20,7 @@ try:
     from matplotlib.figure import Figure as Figure
     from matplotlib.patches import Circle as Circle
     from matplotlib.patches import Ellipse as Ellipse
+    from matplotlib.patches import Patch as Patch
 except ImportError as error:
     raise SetupError(extra_hint("matplotlib", "report", error)) from error
 

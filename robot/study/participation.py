@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import inf, isnan, nan
 
 from gazerig.robot.study.design import Exclusion, StudyDesign
 from gazerig.robot.study.questionnaire import Questionnaire
@@ -56,7 +57,6 @@ class TrialRow:
     utc: str
     recording: str
     reason: str
-    largest_step_deg: float
     measured: Mapping[str, float]
 
 
@@ -138,13 +138,13 @@ def _trials(records: Iterable[Record]) -> tuple[TrialRow, ...]:
         if isinstance(one, TrialBegan):
             attempts = found[one.trial, one.side].attempts if (one.trial, one.side) in found else 0
             found[one.trial, one.side] = TrialRow(
-                one.trial, one.side, one.condition, attempts + 1, "interrupted", float("nan"),
-                one.utc, "", "did not end", float("nan"), {},
+                one.trial, one.side, one.condition, attempts + 1, "interrupted", nan,
+                one.utc, "", "did not end", {},
             )  # fmt: skip
         elif isinstance(one, TrialEnded) and (one.trial, one.side) in found:
             found[one.trial, one.side] = replace(
                 found[one.trial, one.side], outcome=one.outcome, seconds=one.seconds,
-                recording=one.recording, reason=one.reason, largest_step_deg=one.largest_step_deg,
+                recording=one.recording, reason=one.reason,
             )  # fmt: skip
         elif isinstance(one, Measured) and (one.trial, one.side) in found:
             before = found[one.trial, one.side]
@@ -170,7 +170,8 @@ def _without_hasty(rows: Iterable[AnswerRow], rules: Exclusion) -> list[AnswerRo
     slowest: dict[tuple[int | None, str], float] = {}
     for row in rows:
         page = row.trial, row.questionnaire
-        slowest[page] = max(slowest.get(page, 0.0), row.ms)
+        # A browser that measured nothing was not too fast.
+        slowest[page] = max(slowest.get(page, 0.0), inf if isnan(row.ms) else row.ms)
     return [
         replace(row, left_out=row.left_out or "answered too fast")
         if slowest[row.trial, row.questionnaire] < rules.fastest_answer_ms

@@ -1,0 +1,1 @@
+"""The report of a study: page, figures, sentences, tidy table and BIDS layout."""
