@@ -1,7 +1,7 @@
 """A study as a whole: who took part, what was measured in each condition, and what was decided."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import nan, sqrt
 
 import numpy as np
@@ -123,6 +123,7 @@ def analysed(
         design_sha256: hash of the design that all data carry.
         people: with what is left out marked.
     """
+    people = without_simulated(people)
     known = [one for one in measures(design, questionnaires).values() if not one.once]
     keys = tuple(design.conditions)
     summaries = [
@@ -135,6 +136,16 @@ def analysed(
         name, design, questionnaires, design_sha256, tuple(people),
         decisions(design, questionnaires, people), tuple(summaries), tuple(choices),
     )  # fmt: skip
+
+
+def without_simulated(people: Sequence[Participation]) -> tuple[Participation, ...]:
+    """Leave simulated participants out where anybody else took part."""
+    if all(one.simulated for one in people):
+        return tuple(people)
+    return tuple(
+        replace(one, left_out=one.left_out or "simulated") if one.simulated else one
+        for one in people
+    )
 
 
 def _summary(

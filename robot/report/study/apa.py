@@ -5,7 +5,7 @@ Symbols in italics, exact chances, no zero before the point of what cannot excee
 
 from math import isfinite
 
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from gazerig.robot.study.analysis import StudyAnalysis
 from gazerig.robot.study.decisions import Decision
@@ -78,7 +78,7 @@ def statistic(test: StatisticalTest) -> Markup:
 
 def sentence(one: Decision, study: StudyAnalysis) -> Markup:
     """Return what was found for one hypothesis as a paper would say it."""
-    better, than = (study.label(c) for c in (one.hypothesis.better, one.hypothesis.than))
+    better, than = study.label(one.hypothesis.better), study.label(one.hypothesis.than)
     what = measure_words(one.measure)
     if one.verdict == "too few" or one.test is None:
         return Markup(
@@ -91,9 +91,8 @@ def sentence(one: Decision, study: StudyAnalysis) -> Markup:
     if one.test.key != "chi_square":
         figures.append(Markup("<i>n</i> = {}").format(one.n))
     listed = Markup(", ").join(part for part in figures if part)
-    return Markup("{} ({}), {}.").format(
-        _finding(one, better, than, what), TEST_NAMES[one.test.key], listed
-    )
+    found = _finding(one, better, than, what)
+    return Markup("{} ({}), {}.").format(found, TEST_NAMES[one.test.key], listed)
 
 
 def _chances(one: Decision, correction: str) -> Markup:
@@ -108,6 +107,7 @@ def _chances(one: Decision, correction: str) -> Markup:
 
 def _finding(one: Decision, better: str, than: str, what: str) -> Markup:
     """Return the first half of the sentence: which lies above, and where both lie."""
+    better = better[:1].upper() + better[1:]
     if one.measure.kind == "choice":
         share = Markup("{:.0f}% of direct choices").format(100.0 * one.means[0])
         verb = {
@@ -133,8 +133,3 @@ def plain(value: float) -> str:
 def measure_words(measure: Measure) -> str:
     """Return a measure's name as a reader says it."""
     return measure.name.partition(".")[2].replace("_", " ") or measure.name.replace("_", " ")
-
-
-def cell(text: str) -> Markup:
-    """Return a text for a table, nothing where it is empty."""
-    return escape(text) if text else Markup("")

@@ -85,11 +85,6 @@ def study_page(study: StudyAnalysis, made_by: str, progress: Progress) -> str:
         made_by: program and version.
         progress: told how far drawing is.
     """
-    forest = StudyFigure(
-        "Effects", figures.forest_png(study, [_short(one, study) for one in study.decisions]),
-        "Squares: the effect of each hypothesis; lines: its 95 % interval. Right of zero lies what "
-        "was expected.",
-    )  # fmt: skip
     sections = []
     for k, one in enumerate(study.measures):
         progress("drawing", k / max(1, len(study.measures)))
@@ -99,12 +94,21 @@ def study_page(study: StudyAnalysis, made_by: str, progress: Progress) -> str:
     return rendered(
         "study/study.html", study=study, made_by=made_by, banners=banners(study),
         facts=_facts(study), hypotheses=[_line(one, study) for one in study.decisions],
-        tests=list(_tests(study)), forest=forest if study.decisions else None, sections=sections,
+        tests=list(_tests(study)), forest=_forest(study) if study.decisions else None, sections=sections,
         choices=[_choice_section(one, study) for one in study.choices],
         checks=[(_short(one, study), one.checks) for one in study.decisions if one.checks],
         left_out=[one for one in study.people if one.left_out], rows=_rows_left_out(study),
         remarks=study.remarks, plan=study.design.plan, rules=_rules(study),
         css=lambda fine: "pass" if fine else "uncertain", p=apa.chance, isfinite=isfinite,
+    )  # fmt: skip
+
+
+def _forest(study: StudyAnalysis) -> StudyFigure:
+    names = [_short(one, study) for one in study.decisions]
+    return StudyFigure(
+        "Effects", figures.forest_png(study, names),
+        "Squares: the effect of each hypothesis; lines: its 95 % interval. Right of zero lies what "
+        "was expected.",
     )  # fmt: skip
 
 
