@@ -56,6 +56,19 @@ class ShownTrial:
     condition: str
 
 
+@dataclass(frozen=True)
+class AskedItems:
+    """A page of questions by its keys; see records.ItemAnswered.
+
+    items: in the order in which they are shown
+    """
+
+    trial: int | None
+    condition: str
+    questionnaire: str
+    items: tuple[str, ...]
+
+
 class StudySession:
     """A participant's session.
 
@@ -93,7 +106,7 @@ class StudySession:
     def screen(self) -> Screen:
         """Return what the participant sees now."""
         place, design = self._progress.place, self.design
-        if self.paused and place.step in ("ready", "presentation"):
+        if self.paused and place.step == "ready":
             return PausedScreen()
         match place.step:
             case "consent":
@@ -129,6 +142,16 @@ class StudySession:
             return None
         condition = self._progress.trials[place.trial].split(PAIR)[place.side]
         return ShownTrial(place.trial, place.attempt, place.side, condition)
+
+    @property
+    def asked(self) -> "AskedItems | None":
+        """Return what is asked now, None where nothing is; for the program alone."""
+        place = self._progress.place
+        if place.step != "questions":
+            return None
+        keys = tuple(key for key, _ in self._items(place))
+        condition = "" if place.trial is None else self._progress.trials[place.trial]
+        return AskedItems(place.trial, condition, place.questionnaire, keys)
 
     @property
     def trial(self) -> int | None:
@@ -239,18 +262,17 @@ class StudySession:
             WrongAnswer: no questions are shown, one is not answered, or not as it can be.
         """
         self._require("questions")
-        place = self._progress.place
-        items = self._items(place)
+        asked, items = self.asked, self._items(self._progress.place)
+        assert asked is not None  # on a page of questions
         if unknown := set(values) - set(range(len(items))):
             raise WrongAnswer(f"there is no question {min(unknown)}")
-        condition = "" if place.trial is None else self._progress.trials[place.trial]
+        at = (asked.trial, asked.condition, asked.questionnaire)
         records = []
         for number, (key, item) in enumerate(items):
             value = checked(number, item, values.get(number))
             late = ms.get(number, nan)
             late = late if isfinite(late) and late >= 0.0 else nan
-            asked = (place.trial, condition, place.questionnaire, key)
-            records.append(ItemAnswered(*asked, value, late, utc))
+            records.append(ItemAnswered(*at, key, value, late, utc))
         return tuple(records)
 
     def finish(self, utc: str) -> tuple[Record, ...]:

@@ -1,0 +1,319 @@
+"""A participant's session: its screens, and that it goes on where it was cut off."""
+
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from study_runs import UTC, run_of, screens, step
+
+from gazerig.config.shipped import shipped_names
+from gazerig.config.study_file import LoadedStudy, load_questionnaire, load_study
+from gazerig.robot.study.answers import LONGEST_TEXT, WrongAnswer
+from gazerig.robot.study.journal import read
+from gazerig.robot.study.order import PAIR
+from gazerig.robot.study.presenter import HeadLost, Presented
+from gazerig.robot.study.records import Closed, ItemAnswered, TrialBegan, TrialEnded
+from gazerig.robot.study.screens import (
+    ConsentScreen,
+    EndScreen,
+    InstructionsScreen,
+    PausedScreen,
+    PresentationScreen,
+    QuestionsScreen,
+    ReadyScreen,
+    RestScreen,
+)
+from gazerig.robot.study.session import INTERRUPTED, ShownTrial
+
+
+def rating(**trials: float) -> LoadedStudy:
+    return _with(load_study("default_against_papers"), **trials)
+
+
+def pairs(**trials: float) -> LoadedStudy:
+    study = _with(load_study("default_against_papers"), **trials)
+    design = replace(study.design, task="pairwise", questionnaires=("choice",))
+    asked = {**study.questionnaires, "choice": load_questionnaire("choice")}
+    return replace(study, design=replace(design, hypotheses=()), questionnaires=asked)
+
+
+def _with(study: LoadedStudy, **trials: float) -> LoadedStudy:
+    design = replace(study.design, trials=replace(study.design.trials, **trials))  # type: ignore[arg-type]
+    return replace(study, design=design)
+
+
+@pytest.mark.parametrize("name", shipped_names("studies"))
+def test_all_of_a_study_is_shown_and_asked_in_its_order(name: str, tmp_path: Path) -> None:
+    study = load_study(name)
+    study = replace(
+        study,
+        design=replace(study.design, presentation=replace(study.design.presentation, on="film")),
+    )
+    run, journal = run_of(study, tmp_path, 3)
+    seen = screens(run)
+    assert isinstance(seen[0], ConsentScreen) and seen[-1] == EndScreen("finished")
+    shown = [one for one in journal.records if isinstance(one, TrialBegan) and one.trial >= 0]
+    expected = [key for trial in run._session.order for key in trial.split(PAIR)]
+    assert [one.condition for one in shown] == expected
+    answers = [one for one in journal.records if isinstance(one, ItemAnswered)]
+    per_trial = sum(len(study.questionnaires[q].items) for q in study.design.questionnaires)
+    at_end = sum(len(study.questionnaires[q].items) for q in study.design.after)
+    trials = len(run._session.order) + study.design.trials.practice
+    assert len(answers) == trials * per_trial + at_end
+    assert [type(one) for one in journal.records].count(Closed) == 1
+    journal.close()
+
+
+def test_rests_come_after_every_so_many_trials_and_never_before_the_first(tmp_path: Path) -> None:
+    run, journal = run_of(rating(rest_every=2, repetitions=2, practice=1), tmp_path)
+    seen = [one for one in screens(run) if isinstance(one, RestScreen | ReadyScreen)]
+    rests = [after.number for one, after in pairwise(seen) if isinstance(one, RestScreen)]  # type: ignore[union-attr]
+    assert rests == [3, 5]
+    journal.close()
+
+
+def test_a_session_that_is_cut_off_anywhere_goes_on_at_that_screen(tmp_path: Path) -> None:
+    """Each step is done by another program; only a presentation under way begins again."""
+    study = pairs(rest_every=2, practice=1)
+    whole, journal = run_of(study, tmp_path / "whole")
+    expected = [(type(one), one) for one in screens(whole)]
+    journal.close()
+    seen = []
+    for _ in range(200):
+        run, journal = run_of(study, tmp_path / "cut")
+        page, screen = run.now()
+        journal.close()
+        run, journal = run_of(study, tmp_path / "cut")
+        if not isinstance(screen, RestScreen):
+            assert run.now() == (page, screen), "the same page after one more crash"
+        seen.append(step(run))
+        while isinstance(seen[-1], InstructionsScreen | RestScreen | ReadyScreen):
+            seen.append(step(run))  # what leaves nothing on disk, and a presentation
+        journal.close()
+        if isinstance(seen[-1], EndScreen):
+            break
+    kinds = [type(one) for one in seen]
+    assert [kind for kind in kinds if kind is not PresentationScreen] == [
+        kind for kind, _ in expected if kind is not PresentationScreen
+    ]
+    answers = [one for one in read(tmp_path / "cut") if isinstance(one, ItemAnswered)]
+    keys = [(one.trial, one.questionnaire, one.item) for one in answers]
+    assert len(keys) == len(set(keys)), "nothing is asked twice"
+
+
+def test_a_presentation_under_way_at_a_crash_is_marked_and_begins_again(tmp_path: Path) -> None:
+    study = rating(practice=0)
+    run, journal = run_of(study, tmp_path)
+    while not isinstance(run.now()[1], PresentationScreen):
+        step(run)
+    token = run.now()[1].film  # type: ignore[union-attr]
+    condition = run.film_of(token)
+    assert condition in study.design.conditions and run.film_of("guessed") is None
+    journal.close()
+    run, journal = run_of(study, tmp_path)
+    ended = [one for one in journal.records if isinstance(one, TrialEnded)]
+    assert [(one.outcome, one.reason) for one in ended] == [("interrupted", INTERRUPTED)]
+    screen = run.now()[1]
+    assert isinstance(screen, ReadyScreen) and screen.again and screen.number == 1
+    assert run.film_of(token) is None, "the name of a film is good for one attempt"
+    step(run)
+    assert run.film_of(run.now()[1].film) == condition  # type: ignore[union-attr]
+    journal.close()
+
+
+def test_what_comes_twice_or_late_changes_nothing(tmp_path: Path) -> None:
+    run, journal = run_of(rating(), tmp_path)
+    first = run.now()[0]
+    run.consent(first, True, False, True)
+    run.consent(first, False, False, False)
+    assert not run.state().closed
+    while not isinstance(run.now()[1], QuestionsScreen):
+        step(run)
+    page, screen = run.now()
+    values = {one.number: 1 for one in screen.questions}  # type: ignore[union-attr]
+    for _ in range(3):
+        run.answer(page, values, {})
+    assert run.state().answers == len(values)
+    journal.close()
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ({}, "question 0 is not answered"),
+        ({0: 0, 1: 1}, "question 0: a whole number from 1 to 5"),
+        ({0: 6, 1: 1}, "question 0: a whole number from 1 to 5"),
+        ({0: True, 1: 1}, "question 0: a whole number from 1 to 5"),
+        ({0: "3", 1: 1}, "question 0: a whole number from 1 to 5"),
+        ({0: 1, 1: 1, 9: 1}, "there is no question 9"),
+    ],
+)
+def test_answers_that_cannot_be_are_refused_and_the_page_stays(
+    values: dict[int, int | str], said: str, tmp_path: Path
+) -> None:
+    run, journal = run_of(rating(practice=0), tmp_path)
+    while not isinstance(run.now()[1], QuestionsScreen):
+        step(run)
+    page = run.now()[0]
+    with pytest.raises(WrongAnswer, match=said):
+        run.answer(page, values, {})
+    assert run.now()[0] == page and run.state().answers == 0
+    journal.close()
+
+
+def test_a_text_has_a_longest_length(tmp_path: Path) -> None:
+    run, journal = run_of(rating(practice=0), tmp_path)
+    while not (
+        isinstance(screen := run.now()[1], QuestionsScreen)
+        and screen.questions[0].item.kind == "text"
+    ):
+        step(run)
+    with pytest.raises(WrongAnswer, match=str(LONGEST_TEXT)):
+        run.answer(run.now()[0], {0: "a" * (LONGEST_TEXT + 1)}, {})
+    run.answer(run.now()[0], {0: "a" * LONGEST_TEXT}, {})
+    assert run.state().closed
+    journal.close()
+
+
+def test_who_declines_or_leaves_is_asked_nothing_more(tmp_path: Path) -> None:
+    run, journal = run_of(rating(), tmp_path / "declines")
+    run.consent(run.now()[0], False, True, True)
+    assert run.now()[1] == EndScreen("declined")
+    journal.close()
+    run, journal = run_of(rating(), tmp_path / "leaves")
+    for _ in range(3):
+        step(run)
+    run.withdraw()
+    run.withdraw()
+    assert run.now()[1] == EndScreen("withdrawn")
+    ends = [one for one in journal.records if isinstance(one, TrialEnded | Closed)]
+    assert [type(one) for one in ends] == [TrialEnded, Closed]
+    journal.close()
+
+
+class LosesHead:
+    """A head that is lost in the given presentations, counted from 0."""
+
+    def __init__(self, *lost: int) -> None:
+        self._lost, self._count, self._why = lost, -1, ""
+
+    def begin(self, shown: ShownTrial) -> None:
+        self._count += 1
+        self._why = "servo 3 does not answer" if self._count in self._lost else ""
+
+    def end(self) -> Presented:
+        return Presented("run-01.mcap", (1.0, 2.0), 0.1)
+
+    def fault(self) -> str:
+        return self._why
+
+    def restart(self) -> None:
+        self._why = ""
+
+
+def on_head(study: LoadedStudy, **rules: object) -> LoadedStudy:
+    design = study.design
+    shown = replace(design.presentation, on="head")
+    exclusion = replace(design.exclusion, **rules)  # type: ignore[arg-type]
+    return replace(study, design=replace(design, presentation=shown, exclusion=exclusion))
+
+
+@pytest.mark.parametrize(
+    ("rule", "repeats", "lost", "attempts"),
+    [
+        ("repeat", 2, (0,), [0, 1, 0, 0]),
+        ("repeat", 1, (0, 1), [0, 1, 0, 0]),  # twice is too often: the trial is left out
+        ("exclude", 2, (1,), [0, 0, 0]),
+    ],
+)
+def test_a_lost_head_pauses_and_the_trial_goes_by_the_rule(
+    rule: str, repeats: int, lost: tuple[int, ...], attempts: list[int], tmp_path: Path
+) -> None:
+    now = [0.0]
+    study = on_head(rating(practice=0, seconds=10.0), lost_head=rule, repeats=repeats)
+    run, journal = run_of(study, tmp_path, presenter=LosesHead(*lost), now_s=lambda: now[0])
+    for _ in range(60):
+        screen = step(run)
+        if isinstance(screen, EndScreen):
+            break
+        if isinstance(run.now()[1], PresentationScreen):
+            run.poll()
+            now[0] += 10.0
+            run.poll()
+            if run.state().fault:
+                assert run.now()[1] == PausedScreen()
+    began = [one for one in journal.records if isinstance(one, TrialBegan)]
+    ended = [one for one in journal.records if isinstance(one, TrialEnded)]
+    assert [one.attempt for one in began] == attempts
+    assert [i for i, one in enumerate(ended) if one.outcome == "head_lost"] == list(lost)
+    assert {one.reason for one in ended if one.outcome == "head_lost"} == {
+        "servo 3 does not answer"
+    }
+    asked = {one.trial for one in journal.records if isinstance(one, ItemAnswered)}
+    complete = {one.trial for one in ended if one.outcome == "complete"}
+    assert asked - {None} == complete
+    journal.close()
+
+
+def test_a_head_that_cannot_begin_pauses_until_it_can(tmp_path: Path) -> None:
+    class Refuses(LosesHead):
+        def begin(self, shown: ShownTrial) -> None:
+            super().begin(shown)
+            if self._why:
+                raise HeadLost(self._why)
+
+    run, journal = run_of(on_head(rating(practice=0)), tmp_path, presenter=Refuses(0))
+    while not isinstance(run.now()[1], ReadyScreen):
+        step(run)
+    step(run)
+    assert run.now()[1] == PausedScreen() and run.state().fault == "servo 3 does not answer"
+    run.begin(run.now()[0])
+    assert run.now()[1] == PausedScreen()
+    run.pause(False)
+    assert isinstance(run.now()[1], ReadyScreen) and not run.state().fault
+    step(run)
+    assert isinstance(run.now()[1], PresentationScreen)
+    journal.close()
+
+
+def test_the_experimenter_may_repeat_and_exclude(tmp_path: Path) -> None:
+    run, journal = run_of(rating(practice=0), tmp_path)
+    with pytest.raises(WrongAnswer):
+        run.repeat()
+    while not isinstance(run.now()[1], PresentationScreen):
+        step(run)
+    run.repeat()
+    screen = run.now()[1]
+    assert isinstance(screen, ReadyScreen) and screen.again
+    run.exclude("asked what the difference is")
+    assert run.now()[1] == EndScreen("excluded")
+    assert journal.records[-1] == Closed("excluded", "asked what the difference is", UTC)
+    journal.close()
+
+
+def test_no_screen_says_which_condition_it_is_of(tmp_path: Path) -> None:
+    study = pairs()
+    names = set(study.design.conditions) | {one.label for one in study.design.conditions.values()}
+    run, journal = run_of(study, tmp_path)
+    for _ in range(100):
+        page, screen = run.now()
+        words = f"{page} {screen!r}"
+        assert not [name for name in names - {"default"} if name in words]
+        if isinstance(step(run), EndScreen):
+            break
+    journal.close()
+
+
+def test_a_film_that_was_not_shown_whole_is_shown_again(tmp_path: Path) -> None:
+    run, journal = run_of(rating(practice=0, seconds=20.0), tmp_path)
+    while not isinstance(run.now()[1], PresentationScreen):
+        step(run)
+    for seconds in (3.0, float("nan")):
+        run.film_ended(run.now()[0], seconds)
+        screen = run.now()[1]
+        assert isinstance(screen, ReadyScreen) and screen.again
+        step(run)
+    run.film_ended(run.now()[0], 19.9)
+    assert isinstance(run.now()[1], QuestionsScreen)
+    journal.close()
