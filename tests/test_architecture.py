@@ -27,7 +27,7 @@ OWNERS = {
     "orjson": ("robot.recording.",),
     "matplotlib": ("robot.report.plotting",),
     "pyarrow": ("robot.sweep.table",),
-    "jinja2": ("robot.report.",),
+    "jinja2": ("robot.report.", "robot.study.preregistration_text"),
     "aiohttp": ("robot.dashboard.",),
     "ruamel": ("config.entries", "config.save"),
     "pydantic": ("config.",),

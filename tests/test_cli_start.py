@@ -95,7 +95,7 @@ HEAVY = ("numpy", "cv2", "scipy", "ruamel", "serial", "mcap", "dynamixel_sdk", "
 
 LIGHT_HELP = (
     *("", "run", "ctl", "stop", "replay", "report", "compare", "sweep", "export", "check"),
-    *("kinds", "schema", "record-camera", "fit-scanpath", "ctl set"),
+    *("kinds", "schema", "record-camera", "fit-scanpath", "ctl set", "study"),
 )
 """Commands whose help is there at once; that of others imports what speaks to servos."""
 
@@ -142,9 +142,12 @@ def test_help_imports_nothing_heavy(words: str, helps: dict[str, str]) -> None:
 
 
 def test_every_command_has_examples_and_no_example_is_without_command() -> None:
-    ctl = commands()["ctl"]
-    assert isinstance(ctl, TyperGroup)
-    assert {*commands(), *ctl.commands} == set(EXAMPLES)
+    ctl, study = commands()["ctl"], commands()["study"]
+    assert isinstance(ctl, TyperGroup) and isinstance(study, TyperGroup)
+    of_studies = {f"study {name}" for name in study.commands}
+    assert {*commands(), *ctl.commands, *of_studies} == set(EXAMPLES)
+    for name, command in study.commands.items():
+        assert f"gazerig study {name}" in str(command.epilog), name
     for name, command in commands().items():
         assert f"gazerig {name}" in str(command.epilog), name
     for name, order in ctl.commands.items():

@@ -53,6 +53,11 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
             "Write a recorded run as eye-tracking tools read it: degrees, + left and + up.",
         ),
     },
+    "Study": {
+        "study": CommandEntry(
+            "study", "Let people judge two to six gazes, blind: design, run and analyse a study."
+        ),
+    },
     "Bring-up": {
         "scan": CommandEntry(
             "scan", "List serial ports, and who answers on one at every baud rate."

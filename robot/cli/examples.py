@@ -152,21 +152,32 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("sweep my.yaml --fit --set gaze.lids.blinks_per_min=4:40", "what is most like people"),
     ),
     "compare": (("compare shy.mcap bold.mcap", "two recordings side by side"),),
+    "study": (
+        ("study design --example study.yaml", "a study of two gazes to start from"),
+        ("study design study.yaml", "check it; how many participants, and what is stated before"),
+    ),
+    "study design": (
+        ("study design --example study.yaml", "a study of two gazes to start from"),
+        ("study design study.yaml", "check it and write its pre-registration"),
+        ("study design nakamoto_1", "a shipped study: of Nakamoto & Tsuruno"),
+    ),
 }
-"""Command -> examples, each with what it is for."""
+"""Command -> examples, each with what it is for; of a study's commands with the group's name."""
 
 
-def add_examples(app: typer.Typer, panels: bool = True) -> None:
+def add_examples(app: typer.Typer, panels: bool = True, within: str = "") -> None:
     """Add examples to the help of every command of an app.
 
     panels: each command is put into its panel, too
+    within: the group that it is in, "" for none
     """
     for command in app.registered_commands:
         name = command.name or _dashed(command.callback)
         if panels:
             command.rich_help_panel = panel_of(name)
-        if name in EXAMPLES:
-            command.epilog = epilog(EXAMPLES[name])
+        examples = EXAMPLES.get(f"{within} {name}") or EXAMPLES.get(name)
+        if examples:
+            command.epilog = epilog(examples)
     for group in app.registered_groups:
         part = group.typer_instance
         if part is None:
@@ -176,7 +187,8 @@ def add_examples(app: typer.Typer, panels: bool = True) -> None:
             group.rich_help_panel = panel_of(title)
         if title in EXAMPLES:
             part.info.epilog = epilog(EXAMPLES[title])
-        add_examples(part, panels and not isinstance(title, str))
+        named = isinstance(title, str)
+        add_examples(part, panels and not named, str(title) if named else within)
 
 
 def panel_of(command: str) -> str:

@@ -1,0 +1,149 @@
+"""The command ``gazerig study design``: a study checked, and stated before it begins."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gazerig.config.shipped import shipped_names
+from gazerig.drivers.file_output import write_file
+from gazerig.robot.cli.examples import complete_shipped
+from gazerig.robot.cli.terminal import ForceOption, clear_errors, say
+
+if TYPE_CHECKING:
+    from gazerig.config.study_file import LoadedStudy
+    from gazerig.robot.study.questionnaire import Questionnaire, Texts
+
+EXAMPLE = """\
+# A study of two gazes: does blinking look natural? Change it, then: gazerig study design study.yaml
+title: Blinking against staring
+welcome: # what participants read first; it must not tell what differs
+  - You will see short films of a robot's face and answer two questions about each.
+conditions: # two to six; each says what differs from the rig below
+  blinks: {}
+  stares:
+    params: # any key of a rig's YAML; gazerig ctl get lists them. Or profile:, character:, scanpath:
+      gaze.lids.blinks_per_min: 0.0
+      gaze.lids.conversation_per_min: 0.0
+presentation:
+  on: film # films in the browser; head: the head in the room
+  rig: expressive
+  scene: face-to-face # what an emulated head looks at
+trials:
+  seconds: 20
+questionnaires: [nakamoto_tsuruno] # or godspeed, rosas, free_text; choice with task: pairwise
+hypotheses:
+  - measure: nakamoto_tsuruno.naturalness
+    better: blinks
+    than: stares
+plan:
+  participants: 26
+privacy:
+  contact: "" # whom participants write to
+"""
+"""A design to start from; written by --example."""
+
+StudyArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="STUDY",
+        help=f"A study's YAML file, or a shipped one: {', '.join(shipped_names('studies'))}.",
+        autocompletion=complete_shipped("studies"),
+    ),
+]
+DataOption = Annotated[
+    Path | None,
+    typer.Option("--data", help="Folder of the study's data; default: NAME-data, after the file."),
+]
+
+
+def design(
+    study: StudyArgument = "study.yaml",
+    data: DataOption = None,
+    example: Annotated[
+        bool, typer.Option("--example", help="Write a study of two gazes to start from as STUDY.")
+    ] = False,
+    force: ForceOption = False,
+) -> None:
+    """Check a study's YAML, say how many participants it takes, and write its pre-registration."""
+    if example:
+        with clear_errors():
+            write_file(Path(study), EXAMPLE, force)
+            print(f"{study}: written; change it, then: gazerig study design {study}")
+        return
+    with clear_errors():
+        import gazerig
+        from gazerig.robot.app.study_file import checked_study
+        from gazerig.robot.study.preregistration_text import text
+
+        found = checked_study(study)
+        for line in summary(study, found):
+            print(line)
+        file = data_folder(found, data) / "preregistration.md"
+        changes = {key: found.changes(None, key) for key in found.design.conditions}
+        stated = text(
+            found.design, found.questionnaires, changes, found.sha256, gazerig.__version__
+        )
+        kept = file.is_file() and file.read_text(encoding="utf-8") == stated
+        if not kept:
+            file.parent.mkdir(parents=True, exist_ok=True)
+            write_file(file, stated, force)
+        for note in notes(found):
+            say(f"note: {note}")
+        print(f"{file}: {'as it was' if kept else 'written'}; sha256 {found.sha256}")
+        print(f"next: gazerig study run {study} --participant 1")
+
+
+def data_folder(study: "LoadedStudy", data: Path | None) -> Path:
+    """Return the folder of a study's data."""
+    return data if data is not None else Path(f"{study.name}-data")
+
+
+def summary(name: str, study: "LoadedStudy") -> list[str]:
+    """Return what a study is, in a few lines."""
+    from gazerig.robot.study.order import orders
+    from gazerig.robot.study.preregistration_text import claims_of, minutes, sentence, size_words
+
+    design = study.design
+    keys = ", ".join(design.conditions)
+    trials = len(orders(design, 1))
+    lines = [
+        f"{name}: good: {design.title!r}, {len(design.conditions)} conditions ({keys})",
+        f"{design.plan.participants} participants, {trials} trials each, "
+        f"about {minutes(design, study.questionnaires)} minutes",
+    ]
+    for i, (one, found) in enumerate(
+        zip(design.hypotheses, claims_of(design, study.questionnaires), strict=True), 1
+    ):
+        lines += [f"hypothesis {i}: {sentence(one)}", f"  {size_words(design, found)}"]
+    return lines
+
+
+def notes(study: "LoadedStudy") -> list[str]:
+    """Return what is allowed and should be known."""
+    from gazerig.robot.study.preregistration_text import claims_of
+
+    design, found = study.design, []
+    claims = claims_of(design, study.questionnaires)
+    if not claims:
+        found.append("no hypothesis is stated: the study is exploratory and decides nothing")
+    needed = [one.needed for one in claims if one.needed is not None]
+    if any(one.needed is None or one.needed > one.participants for one in claims):
+        enough = f"plan.participants: {max(needed)}" if len(needed) == len(claims) else "see above"
+        found.append(
+            f"{design.plan.participants} participants are too few for d_z = {design.plan.effect:g} "
+            f"with power {design.plan.power:g}: {enough}"
+        )
+    if not design.privacy.contact:
+        found.append("privacy.contact is empty: participants do not know whom to write to")
+    if design.privacy.pictures:
+        found.append("pictures of participants are kept; the consent page asks them for it")
+    for key, one in study.questionnaires.items():
+        if any(design.language not in texts for texts in _texts(one)):
+            found.append(f"{key} is not all in {design.language!r}; English stands where it is not")
+    return found
+
+
+def _texts(one: "Questionnaire") -> list["Texts"]:
+    items = [texts for item in one.items.values() for texts in (item.text, item.low, item.high)]
+    return [texts for texts in (one.instruction, *items) if texts]

@@ -1,0 +1,138 @@
+"""Power that is claimed is power that drawn studies have; sample sizes grow as they must."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from gazerig.config.study_file import load_study
+from gazerig.robot.study.measures import measures
+from gazerig.robot.study.power import (
+    MOST,
+    PowerQuestion,
+    by_formula,
+    claim,
+    joint,
+    power_of,
+    sample_size,
+)
+from gazerig.robot.study.simulation import differences, effect_of, shift_of
+from gazerig.robot.study.statistics.ranks import exact_signed_rank, rank_sum
+
+SIGNED = PowerQuestion("signed_rank", 0.6, 0.05)
+STUDIES = 500
+
+
+@pytest.mark.parametrize(
+    ("n", "alpha", "two_sided"),
+    [(9, 0.05, True), (24, 0.05, True), (24, 0.0125, True), (18, 0.05, False), (50, 0.05, True)],
+)
+def test_the_claim_is_what_simulated_participants_give(
+    n: int, alpha: float, two_sided: bool
+) -> None:
+    asked = replace(SIGNED, alpha=alpha, two_sided=two_sided, effect=0.4 if n == 50 else 0.6)
+    drawn = differences(asked.effect, (STUDIES, n), np.random.default_rng(n))
+    found = [row.any() and exact_signed_rank(row, two_sided) <= alpha for row in drawn]
+    # The standard error of 500 studies is .018 to .022; the seed is fixed.
+    assert power_of(asked, n) == pytest.approx(np.mean(found), abs=0.045)
+
+
+def test_the_joint_chances_are_those_of_the_effect() -> None:
+    chances, points = joint(0.6, 5), np.arange(1, 6)
+    assert chances.sum() == pytest.approx(1.0, abs=1e-9)
+    difference = points[:, None] - points[None, :]
+    mean = (chances * difference).sum()
+    spread = np.sqrt((chances * (difference - mean) ** 2).sum())
+    assert mean / spread == pytest.approx(0.6, abs=2e-3)
+    assert effect_of(shift_of(0.6, 5), 5) == pytest.approx(0.6, abs=1e-6)
+    assert joint(0.0, 5) == pytest.approx(joint(0.0, 5).T)
+
+
+@pytest.mark.parametrize("test", ["signed_rank", "rank_sum", "chi_square", "ordinal_mixed"])
+@pytest.mark.parametrize("points", [5, 9])
+def test_without_an_effect_it_is_the_chance_of_a_false_alarm(test: str, points: int) -> None:
+    asked = PowerQuestion(test, 0.0, 0.05, points=points)  # type: ignore[arg-type]
+    assert 0.0 < power_of(asked, 40) < 0.056
+    assert power_of(asked, 0) == 0.0
+
+
+def test_fewer_than_six_different_answers_can_never_be_significant() -> None:
+    assert power_of(SIGNED, 5) == 0.0  # the least chance of five signs is 2 / 32
+    assert power_of(replace(SIGNED, alpha=0.01), 7) == 0.0
+    assert power_of(SIGNED, 6) > 0.0
+
+
+def test_continuous_answers_have_the_power_that_the_efficiency_says() -> None:
+    asked = replace(SIGNED, points=0)
+    t_test = stats.nct.sf(stats.t.isf(0.025, 99), 99, 0.3 * 10)
+    assert power_of(replace(asked, effect=0.3 * np.sqrt(np.pi / 3)), 100) == pytest.approx(
+        t_test, abs=0.02
+    )
+    assert sample_size(asked, 0.8) == pytest.approx(by_formula(asked, 0.8), abs=3)
+
+
+def test_ties_cost_power_and_more_participants_give_it() -> None:
+    by_n = [power_of(SIGNED, n) for n in (8, 12, 16, 24, 36, 60)]
+    assert by_n == sorted(by_n) and by_n[-1] > 0.98
+    by_effect = [power_of(replace(SIGNED, effect=d), 24) for d in (0.2, 0.4, 0.6, 0.8)]
+    assert by_effect == sorted(by_effect)
+    few = sample_size(SIGNED, 0.8)
+    assert few is not None and few >= by_formula(SIGNED, 0.8)
+    assert power_of(SIGNED, few) >= 0.8
+
+
+@pytest.mark.parametrize("multiple", [1, 2, 6, 10])
+def test_a_sample_size_is_the_least_multiple_with_the_power(multiple: int) -> None:
+    n = sample_size(SIGNED, 0.8, multiple)
+    assert n is not None and n % multiple == 0
+    assert power_of(SIGNED, n) >= 0.8 > power_of(SIGNED, n - multiple)
+
+
+def test_what_would_take_too_many_has_no_size() -> None:
+    assert sample_size(replace(SIGNED, effect=0.05, points=0), 0.95) is None
+    assert by_formula(replace(SIGNED, effect=0.05), 0.95) > MOST
+
+
+def test_the_rank_sum_test_wastes_what_the_same_participants_share() -> None:
+    paired = power_of(SIGNED, 30)
+    unpaired = power_of(replace(SIGNED, test="rank_sum"), 30)
+    counts = power_of(replace(SIGNED, test="chi_square"), 30)
+    assert paired > unpaired + 0.05 > counts + 0.1
+    rng = np.random.default_rng(2)
+    cells = joint(0.6, 5)
+    drawn = rng.choice(25, (200, 30), p=(cells / cells.sum()).ravel())
+    found = [rank_sum(row % 5, row // 5, paired=False).p <= 0.05 for row in drawn[:60]]
+    assert unpaired == pytest.approx(np.mean(found), abs=0.15)
+
+
+def test_choices_have_the_binomial_tests_power() -> None:
+    asked = PowerQuestion("bradley_terry", 0.6, 0.05)
+    share = stats.norm.cdf(0.6)
+    exact = [stats.binomtest(k, 30).pvalue <= 0.05 for k in range(31)]
+    assert power_of(asked, 30) == pytest.approx(stats.binom.pmf(range(31), 30, share) @ exact)
+    assert power_of(replace(asked, choices=2), 15) == power_of(asked, 30)
+    one = replace(asked, two_sided=False)
+    exact = [stats.binomtest(k, 30, alternative="greater").pvalue <= 0.05 for k in range(31)]
+    assert power_of(one, 30) == pytest.approx(stats.binom.pmf(range(31), 30, share) @ exact)
+    n = sample_size(asked, 0.8)
+    assert n is not None and 30 < n < 45
+
+
+def test_friedmans_power_is_that_of_its_test() -> None:
+    asked = PowerQuestion("friedman", 0.6, 0.05, heights=(0.5, -0.5, -0.5))
+    assert power_of(replace(asked, effect=0.0), 20) == pytest.approx(0.05, abs=0.015)
+    assert power_of(asked, 12) < power_of(asked, 24) < power_of(asked, 40)
+    assert power_of(replace(asked, heights=(0.5, -0.5, 0.0)), 24) < power_of(asked, 24)
+
+
+def test_a_hypothesis_gets_its_share_of_the_false_alarms() -> None:
+    study = load_study("default_against_papers")
+    known = measures(study.design, study.questionnaires)
+    one = study.design.hypotheses[0]
+    found = claim(study.design, one, known[one.measure])
+    assert found.question.alpha == pytest.approx(0.05 / 4)
+    assert found.participants == 42 and found.power >= 0.8
+    assert found.needed is not None and found.needed <= 42 and found.needed % 6 == 0
+    alone = replace(study.design, plan=replace(study.design.plan, correction="none"))
+    assert claim(alone, one, known[one.measure]).question.alpha == 0.05
