@@ -19,6 +19,11 @@ def rig_text(rig: Rig) -> str:
     return "".join(_lines(plain(rig)))
 
 
+def params_text(params: Any) -> str:
+    """Return a dataclass of parameters, such as a world's script, as YAML."""
+    return "".join(_lines(plain(params)))
+
+
 def walk_text(name_or_path: str) -> str:
     """Return the face walk that a rig names as YAML.
 

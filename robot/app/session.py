@@ -2,6 +2,7 @@
 
 import contextlib
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -37,6 +38,7 @@ from gazerig.robot.recording.run_info import RunInfo, versions
 
 if TYPE_CHECKING:
     from gazerig.robot.recording.recorder import Recorder
+    from gazerig.robot.recording.world_info import WorldInfo
 
 
 SECONDS = "seconds"
@@ -79,8 +81,27 @@ def compose(
         recorder = Recorder(options.record, info, options.force, patient=options.fast)
         substitutes = substitutes._replace(body=recorder.recorded)
     made = assemble(rig, options, substitutes, shared)
+    if recorder is not None and options.world is not None:
+        people = shared.world.spec.figures if shared is not None else None
+        seed = people.seed if people is not None else options.seed
+        recorder.in_world(_begun_world(options, seed, made.world_start_s))
     names = (options.rig, options.character, options.profile)
     return ComposedRun(options, made, ParamStore(made.live, made.robot.command, *names), recorder)
+
+
+def _begun_world(
+    options: RunOptions, seed: int, begins_s: Callable[[], float | None]
+) -> Callable[[], "WorldInfo | None"]:
+    """Return what tells the world of a run, once its people have begun."""
+    from gazerig.robot.app.recorded_world import world_info  # with the people in it
+
+    info = world_info(options, seed)
+
+    def begun() -> "WorldInfo | None":
+        start_s = begins_s()
+        return None if info is None or start_s is None else replace(info, start_s=start_s)
+
+    return begun
 
 
 def run_info(rig: Rig, options: RunOptions, stands: tuple[float, ...] = ()) -> RunInfo:

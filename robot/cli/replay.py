@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from gazerig.robot.app.resimulate import Resimulation
     from gazerig.robot.control.loop import Tick
     from gazerig.robot.dashboard.feed.snapshot import ShownRig
+    from gazerig.robot.model.world_shapes import WorldShapes
+    from gazerig.robot.recording.read import RunRecording
 
 app = typer.Typer(add_completion=False)
 
@@ -162,7 +164,12 @@ def _show(
     stopped: Callable[[], str | None],
 ) -> bool:
     """Serve the page until told to stop; False where it cannot be had."""
-    from gazerig.robot.dashboard.feed.live_feed import LiveRig, rig_message
+    from gazerig.robot.dashboard.feed.live_feed import (
+        LiveRig,
+        RunState,
+        rig_message,
+        state_message,
+    )
     from gazerig.robot.dashboard.feed.page_process import PageProcess
     from gazerig.robot.model.clock import RealClock
     from gazerig.robot.recording.playback_clock import PlaybackState
@@ -182,6 +189,8 @@ def _show(
             built,
             read,
         )
+    world = _world(recording)
+    start_s = recording.world.start_s if recording.world is not None else None
     replaying = Replay(frames, clock)
     page = PageProcess(*address, replaying.handle_request)
     began_s, urls, starts = clock.now_s(), [""], [0]
@@ -193,7 +202,8 @@ def _show(
         if page.started != starts[-1]:
             starts.append(page.started)
             if built is not None:
-                page.send(rig_message(LiveRig(rate_hz, built)))
+                page.send(rig_message(LiveRig(rate_hz, built, world=world)))
+                page.send(state_message(RunState({}, "", "", "", (None, None, 0), start_s)))
             replaying.begin_anew()
         if url is not None and url != urls[-1]:
             urls.append(url)
@@ -210,6 +220,19 @@ def _show(
     finally:
         page.close()
         frames.close()
+
+
+def _world(recording: "RunRecording") -> "WorldShapes | None":
+    """Return how the recorded run's world looked; None without one, or, said why, if it is lost."""
+    if recording.world is None:
+        return None
+    from gazerig.robot.app.recorded_world import recorded_shapes
+
+    try:
+        return recorded_shapes(recording.world, recording.info.stands)
+    except SetupError as error:
+        say(str(error))
+        return None
 
 
 def _built(config_yaml: str) -> "ShownRig | None":

@@ -25,6 +25,7 @@ from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording.chunk_reader import LARGEST_BYTES, unpacked
 from gazerig.robot.recording.run_info import FORMAT, PROFILE, RunEnd, RunInfo, end_of, info_of
 from gazerig.robot.recording.tick_record import TickRecord, from_json, percept_from_json
+from gazerig.robot.recording.world_info import WorldInfo, world_of
 
 _CURE = "make one with gazerig run --record"
 _CAMERA = "gazerig-camera-"
@@ -61,6 +62,7 @@ class RunRecording:
 
     path: the file
     info: the run as it was started; end: how it ended
+    world: the simulated world that it was in, None without one and in older recordings
     whole: the file was closed properly; else it ends where its writer was killed
     duration_s: from the first to the last message
     """
@@ -74,6 +76,7 @@ class RunRecording:
         self.path = Path(path)
         self.whole = False
         self.end = RunEnd()
+        self.world: WorldInfo | None = None
         self._chunks: list[_ChunkIndex] = []
         found: RunInfo | None = None
         with open_mcap(self.path, BadRecording, _CURE) as file:
@@ -183,6 +186,8 @@ class RunRecording:
         with _damage(self.path):
             if record.name == fmt.END:
                 self.end = end_of(record.metadata)
+            if record.name == fmt.WORLD:
+                self.world = world_of(record.metadata)
             return info_of(record.metadata) if record.name == fmt.RUN else None
 
     def _judge(self, profile: str) -> None:

@@ -31,6 +31,7 @@ from gazerig.robot.recording.frame_picker import FramePicker
 from gazerig.robot.recording.joint_recorder import JointRecorder
 from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text, started_ns
 from gazerig.robot.recording.tick_record import BodyRecord, MeasuredJoints, plain
+from gazerig.robot.recording.world_info import WorldInfo
 from gazerig.robot.recording.writer_client import WriterClient
 
 _HEALTH_S = 1.0
@@ -71,7 +72,15 @@ class Recorder:
         self._checked_s = -inf
         self._beside: Path | None = None
         self._opened = self._said = False
+        self._world: Callable[[], WorldInfo | None] | None = None
         self.lost = 0
+
+    def in_world(self, world: Callable[[], WorldInfo | None]) -> None:
+        """Record the world that the run is in, too.
+
+        world: returns it, None as long as its beginning is not known
+        """
+        self._world = world
 
     def open(self) -> None:
         """Create the file and start the process that writes it; returns at once.
@@ -120,6 +129,9 @@ class Recorder:
     def record(self, tick: Tick) -> None:
         """Record a tick; called by the loop."""
         before = self._before(tick)
+        if self._world is not None and (world := self._world()) is not None:
+            self._world = None
+            self._link.post(writer.WORLD, encode(as_text(world)))
         dt_s = tick.t_s - self._last_s if self._last_s is not None else self._seconds or 0.0
         self._last_s = tick.t_s
         self.stream.append(tick, dt_s, before)

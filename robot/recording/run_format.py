@@ -10,7 +10,7 @@ TICK, PERCEPT, HEALTH = "/rig/tick", "/rig/percept", "/rig/health"
 FRAME, LOG, ORDER = "/camera/picture", "/log", "/rig/order"
 JOINT_STATES, TRANSFORMS, SCENE = "/joint_states", "/tf", "/scene"
 
-RUN, END = "gazerig.run", "gazerig.end"
+RUN, WORLD, END = "gazerig.run", "gazerig.world", "gazerig.end"
 """Names of the metadata records at the beginning and the end."""
 
 UNUSED = ("metadata", "arrows", "cubes", "cylinders", "triangles", "texts", "models")

@@ -8,6 +8,8 @@ from dataclasses import asdict, dataclass, field, fields
 from datetime import datetime
 from typing import Any
 
+from gazerig.robot.recording.world_info import WorldInfo
+
 FORMAT = 1
 """Version of what the messages hold; goes up when an older reader would misread them."""
 PROFILE = "gazerig-run-1"
@@ -86,7 +88,7 @@ def started_ns(info: RunInfo) -> int:
     return round(datetime.fromisoformat(info.started_utc).timestamp() * 1e6) * 1000
 
 
-def as_text(value: RunInfo | RunEnd) -> dict[str, str]:
+def as_text(value: RunInfo | RunEnd | WorldInfo) -> dict[str, str]:
     """Return the fields as MCAP metadata: YAML as it is, all else as JSON."""
     plain = asdict(value)
     return {k: v if k.endswith("_yaml") else json.dumps(v) for k, v in plain.items()}

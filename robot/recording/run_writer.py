@@ -70,6 +70,11 @@ class RunWriter:
         self._counts[message.topic] = self._counts.get(message.topic, 0) + 1
         self._safely(self._add, message)
 
+    def world(self, about: Mapping[str, str]) -> None:
+        """Write the world that the run is in, as ``run_info.as_text`` gives it."""
+        if not self.failed:
+            self._safely(self._add_world, about)
+
     def flush(self) -> None:
         """Write the chunk in progress and hand it to the system."""
         if not self.failed:
@@ -89,6 +94,11 @@ class RunWriter:
     def _begin(self, about: Mapping[str, str]) -> None:
         self._writer.start(PROFILE, "gazerig")
         self._writer.add_metadata(fmt.RUN, dict(about))
+        self._file.keep()
+
+    def _add_world(self, about: Mapping[str, str]) -> None:
+        self._flush()
+        self._writer.add_metadata(fmt.WORLD, dict(about))
         self._file.keep()
 
     def _add(self, message: fmt.Message) -> None:

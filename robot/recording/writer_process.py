@@ -25,7 +25,7 @@ from gazerig.robot.recording.run_info import RunEnd
 from gazerig.robot.recording.run_writer import RunWriter
 
 MORE, LAST = b"+", b"."
-BEGIN, TICKS, FRAME, HEALTH, END = b"b", b"t", b"f", b"h", b"e"
+BEGIN, WORLD, TICKS, FRAME, HEALTH, END = b"b", b"w", b"t", b"f", b"h", b"e"
 """What may be handed over. Bodies are MessagePack; of TICKS, see ``tick_stream.TickBatch``."""
 FAILED, DONE = "failed", "done"
 """What is answered: why nothing more can be written; what was written."""
@@ -73,6 +73,8 @@ def _write(
         if one is not None:
             if one.kind == END:
                 end = RunEnd(**decode_plain(one.body))
+            elif one.kind == WORLD:
+                writer.world(decode_plain(one.body))
             else:
                 _take(router, one)
         now_s = clock.now_s()

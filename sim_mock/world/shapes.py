@@ -4,11 +4,13 @@ MuJoCo is loaded where the shapes are made, not where they are sent from.
 """
 
 from collections.abc import Mapping, Sequence
+from math import radians
 from typing import NamedTuple
 
 from gazerig.gaze.types import Vec3
 from gazerig.robot.model.quaternion import Quaternion
 from gazerig.robot.model.world_shapes import WorldFinish, WorldPart
+from gazerig.sim_mock.world.figure import Figures
 from gazerig.sim_mock.world.other_heads import OtherHeads
 from gazerig.sim_mock.world.rig_in_world import RigInWorld
 from gazerig.sim_mock.world.world_spec import WorldSpec
@@ -72,6 +74,23 @@ def shapes_of(spec: WorldSpec, others: OtherHeads | None = None) -> SpecShapes:
     joints = {rig.prefix + name for rig in spec.rigs for name in rig.stops_rad}
     places = tuple(_place(rig) for rig in spec.rigs)
     return SpecShapes(spec._replace(rigs=places), frozenset(joints), others)
+
+
+def script_shapes(figures: Figures) -> SpecShapes:
+    """Return the shapes of a script's world without any rig; they are small to send.
+
+    Args:
+        figures: the people of the script.
+    """
+    heads = figures.script.heads.items()
+    places = [RigInWorld(_no_body, {}, {}, ())]
+    places += [
+        RigInWorld(
+            _no_body, {}, {}, (), f"{name}_", (head.x_m, head.y_m, 0.0), radians(head.facing_deg)
+        )
+        for name, head in heads
+    ]
+    return SpecShapes(WorldSpec(figures, tuple(places)))
 
 
 def _place(rig: RigInWorld) -> RigInWorld:

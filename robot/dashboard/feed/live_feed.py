@@ -148,12 +148,14 @@ class LiveFeed:
     emulated: the servos are; False before the rig has said so
     choices: what is wanted in the camera's image
     watched: someone sees the images; otherwise none is drawn
+    shown_s: the time of what is shown: of the newest tick, or of a recording's snapshot
     """
 
     def __init__(self) -> None:
         self.emulated = False
         self.choices = OverlayChoices()
         self.watched = True
+        self.shown_s: float | None = None
         self._picture: DrawPicture | None = None
         self._world: WorldShapes | None = None
         self._trail = GazeTrail()
@@ -213,11 +215,11 @@ class LiveFeed:
         return rig.shape if rig is not None else None
 
     def world(self) -> WorldNow | None:
-        """Return the world about the rig at the newest tick; None without one, or too early."""
-        start_s, tick = self._state.scene_start_s, self._newest
-        if self._world is None or start_s is None or tick is None:
+        """Return the world about the rig as it is shown; None without one, or too early."""
+        start_s, t_s = self._state.scene_start_s, self.shown_s
+        if self._world is None or start_s is None or t_s is None:
             return None
-        return WorldNow(self._world, tick.t_s - start_s)
+        return WorldNow(self._world, t_s - start_s)
 
     def image(self) -> ImageArray | None:
         """Return the newest frame with what was found in it; None without a new one."""
@@ -275,7 +277,7 @@ class LiveFeed:
             tick = self._tick(row, percepts)
             self._builder.update(tick)
             self._poses.remember(tick.t_s, tick.pose.head_rad, tick.pose.base_rad)
-            self._newest = tick
+            self._newest, self.shown_s = tick, tick.t_s
             self._trail.add(tick.t_s, tick.gaze.gaze_point_world_m)
         self._new_ticks = True
 

@@ -59,6 +59,7 @@ def drain(feed: MessageLink, live: LiveFeed) -> News:
         kind, body = message[:1], message[1:]
         if kind == SNAPSHOT:
             snapshots.append(unpack(message))
+            live.shown_s = snapshots[-1].t_s
         elif kind == FRAME:
             jpeg = body
         elif kind in (CHOICES, PARAMS, VALUES, MESSAGE, REPLAY):
