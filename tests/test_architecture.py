@@ -23,7 +23,11 @@ OWNERS = {
     "mcap": ("drivers.camera.recording_", "robot.recording."),
     "smbus2": ("drivers.i2c.port",),
     "zstandard": ("robot.recording.",),
-    "msgspec": ("robot.control.tick_stream", "robot.study.journal"),
+    "msgspec": (
+        "robot.control.tick_stream",
+        "robot.study.journal",
+        "robot.dashboard.study.participant_events",
+    ),
     "orjson": ("robot.recording.",),
     "matplotlib": ("robot.report.plotting",),
     "pyarrow": ("robot.sweep.table",),

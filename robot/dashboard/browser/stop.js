@@ -5,7 +5,8 @@
 // frame of the view too, unless the user types. A stop is sent again until the rig has taken it.
 //
 // What comes over the connection is an event "rig-state" of the window for the other scripts;
-// they talk to the rig by window.rig: ask(what) waits for an answer, tell(what) does not.
+// they talk to the rig by window.rig: ask(what) waits for an answer, tell(what) does not. There is no
+// button where a recording is shown, or films without a head ("headless").
 
 (() => {
   "use strict";
@@ -108,6 +109,7 @@
   // What there is to say, most urgent first: [text, alarm, buttons].
   function saying() {
     if (state.recording) return ["A recording: nothing here moves or stops a rig.", false, []];
+    if (state.headless) return ["", false, []];
     const lost = performance.now() - heardAt > SILENT_AFTER_MS;
     if (failed) return [`${failed}. Use the emergency stop of the rig.`, true, []];
     if (lost) return [why_lost || NO_CONNECTION, true, []];
@@ -130,7 +132,7 @@
   let drawn = "";
   function draw() {
     if (!stop) return;
-    stop.hidden = Boolean(state.recording);
+    stop.hidden = Boolean(state.recording || state.headless);
     stop.classList.toggle("going", Boolean(stopping));
     const label = stopping ? "stopping…" : "STOP";
     if (stop.firstChild.textContent !== label) stop.firstChild.textContent = label;
@@ -180,7 +182,7 @@
 
   // Caught before other handlers see it: a space would also press the button in focus.
   function key(event) {
-    if (event.code !== "Space" || state.recording || typing(event.target)) return;
+    if (event.code !== "Space" || stop?.hidden || typing(event.target)) return;
     event.preventDefault();
     event.stopImmediatePropagation();
     if (event.type === "keydown" && !event.repeat) halt("the space bar was pressed on the page");
