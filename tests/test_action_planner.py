@@ -82,6 +82,14 @@ def test_a_punch_whose_speed_is_certain_is_guarded_against_at_once() -> None:
         assert ActionPlanner(PARAMS).step(sure, EYE, 0.0).action == action
 
 
+def test_a_fist_has_come_on_since_its_picture_was_made() -> None:
+    """At 2.5 m/s from 1.7 m it arrives in 0.56 s, which is no threat yet; 0.2 s later it is."""
+    for late_s, action in ((0.0, "wait"), (0.2, "guard")):
+        planner = ActionPlanner(PARAMS)
+        plans = stepped(planner, [punch(k * 0.001, 1.7) for k in range(40)], late_s)
+        assert plans[-1].action == action
+
+
 @pytest.mark.parametrize(
     "comes",
     [{"speed_m_s": 0.7}, {"speed_m_s": -2.5}, {"aside_m": 0.5}, {"away_m": 3.0, "speed_m_s": 2.5}],

@@ -2,6 +2,7 @@
 
 import pickle
 from functools import cache
+from math import cos, radians, sin
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,9 +12,11 @@ from scipy.spatial.transform import Rotation
 from world_scripts import WORLDS, shipped_world
 
 from gazerig.gaze.types import Floats
+from gazerig.sim_mock.world.faces import looks
 from gazerig.sim_mock.world.figure import SEGMENTS, Figures
 from gazerig.sim_mock.world.rotations import rotation_matrix
-from gazerig.sim_mock.world.timeline import HEAD_M
+from gazerig.sim_mock.world.script import Act, PersonScript, PlaceScript, WorldScript
+from gazerig.sim_mock.world.timeline import HEAD_M, TimedAct
 from gazerig.sim_mock.world.world_scene import WorldScene
 
 STEP_S = 0.02
@@ -269,3 +272,39 @@ def test_a_rotation_matrix_is_that_of_its_quaternion() -> None:
     for turn in Rotation.random(20, rng=np.random.default_rng(3)):
         found = rotation_matrix(turn.as_quat(scalar_first=True))
         np.testing.assert_allclose(found, turn.as_matrix(), atol=1e-12)
+
+
+def test_a_head_does_not_turn_to_what_is_behind_it() -> None:
+    """Somebody who looks at a place behind stays ahead with the head; the eyes do what they can."""
+    t_s = np.arange(0.0, 4.0, 0.01)
+    eyes, ahead = np.tile((0.0, 0.0, 1.6), (len(t_s), 1)), np.zeros(len(t_s))
+    places = {
+        name: np.tile((cos(angle), sin(angle), 1.6), (len(t_s), 1))
+        for name, angle in (("aside", radians(60.0)), ("behind", radians(170.0)))
+    }
+    turned = {}
+    for name in places:
+        act = TimedAct(Act(at_s=1.0, do="look_at", to=name), 1.0, 1.0)
+        first = np.tile((1.0, 0.0, 1.6), (len(t_s), 1))
+        rng = np.random.default_rng(0)
+        found = looks(t_s, (act,), first, places, eyes, ahead, "head", rng)
+        turned[name] = float(np.degrees(found.yaw[len(t_s) // 2 :]).mean())
+    assert turned["aside"] > 40.0
+    assert abs(turned["behind"]) < 5.0
+
+
+def test_only_a_hand_before_the_camera_is_to_be_looked_at() -> None:
+    """One that reaches for what lies on the floor is below the picture all the time."""
+    found = {}
+    for name, height_m in (("level", 1.0), ("floor", 0.2)):
+        script = WorldScript(
+            {"p": PersonScript("near", acts=(Act(at_s=1.0, do="reach", to="it", for_s=2.8),))},
+            round_s=5.0,
+            places={
+                "near": PlaceScript(0.75, 0.0, facing_deg=180.0),
+                "it": PlaceScript(0.5, 0.1, height_m=height_m),
+            },
+        )
+        events = WorldScene(name, script).events()
+        found[name] = [event.name for event in events]
+    assert found == {"level": ["reach"], "floor": []}

@@ -65,6 +65,12 @@ def test_an_act_that_cannot_be_done_is_refused_at_its_line(
     assert f"own.yaml:{line}:" in text and said in text, text
 
 
+def test_acts_of_one_arm_keep_apart_by_what_varies(tmp_path: Path) -> None:
+    """The second begins 0.1 s after the first's end, but up to 0.3 s earlier by the seed."""
+    acts = "      - {at_s: 1, do: wave}\n      - {at_s: 3.7, do: punch, to: head, vary_s: 0.3}\n"
+    assert "keeps the right arm busy until 3.6 s; begin then" in refused(tmp_path, acts, "front")
+
+
 def test_two_people_cannot_be_at_one_place_at_once(tmp_path: Path) -> None:
     text = refused(tmp_path, "      - {at_s: 1, do: nod}\n", "front", "  ben:\n    start: front\n")
     assert "anna is at front then; choose another place or time" in text and ":9:" in text

@@ -223,3 +223,37 @@ def test_a_restart_lets_go_of_the_joint_until_torque_comes_on_again() -> None:
     arm(servo)
     bench.pass_ms(200)
     assert servo.position_steps == pytest.approx(moved, abs=3.0)
+
+
+def test_acceleration_is_fed_forward_as_by_servos_with_mechanics_of_their_own() -> None:
+    """With a profile and a soft controller the second gain sets the shaft in motion."""
+    first = {}
+    for gain in (0, 16000):
+        bench = _armed("desk", "neck_yaw", (100, 0, 0))
+        for servo in bench.both("neck_yaw"):
+            write(servo, "feedforward_2nd_gain", gain)
+            write(servo, "profile_acceleration", 300)
+            write(servo, "profile_velocity", 100)
+        world, own = _moves(bench, "neck_yaw", 100)
+        assert max(abs(a[0] - b[0]) for a, b in zip(world, own, strict=True)) < 0.03 * STEP
+        first[gain] = world[1][2]
+    assert first[16000] > first[0] + 0.1
+
+
+def test_a_stalled_motor_does_not_wind_up() -> None:
+    """Freed after a second it goes past its goal by no more than one that was never held."""
+    past = []
+    for held_ms in (0, 1000):
+        bench = _armed("desk", "neck_yaw", (1500, 300, 3000))
+        servo = bench.servos["neck_yaw"]
+        start = servo.position_steps
+        servo.jam(held_ms > 0)
+        write(servo, "goal_position", round(start) + 3 * STEP)
+        bench.pass_ms(held_ms)
+        servo.jam(False)
+        most = 0.0
+        for _ in range(120):
+            bench.pass_ms(5)
+            most = max(most, servo.position_steps - start)
+        past.append(most - 3 * STEP)
+    assert past[1] < past[0] + 5.0

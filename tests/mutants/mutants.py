@@ -1,4 +1,4 @@
-"""Mutants of gaze, perception, scanpath and drivers: one wrong line each, and who has to notice."""
+"""Mutants of gaze, perception, drivers, worlds and descriptions: a wrong line, and who notices."""
 
 from typing import NamedTuple
 
@@ -148,4 +148,50 @@ MUTANTS = (
            "three FF in a row begin a packet of the wrong servo", ("feetech_packets",)),
     Mutant("drivers/multi_bus.py", "if goal != goal:", "if False:",
            "NaN goes to the buses before the one that refuses it", ("mixed_bus", "bus_kinds", "bus_kinds_lost")),
+    # ---- action planner
+    Mutant("gaze/action_planner.py", "late_s = max(0.0, t_s - percept.captured_s)", "late_s = 0.0",
+           "a fist is taken to be where it was when the picture was made", ("action_planner",)),
+    Mutant("gaze/action_planner.py",
+           "places(face, hands, p_eye) if len(hands) >= HANDS or asked is not None else []",
+           "places(face, hands, p_eye)", "an opponent is open whose hands are not both known", ("action_planner",)),
+    Mutant("gaze/action_planner.py", "if t_s - self._attack_end_s < par.rest_ms / 1e3:", "if False:",
+           "attacks without a rest between them", ("action_planner",)),
+    Mutant("gaze/action_planner.py", "par.release_ratio if one.id == guarded else 1.0", "1.0",
+           "a guard drops as soon as the fist fails a limit", ("action_planner",)),
+    Mutant("robot/analysis/planner_score.py", "phase_s = at_s % self._round_s", "phase_s = at_s",
+           "attacks of later rounds are never into an open guard", ("behaviours", "action_planner_rerun")),
+    # ---- worlds
+    Mutant("sim_mock/world/physics.py", "            for device in self._devices:\n                device.positions_steps()\n", "",
+           "a servo nobody asks knows neither heat nor watchdog", ("world_servos", "world_rigs")),
+    Mutant("sim_mock/world/physics.py", "if self._warned[_UNSTABLE].any():", "if False:",
+           "a world that ran away begins anew, unseen", ("world_servos", "world_rigs", "world_model")),
+    Mutant("sim_mock/world/physics.py",
+           "self._pushes = [one for one in self._pushes if self._ms < one.until_ms]", "pass",
+           "a push lasts for ever", ("world_push",)),
+    Mutant("sim_mock/world/physics.py", "wrenches[one.body, 3:] += np.cross(lever, one.force_n)", "pass",
+           "a push acts on the centre of mass", ("world_push",)),
+    Mutant("sim_mock/world/shaft.py",
+           "self.volts = self.supply - self._built.sag * power if power > 0.0 else self.supply",
+           "self.volts = self.supply", "the supply does not sag", ("world_servos", "world_rigs")),
+    Mutant("sim_mock/world/shaft.py", "c += f2 * (rv - self._rv)", "pass",
+           "the second feed-forward gain does nothing", ("world_servos",)),
+    Mutant("sim_mock/world/shaft.py", "if (loop.i or loop.vi) and not clipped:", "if loop.i or loop.vi:",
+           "the I part winds up while the motor gives all it can", ("world_servos",)),
+    Mutant("sim_mock/world/state_file.py", "if self.count <= count:", "if True:",
+           "a reader that was overtaken returns half of two states", ("world_state_file",)),
+    Mutant("sim_mock/world/faces.py", "share = share * (1.0 - rise((np.abs(aside) - 1.9) / 1.0))", "pass",
+           "people turn their heads to what is behind them", ("world_people", "world_acts", "world_faces")),
+    Mutant("sim_mock/world/script_faults.py", "begins_s = one.act.at_s - spare_s", "begins_s = one.act.at_s",
+           "two acts of one arm may meet by what varies", ("world_scripts",)),
+    Mutant("sim_mock/world/world_scene.py", "and z > -0.35 * x)", ")",
+           "a hand below the picture counts as seen", ("world_acts", "world_scripts", "world_people")),
+    # ---- description
+    Mutant("robot/model/description/build.py", "edge = meet - up * shut", "edge = meet",
+           "lids do not meet where the rig says that they are shut", ("description",)),
+    Mutant("robot/model/description/build.py",
+           "place + share * (place - off)", "place", "the head is not balanced with its eyes and jaw", ("description",)),
+    Mutant("robot/model/description/clearance.py", "(free, middle) if deep else (middle, met)", "(free, met)",
+           "parts are said to meet at the joint's limit", ("clearance",)),
+    Mutant("robot/model/cut.py", "stumps[alone != side]", "stumps[alone == side]",
+           "a cut gives the wider part of a triangle to the wrong side", ("cut",)),
 )  # fmt: skip
