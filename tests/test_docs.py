@@ -27,6 +27,15 @@ from gazerig.drivers.servo_models import SERVOS
 from gazerig.gaze.gesture import LID_GROUPS, Gesture, KeyFrame
 from gazerig.robot.cli.examples import EXAMPLES
 from gazerig.robot.model.joint import JointParams
+from gazerig.robot.study.design import (
+    Exclusion,
+    Presentation,
+    Privacy,
+    StatisticalPlan,
+    StudyDesign,
+    Trials,
+)
+from gazerig.robot.study.questionnaire import Item, Questionnaire
 from gazerig.sim_mock.scenes.registry import scenes
 from gazerig.sim_mock.world.camera_params import WorldCameraParams
 from gazerig.sim_mock.world.script import (
@@ -140,6 +149,10 @@ def test_yaml_shown_has_keys_that_there_are() -> None:
         if "people" in data:
             _fits(Shape("params", params=WorldScript), data, "world")
             continue
+        if "conditions" in data or "items" in data:
+            form = StudyDesign if "conditions" in data else Questionnaire
+            _fits(Shape("params", params=form), data, form.__name__)
+            continue
         for key, value in data.items():
             if key in shapes_of(Rig):
                 _fits(shapes_of(Rig)[key], value, key)
@@ -180,7 +193,7 @@ def test_links_lead_somewhere(paper: Path) -> None:
             assert not anchor or anchor in slugs(file), f"{paper.name}: {link}"
 
 
-READERS_OWN = ("myrig.yaml", "my.yaml", "myhead.yaml", "agree.yaml", "greet.py")
+READERS_OWN = ("study.yaml", "myrig.yaml", "my.yaml", "myhead.yaml", "agree.yaml", "greet.py")
 """Files that a reader writes."""
 
 
@@ -291,6 +304,18 @@ def test_every_span_names_something_that_is_there(paper: Path) -> None:
     scripts = (WorldScript, PersonScript, PlaceScript, ThingScript, Act)
     words |= {field.name for script in scripts for field in fields(script)}
     words |= {*get_args(Do), *shipped_names("worlds"), HEAD}
+    forms = (
+        StudyDesign,
+        Presentation,
+        Trials,
+        StatisticalPlan,
+        Exclusion,
+        Privacy,
+        Questionnaire,
+        Item,
+    )
+    words |= {field.name for form in forms for field in fields(form)}
+    words |= {*shipped_names("studies"), *shipped_names("questionnaires")}
     for span in spans(paper):
         if span.startswith(("gazerig ", "--", "make ", "pip install ", "/dev/", "/etc/", "test_")):
             continue

@@ -1,9 +1,11 @@
 """Studies and questionnaires are read and checked as rigs are: file, line, key, rule and cure."""
 
+import json
 from pathlib import Path
 from textwrap import dedent, indent
 
 import pytest
+from command_line import typed
 
 from gazerig.config.faults import ConfigError
 from gazerig.config.shipped import shipped_names
@@ -273,6 +275,21 @@ def test_the_planner_is_a_behaviour_where_it_is_on(tmp_path: Path) -> None:
         )
     )
     assert load_study(str(file)).design.conditions["a"].behaviour == PLANNED
+
+
+def test_editors_get_a_schema_of_studies_and_questionnaires(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    schemas = {}
+    for kind in ("study", "questionnaire"):
+        assert typed("schema", "--of", kind) == 0
+        schemas[kind] = json.loads(capfd.readouterr().out)
+    design, asked = schemas["study"], schemas["questionnaire"]
+    assert design["required"] == ["title", "conditions", "questionnaires"]
+    assert design["properties"]["language"]["enum"] == ["en", "ja", "de"]
+    condition = design["$defs"]["Condition"]["properties"]
+    assert condition["params"]["additionalProperties"] in (True, {})  # any value of a rig's key
+    assert asked["$defs"]["Item"]["properties"]["points"]["maximum"] == 11
 
 
 QUESTIONNAIRE = "title: t\nsource: s\nlicence: l\nitems:\n  x: "

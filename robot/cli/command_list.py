@@ -114,7 +114,10 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
             "List buses, cameras, detectors, rules, gestures and rigs, of this program and of "
             "packages.",
         ),
-        "schema": CommandEntry("rig_check", "Export the JSON Schema of rig files, for editors."),
+        "schema": CommandEntry(
+            "rig_check",
+            "Export the JSON Schema of rig files, for editors; also of studies and questionnaires.",
+        ),
         "emulate": CommandEntry(
             "emulate",
             "Emulate servos on a pseudo-terminal; prints its path as JSON, takes fault commands.",

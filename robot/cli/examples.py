@@ -26,7 +26,10 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("describe my.yaml", "MJCF, URDF and glTF with meshes, in a folder named as the rig"),
         ("describe my.yaml --urdf out/", "URDF alone, in a folder of your choice"),
     ),
-    "schema": (("schema rig.schema.json", "let an editor complete and check rig files"),),
+    "schema": (
+        ("schema rig.schema.json", "let an editor complete and check rig files"),
+        ("schema study.schema.json --of study", "and studies"),
+    ),
     "kinds": (
         ("kinds", "what buses, cameras, detectors and rules there are, and from which package"),
         ("kinds --json", "the same for a program"),

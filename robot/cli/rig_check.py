@@ -1,8 +1,8 @@
-"""The commands check and schema: a rig's file alone."""
+"""The commands check and schema: files alone, of rigs and of studies."""
 
 import json
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -49,13 +49,19 @@ def collision_lines(rig: str) -> list[str]:
 @app.command()
 def schema(
     out: Annotated[Path | None, typer.Argument(help="File to write; default: print.")] = None,
+    of: Annotated[
+        Literal["rig", "study", "questionnaire"], typer.Option(help="Kind of the files.")
+    ] = "rig",
     force: ForceOption = False,
 ) -> None:
-    """Export the JSON Schema of rig files, for editors."""
+    """Export the JSON Schema of rig files, for editors; also of studies and questionnaires."""
     from gazerig.config.export import json_schema
     from gazerig.config.schema import Rig
+    from gazerig.robot.study.design import StudyDesign
+    from gazerig.robot.study.questionnaire import Questionnaire
 
-    text = json.dumps(json_schema(Rig), indent=2) + "\n"
+    kinds = {"rig": Rig, "study": StudyDesign, "questionnaire": Questionnaire}
+    text = json.dumps(json_schema(kinds[of]), indent=2) + "\n"
     if out is None:
         print(text, end="")
     else:
