@@ -17,6 +17,7 @@ from gazerig.robot.app.drawn_motion import MotionOfDrawn
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PUPIL_DISTANCE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.intrinsics import project
+from gazerig.robot.model.scene_view import PinholeView
 from gazerig.robot.perception.face_pose import face_pose
 from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
 from gazerig.sim_mock.world.gl_context import import_mujoco
@@ -90,7 +91,9 @@ class PosedPeople:
     def show(self, pose: Pose) -> ImageArray:
         """Return what the camera sees of a face."""
         self._pose = pose
-        image = self.picture.draw(pose.t_s, self.lens, self.size_px, OPTICAL, CAMERA_M).image
+        image = self.picture.draw(
+            PinholeView(pose.t_s, self.lens, self.size_px, OPTICAL, CAMERA_M)
+        ).image
         noise = self._rng.normal(0.0, self._noise, image.shape).astype(np.float32)
         noisy: ImageArray = cv2.add(image, noise, dtype=cv2.CV_8U).astype(np.uint8)
         return noisy
@@ -119,7 +122,7 @@ class PosedPeople:
 
     def draw(self) -> ImageArray:
         """Return what the camera sees of the people who are gathered."""
-        return self.picture.draw(1.0, self.lens, self.size_px, OPTICAL, CAMERA_M).image
+        return self.picture.draw(PinholeView(1.0, self.lens, self.size_px, OPTICAL, CAMERA_M)).image
 
     def close(self) -> None:
         """Free the renderer."""

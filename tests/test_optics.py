@@ -6,10 +6,10 @@ import pytest
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.intrinsics import project
+from gazerig.robot.model.scene_view import PinholeView, Rendered
 from gazerig.sim_mock.cameras.optics import (
     CameraMotion,
     OpticsParams,
-    Rendered,
     expose,
     through_lens,
     widest_px,
@@ -31,9 +31,9 @@ class Dots:
         self.times: list[float] = []
 
     def draw(
-        self, t_s: float, lens: Intrinsics, size_px: tuple[int, int], R: Mat3, p_m: Vec3,
-        *, depth: bool = False, rows: tuple[int, int] | None = None,
-    ) -> Rendered:  # fmt: skip
+        self, seen_by: PinholeView, *, depth: bool = False, rows: tuple[int, int] | None = None
+    ) -> Rendered:
+        t_s, lens, size_px, R, _ = seen_by
         self.times.append(t_s)
         image = np.zeros((size_px[1], size_px[0], 3), np.uint8)
         for x, y in np.rint(project(self.directions @ np.array(R), lens)).astype(int):
@@ -50,7 +50,7 @@ class Dots:
 def test_what_a_lens_bends_lands_where_the_programs_model_of_it_says(k1: float) -> None:
     lens = Intrinsics(120.0, 124.0, 82.0, 57.0, (k1, 0.05, 0.001, -0.002, 0.0))
     for direction in ((0.0, 0.0, 1.0), (0.4, -0.3, 1.0), (-0.55, 0.3, 1.0)):
-        seen = through_lens(Dots(direction), 0.0, lens, SIZE, LEVEL, HERE, depth=True)
+        seen = through_lens(Dots(direction), PinholeView(0.0, lens, SIZE, LEVEL, HERE), depth=True)
         light = seen.image[..., 0].astype(float)
         rows, columns = np.mgrid[0 : SIZE[1], 0 : SIZE[0]]
         place = (light * columns).sum() / light.sum(), (light * rows).sum() / light.sum()
@@ -76,7 +76,7 @@ def test_rows_are_read_from_the_first_to_the_last() -> None:
     assert seen.image.shape == (120, 160, 3)
     assert seen.depth_m is not None
     assert seen.depth_m.shape == (120, 160)
-    whole = Dots((0.0, 0.0, 1.0)).draw(0.0, LENS, SIZE, LEVEL, HERE)
+    whole = Dots((0.0, 0.0, 1.0)).draw(PinholeView(0.0, LENS, SIZE, LEVEL, HERE))
     assert (seen.image == whole.image).all()
 
 

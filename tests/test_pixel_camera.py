@@ -17,6 +17,7 @@ from gazerig.gaze.types import Angles2, Angles3, Mat3, Vec3
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams, PoseHistory
 from gazerig.robot.model.intrinsics import project
+from gazerig.robot.model.scene_view import PinholeView
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.face_pose import face_pose
 from gazerig.robot.perception.perception import Perception
@@ -82,7 +83,7 @@ class Still:
 
 def canvas_at(head_rad: Angles3 = (0.0, 0.0, 0.0), p_m: Vec3 = (0.0, 0.0, 0.0)) -> Canvas:
     R, p = MOUNT.pose(rotation(head_rad), p_m)
-    return Canvas(WIDTH, HEIGHT, LENS, R, p)
+    return Canvas(PinholeView(0.0, LENS, (WIDTH, HEIGHT), R, p))
 
 
 def level(_: float) -> tuple[Mat3, Vec3]:

@@ -13,6 +13,7 @@ from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Mat3
 from gazerig.robot.dashboard.feed.gaze_heat import draw_heat
 from gazerig.robot.dashboard.feed.gaze_trail import GazeTrail
+from gazerig.robot.model.scene_view import PinholeView
 from gazerig.sim_mock.scenes.picture import ScenePicture
 from gazerig.sim_mock.scenes.registry import scenes
 
@@ -32,9 +33,12 @@ def camera(yaw: float = 0.0, pitch: float = 0.0) -> Mat3:
 @pytest.mark.parametrize("name", sorted(scenes()))
 def test_every_scene_can_be_sent_and_drawn_at_any_time(name: str) -> None:
     picture = pickle.loads(pickle.dumps(ScenePicture(scenes()[name])))
-    drawn = [picture.draw(t_s, LENS, SIZE_PX, camera(), EYE_M) for t_s in (0.0, 5.0, 17.9)]
+    drawn = [
+        picture.draw(PinholeView(t_s, LENS, SIZE_PX, camera(), EYE_M)).image
+        for t_s in (0.0, 5.0, 17.9)
+    ]
     assert all(image.shape == (400, 640, 3) and image.dtype == np.uint8 for image in drawn)
-    again = picture.draw(5.0, LENS, SIZE_PX, camera(), EYE_M)
+    again = picture.draw(PinholeView(5.0, LENS, SIZE_PX, camera(), EYE_M)).image
     assert np.array_equal(again, drawn[1])
 
 
@@ -43,7 +47,7 @@ def test_the_picture_turns_with_the_camera() -> None:
 
     def middle(yaw: float) -> float:
         """The column about which the visitor's blue shirt lies."""
-        image = picture.draw(2.0, LENS, SIZE_PX, camera(yaw), EYE_M).astype(int)
+        image = picture.draw(PinholeView(2.0, LENS, SIZE_PX, camera(yaw), EYE_M)).image.astype(int)
         shirt = (image[..., 0] > image[..., 2] + 40) & (np.arange(400) > 260)[:, None]
         return float(np.argwhere(shirt)[:, 1].mean())
 
@@ -53,9 +57,9 @@ def test_the_picture_turns_with_the_camera() -> None:
 def test_nothing_in_front_of_the_camera_and_a_face_at_the_lens_are_drawn_without_harm() -> None:
     picture = ScenePicture(scenes()["visitor"])
     for yaw, pitch in ((pi, 0.0), (0.0, 1.4), (0.0, -1.4)):
-        assert picture.draw(2.0, LENS, SIZE_PX, camera(yaw, pitch), EYE_M).any()
+        assert picture.draw(PinholeView(2.0, LENS, SIZE_PX, camera(yaw, pitch), EYE_M)).image.any()
     for at_m in ((0.97, -0.05, 0.24), (1.0, -0.05, 0.24), (0.9, -0.05, 0.2)):
-        assert picture.draw(2.0, LENS, SIZE_PX, camera(), at_m).any()
+        assert picture.draw(PinholeView(2.0, LENS, SIZE_PX, camera(), at_m)).image.any()
 
 
 def test_the_control_loop_need_not_load_opencv_to_name_a_picture() -> None:

@@ -16,10 +16,10 @@ from gazerig.gaze.angles import compose, rotate, rotation, sub
 from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.robot.model.description.links import IDENTITY, ORIGIN
 from gazerig.robot.model.intrinsics import project
+from gazerig.robot.model.scene_view import PinholeView, Rendered
 from gazerig.sim_mock.cameras.optics import (
     CameraMotion,
     OpticsParams,
-    Rendered,
     expose,
     smeared,
     through_lens,
@@ -110,7 +110,7 @@ def test_a_point_lands_where_the_programs_own_lens_says(
 ) -> None:
     pixels, away_m = visible(*pose, lens)
     assert len(pixels) >= 2
-    seen = through_lens(balls.picture, 0.0, lens, SIZE, *pose, depth=True)
+    seen = through_lens(balls.picture, PinholeView(0.0, lens, SIZE, *pose), depth=True)
     off = landed(seen, pixels) - pixels
     assert np.abs(off).max() < 0.5
     assert seen.depth_m is not None
@@ -122,8 +122,8 @@ def test_a_point_lands_where_the_programs_own_lens_says(
 
 def test_rows_alone_are_those_of_the_whole_picture(balls: Balls) -> None:
     for lens in (LENS, BENT):
-        whole = through_lens(balls.picture, 0.0, lens, SIZE, *POSES[1])
-        part = through_lens(balls.picture, 0.0, lens, SIZE, *POSES[1], rows=(90, 150))
+        whole = through_lens(balls.picture, PinholeView(0.0, lens, SIZE, *POSES[1]))
+        part = through_lens(balls.picture, PinholeView(0.0, lens, SIZE, *POSES[1]), rows=(90, 150))
         assert part.image.shape == (60, 320, 3)
         assert np.abs(part.image.astype(int) - whole.image[90:150]).max() <= 40  # samples at edges
         assert np.abs(part.image.astype(int) - whole.image[90:150]).mean() < 0.05
@@ -228,11 +228,11 @@ def test_the_head_that_carries_the_camera_does_not_see_itself() -> None:
 
 
 def test_several_threads_may_use_one_renderer_and_it_can_be_closed_twice(balls: Balls) -> None:
-    expected = balls.picture.draw(0.0, LENS, SIZE, *POSES[0]).image
+    expected = balls.picture.draw(PinholeView(0.0, LENS, SIZE, *POSES[0])).image
     found: list[np.ndarray] = []
 
     def draw() -> None:
-        found.append(balls.picture.draw(0.0, LENS, SIZE, *POSES[0]).image)
+        found.append(balls.picture.draw(PinholeView(0.0, LENS, SIZE, *POSES[0])).image)
 
     threads = [threading.Thread(target=draw) for _ in range(3)]
     for thread in threads:
@@ -242,10 +242,10 @@ def test_several_threads_may_use_one_renderer_and_it_can_be_closed_twice(balls: 
     assert len(found) == 3
     assert all((image == expected).all() for image in found)
     other = Balls(ONE)
-    other.picture.draw(0.0, LENS, SIZE, *POSES[0])
+    other.picture.draw(PinholeView(0.0, LENS, SIZE, *POSES[0]))
     other.picture.close()
     other.picture.close()
-    assert (balls.picture.draw(0.0, LENS, SIZE, *POSES[0]).image == expected).all()
+    assert (balls.picture.draw(PinholeView(0.0, LENS, SIZE, *POSES[0])).image == expected).all()
 
 
 def refused(**environment: str) -> str:
@@ -299,10 +299,10 @@ def test_places_of_a_camera_are_as_from_where_its_rig_stands(balls: Balls) -> No
     elsewhere = Balls(R_world_base=turned, p_world_base_m=stands_m)
     try:
         seen = elsewhere.picture.draw(
-            0.0, LENS, SIZE, compose(back, R), rotate(back, sub(p_m, stands_m))
+            PinholeView(0.0, LENS, SIZE, compose(back, R), rotate(back, sub(p_m, stands_m)))
         )
     finally:
         elsewhere.picture.close()
-    here = balls.picture.draw(0.0, LENS, SIZE, R, p_m)
+    here = balls.picture.draw(PinholeView(0.0, LENS, SIZE, R, p_m))
     assert here.image.max() > 200
     assert np.abs(seen.image.astype(int) - here.image.astype(int)).max() <= 8

@@ -34,6 +34,7 @@ from gazerig.robot.app.world_poses import SimulatedPoses, WorldPoses
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens
+from gazerig.robot.model.scene_view import PinholeView
 from gazerig.robot.perception.motion_source import motion_finder
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.scenes.scene import Scene
@@ -43,7 +44,7 @@ from gazerig.sim_mock.world.state_file import HostState
 from gazerig.sim_mock.world.world_spec import WorldSpec
 
 if TYPE_CHECKING:
-    from gazerig.sim_mock.cameras.optics import SceneView
+    from gazerig.robot.model.scene_view import SceneView
     from gazerig.sim_mock.cameras.rendered import FindMotion, PixelCamera
 
 HEAD_LINK = "head"
@@ -114,7 +115,7 @@ class RenderedWorld(NamedTuple):
             params, self.scene, self.mount, head, detector, self.rng, find_motion, locate, view,
             lens, begins_s,
         )  # fmt: skip
-        view.draw(0.0, lens, size_px, _LEVEL, (0.0, 0.0, 0.0))
+        view.draw(PinholeView(0.0, lens, size_px, _LEVEL, (0.0, 0.0, 0.0)))
         return camera
 
 

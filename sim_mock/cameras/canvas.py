@@ -10,8 +10,8 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.gaze.types import Mat3, Vec3
+from gazerig.gaze.types import Vec3
+from gazerig.robot.model.scene_view import PinholeView
 
 Floats = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
@@ -36,16 +36,18 @@ class TexturedQuad(NamedTuple):
 class Canvas:
     """The image of one camera at one position: colours and distances along its axis.
 
+    Args:
+        seen_by: the camera.
+
     image: (h, w, 3) BGR; depth_m: (h, w) float32, infinite where nothing was drawn
     """
 
-    def __init__(
-        self, width_px: int, height_px: int, lens: Intrinsics, R_world_camera: Mat3, p_m: Vec3
-    ) -> None:
+    def __init__(self, seen_by: PinholeView) -> None:
+        _, lens, (width_px, height_px), R, p_m = seen_by
         self.image: Bytes = np.zeros((height_px, width_px, 3), np.uint8)
         self.depth_m = np.full((height_px, width_px), np.inf, np.float32)
         self.lens = lens
-        self.R_world_camera = np.array(R_world_camera)
+        self.R_world_camera = np.array(R)
         self.p_m = np.array(p_m)
 
     def seen(self, points_world_m: ArrayLike) -> Floats:

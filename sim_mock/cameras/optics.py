@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, hypot
-from typing import Annotated, NamedTuple, Protocol
+from typing import Annotated, NamedTuple
 
 import cv2
 import numpy as np
@@ -20,6 +20,7 @@ from gazerig.drivers.types import ImageArray
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.model.intrinsics import rays
+from gazerig.robot.model.scene_view import PinholeView, Rendered, SceneView
 
 _BORDER_PX = 1.0
 _MOST_PIXELS = 4.0  # of an ideal picture, as a multiple of what the lens shows of it
@@ -39,45 +40,6 @@ class OpticsParams:
         "blur of the lens: standard deviation in pixels; it softens jagged edges, too"] = 0.0
     bands: Annotated[int, Bounds(2, 64), "bands of rows that are drawn one after another for a rolling shutter"] = 8
     # fmt: on
-
-
-class Rendered(NamedTuple):
-    """A picture: image (h, w, 3) BGR; depth_m (h, w) along the axis, inf where nothing is."""
-
-    image: ImageArray
-    depth_m: NDArray[np.float32] | None
-
-
-class SceneView(Protocol):
-    """Draws what a pinhole camera sees at an instant."""
-
-    def draw(
-        self,
-        t_s: float,
-        lens: Intrinsics,
-        size_px: tuple[int, int],
-        R: Mat3,
-        p_m: Vec3,
-        *,
-        depth: bool = False,
-        rows: tuple[int, int] | None = None,
-    ) -> Rendered:
-        """Return a picture.
-
-        Args:
-            t_s: time since the scene began, seconds.
-            lens: of the camera, for pictures of this size; its distortion is not drawn.
-            size_px: width and height.
-            R: rotation of the camera in the world, its axes optical.
-            p_m: position of the camera in the world.
-            depth: with distances.
-            rows: the first row and the one after the last, where only these are wanted.
-        """
-        ...
-
-    def close(self) -> None:
-        """Free what drawing needs; safe to call twice."""
-        ...
 
 
 class CameraMotion(NamedTuple):
@@ -189,9 +151,8 @@ def _averaged(
         after_s = late_s + exposure_s * ((i + 0.5) / count - 0.5)
         R, p_m = motion.pose(after_s)
         middle = depth and i == count // 2
-        image, metres = through_lens(
-            view, t_s + after_s, lens, size_px, R, p_m, depth=middle, rows=rows
-        )
+        seen_by = PinholeView(t_s + after_s, lens, size_px, R, p_m)
+        image, metres = through_lens(view, seen_by, depth=middle, rows=rows)
         if count == 1:
             return Rendered(image, metres)
         seen = metres if middle else seen
@@ -203,24 +164,22 @@ def _averaged(
 
 def through_lens(
     view: SceneView,
-    t_s: float,
-    lens: Intrinsics,
-    size_px: tuple[int, int],
-    R: Mat3,
-    p_m: Vec3,
+    seen_by: PinholeView,
     *,
     depth: bool = False,
     rows: tuple[int, int] | None = None,
 ) -> Rendered:
     """Return what is seen through a lens that may distort; see ``SceneView.draw``."""
+    lens, size_px = seen_by.lens, seen_by.size_px
     if not lens.distorts:
-        return view.draw(t_s, lens, size_px, R, p_m, depth=depth, rows=rows)
+        return view.draw(seen_by, depth=depth, rows=rows)
     ideal, ideal_px, columns, lines = _undistorting(lens, size_px)
     top, bottom = rows or (0, size_px[1])
     columns, lines = columns[top:bottom], lines[top:bottom]
     first = max(0, int(lines.min()) - 1) if rows else 0
     last = min(ideal_px[1], ceil(float(lines.max())) + 2) if rows else ideal_px[1]
-    drawn = view.draw(t_s, ideal, ideal_px, R, p_m, depth=depth, rows=(first, last))
+    straight = seen_by._replace(lens=ideal, size_px=ideal_px)
+    drawn = view.draw(straight, depth=depth, rows=(first, last))
     lines = lines - np.float32(first)
     edge = cv2.BORDER_REPLICATE
     bent = cv2.remap(drawn.image, columns, lines, cv2.INTER_LINEAR, borderMode=edge)

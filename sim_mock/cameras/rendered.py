@@ -23,14 +23,13 @@ from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.params import Bounds
 from gazerig.robot.model.frames import CameraMount
+from gazerig.robot.model.scene_view import PinholeView, Rendered, SceneView
 from gazerig.sim_mock.cameras.canvas import Canvas
 from gazerig.sim_mock.cameras.draw_person import draw_arm_of, draw_person, draw_thing
 from gazerig.sim_mock.cameras.draw_room import draw_room
 from gazerig.sim_mock.cameras.optics import (
     CameraMotion,
     OpticsParams,
-    Rendered,
-    SceneView,
     expose,
 )
 from gazerig.sim_mock.cameras.sensor import Sensor, SensorParams
@@ -226,19 +225,11 @@ class DrawnScene(NamedTuple):
     room_seed: int = 0
 
     def draw(
-        self,
-        t_s: float,
-        lens: Intrinsics,
-        size_px: tuple[int, int],
-        R: Mat3,
-        p_m: Vec3,
-        *,
-        depth: bool = False,
-        rows: tuple[int, int] | None = None,
+        self, seen_by: PinholeView, *, depth: bool = False, rows: tuple[int, int] | None = None
     ) -> Rendered:
         """Return a picture; see ``SceneView.draw``."""
-        canvas = Canvas(*size_px, lens, R, p_m)
-        draw_scene(canvas, self.scene, t_s, self.room_seed)
+        canvas = Canvas(seen_by)
+        draw_scene(canvas, self.scene, seen_by.t_s, self.room_seed)
         wanted = slice(*(rows or (None,)))
         return Rendered(canvas.image[wanted], canvas.depth_m[wanted] if depth else None)
 

@@ -11,13 +11,13 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import ImageArray
 from gazerig.gaze.angles import rotation
-from gazerig.gaze.types import Floats, Mat3, Vec3
+from gazerig.gaze.types import Floats, Vec3
 from gazerig.robot.model.mesh import turned
 from gazerig.robot.model.paint import Painted, painted
 from gazerig.robot.model.person_shape import LOOKS, hand, head_parts, torso
+from gazerig.robot.model.scene_view import PinholeView
 from gazerig.sim_mock.cameras.canvas import Canvas
 from gazerig.sim_mock.cameras.draw_arm import elbow_m, shoulder_m
 from gazerig.sim_mock.scenes.scene import Scene, ScenePerson
@@ -36,21 +36,13 @@ _TABLE_M = -0.55
 _BALL_BGR = (190, 150, 110)
 
 
-def draw_picture(
-    scene: Scene,
-    scene_s: float,
-    lens: Intrinsics,
-    size_px: tuple[int, int],
-    R: Mat3,
-    p_m: Vec3,
-) -> ImageArray:
-    """Return what a camera sees of a scene, BGR; see ``DrawPicture.draw`` for the arguments."""
-    width, height = size_px
-    canvas = Canvas(width, height, lens, R, p_m)
+def draw_picture(scene: Scene, seen_by: PinholeView) -> ImageArray:
+    """Return what a camera sees of a scene, BGR."""
+    canvas, p_m = Canvas(seen_by), seen_by.p_m
     _draw_room(canvas)
-    people = scene.people(scene_s)
+    people = scene.people(seen_by.t_s)
     solids = [solid for i, one in enumerate(people) for solid in _person(one, i, p_m)]
-    for thing in scene.things(scene_s):
+    for thing in scene.things(seen_by.t_s):
         if thing.person is not None and thing.person < len(people):
             solids += _arm(people[thing.person], thing.person, thing.p_world_m, p_m)
         elif thing.kind == "hand":

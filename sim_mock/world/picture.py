@@ -4,11 +4,10 @@ from collections.abc import Callable, Collection
 
 import mujoco
 
-from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.gaze.angles import add, compose, rotate
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.description.links import IDENTITY, ORIGIN
-from gazerig.sim_mock.cameras.optics import Rendered
+from gazerig.robot.model.scene_view import PinholeView, Rendered
 from gazerig.sim_mock.world.renderer import Renderer, RendererParams
 
 PlaceBodies = Callable[[mujoco.MjData, float], None]
@@ -53,21 +52,14 @@ class WorldPicture:
         return self._renderer.backend if self._renderer is not None else ""
 
     def draw(
-        self,
-        t_s: float,
-        lens: Intrinsics,
-        size_px: tuple[int, int],
-        R: Mat3,
-        p_m: Vec3,
-        *,
-        depth: bool = False,
-        rows: tuple[int, int] | None = None,
+        self, seen_by: PinholeView, *, depth: bool = False, rows: tuple[int, int] | None = None
     ) -> Rendered:
         """Return a picture; see ``SceneView.draw``.
 
         Raises:
             NoRenderer: nothing on this machine can render.
         """
+        t_s, lens, size_px, R, p_m = seen_by
         self._place(self._data, t_s)
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)

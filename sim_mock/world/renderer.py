@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.gaze.types import Floats
 from gazerig.params import Bounds
-from gazerig.sim_mock.cameras.optics import Rendered
+from gazerig.robot.model.scene_view import Rendered
 from gazerig.sim_mock.world.gl_context import Backend, Context, open_context
 
 _NEAREST_M, _FARTHEST_M = 0.02, 60.0

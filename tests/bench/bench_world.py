@@ -48,6 +48,7 @@ from gazerig.robot.app.options import RunOptions  # noqa: E402
 from gazerig.robot.control.loop import run  # noqa: E402
 from gazerig.robot.control.tick import Tick  # noqa: E402
 from gazerig.robot.model.intrinsics import project  # noqa: E402
+from gazerig.robot.model.scene_view import PinholeView  # noqa: E402
 from gazerig.sim_mock.cameras.optics import CameraMotion, OpticsParams, expose  # noqa: E402
 from gazerig.sim_mock.scenes.scene import ScenePerson  # noqa: E402
 from gazerig.sim_mock.true_gaze import gaze_off_rad, true_part  # noqa: E402
@@ -271,7 +272,7 @@ def scripts(args: argparse.Namespace) -> None:
         detectors = _detectors(args.yunet)
         for t_s in np.linspace(1.0, script.round_s - 1.0, moments):
             R = compose(rotation((float(rng.uniform(-0.4, 0.4)), 0.1, 0.0)), OPTICAL)
-            image = picture.draw(float(t_s), lens, (320, 240), R, CAMERA_M).image
+            image = picture.draw(PinholeView(float(t_s), lens, (320, 240), R, CAMERA_M)).image
             noise = rng.normal(0.0, 3.0, image.shape).astype(np.float32)
             image = cv2.add(image, noise, dtype=cv2.CV_8U).astype(np.uint8)
             true = [_seen(one, R, lens) for one in scene.people(float(t_s))]

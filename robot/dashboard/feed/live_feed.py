@@ -24,9 +24,9 @@ from gazerig.robot.dashboard.feed.gaze_trail import GazeTrail
 from gazerig.robot.dashboard.feed.overlay_choices import OverlayChoices
 from gazerig.robot.dashboard.feed.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts
 from gazerig.robot.model.description.build import RigShape
-from gazerig.robot.model.draw_picture import DrawPicture
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
+from gazerig.robot.model.scene_view import PinholeView, SceneView
 from gazerig.robot.model.types import Level, OtherHead, Snapshot
 from gazerig.robot.model.world_shapes import WorldShapes
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
@@ -50,7 +50,7 @@ class LiveRig(NamedTuple):
     rate_hz: float
     shown: ShownRig
     emulated: bool = False
-    picture: DrawPicture | None = None
+    picture: SceneView | None = None
     world: WorldShapes | None = None
 
 
@@ -156,7 +156,7 @@ class LiveFeed:
         self.choices = OverlayChoices()
         self.watched = True
         self.shown_s: float | None = None
-        self._picture: DrawPicture | None = None
+        self._picture: SceneView | None = None
         self._world: WorldShapes | None = None
         self._trail = GazeTrail()
         self._builder: SnapshotBuilder | None = None
@@ -254,8 +254,8 @@ class LiveFeed:
         if not _blank(found) or self._picture is None or start_s is None:
             return found
         size_px = found.width_px, found.height_px
-        drawn = self._picture.draw(found.captured_s - start_s, lens, size_px, R, p_m)
-        return replace(found, image=drawn)
+        seen_by = PinholeView(found.captured_s - start_s, lens, size_px, R, p_m)
+        return replace(found, image=self._picture.draw(seen_by).image)
 
     def _take_rig(self, rig: LiveRig) -> None:
         if self._builder is None:
