@@ -10,6 +10,7 @@ from study_records import QUESTIONS, design, pairs, records
 from gazerig.robot.study.design import Hypothesis, Trials
 from gazerig.robot.study.measures import measures
 from gazerig.robot.study.participation import participation
+from gazerig.robot.study.power import PowerQuestion, power_of
 from gazerig.robot.study.scores import scores, wins
 from gazerig.robot.study.simulation import (
     BETWEEN_SD,
@@ -24,6 +25,7 @@ from gazerig.robot.study.simulation import (
     rated,
     shift_of,
 )
+from gazerig.robot.study.statistics.ranks import exact_signed_rank
 
 
 @pytest.mark.parametrize("points", [2, 5, 7, 11])
@@ -46,6 +48,15 @@ def test_means_of_scales_and_repetitions_have_it_too(items: int, repetitions: in
     found = means[0] - means[1]
     assert found.mean() / found.std() == pytest.approx(0.6, abs=0.025)
     assert effect_of(shift, 5, items, repetitions) == pytest.approx(0.6)
+
+
+@pytest.mark.parametrize(("people", "effect"), [(12, 0.8), (24, 0.6), (40, 0.5)])
+def test_500_studies_find_as_often_as_their_design_claims(people: int, effect: float) -> None:
+    """tests/bench/bench_study.py lets 500 studies go the whole way, for each test."""
+    rows = differences(effect, (500, people), np.random.default_rng(5))
+    share = np.mean([exact_signed_rank(row) <= 0.05 for row in rows])
+    claimed = power_of(PowerQuestion("signed_rank", effect, 0.05), people)
+    assert share == pytest.approx(claimed, abs=0.03)
 
 
 def test_levels_follow_the_hypotheses() -> None:

@@ -46,6 +46,7 @@ class DatasetDescription(NamedTuple):
     subject, task: names, made to letters and digits in file names
     rate_hz: control rate of the run; started_utc: wall clock at its start, "" where unknown
     made_by: names and versions of what recorded and wrote it
+    run: number among several of one subject and task, None where there is one alone
     """
 
     subject: str
@@ -53,6 +54,7 @@ class DatasetDescription(NamedTuple):
     rate_hz: float
     started_utc: str
     made_by: str
+    run: int | None = None
 
 
 class _RecordedEye(NamedTuple):
@@ -82,8 +84,9 @@ def write_bids(
     """
     subject, task = f"sub-{label_of(about.subject)}", label_of(about.task)
     folder = root / subject / "beh"
-    _refuse_foreign(root, force)
-    stems = [folder / f"{subject}_task-{task}_recording-{eye.label}" for eye in _eyes(trace)]
+    refuse_foreign(root, force)
+    run = "" if about.run is None else f"_run-{about.run:02d}"
+    stems = [folder / f"{subject}_task-{task}{run}_recording-{eye.label}" for eye in _eyes(trace)]
     for stem in stems:
         there = stem.with_name(f"{stem.name}_physio.tsv.gz")
         if there.exists() and not force:
@@ -96,8 +99,12 @@ def write_bids(
     return tuple(made)
 
 
-def _refuse_foreign(root: Path, force: bool) -> None:
-    """Refuse to put a run into another data set, or among files that are none."""
+def refuse_foreign(root: Path, force: bool = False) -> None:
+    """Refuse to put a run into another data set, or among files that are none.
+
+    Raises:
+        SetupError: the folder holds something that gazerig has not made.
+    """
     if force or not root.is_dir() or not any(root.iterdir()):
         return
     try:
@@ -110,6 +117,15 @@ def _refuse_foreign(root: Path, force: bool) -> None:
     raise SetupError(
         f"{root} is there and is no data set of gazerig: name another folder, or use --force"
     )
+
+
+def generated(made_by: str) -> dict[str, object]:
+    """Return what a description says of a data set's making, by which it is known again."""
+    return {
+        "BIDSVersion": BIDS_VERSION,
+        "DatasetType": "raw",
+        "GeneratedBy": [{"Name": _GENERATOR, "Description": made_by}],
+    }
 
 
 def label_of(name: str) -> str:
@@ -149,9 +165,7 @@ def _write_frame(root: Path, subject: str, about: DatasetDescription) -> Iterato
     """Write what a data set has beside its recordings; what is there of it stays."""
     description = {
         "Name": "Gaze of an animatronic head",
-        "BIDSVersion": BIDS_VERSION,
-        "DatasetType": "raw",
-        "GeneratedBy": [{"Name": _GENERATOR, "Description": about.made_by}],
+        **generated(about.made_by),
     }
     readme = (
         "# Gaze of an animatronic head\n\nThe participants are robots. What an eye tracker would\n"
