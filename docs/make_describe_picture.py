@@ -14,7 +14,7 @@ from gazerig.robot.model.description.files import description_files
 PICTURE = Path(__file__).parent / "figures" / "describe.png"
 _SIZE = (520, 640)
 _POSES = {
-    "desk": {"left_upper_lid": 20.0, "right_upper_lid": 20.0, "neck_yaw": -8.0},
+    "desk": {"left_upper_lid": 16.9, "right_upper_lid": 16.9, "neck_yaw": -8.0},
     "expressive": {
         "left_upper_lid": 20.0, "right_upper_lid": 20.0, "jaw": 14.0, "left_brow": 12.0,
         "right_brow": 12.0, "neck_yaw": 14.0, "eyes_pan": -12.0,

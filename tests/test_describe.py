@@ -51,6 +51,24 @@ def test_all_files_are_read_by_others(written: Path) -> None:
     assert sum(path.stat().st_size for path in written.rglob("*") if path.is_file()) < 5e6
 
 
+def test_lids_are_open_at_first_and_pupils_free(written: Path) -> None:
+    """Joints keep their angles: it is where MuJoCo and glTF begin that differs from 0."""
+    model = mujoco.MjModel.from_xml_path(str(written / "expressive.xml"))
+    began = {model.joint(i).name: float(np.degrees(model.qpos0[i])) for i in range(model.njnt)}
+    lids = {name: began.pop(name) for name in ("left_upper_lid", "right_upper_lid")}
+    assert lids == pytest.approx(dict.fromkeys(lids, 16.875))  # 24 deg above the middle
+    assert set(began.values()) == {0.0}
+    description = description_of(shipped("expressive"), looks=False)
+    scene = trimesh.load_scene(written / "expressive.glb")
+    upright, _ = scene.graph.get("base_link")
+    poses = description.poses({joint.name: joint.awake_rad for joint in description.joints})
+    for link in ("left_upper_lid_link", "right_upper_lid_link", "head", "left_eye"):
+        matrix, _ = scene.graph.get(link)
+        R, p = poses[link]
+        assert np.allclose((np.linalg.inv(upright) @ matrix)[:3, :3], R, atol=1e-6)
+        assert np.allclose((np.linalg.inv(upright) @ matrix)[:3, 3], p, atol=1e-6)
+
+
 def _links(rig: str) -> tuple[Any, ...]:
     return description_of(shipped(rig)).links
 

@@ -40,6 +40,11 @@ def _in_mujoco(description: Description, angles: Mapping[str, float]) -> Poses:
     return _mujoco_poses(model, description, angles)
 
 
+def _in_mujoco_awake(description: Description, angles: Mapping[str, float]) -> Poses:
+    text = mjcf(description, looks=False, awake=True).xml
+    return _mujoco_poses(mujoco.MjModel.from_xml_string(text), description, angles)
+
+
 def _mujoco_poses(
     model: mujoco.MjModel, description: Description, angles: Mapping[str, float]
 ) -> Poses:
@@ -72,7 +77,7 @@ def _in_yourdfpy(description: Description, angles: Mapping[str, float]) -> Poses
     return {name: (matrix[:3, :3], matrix[:3, 3]) for name, matrix in found.items()}
 
 
-READERS = (_own, _in_mujoco, _in_mujoco_from_urdf, _in_yourdfpy)
+READERS = (_own, _in_mujoco, _in_mujoco_awake, _in_mujoco_from_urdf, _in_yourdfpy)
 
 
 @pytest.mark.parametrize("name", SHIPPED)

@@ -8,7 +8,7 @@ with their signs (robot/model/kinematics.py).
 
 from collections.abc import Mapping
 from itertools import combinations, product
-from math import radians
+from math import copysign, radians
 from typing import NamedTuple
 
 from gazerig.gaze.angles import rotation
@@ -203,7 +203,9 @@ class _Builder:
         meet = self._meet_rad(side)
         # With the joint at 0 the edge is so far above the eye's equator.
         edge = meet - up * shut
-        joint = self._joint(name, (0.0, -up, 0.0))
+        opened = parts.awake_opening_rad(which == "upper", meet, abs(wide - shut))
+        awake = shut + copysign(opened, wide - shut)
+        joint = self._joint(name, (0.0, -up, 0.0))._replace(awake_rad=awake)
         place = parts.eye_m(side, self._measures.interocular_m)
         self._links.append(
             parts.lid(link_of(name), HEAD, place, joint, self._measures, which == "upper", edge)

@@ -1,7 +1,8 @@
 """A description as binary glTF: a tree of nodes with meshes, for browsers and modelling programs.
 
-A joint is a node of its own between a link and its parent: turned about the axis that stands in
-its extras, it moves what hangs on it. y is up, as glTF wants it, under a root that turns z up.
+A joint is a node of its own between a link and its parent: its rotation is by the joint's angle
+about the axis that stands in its extras, and moves what hangs on it. y is up, as glTF wants it,
+under a root that turns z up.
 """
 
 from collections.abc import Collection
@@ -14,8 +15,16 @@ from PIL import Image
 from trimesh.exchange.gltf import export_glb
 from trimesh.visual.material import PBRMaterial
 
+from gazerig.gaze.angles import compose
 from gazerig.gaze.types import Floats, Mat3, Vec3
-from gazerig.robot.model.description.links import IDENTITY, ORIGIN, Description, Finish, Visual
+from gazerig.robot.model.description.links import (
+    IDENTITY,
+    ORIGIN,
+    Description,
+    Finish,
+    Visual,
+    turn_about,
+)
 from gazerig.robot.model.description.texture import textured
 
 _ROUGHNESS: dict[Finish, float] = {
@@ -28,7 +37,7 @@ _VERTICES, _FACES = 34962, 34963
 
 
 def gltf(description: Description) -> bytes:
-    """Return a description as a binary glTF file, all joints at 0."""
+    """Return a description as a binary glTF file, its lids open and all other joints at 0."""
     scene: Any = trimesh.Scene(base_frame=_ROOT)
     names = {_ROOT, *(link.name for link in description.links)}
     names |= {f"{look.name}_mesh" for link in description.links for look in link.visuals}
@@ -38,6 +47,7 @@ def gltf(description: Description) -> bytes:
         R, p = (link.R, link.p_m) if link.parent else (_Y_UP, ORIGIN)
         if link.joint is not None:
             node = _free(link.joint.name, {*names, *joints})
+            R = compose(R, turn_about(link.joint.axis, link.joint.awake_rad))
             scene.graph.update(frame_from=parent, frame_to=node, matrix=_matrix(R, p))
             joints[node] = {
                 "joint": link.joint.name,

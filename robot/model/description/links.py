@@ -70,6 +70,7 @@ class LinkJoint(NamedTuple):
     name: as in the rig, or one of its own where it follows another joint
     axis: unit vector in the link's frame; positive angles turn about it by the right-hand rule
     max_torque_nm: of the servo at the joint
+    awake_rad: where it is while the head is awake and looks straight ahead
     """
 
     name: str
@@ -79,6 +80,7 @@ class LinkJoint(NamedTuple):
     max_speed_rad_s: float
     max_torque_nm: float
     follows: Follows | None = None
+    awake_rad: float = 0.0
 
 
 class Link(NamedTuple):

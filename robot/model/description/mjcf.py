@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from math import atan, degrees, tan
 from typing import NamedTuple
 
+from gazerig.gaze.angles import compose
 from gazerig.robot.model.description.links import (
     IDENTITY,
     CollisionShape,
@@ -17,6 +18,7 @@ from gazerig.robot.model.description.links import (
     Link,
     LinkJoint,
     Visual,
+    turn_about,
 )
 from gazerig.robot.model.description.mesh_files import mesh_files
 from gazerig.robot.model.description.numbers import numbers
@@ -42,7 +44,12 @@ class Mjcf(NamedTuple):
 
 
 def mjcf(
-    description: Description, prefix: str = "", folder: str = "", *, looks: bool = True
+    description: Description,
+    prefix: str = "",
+    folder: str = "",
+    *,
+    looks: bool = True,
+    awake: bool = False,
 ) -> Mjcf:
     """Return a description as MJCF.
 
@@ -51,6 +58,7 @@ def mjcf(
         prefix: before the name of everything, so that two rigs fit in one world.
         folder: of the meshes and textures, relative to the text.
         looks: with what can be seen; without, it is the same mechanism without files.
+        awake: its lids are open at first, else all joints are at 0.
     """
     if not looks:
         description = description.without_looks()
@@ -65,7 +73,7 @@ def mjcf(
     for link in description.links:
         body = ET.SubElement(bodies[link.parent or ""], "body", name=prefix + link.name)
         bodies[link.name] = body
-        _fill(body, link, prefix)
+        _fill(body, link, prefix, awake)
         if link.name == description.camera.optical:
             _add_camera(body, description, prefix)
     _add_contacts(ET.SubElement(root, "contact"), description, prefix)
@@ -94,13 +102,17 @@ def _visuals(description: Description) -> Iterator[Visual]:
         yield from link.visuals
 
 
-def _fill(body: ET.Element, link: Link, prefix: str) -> None:
+def _fill(body: ET.Element, link: Link, prefix: str, awake: bool) -> None:
     """Write what a body consists of, its joint first."""
-    _place(body, link.p_m, link.R)
+    at_rad, R = 0.0, link.R
+    if awake and link.joint is not None and link.joint.awake_rad:
+        at_rad = link.joint.awake_rad
+        R = compose(R, turn_about(link.joint.axis, at_rad))
+    _place(body, link.p_m, R)
     if link.inertia is not None:
         _add_inertia(body, link.inertia)
     if link.joint is not None:
-        _add_joint(body, link.joint, prefix)
+        _add_joint(body, link.joint, prefix, at_rad)
     for shape in link.collisions:
         _add_shape(body, shape)
     for visual in link.visuals:
@@ -127,11 +139,14 @@ def _add_inertia(body: ET.Element, inertia: Inertia) -> None:
     )  # fmt: skip
 
 
-def _add_joint(body: ET.Element, joint: LinkJoint, prefix: str) -> None:
-    ET.SubElement(
+def _add_joint(body: ET.Element, joint: LinkJoint, prefix: str, at_rad: float) -> None:
+    """Write a joint; at_rad: its angle in the pose that the body is written in."""
+    element = ET.SubElement(
         body, "joint", name=prefix + joint.name, type="hinge", axis=numbers(joint.axis),
         range=numbers((joint.low_rad, joint.high_rad)),
     )  # fmt: skip
+    if at_rad:
+        element.set("ref", numbers((at_rad,)))
 
 
 def _add_shape(body: ET.Element, shape: CollisionShape) -> None:

@@ -78,6 +78,18 @@ def meeting_rad(upper_span_rad: float, lower_span_rad: float) -> float:
     return min(0.0, max(_LOWEST_MEETING_RAD, 0.5 * (for_upper + for_lower)))
 
 
+def awake_opening_rad(upper: bool, meet_rad: float, span_rad: float) -> float:
+    """Return how far a lid is opened in an eye that looks awake, as far as it can be.
+
+    Args:
+        upper: the upper lid, else the lower one.
+        meet_rad: elevation at which the lids meet.
+        span_rad: its travel.
+    """
+    wanted = _UPPER_AWAKE_RAD - meet_rad if upper else meet_rad - _LOWER_AWAKE_RAD
+    return min(span_rad, max(0.0, wanted))
+
+
 def base(name: str, measures: HeadMeasures, head_m: Vec3, column_m: float, necked: bool) -> Link:
     """Return what stands on the table: shoulders, and a neck that does not move.
 
