@@ -94,7 +94,7 @@ function instructions(page) {
     "section", {},
     make("h1", { tabIndex: -1 }, say("instructions.title")),
     ...paragraphs([
-      say(kind, { count: page.count, seconds: Math.round(page.seconds) }),
+      say(kind, { count: page.count + page.practice, seconds: Math.round(page.seconds) }),
       ...(page.practice ? [say(some, { count: page.practice })] : []),
       say("instructions.impression"),
     ]),
