@@ -1,6 +1,6 @@
 """Studies and questionnaires by name or path: read, and checked with the rigs that they show."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from hashlib import sha256
@@ -97,7 +97,8 @@ def load_study(name_or_path: str, *further: Check[StudyDesign]) -> LoadedStudy:
 
     Args:
         name_or_path: of the study; files that it names are relative to its own folder.
-        further: rules of what this room does not know, such as scenes.
+        further: rules of what this room does not know, such as scenes; the design that they get
+            has its paths as seen from the working folder.
 
     Raises:
         gazerig.config.load.ConfigError: with every fault, each with the study's line.
@@ -105,7 +106,8 @@ def load_study(name_or_path: str, *further: Check[StudyDesign]) -> LoadedStudy:
     path = _find("studies", name_or_path)
     folder = path.parent
     checks: list[Check[StudyDesign]] = [design_rules, partial(_asked_faults, folder)]
-    checks += [partial(_rig_faults, folder), *further]
+    checks += [partial(_rig_faults, folder)]
+    checks += [partial(_located, folder, check) for check in further]
     design = _from_its_folder(load(path, StudyDesign, checks=checks), folder)
     files = (*design.questionnaires, *design.after)
     design = replace(
@@ -121,6 +123,12 @@ def load_study(name_or_path: str, *further: Check[StudyDesign]) -> LoadedStudy:
         path,
         read_yaml(path).text,
     )
+
+
+def _located(
+    folder: Path, check: Check[StudyDesign], raw: StudyDesign
+) -> Iterable[tuple[str, str]]:
+    return check(_from_its_folder(raw, folder))
 
 
 def load_questionnaire(name_or_path: str) -> Questionnaire:

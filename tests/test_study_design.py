@@ -1,12 +1,18 @@
 """``gazerig study design``: a study checked, stated before it begins, and what to type next."""
 
 import re
+from itertools import combinations
 from pathlib import Path
 
+import numpy as np
 import pytest
 from command_line import typed
 
+from gazerig.config.schema import Rig
 from gazerig.config.shipped import shipped_names
+from gazerig.robot.app.assemble import with_options
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.simulated_run import simulate
 from gazerig.robot.app.study_file import checked_study
 from gazerig.robot.cli.study_design import EXAMPLE, notes
 
@@ -120,3 +126,26 @@ def test_pairs_are_stated_as_pairs(elsewhere: Path, capfd: Terminal) -> None:
     assert "each of the 1 pairs" not in stated
     assert "blinks then stares" in stated and "stares then blinks" in stated
     assert "the first or the second" in stated and "by the normal approximation" in stated
+
+
+@pytest.mark.parametrize("name", shipped_names("studies"))
+def test_the_conditions_of_shipped_studies_move_the_head_differently(name: str) -> None:
+    study = checked_study(name)
+    shown = study.design.presentation
+    asked = RunOptions(
+        mock=True, fast=True, bus="ideal", scene=shown.scene, seconds=6.0, rig=shown.rig
+    ).checked()  # fmt: skip
+    moved = {
+        key: np.degrees(_desired(with_options(rig, asked), asked))
+        for key, rig in study.rigs.items()
+    }
+    for one, two in combinations(moved, 2):
+        apart = np.sqrt(np.mean((moved[one] - moved[two]) ** 2, axis=0)).max()
+        assert apart > 1.0, f"{one} and {two}: {apart:.2f} deg at the joint that differs most"
+
+
+def _desired(rig: Rig, asked: RunOptions) -> list[tuple[float, ...]]:
+    """Return the joint angles that every tick of a run wanted."""
+    found: list[tuple[float, ...]] = []
+    simulate(rig, asked, watch=lambda tick: found.append(tick.desired_rad))
+    return found

@@ -6,6 +6,7 @@ from textwrap import dedent, indent
 
 import pytest
 from command_line import typed
+from recorded_run import record
 
 from gazerig.config.faults import ConfigError
 from gazerig.config.shipped import shipped_names
@@ -21,6 +22,14 @@ conditions:
     profile: nakamoto
 plan: {participants: 24}
 """
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """Return half a second of the rig desk."""
+    path = tmp_path_factory.mktemp("recorded") / "run.mcap"
+    record(path, 0.5)
+    return path.read_bytes()
 
 
 def faults(tmp_path: Path, text: str, name: str = "s.yaml") -> list[str]:
@@ -275,6 +284,33 @@ def test_the_planner_is_a_behaviour_where_it_is_on(tmp_path: Path) -> None:
         )
     )
     assert load_study(str(file)).design.conditions["a"].behaviour == PLANNED
+
+
+def test_a_recording_must_be_of_the_rig_and_as_long_as_a_trial(
+    tmp_path: Path, recording: bytes
+) -> None:
+    (tmp_path / "run.mcap").write_bytes(recording)
+    (tmp_path / "torn.mcap").write_bytes(recording[:200])
+    (tmp_path / "none.mcap").write_bytes(b"nothing")
+    text = conditions(
+        "a: {recording: run.mcap}\nb: {recording: torn.mcap}\nc: {recording: none.mcap}",
+        "plan: {participants: 6}\npresentation: {rig: desk}\n",
+    )
+    said = faults(tmp_path, text)
+    assert len(said) == 3, said
+    assert "4: conditions.a.recording: lasts 0." in said[0] and "a trial 30 s" in said[0]
+    assert "5: conditions.b.recording: " in said[1] and "ends before it begins" in said[1]
+    assert "6: conditions.c.recording: " in said[2]
+    (one,) = faults(
+        tmp_path,
+        conditions(
+            "a: {recording: run.mcap}\nb: {}",
+            "plan: {participants: 6}\ntrials: {seconds: 2}\npresentation: {rig: expressive}\n",
+        ),
+    )[:1]
+    assert (
+        "with other joints (" in one and "jaw, left_brow" in one and "record with this one" in one
+    )
 
 
 def test_editors_get_a_schema_of_studies_and_questionnaires(

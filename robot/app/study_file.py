@@ -1,11 +1,14 @@
 """A study checked with all that the program knows: scenes, worlds, measures of the report."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 from gazerig.config.export import suggestion
-from gazerig.config.load import shipped_names
+from gazerig.config.load import ConfigError, shipped_names
+from gazerig.config.schema import load_rig
 from gazerig.config.study_file import LoadedStudy, load_study
 from gazerig.robot.analysis.norm_bands import BY_KEY
+from gazerig.robot.recording.read import BadRecording, RunRecording
 from gazerig.robot.study.design import StudyDesign
 from gazerig.robot.study.rules import objective_rules
 from gazerig.sim_mock.scenes.registry import scenes
@@ -17,7 +20,7 @@ def checked_study(name_or_path: str) -> LoadedStudy:
     Raises:
         gazerig.config.load.ConfigError: with every fault.
     """
-    return load_study(name_or_path, _surroundings, _objective)
+    return load_study(name_or_path, _surroundings, _objective, _recordings)
 
 
 def _objective(design: StudyDesign) -> Iterator[tuple[str, str]]:
@@ -36,3 +39,31 @@ def _surroundings(design: StudyDesign) -> Iterator[tuple[str, str]]:
     if world is not None and "/" not in world and "." not in world and world not in worlds:
         near = suggestion(world, worlds) or ";"
         yield "presentation.world", f"no world {world!r}{near} there is {', '.join(worlds)}"
+
+
+def _recordings(design: StudyDesign) -> Iterator[tuple[str, str]]:
+    """Find recordings that the rig cannot repeat for a whole trial."""
+    for key, one in design.conditions.items():
+        if one.recording is None or not Path(one.recording).is_file():
+            continue
+        try:
+            run = RunRecording(one.recording)
+            names = next(run.ticks()).guard_result.joints
+            rig = load_rig(one.rig or design.presentation.rig)
+        except ConfigError:
+            continue  # told at the rig
+        except (BadRecording, StopIteration) as error:
+            yield f"conditions.{key}.recording", str(error) or "holds no tick; record it again"
+            continue
+        if names != rig.names:
+            other = ", ".join(sorted({*names} ^ {*rig.names}))
+            rule = (
+                f"is of a rig with other joints ({other}); name that rig, or record with this one"
+            )
+            yield f"conditions.{key}.recording", rule
+        if run.duration_s < design.trials.seconds:
+            rule = (
+                f"lasts {run.duration_s:.1f} s, and a trial {design.trials.seconds:g} s: shorten "
+                "trials.seconds, or record longer"
+            )
+            yield f"conditions.{key}.recording", rule
