@@ -52,15 +52,19 @@ class Pages:
         self.run = StudyRun(
             CODE, session, self.journal, presenter or FilmPresenter(), lambda: self.now_s, lambda: UTC
         )  # fmt: skip
-        self.server = StudyServer(
-            self.run,
-            study.design,
-            ("127.0.0.1", free_port()),
-            (PARTICIPANT, EXPERIMENTER),
-            films,
-            self._finish,
-            head,
-        )
+        self._made_of = study.design, films, head
+        self._port = free_port()
+        self.server = self._new_server()
+
+    def _new_server(self) -> StudyServer:
+        design, films, head = self._made_of
+        address, tokens = ("127.0.0.1", self._port), (PARTICIPANT, EXPERIMENTER)
+        return StudyServer(self.run, design, address, tokens, films, self._finish, head)
+
+    def serve_again(self) -> None:
+        """Serve at the same address, after the server was closed."""
+        self.server = self._new_server()
+        self.server.open()
 
     def _finish(self) -> None:
         self.finished += 1

@@ -15,6 +15,8 @@ from study_at_the_page import CODE, EXPERIMENTER, PARTICIPANT, Pages, Tab, answe
 
 from gazerig.config.load import SHIPPED
 from gazerig.config.study_file import LoadedStudy, load_study
+from gazerig.robot.dashboard.door import connection_limits
+from gazerig.robot.dashboard.study import server
 from gazerig.robot.dashboard.study.study_files import FOLDER, HEADERS
 from gazerig.robot.study.design import Condition
 from gazerig.robot.study.journal import NotKept
@@ -138,7 +140,8 @@ def test_a_film_has_no_name_date_or_tag_and_is_there_only_while_it_is_shown(
     answer = asked.getresponse()
     assert answer.status == 200 and len(answer.read()) == 1024
     told = {name.lower() for name, _ in answer.getheaders()}
-    assert told == {"content-type", "content-length", "date", "server", *map(str.lower, HEADERS)}
+    always = {"content-type", "content-length", "connection", "date", "server"}
+    assert told == {*always, *map(str.lower, HEADERS)}
     asked.close()
     assert tab.get("/study/film/0123456789abcdef0123")[0] == 404
     tab.goes_through(page)
@@ -343,6 +346,23 @@ def test_the_name_of_the_present_page_is_pushed(pages: Pages, tab: Tab) -> None:
         pass
     assert said == f"data: {then['page']}\n".encode()
     line.close()
+
+
+def test_what_listens_is_not_cut_off_as_a_slow_request_is(
+    studies: dict[str, LoadedStudy], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("BUSY_S", "IDLE_S", "_LOOK_EVERY_S"):
+        monkeypatch.setattr(connection_limits, name, 0.05)
+    monkeypatch.setattr(server, "_BEAT_S", 0.1)
+    study = studies["nakamoto_1"]
+    with serving(study, tmp_path / CODE, {}) as pages:
+        tab = Tab(pages.server.participant_url)
+        line = HTTPConnection(urlsplit(tab.url).netloc, timeout=20.0)
+        line.request("GET", "/study/news", headers=tab.headers)
+        answer = line.getresponse()
+        said = [answer.readline() for _ in range(10)]  # half a second, ten times what is allowed
+        line.close()
+    assert all(said)
 
 
 # --- texts ----------------------------------------

@@ -190,3 +190,22 @@ def test_what_is_not_kept_is_said_and_goes_on_by_itself_on_a_phone(
         person.says("document.getElementById('leave-yes').click()")
         person.sees("end")
         assert pages.session.closed
+
+
+def test_a_connection_that_was_lost_comes_back_with_what_was_answered(
+    pages: Pages, desk: Browser
+) -> None:
+    person = Participant(desk)
+    desk.go(pages.server.participant_url)
+    person.sees("consent")
+    pages.server.close()
+    person.says("document.getElementById('use-agree').click()")
+    person.says("document.querySelector('form').requestSubmit()")
+    wait_for(lambda: person.says("document.querySelector('#notice.not_saved') !== null"), "words")
+    pages.serve_again()
+    person.sees("instructions")
+    assert pages.session.keeps_gaze is False
+    # Somebody else goes on, e.g. the experimenter; the page hears of it by itself.
+    pages.run.exclude("the end of the test")
+    pages.server.notify()
+    person.sees("end")

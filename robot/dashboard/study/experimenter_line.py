@@ -44,7 +44,7 @@ _DOING: dict[type[Screen], str] = {
     PausedScreen: "waits",
     EndScreen: "has read to the end",
 }
-Watch = Callable[[str, Callable[[], Awaitable[None]], float], Awaitable[None]]
+Watch = Callable[[web.Request, str, Callable[[], Awaitable[None]], float], Awaitable[None]]
 
 
 class ExperimenterLine:
@@ -94,7 +94,7 @@ class ExperimenterLine:
             async with asyncio.timeout(TAKES_S):
                 await line.send_str(json.dumps({"state": state}))
 
-        await until_one_ends(self._watch(WHO, tell, _BEAT_S), self._receive(line))
+        await until_one_ends(self._watch(request, WHO, tell, _BEAT_S), self._receive(line))
         await close_socket(line, request)
         return line
 

@@ -237,14 +237,13 @@ class StudyServer:
         """Send the name of the present page whenever it changes, and every two seconds."""
         stream = web.StreamResponse(headers={**HEADERS, "Content-Type": "text/event-stream"})
         await stream.prepare(request)
-        self._connections.lasting(request)
 
         async def tell() -> None:
             name, _ = await asyncio.to_thread(self._study_run.now)
             async with asyncio.timeout(TAKES_S):
                 await stream.write(f"data: {name}\n\n".encode())
 
-        await self._watch(_PARTICIPANT, tell, _BEAT_S)
+        await self._watch(request, _PARTICIPANT, tell, _BEAT_S)
         return stream
 
     async def _film(self, request: web.Request) -> web.Response:
@@ -260,12 +259,22 @@ class StudyServer:
             self._experimenter.trouble = f"the film cannot be read: {error}"
             self._wake()
             return await _nothing(request)
-        return web.Response(body=body, content_type="video/webm", headers=HEADERS)
+        self._connections.lasting(request)  # as long as a slow network takes
+        answer = web.Response(body=body, content_type="video/webm", headers=HEADERS)
+        answer.force_close()
+        return answer
 
     # --- who listens ----------------------------------------------------------------------------
 
-    async def _watch(self, who: str, tell: Callable[[], Awaitable[None]], beat_s: float) -> None:
+    async def _watch(
+        self,
+        request: web.Request,
+        who: str,
+        tell: Callable[[], Awaitable[None]],
+        beat_s: float,
+    ) -> None:
         """Tell a browser now, at news and after each beat, until it goes."""
+        self._connections.lasting(request)
         news = asyncio.Event()
         self._news.add(news)
         try:

@@ -146,8 +146,11 @@ function end(page) {
 // --- what goes wrong, and leaving -------------------------------------------------------------------
 
 let soon = null;
+let said = "";
 
 function state(now) {
+  if (now === said) return; // what stands there is not read out again
+  said = now;
   clearTimeout(soon);
   document.body.classList.toggle("sending", now === "saving");
   if (now === "saving") { // said only where it takes long enough to be noticed
