@@ -37,7 +37,7 @@ FIRST = (
         "hardware",
         "raspberry-pi",
     ),
-    *("tuning", "gestures", "worlds", "studies", "plugins"),
+    *("tuning", "gestures", "worlds", "studies", "study-analysis", "plugins"),
 )
 """Pages at the head of the navigation, in this order; all others follow by name."""
 

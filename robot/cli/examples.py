@@ -164,6 +164,10 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("study design study.yaml", "check it and write its pre-registration"),
         ("study design nakamoto_1", "a shipped study: of Nakamoto & Tsuruno"),
     ),
+    "study analyse": (
+        ("study analyse study-data", "one page for reviewers, tables, a BIDS data set"),
+        ("study analyse study-data --out ../paper/report", "written elsewhere"),
+    ),
 }
 """Command -> examples, each with what it is for; of a study's commands with the group's name."""
 

@@ -2,6 +2,7 @@
 
 import typer
 
+from gazerig.robot.cli.study_analyse import analyse
 from gazerig.robot.cli.study_design import design
 
 app = typer.Typer(
@@ -10,3 +11,4 @@ app = typer.Typer(
     no_args_is_help=True,
 )
 app.command("design")(design)
+app.command("analyse")(analyse)

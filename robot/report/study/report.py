@@ -1,0 +1,78 @@
+"""A study's report as files: the page, tidy tables, results for programs, and a BIDS data set."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.file_output import make_folder, write_file
+from gazerig.robot.report.study.bids import write_study
+from gazerig.robot.report.study.page import Progress, study_page
+from gazerig.robot.report.study.tables import answers_csv, results_json, trials_csv
+from gazerig.robot.study.analysis import StudyAnalysis, analysed
+from gazerig.robot.study.collected import collected
+
+PAGE, DATA_SET = "index.html", "bids"
+_MARK = b'name="generator" content="gazerig"'
+_HEAD_BYTES = 4096
+
+
+class StudyReport(NamedTuple):
+    """What was found, and where it is written.
+
+    page: the report; data_set: folder of the BIDS data set; files: how many that has
+    """
+
+    study: StudyAnalysis
+    page: Path
+    data_set: Path
+    files: int
+
+
+def write_report(data: Path, out: Path, made_by: str, progress: Progress) -> StudyReport:
+    """Analyse the data of a study and write all that is made of them.
+
+    An earlier report in the folder is replaced; files of others are kept, and refused.
+
+    Args:
+        data: folder of the study's data.
+        out: folder to write to.
+        made_by: program and version.
+        progress: told what is done.
+
+    Raises:
+        SetupError: the data cannot be analysed, or the folder holds something else, or something
+            cannot be written.
+    """
+    refuse_foreign_folder(out)
+    found = collected(data)
+    study = analysed(
+        found.name, found.design, found.questionnaires, found.design_sha256, found.people
+    )
+    page = study_page(study, made_by, progress)
+    make_folder(out)
+    for name, text in (
+        ("answers.csv", answers_csv(study)),
+        ("trials.csv", trials_csv(study)),
+        ("results.json", results_json(study)),
+    ):
+        write_file(out / name, text, force=True)
+    files = write_study(study, out / DATA_SET, found.folders, made_by, progress)
+    write_file(out / PAGE, page, force=True)
+    return StudyReport(study, out / PAGE, out / DATA_SET, files)
+
+
+def refuse_foreign_folder(out: Path) -> None:
+    """Refuse a folder that holds anything but an earlier report.
+
+    Raises:
+        SetupError: it does.
+    """
+    if not out.exists() or (out.is_dir() and not any(out.iterdir())):
+        return
+    try:
+        with (out / PAGE).open("rb") as file:
+            if _MARK in file.read(_HEAD_BYTES):
+                return
+    except OSError:
+        pass
+    raise SetupError(f"{out} holds something that is no report of a study: name another with --out")

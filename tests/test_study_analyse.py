@@ -1,0 +1,169 @@
+"""Tests of gazerig study analyse: folders of data, good and bad, and what is written of them."""
+
+import csv
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from study_records import QUESTIONS, design, records
+
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.cli.study_analyse import verdicts
+from gazerig.robot.report.study.report import write_report
+from gazerig.robot.study.collected import collected
+from gazerig.robot.study.data_folder import StudyData, code_of
+from gazerig.robot.study.design import Condition, Exclusion, StudyDesign
+from gazerig.robot.study.journal import FILE, Journal
+from gazerig.robot.study.preregistration import canonical
+from gazerig.robot.study.records import Record
+from gazerig.robot.study.simulation import Population
+
+SHOWN = {"walk": {"gaze.scanpath.model": "markov"}, "centre": {"gaze.scanpath.model": "simple"}}
+
+
+def text_of(study: StudyDesign) -> bytes:
+    keys = {*study.questionnaires, *study.after}
+    return canonical(study, {key: QUESTIONS[key] for key in QUESTIONS if key in keys}, SHOWN)
+
+
+def kept(folder: Path, study: StudyDesign, count: int, cut: int | None = None) -> StudyData:
+    """Write the data of simulated participants; the last one's records end at ``cut``."""
+    data = StudyData(folder)
+    sha256 = data.claim("mine", text_of(study))
+    for number in range(1, count + 1):
+        found: list[Record] = records(study, number, Population(1.2), sha256=sha256)
+        with Journal(data.participant(number)) as journal:
+            journal.write(found[: cut if number == count else None])
+    return data
+
+
+def analyse(folder: Path) -> None:
+    write_report(folder, folder / "report", "gazerig 0.1.0", lambda _, __: None)
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("mine-data")
+    kept(folder, design(participants=12), 12)
+    analyse(folder)
+    return folder
+
+
+def test_a_folder_gives_back_the_design_and_all_answers(data: Path) -> None:
+    found = collected(data)
+    wanted = design(participants=12)
+    # Names of rigs and films are replaced by their values, which the analysis does not need.
+    assert found.design == wanted and found.name == "mine"
+    assert list(found.questionnaires["paper"].items) == ["naturalness", "looked_at"]
+    assert [one.participant for one in found.people] == [code_of(k) for k in range(1, 13)]
+    assert len(found.folders) == 12 and found.deleted == ()
+
+
+def test_the_order_of_conditions_and_items_is_kept(tmp_path: Path) -> None:
+    turned = replace(design(), conditions={"walk": Condition(), "centre": Condition()})
+    swapped = dict(reversed(list(turned.conditions.items())))
+    kept(tmp_path / "one", replace(turned, conditions=swapped), 1)
+    assert list(collected(tmp_path / "one").design.conditions) == ["centre", "walk"]
+
+
+def test_the_report_has_its_page_tables_and_results(data: Path) -> None:
+    report = data / "report"
+    assert "<title>Walk against centre</title>" in (report / "index.html").read_text()
+    rows = list(csv.DictReader((report / "answers.csv").open()))
+    assert len(rows) == 12 * 5
+    assert json.loads((report / "results.json").read_text())["participants"]["came"] == 12
+
+
+def test_the_bids_data_set_has_a_table_for_each_participant(data: Path) -> None:
+    root = data / "report" / "bids"
+    people = list(csv.DictReader((root / "participants.tsv").open(), delimiter="\t"))
+    assert len(people) == 12 and people[0]["participant_id"] == "sub-P001"
+    table = root / "sub-P001" / "beh" / "sub-P001_task-mine_beh.tsv"
+    rows = list(csv.DictReader(table.open(), delimiter="\t"))
+    assert {row["condition"] for row in rows} == {"walk", "centre", "n/a"}
+    sidecar = json.loads(table.with_suffix(".json").read_text())
+    assert set(rows[0]) <= set(sidecar) and sidecar["TaskName"] == "mine"
+    assert set(sidecar["condition"]["Levels"]) == {"walk", "centre"}
+
+
+def test_it_can_be_run_again_and_the_same_data_give_the_same_bytes(data: Path) -> None:
+    report = data / "report"
+    before = {p: p.read_bytes() for p in report.rglob("*") if p.is_file()}
+    analyse(data)
+    assert before == {p: p.read_bytes() for p in report.rglob("*") if p.is_file()}
+
+
+def test_who_was_deleted_is_gone_from_what_is_made_again(tmp_path: Path) -> None:
+    data = kept(tmp_path, design(), 4)
+    analyse(tmp_path)
+    data.delete(2)
+    analyse(tmp_path)
+    written = b"".join(p.read_bytes() for p in (tmp_path / "report").rglob("*") if p.is_file())
+    assert b"P001" in written and b"P002" not in written
+    assert collected(tmp_path).deleted == ("P002",)
+
+
+def test_an_unfinished_participant_is_left_out_or_kept_by_the_rule(tmp_path: Path) -> None:
+    kept(tmp_path / "a", design(), 3, cut=-2)
+    assert [p.left_out for p in collected(tmp_path / "a").people] == ["", "", "did not finish"]
+    kept(tmp_path / "b", replace(design(), exclusion=Exclusion(incomplete="keep")), 3, cut=-2)
+    assert not any(p.left_out for p in collected(tmp_path / "b").people)
+
+
+def test_a_torn_line_is_no_record_and_hinders_nothing(tmp_path: Path) -> None:
+    data = kept(tmp_path, design(), 2)
+    journal = data.participant(1) / FILE
+    whole = collected(tmp_path)
+    with journal.open("ab") as file:
+        file.write(b'[{"kind": "Closed", "how": "wit')
+    assert collected(tmp_path) == whole
+
+
+def test_a_damaged_line_is_named_with_its_number(tmp_path: Path) -> None:
+    data = kept(tmp_path, design(), 1)
+    journal = data.participant(1) / FILE
+    journal.write_bytes(journal.read_bytes() + b"nonsense\n")
+    with pytest.raises(SetupError, match=r"P001/journal\.jsonl:2: .*damaged"):
+        analyse(tmp_path)
+
+
+def test_data_of_two_designs_are_refused_with_both_hashes(tmp_path: Path) -> None:
+    data = kept(tmp_path, design(), 2)
+    with Journal(data.participant(3)) as journal:
+        journal.write(records(design(), 3, sha256="f" * 64))
+    with pytest.raises(SetupError, match=r"P003 was recorded with another design \(ffffffffffff\)"):
+        analyse(tmp_path)
+
+
+def test_an_edited_design_is_refused(tmp_path: Path) -> None:
+    kept(tmp_path, design(), 1)
+    path = tmp_path / "design.json"
+    path.write_text(path.read_text().replace('"alpha": 0.05', '"alpha": 0.2'))
+    with pytest.raises(SetupError, match="changed"):
+        analyse(tmp_path)
+
+
+def test_a_folder_without_a_study_or_participants_says_what_to_do(tmp_path: Path) -> None:
+    with pytest.raises(SetupError, match=r"no data of a study"):
+        analyse(tmp_path)
+    kept(tmp_path, design(), 0)
+    with pytest.raises(SetupError, match=r"no participant yet: gazerig study run"):
+        analyse(tmp_path)
+
+
+def test_a_folder_of_somebody_else_is_not_written_to(tmp_path: Path) -> None:
+    kept(tmp_path, design(), 1)
+    there = tmp_path / "report"
+    there.mkdir()
+    (there / "thesis.txt").write_text("mine")
+    with pytest.raises(SetupError, match="no report of a study"):
+        analyse(tmp_path)
+    assert [p.name for p in there.iterdir()] == ["thesis.txt"]
+
+
+def test_the_terminal_says_what_became_of_each_hypothesis(data: Path) -> None:
+    report = write_report(data, data / "report", "gazerig 0.1.0", lambda _, __: None)
+    lines = verdicts(report.study)
+    assert lines[0] == "12 of 12 participants count"
+    assert lines[1].startswith("naturalness: walk > centre: supported (corrected p = ")
