@@ -303,18 +303,13 @@ class Robot:
             self.camera.close()
 
     def _obey(self, t_s: float) -> tuple[Command, ...]:
-        """Execute the commands that wait, and end a lead that is not renewed."""
-        taken = self._execute(t_s) if self._commands else ()
-        self._executor.end_lapsed(t_s)
-        return taken
-
-    def _execute(self, t_s: float) -> tuple[Command, ...]:
-        """Execute the commands of this tick; return them as a recording needs them."""
+        """Execute and return the commands that wait, and end a lead that is not renewed."""
         taken = []
-        for waiting in self._commands.take():
+        for waiting in self._commands.take() if self._commands else ():
             command = self._looks.resolved(waiting.command)
             taken.append(command)
             waiting.ticket.answer(self._executor.execute(command, t_s))
+        self._executor.end_lapsed(t_s)
         return tuple(taken)
 
     def _frame_age_s(self, percept: Percept | None, t_s: float) -> float:
