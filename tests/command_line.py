@@ -5,6 +5,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -62,6 +63,14 @@ def answers_in(folder: Path, *lines: str) -> str:
     return str(file)
 
 
+@cache
+def tree() -> TyperGroup:
+    """Return all commands, made once: a thousand words of documents are looked up in them."""
+    group = typer.main.get_command(app)
+    assert isinstance(group, TyperGroup)
+    return group
+
+
 def parse(words: Sequence[str]) -> None:
     """Read a command as the program would, and do nothing.
 
@@ -71,7 +80,8 @@ def parse(words: Sequence[str]) -> None:
     Raises:
         ValueError: there is no such command or option, or a word is no value of it.
     """
-    command, rest = typer.main.get_command(app), [word for word in words if word != "--help"]
+    command: Any = tree()
+    rest = [word for word in words if word != "--help"]
     while isinstance(command, TyperGroup):
         if not rest or rest[0] not in command.commands:
             if not isinstance(command, JointsUnlessNamed):
@@ -88,8 +98,7 @@ def parse(words: Sequence[str]) -> None:
 def options(of: str = "") -> set[str]:
     """Return the options of a command, or of all."""
     found: set[str] = set()
-    group = typer.main.get_command(app)
-    assert isinstance(group, TyperGroup)
+    group = tree()
     waiting = [command for name, command in group.commands.items() if of in ("", name)]
     for command in waiting:
         opts = {o for param in command.params for o in param.opts}
