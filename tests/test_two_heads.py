@@ -13,9 +13,10 @@ pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install -e '.
 from command_line import invoked
 
 from gazerig.drivers.errors import SetupError
+from gazerig.robot.analysis.kept_time import fell_behind
 from gazerig.robot.analysis.mutual_gaze import HeadPlace, mutual_gaze
 from gazerig.robot.app.first_world import what_it_needs
-from gazerig.robot.app.head_group import Following, Kept, compose_group, has_other_heads
+from gazerig.robot.app.head_group import Following, compose_group, has_other_heads
 from gazerig.robot.app.lockstep import Lockstep
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.interrupts import Interrupts
@@ -86,15 +87,18 @@ def test_a_second_request_to_end_reaches_all_heads() -> None:
 
 
 @pytest.mark.parametrize(
-    ("overruns", "pictures", "is_behind"), [(10, 290, False), (300, 290, True), (10, 200, True)]
+    ("overruns", "pictures", "behind"), [(10, 290, False), (300, 290, True), (10, 200, True)]
 )
-def test_who_falls_behind_is_told(overruns: int, pictures: int, is_behind: bool) -> None:
-    figures = {"ticks": 2000, "overruns": overruns, "seconds": 10.0, "pictures": pictures}
-    kept = Kept.of(figures)
-    assert kept is not None and kept.is_behind(30.0) is is_behind
+def test_who_falls_behind_is_told(overruns: int, pictures: int, behind: bool) -> None:
+    well = {"ticks": 2000, "overruns": 0, "seconds": 10.0, "pictures": 300}
+    figures = {**well, "overruns": overruns, "pictures": pictures}
+    line = fell_behind([("first", well), ("other", figures), ("third", None)], 30.0, rendered=True)
+    assert line.startswith("the computer is too busy for these heads (other: ") is behind
+    assert line.endswith("; --no-pictures asks less of it") is behind
     if overruns == 300:
-        assert kept.text(30.0) == "13% of ticks late, 29 of 30 pictures a second"
-    assert Kept.of({**figures, "seconds": 1.0}) is None
+        assert "(other: 13% of ticks late, 29 of 30 pictures a second)" in line
+        assert fell_behind([("other", figures)], 30.0, rendered=False).endswith("second)")
+    assert fell_behind([("other", {**figures, "seconds": 1.0})], 30.0, rendered=True) == ""
 
 
 def test_time_goes_on_when_all_wait_and_the_earliest_goes_first() -> None:

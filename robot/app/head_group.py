@@ -4,11 +4,12 @@ What ends one of them ends all: each parks and lets go.
 """
 
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from gazerig.robot.analysis.kept_time import fell_behind
 from gazerig.robot.analysis.mutual_gaze import HeadPlace, MutualGazeTrace
 from gazerig.robot.app.assemble import SharedPlace
 from gazerig.robot.app.options import RunOptions
@@ -18,15 +19,10 @@ from gazerig.robot.app.session import SECONDS, ComposedRun, compose, run
 from gazerig.robot.app.shared_world import FaceNow, ServedWorld, SharedWorld, SimulatedWorld
 from gazerig.robot.control.heads_together import NamedRobot
 from gazerig.robot.control.interrupts import Interrupts
-from gazerig.robot.control.loop_timing import BUSY_SHARE
 from gazerig.robot.control.tick import Tick
 from gazerig.sim_mock.world.heads_scene import HeadsScene, RigFrame
 
 FIRST = "first"
-_TELLING_S = 3.0
-"""A shorter run tells nothing of how well time was kept."""
-_ENOUGH = 0.7
-"""With a smaller share of the pictures a head reacts visibly later."""
 
 
 class _Member(NamedTuple):
@@ -82,7 +78,8 @@ def compose_group(options: RunOptions) -> "HeadGroup":
             member.composed.made.close()
         world.close()
         raise
-    return HeadGroup(_together(members), world, None if options.fast else found.camera.rate_hz)
+    pictures = None if options.fast else (found.camera.rate_hz, not options.no_pictures)
+    return HeadGroup(_together(members), world, pictures)
 
 
 def _together(members: Sequence[_Member]) -> list[_Member]:
@@ -141,54 +138,27 @@ class Following(Interrupts):
         return max(super().requests, self._lead.requests)
 
 
-class Kept(NamedTuple):
-    """How well a head kept its time.
-
-    Attributes:
-        late: share of its ticks that came late.
-        pictures_hz: how many pictures it saw a second.
-    """
-
-    late: float
-    pictures_hz: float
-
-    @classmethod
-    def of(cls, figures: Mapping[str, Any]) -> "Kept | None":
-        """Return it of the figures of a run, None of one that was too short to tell."""
-        ticks, overruns, seconds = figures["ticks"], figures["overruns"], figures["seconds"]
-        if seconds < _TELLING_S:
-            return None
-        return cls(overruns / max(1, ticks + overruns), figures["pictures"] / seconds)
-
-    def is_behind(self, pictures_hz: float) -> bool:
-        """Return whether ticks or pictures fell behind; pictures_hz: as many were asked for."""
-        return self.late >= BUSY_SHARE or self.pictures_hz < _ENOUGH * pictures_hz
-
-    def text(self, pictures_hz: float) -> str:
-        """Return it in words."""
-        return (
-            f"{self.late:.0%} of ticks late, {self.pictures_hz:.0f} of {pictures_hz:.0f} pictures "
-            "a second"
-        )
-
-
 class HeadGroup:
     """Several heads that run together until one of them ends.
 
     Args:
         members: the heads, the first one first.
         world: in which they are.
-        pictures_hz: pictures a second of each camera; None: time is simulated and waits for them.
+        pictures: in real time how many each camera has a second, and whether they are rendered;
+            None: time is simulated and waits for them.
 
     Attributes:
         members: the heads.
     """
 
     def __init__(
-        self, members: Sequence[_Member], world: SharedWorld, pictures_hz: float | None = None
+        self,
+        members: Sequence[_Member],
+        world: SharedWorld,
+        pictures: tuple[float, bool] | None = None,
     ) -> None:
         self.members, self._world = tuple(members), world
-        self._pictures_hz = pictures_hz
+        self._pictures = pictures
         self._figures: list[dict[str, object] | None] = [None] * len(members)
         self._failures: list[BaseException] = []
         self._ending: set[int] = set()
@@ -248,7 +218,10 @@ class HeadGroup:
             self._world.close()
         if self._failures:
             raise self._failures[0]
-        if line := self._behind():
+        names = [member.name for member in self.members]
+        if self._pictures is not None and (
+            line := fell_behind(zip(names, self._figures, strict=True), *self._pictures)
+        ):
             say(line)
         return self._joined()
 
@@ -291,19 +264,6 @@ class HeadGroup:
             trace.update(0, tick)
         if watch is not None:
             watch(tick)
-
-    def _behind(self) -> str:
-        """Return in one line which heads could not keep up in real time, "" where all did."""
-        if self._pictures_hz is None:
-            return ""
-        slow = []
-        for member, figures in zip(self.members, self._figures, strict=True):
-            kept = Kept.of(figures) if figures is not None else None
-            if kept is not None and kept.is_behind(self._pictures_hz):
-                slow.append(f"{member.name}: {kept.text(self._pictures_hz)}")
-        if not slow:
-            return ""
-        return f"the computer is too busy for these heads ({'; '.join(slow)}); --no-pictures asks less of it"
 
     def _joined(self) -> dict[str, object]:
         first, *others = self._figures
