@@ -182,13 +182,9 @@ def _show(
     built, rate_hz = _built(recording.info.config_yaml), recording.info.rate_hz
     with used(file), _progress("reading", recording.duration_s) as read:
         frames = SnapshotIndex(
-            recording.ticks(),
-            recording.frames(),
-            rate_hz,
-            recording.info.character or "",
-            built,
+            recording.ticks(), recording.frames(), rate_hz, recording.info.character or "", built,
             read,
-        )
+        )  # fmt: skip
     world = _world(recording)
     start_s = recording.world.start_s if recording.world is not None else None
     replaying = Replay(frames, clock)
