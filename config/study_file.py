@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from hashlib import sha256
+from os.path import isfile
 from pathlib import Path
 from typing import cast
 
@@ -284,7 +285,7 @@ def _file_faults(at: str, one: Condition) -> Iterator[tuple[str, str]]:
             continue
         if not file.endswith(ending):
             yield f"{at}.{name}", f"{file} does not end in {ending}; name such a file"
-        elif not Path(file).is_file():
+        elif not isfile(file):
             yield f"{at}.{name}", f"there is no file {file}; check the name"
 
 

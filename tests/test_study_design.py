@@ -15,6 +15,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.simulated_run import simulate
 from gazerig.robot.app.study_file import checked_study
 from gazerig.robot.cli.study_design import EXAMPLE, notes
+from gazerig.robot.study.data_folder import StudyData
 
 Terminal = pytest.CaptureFixture[str]
 
@@ -28,6 +29,8 @@ def elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_the_example_is_a_good_study_with_enough_participants(
     elsewhere: Path, capfd: Terminal
 ) -> None:
+    assert typed("study", "design") == 2
+    assert "there is no study.yaml here" in capfd.readouterr().err
     assert typed("study", "design", "--example", "study.yaml") == 0
     assert (elsewhere / "study.yaml").read_text(encoding="utf-8") == EXAMPLE
     assert typed("study", "design", "--example", "study.yaml") == 2
@@ -56,6 +59,25 @@ def test_a_preregistration_is_kept_unless_it_is_forced(elsewhere: Path, capfd: T
     again = stated.read_text(encoding="utf-8")
     hashes = [re.findall(r"`([0-9a-f]{64})`", text) for text in (first, again)]
     assert hashes[0] != hashes[1] and "25 s each" in again
+
+
+def test_a_design_that_people_have_answered_is_not_stated_anew(
+    elsewhere: Path, capfd: Terminal
+) -> None:
+    file = elsewhere / "study.yaml"
+    file.write_text(EXAMPLE, encoding="utf-8")
+    first = checked_study("study.yaml")
+    StudyData(elsewhere / "study-data").claim("study", first.canonical)  # the first participant
+    assert typed("study", "design") == 0
+    capfd.readouterr()
+    file.write_text(EXAMPLE.replace("seconds: 20", "seconds: 25"), encoding="utf-8")
+    assert typed("study", "design", "--force") == 2
+    said = capfd.readouterr().err
+    other = checked_study("study.yaml").sha256
+    assert first.sha256[:12] in said and other[:12] in said and "--data NEW_FOLDER" in said
+    stated = (elsewhere / "study-data" / "preregistration.md").read_text(encoding="utf-8")
+    assert first.sha256 in stated
+    assert typed("study", "design", "--data", "second") == 0
 
 
 def test_a_preregistration_states_all_that_a_reviewer_asks_for(elsewhere: Path) -> None:

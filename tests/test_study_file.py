@@ -162,6 +162,7 @@ def test_conditions_that_cannot_be_told_apart_are_refused_and_both_named(tmp_pat
             "a: {}\nb:\n  profile: mitake\n  film: no.webm",
             ["6: conditions.b.profile: has no effect beside film", "7: conditions.b.film: there is"],
         ),
+        (f"a: {{}}\nb: {{recording: {'a' * 300}.mcap}}", ["5: conditions.b.recording: there is no"]),
         ("a: {}\nb: {recording: run.mp4}", ["5: conditions.b.recording", "end in .mcap"]),
         ("a: {}\nB!: {profile: mitake}", ["5: conditions.B!: no name of a condition"]),
         (

@@ -1,7 +1,7 @@
 """A study checked with all that the program knows: scenes, worlds, measures of the report."""
 
 from collections.abc import Iterator
-from pathlib import Path
+from os.path import isfile
 
 from gazerig.config.export import suggestion
 from gazerig.config.load import ConfigError, shipped_names
@@ -44,7 +44,7 @@ def _surroundings(design: StudyDesign) -> Iterator[tuple[str, str]]:
 def _recordings(design: StudyDesign) -> Iterator[tuple[str, str]]:
     """Find recordings that the rig cannot repeat for a whole trial."""
     for key, one in design.conditions.items():
-        if one.recording is None or not Path(one.recording).is_file():
+        if one.recording is None or not isfile(one.recording):
             continue
         try:
             run = RunRecording(one.recording)

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gazerig.config.shipped import shipped_names
-from gazerig.drivers.file_output import write_file
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.file_output import make_folder, write_file
 from gazerig.robot.cli.examples import complete_shipped
 from gazerig.robot.cli.terminal import ForceOption, clear_errors, say
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
     from gazerig.config.study_file import LoadedStudy
     from gazerig.robot.study.questionnaire import Questionnaire, Texts
 
+DEFAULT, PREREGISTRATION = "study.yaml", "preregistration.md"
 EXAMPLE = """\
 # A study of two gazes: does blinking look natural? Change it, then: gazerig study design study.yaml
 title: Blinking against staring
@@ -58,7 +60,7 @@ DataOption = Annotated[
 
 
 def design(
-    study: StudyArgument = "study.yaml",
+    study: StudyArgument = DEFAULT,
     data: DataOption = None,
     example: Annotated[
         bool, typer.Option("--example", help="Write a study of two gazes to start from as STUDY.")
@@ -72,31 +74,53 @@ def design(
             print(f"{study}: written; change it, then: gazerig study design {study}")
         return
     with clear_errors():
-        import gazerig
+        if study == DEFAULT and not Path(study).exists():
+            raise SetupError(
+                f"there is no {study} here: name a study, or gazerig study design --example {study}"
+            )
         from gazerig.robot.app.study_file import checked_study
-        from gazerig.robot.study.preregistration_text import text
 
         found = checked_study(study)
         for line in summary(study, found):
             print(line)
-        file = data_folder(found, data) / "preregistration.md"
-        changes = {key: found.changes(None, key) for key in found.design.conditions}
-        stated = text(
-            found.design, found.questionnaires, changes, found.sha256, gazerig.__version__
-        )
-        kept = file.is_file() and file.read_text(encoding="utf-8") == stated
-        if not kept:
-            file.parent.mkdir(parents=True, exist_ok=True)
-            write_file(file, stated, force)
+        folder = data_folder(found, data)
+        written = write_preregistration(found, folder, force)
         for note in notes(found):
             say(f"note: {note}")
-        print(f"{file}: {'as it was' if kept else 'written'}; sha256 {found.sha256}")
+        said = "written" if written else "as it was"
+        print(f"{folder / PREREGISTRATION}: {said}; sha256 {found.sha256}")
         print(f"next: gazerig study run {study} --participant 1")
 
 
 def data_folder(study: "LoadedStudy", data: Path | None) -> Path:
     """Return the folder of a study's data."""
     return data if data is not None else Path(f"{study.name}-data")
+
+
+def write_preregistration(study: "LoadedStudy", folder: Path, force: bool = False) -> bool:
+    """Write a study's pre-registration into the folder of its data; return whether it was new.
+
+    Args:
+        study: a checked one.
+        folder: of its data; it need not be there yet.
+        force: Replace another one.
+
+    Raises:
+        SetupError: the folder has data of another design, or another pre-registration that is
+            not to be replaced, or cannot be written.
+    """
+    import gazerig
+    from gazerig.robot.study.data_folder import StudyData
+    from gazerig.robot.study.preregistration_text import text
+
+    sha256, file = StudyData(folder).check(study.canonical), folder / PREREGISTRATION
+    changes = {key: study.changes(None, key) for key in study.design.conditions}
+    stated = text(study.design, study.questionnaires, changes, sha256, gazerig.__version__)
+    if file.is_file() and file.read_text(encoding="utf-8") == stated:
+        return False
+    make_folder(folder)
+    write_file(file, stated, force)
+    return True
 
 
 def summary(name: str, study: "LoadedStudy") -> list[str]:

@@ -52,20 +52,28 @@ class StudyData:
         Raises:
             SetupError: it belongs to another design, or cannot be written.
         """
-        sha256 = design_sha256(canonical)
-        path = self.folder / _DESIGN
+        sha256, path = self.check(canonical), self.folder / _DESIGN
         if path.exists():
-            there = self.sha256()
-            if there != sha256:
-                raise SetupError(
-                    f"{self.folder} has data of another design ({there[:12]}; this one is "
-                    f"{sha256[:12]}): a design does not change after its first participant; put "
-                    "it back as it was, or begin a new study with --data NEW_FOLDER"
-                )
             return sha256
         make_folder(self.folder)
         stated = {"name": name, "sha256": sha256, "design": json.loads(canonical)}
         write_file(path, json.dumps(stated, indent=1, ensure_ascii=False) + "\n")
+        return sha256
+
+    def check(self, canonical: bytes) -> str:
+        """Return a design's hash, if the folder can have its data; nothing is written.
+
+        Raises:
+            SetupError: it belongs to another design.
+        """
+        sha256 = design_sha256(canonical)
+        there = self.sha256() if (self.folder / _DESIGN).exists() else sha256
+        if there != sha256:
+            raise SetupError(
+                f"{self.folder} has data of another design ({there[:12]}; this one is "
+                f"{sha256[:12]}): a design does not change after its first participant; put "
+                "it back as it was, or begin a new study with --data NEW_FOLDER"
+            )
         return sha256
 
     def sha256(self) -> str:
