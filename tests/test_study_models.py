@@ -156,7 +156,10 @@ def test_choices_against_a_third_condition_count() -> None:
     [
         ({}, "nothing was chosen"),
         ({(0, 1): (3, 2)}, "never compared"),
-        ({(0, 1): (5, 0), (1, 2): (3, 2), (0, 2): (4, 0)}, "condition 1 was chosen always"),
+        (
+            {(0, 1): (5, 0), (1, 2): (3, 2), (0, 2): (4, 0)},
+            "condition 1 was chosen always over others",
+        ),
     ],
 )
 def test_choices_without_finite_scores_are_refused_in_words(

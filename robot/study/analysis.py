@@ -73,6 +73,7 @@ class StudyAnalysis:
     """All that a report tells.
 
     name: of the study's file; design_sha256: which all data carry
+    deleted: how many had their data deleted
     """
 
     name: str
@@ -83,6 +84,7 @@ class StudyAnalysis:
     decisions: tuple[Decision, ...]
     measures: tuple[MeasureSummary, ...]
     choices: tuple[ChoiceSummary, ...]
+    deleted: int = 0
 
     @property
     def counted(self) -> tuple[Participation, ...]:
@@ -113,6 +115,7 @@ def analysed(
     questionnaires: Mapping[str, Questionnaire],
     design_sha256: str,
     people: Sequence[Participation],
+    deleted: int = 0,
 ) -> StudyAnalysis:
     """Analyse a study.
 
@@ -122,6 +125,7 @@ def analysed(
         questionnaires: by the keys in the design.
         design_sha256: hash of the design that all data carry.
         people: with what is left out marked.
+        deleted: how many had their data deleted.
     """
     people = without_simulated(people)
     known = [one for one in measures(design, questionnaires).values() if not one.once]
@@ -134,7 +138,7 @@ def analysed(
     choices = [_choices(one, people, keys) for one in known if one.kind == "choice"]
     return StudyAnalysis(
         name, design, questionnaires, design_sha256, tuple(people),
-        decisions(design, questionnaires, people), tuple(summaries), tuple(choices),
+        decisions(design, questionnaires, people), tuple(summaries), tuple(choices), deleted,
     )  # fmt: skip
 
 
@@ -209,4 +213,4 @@ def _choices(
         if row.questionnaire == measure.questionnaire and row.item in measure.items
     ]
     first = sum(value == "first" for value in made), len(made)
-    return ChoiceSummary(measure, table, fit(table), circular_triples(table), first)
+    return ChoiceSummary(measure, table, fit(table, conditions), circular_triples(table), first)

@@ -178,7 +178,7 @@ def _chosen(
         why = "nobody has chosen"
         nothing = (nan, nan)
         return Decision(one, measure, None, (), nan, "too few", 0, nothing, nothing, None, (), why)
-    test = preferred(table, better, than, one.two_sided)
+    test = preferred(table, better, than, one.two_sided, conditions)
     shares = (table[better, than] / direct, table[than, better] / direct) if direct else (nan, nan)
     return Decision(
         one, measure, test, (), nan, "not supported", n, (nan, nan),

@@ -10,24 +10,38 @@ from gazerig.robot.study.analysis import ChoiceSummary, MeasureSummary, StudyAna
 from gazerig.robot.study.decisions import Decision
 from gazerig.robot.study.statistics.results import EffectSize
 
-SHADES = ("#b35806", "#f1a340", "#fee0b6", "#d8daeb", "#998ec3", "#542788")
-"""From the least to the most, readable without colours (Brewer's PuOr, which the colour-blind
-tell apart); five points leave one out in the middle."""
+_LOW, _HIGH = ((179, 88, 6), (254, 224, 182)), ((216, 218, 235), (84, 39, 136))
+"""From the least to the middle and from there to the most: Brewer's PuOr, which the colour-blind
+tell apart, as red, green and blue of 0 to 255."""
 
 _MIDDLE = "#e8e8ea"
 _ACCENT = "#1c6ea4"
 _ROW_IN, _HEAD_IN, _ITEM_IN, _WIDE_IN = 0.42, 0.95, 0.3, 8.4
 _LEAST_NUMBERED = 4.0
 _JITTER = 0.05
+_DARK = 140.0
+
+Colour = tuple[int, int, int]
 
 
 def shades(points: int) -> list[str]:
     """Return one colour a point, from the least to the most, grey in an odd middle."""
     half = points // 2
-    low = [SHADES[round(k * 2 / max(1, half - 1))] if half > 1 else SHADES[1] for k in range(half)]
-    high = [SHADES[5 - round(k * 2 / max(1, half - 1))] if half > 1 else SHADES[4]
-            for k in range(half)]  # fmt: skip
-    return [*low, *([_MIDDLE] if points % 2 else []), *reversed(high)]
+    low, high = (_between(*ends, half) for ends in (_LOW, _HIGH))
+    return [*low, *([_MIDDLE] if points % 2 else []), *high]
+
+
+def _between(first: Colour, last: Colour, count: int) -> list[str]:
+    """Return evenly spaced colours; of one alone that in between."""
+    at = np.linspace(0.0, 1.0, count) if count > 1 else np.array([0.5])
+    mixed = np.rint(np.outer(1.0 - at, first) + np.outer(at, last)).astype(int)
+    return ["#{:02x}{:02x}{:02x}".format(*one) for one in mixed.tolist()]
+
+
+def _is_dark(colour: str) -> bool:
+    """Whether white is easier to read on a colour than ink (luma of ITU-R BT.601)."""
+    red, green, blue = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
+    return 0.299 * red + 0.587 * green + 0.114 * blue < _DARK
 
 
 def counts_png(some: Sequence[MeasureSummary], study: StudyAnalysis) -> bytes:
@@ -66,9 +80,8 @@ def _counts(axes: Axes, one: MeasureSummary, names: list[str]) -> None:
         for point, share in enumerate(shares):
             axes.barh(row, share, 0.7, left=at, color=colours[point])
             if share >= _LEAST_NUMBERED:
-                dark = colours[point] in (SHADES[0], SHADES[4], SHADES[5])
                 axes.text(at + 0.5 * share, row, str(each[point]), ha="center", va="center",
-                          fontsize=8.5, color="white" if dark else INK)  # fmt: skip
+                          fontsize=8.5, color="white" if _is_dark(colours[point]) else INK)  # fmt: skip
             at += share
     axes.axvline(0.0, color=HUMAN, lw=0.8)
     axes.set_yticks(range(len(names)), names)

@@ -143,18 +143,26 @@ def _facts(study: StudyAnalysis) -> tuple[tuple[str, str], ...]:
         ("study", study.name),
         ("design (SHA-256)", f"{study.design_sha256}; all {len(people)} participants carry it"),
         ("participants", f"{len(people)} came, {len(study.counted)} count, {plan.participants} "
-                         "were planned"),
+                         f"were planned{_deleted(study.deleted)}"),
         ("from, to", f"{dates[0]}, {dates[-1]}" if dates else ""),
         ("conditions", "; ".join(f"{k}: {study.label(k)}" for k in design.conditions)),
         ("task", "each was rated" if design.task == "rating" else "one of two was chosen"),
         ("shown", f"{design.trials.seconds:g} s {_SHOWN[design.presentation.on]}, "
-                  f"{design.trials.repetitions} time(s) each"),
+                  f"each {_times(design.trials.repetitions)}"),
         ("plan", f"alpha {plan.alpha:g} over all hypotheses ({plan.correction}), power "
                  f"{plan.power:g} for d_z = {plan.effect:g}"),
     )  # fmt: skip
 
 
 _SHOWN = {"head": "of the head in the room", "film": "of film"}
+
+
+def _deleted(count: int) -> str:
+    return f"; data of {count} more were deleted as they wished" if count else ""
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"
 
 
 def _rules(study: StudyAnalysis) -> tuple[str, ...]:
@@ -184,8 +192,9 @@ def _short(one: Decision, study: StudyAnalysis) -> str:
 
 def _line(one: Decision, study: StudyAnalysis) -> HypothesisLine:
     said = one.hypothesis
+    better = study.label(said.better)
     expected = (
-        f"{study.label(said.better)} exceeds {study.label(said.than)} in "
+        f"{better[:1].upper()}{better[1:]} exceeds {study.label(said.than)} in "
         f"{apa.measure_words(one.measure)}"
     )
     if not said.two_sided:

@@ -46,8 +46,9 @@ def write_report(data: Path, out: Path, made_by: str, progress: Progress) -> Stu
     refuse_foreign_folder(out)
     found = collected(data)
     study = analysed(
-        found.name, found.design, found.questionnaires, found.design_sha256, found.people
-    )
+        found.name, found.design, found.questionnaires, found.design_sha256, found.people,
+        len(found.deleted),
+    )  # fmt: skip
     page = study_page(study, made_by, progress)
     make_folder(out)
     for name, text in (

@@ -3,6 +3,7 @@
 P(i chosen over j) = 1 / (1 + exp(-(s_i - s_j))); the scores s add up to zero. Ties are no answers.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import comb, inf, nan
 
@@ -45,7 +46,7 @@ class BradleyTerryFit:
         return float(contrast @ self.scores), float(np.sqrt(variance))
 
 
-def fit(wins: NDArray[np.int64]) -> BradleyTerryFit:
+def fit(wins: NDArray[np.int64], names: Sequence[str] = ()) -> BradleyTerryFit:
     """Fit scores to choices.
 
     There are finite scores only where no group of conditions was always chosen over all others, nor
@@ -53,9 +54,10 @@ def fit(wins: NDArray[np.int64]) -> BradleyTerryFit:
 
     Args:
         wins: (k, k) how often the row was chosen over the column.
+        names: of the rows, for the fault; numbers from 1 without.
     """
     k = len(wins)
-    if fault := disconnected(wins):
+    if fault := disconnected(wins, names):
         return BradleyTerryFit(np.full(k, nan), np.full((k, k), nan), nan, fault)
     shown = wins + wins.T
     scores = np.zeros(k)
@@ -79,7 +81,7 @@ def _information(shown: NDArray[np.int64], chance: Floats) -> Floats:
     return np.diag(weights.sum(axis=1)) - weights
 
 
-def disconnected(wins: NDArray[np.int64]) -> str:
+def disconnected(wins: NDArray[np.int64], names: Sequence[str] = ()) -> str:
     """Return why choices allow no finite scores, "" where they do."""
     if not (wins + wins.T).any():
         return "nothing was chosen"
@@ -91,11 +93,13 @@ def disconnected(wins: NDArray[np.int64]) -> str:
     if strong == 1:
         return ""
     never = [k for k in range(len(wins)) if not wins[np.ix_(of != of[k], of == of[k])].any()]
-    which = ", ".join(str(k + 1) for k in never)
-    return f"condition {which} was chosen always: no finite score fits"
+    which = " and ".join(names[k] if names else f"condition {k + 1}" for k in never)
+    return f"{which} was chosen always over others: no finite score fits"
 
 
-def preferred(wins: NDArray[np.int64], better: int, than: int, two_sided: bool) -> StatisticalTest:
+def preferred(
+    wins: NDArray[np.int64], better: int, than: int, two_sided: bool, names: Sequence[str] = ()
+) -> StatisticalTest:
     """Test whether one condition is chosen over another, by all choices there are.
 
     The statistic is the likelihood ratio of equal scores; exact is the binomial chance of the
@@ -106,6 +110,7 @@ def preferred(wins: NDArray[np.int64], better: int, than: int, two_sided: bool) 
         better: row of the condition expected above.
         than: row of the other.
         two_sided: either sign counts.
+        names: of the rows, for notes.
     """
     won, lost = int(wins[better, than]), int(wins[than, better])
     direct = won + lost
@@ -114,7 +119,7 @@ def preferred(wins: NDArray[np.int64], better: int, than: int, two_sided: bool) 
         side = "two-sided" if two_sided else "greater"
         exact = float(stats.binomtest(won, direct, 0.5, alternative=side).pvalue)
     least = min(1.0, (2.0 if two_sided else 1.0) * 0.5**direct) if direct else 1.0
-    found = fit(wins)
+    found = fit(wins, names)
     notes = (f"{won} of {direct} direct choices", "choices count as independent of each other")
     if found.fault:
         effect = EffectSize("difference of scores", "Δs", nan, nan, nan, "none", bounded=False)
