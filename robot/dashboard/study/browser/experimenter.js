@@ -48,7 +48,8 @@ function draw() {
   head(now);
   set("answers", String(now.answers));
   set("elapsed", clock(now.elapsed_s));
-  set("attempt", now.condition ? String(now.attempt + 1) : "–");
+  const shown = now.showing ? `, shown for ${Math.floor(now.showing_s)} s` : "";
+  set("attempt", now.condition ? `${now.attempt + 1}${shown}` : "–");
   set("pause", now.paused ? "Go on" : "Pause");
   for (const id of ["pause", "repeat", "exclude"]) element(id).disabled = Boolean(now.how);
   element("repeat").disabled ||= !now.showing;
