@@ -1,4 +1,4 @@
-"""Photograph a study's pages for studies.md: python docs/make_study_pictures.py (20 s, Chromium)."""
+"""Photograph the pages of a study: python docs/make_study_pictures.py (9 s, with Chromium)."""
 
 import sys
 from io import BytesIO
