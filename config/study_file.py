@@ -62,6 +62,12 @@ class LoadedStudy:
         there = self.rig if before is None else self.rigs[before]
         return _differing(there, self.rigs[after])
 
+    def changes_of_own_rig(self, condition: str) -> dict[str, Value]:
+        """Return what a condition lays over its own rig, profile and character, by dotted key."""
+        one = self.design.conditions[condition]
+        there = load_rig(one.rig or self.design.presentation.rig, one.character, one.profile)
+        return _differing(there, self.rigs[condition])
+
     @cached_property
     def canonical(self) -> bytes:
         """Return what the data's hash is of: all that is shown and asked, defaults and all."""

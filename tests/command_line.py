@@ -5,7 +5,6 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -63,14 +62,6 @@ def answers_in(folder: Path, *lines: str) -> str:
     return str(file)
 
 
-@cache
-def tree() -> TyperGroup:
-    """Return all commands, made once: a thousand words of documents are looked up in them."""
-    group = typer.main.get_command(app)
-    assert isinstance(group, TyperGroup)
-    return group
-
-
 def parse(words: Sequence[str]) -> None:
     """Read a command as the program would, and do nothing.
 
@@ -80,8 +71,7 @@ def parse(words: Sequence[str]) -> None:
     Raises:
         ValueError: there is no such command or option, or a word is no value of it.
     """
-    command: Any = tree()
-    rest = [word for word in words if word != "--help"]
+    command, rest = typer.main.get_command(app), [word for word in words if word != "--help"]
     while isinstance(command, TyperGroup):
         if not rest or rest[0] not in command.commands:
             if not isinstance(command, JointsUnlessNamed):
@@ -98,7 +88,8 @@ def parse(words: Sequence[str]) -> None:
 def options(of: str = "") -> set[str]:
     """Return the options of a command, or of all."""
     found: set[str] = set()
-    group = tree()
+    group = typer.main.get_command(app)
+    assert isinstance(group, TyperGroup)
     waiting = [command for name, command in group.commands.items() if of in ("", name)]
     for command in waiting:
         opts = {o for param in command.params for o in param.opts}

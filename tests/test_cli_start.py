@@ -16,7 +16,7 @@ from typing import Any
 
 import pytest
 import typer
-from command_line import gazerig, parse, tree, typed
+from command_line import gazerig, parse, typed
 from typer.core import TyperGroup
 
 from gazerig import __version__
@@ -24,6 +24,7 @@ from gazerig.drivers.serial.list_ports import SerialPort
 from gazerig.robot.cli.command_group import CommandsByName
 from gazerig.robot.cli.command_list import COMMANDS
 from gazerig.robot.cli.examples import EXAMPLES
+from gazerig.robot.cli.main import app
 from gazerig.robot.cli.terminal import DEBUG_LOGGER, tidied_up
 from gazerig.robot.cli.welcome import next_steps
 
@@ -67,7 +68,9 @@ def test_gazerig_alone_shows_it_and_is_no_error() -> None:
 
 
 def commands() -> dict[str, Any]:
-    return dict(tree().commands)
+    group = typer.main.get_command(app)
+    assert isinstance(group, TyperGroup)
+    return dict(group.commands)
 
 
 def test_the_list_of_commands_is_that_of_their_modules() -> None:

@@ -4,14 +4,21 @@ from typing import Any
 
 import pytest
 import typer
-from command_line import tree
+from typer.core import TyperGroup
 
 from gazerig.robot.cli.examples import PANELS
+from gazerig.robot.cli.main import app
+
+
+def group_of_all() -> TyperGroup:
+    group = typer.main.get_command(app)
+    assert isinstance(group, TyperGroup)
+    return group
 
 
 def values(*words: str) -> dict[str, Any]:
     """Parse a command as the command line does, without running it."""
-    command = tree().commands[words[0]]
+    command = group_of_all().commands[words[0]]
     return dict(command.make_context(words[0], list(words[1:])).params)
 
 
@@ -55,7 +62,7 @@ def test_the_rig_is_found_among_the_words(
 
 
 def test_no_command_has_a_rig_option() -> None:
-    waiting: list[Any] = list(tree().commands.values())
+    waiting: list[Any] = list(group_of_all().commands.values())
     for command in waiting:
         waiting.extend(getattr(command, "commands", {}).values())
         assert not any("--rig" in param.opts for param in command.params), command.name
@@ -71,7 +78,7 @@ def test_a_renamed_option_is_taken_with_one_line(capsys: pytest.CaptureFixture[s
 
 
 def test_every_command_stands_in_a_panel_of_help_and_in_its_order() -> None:
-    group = tree()
+    group = group_of_all()
     context = typer.Context(group)
     named = [name for names in PANELS.values() for name in names]
     shown = group.list_commands(context)

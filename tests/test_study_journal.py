@@ -25,7 +25,7 @@ ALL: tuple[Record, ...] = (
     Opened("P001", "ab" * 32, ("a", "b|c"), "0.1", UTC),
     Consented(True, False, True, UTC),
     TrialBegan(-1, 0, "a", UTC),
-    TrialEnded(-1, 0, "head_lost", 3.5, UTC, 1, "run-01.mcap", "servo 3", 1.0, 4.5, 0.2),
+    TrialEnded(-1, 0, "head_lost", 3.5, UTC, 1, "run-01.mcap", "servo 3", 1.0, 4.5),
     ItemAnswered(0, "b|c", "choice", "alive", "first", 812.5, UTC),
     ItemAnswered(None, "", "free_text", "what", 'schön\n"ja" 目', 1.0, UTC),
     Measured(0, "b", {"first_look_s": 1.5}, 1, 2),

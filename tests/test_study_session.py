@@ -203,7 +203,7 @@ class LosesHead:
         self._why = "servo 3 does not answer" if self._count in self._lost else ""
 
     def end(self) -> Presented:
-        return Presented("run-01.mcap", (1.0, 2.0), 0.1)
+        return Presented("run-01.mcap", (1.0, 2.0))
 
     def fault(self) -> str:
         return self._why

@@ -158,12 +158,20 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
     "study": (
         ("study design --example study.yaml", "a study of two gazes to start from"),
         ("study design study.yaml", "check it; how many participants, and what is stated before"),
+        ("study run study.yaml --participant 1", "the first participant's session"),
     ),
     "study design": (
         ("study design --example study.yaml", "a study of two gazes to start from"),
         ("study design study.yaml", "check it and write its pre-registration"),
         ("study design nakamoto_1", "a shipped study: of Nakamoto & Tsuruno"),
     ),
+    "study film": (("study film study.yaml", "its films, to look at before anybody comes"),),
+    "study run": (
+        ("study run study.yaml --participant 7", "a session, in the browser"),
+        ("study run study.yaml --participant 7 --mock", "on an emulated head"),
+        ("study run study.yaml --simulate 24 --data trial", "24 simulated participants"),
+    ),
+    "study delete": (("study delete study-data --participant 7", "all data of a participant"),),
     "study analyse": (
         ("study analyse study-data", "one page for reviewers, tables, a BIDS data set"),
         ("study analyse study-data --out ../paper/report", "written elsewhere"),

@@ -4,6 +4,7 @@ import typer
 
 from gazerig.robot.cli.study_analyse import analyse
 from gazerig.robot.cli.study_design import design
+from gazerig.robot.cli.study_run import delete, film, run
 
 app = typer.Typer(
     name="study",
@@ -11,4 +12,7 @@ app = typer.Typer(
     no_args_is_help=True,
 )
 app.command("design")(design)
+app.command("film")(film)
+app.command("run")(run)
+app.command("delete")(delete)
 app.command("analyse")(analyse)

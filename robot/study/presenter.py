@@ -17,7 +17,6 @@ class Presented:
 
     recording: str = ""
     span_s: tuple[float, float] = (nan, nan)
-    largest_step_deg: float = nan
 
 
 class Presenter(Protocol):

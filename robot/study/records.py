@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from math import nan
 from typing import Literal
 
+STEP_DEG = "largest_step_deg"
+"""Largest step of any joint's goal, from tick to tick, in the switch to the condition."""
 Outcome = Literal["complete", "head_lost", "interrupted", "withdrawn"]
 AnswerValue = int | str
 """A rating 1..points, "first"/"second", or free text."""
@@ -63,8 +65,6 @@ class TrialEnded:
 
     recording: file beside the journal, "" without; reason: why it was not completed
     from_s, to_s: when it began and ended in the recording's time, nan without one
-    largest_step_deg: from tick to tick, of any joint's goal, in the switch to the condition;
-        nan with a film
     """
 
     trial: int
@@ -77,7 +77,6 @@ class TrialEnded:
     reason: str = ""
     from_s: float = nan
     to_s: float = nan
-    largest_step_deg: float = nan
 
 
 @dataclass(frozen=True)
@@ -99,7 +98,10 @@ class ItemAnswered:
 
 @dataclass(frozen=True)
 class Measured:
-    """Objective measures of one presentation: name -> value."""
+    """Measures of one presentation: name -> value, nan where there is none.
+
+    values: the design's objective ones, and STEP_DEG
+    """
 
     trial: int
     condition: str

@@ -163,15 +163,10 @@ class StudySession:
         """Return whether the session has ended for good."""
         return self._progress.closed is not None
 
-    @property
-    def keeps_pictures(self) -> bool:
-        """Return whether the participant agreed to pictures of the camera being kept."""
-        return self._progress.consented is not None and self._progress.consented.pictures
-
-    @property
-    def keeps_gaze(self) -> bool:
-        """Return whether the participant agreed to the direction of their gaze being kept."""
-        return self._progress.consented is not None and self._progress.consented.gaze
+    def agreed(self) -> tuple[bool, bool]:
+        """Return whether the participant's gaze may be kept, and pictures of the camera."""
+        said = self._progress.consented
+        return (False, False) if said is None else (said.gaze, said.pictures)
 
     def film_of(self, token: str) -> str | None:
         """Return the condition whose film is shown now under this name, None for another name."""
@@ -234,7 +229,6 @@ class StudySession:
         reason: str = "",
         recording: str = "",
         span_s: tuple[float, float] = (nan, nan),
-        largest_step_deg: float = nan,
     ) -> tuple[Record, ...]:
         """Return the record of the presentation that ends now.
 
@@ -245,13 +239,12 @@ class StudySession:
             reason: why it was not completed.
             recording: file beside the journal that holds it.
             span_s: its beginning and end in the recording's time.
-            largest_step_deg: of a joint's goal, from tick to tick, in the switch before it.
 
         Raises:
             WrongAnswer: none is under way.
         """
         self._require("presentation")
-        return self._cut(outcome, seconds, utc, reason, recording, span_s, largest_step_deg)
+        return self._cut(outcome, seconds, utc, reason, recording, span_s)
 
     def answer(
         self, values: Mapping[int, AnswerValue], ms: Mapping[int, float], utc: str
@@ -305,14 +298,13 @@ class StudySession:
         reason: str = "",
         recording: str = "",
         span_s: tuple[float, float] = (nan, nan),
-        largest_step_deg: float = nan,
     ) -> tuple[Record, ...]:
         """Return the record of the end of the presentation under way, none without one."""
         began = self._progress.began
         if began is None:
             return ()
-        at, rest = (began.trial, began.attempt), (*span_s, largest_step_deg)
-        return (TrialEnded(*at, outcome, seconds, utc, began.side, recording, reason, *rest),)
+        at = (began.trial, began.attempt)
+        return (TrialEnded(*at, outcome, seconds, utc, began.side, recording, reason, *span_s),)
 
     @property
     def _ending(self) -> Ending:

@@ -11,7 +11,7 @@ from math import isfinite
 
 from gazerig.robot.study.answers import WrongAnswer
 from gazerig.robot.study.journal import Journal
-from gazerig.robot.study.presenter import HeadLost, Presented, Presenter
+from gazerig.robot.study.presenter import HeadLost, Presenter
 from gazerig.robot.study.records import AnswerValue, Outcome, Record
 from gazerig.robot.study.screens import PresentationScreen, ReadyScreen, Screen
 from gazerig.robot.study.session import ShownTrial, StudySession
@@ -21,7 +21,7 @@ WHOLE_SHARE = 0.9
 
 
 @dataclass(frozen=True)
-class RunState:
+class StudyRunState:
     """What the experimenter sees.
 
     Attributes:
@@ -84,12 +84,12 @@ class StudyRun:
         with self._lock:
             return self._session.page, self._session.screen
 
-    def state(self) -> RunState:
+    def state(self) -> StudyRunState:
         """Return what the experimenter sees."""
         with self._lock:
             session, screen = self._session, self._session.screen
             presenting = isinstance(screen, PresentationScreen)
-            return RunState(
+            return StudyRunState(
                 self._code, screen, session.trial, len(session.order), session.shown, presenting,
                 self._now_s() - self._began_s if presenting else 0.0,
                 sum(type(one).__name__ == "ItemAnswered" for one in self._journal.records),
@@ -238,7 +238,8 @@ class StudyRun:
         """End the presentation under way."""
         seconds = self._now_s() - self._began_s
         what = self._presenter.end()
-        self._keep(self._session.end(outcome, seconds, self._utc(), reason, *_as_ended(what)))
+        ended = (outcome, seconds, self._utc(), reason, what.recording, what.span_s)
+        self._keep(self._session.end(*ended))
 
     def _leave(self, records: Sequence[Record]) -> None:
         presenting = isinstance(self._session.screen, PresentationScreen)
@@ -253,7 +254,3 @@ class StudyRun:
         end = self._session.finish(self._utc())
         self._journal.write(end)
         self._session.add(end)
-
-
-def _as_ended(what: Presented) -> tuple[str, tuple[float, float], float]:
-    return what.recording, what.span_s, what.largest_step_deg

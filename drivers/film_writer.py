@@ -1,0 +1,60 @@
+"""Films for browsers: WebM with VP8, which every browser of today plays."""
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import cv2
+
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.types import ImageArray
+
+_CODEC, _BITS_PER_S = "VP80", 2_000_000
+_OPTIONS = "OPENCV_FFMPEG_WRITER_OPTIONS"
+
+
+@contextmanager
+def film_writer(
+    path: Path, size_px: tuple[int, int], rate_hz: float
+) -> Iterator[Callable[[ImageArray], None]]:
+    """Return what writes BGR pictures to a film, one after the other.
+
+    Args:
+        path: of the film, ending in .webm; a file that is there is written over.
+        size_px: width and height of all pictures.
+        rate_hz: pictures a second.
+
+    Raises:
+        SetupError: OpenCV cannot write such a film here.
+    """
+    before = os.environ.get(_OPTIONS)
+    os.environ[_OPTIONS] = f"b;{_BITS_PER_S}|deadline;good|auto-alt-ref;0"
+    try:
+        code = cv2.VideoWriter.fourcc(*_CODEC)
+        with _without_stderr():
+            writer = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, code, rate_hz, size_px)
+    finally:
+        if before is None:
+            del os.environ[_OPTIONS]
+        else:
+            os.environ[_OPTIONS] = before
+    try:
+        if not writer.isOpened():
+            raise SetupError(f"{path}: this OpenCV cannot write {_CODEC} films; pip's builds can")
+        yield lambda picture: writer.write(picture)
+    finally:
+        writer.release()
+
+
+@contextmanager
+def _without_stderr() -> Iterator[None]:
+    """Drop what native code prints: OpenCV says that WebM does not know VP8, its own codec."""
+    kept, nothing = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nothing, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nothing)

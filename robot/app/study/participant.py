@@ -1,0 +1,169 @@
+"""One participant's session from start to end: data folder, journal, pages, films or the head."""
+
+import secrets
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import gazerig
+from gazerig.config.study_file import LoadedStudy
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.study.head_presenter import HeadPresenter
+from gazerig.robot.app.study.trial_measures import measured
+from gazerig.robot.dashboard.study.server import StudyServer
+from gazerig.robot.model.clock import Clock
+from gazerig.robot.study.data_folder import StudyData, code_of
+from gazerig.robot.study.journal import Journal, NotKept
+from gazerig.robot.study.presenter import FilmPresenter
+from gazerig.robot.study.records import Opened
+from gazerig.robot.study.session import StudySession
+from gazerig.robot.study.study_run import StudyRun
+
+_POLL_S = 0.05
+_TOKEN_BYTES = 16
+
+
+@dataclass(frozen=True)
+class SessionPlan:
+    """What a session is run with.
+
+    Attributes:
+        study: A checked one.
+        data: Its folder.
+        number: Of the participant, from 1.
+        address: Where the pages are served, host and port.
+        films: Of each condition; empty with a head.
+        head: How the head is run, None with films.
+    """
+
+    study: LoadedStudy
+    data: StudyData
+    number: int
+    address: tuple[str, int]
+    films: Mapping[str, Path]
+    head: RunOptions | None
+
+
+def utc_now() -> str:
+    """Return date and time of day."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
+
+
+def opened_journal(study: LoadedStudy, data: StudyData, number: int, sha256: str) -> Journal:
+    """Return the journal of a participant who has not finished yet, of this design.
+
+    Raises:
+        SetupError: the participant's data were deleted or are of another design, or a session is
+            under way.
+    """
+    code = code_of(number)
+    if code in data.deleted():
+        raise SetupError(f"the data of {code} were deleted on request: take another participant")
+    journal = Journal(data.participant(number))
+    for one in journal.records:
+        if isinstance(one, Opened) and one.design_sha256 != sha256:
+            journal.close()
+            raise SetupError(
+                f"{data.participant(number)} was begun with another design "
+                f"({one.design_sha256[:12]}; this one is {sha256[:12]}): begin a new study with "
+                "--data NEW_FOLDER"
+            )
+    return journal
+
+
+def run_session(
+    plan: SessionPlan,
+    stopped: Callable[[], str | None],
+    say: Callable[[str], None],
+    clock: Clock,
+    browse: Callable[[str], object] | None = None,
+) -> str:
+    """Run a participant's session until it is over, or is to stop; return how it ended, in words.
+
+    Args:
+        plan: what to run.
+        stopped: returns why to end now, None to go on; the session can be resumed.
+        say: writes a line for the experimenter.
+        clock: the host's.
+        browse: opens the participant's page in a browser here, None: only its address is said.
+
+    Raises:
+        SetupError: the participant has finished already, or the session cannot begin.
+    """
+    study, data = plan.study, plan.data
+    sha256 = data.claim(study.name, study.canonical)
+    folder = data.participant(plan.number)
+    with opened_journal(study, data, plan.number, sha256) as journal:
+        session = StudySession(
+            study.design, study.questionnaires, plan.number, data.secret(), journal.records
+        )
+        code = code_of(plan.number)
+        if session.closed:
+            raise SetupError(f"{code} has ended the session already: take another participant")
+        journal.write((session.opened(code, sha256, gazerig.__version__, utc_now()),))
+        head = None
+        if plan.head is not None:
+            head = HeadPresenter(study, plan.head, folder, session.agreed, clock)
+        run = StudyRun(code, session, journal, head or FilmPresenter(), clock.now_s, utc_now)
+        finished: list[str] = []
+        tokens = secrets.token_hex(_TOKEN_BYTES), secrets.token_hex(_TOKEN_BYTES)
+        server = StudyServer(
+            run, study.design, plan.address, tokens, plan.films,
+            lambda: finished.append("ended by the experimenter"), head,
+        )  # fmt: skip
+        try:
+            _open(server, plan)
+            say(f"participant: {server.participant_url}")
+            say(f"experimenter: {server.experimenter_url}")
+            if browse is not None:
+                browse(server.participant_url)
+            how = _until_over(
+                run, server, lambda: finished[0] if finished else stopped(), say, clock
+            )
+        finally:
+            server.close()
+            if head is not None:
+                say("the head parks")
+                head.close()
+        if head is not None:
+            journal.write(measured(study, journal.records, folder, say))
+    return how
+
+
+def _open(server: StudyServer, plan: SessionPlan) -> None:
+    try:
+        server.open()
+    except OSError as error:
+        host, port = plan.address
+        raise SetupError(
+            f"the pages cannot be served at {host}:{port} ({error.strerror or error}): name another "
+            "address with --page HOST:PORT"
+        ) from error
+
+
+def _until_over(
+    run: StudyRun,
+    server: StudyServer,
+    stopped: Callable[[], str | None],
+    say: Callable[[str], None],
+    clock: Clock,
+) -> str:
+    """Have time pass for the session until it is closed and its last page shown, or is to stop."""
+    shown, said = run.now()[0], ""
+    while (why := stopped()) is None:
+        try:
+            run.poll()
+        except NotKept as error:
+            if str(error) != said:
+                said = str(error)
+                say(said)
+        if (page := run.now()[0]) != shown:
+            shown = page
+            server.notify()
+        clock.sleep_until(clock.now_s() + _POLL_S)
+    state = run.state()
+    if state.closed:
+        return "the session is over"
+    return f"{why}: the session goes on with the same command"

@@ -1,0 +1,121 @@
+"""Simulated participants go through a study as real ones do: same screens, same journals."""
+
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+
+import gazerig
+from gazerig.config.study_file import LoadedStudy
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.app.study.participant import opened_journal
+from gazerig.robot.study.data_folder import StudyData, code_of
+from gazerig.robot.study.journal import Journal
+from gazerig.robot.study.presenter import FilmPresenter
+from gazerig.robot.study.records import AnswerValue, Measured, TrialEnded
+from gazerig.robot.study.screens import (
+    ConsentScreen,
+    EndScreen,
+    InstructionsScreen,
+    PresentationScreen,
+    QuestionsScreen,
+    ReadyScreen,
+    RestScreen,
+)
+from gazerig.robot.study.session import StudySession
+from gazerig.robot.study.simulation import Population, SimulatedParticipant
+from gazerig.robot.study.study_run import StudyRun
+
+_BEGAN = datetime(2000, 1, 1, tzinfo=UTC)
+_MOST_SCREENS = 100_000
+
+
+def simulate_study(
+    study: LoadedStudy,
+    data: StudyData,
+    count: int,
+    population: Population,
+    progress: Callable[[float], None] = lambda share: None,
+) -> None:
+    """Run participants 1 to ``count`` through a study; the same seed gives the same journals.
+
+    Args:
+        study: a checked one.
+        data: a folder without participants.
+        count: how many.
+        population: whom they are drawn from.
+        progress: told the share that is done, 0..1.
+
+    Raises:
+        SetupError: there are data of participants already, or they cannot be written.
+    """
+    if data.numbers():
+        raise SetupError(
+            f"{data.folder} has data of participants: simulated ones go to a folder of their own, "
+            "--data NEW_FOLDER"
+        )
+    sha256 = data.claim(study.name, study.canonical)
+    for number in range(1, count + 1):
+        with opened_journal(study, data, number, sha256) as journal:
+            _simulate(study, journal, number, population, sha256, data.secret())
+        progress(number / count)
+
+
+def _simulate(
+    study: LoadedStudy,
+    journal: Journal,
+    number: int,
+    population: Population,
+    sha256: str,
+    secret: bytes,
+) -> None:
+    """Run one participant, in simulated time."""
+    now_s = [0.0]
+
+    def utc() -> str:
+        return (_BEGAN + timedelta(days=number, seconds=now_s[0])).isoformat(timespec="seconds")
+
+    session = StudySession(study.design, study.questionnaires, number, secret)
+    code = code_of(number)
+    journal.write((session.opened(code, sha256, gazerig.__version__, utc(), simulated=True),))
+    run = StudyRun(code, session, journal, FilmPresenter(), lambda: now_s[0], utc)
+    person = SimulatedParticipant(study.design, study.questionnaires, number, population)
+    for _ in range(_MOST_SCREENS):
+        page, screen = run.now()
+        match screen:
+            case ConsentScreen():
+                run.consent(page, True, True, True)
+            case InstructionsScreen():
+                run.go_on(page)
+            case RestScreen():
+                now_s[0] += screen.seconds
+                run.go_on(page)
+            case ReadyScreen():
+                run.begin(page)
+            case PresentationScreen():
+                now_s[0] += screen.seconds
+                run.film_ended(page, screen.seconds)
+                run.poll()
+            case QuestionsScreen():
+                now_s[0] += _answer(run, page, session, person)
+            case EndScreen():
+                break
+    ended = [one for one in journal.records if isinstance(one, TrialEnded)]
+    if study.design.objective:
+        shown = {**dict(enumerate(session.order))}
+        journal.write([
+            Measured(one.trial, shown[one.trial], person.measured(one.trial, shown[one.trial]))
+            for one in ended
+            if one.trial in shown and shown[one.trial] in study.design.conditions
+        ])  # fmt: skip
+
+
+def _answer(run: StudyRun, page: str, session: StudySession, person: SimulatedParticipant) -> float:
+    """Answer a page; return the seconds that it took."""
+    asked = session.asked
+    assert asked is not None  # of a page of questions
+    values: dict[int, AnswerValue] = {}
+    ms: dict[int, float] = {}
+    for number, item in enumerate(asked.items):
+        said = person.answer(asked.trial, asked.condition, asked.questionnaire, item)
+        values[number], ms[number] = said
+    run.answer(page, values, ms)
+    return sum(ms.values()) / 1000.0
