@@ -25,6 +25,7 @@ OWNERS = {
     "zstandard": ("robot.recording.",),
     "msgspec": (
         "robot.control.tick_stream",
+        "robot.study.collected",
         "robot.study.journal",
         "robot.dashboard.study.participant_events",
     ),
