@@ -76,6 +76,19 @@ def test_pairs_are_seen_both_ways_round_equally_often_in_every_place(n: int) -> 
         assert all(len({one in shown(design) for one in order}) == 2 for order in every)
 
 
+@pytest.mark.parametrize("n", [2, 3, 4])
+def test_repeated_pairs_stay_balanced_and_one_pair_is_turned(n: int) -> None:
+    design = replace(design_of(n, repetitions=3), task="pairwise")
+    every = [orders(design, p) for p in range(1, rows(design) + 1)]
+    pairs = len(shown(design))
+    for k in range(3):
+        cells = Counter((i, o[k * pairs + i]) for o in every for i in range(pairs))
+        assert set(cells.values()) == {1} and len(cells) == 2 * pairs * pairs
+    for order in every:
+        for one, two in zip(order, order[1:], strict=False):
+            assert one != two and (n == 2 or set(one.split(PAIR)) != set(two.split(PAIR)))
+
+
 def test_the_participant_and_the_seed_decide_and_nothing_else() -> None:
     design = design_of(5, order="random", seed=4)
     assert orders(design, 3) == orders(design, 3)

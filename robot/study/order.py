@@ -120,6 +120,8 @@ def _table(design: StudyDesign) -> tuple[tuple[str, ...], ...]:
 def _step(table: tuple[tuple[str, ...], ...]) -> int:
     """Return how many rows further a participant's next block is taken from."""
     n = len(table)
+    if len(table[0]) == 1:  # one pair: the other way round
+        return 1
     for step in range(1, n):
         if all(not _same(table[i][-1], table[(i + step) % n][0]) for i in range(n)):
             return step
