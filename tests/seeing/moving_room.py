@@ -238,13 +238,26 @@ def _painted(
         return out
     H = cv2.getPerspectiveTransform(source.astype(np.float32), (corners - low).astype(np.float32))
     size = int(high[0] - low[0]), int(high[1] - low[1])
-    cut = _cut(board.figure, (rows, columns))
-    cover = cv2.warpPerspective(cut, H, size)
     paint = cv2.warpPerspective(texture, H, size, borderMode=cv2.BORDER_REPLICATE)
     window = np.s_[low[1] : high[1], low[0] : high[0]]
+    if not board.figure and _fills(np.linalg.inv(H), size, (rows, columns)):
+        image[window], out[window] = paint, True
+        return out
+    cover = cv2.warpPerspective(_cut(board.figure, (rows, columns)), H, size)
     image[window] = image[window] * (1 - cover) + paint * cover
     out[window] = cover > 0.5
     return out
+
+
+def _fills(H: Floats, size: tuple[int, int], shape: tuple[int, int]) -> bool:
+    """Return whether a board covers a window as far as its edges, as the wall behind all does.
+
+    H: window to texture
+    """
+    right, bottom = size[0] - 1.0, size[1] - 1.0
+    ends = np.array([[(0.0, 0.0), (right, 0.0), (right, bottom), (0.0, bottom)]])
+    at = cv2.perspectiveTransform(ends, H)[0]
+    return bool((at >= 1.0).all() and (at <= (shape[1] - 2.0, shape[0] - 2.0)).all())
 
 
 def shaken(picture: Image, motion: Pose, share: float = 0.72, view_rad: float = FIELD_RAD) -> Image:

@@ -77,7 +77,7 @@ def _jumps(shift: Flow | None) -> Plane | float:
     if shift is None:
         return 0.0
     ends = cv2.morphologyEx(shift, cv2.MORPH_GRADIENT, np.ones((_SMEAR_PX, _SMEAR_PX), np.uint8))
-    return np.asarray(ends.sum(axis=2), dtype=np.float32)
+    return np.asarray(ends[..., 0] + ends[..., 1], dtype=np.float32)
 
 
 def _nearer(rest: Flow, ego: Ego, most: float) -> Flow:
@@ -93,8 +93,18 @@ def _nearer(rest: Flow, ego: Ego, most: float) -> Flow:
     """
     room = -_background(np.asarray(np.linalg.inv(ego.total)), rest.shape[:2])
     room = _added(room, 1.0)
-    along = (rest * room).sum(axis=2) / np.maximum((room * room).sum(axis=2), np.float32(1e-6))
+    squares = np.maximum(_dot(room, room), np.float32(1e-6))
+    along = np.asarray(_dot(rest, room) / squares, dtype=np.float32)
     out: Flow = np.clip(along, -_BEHIND, most)[..., None] * room
+    return out
+
+
+def _dot(a: Flow, b: Flow) -> Plane:
+    """Return the scalar products of two flows, (h, w).
+
+    Over an axis of two, ``sum`` takes several times as long as one addition.
+    """
+    out: Plane = a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1]
     return out
 
 
