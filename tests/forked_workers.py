@@ -59,6 +59,8 @@ def run(session: pytest.Session, workers: int) -> None:
     files = deque([list(items) for _, items in by_file])
     factory: Any = session.config._tmp_path_factory  # type: ignore[attr-defined]
     factory.getbasetemp()  # else each fork would make one
+    if len(files) > 10 * workers:
+        _read_rigs()
     crew = [_Worker(session) for _ in range(min(workers, len(files)))]
     try:
         while crew:
@@ -69,6 +71,15 @@ def run(session: pytest.Session, workers: int) -> None:
                 raise session.Interrupted(session.shouldstop)
     finally:
         child_processes.end(worker.pid for worker in crew)
+
+
+def _read_rigs() -> None:
+    """Load the shipped rigs: their YAML and what judges it are kept, once for all forks."""
+    from gazerig.config.schema import load_rig
+    from gazerig.config.shipped import shipped_names
+
+    for name in shipped_names("rigs"):
+        load_rig(name)
 
 
 def _hear(session: pytest.Session, crew: list["_Worker"], files: deque[list[pytest.Item]]) -> None:

@@ -44,7 +44,7 @@ CORRECTED_S = 0.25
 
 
 @pytest.fixture(scope="module")
-def ticks() -> tuple[Assembly, list[Tick]]:
+def ticks(ideal_servos: None) -> tuple[Assembly, list[Tick]]:
     """Run the rig in simulated time; half its rate, and no search for faces of few pixels."""
     if not FILM.exists():
         pytest.skip(f"no film at {FILM}")

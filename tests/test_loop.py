@@ -60,7 +60,7 @@ def test_it_starts_slowly_from_where_the_joints_are() -> None:
 def test_every_goal_on_the_bus_is_inside_the_limits() -> None:
     rig = load_rig("desk")
     rig = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
-    run_of = assemble(rig, RunOptions(mock=True, fast=True, seed=3, scene="visitor"))
+    run_of = assemble(rig, RunOptions(mock=True, fast=True, seed=3, scene="visitor", bus="ideal"))
     commands = np.array([tick.guard_result.command_rad for tick in ticks(run_of, 30.0)])
     speeds = np.diff(commands, axis=0) / 0.010
     for i, name in enumerate(GAZE_JOINTS):

@@ -165,12 +165,14 @@ def test_every_live_knob_has_an_effect_on_the_running_parts(
     section: str, names: tuple[str, ...], walk: str
 ) -> None:
     dice = np.random.default_rng(0)
-    made = fresh(RIG)
+    made, in_force = fresh(RIG), RIG
+    first = running_parameters(made, names)
     for knob in of_section(section):
         base = changed(RIG, in_use(knob.key))
         other = acceptable(knob, base, dice, walk)
-        put(made, base)
-        first = running_parameters(made, names)
+        if base != in_force:  # nearly every knob has the same one, which the last left in force
+            put(made, base)
+            first, in_force = running_parameters(made, names), base
         said = put(made, other)
         assert any(knob.key in line for line in said), said
         assert running_parameters(made, names) != first, f"{knob.key} changes nothing"

@@ -13,6 +13,8 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
 from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 
+pytestmark = pytest.mark.usefixtures("ideal_servos")
+
 SECONDS = 3.0
 
 

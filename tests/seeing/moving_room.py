@@ -240,7 +240,7 @@ def _painted(
     size = int(high[0] - low[0]), int(high[1] - low[1])
     paint = cv2.warpPerspective(texture, H, size, borderMode=cv2.BORDER_REPLICATE)
     window = np.s_[low[1] : high[1], low[0] : high[0]]
-    if not board.figure and _fills(np.linalg.inv(H), size, (rows, columns)):
+    if not board.figure and _fills(np.asarray(np.linalg.inv(H), float), size, (rows, columns)):
         image[window], out[window] = paint, True
         return out
     cover = cv2.warpPerspective(_cut(board.figure, (rows, columns)), H, size)
