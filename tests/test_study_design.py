@@ -10,11 +10,12 @@ from command_line import typed
 
 from gazerig.config.schema import Rig
 from gazerig.config.shipped import shipped_names
+from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.assemble import with_options
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.simulated_run import simulate
 from gazerig.robot.app.study_file import checked_study
-from gazerig.robot.cli.study_design import EXAMPLE, notes
+from gazerig.robot.cli.study_design import EXAMPLE, notes, state
 from gazerig.robot.study.data_folder import StudyData
 
 Terminal = pytest.CaptureFixture[str]
@@ -78,6 +79,26 @@ def test_a_design_that_people_have_answered_is_not_stated_anew(
     stated = (elsewhere / "study-data" / "preregistration.md").read_text(encoding="utf-8")
     assert first.sha256 in stated
     assert typed("study", "design", "--data", "second") == 0
+
+
+def test_a_study_is_stated_before_somebody_takes_part(elsewhere: Path, capfd: Terminal) -> None:
+    file, folder = elsewhere / "study.yaml", elsewhere / "d"
+    file.write_text(EXAMPLE, encoding="utf-8")
+    first = checked_study("study.yaml")
+    state("study.yaml", first, folder)
+    stated = (folder / "preregistration.md").read_text(encoding="utf-8")
+    assert first.sha256 in stated
+    state("study.yaml", first, folder)
+    file.write_text(EXAMPLE.replace("seconds: 20", "seconds: 25"), encoding="utf-8")
+    with pytest.raises(SetupError, match="gazerig study design study.yaml --force"):
+        state("study.yaml", checked_study("study.yaml"), folder)
+    StudyData(folder).claim("study", first.canonical)  # the first participant
+    with pytest.raises(SetupError, match="begin a new study with --data"):
+        state("study.yaml", checked_study("study.yaml"), folder)
+    (folder / "preregistration.md").unlink()
+    with pytest.raises(SetupError, match="data of another design"):
+        state("study.yaml", checked_study("study.yaml"), folder)
+    assert not (folder / "preregistration.md").exists()
 
 
 def test_a_preregistration_states_all_that_a_reviewer_asks_for(elsewhere: Path) -> None:

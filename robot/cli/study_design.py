@@ -123,6 +123,34 @@ def write_preregistration(study: "LoadedStudy", folder: Path, force: bool = Fals
     return True
 
 
+def state(name: str, study: "LoadedStudy", folder: Path) -> None:
+    """See to it that a study is stated before somebody takes part; say so where it is done now.
+
+    Args:
+        name: of the study as it was typed.
+        study: a checked one.
+        folder: of its data.
+
+    Raises:
+        SetupError: what is stated there, or the data there, are of another design.
+    """
+    from gazerig.robot.study.data_folder import StudyData
+
+    data, file = StudyData(folder), folder / PREREGISTRATION
+    sha256 = data.check(study.canonical)
+    if not file.exists():
+        before = "before the first participant"
+        if data.numbers():
+            before = f"anew after {len(data.numbers())} participants; it was not there any more"
+        write_preregistration(study, folder)
+        say(f"{file}: written {before}")
+    elif sha256 not in file.read_text(encoding="utf-8"):
+        raise SetupError(
+            f"{file} states another design than {name} is now; nobody has taken part yet, so "
+            f"state it anew: gazerig study design {name} --force"
+        )
+
+
 def summary(name: str, study: "LoadedStudy") -> list[str]:
     """Return what a study is, in a few lines."""
     from gazerig.robot.study.order import orders

@@ -12,7 +12,7 @@ from gazerig.robot.app.options import RunOptions, camera_of, host_port
 from gazerig.robot.cli import run_options as options
 from gazerig.robot.cli.browser import desktop_here, open_page
 from gazerig.robot.cli.progress_bar import progress_bar
-from gazerig.robot.cli.study_design import DataOption, StudyArgument, data_folder
+from gazerig.robot.cli.study_design import DataOption, StudyArgument, data_folder, state
 from gazerig.robot.cli.terminal import clear_errors, say, signals
 
 if TYPE_CHECKING:
@@ -66,6 +66,7 @@ def run(
             _simulate(found, folder, simulate, effect, seed)
             print(f"next: gazerig study analyse {folder.folder}")
             return
+        state(study, found, folder.folder)
         from gazerig.robot.app.study.participant import SessionPlan, run_session
         from gazerig.robot.model.clock import RealClock
 
