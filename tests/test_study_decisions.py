@@ -66,9 +66,17 @@ def test_who_is_left_out_as_a_whole() -> None:
     assert left_out([*found[:-1], gone], kept) == "withdrew: felt unwell"
     sent = Closed("excluded", "", UTC)
     assert left_out([*found[:-1], sent]) == "excluded by the experimenter"
-    same = [replace(r, value=4) if isinstance(r, ItemAnswered) else r for r in found]
-    assert "one answer" in left_out(same)
-    allowed = replace(design(), exclusion=Exclusion(same_answers=False))
+
+
+def test_one_answer_to_everything_leaves_out_where_there_are_enough_of_them() -> None:
+    twice = replace(design(), trials=Trials(repetitions=2))
+    same, few = (
+        [replace(r, value=4) if isinstance(r, ItemAnswered) else r for r in records(study, 1)]
+        for study in (twice, design())
+    )
+    assert "one answer" in left_out(same, twice)
+    assert left_out(few) == ""  # four equal ratings may be honest
+    allowed = replace(twice, exclusion=Exclusion(same_answers=False))
     assert left_out(same, allowed) == ""
 
 

@@ -15,9 +15,9 @@ from gazerig.robot.report.study import apa, figures
 from gazerig.robot.report.study.page import banners, study_page
 from gazerig.robot.report.study.tables import ANSWERS, answers_csv, results_json, trials_csv
 from gazerig.robot.study.analysis import StudyAnalysis, analysed, within_halves
-from gazerig.robot.study.design import Condition, Hypothesis, StudyDesign
+from gazerig.robot.study.design import Condition, Hypothesis, StudyDesign, Trials
 from gazerig.robot.study.participation import participation
-from gazerig.robot.study.records import ItemAnswered, Opened
+from gazerig.robot.study.records import STEP_DEG, ItemAnswered, Opened
 from gazerig.robot.study.simulation import Population
 from gazerig.robot.study.statistics.results import EffectSize, StatisticalTest
 
@@ -138,16 +138,32 @@ def test_the_page_says_what_a_reviewer_asks(page: str, ratings: StudyAnalysis) -
 
 def test_too_few_are_said_first() -> None:
     small = study(design(), 4)
-    assert any(words.startswith("Too few: 4 of the 24") for words in banners(small))
+    assert any(
+        words.startswith("Too few: 4 of the 24 participants who were planned came, 4 count")
+        for words in banners(small)
+    )
     said = text_of(page_of(small))
     assert "Too few: with n = 4 nothing can be said of whether the walk exceeds" in said
 
 
 def test_who_is_left_out_is_listed_with_the_reason() -> None:
-    careless = study(population=Population(1.0, careless=1.0), count=3)
+    four = replace(design(participants=4), trials=Trials(repetitions=2))
+    careless = study(four, 3, Population(1.0, careless=1.0))
     said = text_of(page_of(careless))
     assert "P002 gave one answer to every item of all trials" in said
     assert "3 came, 0 count" in said
+
+
+def test_exclusions_and_switches_are_told() -> None:
+    whole = study()
+    lost = replace(whole.people[0], left_out="did not finish")
+    step = replace(whole.people[1].trials[0], measured={STEP_DEG: 0.125})
+    moved = replace(whole.people[1], trials=(step, *whole.people[1].trials[1:]))
+    one = replace(whole, people=(lost, moved, *whole.people[2:]), deleted=2)
+    assert any(words.startswith("11 of the 12 participants who were") for words in banners(one))
+    said = text_of(page_of(one))
+    assert "largest step of a commanded joint 0.12 deg in a tick, 1 switches" in said
+    assert "data of 2 more were deleted" in said
 
 
 def test_simulated_ones_do_not_count_beside_people() -> None:

@@ -1,5 +1,6 @@
 """Tests of simulated participants: the effect is there as it was asked for, and nothing drifts."""
 
+from dataclasses import replace
 from math import sqrt
 
 import numpy as np
@@ -106,7 +107,8 @@ def test_choices_prefer_as_often_as_differences_are_positive() -> None:
 
 
 def test_careless_and_hasty_ones_are_among_them_and_are_left_out() -> None:
-    study, careless = design(), Population(careless=0.3, hasty=0.2)
+    study = replace(design(), trials=Trials(repetitions=2))
+    careless = Population(careless=0.3, hasty=0.2)
     people = [participation(records(study, k, careless), study, QUESTIONS) for k in range(1, 61)]
     same = [p for p in people if "one answer" in p.left_out]
     fast = [p for p in people if any(r.left_out == "answered too fast" for r in p.answers)]
@@ -114,8 +116,6 @@ def test_careless_and_hasty_ones_are_among_them_and_are_left_out() -> None:
 
 
 def test_objective_measures_have_the_effect_over_repetitions() -> None:
-    from dataclasses import replace
-
     study = replace(design(), objective=("mutual_gaze_share",), trials=Trials(repetitions=2))
     d = []
     for k in range(1, 401):

@@ -18,8 +18,8 @@ from gazerig.robot.study.records import (
     TrialEnded,
 )
 
-LEAST_SAME = 4
-"""Ratings from which on one answer to all of them tells something."""
+LEAST_SAME = 8
+"""Ratings from which on one answer to all of them tells something: fewer may well be honest."""
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ import jinja2
 from gazerig.robot.study.design import Hypothesis, StudyDesign, Test
 from gazerig.robot.study.measures import GAZE_MEASURES, measures
 from gazerig.robot.study.order import PAIR, orders, rows, shown
+from gazerig.robot.study.participation import LEAST_SAME
 from gazerig.robot.study.power import MOST, PowerClaim, claim, power_of
 from gazerig.robot.study.questionnaire import Item, Questionnaire, Texts
 
@@ -269,7 +270,10 @@ def _exclusions(design: StudyDesign) -> Iterator[str]:
     if rule.fastest_answer_ms:
         yield f"A page of answers given in less than {rule.fastest_answer_ms:g} ms is left out."
     if rule.same_answers:
-        yield "Who gives one answer to every item of all trials is left out."
+        yield (
+            f"Who gives one answer to every item of all trials, at least {LEAST_SAME} ratings, is left "
+            "out."
+        )
     if rule.incomplete == "exclude":
         yield "Who did not finish is left out."
     else:

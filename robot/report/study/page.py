@@ -3,7 +3,7 @@
 from base64 import b64encode
 from collections import Counter
 from collections.abc import Callable, Iterator
-from math import isfinite
+from math import isfinite, nan
 from typing import NamedTuple
 
 from markupsafe import Markup
@@ -12,6 +12,7 @@ from gazerig.robot.report.page import number, rendered
 from gazerig.robot.report.study import apa, figures
 from gazerig.robot.study.analysis import ChoiceSummary, MeasureSummary, StudyAnalysis
 from gazerig.robot.study.decisions import Decision
+from gazerig.robot.study.records import STEP_DEG
 from gazerig.robot.study.statistics.results import StatisticalTest
 
 Progress = Callable[[str, float], None]
@@ -122,12 +123,18 @@ def banners(study: StudyAnalysis) -> tuple[str, ...]:
         found.append(
             f"{simulated} of {len(study.people)} participants are simulated, and are left out."
         )
-    counted, planned = len(study.counted), study.design.plan.participants
-    if counted < planned:
+    came, counted = len(study.people), len(study.counted)
+    planned = study.design.plan.participants
+    if came < planned:
         found.append(
-            f"Too few: {counted} of the {planned} participants who were planned count. A study that "
-            "is looked at before its end, and goes on until it pleases, finds effects that are not "
-            "there: go on to the number that was planned."
+            f"Too few: {came} of the {planned} participants who were planned came, {counted} count. "
+            "A study that is looked at before its end, and goes on until it pleases, finds effects "
+            "that are not there: go on to the number that was planned."
+        )
+    elif counted < planned:
+        found.append(
+            f"{counted} of the {planned} participants who were planned count, as others are left "
+            "out: effects are found more seldom than the plan says."
         )
     programs = {one.program for one in study.people}
     if len(programs) > 1:
@@ -149,12 +156,23 @@ def _facts(study: StudyAnalysis) -> tuple[tuple[str, str], ...]:
         ("task", "each was rated" if design.task == "rating" else "one of two was chosen"),
         ("shown", f"{design.trials.seconds:g} s {_SHOWN[design.presentation.on]}, "
                   f"each {_times(design.trials.repetitions)}"),
+        *_switches(study),
         ("plan", f"alpha {plan.alpha:g} over all hypotheses ({plan.correction}), power "
                  f"{plan.power:g} for d_z = {plan.effect:g}"),
     )  # fmt: skip
 
 
 _SHOWN = {"head": "of the head in the room", "film": "of film"}
+
+
+def _switches(study: StudyAnalysis) -> list[tuple[str, str]]:
+    """Return the largest step of a joint as the head went to another condition, if recorded."""
+    steps = [t.measured.get(STEP_DEG, nan) for one in study.people for t in one.trials]
+    known = [step for step in steps if isfinite(step)]
+    if not known:
+        return []
+    return [("switches", f"largest step of a commanded joint {max(known):.2f} deg in a tick, "
+                         f"{len(known)} switches")]  # fmt: skip
 
 
 def _deleted(count: int) -> str:
