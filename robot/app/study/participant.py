@@ -119,17 +119,22 @@ def run_session(
             say(f"experimenter: {server.experimenter_url}")
             if browse is not None:
                 browse(server.participant_url)
-            how = _until_over(
-                run, server, lambda: finished[0] if finished else stopped(), say, clock
+
+            def over() -> None:
+                """Park the head, and measure what it showed."""
+                if head is not None:
+                    head.close_head()
+                    journal.write(measured(study, journal.records, folder, say))
+
+            why = _until_told(
+                run, server, lambda: finished[0] if finished else stopped(), over, say, clock
             )
         finally:
             server.close()
             if head is not None:
-                say("the head parks")
                 head.close()
-        if head is not None:
-            journal.write(measured(study, journal.records, folder, say))
-    return how
+        over()
+    return "the session is over" if session.closed else f"{why}; the same command goes on with it"
 
 
 def _open(server: StudyServer, plan: SessionPlan) -> None:
@@ -143,16 +148,20 @@ def _open(server: StudyServer, plan: SessionPlan) -> None:
         ) from error
 
 
-def _until_over(
+def _until_told(
     run: StudyRun,
     server: StudyServer,
-    stopped: Callable[[], str | None],
+    told: Callable[[], str | None],
+    over: Callable[[], None],
     say: Callable[[str], None],
     clock: Clock,
 ) -> str:
-    """Have time pass for the session until it is closed and its last page shown, or is to stop."""
-    shown, said = run.now()[0], ""
-    while (why := stopped()) is None:
+    """Have time pass for the session until the program is told to end; return why.
+
+    over: called once when the session has been closed; its last page stays
+    """
+    shown, said, closed = run.now()[0], "", False
+    while (why := told()) is None:
         try:
             run.poll()
         except NotKept as error:
@@ -162,8 +171,9 @@ def _until_over(
         if (page := run.now()[0]) != shown:
             shown = page
             server.notify()
+        if not closed and run.state().closed:
+            closed = True
+            over()
+            say("the session is over; Ctrl-C, or the experimenter's page, ends the program")
         clock.sleep_until(clock.now_s() + _POLL_S)
-    state = run.state()
-    if state.closed:
-        return "the session is over"
-    return f"{why}: the session goes on with the same command"
+    return why
