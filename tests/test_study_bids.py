@@ -12,7 +12,7 @@ from recorded_run import record
 from study_records import QUESTIONS, design, records
 
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.report.study.bids import write_study
+from gazerig.robot.report.study.bids import StudyDataSet, write_study
 from gazerig.robot.study.analysis import StudyAnalysis, analysed
 from gazerig.robot.study.participation import participation
 from gazerig.robot.study.records import ItemAnswered, Record, TrialEnded
@@ -27,7 +27,7 @@ def study(*people: list[Record]) -> StudyAnalysis:
     )
 
 
-def write(one: StudyAnalysis, root: Path, folder: Path) -> int:
+def write(one: StudyAnalysis, root: Path, folder: Path) -> StudyDataSet:
     return write_study(one, root, [folder for _ in one.people], "gazerig 0.1.0", lambda _, __: None)
 
 
@@ -90,12 +90,24 @@ def test_a_recording_of_several_trials_stands_once_beside_the_answers(root: Path
     assert len(list((root / "sub-P002/beh").iterdir())) == 2
 
 
+@pytest.mark.parametrize("data", [b"", b"noise" * 99, None])
+def test_a_damaged_recording_is_left_out_and_named(data: bytes | None, tmp_path: Path) -> None:
+    if data is not None:
+        (tmp_path / "run-01.mcap").write_bytes(data)
+    found = [
+        replace(r, recording="run-01.mcap") if isinstance(r, TrialEnded) else r
+        for r in records(design(), 1)
+    ]
+    made = write(study(found), tmp_path / "bids", tmp_path)
+    assert made.files == 6 and len(made.left_out) == 1 and "run-01.mcap" in made.left_out[0]
+
+
 def test_it_is_written_anew_over_its_own_and_over_nothing_else(
     folder: Path, tmp_path: Path
 ) -> None:
     root = tmp_path / "bids"
-    assert write(study(records(design(), 1), records(design(), 2)), root, folder) == 8
-    assert write(study(records(design(), 2)), root, folder) == 6
+    assert write(study(records(design(), 1), records(design(), 2)), root, folder).files == 8
+    assert write(study(records(design(), 2)), root, folder).files == 6
     assert not (root / "sub-P001").exists()
     other = tmp_path / "other"
     other.mkdir()

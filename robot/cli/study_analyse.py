@@ -38,7 +38,9 @@ def analyse(
         for line in verdicts(made.study):
             print(line)
         print(f"{made.page}: the whole report; tables beside it")
-        print(f"{made.data_set}: a BIDS data set of {made.files} files")
+        print(f"{made.data_set.root}: a BIDS data set of {made.data_set.files} files")
+        for why in made.data_set.left_out:
+            say(f"left out of the data set: {why}")
 
 
 def verdicts(study: "StudyAnalysis") -> list[str]:

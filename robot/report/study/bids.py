@@ -10,7 +10,9 @@ import shutil
 from collections.abc import Iterator, Sequence
 from math import isfinite
 from pathlib import Path
+from typing import NamedTuple
 
+from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_output import make_folder, write_file
 from gazerig.robot.recording.export_bids import (
     DatasetDescription,
@@ -34,14 +36,26 @@ COLUMNS = (
 _MISSING = "n/a"
 
 
+class StudyDataSet(NamedTuple):
+    """What was written.
+
+    root: its folder; files: how many it has
+    left_out: the recordings that are damaged or gone, each with the reason
+    """
+
+    root: Path
+    files: int
+    left_out: tuple[str, ...]
+
+
 def write_study(
     study: StudyAnalysis,
     root: Path,
     folders: Sequence[Path],
     made_by: str,
     progress: Progress,
-) -> int:
-    """Write the data set in place of one that gazerig has made before; return its files' number.
+) -> StudyDataSet:
+    """Write the data set in place of one that gazerig has made before.
 
     Args:
         study: analysed.
@@ -60,12 +74,14 @@ def write_study(
     make_folder(root)
     for path, text in _frame(study, labels, made_by):
         write_file(root / path, text)
+    left_out: list[str] = []
     for k, (one, label, folder) in enumerate(zip(study.people, labels, folders, strict=True)):
         progress("data set", k / len(study.people))
         _write_answers(study, one, label, root)
-        _write_recordings(study, one, label, folder, root)
+        left_out += _write_recordings(study, one, label, folder, root)
     progress("data set", 1.0)
-    return sum(path.is_file() for path in root.rglob("*"))
+    files = sum(path.is_file() for path in root.rglob("*"))
+    return StudyDataSet(root, files, tuple(left_out))
 
 
 def _frame(study: StudyAnalysis, labels: Sequence[str], made_by: str) -> Iterator[tuple[str, str]]:
@@ -149,18 +165,20 @@ def _sidecar(study: StudyAnalysis) -> dict[str, object]:
 
 def _write_recordings(
     study: StudyAnalysis, one: Participation, label: str, folder: Path, root: Path
-) -> None:
-    """Write each recording once, in the order of the trials; lost files are left out."""
+) -> Iterator[str]:
+    """Write each recording once, in the order of the trials; give why some are left out."""
     names = dict.fromkeys(trial.recording for trial in one.trials if trial.recording)
     for number, name in enumerate(names, start=1):
         file = folder / name
-        if not file.is_file():
+        try:
+            with used(file):
+                recording = RunRecording(file)
+                trace = trace_of(recording.ticks())
+                labels = labels_of(trace)
+                stretches = stretches_of(trace, labels)
+        except SetupError as error:  # the answers are worth their report without it
+            yield str(error)
             continue
-        with used(file):
-            recording = RunRecording(file)
-            trace = trace_of(recording.ticks())
-            labels = labels_of(trace)
-            stretches = stretches_of(trace, labels)
         info = recording.info
         versions = ", ".join(f"{what} {which}" for what, which in sorted(info.versions.items()))
         about = DatasetDescription(

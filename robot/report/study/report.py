@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_output import make_folder, write_file
-from gazerig.robot.report.study.bids import write_study
+from gazerig.robot.report.study.bids import StudyDataSet, write_study
 from gazerig.robot.report.study.page import Progress, study_page
 from gazerig.robot.report.study.tables import answers_csv, results_json, trials_csv
 from gazerig.robot.study.analysis import StudyAnalysis, analysed
@@ -19,13 +19,12 @@ _HEAD_BYTES = 4096
 class StudyReport(NamedTuple):
     """What was found, and where it is written.
 
-    page: the report; data_set: folder of the BIDS data set; files: how many that has
+    page: the report; data_set: what there is of it in BIDS
     """
 
     study: StudyAnalysis
     page: Path
-    data_set: Path
-    files: int
+    data_set: StudyDataSet
 
 
 def write_report(data: Path, out: Path, made_by: str, progress: Progress) -> StudyReport:
@@ -57,9 +56,9 @@ def write_report(data: Path, out: Path, made_by: str, progress: Progress) -> Stu
         ("results.json", results_json(study)),
     ):
         write_file(out / name, text, force=True)
-    files = write_study(study, out / DATA_SET, found.folders, made_by, progress)
+    data_set = write_study(study, out / DATA_SET, found.folders, made_by, progress)
     write_file(out / PAGE, page, force=True)
-    return StudyReport(study, out / PAGE, out / DATA_SET, files)
+    return StudyReport(study, out / PAGE, data_set)
 
 
 def refuse_foreign_folder(out: Path) -> None:
