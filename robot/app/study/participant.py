@@ -1,6 +1,7 @@
 """One participant's session from start to end: data folder, journal, pages, films or the head."""
 
-import secrets
+import hashlib
+import hmac
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -22,7 +23,7 @@ from gazerig.robot.study.session import StudySession
 from gazerig.robot.study.study_run import StudyRun
 
 _POLL_S = 0.05
-_TOKEN_BYTES = 16
+_TOKEN_DIGITS = 32
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,7 @@ def run_session(
             head = HeadPresenter(study, plan.head, folder, session.agreed, clock)
         run = StudyRun(code, session, journal, head or FilmPresenter(), clock.now_s, utc_now)
         finished: list[str] = []
-        tokens = secrets.token_hex(_TOKEN_BYTES), secrets.token_hex(_TOKEN_BYTES)
+        tokens = _tokens(data.secret(), plan.number)
         server = StudyServer(
             run, study.design, plan.address, tokens, plan.films,
             lambda: finished.append("ended by the experimenter"), head,
@@ -135,6 +136,19 @@ def run_session(
                 head.close()
         over()
     return "the session is over" if session.closed else f"{why}; the same command goes on with it"
+
+
+def _tokens(secret: bytes, number: int) -> tuple[str, str]:
+    """Return what lets the participant and the experimenter in.
+
+    They are the same when a session is resumed: pages that stood open go on by themselves.
+    """
+
+    def token(who: str) -> str:
+        text = f"the page of the {who} of session {number}"
+        return hmac.new(secret, text.encode(), hashlib.sha256).hexdigest()[:_TOKEN_DIGITS]
+
+    return token("participant"), token("experimenter")
 
 
 def _open(server: StudyServer, plan: SessionPlan) -> None:

@@ -72,11 +72,13 @@ function condition({ condition: key, label }) {
   place.replaceChildren(...(key ? [name, label] : ["No presentation now"]));
 }
 
+// Who stopped it stands beside STOP; a fault holds the session until it goes on.
 function head(now) {
-  const wrong = now.fault || now.head_says;
-  const state = now.fault && WELL.has(now.head) ? HEAD.fault : HEAD[now.head];
-  element("head").classList.toggle("bad", Boolean(now.fault) || !WELL.has(now.head));
-  set("head", wrong ? `${state}: ${wrong}` : state);
+  const well = WELL.has(now.head);
+  const wrong = now.head === "stopped" ? "" : now.head_says;
+  const held = well && now.fault && now.fault !== now.head_says ? `; paused, as it was: ${now.fault}` : "";
+  element("head").classList.toggle("bad", !well || Boolean(wrong));
+  set("head", `${HEAD[now.head]}${wrong ? `: ${wrong}` : ""}${held}`);
 }
 
 function clock(seconds) {
