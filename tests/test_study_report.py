@@ -17,7 +17,7 @@ from gazerig.robot.report.study.tables import ANSWERS, answers_csv, results_json
 from gazerig.robot.study.analysis import StudyAnalysis, analysed, within_halves
 from gazerig.robot.study.design import Condition, Hypothesis, StudyDesign, Trials
 from gazerig.robot.study.participation import participation
-from gazerig.robot.study.records import STEP_DEG, ItemAnswered, Opened
+from gazerig.robot.study.records import STEP_DEG, ItemAnswered, Opened, TrialEnded
 from gazerig.robot.study.simulation import Population
 from gazerig.robot.study.statistics.results import EffectSize, StatisticalTest
 
@@ -239,6 +239,20 @@ def test_pairs_and_factors_have_columns_of_their_own() -> None:
 def test_presentations_are_a_table_too(ratings: StudyAnalysis) -> None:
     rows = list(csv.DictReader(trials_csv(ratings).splitlines()))
     assert len(rows) == 24 and {row["outcome"] for row in rows} == {"complete"}
+
+
+def test_a_presentation_is_found_in_its_recording() -> None:
+    of = design()
+    found = [
+        replace(r, recording="run-01.mcap", from_s=6828.507365, to_s=6831.517)
+        if isinstance(r, TrialEnded) else r
+        for r in records(of, 1)
+    ]  # fmt: skip
+    one = analysed("m", of, QUESTIONS, SHA, [participation(found, of, QUESTIONS)])
+    (row, *_) = csv.DictReader(trials_csv(one).splitlines())
+    assert (row["recording"], row["from_s"], row["to_s"]) == (
+        "run-01.mcap", "6828.507365", "6831.517",
+    )  # fmt: skip
 
 
 def test_programs_read_the_results_as_json(ratings: StudyAnalysis) -> None:

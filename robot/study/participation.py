@@ -46,6 +46,7 @@ class TrialRow:
     """One trial in its last attempt: outcome and what it was measured by.
 
     side: 1 for the second presentation of a pair
+    from_s, to_s: when it began and ended in the recording's time, nan without one
     """
 
     trial: int
@@ -58,6 +59,8 @@ class TrialRow:
     recording: str
     reason: str
     measured: Mapping[str, float]
+    from_s: float = nan
+    to_s: float = nan
 
 
 @dataclass(frozen=True)
@@ -144,7 +147,7 @@ def _trials(records: Iterable[Record]) -> tuple[TrialRow, ...]:
         elif isinstance(one, TrialEnded) and (one.trial, one.side) in found:
             found[one.trial, one.side] = replace(
                 found[one.trial, one.side], outcome=one.outcome, seconds=one.seconds,
-                recording=one.recording, reason=one.reason,
+                recording=one.recording, reason=one.reason, from_s=one.from_s, to_s=one.to_s,
             )  # fmt: skip
         elif isinstance(one, Measured) and (one.trial, one.side) in found:
             before = found[one.trial, one.side]

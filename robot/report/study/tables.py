@@ -22,7 +22,7 @@ ANSWERS = (
 
 TRIALS = (
     "participant", "simulated", "trial", "side", "condition", "attempts", "outcome", "seconds",
-    "utc", "recording", "reason",
+    "utc", "recording", "from_s", "to_s", "reason",
 )  # fmt: skip
 """Columns of trials.csv; those of the objective measures stand after them."""
 
@@ -70,7 +70,7 @@ def trials_csv(study: StudyAnalysis) -> str:
     rows = (
         [
             one.participant, _yes(one.simulated), t.trial, t.side, t.condition, t.attempts,
-            t.outcome, t.seconds, t.utc, t.recording, t.reason,
+            t.outcome, t.seconds, t.utc, t.recording, t.from_s, t.to_s, t.reason,
             *(t.measured.get(name) for name in measured),
         ]
         for one in study.people
@@ -137,7 +137,7 @@ def _cell(value: object) -> str:
     """Return a value as short as it is exact; what is not known is empty."""
     if value is None or (isinstance(value, float) and not isfinite(value)):
         return ""
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    return f"{value:.10g}" if isinstance(value, float) else str(value)
 
 
 def _yes(value: bool) -> str:
