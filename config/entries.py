@@ -79,7 +79,7 @@ def read(
     file, text = str(path), ""
     try:
         text = read_limited(path, _LARGEST).decode("utf-8-sig")
-        node = _composed(text)
+        node = composed(text)
     except OSError as error:
         faults.append(ConfigFault(file, None, "", "", _unreadable(path, error)))
     except UnicodeDecodeError as error:
@@ -97,7 +97,9 @@ def read(
                 rule = f"is no such configuration: none of its keys is one of {', '.join(known)}"
                 faults.append(ConfigFault(file, _line(node), "", "", rule))
                 return text, None
-            return text, _Reader(file, faults).whole(node)
+            root, found = _entries_of(file, text)
+            faults += found
+            return text, root
         rule = "is empty" if node is None else "the top level is no mapping"
         line = 1 if node is None else _line(node)
         faults.append(ConfigFault(file, line, "", "", f"{rule}; write 'key: value' lines"))
@@ -127,7 +129,7 @@ class _BoundedComposer(Composer):
 
 
 @lru_cache(maxsize=64)
-def _composed(text: str) -> Node | None:
+def composed(text: str) -> Node | None:
     """Return YAML parsed as far as nodes, which know their lines and are only read.
 
     The parser takes nearly all the time of loading, and a rig loads the same layers again
@@ -139,6 +141,17 @@ def _composed(text: str) -> Node | None:
     yaml.composer.warn_double_anchors = False  # YAML 1.2 allows to set an anchor again
     node: Node | None = yaml.compose(text)
     return node
+
+
+@lru_cache(maxsize=64)
+def _entries_of(file: str, text: str) -> tuple[Entry | None, tuple[ConfigFault, ...]]:
+    """Return the top mapping of a text as an entry, None where it is too much, and its faults.
+
+    Kept for the next loading of the same file: entries are only read, as nodes are.
+    """
+    node, faults = composed(text), list[ConfigFault]()
+    assert isinstance(node, MappingNode)
+    return _Reader(file, faults).whole(node), tuple(faults)
 
 
 def _unreadable(path: Path, error: OSError) -> str:

@@ -91,10 +91,9 @@ class Parameter(NamedTuple):
 
 def parameters(rig: Rig, defaults: Rig) -> tuple[Parameter, ...]:
     """Return the parameters of a rig in the order of its file."""
-    return tuple(
-        _knob(key, shape, _at(defaults, key))
-        for key, shape, _ in _leaves(_root(rig), rig, (), _unlisted(rig))
-    )
+    known = values(defaults)
+    leaves = _leaves(_root(rig), rig, (), _unlisted(rig))
+    return tuple(_knob(k, s, known[k] if k in known else _at(defaults, k)) for k, s, _ in leaves)
 
 
 def value_of(rig: Rig, key: str) -> Value:

@@ -6,6 +6,7 @@ refused as unknown, with the version after.
 
 import logging
 from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import Any
 
 from gazerig.config.entries import Entry
@@ -97,13 +98,18 @@ def renamed(root: Entry, into: type, faults: list[ConfigFault], report: bool = T
 
 def renamed_key(key: str, into: type = Rig) -> str:
     """Return a dotted key, or the beginning of one, under the names of now; said once if old."""
-    table, steps = _TABLES.get(into, {}), key.split(".")
-    for i, step in enumerate(steps):
-        steps[i] = _names(table, steps[:i]).get(step, step)
-    new = ".".join(steps)
+    new = _key_now(key, into)
     if new != key:
         report_once(_line("", key, new))
     return new
+
+
+@lru_cache(maxsize=2048)
+def _key_now(key: str, into: type) -> str:
+    table, steps = _TABLES.get(into, {}), key.split(".")
+    for i, step in enumerate(steps):
+        steps[i] = _names(table, steps[:i]).get(step, step)
+    return ".".join(steps)
 
 
 def renamed_changes(changes: Mapping[str, Any], into: type = Rig) -> dict[str, Any]:

@@ -9,14 +9,13 @@ import operator
 import re
 import textwrap
 from collections.abc import Mapping
-from functools import lru_cache
 from math import isfinite
 from typing import NamedTuple
 
-from ruamel.yaml import YAML
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from gazerig.config.bounds import Shape, shapes_of
+from gazerig.config.entries import composed
 from gazerig.config.renamed import old_keys
 
 Value = str | int | float | bool | None | tuple["Value", ...] | list["Value"]
@@ -48,7 +47,7 @@ def edited(text: str, changes: Mapping[str, Value], into: type) -> str:
     Raises:
         Unchangeable: a value cannot be written where it should stand.
     """
-    root = _composed(text)
+    root = _top(text)
     edits, absent = [], {}
     for key, value in changes.items():
         place = _find(root, key.split("."))
@@ -60,7 +59,7 @@ def edited(text: str, changes: Mapping[str, Value], into: type) -> str:
         text = text[: edit.start] + edit.new + text[edit.end :]
     for key, value in absent.items():
         # One after the other: the first may make the mapping that the next one needs.
-        edit = _added(text, _composed(text), key, value, into)
+        edit = _added(text, _top(text), key, value, into)
         text = text[: edit.start] + edit.new + text[edit.end :]
     return text
 
@@ -71,7 +70,7 @@ def with_new_names(text: str, into: type) -> str:
     Raises:
         Unchangeable: the top level is no mapping.
     """
-    for start, end, new in reversed(list(old_keys(_composed(text), into))):
+    for start, end, new in reversed(list(old_keys(_top(text), into))):
         text = text[:start] + new + text[end:]
     return text
 
@@ -101,10 +100,9 @@ def written(value: Value) -> str:
         raise EditRefused(f"{value!r} is no number, text, truth value or list of those") from None
 
 
-@lru_cache(maxsize=2)
-def _composed(text: str) -> MappingNode:
-    """Parse the text as far as nodes, which know where they stand; they are not changed."""
-    node = YAML(typ="safe", pure=True).compose(text)
+def _top(text: str) -> MappingNode:
+    """Return the top node of the text; nodes know where they stand and are not changed."""
+    node = composed(text)
     if not isinstance(node, MappingNode):
         raise EditRefused("the top level is no mapping; write 'key: value' lines")
     return node

@@ -38,11 +38,14 @@ class Canvas:
 
     Args:
         seen_by: the camera.
+        depth: whether distances are wanted, which take as long as the colours.
 
-    image: (h, w, 3) BGR; depth_m: (h, w) float32, infinite where nothing was drawn
+    image: (h, w, 3) BGR
+    depth_m: (h, w) float32, infinite where nothing was drawn, and everywhere if not wanted
     """
 
-    def __init__(self, seen_by: PinholeView) -> None:
+    def __init__(self, seen_by: PinholeView, depth: bool = True) -> None:
+        self._depth = depth
         _, lens, (width_px, height_px), R, p_m = seen_by
         self.image: Bytes = np.zeros((height_px, width_px, 3), np.uint8)
         self.depth_m = np.full((height_px, width_px), np.inf, np.float32)
@@ -100,11 +103,15 @@ class Canvas:
         if drawn.shape[2] == 4:
             mask = np.minimum(mask, drawn[:, :, 3])
         self._blend(window, np.asarray(drawn[:, :, :3], np.uint8), np.asarray(mask, np.uint8))
+        if not self._depth:
+            return
         normal = np.cross(right, down)
         self._deepen(window, np.asarray(mask, np.uint8), normal / float(normal @ corner))
 
     def ellipsoid_depth(self, centre_m: Vec3, R_world_body: Floats, half_m: Vec3) -> None:
         """Set the distances of an ellipsoid's front where it is seen; colours stay."""
+        if not self._depth:
+            return
         A = self.R_world_camera.T @ R_world_body / np.array(half_m)
         centre = self.seen(centre_m)[0]
         reach = float(max(half_m))
@@ -155,10 +162,13 @@ class Canvas:
         """Lay what was drawn over the image as far as the mask is opaque."""
         left, top, width, height = window
         part = self.image[top : top + height, left : left + width]
-        cv2.copyTo(drawn, np.where(mask == 255, mask, np.uint8(0)), part)
-        y, x = np.nonzero((mask > 0) & (mask < 255))
-        share = mask[y, x, None].astype(np.float32) / 255.0
-        part[y, x] = np.rint(part[y, x] * (1.0 - share) + drawn[y, x] * share).astype(np.uint8)
+        cv2.copyTo(drawn, cv2.inRange(mask, 255, 255), part)
+        edge = cv2.findNonZero(cv2.inRange(mask, 1, 254))
+        if edge is not None:
+            x, y = edge[:, 0, 0], edge[:, 0, 1]
+            share = mask[y, x, None].astype(np.float32) / 255.0
+            mixed = part[y, x] * (1.0 - share) + drawn[y, x] * share
+            part[y, x] = np.rint(mixed).astype(np.uint8)
 
     def _deepen(self, window: tuple[int, int, int, int], mask: Bytes, inverse: Floats) -> None:
         """Set the distances of a plane in which 1 / z = inverse . ray."""

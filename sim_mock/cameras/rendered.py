@@ -228,7 +228,7 @@ class DrawnScene(NamedTuple):
         self, seen_by: PinholeView, *, depth: bool = False, rows: tuple[int, int] | None = None
     ) -> Rendered:
         """Return a picture; see ``SceneView.draw``."""
-        canvas = Canvas(seen_by)
+        canvas = Canvas(seen_by, depth)
         draw_scene(canvas, self.scene, seen_by.t_s, self.room_seed)
         wanted = slice(*(rows or (None,)))
         return Rendered(canvas.image[wanted], canvas.depth_m[wanted] if depth else None)
