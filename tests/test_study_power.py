@@ -18,6 +18,7 @@ from gazerig.robot.study.power import (
     sample_size,
 )
 from gazerig.robot.study.simulation import differences, effect_of, shift_of
+from gazerig.robot.study.statistics.bradley_terry import preferred
 from gazerig.robot.study.statistics.ranks import exact_signed_rank, rank_sum
 
 SIGNED = PowerQuestion("signed_rank", 0.6, 0.05)
@@ -117,6 +118,22 @@ def test_choices_have_the_binomial_tests_power() -> None:
     assert power_of(one, 30) == pytest.approx(stats.binom.pmf(range(31), 30, share) @ exact)
     n = sample_size(asked, 0.8)
     assert n is not None and 30 < n < 45
+
+
+def test_all_choices_decide_between_two_of_several_conditions() -> None:
+    asked = PowerQuestion("bradley_terry", 0.6, 0.05, heights=(0.5, -0.5, -0.5))
+    alone = replace(asked, heights=(0.5, -0.5))
+    assert power_of(asked, 24) > power_of(alone, 24) + 0.1
+    rng, chance, found = np.random.default_rng(3), stats.norm.cdf(0.6), 0
+    for _ in range(150):
+        wins = np.zeros((3, 3), np.int64)
+        for i, j, p in ((0, 1, chance), (0, 2, chance), (1, 2, 0.5)):
+            wins[i, j] = rng.binomial(24, p)
+            wins[j, i] = 24 - wins[i, j]
+        found += preferred(wins, 0, 1, two_sided=True).deciding_p <= 0.05
+    # The standard error of 150 studies is .033; the seed is fixed.
+    assert power_of(asked, 24) == pytest.approx(found / 150, abs=0.07)
+    assert power_of(replace(asked, effect=0.0), 24) == pytest.approx(0.05, abs=1e-3)
 
 
 def test_friedmans_power_is_that_of_its_test() -> None:

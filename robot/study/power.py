@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import optimize, special, stats
 
 from gazerig.gaze.types import Floats
 from gazerig.robot.study.design import Hypothesis, StudyDesign, Test
@@ -105,26 +105,28 @@ def _question(design: StudyDesign, one: Hypothesis, measure: Measure) -> PowerQu
     middle = 0.5 * max(at.values())
     others = [at[key] - middle for key in at if key not in (one.better, one.than)]
     whole = measure.kind == "item" and repetitions == 1
+    heights: tuple[float, ...] = (0.5, -0.5)
+    if one.test == "friedman":
+        heights = (at[one.better] - middle, at[one.than] - middle, *others)
+    if one.test == "bradley_terry":  # the others say something of both, wherever they are
+        heights = (0.5, -0.5, *others)
     return PowerQuestion(
         one.test, design.plan.effect, design.plan.alpha / many, one.two_sided,
         measure.points if whole else 0,
-        (at[one.better] - middle, at[one.than] - middle, *others) if one.test == "friedman"
-        else (0.5, -0.5),
-        repetitions,
+        heights, repetitions,
     )  # fmt: skip
 
 
 def by_formula(asked: PowerQuestion, power: float) -> int:
     """Return participants by the normal approximation, ties left out of account.
 
-    n = ((z_alpha + z_power) / d)^2, of rank tests over 3/pi; of choices for the share chosen.
+    n = ((z_alpha + z_power) / d)^2, of rank tests over 3/pi; of choices d is the root of the
+    likelihood ratio that one participant's choices are expected to have.
     """
     sides = 2 if asked.two_sided else 1
     z_null, z_power = float(stats.norm.isf(asked.alpha / sides)), float(stats.norm.ppf(power))
     if asked.test == "bradley_terry":
-        share = preference(asked.effect)
-        spread = 0.5 * z_null + z_power * sqrt(share * (1.0 - share))
-        return ceil((spread / (share - 0.5)) ** 2 / asked.choices)
+        return ceil(((z_null + z_power) / _mean_of_one(asked)) ** 2)
     ranks = 1.0 if asked.test == "ordinal_mixed" else pi / 3.0
     return ceil(((z_null + z_power) / asked.effect) ** 2 * ranks)
 
@@ -158,13 +160,14 @@ def power_of(asked: PowerQuestion, n: int) -> float:
     """Return the chance that a test of ``n`` participants is significant.
 
     That of a mixed ordinal model is the normal approximation for paired answers, which needs its
-    differences' d_z alone.
+    differences' d_z alone; that of choices is the binomial test's where there is one pair, and
+    else the normal approximation of the difference of scores.
     """
     if n < 1:
         return 0.0
-    if asked.test == "bradley_terry":
+    if asked.test == "bradley_terry" and len(asked.heights) == 2:
         return _binomial(asked, n * asked.choices)
-    if asked.test == "ordinal_mixed":
+    if asked.test in ("ordinal_mixed", "bradley_terry"):
         return _normal(asked, n)
     rng = np.random.default_rng((_SEED, n))
     if asked.test == "friedman":
@@ -314,12 +317,34 @@ def _friedman(asked: PowerQuestion, n: int, rng: np.random.Generator) -> float:
     return float(np.mean(stats.chi2.sf(statistic, k - 1) <= asked.alpha))
 
 
+def _mean_of_one(asked: PowerQuestion) -> float:
+    """Return the mean of a normal statistic of one participant; that of n is sqrt(n) times it.
+
+    Of answers it is d_z. Of choices between all pairs it is the root of the likelihood ratio that
+    is expected: of the true scores over the best ones in which both are alike (Self, Mauritsen &
+    Ohara 1992).
+    """
+    if asked.test != "bradley_terry":
+        return asked.effect
+    scores = special.logit(preference(asked.effect)) * np.array(asked.heights)
+    i, j = np.triu_indices(len(scores), 1)
+    true = special.expit(scores[i] - scores[j])
+
+    def lost(others: Floats) -> float:
+        guessed = special.expit(np.subtract(*np.array([0.0, 0.0, *others])[[i, j]]))
+        return float(
+            np.sum(special.rel_entr(true, guessed) + special.rel_entr(1 - true, 1 - guessed))
+        )
+
+    others = scores[2:] - scores[:2].mean()
+    least = optimize.minimize(lost, others).fun if len(others) else lost(others)
+    return sqrt(2.0 * asked.choices * float(least))
+
+
 def _normal(asked: PowerQuestion, n: int) -> float:
-    """Return the power of a test whose statistic is normal, with the mean d_z sqrt(n)."""
-    z, mean = (
-        stats.norm.isf(asked.alpha / (2.0 if asked.two_sided else 1.0)),
-        asked.effect * sqrt(n),
-    )
+    """Return the power of a test whose statistic is normal with variance 1."""
+    z = stats.norm.isf(asked.alpha / (2.0 if asked.two_sided else 1.0))
+    mean = _mean_of_one(asked) * sqrt(n)
     return float(stats.norm.sf(z - mean) + (stats.norm.cdf(-z - mean) if asked.two_sided else 0.0))
 
 
