@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from http.client import HTTPConnection
 from pathlib import Path
+from socket import gethostname
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -16,6 +17,7 @@ from study_at_the_page import CODE, EXPERIMENTER, PARTICIPANT, Pages, Tab, answe
 from gazerig.config.load import SHIPPED
 from gazerig.config.study_file import LoadedStudy, load_study
 from gazerig.robot.dashboard.door import connection_limits
+from gazerig.robot.dashboard.door.addresses import page_url
 from gazerig.robot.dashboard.study import server
 from gazerig.robot.dashboard.study.study_files import FOLDER, HEADERS
 from gazerig.robot.study.design import Condition
@@ -391,3 +393,15 @@ def test_the_scripts_say_texts_that_are_there_and_no_text_is_left_over() -> None
     ]
     left = {key for key in texts if not any(re.fullmatch(one, key) for one in patterns)}
     assert not left
+
+
+@pytest.mark.parametrize(
+    ("host", "there"),
+    [
+        ("127.0.0.1", "http://127.0.0.1:8090"),
+        ("::1", "http://[::1]:8090"),
+        ("0.0.0.0", f"http://{gethostname()}:8090"),
+    ],
+)
+def test_who_is_to_come_in_is_given_an_address_that_leads_here(host: str, there: str) -> None:
+    assert page_url(host, 8090) == there

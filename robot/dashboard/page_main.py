@@ -26,6 +26,7 @@ import viser
 
 from gazerig.drivers import message_link
 from gazerig.drivers.message_link import MessageLink
+from gazerig.robot.dashboard.door.addresses import page_url
 from gazerig.robot.dashboard.door.auth_proxy import AuthProxy
 from gazerig.robot.dashboard.door.viser_server import browser_of, camera_of, open_server
 from gazerig.robot.dashboard.feed.live_feed import LiveFeed
@@ -49,7 +50,6 @@ _FRAME_S = 0.04
 _SILENT_AFTER_S = 1.0
 _PORTS_TRIED = 100
 _PORTS = 65536
-_EVERYWHERE = ("0.0.0.0", "::")
 _NICENESS = 5  # the control loop comes first where both want the same core
 _MOST_FILES = 8192  # a burst of connections must leave some
 
@@ -121,9 +121,8 @@ def serve(
     text = []
     if port not in (0, open_port):  # 0 asks for any port
         text.append(f"port {port} is busy, using {open_port}")
-    name = socket.gethostname() if host in _EVERYWHERE else host
-    url = f"http://[{name}]:{open_port}" if ":" in name else f"http://{name}:{open_port}"
-    return Served(server, door, pointer, f"{url}/?token={token}", "; ".join(text) or None)
+    url = f"{page_url(host, open_port)}/?token={token}"
+    return Served(server, door, pointer, url, "; ".join(text) or None)
 
 
 def _browser(server: viser.ViserServer, client: str) -> str:

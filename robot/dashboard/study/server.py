@@ -15,6 +15,7 @@ from pathlib import Path
 from aiohttp import web
 from aiohttp.typedefs import Handler, Middleware
 
+from gazerig.robot.dashboard.door.addresses import page_url
 from gazerig.robot.dashboard.door.admission import Admission
 from gazerig.robot.dashboard.door.browsers import TabLimits
 from gazerig.robot.dashboard.door.connection_limits import Connections
@@ -127,9 +128,7 @@ class StudyServer:
             self._thread.join(_CLOSE_TIMEOUT_S)
 
     def _url(self, who: str, path: str) -> str:
-        host, port = self._address
-        name = f"[{host}]" if ":" in host else host
-        return f"http://{name}:{port}{path}?token={self._tokens[who]}"
+        return f"{page_url(*self._address)}{path}?token={self._tokens[who]}"
 
     def _run(self) -> None:
         asyncio.set_event_loop(self._loop)
