@@ -17,7 +17,6 @@ from gazerig.config.schema import Rig
 from gazerig.config.study_file import LoadedStudy
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.extras import extra_hint
 from gazerig.drivers.file_output import make_folder
 from gazerig.drivers.film_writer import film_writer
 from gazerig.drivers.types import ImageArray
@@ -58,16 +57,15 @@ class HeadPictures:
     """
 
     def __init__(self, rig: Rig, p_viewer_m: Vec3) -> None:
-        try:
-            import mujoco
-        except ImportError as error:
-            raise SetupError(extra_hint("mujoco", "world", error)) from error
+        from gazerig.sim_mock.world.gl_context import import_mujoco
+
+        mujoco: Any = import_mujoco()
         from gazerig.sim_mock.world.renderer import Renderer, RendererParams
 
         self._description = description_of(rig)
         files = description_files(self._description, ["mjcf"])
         scene = files.pop("scene.xml").decode()
-        self._mujoco: Any = mujoco
+        self._mujoco = mujoco
         self._model = mujoco.MjModel.from_xml_string(scene, files)
         self._data = mujoco.MjData(self._model)
         params = RendererParams(_SHADOW_PX, _SAMPLES)

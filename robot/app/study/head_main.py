@@ -5,6 +5,7 @@ when its input does, so also when the study's program dies.
 """
 
 import json
+import os
 import signal
 import sys
 import threading
@@ -44,7 +45,7 @@ def main() -> int:
     options = options_in(sys.stdin.buffer.readline())
 
     def wait() -> None:
-        while sys.stdin.buffer.read(1):
+        while os.read(0, 4096):  # not by the buffer, whose lock the program's end waits for
             pass
         ended.append("the end of the study's session")
 

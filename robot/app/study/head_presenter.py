@@ -6,7 +6,7 @@ these.
 """
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import nan
 from pathlib import Path
@@ -15,13 +15,15 @@ from gazerig.config.study_file import LoadedStudy
 from gazerig.drivers.errors import DriverError
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.study.head_process import HeadProcess
+from gazerig.robot.control.head_state import HeadState
 from gazerig.robot.dashboard.study.head_link import HeadReport
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.commands import Value
 from gazerig.robot.study.presenter import HeadLost, Presented
 from gazerig.robot.study.session import ShownTrial
 
-_LOOKS_S, _LATE_S = 0.2, 1.0
+_LOOKS_S, _LATE_S, _HELD_S = 0.2, 1.0, 1.0
+_MOST_REASONS = 3
 _PICTURES_HZ = 2.0
 
 Agreed = Callable[[], tuple[bool, bool]]
@@ -30,6 +32,9 @@ Agreed = Callable[[], tuple[bool, bool]]
 
 class HeadPresenter:
     """Shows conditions on a head; also what the experimenter's page knows of it.
+
+    Attributes:
+        head: The process, None while none runs.
 
     Args:
         study: a checked one.
@@ -44,7 +49,7 @@ class HeadPresenter:
     ) -> None:
         self._study, self._options, self._folder = study, options, folder
         self._agreed, self._clock = agreed, clock
-        self._head: HeadProcess | None = None
+        self.head: HeadProcess | None = None
         self._rig: str | None = None
         self._condition: str | None = None
         self._recording = ""
@@ -73,7 +78,7 @@ class HeadPresenter:
     def end(self) -> Presented:
         """Return where in the recording the presentation is that ends now."""
         try:
-            to_s = nan if self._head is None else self._head.state().t_s
+            to_s = nan if self.head is None else self.head.state().t_s
         except HeadLost:
             to_s = nan
         return Presented(self._recording, (self._from_s, to_s))
@@ -114,13 +119,13 @@ class HeadPresenter:
 
     def close_head(self) -> None:
         """Park the head and end its process; it may be started again."""
-        head, self._head = self._head, None
+        head, self.head = self.head, None
         self._rig, self._condition = None, None
         if head is not None:
             head.end()
 
     def _asked(self, what: Callable[[HeadProcess], object]) -> str:
-        head = self._head
+        head = self.head
         if head is None:
             return "the head does not run"
         try:
@@ -133,8 +138,8 @@ class HeadPresenter:
         """Return the head as the rig that a condition needs, started if need be."""
         one = self._study.design.conditions[condition]
         rig = condition if one.rig is not None else ""
-        if self._head is not None and self._head.alive and self._rig == rig:
-            return self._head
+        if self.head is not None and self.head.alive and self._rig == rig:
+            return self.head
         self.close_head()
         options = self._options
         if one.rig is not None:
@@ -148,9 +153,9 @@ class HeadPresenter:
             hz = _PICTURES_HZ if pictures else 0.0
             path = self._folder / self._recording
             options = replace(options, record=path, record_pictures=hz)
-        self._head = HeadProcess(options, self._folder / f"{name}.log", self._clock)
+        self.head = HeadProcess(options, self._folder / f"{name}.log", self._clock)
         self._rig = rig
-        return self._head
+        return self.head
 
     def _changes(self, condition: str) -> Mapping[str, Value]:
         """Return what turns the running head into a condition, by dotted key."""
@@ -161,28 +166,46 @@ class HeadPresenter:
 
     def _watch(self) -> None:
         """Keep the report new; the thread of that."""
-        seen_s, at_s = nan, self._clock.now_s()
+        judge = _Judge(self._clock)
         while not self._ended.wait(_LOOKS_S):
-            head = self._head
+            head = self.head
             if head is None:
                 continue
             try:
-                state = head.state()
+                report = judge.report(head.state())
             except HeadLost as lost:
-                if head is self._head:
-                    self._report = HeadReport("fault", str(lost))
-                continue
-            now_s = self._clock.now_s()
-            if state.t_s != seen_s:
-                seen_s, at_s = state.t_s, now_s
-            if head is not self._head:
-                continue
-            if state.stopped:
-                self._report = HeadReport("stopped", f"stopped: {state.stopped}")
-            elif state.level == "torque_off":
-                self._report = HeadReport("fault", "; ".join(state.reasons) or "its torque is off")
-            elif now_s - at_s > _LATE_S:
-                self._report = HeadReport("late", "the head does not tick")
-            else:
-                faults = [f"{name}: {one.fault}" for name, one in state.joints.items() if one.fault]
-                self._report = HeadReport("alive", "; ".join(faults))
+                report = HeadReport("fault", str(lost))
+            if head is self.head:
+                self._report = report
+
+
+class _Judge:
+    """Judges a head by its newest ticks."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._clock = clock
+        self._tick_s, self._seen_s = nan, clock.now_s()
+        self._free_s = self._seen_s
+
+    def report(self, state: HeadState) -> HeadReport:
+        """Return how the head is.
+
+        One that is held for longer than a moment does not show its condition any more.
+        """
+        now_s = self._clock.now_s()
+        if state.t_s != self._tick_s:
+            self._tick_s, self._seen_s = state.t_s, now_s
+        if state.level not in ("hold", "torque_off"):
+            self._free_s = now_s
+        if state.stopped:
+            return HeadReport("stopped", f"stopped: {state.stopped}")
+        if now_s - self._free_s > _HELD_S:
+            return HeadReport("fault", f"the joints are held: {_listed(state.reasons)}")
+        if now_s - self._seen_s > _LATE_S:
+            return HeadReport("late", "the head does not tick")
+        return HeadReport("alive")
+
+
+def _listed(reasons: Sequence[str]) -> str:
+    more = len(reasons) - _MOST_REASONS
+    return "; ".join(reasons[:_MOST_REASONS]) + (f" and {more} more" if more > 0 else "")
