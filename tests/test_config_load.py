@@ -246,6 +246,12 @@ def test_all_faults_together_in_one_message(tmp_path: Path) -> None:
     assert sorted(faults_of(tmp_path, ALL_WRONG)) == sorted(ALL_FAULTS.splitlines())
 
 
+def test_a_second_reading_of_the_same_file_tells_the_same_faults(tmp_path: Path) -> None:
+    first = faults_of(tmp_path, ALL_WRONG)
+    assert any("stands twice" in fault for fault in first)
+    assert faults_of(tmp_path, ALL_WRONG) == first
+
+
 def test_faults_come_in_the_order_of_their_lines(tmp_path: Path) -> None:
     lines = [int(fault.split(":")[1]) for fault in faults_of(tmp_path, ALL_WRONG)]
     assert lines == sorted(lines)

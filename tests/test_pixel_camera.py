@@ -119,6 +119,17 @@ def test_a_point_of_the_world_is_drawn_where_a_camera_sees_it(yaw_deg: float) ->
     assert np.isinf(canvas.depth_m[0, 0])
 
 
+def test_a_picture_without_distances_has_the_same_colours() -> None:
+    R, p = MOUNT.pose(rotation((radians(20.0), 0.0, 0.0)), (0.0, 0.0, 0.0))
+    seen_by = PinholeView(0.0, LENS, (WIDTH, HEIGHT), R, p)
+    whole, colours = Canvas(seen_by), Canvas(seen_by, depth=False)
+    for canvas in (whole, colours):
+        draw_room(canvas)
+        canvas.ellipsoid_depth((1.0, 0.0, 0.0), np.eye(3), (0.1, 0.2, 0.3))
+    assert (colours.image == whole.image).all()
+    assert np.isfinite(whole.depth_m).all() and np.isinf(colours.depth_m).all()
+
+
 @pytest.mark.parametrize("yaw_deg", [0.0, 60.0, 120.0, 180.0, -75.0])
 def test_the_room_fills_every_picture_and_has_something_on_its_walls(yaw_deg: float) -> None:
     canvas = canvas_at((radians(yaw_deg), radians(20.0), 0.0))
