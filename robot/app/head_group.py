@@ -16,7 +16,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_rig import run_rig
 from gazerig.robot.app.run_world import RunWorld, world_of, world_scene
 from gazerig.robot.app.session import SECONDS, ComposedRun, compose, run
-from gazerig.robot.app.shared_world import FaceNow, ServedWorld, SharedWorld, SimulatedWorld
+from gazerig.robot.app.shared_world import FaceNow, RealTimeWorld, SharedWorld, SimulatedWorld
 from gazerig.robot.control.heads_together import NamedRobot
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.tick import Tick
@@ -66,7 +66,7 @@ def compose_group(options: RunOptions) -> "HeadGroup":
     others = [_other(options, name, n, heads[name].rig) for n, name in enumerate(heads, 1)]
     each = (options, *others)
     rigs = [(FIRST, first), *zip(heads, map(run_rig, others), strict=True)]
-    world = SimulatedWorld(found) if options.fast else ServedWorld(found, rigs)
+    world = SimulatedWorld(found) if options.fast else RealTimeWorld(found, rigs)
     members: list[_Member] = []
     try:
         faces = [world.face(number, rig) for number, (_, rig) in enumerate(rigs)]

@@ -8,7 +8,7 @@ head's control loop speaks to its own terminals, on the host's clock.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from gazerig.config.schema import Rig
 from gazerig.drivers.errors import SetupError
@@ -25,11 +25,8 @@ from gazerig.sim_mock.pty.client import PtyBuses, has_terminals
 from gazerig.sim_mock.scenes.scene import Scene
 from gazerig.sim_mock.world.heads_scene import HeadFace, RigFrame
 
-if TYPE_CHECKING:
-    pass
 
-
-class NewestPose(Protocol):
+class TrueHeadPose(Protocol):
     """Tells where a head truly is."""
 
     def head(self, t_s: float) -> tuple[Mat3, Vec3]:
@@ -47,7 +44,7 @@ class FaceNow:
         nose_m: tip of its nose in the head's own frame.
     """
 
-    poses: NewestPose
+    poses: TrueHeadPose
     frame: RigFrame
     nose_m: Vec3
 
@@ -131,7 +128,7 @@ class SimulatedWorld:
         """Do nothing: it ends with this process."""
 
 
-class ServedWorld:
+class RealTimeWorld:
     """The world of several heads in the emulator's process, in real time.
 
     Args:

@@ -86,7 +86,9 @@ class HeadPresenter:
     def fault(self) -> str:
         """Return why nothing can be shown, "" while all is well or nothing runs yet."""
         report = self._report
-        return report.says if report.state in ("fault", "stopped") else ""
+        if report.state == "stopped":
+            return f"stopped: {report.says}"
+        return report.says if report.state == "fault" else ""
 
     def restart(self) -> None:
         """Start the head again; what is wrong then ``fault`` says."""
@@ -198,7 +200,7 @@ class _Judge:
         if state.level not in ("hold", "torque_off"):
             self._free_s = now_s
         if state.stopped:
-            return HeadReport("stopped", f"stopped: {state.stopped}")
+            return HeadReport("stopped", state.stopped)
         if now_s - self._free_s > _HELD_S:
             return HeadReport("fault", f"the joints are held: {_listed(state.reasons)}")
         if now_s - self._seen_s > _LATE_S:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-HeadState = Literal["none", "alive", "late", "fault", "stopped"]
+HeadHealth = Literal["none", "alive", "late", "fault", "stopped"]
 """none: films are shown; late: it does not answer; stopped: its torque is off."""
 
 
@@ -11,7 +11,7 @@ HeadState = Literal["none", "alive", "late", "fault", "stopped"]
 class HeadReport:
     """How the head is; says: what is wrong or who stopped it, "" for nothing."""
 
-    state: HeadState
+    state: HeadHealth
     says: str = ""
 
 
