@@ -47,6 +47,22 @@ def film_writer(
         writer.release()
 
 
+def film_seconds(path: Path | str) -> float:
+    """Return how long a film lasts.
+
+    Raises:
+        SetupError: it cannot be read.
+    """
+    reader = cv2.VideoCapture(str(path))
+    try:
+        rate_hz, count = reader.get(cv2.CAP_PROP_FPS), reader.get(cv2.CAP_PROP_FRAME_COUNT)
+        if not reader.isOpened() or not reader.grab() or not rate_hz > 0.0:
+            raise SetupError(f"{path} cannot be read as a film: make it again as WebM")
+        return count / rate_hz
+    finally:
+        reader.release()
+
+
 @contextmanager
 def _without_stderr() -> Iterator[None]:
     """Drop what native code prints: OpenCV says that WebM does not know VP8, its own codec."""

@@ -66,7 +66,7 @@ def write_study(folder: Path) -> Path:
     """Write a study with two small films; return its file."""
     for number, name in enumerate("ab"):
         with film_writer(folder / f"{name}.webm", (64, 64), 10.0) as write:
-            for _ in range(3):
+            for _ in range(20):
                 write(np.full((64, 64, 3), 90 * number + 40, np.uint8))
     file = folder / "films.yaml"
     file.write_text(STUDY, encoding="utf-8")

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from rendering import renders as renders
 
+from gazerig.config.faults import ConfigError
 from gazerig.config.study_file import LoadedStudy, load_study
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.film_writer import film_writer
+from gazerig.drivers.film_writer import film_seconds, film_writer
 from gazerig.drivers.types import ImageArray
 from gazerig.robot.app.study import film
+from gazerig.robot.app.study_file import checked_study
 
 
 @pytest.fixture(scope="module")
@@ -86,3 +88,33 @@ def test_a_film_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
         film_writer(tmp_path / "no" / "folder.webm", (64, 64), 10.0),
     ):
         pass
+
+
+def test_a_film_that_is_over_too_soon_is_told_when_the_study_is_checked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its path counts from the study's folder, wherever the program is started."""
+    for name, count in (("a", 30), ("b", 20)):
+        with film_writer(tmp_path / f"{name}.webm", (64, 64), 10.0) as write:
+            for i in range(count):
+                write(np.full((64, 64, 3), 8 * i, np.uint8))
+    (tmp_path / "c.webm").write_bytes(b"no film")
+    assert film_seconds(tmp_path / "a.webm") == pytest.approx(3.0, abs=0.11)
+    text = """\
+title: films
+conditions:
+  a: {film: a.webm}
+  b: {film: b.webm}
+  c: {film: c.webm}
+trials: {seconds: 3}
+questionnaires: [nakamoto_tsuruno]
+plan: {participants: 6}
+"""
+    (tmp_path / "s.yaml").write_text(text)
+    monkeypatch.chdir("/")
+    with pytest.raises(ConfigError) as raised:
+        checked_study(str(tmp_path / "s.yaml"))
+    told = [str(one).removeprefix(f"{tmp_path}/") for one in raised.value.faults]
+    assert len(told) == 2
+    assert told[0].startswith("s.yaml:4:") and "conditions.b.film: lasts 2.0 s" in told[0]
+    assert "conditions.c.film" in told[1] and "cannot be read as a film" in told[1]

@@ -7,10 +7,13 @@ from gazerig.config.export import suggestion
 from gazerig.config.load import ConfigError, shipped_names
 from gazerig.config.schema import load_rig
 from gazerig.config.study_file import LoadedStudy, load_study
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.film_writer import film_seconds
 from gazerig.robot.analysis.norm_bands import BY_KEY
 from gazerig.robot.recording.read import BadRecording, RunRecording
 from gazerig.robot.study.design import StudyDesign
 from gazerig.robot.study.rules import objective_rules
+from gazerig.robot.study.study_run import WHOLE_SHARE
 from gazerig.sim_mock.scenes.registry import scenes
 
 
@@ -20,7 +23,7 @@ def checked_study(name_or_path: str) -> LoadedStudy:
     Raises:
         gazerig.config.load.ConfigError: with every fault.
     """
-    return load_study(name_or_path, _surroundings, _objective, _recordings)
+    return load_study(name_or_path, _surroundings, _objective, _recordings, _films)
 
 
 def _objective(design: StudyDesign) -> Iterator[tuple[str, str]]:
@@ -67,3 +70,22 @@ def _recordings(design: StudyDesign) -> Iterator[tuple[str, str]]:
                 "trials.seconds, or record longer"
             )
             yield f"conditions.{key}.recording", rule
+
+
+def _films(design: StudyDesign) -> Iterator[tuple[str, str]]:
+    """Find films that are over before a presentation counts as seen."""
+    wanted_s = design.trials.seconds
+    for key, one in design.conditions.items():
+        if one.film is None or not isfile(one.film):
+            continue
+        try:
+            seconds = film_seconds(one.film)
+        except SetupError as error:
+            yield f"conditions.{key}.film", str(error)
+            continue
+        if seconds < WHOLE_SHARE * wanted_s:
+            rule = (
+                f"lasts {seconds:.1f} s, and a trial {wanted_s:g} s: shorten trials.seconds, or "
+                "take a longer film"
+            )
+            yield f"conditions.{key}.film", rule

@@ -7,7 +7,7 @@ what comes twice, or late from a page that is over, changes nothing.
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, nan
 
 from gazerig.robot.study.answers import WrongAnswer
 from gazerig.robot.study.journal import Journal
@@ -156,7 +156,7 @@ class StudyRun:
                 return  # the head's own time decides
             whole = isfinite(seconds) and seconds >= WHOLE_SHARE * screen.seconds
             reason = "" if whole else "the film was not shown whole"
-            self._end("complete" if whole else "interrupted", reason)
+            self._end("complete" if whole else "interrupted", reason, seconds)
 
     def poll(self) -> None:
         """End the presentation when its time is over or the head was lost; call it often.
@@ -234,9 +234,10 @@ class StudyRun:
         with self._lock:
             self._leave(self._session.exclude(reason, self._utc()))
 
-    def _end(self, outcome: Outcome, reason: str) -> None:
-        """End the presentation under way."""
-        seconds = self._now_s() - self._began_s
+    def _end(self, outcome: Outcome, reason: str, seconds: float = nan) -> None:
+        """End the presentation under way; seconds: how long it was shown, nan: since it began."""
+        if not isfinite(seconds):
+            seconds = self._now_s() - self._began_s
         what = self._presenter.end()
         ended = (outcome, seconds, self._utc(), reason, what.recording, what.span_s)
         self._keep(self._session.end(*ended))
