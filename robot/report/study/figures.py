@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from math import isfinite
+from textwrap import fill
 
 import numpy as np
 
@@ -20,6 +21,8 @@ _ROW_IN, _HEAD_IN, _ITEM_IN, _WIDE_IN = 0.42, 0.95, 0.3, 8.4
 _LEAST_NUMBERED = 4.0
 _JITTER = 0.05
 _DARK = 140.0
+_TICK_CHARACTERS = 22
+"""Longer names of conditions go on in another line."""
 
 Colour = tuple[int, int, int]
 
@@ -115,7 +118,7 @@ def _paired(figure: Figure, one: MeasureSummary, names: list[str]) -> None:
         axes.plot(k, c.mean, "D", color=_ACCENT, ms=8, zorder=5)
         axes.annotate(f"{c.mean:.2f}", (k, c.mean), (12, -3), textcoords="offset points",
                       color=_ACCENT, fontweight="bold")  # fmt: skip
-    axes.set_xticks(x, names)
+    axes.set_xticks(x, [fill(name, _TICK_CHARACTERS) for name in names])
     axes.set_xlim(-0.5, len(names) - 0.5)
     if one.measure.points:
         axes.set_ylim(0.8, one.measure.points + 0.2)
