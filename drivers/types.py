@@ -241,6 +241,8 @@ class MovingBlob:
         it covers; flow_px_s: its mean motion, the camera's own taken out
     fastest_m, fastest_m_s: place and velocity of the quarter of it that moves fastest, as
         ``p_camera_m`` and ``v_camera_m_s``: of an arm, the hand
+    thickness_m: diameter of the largest disc within it, as far away as ``p_camera_m``: of an arm,
+        about the width of its hand; from_side: it goes on beyond the left or right edge
     """
 
     id: int
@@ -260,6 +262,8 @@ class MovingBlob:
     flow_px_s: tuple[float, float] = (0.0, 0.0)
     fastest_m: tuple[float, float, float] | None = None
     fastest_m_s: tuple[float, float, float] | None = None
+    thickness_m: float = 0.0
+    from_side: bool = False
 
 
 _Row = tuple[float, float, float]

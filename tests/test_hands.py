@@ -229,6 +229,53 @@ def test_other_hands_are_as_far_as_the_person_or_as_measured(seen: LocalisedDete
     )
 
 
+def reaching(wide_m: float, **more: object) -> LocalisedDetection:
+    """Return an arm from aside, as wide as given if it were as far away as the person of FACE."""
+    said: dict[str, object] = {
+        "from_side": True,
+        "p": (2.0, 1.1, -0.2),
+        "fastest_m": BESIDE,
+        **more,
+    }
+    return patch(thickness_m=2.1 * wide_m, **said)  # type: ignore[arg-type]
+
+
+def test_an_arm_that_comes_in_at_the_side_is_as_near_as_makes_it_as_wide_as_a_hand() -> None:
+    hands = Hands()
+    seen = [reaching(0.17)] * 3 + [reaching(0.06)] * 3 + [reaching(0.25)] * 2
+    away = [
+        level(hands.named([one], [FACE], EYE, k / 30)[0].p_world_m) for k, one in enumerate(seen)
+    ]
+    assert away[1:] == pytest.approx([0.5] * 7, abs=0.03), "and stays there as less of it moves"
+
+
+@pytest.mark.parametrize(
+    "seen",
+    [reaching(0.1), reaching(0.17, from_side=False),
+     reaching(0.17, p=(2.0, 0.55, -0.4)),
+     reaching(0.17, p=(1.0, 0.55, -0.1), fastest_m=(1.0, 0.35, -0.1), radius_m=0.12,
+              depth_measured=True, along_sd_m=0.02)],
+    ids=["as wide as an arm is there", "within the image", "from the shoulder", "measured"],
+)  # fmt: skip
+def test_other_arms_are_as_far_as_the_person_or_as_measured_however_wide(
+    seen: LocalisedDetection,
+) -> None:
+    hands = Hands()
+    for k in range(4):
+        (found,) = hands.named([seen], [FACE], EYE, k / 30)
+    assert found.kind == HAND and level(found.p_world_m) == pytest.approx(1.0, abs=0.07)
+
+
+def test_a_known_hand_beside_one_at_rest_does_not_take_its_place() -> None:
+    """A glove that its colour shows is where it was; the hand that came to rest is another one."""
+    hands, rests = Hands(), patch(v=(0.0, 0.0, 0.0), thickness_m=0.1)
+    glove = patch(p=(0.95, 0.3, -0.1), mark=99, kind=HAND, depth_measured=True)
+    for k, one in enumerate([patch()] * 3 + [rests] * 2):
+        hands.named([one, glove], [FACE], EYE, k / 30)
+    later = hands.named([glove], [FACE], EYE, 1.0)
+    assert {one.mark for one in later} == {99, 7}
+
+
 def test_one_large_frame_brings_no_hand_near() -> None:
     hands = Hands()
     for k, seen in enumerate([patch()] * 4 + [FIST] + [patch()] * 2):

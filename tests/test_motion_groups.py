@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gazerig.drivers.vision.motion.clustering import gathered
+from gazerig.drivers.vision.motion.clustering import gathered, inscribed_px
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.drivers.vision.motion.segmentation import Things
 from gazerig.drivers.vision.motion.tracking import MotionTracks, PatchTrack
@@ -114,3 +114,16 @@ def test_the_camera_s_turn_moves_what_is_expected() -> None:
     tracks.predict(H, 0.1, 0.1)
     (other,) = follow(tracks, 2, (170, 50))
     assert one.id == other.id
+
+
+def test_the_largest_disc_within_a_patch_tells_how_thick_it_is() -> None:
+    """An arm is as thick as it is wide, however long; small holes and the edge change nothing."""
+    (arm,) = gathered(things(((100, 50, 90, 24), (2, 0))), MotionParams())
+    assert inscribed_px(arm, SHAPE) == pytest.approx(12.0, abs=1.0)
+    holed = things(((100, 50, 90, 24), (2, 0)))
+    holed.mask[60:62, 120:122] = False
+    assert inscribed_px(gathered(holed, MotionParams())[0], SHAPE) == pytest.approx(12.0, abs=1.0)
+    (cut,) = gathered(things(((0, 50, 90, 24), (2, 0))), MotionParams())
+    assert inscribed_px(cut, SHAPE) == pytest.approx(12.0, abs=1.0)
+    (corner,) = gathered(things(((0, 0, 40, 30), (2, 0))), MotionParams())
+    assert inscribed_px(corner, SHAPE) > 25.0, "it goes on beyond both edges"

@@ -201,6 +201,8 @@ def thing_in_camera(blob: MovingBlob) -> DetectionInCamera | None:
         fastest_m=_finite(blob.fastest_m),
         fastest_m_s=_finite(blob.fastest_m_s),
         compact=_is_compact(blob),
+        thickness_m=blob.thickness_m if isfinite(blob.thickness_m) else 0.0,
+        from_side=blob.from_side,
     )
 
 

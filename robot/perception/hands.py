@@ -8,7 +8,9 @@ that has come to rest is still there for a while, though flow shows nothing that
 
 A hand that comes towards the camera, or reaches in from the side near it, is nearer than the person
 it is taken to be of. Where depth is not measured its size tells: what is compact, and not an arm,
-and too large for a hand at the person's distance is as near as makes it a hand's size.
+and too large for a hand at the person's distance is as near as makes it a hand's size. An arm that
+comes in at the side of the image, and not from the person's shoulder, is as near as makes it as
+wide as a hand.
 """
 
 from collections.abc import Iterable
@@ -48,6 +50,9 @@ _HAND_RADIUS_M = 0.07
 # person's distance, in how many frames, means that it is nearer: other people's hands are not so
 # much larger.
 _ALONE_M, _TOO_LARGE, _LARGE_FRAMES = 0.065, 1.6, 2
+# Width of a hand; how many times as wide an arm that comes in at the side has to be, in how many
+# frames that is measured, and how far from the person's shoulder the arm has to lead.
+_WIDE_M, _TOO_WIDE, _WIDE_FRAMES, _ANOTHERS_M = 0.085, 1.4, 3, 0.165
 # What is found of that counts by this share of the way in each frame, as in frames without.
 _NEARER_GAIN = 0.5
 _ACROSS_SD_M, _ALONG_SD_M = 0.04, 0.25
@@ -60,6 +65,7 @@ class _Moving:
     at_s: when it last moved as one; p_face: of whom it is; frames: in how many it moved so
     hand: where it was then
     large: frames in a row in which it was too large for a hand as far away as the person
+    wide: in how many it came in at the side and was too wide for that
     nearer: its distance over that of the person, by its size
     """
 
@@ -68,19 +74,32 @@ class _Moving:
     hand: LocalisedDetection
     frames: int = 0
     large: int = 0
+    wide: int = 0
     nearer: float = 1.0
 
-    def sized(self, thing: LocalisedDetection, radius_m: float) -> None:
+    def sized(self, thing: LocalisedDetection, arm: "_Arm") -> None:
         """Update how far away it is by its size.
 
         Args:
             thing: the patch.
-            radius_m: its size as far away as the person.
+            arm: the same as far away as the person.
         """
-        seen = 1.0
-        if thing.compact and not thing.depth_measured and radius_m > _TOO_LARGE * _ALONE_M:
-            seen = _ALONE_M / radius_m
-        self.large = self.large + 1 if seen < 1.0 else 0
+        if thing.depth_measured:
+            return
+        radius_m, wide_m = arm.ratio * thing.radius_m, arm.ratio * thing.thickness_m
+        comes_in = thing.from_side and arm.shoulder_m > _ANOTHERS_M
+        if comes_in and wide_m > _TOO_WIDE * _WIDE_M:
+            # The first frames decide. An arm that slows down looks thinner, as less of it moves,
+            # and does not go away; what changed its distance later would seem to come or to go.
+            self.wide += 1
+            if self.wide <= _WIDE_FRAMES:
+                before = self.nearer if self.wide > 1 else 0.0
+                self.nearer = before + (_WIDE_M / wide_m - before) / self.wide
+        if self.wide:
+            return
+        large = thing.compact and radius_m > _TOO_LARGE * _ALONE_M
+        seen = _ALONE_M / radius_m if large else 1.0
+        self.large = self.large + 1 if large else 0
         if self.large == _LARGE_FRAMES:
             self.nearer = min(self.nearer, seen)
         elif self.large == 0 or self.large > _LARGE_FRAMES:
@@ -134,11 +153,13 @@ class Hands:
     ) -> list[LocalisedDetection]:
         """Return the hands that have come to rest and are not seen to move."""
         marks = {thing.mark for thing in found}
+        # What the detector itself knows as a hand, it would know again.
+        moving = [thing for thing in found if thing.mark in self._moving]
         self._held = {
             mark: one
             for mark, one in self._held.items()
             if mark in marks
-            or (t_s - one.seen_s <= _HELD_S and not _moves_again(one.hand, found, p_camera))
+            or (t_s - one.seen_s <= _HELD_S and not _moves_again(one.hand, moving, p_camera))
         }
         return [one.hand for mark, one in self._held.items() if mark not in marks]
 
@@ -159,7 +180,7 @@ class Hands:
         comes = arm.ratio * thing.radius_m >= _ALONE_M and _comes(thing, p_camera)
         if comes or speed > (_STAYS_M_S if named else max(begins, norm(v_face))):
             known = self._moving.setdefault(thing.mark, _Moving(t_s, p_face, thing))
-            known.sized(thing, arm.ratio * thing.radius_m)
+            known.sized(thing, arm)
             known.at_s, known.p_face = t_s, p_face
             known.hand = _as_hand(thing, arm, known.nearer, p_camera)
             known.frames += _FRAMES if comes else 1
@@ -195,12 +216,14 @@ class _Arm(NamedTuple):
 
     face: of the person; tip_m, tip_m_s: place and velocity of its fastest part, as far away as they
     ratio: how many metres there one of the patch is
+    shoulder_m: how far from the person's shoulder it leads
     """
 
     face: Known
     tip_m: Vec3
     tip_m_s: Vec3
     ratio: float
+    shoulder_m: float
 
 
 def _owned(
@@ -228,12 +251,13 @@ def _owned(
         # The arm goes on from the hand over the patch's middle to the shoulder.
         middle = add(p_camera, scale(sub(thing.p_world_m, p_camera), ratio))
         aside, up = _off(sub(scale(middle, 2.0), tip), face[0])
-        off_m = hypot(aside - _SHOULDER_ASIDE_M, up + _SHOULDER_BELOW_M)
+        shoulder_m = hypot(aside - _SHOULDER_ASIDE_M, up + _SHOULDER_BELOW_M)
+        off_m = shoulder_m
         if last is not None and norm(sub(last, face[0])) < _SAME_M:
             off_m -= _REACH_M
         if off_m < least:
             v = (0.0, 0.0, 0.0) if v_tip is None else scale(v_tip, ratio)
-            best, least = _Arm(face, tip, v, ratio), off_m
+            best, least = _Arm(face, tip, v, ratio, shoulder_m), off_m
     return best
 
 

@@ -32,4 +32,6 @@ def placed(found: DetectionInCamera, R_world_camera: Mat3, p_world_m: Vec3) -> L
         None if faster is None else rotate(R_world_camera, faster),
         found.signs,
         found.compact,
+        found.thickness_m,
+        found.from_side,
     )

@@ -48,6 +48,8 @@ class LocalisedDetection:
     signs: of a face, what eyes and mouth do, None where they are not found
     compact: of what moves, whether its patch is about as wide as high and full, as a fist's or a
         hand's alone is and an arm's is not
+    thickness_m: of what moves, diameter of the largest disc within its patch, as far away as its
+        place; from_side: the patch goes on beyond the left or right edge of the image
     """
 
     kind: str
@@ -71,6 +73,8 @@ class LocalisedDetection:
     fastest_m_s: Vec3 | None = None
     signs: FaceSigns | None = None
     compact: bool = False
+    thickness_m: float = 0.0
+    from_side: bool = False
 
 
 @dataclass(slots=True)

@@ -25,6 +25,7 @@ _BETTER_SHARE = 0.6
 _MOST_SPLITS = 3
 _SMOOTH_PX = 5
 _SAMPLE = 400
+_HOLES = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
 
 
 class Group(NamedTuple):
@@ -129,3 +130,26 @@ def _sides(group: Group, threshold_px: float) -> Mask | None:
     rests = [affine_rest(places[side][::step], flow[side][::step]) for side in (sides, ~sides)]
     apart = np.sqrt(share * rests[0] ** 2 + (1.0 - share) * rests[1] ** 2)
     return sides if apart < _BETTER_SHARE * together else None
+
+
+def inscribed_px(group: Group, shape: tuple[int, ...]) -> float:
+    """Return the radius of the largest disc within a patch; beyond the image's edge it goes on.
+
+    Args:
+        group: the patch.
+        shape: height and width of the image.
+    """
+    x, y, width, height = group.box
+    mask = np.zeros((height + 2, width + 2), np.uint8)
+    mask[group.y - y + 1, group.x - x + 1] = 1
+    # Where the flow of a plain skin is not sure there are holes.
+    mask[1:-1, 1:-1] = cv2.morphologyEx(mask[1:-1, 1:-1], cv2.MORPH_CLOSE, _HOLES)
+    if y <= 0:
+        mask[0] = mask[1]
+    if y + height >= shape[0]:
+        mask[-1] = mask[-2]
+    if x <= 0:
+        mask[:, 0] = mask[:, 1]
+    if x + width >= shape[1]:
+        mask[:, -1] = mask[:, -2]
+    return float(cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_3).max())

@@ -25,7 +25,7 @@ from gazerig.drivers.vision.motion.backprojection import (
     small_depth,
     velocity,
 )
-from gazerig.drivers.vision.motion.clustering import Group, fastest, gathered
+from gazerig.drivers.vision.motion.clustering import Group, fastest, gathered, inscribed_px
 from gazerig.drivers.vision.motion.ego_motion import Ego, own_motion, turn_rad
 from gazerig.drivers.vision.motion.gloves import GloveFinder, beside
 from gazerig.drivers.vision.motion.image import (
@@ -56,6 +56,8 @@ _SEARCH_AGAIN_PX = 1.5
 _SHAKES_ON_S = 0.5
 # With less of the older image in view, too little is left to tell motions apart.
 _LEAST_KNOWN = 0.4
+# So near to the image's edge, parts of its width, flow is not known where the camera turns.
+_EDGE_SHARE = 0.06
 # Points enough for an affine fit.
 _SAMPLE = 400
 
@@ -242,6 +244,7 @@ class MotionDetector:
         fx, fy = (fastest_flow / dt_s).tolist()
         (sx, sy), (x, y, width, height) = now.scale, group.box
         left, top = to_given((x - 0.5, y - 0.5), now.scale)
+        edge_px = _EDGE_SHARE * now.grey.shape[1]
         return MovingBlob(
             follow.id,
             _KIND,
@@ -260,6 +263,8 @@ class MotionDetector:
             flow_px_s=(flow_px_s[0] / sx, flow_px_s[1] / sy),
             fastest_m=at,
             fastest_m_s=velocity(at, (fx, fy), loom, now.K),
+            thickness_m=2.0 * far.z_m * inscribed_px(group, now.grey.shape) / float(now.K[0, 0]),
+            from_side=x <= edge_px or x + width >= now.grey.shape[1] - edge_px,
         )
 
 
