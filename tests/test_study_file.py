@@ -422,3 +422,10 @@ def test_whatever_stands_in_a_study_is_right_or_told_with_file_and_line(
         assert len(checked_study(str(file)).sha256) == 64
     except ConfigError as error:
         assert all(fault.file == str(file) and fault.line for fault in error.faults)
+
+
+@pytest.mark.parametrize("shown", ["film: a.webm", "recording: a.mcap"])
+def test_what_takes_the_head_s_place_needs_films(shown: str, tmp_path: Path) -> None:
+    text = conditions(f"a: {{}}\nb: {{{shown}}}", "presentation: {on: head}\n")
+    said = faults(tmp_path, text)
+    assert any("the head itself is shown; write presentation.on: film" in one for one in said)

@@ -30,7 +30,7 @@ class Condition:
     scanpath: Annotated[Literal["markov", "simple", "face_tracking", "random"] | None, "face scanpath"] = None
     behaviour: Annotated[str | None, "behaviour chosen from the rules' menu"] = None
     params: Annotated[Mapping[str, object], "dotted keys of the rig's YAML and their values"] = field(default_factory=dict)
-    recording: Annotated[str | None, "recorded run (.mcap) whose joint angles the head repeats"] = None
+    recording: Annotated[str | None, "recorded run (.mcap) that a film is made of"] = None
     film: Annotated[str | None, "film to show (.webm); null: rendered from the condition"] = None
     factors: Annotated[Mapping[str, str], "level of each factor, for designs with several"] = field(default_factory=dict)
 

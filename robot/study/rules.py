@@ -40,8 +40,11 @@ def _shown_rules(design: StudyDesign) -> Found:
         yield "presentation.world", "there is a scene as well; give one of them"
     for key, one in design.conditions.items():
         at = f"conditions.{key}"
-        if one.film is not None and design.presentation.on == "head":
-            yield f"{at}.film", "the head itself is shown; write presentation.on: film, or leave it"
+        if design.presentation.on == "head":
+            for name in ("film", "recording"):
+                if getattr(one, name) is not None:
+                    rule = "the head itself is shown; write presentation.on: film, or leave it"
+                    yield f"{at}.{name}", rule
         given = ("film", "recording")
         shown = [name for name in given if getattr(one, name) is not None]
         if len(shown) == len(given):
