@@ -67,7 +67,7 @@ class StudyProgress:
         self._passed: set[StudyPlace] = set()
 
     def add(self, records: Iterable[Record]) -> None:
-        """Take up records that are on disk."""
+        """Apply records that are on disk."""
         for one in records:
             match one:
                 case Consented():

@@ -287,7 +287,7 @@ class StudySession:
         return (*self._cut("interrupted", nan, utc, reason), Closed("excluded", reason, utc))
 
     def add(self, records: Iterable[Record]) -> None:
-        """Take up records that are on disk."""
+        """Apply records that are on disk."""
         self._progress.add(records)
 
     def _cut(

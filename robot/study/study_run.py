@@ -97,7 +97,7 @@ class StudyRun:
             )  # fmt: skip
 
     def consent(self, page: str, given: bool, pictures: bool, gaze: bool) -> None:
-        """Take the decision on the consent page.
+        """Record the decision on the consent page.
 
         Raises:
             NotKept: it could not be written.
@@ -139,7 +139,7 @@ class StudyRun:
             self._began_s = self._now_s()
 
     def film_ended(self, page: str, seconds: float) -> None:
-        """Take that the browser has shown the film; one cut short begins again.
+        """Record that the browser has shown the film; one cut short begins again.
 
         Args:
             page: on which it was shown.
@@ -177,7 +177,7 @@ class StudyRun:
                 self._end("complete", "")
 
     def answer(self, page: str, values: Mapping[int, AnswerValue], ms: Mapping[int, float]) -> None:
-        """Take a page of answers; when this returns, they are on disk.
+        """Record a page of answers; when this returns, they are on disk.
 
         Raises:
             NotKept: they could not be written, and the page is still to be answered.
@@ -188,7 +188,7 @@ class StudyRun:
                 self._keep(self._session.answer(values, ms, self._utc()))
 
     def withdraw(self) -> None:
-        """Take that the participant leaves.
+        """Record that the participant leaves.
 
         Raises:
             NotKept: it could not be written.

@@ -106,7 +106,7 @@ class HeadPresenter:
         return self._report
 
     def stop(self, why: str) -> str:
-        """Take its torque off; return why that was not done, "" where it was."""
+        """Switch its torque off; return why that was not done, "" where it was."""
         return self._asked(lambda head: head.client.stop(why))
 
     def resume(self) -> str:

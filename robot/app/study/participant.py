@@ -104,9 +104,7 @@ def run_session(
         if session.closed:
             raise SetupError(f"{code} has ended the session already: take another participant")
         journal.write((session.opened(code, sha256, gazerig.__version__, utc_now()),))
-        head = None
-        if plan.head is not None:
-            head = HeadPresenter(study, plan.head, folder, session.agreed, clock)
+        head = _head(plan, session, folder, clock)
         run = StudyRun(code, session, journal, head or FilmPresenter(), clock.now_s, utc_now)
         finished: list[str] = []
         tokens = _tokens(data.secret(), plan.number)
@@ -136,6 +134,15 @@ def run_session(
                 head.close()
         over()
     return "the session is over" if session.closed else f"{why}; the same command goes on with it"
+
+
+def _head(
+    plan: SessionPlan, session: StudySession, folder: Path, clock: Clock
+) -> HeadPresenter | None:
+    """Return what shows the conditions on the head, None with films."""
+    if plan.head is None:
+        return None
+    return HeadPresenter(plan.study, plan.head, folder, session.agreed, clock)
 
 
 def _tokens(secret: bytes, number: int) -> tuple[str, str]:

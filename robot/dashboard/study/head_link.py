@@ -23,7 +23,7 @@ class HeadLink(Protocol):
         ...
 
     def stop(self, why: str) -> str:
-        """Take its torque off; return why that was not done, "" where it was.
+        """Switch its torque off; return why that was not done, "" where it was.
 
         Raises:
             OSError: the head is gone, or does not answer.

@@ -38,7 +38,7 @@ class _Consent(ParticipantEvent, tag="consent"):
     uses: list[str]
 
     def tell(self, run: StudyRun) -> None:
-        """Take the decision."""
+        """Record the decision."""
         run.consent(self.page, self.given, "pictures" in self.uses, "gaze" in self.uses)
 
 
@@ -58,7 +58,7 @@ class _Seen(ParticipantEvent, tag="seen"):
     seconds: float
 
     def tell(self, run: StudyRun) -> None:
-        """Take how much of the film was seen."""
+        """Record how much of the film was seen."""
         run.film_ended(self.page, self.seconds)
 
 
@@ -74,7 +74,7 @@ class _Answers(ParticipantEvent, tag="answer"):
     answers: list[_Answer]
 
     def tell(self, run: StudyRun) -> None:
-        """Take the answers."""
+        """Record the answers."""
         values: Mapping[int, AnswerValue] = {_number(one): one.value for one in self.answers}
         run.answer(self.page, values, {_number(one): one.ms for one in self.answers})
 

@@ -200,7 +200,7 @@ class StudyServer:
         return web.json_response(await asyncio.to_thread(self._shown), headers=HEADERS)
 
     async def _done(self, request: web.Request) -> web.Response:
-        """Take what was done on a page; answer with the page that follows."""
+        """Do what was done on a page; answer with the page that follows."""
         async with asyncio.timeout(_READ_S):
             body = await request.read()
         try:
@@ -272,7 +272,7 @@ class StudyServer:
         tell: Callable[[], Awaitable[None]],
         beat_s: float,
     ) -> None:
-        """Tell a browser now, at news and after each beat, until it goes."""
+        """Send to a browser now, at news and after each beat, until it goes."""
         self._connections.lasting(request)
         news = asyncio.Event()
         self._news.add(news)
