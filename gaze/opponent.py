@@ -129,6 +129,9 @@ class OpponentHands:
                 off = sub(vec(bodies.p_world_m[row]), p_face)
                 if norm(off) <= _ARM_M:
                     seen.append(SeenHand(bodies.ids[row], off, t_s))
+        # An opponent has two: a third one is another's, or an arm taken for one, and came later.
+        before = {hand.id for hand in self._known}
+        seen = sorted(seen, key=lambda hand: hand.id not in before)[:HANDS]
         ids = {hand.id for hand in seen}
         rest = [
             hand for hand in self._known if hand.id not in ids and t_s - hand.seen_s <= memory_s

@@ -154,6 +154,25 @@ def test_nothing_is_open_before_both_hands_are_known() -> None:
     }
 
 
+def test_an_opponent_has_two_hands_and_a_third_that_comes_later_protects_nothing() -> None:
+    """A hand that reaches in from aside, or an arm taken for one, before the chest."""
+    planner = ActionPlanner(PARAMS)
+    stepped(planner, [guarding(k * DT_S) for k in range(9)])
+    third = fist(9, (0.6, 0.0, -0.18))
+    frames = []
+    for k in range(30):
+        open_one = opened((9 + k) * DT_S, parted=True)
+        rows = [
+            fist(number, tuple(place))
+            for number, place in zip(
+                open_one.bodies.ids, open_one.bodies.p_world_m.tolist(), strict=True
+            )
+        ]
+        frames.append(seen(open_one.captured_s, third, *rows))
+    plans = stepped(planner, frames)
+    assert any(plan.action == "attack" and "chest" in plan.why for plan in plans)
+
+
 def test_a_hand_that_is_not_seen_any_more_is_where_it_was_for_a_while() -> None:
     planner = ActionPlanner(replace(PARAMS, hand_memory_ms=2000.0))
     stepped(planner, [guarding(k * DT_S) for k in range(9)])
