@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import time
@@ -9,6 +10,9 @@ from pathlib import Path
 
 import pytest
 from branch import Branch, gazerig
+
+LINK = re.compile(rb'"link": "([^"]+)"')
+"""The name of an emulated bus, in the command line of its process."""
 
 DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
 
@@ -65,6 +69,10 @@ def test_losing_the_bus_is_a_fault_with_its_cause(tmp_path: Path) -> None:
     process = begun(rig, "--seconds", "30")
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
     for child in children.read_text(encoding="ascii").split():
+        # The system gives a freed terminal's number to whoever asks next: another test's servos
+        # would answer under this name, were the link to it left.
+        for link in LINK.findall(Path(f"/proc/{child}/cmdline").read_bytes()):
+            os.unlink(link)
         os.kill(int(child), signal.SIGKILL)
     out, err = process.communicate(timeout=30)
     assert process.returncode == 1
