@@ -47,8 +47,8 @@ class PortBus(ABC):
     holding, unconfirmed: texts about a servo whose torque is not off, or that does not confirm it
     """
 
-    holding: ClassVar[str] = "still reports torque"
-    unconfirmed: ClassVar[str] = "does not confirm that its torque is off"
+    holding: ClassVar[str] = "torque still on"
+    unconfirmed: ClassVar[str] = "torque-off not confirmed"
 
     _port: BusPort
     _line: Exchange
@@ -163,7 +163,7 @@ class PortBus(ABC):
             (released.unconfirmed, self.unconfirmed),
         ):
             for servo_id in ids:
-                self._log.add(f"{self._servo_label(servo_id)} {what}: {CUT}")
+                self._log.add(f"{self._servo_label(servo_id)}: {what}: {CUT}")
 
     def _lose(self, lost: BusLost) -> None:
         self._link.lose(lost, self._now_s)

@@ -330,4 +330,4 @@ def test_release_is_confirmed_and_reported_where_it_is_not(held):
     held.bus.events()
     held.board.choose("mode", "mute")
     held.bus.disable_torque()
-    assert sum("does not confirm" in line for line in held.bus.events()) == 3
+    assert sum("not confirmed" in line for line in held.bus.events()) == 3

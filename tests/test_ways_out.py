@@ -91,6 +91,17 @@ def test_torque_that_cannot_be_switched_off_is_said_with_what_to_do() -> None:
     assert head.said == ["parked, torque-off could not be sent (no port): cut it"]
 
 
+def test_servos_that_do_not_confirm_are_said_even_where_success_is_not() -> None:
+    head, said = Head(), []
+
+    def off() -> tuple[str, ...]:
+        return tuple(f"eye (servo {n}): torque-off not confirmed: cut it" for n in (1, 2, 3))
+
+    with PowerDown(head.park, off, said.append, Interrupts(), quiet=True) as leaving:
+        leaving.switch_on(lambda: None)
+    assert said == ["parked, torque off; servos 1-3: torque-off not confirmed: cut it"]
+
+
 def test_nobody_to_tell_changes_nothing() -> None:
     head = Head()
 
@@ -266,6 +277,27 @@ def test_nobody_to_say_anything_to_ends_nothing(devices: list[Device]) -> None:
     composed = session.compose(RunOptions(True, True, seconds=0.5).checked())
     figures = session.run(composed, lambda: None, deaf, deaf)
     assert figures["stopped_by"] == "seconds" and on(devices[0]) == 0
+
+
+@pytest.mark.parametrize("rig", ["desk", "feetech"])
+def test_servos_that_go_silent_at_the_end_are_named(
+    rig: str, devices: list[Device], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stop = Robot.stop
+
+    def unplugged(self: Robot) -> tuple[str, ...]:
+        for servo in (2, 3):
+            devices[0].faults.command(f"lose {servo}")
+        return stop(self)
+
+    monkeypatch.setattr(Robot, "stop", unplugged)
+    said: list[str] = []
+    figures = ran(rig, said, 1.0)
+    assert figures["joint_faults"] == {} and had_faults(figures, said.append)
+    assert said[-1] == (
+        "stopped by seconds: parked, torque off; "
+        "servos 2-3: torque-off not confirmed: cut the servo power"
+    )
 
 
 # --- joints that faults hold

@@ -44,8 +44,8 @@ class HobbyBoardBus(PortBus):
         ValueError: a servo is on a channel or at a pulse width that the board cannot have.
     """
 
-    holding = "still gets pulses"
-    unconfirmed = "does not confirm that its pulses have stopped"
+    holding = "pulses still on"
+    unconfirmed = "end of pulses not confirmed"
     _line: BoardLine
     _supervisor: BoardSupervisor
 

@@ -191,6 +191,7 @@ class Session:
         self._start_s = 0.0
         self.stopped_by = "fault: unexpected error"
         self._count = LoopCount(0, 0, self.stopped_by)
+        self._unreleased: tuple[str, ...] = ()
         self._observers = self._all_observers()
         if watch is not None:
             self._observers.add("the program", watch)
@@ -241,6 +242,8 @@ class Session:
         unwritten = self._run_observers.unwritten() or self._unwritten_heatmap()
         if unwritten is not None:
             figures["not_written"] = str(unwritten)
+        if self._unreleased:
+            figures["torque_off_unconfirmed"] = self._unreleased
         return figures
 
     @contextlib.contextmanager
@@ -272,6 +275,7 @@ class Session:
                 yield loop
                 self._count = loop.count(self.stopped_by)
                 leaving.cause = self.stopped_by
+            self._unreleased = leaving.unreleased
         finally:
             if begun:
                 run_observers.close(self._count)

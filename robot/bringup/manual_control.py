@@ -109,9 +109,9 @@ class ManualControl:
         self._guard.reset(self._clock.now_s(), self._goal)
         return self._goal
 
-    def stop(self) -> None:
-        """Torque off and close the bus."""
-        self.body.stop()
+    def stop(self) -> tuple[str, ...]:
+        """Torque off and close the bus; return what the bus says of it."""
+        return self.body.stop()
 
     def jog(self, joint: str, angle_deg: float) -> MoveResult:
         """Move one joint slowly; the others hold where they are.

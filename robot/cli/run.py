@@ -148,7 +148,8 @@ def had_faults(figures: Mapping[str, Any], say: Callable[[str], None]) -> bool:
         share = late / (late + ticks) if late else 0.0
         busy = f"; the computer was too busy: {share:.0%} of ticks came late"
         say(f"the run had faults: {'; '.join(held)}{busy if share >= BUSY_SHARE else ''}")
-    return bool(held) or str(figures["stopped_by"]).startswith("fault")
+    failed = str(figures["stopped_by"]).startswith("fault") or "torque_off_unconfirmed" in figures
+    return bool(held) or failed
 
 
 def _write_summary(figures: dict[str, object], where: str | None, force: bool) -> None:

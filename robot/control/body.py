@@ -1,5 +1,6 @@
 """Joints to servos and back: the only place that knows what a step means at a joint."""
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from operator import add, mul, sub
 
@@ -225,10 +226,18 @@ class Body:
         self._set_up = self._joints
         return self.angles(goals)
 
-    def stop(self) -> None:
-        """Torque off and close the bus."""
+    def stop(self) -> tuple[str, ...]:
+        """Torque off and close the bus; return what the bus says of the torque that went off.
+
+        e.g. "left_lid (servo 7): torque-off not confirmed: cut the servo power"
+        """
         try:
+            with contextlib.suppress(Exception):  # nothing may keep the torque on
+                self.bus.events()  # what was before is no word about this
             self._release()
+            with contextlib.suppress(Exception):
+                return self.bus.events()
+            return ()
         finally:
             self.bus.close()
 

@@ -288,17 +288,17 @@ class Robot:
             guard_result = self._guard.check(pose_rad, joints, 0.0, t_s)
             self.body.write(guard_result.command_rad)
             if watch is not None and isinstance(newest, Tick):
-                pose = self._kinematics.forward(joints)
-                watch(newest.while_parking(t_s, joints, pose, pose_rad, guard_result))
+                pose, events = self._kinematics.forward(joints), self.body.bus.events()
+                watch(newest.while_parking(t_s, joints, pose, pose_rad, guard_result, events))
             errors = zip(pose_rad, joints.position_rad, strict=True)
             if max(abs(desired - now) for desired, now in errors) < radians(2.0):
                 return True
         return False
 
-    def stop(self) -> None:
-        """Torque off, close the bus and the camera."""
+    def stop(self) -> tuple[str, ...]:
+        """Torque off, close the bus and the camera; return what the bus says of the torque."""
         try:
-            self.body.stop()
+            return self.body.stop()
         finally:
             self.camera.close()
 

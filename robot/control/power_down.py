@@ -10,11 +10,12 @@ that, and what is written cannot keep it from happening.
 """
 
 import contextlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from types import FrameType
 from typing import Self, TypeVar
 
 from gazerig.drivers.errors import DriverError
+from gazerig.robot.control.event_text import drawn_together
 from gazerig.robot.control.interrupts import Interrupts
 
 T = TypeVar("T")
@@ -29,7 +30,8 @@ class PowerDown:
     Args:
         park: moves to the parking pose in bounded time; returns what to say of it, such as
             "parked". None: torque goes off where the joints are.
-        torque_off: switches torque off on all servos and closes the bus.
+        torque_off: switches torque off on all servos and closes the bus; returns what the bus
+            says of servos that do not confirm it.
         say: gets the line that tells how it went.
         interrupts: requests to end this program.
         off: what to say of torque that is off.
@@ -38,12 +40,13 @@ class PowerDown:
 
     cause: why it ended, for the line; "" says nothing of it
     how: what became of it, "" before the end
+    unreleased: what the bus says of servos that do not confirm that their torque is off
     """
 
     def __init__(
         self,
         park: Callable[[Again], str] | None,
-        torque_off: Callable[[], None],
+        torque_off: Callable[[], Sequence[str] | None],
         say: Callable[[str], None],
         interrupts: Interrupts,
         off: str = "torque off",
@@ -56,6 +59,7 @@ class PowerDown:
         self._starting = self._on = False
         self.cause = ""
         self.how = ""
+        self.unreleased: tuple[str, ...] = ()
 
     def switch_on(self, start: Callable[[], T]) -> T:
         """Call what switches torque on; return what it returns.
@@ -105,8 +109,8 @@ class PowerDown:
         interrupts.never_raise()
         failed = True
         try:
-            self._torque_off()
-            how, failed = how + self._off, False
+            self.unreleased = tuple(drawn_together(self._torque_off() or ()))
+            how, failed = how + "; ".join((self._off, *self.unreleased)), bool(self.unreleased)
         except BaseException as error:
             how += f"torque-off could not be sent ({_words(error)}){self._left}"
         self._on = self._starting = False

@@ -45,11 +45,12 @@ class Tick(NamedTuple):
         pose: GazeState,
         desired_rad: JointAngles,
         guard_result: GuardResult,
+        events: tuple[str, ...],
     ) -> "Tick":
         """Return a later tick of parking: what was seen is as here, and nobody leads."""
         return Tick(
             t_s, joints, pose, self.detections, self.percept, self.target, self.gaze,
-            desired_rad, guard_result, parking=True,
+            desired_rad, guard_result, events, parking=True,
         )  # fmt: skip
 
 

@@ -42,6 +42,6 @@ class ForwardingBody(Body):
         """
         self._body.disable_torque()
 
-    def stop(self) -> None:
-        """Torque off and close the bus."""
-        self._body.stop()
+    def stop(self) -> tuple[str, ...]:
+        """Torque off and close the bus; return what the bus says of it."""
+        return self._body.stop()
