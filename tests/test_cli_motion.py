@@ -14,6 +14,7 @@ from desk import GAZE_JOINTS
 from served_rigs import Served, rig_files, served
 
 from gazerig.config.schema import load_rig
+from gazerig.robot.bringup.manual_control import ManualControl
 from gazerig.robot.cli.manual_session import holding, left_alone
 
 pytestmark = pytest.mark.usefixtures("branched_children", "simulated_wires")
@@ -42,6 +43,20 @@ def test_sigterm_while_jogging_parks_and_lets_go(desk: Served) -> None:
     assert process.returncode == 1 and "SIGTERM" in words
     assert "parked, torque off on all servos" in words
     assert not any(status(desk.command, servo_id)["torque"] for servo_id in range(1, 10))
+
+
+def test_a_servo_that_does_not_confirm_its_torque_off_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    stop = ManualControl.stop
+
+    def unconfirmed(self: ManualControl) -> tuple[str, ...]:
+        return *stop(self), "neck_roll (servo 9): torque-off not confirmed: cut the servo power"
+
+    monkeypatch.setattr(ManualControl, "stop", unconfirmed)
+    done = invoked("jog", "left_eye_pan", "-2", "--mock", "--seconds", "0", "--no-park")
+    assert done.code == 1
+    assert "torque off on all servos; neck_roll (servo 9): torque-off not confirmed" in done.err
 
 
 def test_monitor_changes_nothing(desk: Served) -> None:

@@ -86,13 +86,16 @@ def test_torque_that_cannot_be_switched_off_is_said_with_what_to_do() -> None:
         raise BusLost("no port")
 
     head.while_off = fail
-    with head.way_out() as leaving:
+    leaving = head.way_out()
+    with leaving:
         leaving.switch_on(lambda: None)
     assert head.said == ["parked, torque-off could not be sent (no port): cut it"]
+    assert leaving.unreleased == ("no port",)
 
 
 def test_servos_that_do_not_confirm_are_said_even_where_success_is_not() -> None:
-    head, said = Head(), []
+    head = Head()
+    said: list[str] = []
 
     def off() -> tuple[str, ...]:
         return tuple(f"eye (servo {n}): torque-off not confirmed: cut it" for n in (1, 2, 3))

@@ -3,13 +3,15 @@
 import contextlib
 from collections.abc import Callable, Iterator, Mapping
 
+import typer
+
 from gazerig.config.schema import Rig
 from gazerig.robot.app.bus_wiring import bus_names, guarded_rig_bus, has_watchdog
 from gazerig.robot.app.rig_limits import limits, park_rad
 from gazerig.robot.bringup.manual_control import JogParams, ManualControl, parked
 from gazerig.robot.bringup.move_result import Step
 from gazerig.robot.bringup.servo_families import KINDS
-from gazerig.robot.cli.terminal import say
+from gazerig.robot.cli.terminal import FAULT, say
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.power_down import PowerDown
@@ -44,6 +46,7 @@ def holding_rig(
 
     Raises:
         SetupError: port or servos are not as configured.
+        typer.Exit: all went well but the torque-off, which not all servos confirm.
     """
     body = Body(
         guarded_rig_bus(rig, paths), rig.joints, park_rad(rig), pairs=pairs_of(rig.couplings)
@@ -60,6 +63,8 @@ def holding_rig(
     ) as way_out:
         way_out.switch_on(control.start)
         yield control
+    if way_out.unreleased:
+        raise typer.Exit(FAULT)
 
 
 def holding(rig: Rig) -> str:

@@ -40,7 +40,7 @@ class PowerDown:
 
     cause: why it ended, for the line; "" says nothing of it
     how: what became of it, "" before the end
-    unreleased: what the bus says of servos that do not confirm that their torque is off
+    unreleased: what is said of servos whose torque may still be on
     """
 
     def __init__(
@@ -113,6 +113,7 @@ class PowerDown:
             how, failed = how + "; ".join((self._off, *self.unreleased)), bool(self.unreleased)
         except BaseException as error:
             how += f"torque-off could not be sent ({_words(error)}){self._left}"
+            self.unreleased = (_words(error),)
         self._on = self._starting = False
         self.how = how
         with contextlib.suppress(Exception):
