@@ -2,8 +2,8 @@
 
 import pytest
 
-from gazerig.robot.app import first_world
-from gazerig.robot.app.first_world import ROOM, main
+from gazerig.robot.app.world import first_world
+from gazerig.robot.app.world.first_world import ROOM, main
 from gazerig.sim_mock.world.gl_context import NoRenderer
 
 

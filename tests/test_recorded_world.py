@@ -12,10 +12,10 @@ pytest.importorskip("mujoco", reason="worlds need MuJoCo: pip install 'gazerig[w
 from gazerig.config.load import load, shipped, shipped_names
 from gazerig.config.text import params_text
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.app.head_group import compose_group
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.recorded_world import recorded_shapes, world_info
 from gazerig.robot.app.session import compose, run
+from gazerig.robot.app.world.head_group import compose_group
+from gazerig.robot.app.world.recorded_world import recorded_shapes, world_info
 from gazerig.robot.dashboard.feed.live_feed import (
     LiveFeed,
     LiveRig,

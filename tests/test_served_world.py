@@ -14,10 +14,10 @@ from gazerig.drivers.errors import CameraError, SetupError
 from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.app.gaze_models import kinematics_of
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.run_world import RunWorld, world_of
-from gazerig.robot.app.world_camera import WorldCamera
-from gazerig.robot.app.world_poses import RigInState, WorldPoses
-from gazerig.robot.app.world_sight import RenderedWorld, served_pixels
+from gazerig.robot.app.world.camera import WorldCamera
+from gazerig.robot.app.world.poses import RigInState, WorldPoses
+from gazerig.robot.app.world.run_world import RunWorld, world_of
+from gazerig.robot.app.world.sight import RenderedWorld, served_pixels
 from gazerig.robot.model.frames import CameraMount
 from gazerig.sim_mock.cameras.detections import SceneCamera, SceneCameraParams
 from gazerig.sim_mock.pty.line import BusSettings

@@ -15,10 +15,10 @@ from command_line import invoked
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.analysis.kept_time import fell_behind
 from gazerig.robot.analysis.mutual_gaze import HeadPlace, mutual_gaze
-from gazerig.robot.app.first_world import what_it_needs
-from gazerig.robot.app.head_group import Following, compose_group, has_other_heads
-from gazerig.robot.app.lockstep import Lockstep
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.world.first_world import what_it_needs
+from gazerig.robot.app.world.head_group import Following, compose_group, has_other_heads
+from gazerig.robot.app.world.lockstep import Lockstep
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.model.description.links import IDENTITY
 from gazerig.robot.recording.read import RunRecording

@@ -20,8 +20,8 @@ if sys.platform != "linux":
 
 from gazerig.config.load import shipped
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.app.head_group import HeadGroup, compose_group
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.world.head_group import HeadGroup, compose_group
 from gazerig.robot.control.heads_together import HeadsTogether
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.tick import Tick

@@ -6,7 +6,7 @@ from world_rigs import WorldBench, mujoco_or_skip
 mujoco_or_skip()
 
 from gazerig.config.schema import load_rig  # noqa: E402
-from gazerig.robot.app.world_rig import rig_in_world, world_ideal_bus  # noqa: E402
+from gazerig.robot.app.world.rig import rig_in_world, world_ideal_bus  # noqa: E402
 from gazerig.sim_mock.world.model import world_model  # noqa: E402
 from gazerig.sim_mock.world.physics import World  # noqa: E402
 

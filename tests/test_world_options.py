@@ -13,8 +13,8 @@ from gazerig.config.schema import load_rig
 from gazerig.config.shipped import shipped_names
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.run_world import world_of, world_script
 from gazerig.robot.app.session import compose
+from gazerig.robot.app.world.run_world import world_of, world_script
 from gazerig.robot.cli.run import what_runs
 from gazerig.sim_mock.world.camera_params import WorldCameraParams
 
@@ -47,7 +47,7 @@ def test_what_does_not_fit_is_refused(changes: dict[str, object], why: str) -> N
 
 def test_a_missing_package_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    monkeypatch.setattr("gazerig.robot.app.run_world.find_spec", lambda name: None)
+    monkeypatch.setattr("gazerig.robot.app.world.run_world.find_spec", lambda name: None)
     with pytest.raises(
         SetupError, match=r"mujoco is not installed: pip install 'gazerig\[world\]'"
     ):
@@ -105,7 +105,7 @@ def test_a_script_is_read_once_until_it_is_changed(
         reads.append(path)
         return load(path, *more, **named)
 
-    monkeypatch.setattr("gazerig.robot.app.run_world.load", counted)
+    monkeypatch.setattr("gazerig.robot.app.world.run_world.load", counted)
     file.write_text("room: living-room\npeople: {}\n")
     asked = replace(ASKED, world=str(file), no_pictures=True, fast=True, bus="ideal")
     compose(asked).made.close()

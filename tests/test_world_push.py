@@ -10,7 +10,7 @@ mujoco_or_skip()
 
 from gazerig.config.schema import load_rig  # noqa: E402
 from gazerig.robot.app.emulation import emulated_lines  # noqa: E402
-from gazerig.robot.app.world_rig import rig_in_world  # noqa: E402
+from gazerig.robot.app.world.rig import rig_in_world  # noqa: E402
 from gazerig.robot.control.tick import Tick  # noqa: E402
 from gazerig.sim_mock.pty.line import BusSettings  # noqa: E402
 from gazerig.sim_mock.pty.server import (  # noqa: E402

@@ -16,7 +16,7 @@ mujoco_or_skip()
 
 from gazerig.config.schema import Rig, load_rig  # noqa: E402
 from gazerig.robot.app.emulation import emulated_lines  # noqa: E402
-from gazerig.robot.app.world_rig import rig_in_world  # noqa: E402
+from gazerig.robot.app.world.rig import rig_in_world  # noqa: E402
 from gazerig.sim_mock.world.figure import Figures  # noqa: E402
 from gazerig.sim_mock.world.model import world_model  # noqa: E402
 from gazerig.sim_mock.world.physics import World  # noqa: E402

@@ -10,7 +10,7 @@ from world_scripts import WORLDS, shipped_world
 
 mujoco = mujoco_or_skip()
 
-from gazerig.robot.app.world_rig import rig_in_world  # noqa: E402
+from gazerig.robot.app.world.rig import rig_in_world  # noqa: E402
 from gazerig.sim_mock.world.figure import SEGMENTS, Figures  # noqa: E402
 from gazerig.sim_mock.world.figure_model import PlacedPeople, add_people  # noqa: E402
 from gazerig.sim_mock.world.model import world_model  # noqa: E402

@@ -16,8 +16,8 @@ import mujoco
 
 from gazerig.config.load import shipped
 from gazerig.config.schema import load_rig
-from gazerig.robot.app.run_world import world_scene
-from gazerig.robot.app.world_rig import rig_in_world
+from gazerig.robot.app.world.rig import rig_in_world
+from gazerig.robot.app.world.run_world import world_scene
 from gazerig.robot.dashboard.view.world_view import part_glb, room_glbs
 from gazerig.robot.model.description.texture import TexturedMesh
 from gazerig.robot.model.paint import Painted
@@ -142,7 +142,7 @@ def test_a_picture_lies_on_a_wall_as_mujoco_lays_it() -> None:
 
 def test_sending_shapes_loads_no_mujoco() -> None:
     code = (
-        "import sys, pickle; from gazerig.robot.app.run_world import world_scene;"
+        "import sys, pickle; from gazerig.robot.app.world.run_world import world_scene;"
         "from gazerig.sim_mock.world.shapes import shapes_of;"
         "from gazerig.sim_mock.world.world_spec import WorldSpec;"
         "found = shapes_of(WorldSpec(world_scene('living-room', 0).figures, ()));"

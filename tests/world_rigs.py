@@ -12,7 +12,7 @@ from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.emulation import emulated_lines, place_of
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.world_rig import rig_in_world
+from gazerig.robot.app.world.rig import rig_in_world
 from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
 from gazerig.sim_mock.devices import build

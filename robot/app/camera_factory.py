@@ -28,7 +28,7 @@ from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.drawn_camera import DrawnCamera, drawn_camera
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import NO_PARTS, ProgramParts, program_camera, watched
-from gazerig.robot.app.world_camera import WorldCamera
+from gazerig.robot.app.world.camera import WorldCamera
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraMount, CameraParams, standing_still
 from gazerig.robot.model.kinematics import Kinematics

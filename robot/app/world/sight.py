@@ -29,8 +29,8 @@ from gazerig.robot.app.drawn_camera import (
 )
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.program_parts import ProgramParts
-from gazerig.robot.app.world_camera import WorldCamera, without_pictures
-from gazerig.robot.app.world_poses import SimulatedPoses, WorldPoses
+from gazerig.robot.app.world.camera import WorldCamera, without_pictures
+from gazerig.robot.app.world.poses import SimulatedPoses, WorldPoses
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens

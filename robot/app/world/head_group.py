@@ -14,9 +14,9 @@ from gazerig.robot.analysis.mutual_gaze import HeadPlace, MutualGazeTrace
 from gazerig.robot.app.assemble import SharedPlace
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_rig import run_rig
-from gazerig.robot.app.run_world import RunWorld, world_of, world_scene
 from gazerig.robot.app.session import SECONDS, ComposedRun, compose, run
-from gazerig.robot.app.shared_world import FaceNow, RealTimeWorld, SharedWorld, SimulatedWorld
+from gazerig.robot.app.world.run_world import RunWorld, world_of, world_scene
+from gazerig.robot.app.world.shared_world import FaceNow, RealTimeWorld, SharedWorld, SimulatedWorld
 from gazerig.robot.control.heads_together import NamedRobot
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.control.tick import Tick

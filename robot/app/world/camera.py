@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.types import Detections
-from gazerig.robot.app.world_poses import WorldPoses
+from gazerig.robot.app.world.poses import WorldPoses
 from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.world.gl_context import NoRenderer
 

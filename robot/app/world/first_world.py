@@ -1,7 +1,7 @@
 """What ``make run`` shows: the living room where it can be rendered, else the visitor of a scene.
 
-``python -m gazerig.robot.app.first_world`` prints the options of ``gazerig run`` that show the
-room, or nothing, and then says on standard error in one line what the room needs.
+``python -m gazerig.robot.app.world.first_world`` prints the options of ``gazerig run`` that show
+the room, or nothing, and then says on standard error in one line what the room needs.
 """
 
 import sys

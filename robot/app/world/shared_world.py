@@ -1,9 +1,9 @@
 """A world that several heads are in: on one simulated clock, or in real time.
 
 In simulated time the world and all heads are in this process, each head in a thread, and one after
-the other (gazerig.robot.app.lockstep): the same seed gives the same bytes on every bus. In real
-time the emulator's process has the world and the servos of all heads, as it has those of one; each
-head's control loop speaks to its own terminals, on the host's clock.
+the other (gazerig.robot.app.world.lockstep): the same seed gives the same bytes on every bus. In
+real time the emulator's process has the world and the servos of all heads, as it has those of one;
+each head's control loop speaks to its own terminals, on the host's clock.
 """
 
 from collections.abc import Sequence
@@ -16,9 +16,9 @@ from gazerig.gaze.angles import add, rotate, rotation
 from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.app.gaze_models import kinematics_of
-from gazerig.robot.app.lockstep import Lockstep
-from gazerig.robot.app.run_world import RunWorld, ServedRig
-from gazerig.robot.app.world_poses import RigInState, SimulatedPoses, WorldPoses
+from gazerig.robot.app.world.lockstep import Lockstep
+from gazerig.robot.app.world.poses import RigInState, SimulatedPoses, WorldPoses
+from gazerig.robot.app.world.run_world import RunWorld, ServedRig
 from gazerig.robot.model.clock import Clock, RealClock
 from gazerig.robot.model.head_shape import HeadMeasures
 from gazerig.sim_mock.pty.client import PtyBuses, has_terminals

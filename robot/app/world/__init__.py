@@ -1,0 +1,1 @@
+"""Runs in a world with physics: who is in it, the rigs among them, and what their cameras see."""
