@@ -12,7 +12,6 @@ from gazerig.config.study_file import LoadedStudy
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.study.head_presenter import HeadPresenter
-from gazerig.robot.app.study.trial_measures import measured
 from gazerig.robot.dashboard.study.server import StudyServer
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.study.data_folder import StudyData, code_of
@@ -113,18 +112,12 @@ def run_session(
             lambda: finished.append("ended by the experimenter"), head,
         )  # fmt: skip
         try:
+            over = _ending(head, study, journal, folder, say)
             _open(server, plan)
             say(f"participant: {server.participant_url}")
             say(f"experimenter: {server.experimenter_url}")
             if browse is not None:
                 browse(server.participant_url)
-
-            def over() -> None:
-                """Park the head, and measure what it showed."""
-                if head is not None:
-                    head.close_head()
-                    journal.write(measured(study, journal.records, folder, say))
-
             why = _until_told(
                 run, server, lambda: finished[0] if finished else stopped(), over, say, clock
             )
@@ -143,6 +136,29 @@ def _head(
     if plan.head is None:
         return None
     return HeadPresenter(plan.study, plan.head, folder, session.agreed, clock)
+
+
+def _ending(
+    head: HeadPresenter | None,
+    study: LoadedStudy,
+    journal: Journal,
+    folder: Path,
+    say: Callable[[str], None],
+) -> Callable[[], None]:
+    """Return what parks the head and measures what it showed; with films it does nothing.
+
+    Raises:
+        SetupError: what measures needs a package that is not installed.
+    """
+    if head is None:
+        return lambda: None
+    from gazerig.robot.app.study.trial_measures import measured  # .7 s of a processor
+
+    def over() -> None:
+        head.close_head()
+        journal.write(measured(study, journal.records, folder, say))
+
+    return over
 
 
 def _tokens(secret: bytes, number: int) -> tuple[str, str]:
