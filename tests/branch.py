@@ -19,6 +19,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any, NoReturn
 
 import child_processes
@@ -104,6 +105,9 @@ def become(
         atexit._run_exitfuncs()
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
+        if code == -signal.SIGINT:
+            signal.signal(signal.SIGINT, signal.SIG_DFL)
+            os.kill(os.getpid(), signal.SIGINT)
     finally:
         os._exit(code)
 
@@ -127,7 +131,7 @@ kept: list[object] = []
 
 
 def _status(work: Callable[[], object]) -> int:
-    """Do the work; return the exit status that Python makes of its end."""
+    """Do the work; return the exit status that Python makes of its end, less than 0: a signal."""
     try:
         work()
     except SystemExit as end:
@@ -137,10 +141,7 @@ def _status(work: Callable[[], object]) -> int:
         return 1
     except KeyboardInterrupt:
         traceback.print_exc()
-        sys.stderr.flush()
-        signal.signal(signal.SIGINT, signal.SIG_DFL)
-        os.kill(os.getpid(), signal.SIGINT)
-        return 1
+        return -signal.SIGINT
     except BaseException:
         traceback.print_exc()
         return 1
@@ -160,6 +161,17 @@ def gazerig(*words: str) -> Callable[[], None]:
         atexit.register(terminal._writer.flush, 1.0)
         sys.argv = ["gazerig", *words]
         main()
+
+    return work
+
+
+def script(file: Path, *words: str) -> Callable[[], None]:
+    """Return what ``python`` does with a file."""
+
+    def work() -> None:
+        sys.argv = [str(file), *words]
+        sys.path.insert(0, str(file.parent))
+        runpy.run_path(str(file), run_name="__main__")
 
     return work
 

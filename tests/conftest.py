@@ -172,6 +172,15 @@ def branched_children() -> Iterator[None]:
 
 
 @pytest.fixture
+def branched_children_here() -> Iterator[None]:
+    """Have them start so in one test, in a file of which others judge the start itself."""
+    from branch import branched_children
+
+    with branched_children():
+        yield
+
+
+@pytest.fixture
 def unlaid_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw figures small and without finding room for their labels, in a third of the time.
 

@@ -12,7 +12,6 @@ import random
 import re
 import signal
 import subprocess
-import sys
 import threading
 import time
 import urllib.error
@@ -22,6 +21,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from branch import Branch, gazerig
 from study_at_the_page import Tab, answers
 
 from gazerig.drivers.film_writer import film_writer
@@ -39,7 +39,6 @@ after: [free_text]
 plan: {participants: 2}
 privacy: {contact: someone@example.org}
 """
-_COMMAND = "from gazerig.robot.cli.entry_point import main; main()"
 _GONE = (urllib.error.URLError, ConnectionError, TimeoutError, OSError)
 
 
@@ -104,15 +103,13 @@ def _ended(folder: Path, number: int) -> bool:
 
 
 @contextlib.contextmanager
-def _program(file: Path, folder: Path, number: int) -> Iterator[tuple[subprocess.Popen[str], str]]:
+def _program(file: Path, folder: Path, number: int) -> Iterator[tuple[Branch, str]]:
     """Start the program; give the participant's address; end it if it lives."""
-    process = subprocess.Popen(
-        [
-            sys.executable, "-c", _COMMAND, "study", "run", str(file), "--participant", str(number),
-            "--data", str(folder / "data"), "--page", f"127.0.0.1:{_PORT}", "--no-browser",
-        ],
-        stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, env={**os.environ},
+    words = (
+        "study", "run", str(file), "--participant", str(number),
+        "--data", str(folder / "data"), "--page", f"127.0.0.1:{_PORT}", "--no-browser",
     )  # fmt: skip
+    process = Branch(gazerig(*words), stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
     try:
         assert process.stderr is not None
         lines = []

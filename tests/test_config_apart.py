@@ -3,23 +3,15 @@
 import os
 import signal
 import sys
-from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 
 import pytest
-from branch import branched_children
 
 from gazerig.config.load import ConfigError
 from gazerig.config.save import copy_shipped, save_rig
 from gazerig.config.schema import load_rig
 from gazerig.config.subprocess_call import in_subprocess
-
-
-@pytest.fixture
-def branched() -> Iterator[None]:
-    with branched_children():
-        yield
 
 
 def test_a_rig_comes_over_whole(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -30,7 +22,7 @@ def test_a_rig_comes_over_whole(monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
     )
 
 
-@pytest.mark.usefixtures("branched")
+@pytest.mark.usefixtures("branched_children_here")
 def test_all_faults_come_over_with_their_lines(tmp_path: Path) -> None:
     file = copy_shipped("desk", tmp_path / "my.yaml")
     text = file.read_text(encoding="utf-8")
@@ -43,7 +35,7 @@ def test_all_faults_come_over_with_their_lines(tmp_path: Path) -> None:
     assert str(there.value) == str(here.value)
 
 
-@pytest.mark.usefixtures("branched")
+@pytest.mark.usefixtures("branched_children_here")
 def test_saving_works_there(tmp_path: Path) -> None:
     file = copy_shipped("desk", tmp_path / "my.yaml")
     now = datetime(2026, 1, 31, 23, 59, 59)
@@ -84,6 +76,7 @@ def test_it_is_another_process_that_ctrl_c_does_not_reach(importable: None) -> N
     assert pid != os.getpid() and session == pid
 
 
+@pytest.mark.usefixtures("branched_children_here")
 def test_a_process_that_fails_is_an_error_in_one_line(
     importable: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -94,6 +87,9 @@ def test_a_process_that_fails_is_an_error_in_one_line(
     monkeypatch.setattr("gazerig.config.subprocess_call._LONGEST_S", 0.5)
     with pytest.raises(ConfigError, match="took more than 0.5 s"):
         in_subprocess(sleeps)
+
+
+def test_a_process_that_cannot_be_started_is_an_error_too(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", "/nonexistent/python")
     with pytest.raises(ConfigError, match="cannot be started: No such file"):
         in_subprocess(here)

@@ -18,6 +18,8 @@ from gazerig.robot.study.presenter import HeadLost
 from gazerig.robot.study.records import STEP_DEG, Record, TrialBegan, TrialEnded
 from gazerig.robot.study.session import ShownTrial
 
+pytestmark = pytest.mark.usefixtures("branched_children")
+
 
 @pytest.fixture(scope="module")
 def study() -> LoadedStudy:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from branch import Branch, gazerig
 
 pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install -e '.[world]'")
 if sys.platform != "linux":
@@ -34,10 +35,10 @@ LET_GO = "(not )?parked, torque off"
 """On a starved machine the time for parking runs out; that it is skipped is told otherwise."""
 
 ASKED = RunOptions(mock=True, world="two-heads", no_pictures=True, rig="minimal", no_page=True)
-COMMAND = (
-    "-c", "from gazerig.robot.cli.entry_point import main; main()", "run", "minimal", "--mock",
-    "--world", "two-heads", "--no-pictures", "--no-page",
-)  # fmt: skip
+COMMAND = ("run", "minimal", "--mock", "--world", "two-heads", "--no-pictures", "--no-page")
+
+
+branched = pytest.mark.usefixtures("branched_children_here")
 
 
 @pytest.fixture
@@ -51,6 +52,7 @@ def group(tmp_path: Path) -> HeadGroup:
     return compose_group(replace(ASKED, rig=str(file)).checked())
 
 
+@branched
 def test_a_fault_of_one_head_parks_the_other_and_both_let_go(group: HeadGroup) -> None:
     fault = group.members[0].composed.made.fault
     assert fault is not None
@@ -74,6 +76,7 @@ def test_a_fault_of_one_head_parks_the_other_and_both_let_go(group: HeadGroup) -
     assert any(line.startswith(f"other: stopped by {why}: ") for line in lines)
 
 
+@branched
 def test_a_stop_stops_both_and_a_resume_frees_both(group: HeadGroup) -> None:
     first, other = (member.composed.made.robot for member in group.members)
     together = HeadsTogether(first, group.members[0].composed.made.others)
@@ -97,6 +100,7 @@ def test_a_stop_stops_both_and_a_resume_frees_both(group: HeadGroup) -> None:
     assert len(ends) == 2 and all(re.search(f": {LET_GO}$", line) for line in ends)
 
 
+@branched
 def test_the_page_is_shown_the_other_head_where_it_is(group: HeadGroup) -> None:
     made = group.members[0].composed.made
     shapes = pickle.loads(pickle.dumps(made.world))  # as to the page's process
@@ -122,6 +126,7 @@ def test_the_page_is_shown_the_other_head_where_it_is(group: HeadGroup) -> None:
         assert abs(w) < 0.5  # it faces the first head
 
 
+@branched
 def test_a_head_that_cannot_start_ends_the_other(
     group: HeadGroup, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -138,10 +143,8 @@ def test_a_head_that_cannot_start_ends_the_other(
 @pytest.fixture
 def running(tmp_path: Path) -> Iterator[subprocess.Popen[str]]:
     """Return a run of two heads whose heads move already."""
-    environment = {**os.environ, "TMPDIR": str(tmp_path), "PYTHONUNBUFFERED": "1"}
-    with subprocess.Popen(
-        [sys.executable, *COMMAND], stderr=subprocess.PIPE, text=True, env=environment
-    ) as process:
+    environment = {**os.environ, "TMPDIR": str(tmp_path)}
+    with Branch(gazerig(*COMMAND), stderr=subprocess.PIPE, text=True, env=environment) as process:
         assert process.stderr is not None
         assert "two-heads" in process.stderr.readline()  # said with the first tick
         time.sleep(1.0)
@@ -156,6 +159,7 @@ def children(pid: int) -> list[int]:
     return own + [each for one in own for each in children(one)]
 
 
+@branched
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_request_to_end_parks_both(running: subprocess.Popen[str], number: int) -> None:
     running.send_signal(number)
