@@ -167,7 +167,7 @@ def summary(name: str, study: "LoadedStudy") -> list[str]:
     for i, (one, found) in enumerate(
         zip(design.hypotheses, claims_of(design, study.questionnaires), strict=True), 1
     ):
-        lines += [f"hypothesis {i}: {sentence(one)}", f"  {size_words(design, found)}"]
+        lines += [f"hypothesis {i}: {sentence(one, design)}", f"  {size_words(design, found)}"]
     return lines
 
 

@@ -101,9 +101,11 @@ class StudyAnalysis:
             if isinstance(row.value, str) and row.value.strip() and self._is_text(row)
         )
 
-    def label(self, condition: str) -> str:
-        """Return what a condition is called in the report."""
-        return self.design.conditions[condition].label or condition
+    def label(self, name: str) -> str:
+        """Return what a condition, or a level of a factor, is called in the report."""
+        if name in self.design.conditions:
+            return self.design.conditions[name].label or name
+        return name.replace("=", " = ")
 
     def _is_text(self, row: AnswerRow) -> bool:
         return self.questionnaires[row.questionnaire].items[row.item].kind == "text"

@@ -6,6 +6,7 @@ from math import isfinite, nan
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
 from gazerig.robot.study.design import Hypothesis, StudyDesign, Test
@@ -39,7 +40,7 @@ class Decision:
 
     test: the one that was planned, None where nothing could be tested; also: further ones
     corrected_p: of the planned test, over all hypotheses
-    n: participants with both conditions; standardised: d_z of their differences
+    n: participants with all conditions of both sides; standardised: d_z of their differences
     medians, means: of the better and of the other condition, nan for choices
     too_few: why no result could have been significant, "" where one could
     """
@@ -114,25 +115,53 @@ def _tested(
     if measure.kind == "choice":
         return _chosen(design, one, measure, people)
     found = scores(measure, people, conditions, questionnaires)
-    both = found.both(one.better, one.than)
-    better, than = found.column(one.better)[both], found.column(one.than)[both]
-    n = int(both.sum())
+    sides = _Sides(found, design.side(one.better), design.side(one.than))
+    better, than = sides.means
+    n = len(better)
     if n < _LEAST_PEOPLE:
         why = f"{n} of {design.plan.participants} participants have both conditions"
         nothing = (nan, nan)
         return Decision(one, measure, None, (), nan, "too few", n, nothing, nothing, None, (), why)
-    tests = [_run(key, one, found, measure) for key in (one.test, *one.also)]
+    tests = [_run(key, one, sides, measure) for key in (one.test, *one.also)]
     return Decision(
         one, measure, tests[0], tuple(tests[1:]), nan, "not supported", n,
         (float(np.median(better)), float(np.median(than))), (float(better.mean()),
-        float(than.mean())), cohens_dz(better - than), _checks(one, measure, found),
+        float(than.mean())), cohens_dz(better - than), _checks(one, measure, sides),
         _too_few(tests[0], design.plan.alpha),
     )  # fmt: skip
 
 
-def _run(key: Test, one: Hypothesis, found: Scores, measure: Measure) -> StatisticalTest:
-    both = found.both(one.better, one.than)
-    better, than = found.column(one.better)[both], found.column(one.than)[both]
+@dataclass(frozen=True)
+class _Sides:
+    """What a hypothesis compares: a condition, or all conditions of a factor's level, each."""
+
+    found: Scores
+    better: tuple[str, ...]
+    than: tuple[str, ...]
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Return who has a mean of every condition on both sides, (participants,)."""
+        found: NDArray[np.bool_] = np.isfinite(self.found.column(*self.better, *self.than))
+        return found
+
+    @property
+    def means(self) -> tuple[Floats, Floats]:
+        """Return the means of the better side and of the other one, (known,) each."""
+        return self.found.column(*self.better)[self.known], self.found.column(*self.than)[
+            self.known
+        ]
+
+    @property
+    def better_first(self) -> NDArray[np.bool_]:
+        """Return who saw the better side first, (known,)."""
+        first, second = self.found.first_seen(*self.better), self.found.first_seen(*self.than)
+        found: NDArray[np.bool_] = (first < second)[self.known]
+        return found
+
+
+def _run(key: Test, one: Hypothesis, sides: _Sides, measure: Measure) -> StatisticalTest:
+    found, (better, than) = sides.found, sides.means
     if key == "signed_rank":
         return signed_rank(better - than, one.two_sided)
     if key == "rank_sum":
@@ -140,24 +169,22 @@ def _run(key: Test, one: Hypothesis, found: Scores, measure: Measure) -> Statist
     if key == "friedman":
         return friedman(found.means[np.isfinite(found.means).all(axis=1)])
     if key == "chi_square":
-        rows = [counts_of(found.answers(c), measure.points) for c in (one.better, one.than)]
+        rows = [counts_of(found.answers(*c), measure.points) for c in (sides.better, sides.than)]
         return chi_square(rows, paired=True)
     if key == "ordinal_mixed":
-        columns = [found.conditions.index(c) for c in (one.better, one.than)]
-        single = found.single[np.isin(found.single[:, 1], columns)]
+        better_at, than_at = found.columns(sides.better), found.columns(sides.than)
+        single = found.single[np.isin(found.single[:, 1], better_at + than_at)]
         return ordinal_mixed(
-            single[:, 2].astype(np.int64), single[:, 1] == columns[0],
+            single[:, 2].astype(np.int64), np.isin(single[:, 1], better_at),
             single[:, 0].astype(np.int64), one.two_sided,
         )  # fmt: skip
     raise ValueError(f"{key} cannot decide on a rating")
 
 
-def _checks(one: Hypothesis, measure: Measure, found: Scores) -> tuple[AssumptionCheck, ...]:
-    both = found.both(one.better, one.than)
-    places = [found.places[both, found.conditions.index(c)] for c in (one.better, one.than)]
-    differences = (found.column(one.better) - found.column(one.than))[both]
-    checks = difference_checks(differences, places[0] < places[1])
-    answers: list[Floats] = [found.answers(c) for c in (one.than, one.better)]
+def _checks(one: Hypothesis, measure: Measure, sides: _Sides) -> tuple[AssumptionCheck, ...]:
+    better, than = sides.means
+    checks = difference_checks(better - than, sides.better_first)
+    answers: list[Floats] = [sides.found.answers(*side) for side in (sides.than, sides.better)]
     if measure.kind in ("item", "scale"):
         checks.append(range_check(np.concatenate(answers), measure.points))
     if "ordinal_mixed" in (one.test, *one.also):
@@ -171,7 +198,9 @@ def _chosen(
     """Decide on a choice between two."""
     conditions = tuple(design.conditions)
     table = wins(measure, people, conditions)
-    better, than = conditions.index(one.better), conditions.index(one.than)
+    better, than = (
+        conditions.index(key) for name in (one.better, one.than) for key in design.side(name)
+    )
     direct = int(table[better, than] + table[than, better])
     n = sum(any(r.item in measure.items for r in p.counted) for p in people)
     if not table.any():

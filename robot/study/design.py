@@ -64,8 +64,8 @@ class Hypothesis:
     """What is expected, and the test that decides on it."""
 
     measure: Annotated[str, "questionnaire.item, questionnaire.scale or an objective measure"]
-    better: Annotated[str, "condition for which more is expected"]
-    than: Annotated[str, "condition that it is compared with"]
+    better: Annotated[str, "condition, or level of a factor (gaze=moving), for which more is expected"]
+    than: Annotated[str, "condition, or level of the same factor, that it is compared with"]
     test: Annotated[Test, "what decides"] = "signed_rank"
     also: Annotated[tuple[Test, ...], "further tests that are printed beside it"] = ()
     two_sided: Annotated[bool, "differences of either sign count"] = True
@@ -123,4 +123,32 @@ class StudyDesign:
     plan: StatisticalPlan = field(default_factory=StatisticalPlan)
     exclusion: Exclusion = field(default_factory=Exclusion)
     privacy: Privacy = field(default_factory=Privacy)
+
+    def side(self, name: str) -> tuple[str, ...]:
+        """Return the conditions of one side of a hypothesis, none where the name is unknown.
+
+        name: of a condition, which it is then alone, or of a level of a factor: "gaze=moving".
+        """
+        if name in self.conditions:
+            return (name,)
+        factor, _, level = name.partition("=")
+        return tuple([key for key, one in self.conditions.items() if one.factors.get(factor) == level])
+
+    def matched(self, one: Hypothesis) -> tuple[tuple[str, str], ...]:
+        """Return the pairs (better, than) of conditions that a hypothesis compares.
+
+        Those of two levels of a factor are alike in all other factors.
+        """
+        better, than = self.side(one.better), self.side(one.than)
+        if one.better in self.conditions:
+            return tuple([(one.better, other) for other in than])
+        factor = one.better.partition("=")[0]
+        cells = {self._beside(factor, key): key for key in than}
+        beside = [(key, cells.get(self._beside(factor, key))) for key in better]
+        return tuple([(key, other) for key, other in beside if other is not None])
+
+    def _beside(self, factor: str, key: str) -> tuple[tuple[str, str], ...]:
+        """Return a condition's levels of all factors but one."""
+        levels = self.conditions[key].factors.items()
+        return tuple(sorted([pair for pair in levels if pair[0] != factor]))
 # fmt: on

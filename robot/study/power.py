@@ -102,12 +102,13 @@ def claim(design: StudyDesign, hypothesis: Hypothesis, measure: Measure) -> Powe
 def _question(design: StudyDesign, one: Hypothesis, measure: Measure) -> PowerQuestion:
     many = len(design.hypotheses) if design.plan.correction != "none" else 1
     at, repetitions = levels(design), design.trials.repetitions
+    sides = (*design.side(one.better), *design.side(one.than))
     middle = 0.5 * max(at.values())
-    others = [at[key] - middle for key in at if key not in (one.better, one.than)]
-    whole = measure.kind == "item" and repetitions == 1
+    others = [at[key] - middle for key in at if key not in sides]
+    whole = measure.kind == "item" and repetitions == 1 and len(sides) == 2
     heights: tuple[float, ...] = (0.5, -0.5)
     if one.test == "friedman":
-        heights = (at[one.better] - middle, at[one.than] - middle, *others)
+        heights = (*[at[key] - middle for key in sides], *others)
     if one.test == "bradley_terry":  # the others say something of both, wherever they are
         heights = (0.5, -0.5, *others)
     return PowerQuestion(

@@ -44,7 +44,7 @@ def text(
     claims = claims_of(design, questionnaires)
     hypotheses = [
         {
-            "sentence": sentence(one),
+            "sentence": sentence(one, design),
             "analysis": _analysis(one),
             "size": size_words(design, found),
         }
@@ -78,9 +78,13 @@ def claims_of(
     return tuple(claim(design, one, known[one.measure]) for one in design.hypotheses)
 
 
-def sentence(one: Hypothesis) -> str:
+def sentence(one: Hypothesis, design: StudyDesign) -> str:
     """Return a hypothesis in words."""
     sides = "either sign counts" if one.two_sided else "the other sign does not count"
+    better, than = design.side(one.better), design.side(one.than)
+    if len(better) > 1:
+        means = (", ".join(f"`{key}`" for key in side) for side in (better, than))
+        sides = f"each participant's mean of {' against that of '.join(means)}; {sides}"
     return f"`{one.measure}` is higher for `{one.better}` than for `{one.than}` ({sides})."
 
 

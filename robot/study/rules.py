@@ -193,11 +193,7 @@ def _hypothesis_rules(
     design: StudyDesign, one: Hypothesis, known: Mapping[str, Measure], complete: bool
 ) -> Found:
     """Find what keeps a hypothesis from being tested."""
-    for key in ("better", "than"):
-        if (name := getattr(one, key)) not in design.conditions:
-            yield key, f"no condition {name!r}; there is {', '.join(design.conditions)}"
-    if one.better == one.than:
-        yield "than", "is the condition itself; name another"
+    yield from _side_rules(design, one)
     measure = known.get(one.measure)
     if measure is None:
         if complete:
@@ -210,6 +206,43 @@ def _hypothesis_rules(
             yield key, f"{test} stands already; once is enough"
         if measure is not None and (rule := _misfit(test, measure, len(design.conditions))):
             yield key, rule
+        elif len(design.side(one.better)) > 1 and test not in LEVEL_TESTS:
+            instead = "name two" if test == "bradley_terry" else f"take {' or '.join(LEVEL_TESTS)}"
+            yield key, f"{test} compares single conditions, not levels of a factor; {instead}"
+
+
+def _side_rules(design: StudyDesign, one: Hypothesis) -> Found:
+    """Find what keeps both sides of a hypothesis from being compared."""
+    sides = {key: design.side(getattr(one, key)) for key in ("better", "than")}
+    for key, side in sides.items():
+        if not side:
+            there = ", ".join((*design.conditions, *_factor_levels(design)))
+            yield key, f"no condition {getattr(one, key)!r}, and no level; there is {there}"
+    if one.better == one.than:
+        yield "than", "is the condition itself; name another"
+    elif all(sides.values()):
+        factors = [
+            name.partition("=")[0] if name not in design.conditions else ""
+            for name in (one.better, one.than)
+        ]
+        if factors[0] != factors[1]:
+            yield "than", "is to be a level of the same factor, or both are to be conditions"
+        elif len(design.matched(one)) != max(len(side) for side in sides.values()):
+            yield (
+                "than",
+                f"{one.better!r} and {one.than!r} do not stand beside the same levels of the other "
+                "factors, so the difference would be theirs as well; compare single conditions",
+            )
+
+
+def _factor_levels(design: StudyDesign) -> list[str]:
+    """Return the levels of all factors as hypotheses name them."""
+    pairs = [pair for one in design.conditions.values() for pair in one.factors.items()]
+    return [f"{factor}={level}" for factor, level in dict.fromkeys(pairs)]
+
+
+LEVEL_TESTS = ("signed_rank", "rank_sum")
+"""Tests of a participant's means, which may go over several conditions."""
 
 
 def _misfit(test: str, measure: Measure, conditions: int) -> str:

@@ -31,19 +31,23 @@ class Scores:
     places: Floats
     single: Floats
 
-    def column(self, condition: str) -> Floats:
-        """Return the means of one condition, (participants,)."""
-        found: Floats = self.means[:, self.conditions.index(condition)]
+    def columns(self, conditions: Sequence[str]) -> list[int]:
+        """Return where conditions stand."""
+        return [self.conditions.index(condition) for condition in conditions]
+
+    def column(self, *conditions: str) -> Floats:
+        """Return the means of one condition, or over several, (participants,); nan with a gap."""
+        found: Floats = self.means[:, self.columns(conditions)].mean(axis=1)
         return found
 
-    def answers(self, condition: str) -> Floats:
-        """Return every single answer on one condition."""
-        found: Floats = self.single[self.single[:, 1] == self.conditions.index(condition), 2]
+    def answers(self, *conditions: str) -> Floats:
+        """Return every single answer on these conditions."""
+        found: Floats = self.single[np.isin(self.single[:, 1], self.columns(conditions)), 2]
         return found
 
-    def both(self, one: str, other: str) -> NDArray[np.bool_]:
-        """Return who has a mean in both conditions, (participants,)."""
-        found: NDArray[np.bool_] = np.isfinite(self.column(one)) & np.isfinite(self.column(other))
+    def first_seen(self, *conditions: str) -> Floats:
+        """Return at which place the first of these conditions was seen, (participants,)."""
+        found: Floats = self.places[:, self.columns(conditions)].min(axis=1)
         return found
 
 

@@ -53,7 +53,7 @@ def levels(design: StudyDesign) -> dict[str, int]:
 
     Without hypotheses the first condition stands above the others.
     """
-    pairs = [(h.better, h.than) for h in design.hypotheses]
+    pairs = [pair for one in design.hypotheses for pair in design.matched(one)]
     first, *others = design.conditions
     pairs = pairs or [(first, other) for other in others]
     found = dict.fromkeys(design.conditions, 0)
@@ -61,6 +61,16 @@ def levels(design: StudyDesign) -> dict[str, int]:
         for better, than in pairs:
             found[better] = max(found[better], min(found[than] + 1, len(found) - 1))
     return found
+
+
+def compared_trials(design: StudyDesign) -> int:
+    """Return over how many trials of a participant the mean goes of which a hypothesis decides.
+
+    Those of all conditions of a factor's level, or of one condition, each as often as it is shown;
+    where hypotheses differ in that, the fewest.
+    """
+    sides = [len(design.side(one.better)) for one in design.hypotheses]
+    return min(sides, default=1) * design.trials.repetitions
 
 
 @cache
@@ -162,6 +172,7 @@ class SimulatedParticipant:
         self._number, self._population = number, population
         self._levels = levels(design)
         self._middle = 0.5 * max(self._levels.values())
+        self._shown = compared_trials(design)
         careless, hasty = self._rng("manner").random(2)
         self.careless = bool(careless < population.careless)
         self.hasty = bool(hasty < population.hasty)
@@ -188,7 +199,7 @@ class SimulatedParticipant:
 
     def measured(self, trial: int, condition: str) -> dict[str, float]:
         """Return the objective measures of a trial, of which each has the population's effect."""
-        shift = sqrt(2.0 / self._design.trials.repetitions) * self._population.effect
+        shift = sqrt(2.0 / self._shown) * self._population.effect
         values = {}
         for name in self._design.objective:
             own = self._rng(name).normal()
@@ -219,7 +230,7 @@ class SimulatedParticipant:
         construct = f"{questionnaire}.{item.scale or key}"
         asked = self._questionnaires[questionnaire].items.values()
         items = sum(one.scale == item.scale for one in asked) if item.scale else 1
-        repetitions = 1 if trial is None else self._design.trials.repetitions
+        repetitions = 1 if trial is None else self._shown
         shift = shift_of(self._population.effect, item.points, items, repetitions)
         latent = (
             BETWEEN_SD * self._rng(construct).normal()
