@@ -65,8 +65,10 @@ def test_every_shipped_study_is_good_and_its_conditions_differ(name: str) -> Non
 @pytest.mark.parametrize("name", shipped_names("studies"))
 def test_what_participants_read_before_names_no_condition(name: str) -> None:
     design = checked_study(name).design
-    said = " ".join(design.welcome).lower()
-    assert said and design.debriefing and design.hypotheses
+    assert design.welcome and design.debriefing and design.hypotheses
+    assert set(design.translations) == {"de", "ja"}
+    every = (design.welcome, *(texts.welcome for texts in design.translations.values()))
+    said = " ".join(line for lines in every for line in lines).lower()
     for key, one in design.conditions.items():
         names = (key, one.profile, one.character, one.scanpath, one.label)
         for name in {*filter(None, names)} - {"robot"}:  # what everybody calls it
@@ -200,6 +202,14 @@ def test_faults_of_conditions_name_line_key_and_cure(
         ("after: [godsped]", "8: after.0: nothing named 'godsped' is shipped; did you mean"),
         ("task: pairwise", "2: questionnaires: task pairwise needs one with a choice"),
         ("objective: [first_look_s]", "8: objective.0: is measured by the head in the room"),
+        (
+            "translations: {fr: {welcome: [Bonjour.]}}",
+            "8: translations.fr: no language of the pages: en, ja, de",
+        ),
+        (
+            "welcome: [Hello.]\ndebriefing: [Bye.]\ntranslations:\n  de: {welcome: [Hallo.]}",
+            "11: translations.de.debriefing: is missing, and the study has one",
+        ),
         ("language: fr", "8: language: 'fr' is not one of 'en', 'ja', 'de'"),
         (
             "presentation: {on: head}\nobjective: [mutual, mutal]",

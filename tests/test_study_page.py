@@ -328,10 +328,12 @@ def test_items_that_are_not_translated_are_english_and_say_so(
     with serving(study, tmp_path / CODE, films_of(study, tmp_path)) as pages:
         tab = Tab(pages.server.participant_url)
         assert b'<html lang="ja">' in tab.get("/")[1]
+        assert "印象" in tab.page()["welcome"][-1]
         papers = to(tab, "questions")
         godspeed = tab.goes_through(papers)
     assert {one["language"] for one in papers["items"]} == {"ja"}
-    assert "視線" in papers["instruction"]
+    assert "視線" in papers["instruction"] and papers["instruction_language"] == "ja"
+    assert godspeed["instruction"] and godspeed["instruction_language"] == "en"
     assert {one["language"] for one in godspeed["items"]} == {"en"}
     assert all(one["low"] and one["high"] for one in godspeed["items"])
 

@@ -36,6 +36,14 @@ class Condition:
 
 
 @dataclass(frozen=True)
+class StudyTexts:
+    """What participants read of the study itself, in one language."""
+
+    welcome: Annotated[tuple[str, ...], "paragraphs before they consent; they must not name the difference"] = ()
+    debriefing: Annotated[tuple[str, ...], "paragraphs at the end"] = ()
+
+
+@dataclass(frozen=True)
 class Presentation:
     """How participants see the conditions."""
 
@@ -114,6 +122,7 @@ class StudyDesign:
     description: Annotated[tuple[str, ...], "what is studied, in paragraphs, for the pre-registration"] = ()
     welcome: Annotated[tuple[str, ...], "paragraphs that participants read before they consent; they must not name the difference"] = ()
     debriefing: Annotated[tuple[str, ...], "paragraphs that participants read at the end"] = ()
+    translations: Annotated[Mapping[str, StudyTexts], "welcome and debriefing by other languages"] = field(default_factory=dict)
     language: Annotated[Language, Choices("en", "ja", "de"), "of questions and pages"] = "en"
     task: Annotated[Task, "what participants do"] = "rating"
     presentation: Presentation = field(default_factory=Presentation)
@@ -123,6 +132,11 @@ class StudyDesign:
     plan: StatisticalPlan = field(default_factory=StatisticalPlan)
     exclusion: Exclusion = field(default_factory=Exclusion)
     privacy: Privacy = field(default_factory=Privacy)
+
+    @property
+    def texts(self) -> StudyTexts:
+        """Return what participants read: in the study's language where there is a translation."""
+        return self.translations.get(self.language, StudyTexts(self.welcome, self.debriefing))
 
     def side(self, name: str) -> tuple[str, ...]:
         """Return the conditions of one side of a hypothesis, none where the name is unknown.

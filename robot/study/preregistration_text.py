@@ -65,7 +65,7 @@ def text(
         objective=[(n, GAZE_MEASURES.get(n, "as in gazerig report")) for n in design.objective],
         correction=_correction(design), curve=_curve(design, claims),
         exclusions=list(_exclusions(design)), privacy=list(_privacy(design)),
-        debriefing="At the end:\n" if design.debriefing else "",
+        debriefing="At the end:\n" if design.texts.debriefing else "",
     )  # fmt: skip
     return made.rstrip("\n") + "\n"
 

@@ -29,9 +29,21 @@ def design_rules(design: StudyDesign) -> Found:
     for key in design.conditions:
         if not JOINT_NAME.fullmatch(key):
             yield f"conditions.{key}", f"no name of a condition: {_NAME}"
+    yield from _translation_rules(design)
     yield from chain(
         _shown_rules(design), _factor_rules(design), _number_rules(design), _objective_rules(design)
     )
+
+
+def _translation_rules(design: StudyDesign) -> Found:
+    """Find translations that nobody can read, and such as leave something out."""
+    for language, texts in design.translations.items():
+        at = f"translations.{language}"
+        if language not in LANGUAGES:
+            yield at, f"no language of the pages: {', '.join(LANGUAGES)}"
+        for name in ("welcome", "debriefing"):
+            if getattr(design, name) and not getattr(texts, name):
+                yield f"{at}.{name}", "is missing, and the study has one; translate it as well"
 
 
 def _shown_rules(design: StudyDesign) -> Found:

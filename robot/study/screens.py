@@ -6,7 +6,7 @@ A screen says nothing of conditions: all that a browser may know is in it.
 from dataclasses import dataclass
 from typing import Literal
 
-from gazerig.robot.study.questionnaire import Item
+from gazerig.robot.study.questionnaire import Item, Texts
 
 Ending = Literal["finished", "declined", "withdrawn", "excluded"]
 
@@ -76,7 +76,7 @@ class Question:
 class QuestionsScreen:
     """One page of questions.
 
-    instruction: what stands above them, in the study's language, "" for nothing
+    instruction: what stands above them, by language; empty for nothing
     once: they are asked once at the end, not of a trial; number is then 0
     """
 
@@ -85,7 +85,7 @@ class QuestionsScreen:
     practice: bool
     pair: bool
     once: bool
-    instruction: str
+    instruction: Texts
     questions: tuple[Question, ...]
 
 

@@ -337,8 +337,7 @@ class StudySession:
         return [items[i] for i in np.random.default_rng(key).permutation(len(items))]
 
     def _questions(self, place: StudyPlace) -> QuestionsScreen:
-        said = self._questionnaires[place.questionnaire].instruction
-        instruction = said.get(self.design.language, said.get("en", ""))
+        instruction = self._questionnaires[place.questionnaire].instruction
         questions = tuple(Question(i, item) for i, (_, item) in enumerate(self._items(place)))
         return QuestionsScreen(*self._number(place), place.trial is None, instruction, questions)
 

@@ -69,7 +69,7 @@ def _consent(screen: ConsentScreen, design: StudyDesign, code: str) -> Json:
     return {
         "kind": "consent",
         "code": code,
-        "welcome": design.welcome,
+        "welcome": design.texts.welcome,
         "uses": [use for use, asked in uses.items() if asked],
         "camera": design.presentation.on == "head",
         "days": design.privacy.deleted_after_days,
@@ -88,7 +88,8 @@ def _questions(screen: QuestionsScreen, language: str) -> Json:
         "kind": "questions",
         **_place(screen),
         "after": screen.once,
-        "instruction": screen.instruction,
+        "instruction": _in(screen.instruction, language),
+        "instruction_language": language if language in screen.instruction else "en",
         "items": [_item(str(one.number), one.item, language) for one in screen.questions],
     }
 
@@ -114,7 +115,7 @@ def _in(texts: Texts, language: str) -> str:
 
 def _end(screen: EndScreen, design: StudyDesign, code: str) -> Json:
     """Return the last page; who did not stay may still ask for their data to be deleted."""
-    told: Mapping[str, object] = {"text": design.debriefing, "code": code}
+    told: Mapping[str, object] = {"text": design.texts.debriefing, "code": code}
     return {
         "kind": "end",
         "how": screen.how,

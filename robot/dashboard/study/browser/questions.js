@@ -1,6 +1,6 @@
 // A page of questions: scales, a choice of two, free text. Nothing is chosen beforehand.
 
-import { make, paragraphs, say } from "./elements.js";
+import { make, say } from "./elements.js";
 
 const TEXT_LENGTH = 4000;
 
@@ -53,7 +53,7 @@ export function questions(page, send) {
   const form = make(
     "form", { noValidate: true, className: "questions" },
     make("h1", { tabIndex: -1 }, say(page.after ? "questions.after" : "questions.title")),
-    ...paragraphs(page.instruction ? [page.instruction] : []),
+    ...(page.instruction ? [make("p", { lang: page.instruction_language }, page.instruction)] : []),
     ...fields.map((one) => one.element),
     make("div", { className: "foot" }, left, next),
   );
