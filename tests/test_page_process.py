@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from urllib.parse import urlsplit
 
+import child_processes
 import pytest
 import shown_page
 from page_visitor import PATIENCE_S, Visitor
@@ -30,7 +31,7 @@ SNAPSHOT = replace(
 
 
 @pytest.fixture(scope="module")
-def shared() -> Iterator[tuple[PageProcess, str, int]]:
+def shared(branched_children: None) -> Iterator[tuple[PageProcess, str, int]]:
     """A page that found its port busy, its address, and that port; one test closes it."""
     with socket.socket() as other:
         other.bind(("127.0.0.1", 0))
@@ -40,8 +41,15 @@ def shared() -> Iterator[tuple[PageProcess, str, int]]:
             yield page, url, busy
 
 
+def page_here() -> int | None:
+    """The process of the page that this one has started, alive or stopped."""
+    found = list(child_processes.running())
+    assert len(found) < 2, found
+    return found[0] if found else None
+
+
 def page_process(parent: int) -> int | None:
-    """The process of the page that a process has started, alive or stopped."""
+    """The process of the page that another one has started, alive or stopped."""
     for entry in Path("/proc").iterdir():
         if not entry.name.isdigit():
             continue
@@ -111,12 +119,12 @@ def test_page_is_on_the_loopback_alone_and_ignores_ctrl_c(
     # The whole of 127.0.0.0/8 is this machine: a page on every address would answer here.
     with pytest.raises(ConnectionRefusedError):
         socket.create_connection(("127.0.0.2", port))
-    process = page_process(os.getpid())
+    process = page_here()
     assert process is not None
     os.kill(process, signal.SIGINT)
     assert Visitor(url).get()
     assert page.notice() is None
-    assert page_process(os.getpid()) == process
+    assert page_here() == process
 
 
 def test_frozen_page_holds_up_nobody_and_wakes_again(shared: tuple[PageProcess, str, int]) -> None:
@@ -132,7 +140,7 @@ def test_frozen_page_holds_up_nobody_and_wakes_again(shared: tuple[PageProcess, 
         for tick in range(3000):
             page.show(replace(SNAPSHOT, t_s=0.01 * tick))
 
-    process = page_process(os.getpid())
+    process = page_here()
     assert process is not None
     os.kill(process, signal.SIGSTOP)
     assert in_time(show_many)
@@ -147,11 +155,11 @@ def test_frozen_page_holds_up_nobody_and_wakes_again(shared: tuple[PageProcess, 
 
 def test_close_ends_even_a_frozen_page(shared: tuple[PageProcess, str, int]) -> None:
     page = shared[0]
-    process = page_process(os.getpid())
+    process = page_here()
     assert process is not None
     os.kill(process, signal.SIGSTOP)
     page.close()
-    assert page_process(os.getpid()) is None
+    assert page_here() is None
     page.close()
     assert page.url() is None
 
@@ -159,10 +167,11 @@ def test_close_ends_even_a_frozen_page(shared: tuple[PageProcess, str, int]) -> 
 # Pages of their own
 
 
+@pytest.mark.usefixtures("branched_children")
 def test_a_page_that_died_is_started_again_at_its_address_and_told_all() -> None:
     with running_page() as (page, url):
         page.offer({"lids": ("wink", "blink")})
-        first, folder = page_process(os.getpid()), Path(page._folder)
+        first, folder = page_here(), Path(page._folder)
         assert first is not None and folder.exists()
         os.kill(first, signal.SIGKILL)
         words = wait_for(page.notice, "the notice")
@@ -170,19 +179,20 @@ def test_a_page_that_died_is_started_again_at_its_address_and_told_all() -> None
         page.show(SNAPSHOT)  # hurts nobody
         assert wait_for(page.url, "the page") == url  # the same port and token
         assert not folder.exists() and Path(page._folder).stat().st_mode & 0o077 == 0
-        assert page_process(os.getpid()) not in (None, first) and page.started == 2
+        assert page_here() not in (None, first) and page.started == 2
         assert wait_for(page.notice, "the second notice") == f"the page is there again, at {url}"
         with Visitor(url).open("/rig/panels") as talk:
             while '"blink"' not in str(talk.recv(timeout=PATIENCE_S)):
                 pass
         # Once more: no more words about it.
-        second = page_process(os.getpid())
+        second = page_here()
         assert second is not None
         os.kill(second, signal.SIGKILL)
         wait_for(lambda: page.started == 3, "the third page")
         assert page.notice() is None
 
 
+@pytest.mark.usefixtures("branched_children")
 def test_a_stop_passes_a_page_that_cannot_be_told_anything_else() -> None:
     heard: list[object] = []
     slow = threading.Event()
@@ -206,6 +216,7 @@ def test_a_stop_passes_a_page_that_cannot_be_told_anything_else() -> None:
         page.close()
 
 
+@pytest.mark.usefixtures("branched_children")
 def test_snapshot_that_cannot_be_drawn_ends_the_page_in_words() -> None:
     with running_page() as (page, _):
         page.show(replace(SNAPSHOT, level="mad"))  # type: ignore[arg-type]
@@ -242,6 +253,7 @@ def test_page_ends_when_the_parent_is_killed(habit: str) -> None:
                 os.kill(sibling, signal.SIGKILL)
 
 
+@pytest.mark.usefixtures("branched_children")
 def test_address_of_another_machine_is_refused_in_words() -> None:
     page = PageProcess("192.0.2.1", 8080)
     page.open()

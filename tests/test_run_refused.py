@@ -42,8 +42,8 @@ def test_what_a_person_can_mend_is_one_line_and_exit_code_2(
 
 
 def test_a_shell_sees_that_line_and_that_exit_code() -> None:
-    done = gazerig("run", "--no-page", "--mock", "--video", "nowhere.avi", timeout=30)
-    one_line_and_exit_code_2(done.returncode, done.stderr, "nowhere.avi")
+    done = gazerig("run", "--no-page", "--mock", "--scene", "circus", timeout=30)
+    one_line_and_exit_code_2(done.returncode, done.stderr, "circus")
 
 
 def one_line_and_exit_code_2(code: int, said: str, message: str) -> None:

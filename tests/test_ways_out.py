@@ -340,6 +340,7 @@ def begun(words: list[str], breaks: str, **options: Any) -> Branch:
 
 # Parking takes a bounded time, in which a starved machine does not come all the way.
 @pytest.mark.own_timeouts
+@pytest.mark.usefixtures("branched_children_here")
 @pytest.mark.parametrize(
     ("rig", "command", "way"),
     [

@@ -150,9 +150,11 @@ def started(words: list[str], way: str, begin: Begin = fresh) -> Started:
     command = typed(words, breaks)
     pipe = subprocess.PIPE
     if way == "| head -1":
-        line = '"$@" 2>&1 </dev/null | head -1; exit ${PIPESTATUS[0]}'
-        shell = ["bash", "-c", line, "-", *command]
-        process = subprocess.Popen(shell, stdout=pipe, env=env, start_new_session=True)
+        with subprocess.Popen(["head", "-1"], stdin=pipe, stdout=subprocess.DEVNULL) as reader:
+            process = begin(
+                words, breaks, stdin=subprocess.DEVNULL, stdout=reader.stdin, stderr=reader.stdin,
+                env=env, preexec_fn=os.setsid,
+            )  # fmt: skip
         return Started(process, -1, -1)
     if way.startswith("tty"):
         master, slave = pty.openpty()
