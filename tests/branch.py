@@ -9,7 +9,9 @@ import atexit
 import gc
 import importlib
 import inspect
+import multiprocessing
 import os
+import pickle
 import runpy
 import signal
 import subprocess
@@ -19,13 +21,16 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from multiprocessing.process import BaseProcess
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, NoReturn
 
 import child_processes
 import pytest
 
 from gazerig.drivers import child_process
+from gazerig.drivers.camera import process as camera_process
 
 _GIVEN = inspect.signature(subprocess.Popen._execute_child)  # type: ignore[attr-defined]
 _SIGNALS = (
@@ -212,6 +217,34 @@ def branched_children() -> Iterator[None]:
         patch.setattr(child_process, "start", start)
         patch.setattr(child_process, "run", run)
         yield
+
+
+@contextmanager
+def branched_cameras() -> Iterator[None]:
+    """Have cameras' processes start as forks of this one.
+
+    What such a process is given goes through pickle, as it does on its way to another Python.
+    """
+    context = multiprocessing.get_context("fork")
+
+    def process(
+        target: Callable[..., None], args: tuple[object, ...], name: str, daemon: bool
+    ) -> BaseProcess:
+        pipe, *given = args
+        words = target, pipe, pickle.dumps(given)
+        return context.Process(target=_camera, args=words, name=name, daemon=daemon)
+
+    forking = SimpleNamespace(Pipe=context.Pipe, Process=process)
+    chosen = SimpleNamespace(get_context={"spawn": forking}.__getitem__)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(camera_process, "multiprocessing", chosen)
+        yield
+
+
+def _camera(target: Callable[..., None], pipe: object, given: bytes) -> None:
+    child_processes.end_with_parent()
+    _begin_afresh()
+    target(pipe, *pickle.loads(given))
 
 
 def _module(name: str, arguments: Sequence[str]) -> Callable[[], None]:

@@ -181,6 +181,15 @@ def branched_children_here() -> Iterator[None]:
 
 
 @pytest.fixture
+def branched_camera() -> Iterator[None]:
+    """Have cameras' processes start as forks of this one in one test."""
+    from branch import branched_cameras
+
+    with branched_cameras():
+        yield
+
+
+@pytest.fixture
 def unlaid_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw figures small and without finding room for their labels, in a third of the time.
 

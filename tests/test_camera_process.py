@@ -30,6 +30,7 @@ from gazerig.robot.perception.frame_locator import FrameLocator
 
 PATIENCE_S = 40.0
 DETECTOR = partial(face_detector, FaceDetectorParams(work_width_px=64))
+forked = pytest.mark.usefixtures("branched_camera")
 LOCATOR = FrameLocator(None, 1.2)
 
 
@@ -103,6 +104,7 @@ def test_what_was_found_comes_over_with_picture_depth_and_lens(recording):
     camera.close()
 
 
+@forked
 def test_source_that_cannot_be_opened_says_so_at_once(tmp_path):
     camera = process(partial(VideoFile, tmp_path / "nope.avi"))
     with pytest.raises(CameraError, match=r"no film or image at .*nope\.avi"):
@@ -110,6 +112,7 @@ def test_source_that_cannot_be_opened_says_so_at_once(tmp_path):
     camera.close()
 
 
+@forked
 def test_detector_that_cannot_be_made_says_so_at_once(recording):
     params = FaceDetectorParams(kind="yunet", model_file="/nowhere/yunet.onnx")
     parts = CameraParts(partial(CameraReplay, recording), partial(face_detector, params))
@@ -120,6 +123,7 @@ def test_detector_that_cannot_be_made_says_so_at_once(recording):
 QUICK = CameraRecoveryParams(retry_ms=1.0, longest_retry_ms=20.0, silent_s=60.0, restart_s=60.0)
 
 
+@forked
 def test_a_killed_process_is_started_again_and_the_rest_goes_on(recording):
     camera = process(partial(CameraReplay, recording), QUICK)
     camera.open()
@@ -145,6 +149,7 @@ def test_a_killed_process_is_started_again_and_the_rest_goes_on(recording):
     camera.close()
 
 
+@forked
 def test_a_process_that_hangs_is_told_of_and_started_again(recording):
     care = CameraRecoveryParams(silent_s=1.0, restart_s=2.0)
     camera = process(partial(CameraReplay, recording), care)
@@ -161,6 +166,7 @@ def test_a_process_that_hangs_is_told_of_and_started_again(recording):
     camera.close()
 
 
+@forked
 def test_where_no_loss_is_borne_a_killed_process_ends_the_run(recording):
     camera = process(partial(CameraReplay, recording), CameraRecoveryParams(give_up_s=0.0))
     camera.open()
@@ -181,6 +187,7 @@ class Fussy:
         return ()
 
 
+@forked
 def test_an_exception_in_the_process_is_named_and_it_is_started_again(recording):
     parts = CameraParts(partial(CameraReplay, recording), Fussy)
     camera = CameraProcess(parts, time.monotonic, QUICK)
@@ -192,6 +199,7 @@ def test_an_exception_in_the_process_is_named_and_it_is_started_again(recording)
     camera.close()
 
 
+@forked
 def test_closing_does_not_wait_for_a_process_that_starts_again(recording):
     camera = process(partial(CameraReplay, recording), QUICK)
     camera.open()
@@ -215,6 +223,7 @@ def test_silence_is_judged_by_what_is_usual():
         assert silence.verdict(now_s + hung_s + 0.01) == "hung"
 
 
+@forked
 def test_camera_lost_for_good_ends_with_its_reason(tmp_path):
     path = tmp_path / "film.avi"
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 50.0, (64, 48))
