@@ -133,6 +133,8 @@ def _begin_afresh() -> None:
 
 
 kept: list[object] = []
+fresh_start = child_process.start
+"""Starts another Python, whatever stands in its place."""
 
 
 def _status(work: Callable[[], object]) -> int:
@@ -168,6 +170,16 @@ def gazerig(*words: str) -> Callable[[], None]:
         main()
 
     return work
+
+
+def ran(*words: str, timeout_s: float = 120.0) -> "subprocess.CompletedProcess[str]":
+    """Run a command of gazerig to its end."""
+    pipe = subprocess.PIPE
+    with Branch(
+        gazerig(*words), stdin=subprocess.DEVNULL, stdout=pipe, stderr=pipe, text=True
+    ) as branch:
+        out, err = branch.communicate(timeout=timeout_s)
+    return subprocess.CompletedProcess(branch.args, branch.returncode, out, err)
 
 
 def script(file: Path, *words: str) -> Callable[[], None]:

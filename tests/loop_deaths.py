@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from branch import Branch
+from branch import Branch, branched_children
 from struck_rigs import rig_of
 
 from gazerig.config.rig import Rig
@@ -143,7 +143,8 @@ def driven(kind: str, guarded: bool = True, watchdog: bool = True) -> Iterator[D
     """Return a rig that a loop in another process drives."""
     with PtyBuses() as buses:
         rig = slow(kind)
-        (path,) = buses.start(emulated_lines(rig)).values()
+        with branched_children():
+            (path,) = buses.start(emulated_lines(rig)).values()
         loop = Branch(
             partial(drive, kind, guarded, watchdog, path), stdout=subprocess.PIPE, text=True
         )

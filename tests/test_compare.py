@@ -24,7 +24,7 @@ from gazerig.robot.report.run_header import RunHeader
 from gazerig.robot.report.statistics import MeasuredValue, mean, median
 from gazerig.robot.study.statistics.multiplicity import corrected
 
-pytestmark = pytest.mark.usefixtures("ideal_servos")
+pytestmark = pytest.mark.usefixtures("ideal_servos", "branched_children")
 
 SECONDS = 16.0
 DICE = np.random.default_rng(11)

@@ -27,7 +27,7 @@ from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo
 
-pytestmark = pytest.mark.usefixtures("ideal_servos")
+pytestmark = pytest.mark.usefixtures("ideal_servos", "branched_children")
 
 NAMES = (
     "eyes_pan", "eyes_tilt", "left_upper_lid", "right_upper_lid", "neck_yaw", "neck_pitch", "jaw",

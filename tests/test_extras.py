@@ -1,10 +1,12 @@
 """What is installed only as an extra: the program does without, and names it where it is needed."""
 
 import re
-import subprocess
-import sys
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
+
+import pytest
+from light_python import LightPython
 
 from gazerig.drivers.extras import extra_hint
 
@@ -14,6 +16,7 @@ EXTRAS: dict[str, list[str]] = PROJECT["optional-dependencies"]
 
 _WITHOUT = """
 import sys
+assert "matplotlib" not in sys.modules and "depthai" not in sys.modules
 sys.modules["matplotlib"] = sys.modules["depthai"] = None  # as if neither were installed
 from gazerig.robot.cli.main import main
 for words in COMMANDS:
@@ -25,19 +28,26 @@ for words in COMMANDS:
 """
 
 
-def without_extras(folder: Path, *commands: tuple[str, ...]) -> tuple[list[str], list[str]]:
+@pytest.fixture(scope="module")
+def python(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LightPython]:
+    light = LightPython(tmp_path_factory.mktemp("said"))
+    yield light
+    light.close()
+
+
+def without_extras(
+    python: LightPython, folder: Path, *commands: tuple[str, ...]
+) -> tuple[list[str], list[str]]:
     """Run commands where no extra is installed; return their exit codes and all they said."""
-    code = _WITHOUT.replace("COMMANDS", repr(commands))
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, cwd=folder, check=False
-    )
-    return re.findall(r"^exit (\d+)$", done.stdout, re.MULTILINE), done.stderr.splitlines()
+    out, err = python.run(_WITHOUT.replace("COMMANDS", repr(commands)), folder)
+    return re.findall(r"^exit (\d+)$", out, re.MULTILINE), err.splitlines()
 
 
 def test_a_command_that_needs_an_extra_names_it_in_one_line_before_anything_is_done(
-    tmp_path: Path,
+    python: LightPython, tmp_path: Path
 ) -> None:
     codes, said = without_extras(
+        python,
         tmp_path,
         ("report", "--scene", "face-to-face"),
         ("compare", "a.mcap", "b.mcap"),
@@ -59,8 +69,9 @@ def test_a_command_that_needs_an_extra_names_it_in_one_line_before_anything_is_d
     assert not list(tmp_path.iterdir())
 
 
-def test_the_head_runs_without_extras(tmp_path: Path) -> None:
+def test_the_head_runs_without_extras(python: LightPython, tmp_path: Path) -> None:
     codes, said = without_extras(
+        python,
         tmp_path,
         ("run", "--mock", "--fast", "--seconds", "1", "--summary", "run.json"),
         ("check", "desk"),

@@ -1,15 +1,17 @@
-"""The process of the control loop imports little: NumPy, the serial port, what reads a rig file.
+"""What processes do not import: that of the control loop has NumPy, the serial port, rig files.
 
-OpenCV, detectors, the page's server and what writes recordings belong to processes of their own.
+OpenCV, detectors, the page's server and what writes recordings belong to processes of their own, a
+world's physics and graphics too.
 """
 
-import subprocess
-import sys
+from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from light_python import LightPython
 
 ALLOWED = {
     *("gazerig", "numpy", "serial", "fastcrc", "msgspec", "smbus2", "dynamixel_sdk"),
@@ -24,6 +26,7 @@ LATER = ("asyncio", "ssl", "http.server", "gazerig.sim_mock.dynamixel.chain")
 
 RUN = """
 import sys
+from pathlib import PosixPath
 from gazerig.robot.app import session
 from gazerig.robot.app.options import RunOptions
 composed = session.compose(RunOptions(mock=True, **{options!r}).checked())
@@ -39,10 +42,23 @@ print("PACKAGES", *(name for name in packages if not name.startswith("_")))
 print("LATER", *(name for name in {later!r} if name in names))
 """
 
+with_mujoco = pytest.mark.skipif(
+    find_spec("mujoco") is None, reason="worlds need MuJoCo: pip install 'gazerig[world]'"
+)
+
+
+@pytest.fixture(scope="module")
+def python(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LightPython]:
+    light = LightPython(tmp_path_factory.mktemp("said"))
+    yield light
+    light.close()
+
 
 @pytest.mark.pty
 @pytest.mark.parametrize("eyes", ["scene", "film, page"])
-def test_the_process_of_the_loop_imports_little(eyes: str, tmp_path: Path) -> None:
+def test_the_process_of_the_loop_imports_little(
+    eyes: str, python: LightPython, tmp_path: Path
+) -> None:
     options: dict[str, object] = {"scene": "visitor"}
     if eyes != "scene":
         film = tmp_path / "film.avi"
@@ -51,12 +67,50 @@ def test_the_process_of_the_loop_imports_little(eyes: str, tmp_path: Path) -> No
             writer.write(np.zeros((48, 64, 3), np.uint8))
         writer.release()
         options = {"video": film, "page": "127.0.0.1:8770"}
-    code = "from pathlib import PosixPath\n" + RUN.format(options=options, later=LATER)
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, timeout=120, cwd=tmp_path
-    )
-    assert done.returncode == 0, done.stderr
-    said = {line.split()[0]: set(line.split()[1:]) for line in done.stdout.splitlines() if line}
+    text, _ = python.run(RUN.format(options=options, later=LATER), tmp_path)
+    said = {line.split()[0]: set(line.split()[1:]) for line in text.splitlines() if line}
     assert said["PACKAGES"] >= {"numpy", "serial", "gazerig"}
     assert not said["PACKAGES"] - ALLOWED
     assert not said["LATER"]
+
+
+@with_mujoco
+def test_the_loop_of_an_ordinary_run_knows_no_world(python: LightPython, tmp_path: Path) -> None:
+    """Nor does that of a world in real time know MuJoCo: it is in two other processes.
+
+    Where people are it reads from a file of the process that has the world.
+    """
+    code = (
+        "import sys; from gazerig.robot.app.assemble import assemble; "
+        "from gazerig.config.schema import load_rig; "
+        "from gazerig.robot.app.options import RunOptions; "
+        "assemble(load_rig('desk'), RunOptions(mock=True, fast=True, scene='visitor')).close(); "
+        "assert not [m for m in sys.modules if 'world.figure' in m or m.startswith('mujoco')]; "
+        "made = assemble(load_rig('desk'), RunOptions(mock=True, world='living-room')); "
+        "made.scene.people(1.0); made.scene.events(); made.close(); "
+        "heavy = ('mujoco', 'OpenGL', 'scipy', 'cv2'); "
+        "assert not [m for m in sys.modules if m.split('.')[0] in heavy]; "
+        "print('ok')"
+    )
+    assert python.run(code, tmp_path)[0].splitlines()[-1] == "ok"
+
+
+@with_mujoco
+def test_sending_shapes_of_a_world_loads_no_mujoco(python: LightPython, tmp_path: Path) -> None:
+    code = (
+        "import sys, pickle; from gazerig.robot.app.world.run_world import world_scene;"
+        "from gazerig.sim_mock.world.shapes import shapes_of;"
+        "from gazerig.sim_mock.world.world_spec import WorldSpec;"
+        "found = shapes_of(WorldSpec(world_scene('living-room', 0).figures, ()));"
+        "pickle.dumps(found); found.poses(1.0); print('mujoco' in sys.modules)"
+    )
+    assert python.run(code, tmp_path)[0] == "False\n"
+
+
+def test_a_rig_of_ours_looks_at_no_package(python: LightPython, tmp_path: Path) -> None:
+    code = (
+        "import sys; from gazerig.config.schema import load_rig; load_rig('desk');"
+        "from gazerig.robot.app.bus_wiring import rig_bus;"
+        "from gazerig.drivers import plugins; print(plugins._outside.cache_info().misses)"
+    )
+    assert python.run(code, tmp_path)[0] == "0\n"

@@ -31,13 +31,17 @@ from gazerig.sim_mock.world.script import WorldScript
 from gazerig.sim_mock.world.shapes import SpecShapes
 from gazerig.sim_mock.world.shapes_from import ShapesFrom
 
+pytestmark = pytest.mark.usefixtures("branched_children")
+
 ASKED = RunOptions(
     mock=True, fast=True, world="living-room", no_pictures=True, seconds=0.1, bus="ideal", seed=4
 )
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunRecording, SpecShapes]:
+def recorded(
+    branched_children: None, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[RunRecording, SpecShapes]:
     """Return a recording of a run in a world, and how that looked."""
     file = tmp_path_factory.mktemp("recorded") / "run.mcap"
     composed = compose(replace(ASKED, record=file))

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from branch import Branch
 from remote_rig import (
     Beat,
     Broken,
@@ -167,26 +168,20 @@ def test_without_a_runtime_folder_it_is_one_of_the_user_in_tmp(tmp_path: Path) -
         assert remote_socket.folder(environ, 4_000_000) == Path("/tmp/gazerig-4000000")
 
 
-LISTENS = """
-import os, sys
-from gazerig.robot.model.clock import RealClock
-from gazerig.robot.remote.param_info import ParamInfo
-from gazerig.robot.remote.request_handler import Pulse, RequestHandler
-from gazerig.robot.remote.socket_server import RemoteServer
-server = RemoteServer(RequestHandler(None, None, Pulse(RealClock()), {"rig": "other"}), print)
-server.open()
-print("open", flush=True)
-sys.stdin.read()
-server.close()
-"""
+def listens() -> None:
+    """Have a socket until standard input ends."""
+    pulse = Pulse(RealClock())
+    server = RemoteServer(RequestHandler(None, None, pulse, {"rig": "other"}), print)  # type: ignore[arg-type]
+    server.open()
+    print("open", flush=True)
+    sys.stdin.read()
+    server.close()
 
 
 @contextlib.contextmanager
 def listening() -> Iterator[subprocess.Popen[str]]:
     """Another process with a socket."""
-    process = subprocess.Popen(
-        [sys.executable, "-c", LISTENS], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    )
+    process = Branch(listens, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     try:
         assert process.stdout is not None and process.stdout.readline() == "open\n"
         yield process

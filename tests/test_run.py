@@ -7,6 +7,7 @@ from typing import Any
 
 import cv2
 import pytest
+from branch import ran
 from command_line import figures, gazerig, typed
 from ideal_bus import ideal_buses
 
@@ -102,7 +103,7 @@ def test_a_recorded_run_is_run_again_to_the_same_bytes(
     run = figures("--seconds", "2", "--record", str(file))
     assert run["ticks"] == pytest.approx(2 * 200, abs=2)
     assert run["stopped_by"] == "seconds" and file.stat().st_size > 10_000
-    again = gazerig("replay", str(file), "--rerun")
+    again = ran("replay", str(file), "--rerun")
     assert again.returncode == 0, again.stderr
     words = re.sub(r"\s+", " ", again.stdout + again.stderr)
     assert "ticks are the same to the bit; the bytes on the bus are the same" in words

@@ -13,13 +13,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from branch import Branch, gazerig
+from branch import Branch, fresh_start, gazerig
 from child_processes import running
-from command_line import GAZERIG, Invoked, invoked
+from command_line import Invoked, invoked
 
 from gazerig.config.load import shipped
 from gazerig.config.schema import load_rig
 from gazerig.config.text import rig_text
+from gazerig.drivers import child_process
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.simulated_run import simulate
@@ -204,15 +205,14 @@ def test_a_process_that_dies_costs_its_run_alone_and_the_end_comes_when_asked() 
 
 
 @contextmanager
-def begun(out: Path, real: bool = False) -> Iterator[subprocess.Popen[str]]:
-    """Start a sweep, really or in a branch of this process, and wait for its first run."""
+def begun(out: Path, fresh: bool = False) -> Iterator[Branch]:
+    """Start a sweep and wait for its first run; fresh: its workers are other Pythons."""
     words = ("sweep", "--out", str(out), *QUICK, "--set", f"{COMFORT}=1:80:80", "--seeds", "50")
     pipe = subprocess.PIPE
-    process = (
-        subprocess.Popen([*GAZERIG, *words], stderr=pipe, text=True)
-        if real
-        else Branch(gazerig(*words), stderr=pipe, text=True)
-    )
+    with pytest.MonkeyPatch.context() as patch:
+        if fresh:
+            patch.setattr(child_process, "start", fresh_start)
+        process = Branch(gazerig(*words), stderr=pipe, text=True)
     file = out / RUNS
     try:
         wait_for(lambda: file.exists() and file.read_bytes().count(b"\n") > 0)
@@ -240,7 +240,7 @@ def children(pid: int) -> list[int]:
 @pytest.mark.slow
 def test_ctrl_c_keeps_what_is_finished_and_leaves_no_process(tmp_path: Path) -> None:
     out = tmp_path / "out"
-    with begun(out, real=True) as process:
+    with begun(out, fresh=True) as process:
         workers = children(process.pid)
         assert len(workers) == 1
         process.send_signal(signal.SIGINT)

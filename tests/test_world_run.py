@@ -1,8 +1,5 @@
 """Whole runs in a world: servo bytes, torques, motion, what is seen, and back to servo bytes."""
 
-import os
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -96,29 +93,6 @@ def test_a_recorded_run_can_be_done_again_to_the_same_bytes(tmp_path: Path) -> N
     again = rerun(recording)
     assert again.same and again.tx_same, again.differs
     assert again.ticks == figures["ticks"]
-
-
-def test_the_loop_of_an_ordinary_run_knows_no_world() -> None:
-    """Nor does that of a world in real time know MuJoCo: it is in two other processes.
-
-    Where people are it reads from a file of the process that has the world.
-    """
-    code = (
-        "import sys; from gazerig.robot.app.assemble import assemble; "
-        "from gazerig.config.schema import load_rig; "
-        "from gazerig.robot.app.options import RunOptions; "
-        "assemble(load_rig('desk'), RunOptions(mock=True, fast=True, scene='visitor')).close(); "
-        "assert not [m for m in sys.modules if 'world.figure' in m or m.startswith('mujoco')]; "
-        "made = assemble(load_rig('desk'), RunOptions(mock=True, world='living-room')); "
-        "made.scene.people(1.0); made.scene.events(); made.close(); "
-        "heavy = ('mujoco', 'OpenGL', 'scipy', 'cv2'); "
-        "assert not [m for m in sys.modules if m.split('.')[0] in heavy]; "
-        "print('ok')"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, env=dict(os.environ)
-    )
-    assert done.stdout.strip() == "ok", done.stderr
 
 
 def test_nothing_but_the_world_imports_its_graphics() -> None:

@@ -1,8 +1,6 @@
 """What of a world the page draws: all of its geoms where they are, its people, and no rig."""
 
 import pickle
-import subprocess
-import sys
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -138,14 +136,3 @@ def test_a_picture_lies_on_a_wall_as_mujoco_lays_it() -> None:
         highest, lowest = wall.vertices[corners, 2].argmax(), wall.vertices[corners, 2].argmin()
         assert v[highest] < v[lowest] and len(top)
     assert checked >= 2
-
-
-def test_sending_shapes_loads_no_mujoco() -> None:
-    code = (
-        "import sys, pickle; from gazerig.robot.app.world.run_world import world_scene;"
-        "from gazerig.sim_mock.world.shapes import shapes_of;"
-        "from gazerig.sim_mock.world.world_spec import WorldSpec;"
-        "found = shapes_of(WorldSpec(world_scene('living-room', 0).figures, ()));"
-        "pickle.dumps(found); found.poses(1.0); sys.exit('mujoco' in sys.modules)"
-    )
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
