@@ -197,6 +197,19 @@ def test_what_is_not_kept_is_said_and_goes_on_by_itself_on_a_phone(
         assert pages.session.closed
 
 
+def test_a_browser_that_cannot_show_films_is_told_before_anything_is_asked(pages: Pages) -> None:
+    with browsing(DESK) as tab:
+        cannot = "HTMLMediaElement.prototype.canPlayType = () => ''"
+        tab.ask("Page.addScriptToEvaluateOnNewDocument", source=cannot)
+        person = Participant(tab)
+        tab.go(pages.server.participant_url)
+        person.sees("consent")
+        assert "Firefox" in person.says("document.querySelector('#sheet [role=alert]').textContent")
+        assert not person.says("document.querySelector('#sheet form') !== null")
+        person.well_made()
+    assert not pages.journal.records[1:]
+
+
 def test_a_connection_that_was_lost_comes_back_with_what_was_answered(
     pages: Pages, desk: Browser
 ) -> None:

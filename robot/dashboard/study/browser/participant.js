@@ -49,7 +49,14 @@ function progress({ step }) {
   along.firstElementChild.style.width = step.practice ? "0" : `${100 * (step.n - 1) / step.of}%`;
 }
 
+// Films are WebM; who could not see them is told before anything is asked.
+const seesFilms = () => document.createElement("video").canPlayType("video/webm") !== "";
+
 function consent(page) {
+  if (!page.camera && !seesFilms()) {
+    return make("section", {}, make("h1", { tabIndex: -1 }, say("consent.title")),
+      make("p", { role: "alert" }, say("film.failed")));
+  }
   const tick = (key, required) => {
     const box = make("input", { type: "checkbox", id: `use-${key}`, required });
     return { box, element: make("p", { className: "tick" }, box, make("label", { htmlFor: box.id }, say(`consent.${key}`))) };
