@@ -7,12 +7,13 @@ import subprocess
 import sys
 import textwrap
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from branch import Branch, script
+from slow_rigs import at_rate
 
 import gazerig
 from gazerig.robot.control.loop import Robot, Tick
@@ -34,13 +35,33 @@ def said() -> list[str]:
     return []
 
 
-def opened(said: list[str], rig: str = "desk") -> gazerig.Head:
-    return gazerig.open(rig, mock=True, scene="face-to-face", say=said.append)
+@pytest.fixture(scope="module")
+def rigs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with rigs whose loops are slow."""
+    folder = tmp_path_factory.mktemp("rigs")
+    for rig in ("desk", "feetech"):
+        at_rate(folder, rig, 80.0)
+    return folder
+
+
+Open = Callable[..., gazerig.Head]
 
 
 @pytest.fixture
-def head(said: list[str]) -> Iterator[gazerig.Head]:
-    with opened(said) as head:
+def opened(said: list[str], rigs: Path) -> Open:
+    """Return what opens a head, the desk rig if no other is named."""
+
+    def head(rig: str = "desk") -> gazerig.Head:
+        file = rigs / f"{rig}.yaml"
+        rig = str(file) if file.exists() else rig
+        return gazerig.open(rig, mock=True, scene="face-to-face", say=said.append)
+
+    return head
+
+
+@pytest.fixture
+def head(opened: Open) -> Iterator[gazerig.Head]:
+    with opened() as head:
         yield head
 
 
@@ -50,10 +71,10 @@ def assert_let_go(said: list[str], why: str = "the program") -> None:
     assert not [t for t in threading.enumerate() if t.name.startswith("head ")]
 
 
-def test_the_end_of_the_block(said: list[str]) -> None:
+def test_the_end_of_the_block(said: list[str], opened: Open) -> None:
     handlers = [signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)]
     switching_s = sys.getswitchinterval()
-    with opened(said) as head:
+    with opened() as head:
         assert [
             signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
         ] == handlers
@@ -62,20 +83,20 @@ def test_the_end_of_the_block(said: list[str]) -> None:
     assert sys.getswitchinterval() == pytest.approx(switching_s)
 
 
-def test_an_exception_in_the_block(said: list[str]) -> None:
-    with pytest.raises(ZeroDivisionError), opened(said):
+def test_an_exception_in_the_block(said: list[str], opened: Open) -> None:
+    with pytest.raises(ZeroDivisionError), opened():
         raise ZeroDivisionError
     assert_let_go(said)
 
 
-def test_an_interrupt_in_the_block(said: list[str]) -> None:
-    with pytest.raises(KeyboardInterrupt), opened(said):
+def test_an_interrupt_in_the_block(said: list[str], opened: Open) -> None:
+    with pytest.raises(KeyboardInterrupt), opened():
         raise KeyboardInterrupt
     assert_let_go(said)
 
 
 def test_a_second_interrupt_skips_what_is_left_of_parking(
-    said: list[str], monkeypatch: pytest.MonkeyPatch
+    said: list[str], opened: Open, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     join, park, parking = threading.Thread.join, Robot.park, threading.Event()
     waits = iter(range(1000))
@@ -95,16 +116,16 @@ def test_a_second_interrupt_skips_what_is_left_of_parking(
 
     monkeypatch.setattr(Robot, "park", parked)
 
-    with pytest.raises(KeyboardInterrupt), opened(said):
+    with pytest.raises(KeyboardInterrupt), opened():
         monkeypatch.setattr(threading.Thread, "join", interrupted)
     assert said[-1] == "stopped by the program: not parked (interrupted), torque off"
 
 
-def test_the_death_of_the_thread_that_opened_it(said: list[str]) -> None:
+def test_the_death_of_the_thread_that_opened_it(said: list[str], opened: Open) -> None:
     kept: list[gazerig.Head] = []
 
     def forget() -> None:
-        kept.append(opened(said).__enter__())  # and no end of it
+        kept.append(opened().__enter__())  # and no end of it
 
     thread = threading.Thread(target=forget)
     thread.start()
@@ -117,7 +138,7 @@ def test_the_death_of_the_thread_that_opened_it(said: list[str]) -> None:
 
 
 def test_an_error_of_the_loop_reaches_the_program(
-    said: list[str], monkeypatch: pytest.MonkeyPatch
+    said: list[str], opened: Open, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tick, failed = Robot.tick, threading.Event()
 
@@ -127,7 +148,7 @@ def test_an_error_of_the_loop_reaches_the_program(
         return tick(self, t_s, dt_s)
 
     monkeypatch.setattr(Robot, "tick", failing)
-    with pytest.raises(gazerig.HeadEnded, match="a bug") as caught, opened(said) as head:
+    with pytest.raises(gazerig.HeadEnded, match="a bug") as caught, opened() as head:
         order = head.look_at(-1.0, 0.0, 0.3)
         failed.set()
         order.wait(100.0)
@@ -136,19 +157,19 @@ def test_an_error_of_the_loop_reaches_the_program(
 
 
 def test_a_fault_that_nobody_asked_about_is_raised_at_the_end(
-    said: list[str], monkeypatch: pytest.MonkeyPatch
+    said: list[str], opened: Open, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def failing(self: Robot, t_s: float, dt_s: float) -> Tick:
         raise RuntimeError("a bug")
 
-    with pytest.raises(gazerig.HeadEnded, match="a bug"), opened(said):
+    with pytest.raises(gazerig.HeadEnded, match="a bug"), opened():
         monkeypatch.setattr(Robot, "tick", failing)
         for running in [t for t in threading.enumerate() if t.name.startswith("head ")]:
             running.join(30.0)
 
 
-def test_a_start_that_fails_raises_what_failed(said: list[str]) -> None:
-    with pytest.raises(gazerig.ConfigError, match="did you mean"), opened(said, "dusk"):
+def test_a_start_that_fails_raises_what_failed(said: list[str], opened: Open) -> None:
+    with pytest.raises(gazerig.ConfigError, match="did you mean"), opened("dusk"):
         pass
     with (
         pytest.raises(gazerig.SetupError, match="nowhere"),
@@ -158,15 +179,18 @@ def test_a_start_that_fails_raises_what_failed(said: list[str]) -> None:
     assert not [t for t in threading.enumerate() if t.name.startswith("head ")]
 
 
-def test_two_heads_in_one_program_are_found_by_their_rigs(said: list[str]) -> None:
-    with opened(said) as desk, opened(said, "feetech") as other:
+def test_two_heads_in_one_program_are_found_by_their_rigs(
+    said: list[str], opened: Open, rigs: Path
+) -> None:
+    feetech = str(rigs / "feetech.yaml")
+    with opened() as desk, opened("feetech") as other:
         assert desk.look_at(1.0, 0.3, 0.3).wait(100.0) == "arrived"
         assert other.look_at(1.0, -0.3, 0.3).wait(100.0) == "arrived"
         assert desk.state.led != other.state.led
         with pytest.raises(gazerig.NotFound, match="2 rigs are running"):
             gazerig.connect()
-        with gazerig.connect(rig="feetech") as far:
-            assert far.rig == "feetech" and far.state.led == other.state.led
+        with gazerig.connect(rig=feetech) as far:
+            assert far.rig == feetech and far.state.led == other.state.led
         with pytest.raises(gazerig.NotFound, match="no heads with the rig maker"):
             gazerig.connect(rig="maker")
     ends = [line for line in said if line.startswith("stopped by")]
@@ -175,9 +199,9 @@ def test_two_heads_in_one_program_are_found_by_their_rigs(said: list[str]) -> No
     )
 
 
-def test_the_first_of_two_heads_may_end_first(said: list[str]) -> None:
+def test_the_first_of_two_heads_may_end_first(opened: Open) -> None:
     switching_s = sys.getswitchinterval()
-    first, second = opened(said), opened(said, "feetech")
+    first, second = opened(), opened("feetech")
     with first:
         second.__enter__()
         shortened_s = sys.getswitchinterval()

@@ -10,18 +10,13 @@ import pytest
 from branch import ran
 from command_line import figures, gazerig, typed
 from ideal_bus import ideal_buses
-
-DESK = Path(__file__).parents[1] / "config" / "rigs" / "desk.yaml"
+from slow_rigs import at_rate
 
 
 @pytest.fixture(scope="module")
 def half(tmp_path_factory: pytest.TempPathFactory) -> str:
     """The desk rig at half its rate, where the rate is not what is asked about."""
-    text, at = DESK.read_text(encoding="utf-8"), "rate_hz: 200.0  # Hz, 20"
-    assert text.count(at) == 1
-    rig = tmp_path_factory.mktemp("rigs") / "half.yaml"
-    rig.write_text(text.replace(at, at.replace("200", "100")), encoding="utf-8")
-    return str(rig)
+    return at_rate(tmp_path_factory.mktemp("rigs"), "desk", 100.0)
 
 
 @pytest.fixture(scope="module")

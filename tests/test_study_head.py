@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from shown_page import wait_for
+from slow_rigs import at_rate
 
 from gazerig.config.study_file import LoadedStudy, load_study
 from gazerig.robot.app.options import RunOptions
@@ -31,7 +32,8 @@ def study() -> LoadedStudy:
 
 def presenter(study: LoadedStudy, folder: Path, agreed: tuple[bool, bool]) -> HeadPresenter:
     rig, scene = study.design.presentation.rig, study.design.presentation.scene
-    options = RunOptions(mock=True, rig=rig, scene=scene, no_page=True).checked()
+    slow = at_rate(folder, rig, 100.0)
+    options = RunOptions(mock=True, rig=slow, scene=scene, no_page=True).checked()
     return HeadPresenter(study, options, folder, lambda: agreed, RealClock())
 
 
@@ -77,7 +79,7 @@ def test_conditions_switch_without_a_jump_and_a_lost_bus_is_told_and_mended(
     found = measured(study, records, tmp_path, said.append)
     assert [(one.trial, one.condition) for one in found] == [*enumerate((*keys, keys[0]))]
     ticks = list(RunRecording(tmp_path / "run-01.mcap").ticks())
-    steps = np.abs(np.diff([tick.guard_result.command_rad for tick in ticks[200:]], axis=0))
+    steps = np.abs(np.diff([tick.guard_result.command_rad for tick in ticks[100:]], axis=0))
     for one in found[1:]:
         assert 0.0 < one.values[STEP_DEG] <= np.degrees(steps.max())
         assert 0.2 <= one.values["participant_gaze_share"] <= 1.0

@@ -1,0 +1,21 @@
+"""Shipped rigs at another rate of their control loop, for tests that do not judge the rate."""
+
+import re
+from pathlib import Path
+
+from gazerig.config.load import shipped
+
+_RATE = re.compile(r"^loop:.*\n  rate_hz: [\d.]+", re.MULTILINE)
+
+
+def at_rate(folder: Path, rig: str, rate_hz: float) -> str:
+    """Write a shipped rig with another loop rate; return the file's path."""
+    text = shipped("rigs", rig).read_text(encoding="utf-8")
+    loop = f"loop:\n  rate_hz: {rate_hz}"
+    text, count = _RATE.subn(loop, text)
+    if count == 0:  # it has the rate of the schema
+        assert not re.search("^loop:", text, re.MULTILINE)
+        text += f"\n{loop}\n"
+    file = folder / f"{rig}.yaml"
+    file.write_text(text, encoding="utf-8")
+    return str(file)
