@@ -4,9 +4,11 @@ import os
 import subprocess
 import sys
 from collections import Counter
+from functools import partial
 from pathlib import Path
 
 import pytest
+from branch import Branch
 
 TESTS = Path(__file__).parent
 CONFTEST = """
@@ -69,11 +71,22 @@ def told(folder: Path, *options: str) -> str:
     conftest = CONFTEST.format(tests=str(TESTS))
     (folder / "conftest.py").write_text(conftest, encoding="utf-8")
     (folder / "pytest.ini").write_text("[pytest]\n", encoding="utf-8")
-    command = [sys.executable, "-m", "pytest", "-q", "-rA", "-p", "no:cacheprovider", *options]
+    words = ["-q", "-rA", "-p", "no:cacheprovider", *options]
     clean = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST")}
     clean["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"  # half of the time of a start
-    done = subprocess.run(command, cwd=folder, env=clean, capture_output=True, text=True)
-    return done.stdout + done.stderr
+    pipe = subprocess.PIPE
+    with Branch(
+        partial(pytest_alone, words), cwd=folder, env=clean, stdout=pipe, stderr=pipe, text=True
+    ) as process:
+        out, err = process.communicate()
+    return str(out + err)
+
+
+def pytest_alone(words: list[str]) -> None:
+    """Run pytest as if nothing of this run of it had been imported."""
+    for name in ("conftest", "forked_workers"):
+        sys.modules.pop(name, None)
+    sys.exit(pytest.main(words))
 
 
 @pytest.mark.parametrize("workers", ["1", "2", "auto"])
