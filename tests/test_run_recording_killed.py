@@ -18,10 +18,12 @@ from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo
 
+TICK_S = 0.01
+
 
 def rig(path: Path) -> None:
     """Record a rig that goes on until it is killed, and say when each tick was handed over."""
-    info = RunInfo("desk", "robot", "a: 1", 0, 200.0, "2026-01-31T00:00:00+00:00")
+    info = RunInfo("desk", "robot", "a: 1", 0, 1.0 / TICK_S, "2026-01-31T00:00:00+00:00")
     recorder = Recorder(path, info)
     recorder.open()
     assert recorder._link is not None and recorder._link._process is not None
@@ -32,10 +34,10 @@ def rig(path: Path) -> None:
     wall = RealClock()
     start_s = wall.now_s()
     for number in range(1, 100000):
-        t_s = 0.005 * number
+        t_s = TICK_S * number
         wall.sleep_until(start_s + t_s)
         made.clock.sleep_until(t_s)
-        recorder.record(made.robot.tick(t_s, 0.005))
+        recorder.record(made.robot.tick(t_s, TICK_S))
         print(wall.now_s(), t_s, flush=True)
 
 

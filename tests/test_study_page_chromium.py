@@ -1,6 +1,7 @@
 """A participant at a browser: by keyboard alone, with a reload, a lost connection, on a phone."""
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -51,6 +52,20 @@ def pages(study: LoadedStudy, film: Path, tmp_path: Path) -> Iterator[Pages]:
 def desk() -> Iterator[Browser]:
     with browsing(DESK) as tab:
         yield tab
+
+
+@contextmanager
+def on_a_phone(tab: Browser) -> Iterator[Browser]:
+    """Have a tab as narrow as a phone."""
+
+    def size(width: int, height: int) -> None:
+        shape = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+        tab.ask("Emulation.setDeviceMetricsOverride", **shape)
+        wait_for(lambda: value(tab, "innerWidth") == width, "the size")
+
+    size(*PHONE)
+    yield tab
+    size(*DESK)
 
 
 class Participant:
@@ -162,7 +177,7 @@ def test_a_reload_loses_no_answer_and_a_film_begins_again(pages: Pages, desk: Br
 
 
 def test_what_is_not_kept_is_said_and_goes_on_by_itself_on_a_phone(
-    pages: Pages, monkeypatch: pytest.MonkeyPatch
+    pages: Pages, desk: Browser, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     refusals = 0
 
@@ -171,7 +186,7 @@ def test_what_is_not_kept_is_said_and_goes_on_by_itself_on_a_phone(
         refusals += 1
         raise NotKept("no space left on device")
 
-    with browsing(PHONE) as tab:
+    with on_a_phone(desk) as tab:
         person = Participant(tab)
         tab.go(pages.server.participant_url)
         person.sees("consent")

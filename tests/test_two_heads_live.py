@@ -43,11 +43,12 @@ branched = pytest.mark.usefixtures("branched_children_here")
 
 @pytest.fixture
 def group(tmp_path: Path) -> HeadGroup:
-    """Return two heads whose buses are given up after a second."""
+    """Return two heads whose loops are slow, and whose buses are given up after a second."""
     file = tmp_path / "quick.yaml"
     text = shipped("rigs", "minimal").read_text(encoding="utf-8")
     file.write_text(
         text.replace("kind: dynamixel,", "kind: dynamixel, dynamixel: {give_up_s: 1.0},")
+        + "loop: {rate_hz: 100}\n"
     )
     return compose_group(replace(ASKED, rig=str(file)).checked())
 
@@ -60,7 +61,7 @@ def test_a_fault_of_one_head_parks_the_other_and_both_let_go(group: HeadGroup) -
 
     def watch(tick: Tick) -> None:
         ticks.append(tick.t_s)
-        if len(ticks) == 40:
+        if len(ticks) == 20:
             fault("other: unplug")
 
     figures = group.run(lambda: None, lines.append, watch=watch)
@@ -112,11 +113,11 @@ def test_the_page_is_shown_the_other_head_where_it_is(group: HeadGroup) -> None:
 
     def watch(tick: Tick) -> None:
         seen.append(tick)
-        if len(seen) % 20 == 0:
+        if len(seen) % 10 == 0:
             turned.add(shapes.poses(0.0)[head])
             [other] = made.others
             assert other.seen().headline
-        if len(seen) == 200:
+        if len(seen) == 100:
             asked.request("the test")
 
     group.run(asked, lambda line: None, watch=watch)
