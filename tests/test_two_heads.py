@@ -52,7 +52,7 @@ def test_two_heads_look_at_each_other_and_the_same_seed_gives_the_same_bytes() -
 def test_each_finds_the_face_of_the_other_in_its_own_picture() -> None:
     if needed := what_it_needs():
         pytest.skip(needed)
-    once, again = (ran(no_pictures=False, seconds=0.5, bus="ideal") for _ in range(2))
+    once, again = (ran(no_pictures=False, seconds=0.37, bus="ideal") for _ in range(2))
     for head in (once, once["heads"]["other"]):
         assert head["pictures"] >= 10 and head["faces_seen"] >= 0.9 * head["pictures"]
     for figures in (once, again):
@@ -138,8 +138,8 @@ def test_short_gaps_in_a_look_are_bridged_and_short_looks_are_none() -> None:
     assert found["mutual_gazes"] == 1 and found["mean_s"] == pytest.approx(3.0)
 
 
+@pytest.mark.usefixtures("few_drawings")
 def test_two_recordings_report_the_figures_of_the_run(tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
     record, page = tmp_path / "run.mcap", tmp_path / "page.html"
     figures = ran(record=record, bus="ideal", seconds=2.0)["mutual_gaze"]["other"]
     assert RunRecording(record).info.stands[:2] == (0.0, 0.0)
