@@ -46,7 +46,8 @@ class ActionPlannerParams:
     contact_ms: Annotated[float, Bounds(0, 5000), "guard against a fist that arrives within this time; 0: never"] = 450.0
     contact_m: Annotated[float, Bounds(0, 2), "a fist this near to the head has arrived"] = 0.3
     closing_m_s: Annotated[float, Bounds(0, 20), "a fist that comes nearer more slowly than this is no punch"] = 0.8
-    miss_m: Annotated[float, Bounds(0, 5), "a fist that would pass the head farther away than this is no punch"] = 0.3
+    miss_m: Annotated[float, Bounds(0, 5),
+        "a fist that would pass the middle of the eyes farther away than this is no punch: half a head and half a fist"] = 0.2
     reaction_ms: Annotated[float, Bounds(0, 1000),
         "what may be a punch must have been seen to come for this long, unless its speed is certain"] = 30.0
     release_ratio: Annotated[float, Bounds(1, 10),

@@ -92,8 +92,14 @@ def test_a_fist_has_come_on_since_its_picture_was_made() -> None:
 
 @pytest.mark.parametrize(
     "comes",
-    [{"speed_m_s": 0.7}, {"speed_m_s": -2.5}, {"aside_m": 0.5}, {"away_m": 3.0, "speed_m_s": 2.5}],
-    ids=["slowly", "goes back", "passes beside", "from afar"],
+    [
+        {"speed_m_s": 0.7},
+        {"speed_m_s": -2.5},
+        {"aside_m": 0.5},
+        {"aside_m": 0.25, "speed_m_s": 1.8},
+        {"away_m": 3.0, "speed_m_s": 2.5},
+    ],
+    ids=["slowly", "goes back", "passes beside", "raised to the guard", "from afar"],
 )
 def test_what_is_no_punch_is_not_guarded_against(comes: dict[str, float]) -> None:
     planner = ActionPlanner(PARAMS)

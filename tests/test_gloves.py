@@ -96,6 +96,16 @@ def test_a_glove_of_which_a_part_is_hidden_is_as_far_away_as_it_was(hides: str) 
     assert all(one.p_camera_m[2] < 0.5 for one in found(GloveFinder(), last))
 
 
+def test_the_longer_a_part_is_hidden_the_less_is_known_of_how_far_away_a_glove_is() -> None:
+    whole, cut = scene((0.05, 0.25, 0.8)), scene((0.05, 0.41, 0.8))
+    finder = GloveFinder()
+    seen = [found(finder, cut if 1 <= k <= 15 else whole, k / 30)[0] for k in range(17)]
+    sds = [glove.depth_sd_m for glove in seen]
+    assert {glove.id for glove in seen} == {seen[0].id}
+    assert sds[1:16] == sorted(sds[1:16]) and sds[15] > 0.5
+    assert sds[16] == sds[0] < 0.05
+
+
 def test_the_arm_and_trunk_behind_a_glove_are_nothing_of_their_own() -> None:
     glove = MovingBlob(1, "hand", (0.0, 0.0, 0.8), 0.07, centre_px=(110.0, 130.0))
     trunk = MovingBlob(2, "thing", (0.0, 0.0, 2.0), 0.3, box_px=(60.0, 120.0, 200.0, 300.0))

@@ -32,11 +32,16 @@ GROUND, DISC = textured(1, 400)[:HEIGHT, :WIDTH], textured(2, 400)
 
 
 def seen(
-    radius: float, slide: tuple[float, float], spin: float, loom: float, count: int = 7
+    radius: float,
+    slide: tuple[float, float],
+    spin: float,
+    loom: float,
+    count: int = 7,
+    at: tuple[float, float] = (160.0, 120.0),
 ) -> list[MovingBlob]:
     """Move a textured disc over textured ground; give what was found of it, picture by picture.
 
-    slide px/s, spin rad/s clockwise, loom 1/s
+    slide px/s, spin rad/s clockwise, loom 1/s; at: its middle halfway, px
     """
     rng = np.random.default_rng(4)
     detector = MotionDetector(MotionParams())
@@ -46,7 +51,7 @@ def seen(
         t_s = (k - count / 2) * DT_S
         growth, angle = np.exp(loom * t_s), spin * t_s
         A = growth * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-        centre = np.array([160.0, 120.0]) + np.array(slide) * t_s
+        centre = np.array(at) + np.array(slide) * t_s
         H = np.column_stack((A, centre - A @ (200.0, 200.0)))
         mask = cv2.warpAffine(cover, H, (WIDTH, HEIGHT))
         picture = GROUND * (1 - mask) + cv2.warpAffine(DISC, H, (WIDTH, HEIGHT)) * mask
@@ -87,6 +92,14 @@ def test_loom_within_10_per_cent(radius: float, loom: float) -> None:
     assert np.median([blob.loom_1_s for blob in blobs]) == pytest.approx(loom, rel=0.1)
     speeds = [blob.v_camera_m_s[2] for blob in blobs if blob.v_camera_m_s is not None]
     assert np.median(speeds) == pytest.approx(-2.0 * loom, rel=0.1)  # nearer: z shrinks
+
+
+@pytest.mark.parametrize("at", [(5.0, 120.0), (315.0, 120.0), (160.0, 5.0), (160.0, 235.0)])
+def test_a_thing_that_the_edge_of_the_image_cuts_does_not_grow(at: tuple[float, float]) -> None:
+    inwards = tuple(np.sign(np.subtract((160.0, 120.0), at)) * 300.0)
+    for blob in seen(40, inwards, 0.0, 0.0, at=at):
+        assert blob.loom_1_s == 0.0 and blob.loom_sd_1_s == np.inf
+        assert blob.v_camera_m_s is not None and blob.v_camera_m_s[2] == 0.0
 
 
 def test_all_three_at_once() -> None:

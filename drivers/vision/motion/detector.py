@@ -238,13 +238,15 @@ class MotionDetector:
         follow.offset = point - follow.centre
         p = place(point, far.z_m, now.K)
         flow_px_s = motion.slide_px[0] / dt_s, motion.slide_px[1] / dt_s
-        loom = _believed(motion.growth, motion.growth_sd) / dt_s
+        edges = _edges(group, *now.grey.shape[:2])
+        # Of a thing that the edge of the image cuts, what comes into view is no growth.
+        growth_sd = np.inf if any(edges) else motion.growth_sd
+        loom = _believed(motion.growth, growth_sd) / dt_s
         fastest_px, fastest_flow = fastest(group)
         at = place(fastest_px, far.z_m, now.K)
         fx, fy = (fastest_flow / dt_s).tolist()
         (sx, sy), (x, y, width, height) = now.scale, group.box
         left, top = to_given((x - 0.5, y - 0.5), now.scale)
-        edge_px = _EDGE_SHARE * now.grey.shape[1]
         return MovingBlob(
             follow.id,
             _KIND,
@@ -256,7 +258,7 @@ class MotionDetector:
             depth_known=far.known,
             depth_sd_m=far.sd_m,
             spin_sd_rad_s=motion.spin_sd / dt_s,
-            loom_sd_1_s=motion.growth_sd / dt_s,
+            loom_sd_1_s=growth_sd / dt_s,
             box_px=(left, top, width / sx, height / sy),
             centre_px=to_given((float(point[0]), float(point[1])), now.scale),
             area_px=len(group.x) / (sx * sy),
@@ -264,8 +266,24 @@ class MotionDetector:
             fastest_m=at,
             fastest_m_s=velocity(at, (fx, fy), loom, now.K),
             thickness_m=2.0 * far.z_m * inscribed_px(group, now.grey.shape) / float(now.K[0, 0]),
-            from_side=x <= edge_px or x + width >= now.grey.shape[1] - edge_px,
+            from_side=edges.left or edges.right,
         )
+
+
+class _Edges(NamedTuple):
+    """Beyond which edges of the image a patch may go on."""
+
+    left: bool
+    top: bool
+    right: bool
+    bottom: bool
+
+
+def _edges(group: Group, rows: int, columns: int) -> _Edges:
+    """Return the edges of the small image that a patch is too near to for its flow to be known."""
+    x, y, width, height = group.box
+    near = _EDGE_SHARE * columns
+    return _Edges(x <= near, y <= near, x + width >= columns - near, y + height >= rows - near)
 
 
 def turned_between(R_world_now: NDArray[Any], R_world_before: NDArray[Any]) -> Floats:

@@ -5,9 +5,11 @@ found at all. A glove is about as round as a ball, so the largest circle within 
 direction and, by its size, its distance. What is white or shines on it belongs to it; red ropes
 and posts do not. Of one glove before another both are found as long as enough of the farther one is
 seen, and one of which the image's edge, another glove or something else hides a part is taken to be
-as large as it was: it does not come nearer because more of it is seen.
+as large as it was: it does not come nearer because more of it is seen. How far away it is is then
+known the less the longer it lasts.
 """
 
+from math import hypot
 from typing import Any, NamedTuple
 
 import cv2
@@ -33,6 +35,8 @@ _TAKEN = 1.35
 _MOVES, _KEPT_S = 2.5, 0.5
 _EDGE_PX = 0.7
 """How well the edge of a colour is known: standard deviation of the radius."""
+_UNSEEN_M_S = 1.0
+"""How fast a glove comes or goes while its size is not seen: standard deviation."""
 # White and pale red: least value, greatest saturation of white, greatest half-degrees off red.
 _PALE_VALUE, _WHITE_SATURATION, _PALE_HUE = 90, 80, 10
 _THIN = 0.25
@@ -59,13 +63,17 @@ class Circle(NamedTuple):
 
 
 class _Glove(NamedTuple):
-    """A circle in the image, pixels of the frame that was searched."""
+    """A circle in the image, pixels of the frame that was searched.
+
+    sized_s: when its radius was measured: later a part of it was hidden
+    """
 
     id: int
     x: float
     y: float
     radius: float
     seen_s: float
+    sized_s: float
 
 
 class GloveFinder:
@@ -137,13 +145,14 @@ class GloveFinder:
         if near:
             before = min(near)[1]
             self._known.remove(before)
-            if cut or covered:
-                radius = max(sure, before.radius)
-            return _Glove(before.id, x, y, radius, captured_s)
+            if (cut or covered) and sure <= before.radius:
+                return _Glove(before.id, x, y, before.radius, captured_s, before.sized_s)
+            radius = sure if cut or covered else radius
+            return _Glove(before.id, x, y, radius, captured_s, captured_s)
         if cut or covered:
             return None
         self._next_id += 1
-        return _Glove(self._next_id - 1, x, y, radius, captured_s)
+        return _Glove(self._next_id - 1, x, y, radius, captured_s, captured_s)
 
 
 def _glove_mask(bgr: ImageArray, least_px: float) -> NDArray[np.uint8]:
@@ -241,7 +250,7 @@ def _blob(glove: _Glove, share: float, lens: Intrinsics) -> MovingBlob:
         KIND,
         place,
         RADIUS_M,
-        depth_sd_m=z * _EDGE_PX / glove.radius,
+        depth_sd_m=hypot(z * _EDGE_PX / glove.radius, _UNSEEN_M_S * (glove.seen_s - glove.sized_s)),
         box_px=(u - radius, v - radius, 2.0 * radius, 2.0 * radius),
         centre_px=(u, v),
         area_px=float(np.pi) * radius**2,
