@@ -19,9 +19,9 @@ from gazerig.robot.app.study_file import checked_study
 
 @pytest.fixture(scope="module")
 def study() -> LoadedStudy:
-    """The first shipped study, of two seconds."""
+    """The first shipped study, of one second."""
     found = load_study("nakamoto_1")
-    trials = replace(found.design.trials, seconds=2.0)
+    trials = replace(found.design.trials, seconds=1.0)
     return replace(found, design=replace(found.design, trials=trials))
 
 
@@ -58,7 +58,7 @@ def test_each_condition_has_a_film_of_the_head_with_a_name_that_says_nothing(
     for key, path in made.items():
         assert path.suffix == ".webm" and not any(one in path.name for one in made)
         frames = pictures(path)
-        assert len(frames) == 20 and frames[0].shape == (160, 160, 3)
+        assert len(frames) == 10 and frames[0].shape == (160, 160, 3)
         skin, wall = frames[5][100, 80], frames[5][10, 10]
         assert skin[2] > skin[0] + 20 and wall[0] > wall[2], "a face before a wall"
         assert np.abs(np.diff(np.stack(frames).astype(int), axis=0)).max() > 40, "it moves"

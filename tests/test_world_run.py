@@ -39,7 +39,7 @@ def test_the_same_seed_gives_the_same_bytes() -> None:
 
 
 def test_a_head_in_a_world_finds_the_person_there() -> None:
-    made = simulate(load_rig("desk"), replace(FAST, seconds=14.0))
+    made = simulate(load_rig("desk"), replace(FAST, seconds=8.0))
     assert int(str(made.figures["faces_seen"])) > 100
     error = made.figures["gaze_error_deg"]
     assert isinstance(error, dict) and error["median"] < 1.0
@@ -109,7 +109,7 @@ def test_ideal_servos_move_the_world_too() -> None:
 def test_pictures_of_the_same_seed_give_the_same_bytes_on_one_machine() -> None:
     if reason := why_not():
         pytest.skip(reason)
-    seen = replace(FAST, no_pictures=False, seconds=0.3)
+    seen = replace(FAST, no_pictures=False, seconds=0.2)
     assert digest(seen) == digest(seen)
 
 

@@ -94,7 +94,7 @@ def ran(profile: str, scanpath: str | None = None, seconds: float = SECONDS) -> 
     options = RunOptions(
         True, True, 0, scene.name, profile=profile, scanpath=scanpath, seconds=seconds, bus="ideal"
     )
-    rig = changed(load_rig("desk", profile=profile), {"loop.rate_hz": 100.0})
+    rig = changed(load_rig("desk", profile=profile), {"loop.rate_hz": 50.0})
     run_scene.scenes = lambda: {**shipped(), scene.name: scene}
     calls.enable()
     try:

@@ -146,14 +146,15 @@ def render(study: LoadedStudy, key: str, path: Path, progress: Progress) -> None
     made = path.with_name(f".{path.name}")
     try:
         with film_writer(made, (SIZE_PX, SIZE_PX), RATE_HZ) as write:
-            begin_s, next_s = None, 0.0
+            begin_s, shown, next_s = None, 0, 0.0
             for tick in _ticks(study, key):
                 begin_s = tick.t_s if begin_s is None else begin_s
                 at_s = tick.t_s - begin_s
                 if at_s < next_s - 1e-9 or next_s >= seconds - 1e-9:
                     continue
                 write(pictures.draw(names, tick.joints.position_rad))
-                next_s += 1.0 / RATE_HZ
+                shown += 1
+                next_s = shown / RATE_HZ
                 progress(min(1.0, next_s / seconds))
         if next_s < seconds - 1.0 / RATE_HZ:
             raise SetupError(

@@ -1,5 +1,8 @@
 """A painted mesh as files that every program reads: Wavefront OBJ, its material and a PNG."""
 
+from functools import lru_cache
+from typing import NamedTuple
+
 import cv2
 import numpy as np
 
@@ -11,12 +14,46 @@ from gazerig.robot.model.paint import Painted
 
 def mesh_files(name: str, painted: Painted) -> dict[str, bytes]:
     """Return the content of ``name``.obj, .mtl and .png by file name; lengths in metres."""
-    mesh = textured(painted)
+    written = _written(_Content(painted))
+    obj = f"mtllib {name}.mtl\no {name}\n{written.points}usemtl {name}\n{written.faces}"
     return {
-        f"{name}.obj": _obj(name, mesh).encode(),
+        f"{name}.obj": obj.encode(),
         f"{name}.mtl": _material(name).encode(),
-        f"{name}.png": png(mesh.image),
+        f"{name}.png": written.image,
     }
+
+
+class _Content:
+    """A painted mesh as a key: it equals another one of the same numbers."""
+
+    def __init__(self, painted: Painted) -> None:
+        self.painted = painted
+        arrays = (*painted.mesh, painted.colours, painted.normals)
+        self._numbers = tuple(
+            None if one is None else (one.shape, one.dtype.str, one.tobytes()) for one in arrays
+        )
+
+    def __hash__(self) -> int:
+        return hash(self._numbers)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Content) and self._numbers == other._numbers
+
+
+class _Written(NamedTuple):
+    """A mesh in its formats, but for its name: points and faces of the OBJ file, and the PNG."""
+
+    points: str
+    faces: str
+    image: bytes
+
+
+# A world is built once for its physics and once for its pictures, with one or more heads of a rig:
+# all parts of four rigs.
+@lru_cache(maxsize=64)
+def _written(content: _Content) -> _Written:
+    mesh = textured(content.painted)
+    return _Written(*_obj(mesh), png(mesh.image))
 
 
 def plain_obj(name: str, mesh: Mesh) -> bytes:
@@ -33,20 +70,18 @@ def png(image: np.ndarray) -> bytes:
     return bytes(data)
 
 
-def _obj(name: str, mesh: TexturedMesh) -> str:
-    """Return a mesh as text: points and normals that are the same are written once."""
+def _obj(mesh: TexturedMesh) -> tuple[str, str]:
+    """Return points and faces as text: points and normals that are the same are written once."""
     points, point_of = _once(mesh.vertices, 6)
     normals, normal_of = _once(mesh.normals, 3)
     # In this format an image begins at its left lower corner.
     corners, corner_of = _once(mesh.uv * (1.0, -1.0) + (0.0, 1.0), 5)
     table = np.stack((point_of, corner_of, normal_of), axis=-1)[mesh.faces] + 1
     return (
-        f"mtllib {name}.mtl\no {name}\n"
-        + _rows("v %.6f %.6f %.6f\n", points)
+        _rows("v %.6f %.6f %.6f\n", points)
         + _rows("vt %.5f %.5f\n", corners)
-        + _rows("vn %.3f %.3f %.3f\n", normals)
-        + f"usemtl {name}\n"
-        + _rows("f %d/%d/%d %d/%d/%d %d/%d/%d\n", table)
+        + _rows("vn %.3f %.3f %.3f\n", normals),
+        _rows("f %d/%d/%d %d/%d/%d %d/%d/%d\n", table),
     )
 
 
