@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from human.measured_run import MeasuredRun, ideal_run
+from human.measured_run import MeasuredRun, half_rate_run
 from human.row_03_rests import TABLE_S, beyond_the_law, visits
 from human.row_09_mutual_gaze import nearest, stays
 from human.row_11_in_flight import pauses_ms
@@ -11,7 +11,7 @@ from human.row_11_in_flight import pauses_ms
 @pytest.fixture(scope="module")
 def run() -> MeasuredRun:
     # Rests are those of the plan, which servos without bytes show as well.
-    return ideal_run("face-to-face", seconds=45.0)
+    return half_rate_run("face-to-face", seconds=45.0)
 
 
 def test_e63_rests_on_a_face_are_as_the_table_and_seldom_short(run: MeasuredRun) -> None:

@@ -4,12 +4,8 @@ All but one run on servos without bytes; the bench has them byte-true. Numbered 
 docs/checks.md.
 """
 
-from functools import partial
-
 from human import row_05_homeward_head, row_14_blinks, row_15_head_share, row_16_idle
-from human.measured_run import ideal_run, measured_run
-
-HALF_RATE = {"loop.rate_hz": 100.0}
+from human.measured_run import half_rate_run, measured_run
 
 
 def outside(wanted: dict[str, tuple[float, float]], figures: dict[str, float]) -> dict[str, float]:
@@ -22,14 +18,14 @@ def outside(wanted: dict[str, tuple[float, float]], figures: dict[str, float]) -
 
 
 def test_e65_the_measured_head_stops_short_of_a_nearer_target() -> None:
-    figures = row_05_homeward_head.measure(ideal_run, 12.5, (0,))
+    figures = row_05_homeward_head.measure(half_rate_run, 12.5, (0,))
     assert outside(row_05_homeward_head.WANTED, figures) == {}
     turned = [figures[f"turned at interest {i} deg"] for i in ("0.2,", "0.5,", "1,")]
     assert turned[0] < turned[1] < turned[2]
 
 
 def test_e74_measured_blinks_are_not_in_the_ticks_of_saccades_and_half_incomplete() -> None:
-    figures = row_14_blinks.measure(partial(ideal_run, overrides=HALF_RATE), 30.0, (0,))
+    figures = row_14_blinks.measure(half_rate_run, 30.0, (0,))
     # Too short for the rates of the two modes, but not for their order.
     assert 6.0 <= figures["at rest, 1/min"] <= 25.0
     assert 14.0 <= figures["in conversation, 1/min"] <= 37.0
@@ -38,7 +34,7 @@ def test_e74_measured_blinks_are_not_in_the_ticks_of_saccades_and_half_incomplet
 
 
 def test_e75_the_measured_head_follows_stahls_law_and_rolls() -> None:
-    figures = row_15_head_share.measure(ideal_run, 30.0, (0,))
+    figures = row_15_head_share.measure(half_rate_run, 30.0, (0,))
     assert outside(row_15_head_share.WANTED, figures) == {}
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 from human import row_01_pursuit, row_02_waving_hand
-from human.measured_run import ideal_run, measured_run
+from human.measured_run import half_rate_run, measured_run
 from human.row_01_pursuit import ON_ONE_POINT, following
 
 
@@ -12,7 +12,7 @@ from human.row_01_pursuit import ON_ONE_POINT, following
 )
 def test_e61_a_swinging_face_is_followed_with_the_gain_of_people(hz: float, band: str) -> None:
     byte_true = hz == 1.0  # once with the delay of real servos, in the middle of the frequencies
-    seen = following(measured_run if byte_true else ideal_run, hz, 14.0, 0)
+    seen = following(measured_run if byte_true else half_rate_run, hz, 14.0, 0)
     low, high = row_01_pursuit.WANTED[band]
     assert max(low, 0.85) <= seen.gain <= high
     assert abs(seen.phase_deg) < 12.0
@@ -20,7 +20,7 @@ def test_e61_a_swinging_face_is_followed_with_the_gain_of_people(hz: float, band
 
 
 def test_e62_a_waving_hand_is_predicted_and_the_head_keeps_still() -> None:
-    figures = row_02_waving_hand.measure(ideal_run, 22.0, [0])
+    figures = row_02_waving_hand.measure(half_rate_run, 22.0, [0])
     for name, (low, high) in row_02_waving_hand.WANTED.items():
         assert low <= figures[name] <= high, f"{name}: {figures[name]:.2f}"
     assert figures["share of the wave on the hand, %"] > 50.0
@@ -28,4 +28,4 @@ def test_e62_a_waving_hand_is_predicted_and_the_head_keeps_still() -> None:
 
 def test_without_the_prediction_the_gain_is_too_high() -> None:
     linear = {**ON_ONE_POINT, "gaze.oculomotor.target_prediction": "velocity"}
-    assert following(ideal_run, 1.0, 14.0, 0, linear).gain > 1.03
+    assert following(half_rate_run, 1.0, 14.0, 0, linear).gain > 1.03

@@ -2,7 +2,7 @@
 
 from functools import partial
 
-from human.measured_run import ideal_run
+from human.measured_run import half_rate_run, ideal_run
 from human.row_10_reaction import WANTED, measure
 
 SHORT_S = 24.0
@@ -21,5 +21,5 @@ def test_e70_a_hand_that_appears_is_looked_at_after_a_reaction_time_of_people() 
 
 
 def test_without_a_reaction_time_most_are_express() -> None:
-    at_once = partial(ideal_run, overrides={"gaze.attention.reaction.median_ms": 0.0})
+    at_once = partial(half_rate_run, overrides={"gaze.attention.reaction.median_ms": 0.0})
     assert measure(at_once, 15.0, (3,))["appears: median, ms"] < 145.0

@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from human.measured_run import MeasuredRun, ideal_run
+from human.measured_run import MeasuredRun, half_rate_run
 from human.profile_trace import PAGE, PROFILES, as_told, claims, ran
 from human.row_03_rests import visits
 
@@ -54,7 +54,7 @@ def test_e68_each_profile_looks_at_what_its_paper_has() -> None:
 
 @pytest.fixture(scope="module")
 def nakamoto() -> MeasuredRun:
-    return ideal_run("face-to-face", "nakamoto", seconds=40.0, overrides=HALF_RATE)
+    return half_rate_run("face-to-face", "nakamoto", seconds=40.0)
 
 
 def test_e68_nakamoto_walks_as_its_table_with_no_look_away(nakamoto: MeasuredRun) -> None:
@@ -74,7 +74,7 @@ def test_e68_nakamoto_turns_the_head_beyond_20_deg_only(nakamoto: MeasuredRun) -
 
 
 def test_e68_mitake_never_blinks_nor_leaves_a_face_that_stands() -> None:
-    run = ideal_run("face-to-face", "mitake", seconds=20.0, overrides=HALF_RATE)
+    run = half_rate_run("face-to-face", "mitake", seconds=20.0)
     assert not run.blink.any() and np.ptp(run.lids_goal) == 0.0
     assert set(run.part) <= {"N", ""} and (run.part == "N").mean() > 0.8
     assert not any("away" in name for name in run.target_name)
