@@ -46,7 +46,8 @@ class ServoLine:
     @property
     def busy(self) -> bool:
         """True if bytes are in transit, or may arrive unasked."""
-        return bool(self._late) or self.device.faults.on("babble")
+        faults = self.device.faults
+        return bool(self._late) or (faults.wire.any and faults.on("babble"))
 
     def next_due_s(self) -> float | None:
         """Return the arrival time of the next bytes, None if none are in transit."""

@@ -331,11 +331,12 @@ class ServoChain(Generic[S, Q]):
         address, rows = self.instructions.sync_writes(params)
         if self._wire.any or self._known.twins or self._known.shadows:
             return self._write_all([(servo_id, address, data) for servo_id, data in rows])
+        servos, now_ms, fed_ms = self._by_id, self._now_ms, self._fed_ms
         for servo_id, data in rows:
-            servo = self._by_id.get(servo_id)
+            servo = servos.get(servo_id)
             if servo is None or servo.drive.followed == (address, data):
                 continue
-            if servo.advance(self._now_ms, self._fed_ms):
+            if servo.advance(now_ms, fed_ms):
                 servo.write(address, data)
         return []
 

@@ -115,25 +115,32 @@ class ShaftMotion:
 
     def _advance(self, ticks: int) -> None:
         """Move on by some milliseconds, at once if that can be, else one by one."""
-        loop, profile = self._loop, self.profile
+        loop, profile, v = self._loop, self.profile, self.v
         # Where there is no speed to follow, D brakes only.
         kr = 0.0 if profile.jumps else loop.d + loop.f1
         led = profile.running
+        linear = self._linear and self._integral == 0.0
+        quick = linear and ticks == SPAN_MS
+        # The quick ways: friction holds it, or it moves on. Where the duty may change only
+        # slowly, as in X330 servos, it meets that limit too often.
+        if quick and v == 0.0 and not led and self._stick(kr):
+            return
         before = profile.r
         path = profile.ahead(ticks)
-        if ticks == SPAN_MS and self._linear and self._integral == 0.0:
-            # The quick ways: it moves on, or friction holds it. Where the duty may change only
-            # slowly, as in X330 servos, it meets that limit too often.
-            if abs(self.v) > self._built.dry:
-                if loop.slew == inf and self._glide(path if led else None, before, kr):
-                    return
-            elif self.v == 0.0 and not led and self._stick(kr):
-                return
-        still = self.v == 0.0
-        was = (self.x, self.u, self._integral, self.joint, self.volts) if still else None
+        glides = quick and loop.slew == inf and abs(v) > self._built.dry
+        if glides and self._glide(path if led else None, before, kr):
+            return
+        if v == 0.0:
+            self._leave_rest(path, before, kr)
+        elif not (linear and self._step(path, before, kr)):
+            self._follow(path, before, kr)
+
+    def _leave_rest(self, path: Sequence[float], before: float, kr: float) -> None:
+        """Follow a path from rest, and see whether it stays at rest for good."""
+        was = self.x, self.u, self._integral, self.joint, self.volts
         if not (self._linear and self._integral == 0.0 and self._step(path, before, kr)):
             self._follow(path, before, kr)
-        if still and self.v == 0.0 and self._rv == 0.0 and not profile.running:
+        if self.v == 0.0 and self._rv == 0.0 and not self.profile.running:
             self.quiet = was == (self.x, self.u, self._integral, self.joint, self.volts)
 
     def _stick(self, kr: float) -> bool:
@@ -224,10 +231,11 @@ class ShaftMotion:
         x, v, u, joint, rv = self.x, self.v, self.u, self.joint, self._rv
         low, high, supply, volts, load = self._low, self._high, self.supply, self.volts, self._load
         u_least, slew_down, play_low, t = -u_max, -slew, -play, self.effort
+        smoothing, slowest, slowest_back = SMOOTHING, SLOWEST, -SLOWEST
         k = kp + self._loop.d
         for r in path:
-            rv += (r - before - rv) * SMOOTHING
-            if -SLOWEST < rv < SLOWEST:
+            rv += (r - before - rv) * smoothing
+            if slowest_back < rv < slowest:
                 rv = 0.0
             before = r
             c = kp * (r - x) + kr * rv

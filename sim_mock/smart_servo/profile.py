@@ -92,16 +92,16 @@ class PositionProfile:
 
     def _ramps(self, goal: float, cruise: float, ramp: float) -> None:
         """Plan by velocity and acceleration from the present speed."""
-        distance = goal - self.r
-        side = 1.0 if distance >= self.v * abs(self.v) / (2.0 * ramp) else -1.0
-        start, ahead = side * self.v, side * distance
-        if start > cruise:
-            top = cruise
-        else:
-            top = min(cruise, sqrt(max(0.0, ramp * ahead + 0.5 * start * start)))
+        distance, v, top = goal - self.r, self.v, cruise
+        side = 1.0 if distance >= v * abs(v) / (2.0 * ramp) else -1.0
+        start, ahead = side * v, side * distance
+        if start <= cruise:
+            square = ramp * ahead + 0.5 * start * start
+            if square < cruise * cruise:
+                top = sqrt(square) if square > 0.0 else 0.0
         first = abs(top - start) / ramp
         left = ahead - 0.5 * (start + top) * first - 0.5 * top * top / ramp
-        flat = max(0.0, left / top) if top > 0.0 else 0.0
+        flat = left / top if left > 0.0 and top > 0.0 else 0.0
         kind = TRAPEZOID if flat > 0.0 else TRIANGLE
         self._plan(goal, kind, side * top, first, flat, top / ramp)
 
