@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from command_line import typed
 
+from gazerig.config.parameters import changed
 from gazerig.config.schema import Rig
 from gazerig.config.shipped import shipped_names
 from gazerig.drivers.errors import SetupError
@@ -190,5 +191,5 @@ def test_the_conditions_of_shipped_studies_move_the_head_differently(name: str) 
 def _desired(rig: Rig, asked: RunOptions) -> list[tuple[float, ...]]:
     """Return the joint angles that every tick of a run wanted."""
     found: list[tuple[float, ...]] = []
-    simulate(rig, asked, watch=lambda tick: found.append(tick.desired_rad))
+    simulate(changed(rig, {"loop.rate_hz": 100.0}), asked, watch=lambda tick: found.append(tick.desired_rad))
     return found
