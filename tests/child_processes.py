@@ -49,9 +49,10 @@ def end_with_parent() -> None:
 def _children(pid: int) -> Iterator[int]:
     """Return the children of a process; each of its threads has a list of its own."""
     with suppress(OSError):
-        for thread in (_PROC / str(pid) / "task").iterdir():
-            with suppress(OSError):
-                yield from map(int, (thread / "children").read_text().split())
+        # Twice in each test: by names alone, in half the time of paths.
+        for thread in os.listdir(f"/proc/{pid}/task"):
+            with suppress(OSError), open(f"/proc/{pid}/task/{thread}/children", "rb") as children:
+                yield from map(int, children.read().split())
 
 
 def _descendants(pid: int) -> Iterator[int]:
