@@ -191,5 +191,6 @@ def test_the_conditions_of_shipped_studies_move_the_head_differently(name: str) 
 def _desired(rig: Rig, asked: RunOptions) -> list[tuple[float, ...]]:
     """Return the joint angles that every tick of a run wanted."""
     found: list[tuple[float, ...]] = []
-    simulate(changed(rig, {"loop.rate_hz": 100.0}), asked, watch=lambda tick: found.append(tick.desired_rad))
+    slower = changed(rig, {"loop.rate_hz": 100.0})
+    simulate(slower, asked, watch=lambda tick: found.append(tick.desired_rad))
     return found
