@@ -218,11 +218,6 @@ def _from_its_folder(design: StudyDesign, folder: Path) -> StudyDesign:
     )
 
 
-def _placed(folder: Path, check: Check[StudyDesign], raw: StudyDesign) -> Iterable[tuple[str, str]]:
-    """Check a design with the paths of its files as seen from the working folder."""
-    return check(_from_its_folder(raw, folder))
-
-
 def _beside(folder: Path, name: str) -> str:
     return str(folder / Path(name).expanduser())
 

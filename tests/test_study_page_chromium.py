@@ -12,7 +12,7 @@ import pytest
 from browser import Browser, browsing
 from page_layout import value, violations
 from shown_page import wait_for
-from study_at_the_page import CODE, Pages, serving
+from study_at_the_page import CODE, Pages, Tab, serving
 
 from gazerig.config.study_file import LoadedStudy, load_study
 from gazerig.robot.study.journal import NotKept
@@ -222,6 +222,8 @@ def test_a_browser_that_cannot_show_films_is_told_before_anything_is_asked(pages
         assert "Firefox" in person.says("document.querySelector('#sheet [role=alert]').textContent")
         assert not person.says("document.querySelector('#sheet form') !== null")
         person.well_made()
+        experimenter = Tab(pages.server.experimenter_url)
+        wait_for(lambda: "cannot play the films" in experimenter.state()["trouble"], "the word")
     assert not pages.journal.records[1:]
 
 

@@ -46,6 +46,10 @@ _OTHERWISE = {
     _PARTICIPANT: "please open the address that you were given by the experimenter",
     _EXPERIMENTER: "open the experimenter's address that the terminal shows",
 }
+_FILMS_FAIL = (
+    "the participant's browser cannot play the films (WebM): open the participant's address in a "
+    "current Firefox, Chrome or Edge, on an iPhone or iPad with iOS 17.4 or later"
+)
 _EXPERIMENTERS_PATHS = ("/experimenter", "/rig/")
 
 
@@ -162,6 +166,7 @@ class StudyServer:
         app.router.add_get("/study/news", self._tell_news)
         app.router.add_post("/study/done", self._done)
         app.router.add_get("/study/film/{token}", self._film)
+        app.router.add_post("/study/film_failed", self._film_failed)
         StudyFiles(self._design.language).add_to(app.router)
         self._experimenter.add_to(app.router)
         app.router.add_get("/{path:.*}", _nothing)
@@ -262,6 +267,12 @@ class StudyServer:
         answer = web.Response(body=body, content_type="video/webm", headers=HEADERS)
         answer.force_close()
         return answer
+
+    async def _film_failed(self, request: web.Request) -> web.Response:
+        """Tell the experimenter, until the next thing is done, that the browser plays no films."""
+        self._experimenter.trouble = _FILMS_FAIL
+        self._wake()
+        return web.Response(status=204, headers=HEADERS)
 
     # --- who listens ----------------------------------------------------------------------------
 

@@ -84,6 +84,11 @@ export function tryNow() {
   retry?.();
 }
 
+// Have the experimenter know that this browser cannot play the films.
+export function filmFailed() {
+  fetch("/study/film_failed", { method: "POST" }).catch(() => setTimeout(filmFailed, AGAIN_MS));
+}
+
 function pause() {
   return new Promise((done) => {
     retry = done;

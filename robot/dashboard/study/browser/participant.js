@@ -1,6 +1,6 @@
 // The participant's page: one sheet, which shows what the study says and sends what is done.
 
-import { connect, send, tryNow } from "./connection.js";
+import { connect, filmFailed, send, tryNow } from "./connection.js";
 import { button, make, paragraphs, readTexts, say } from "./elements.js";
 import { presentation, ready } from "./presentation.js";
 import { questions } from "./questions.js";
@@ -54,6 +54,7 @@ const seesFilms = () => document.createElement("video").canPlayType("video/webm"
 
 function consent(page) {
   if (!page.camera && !seesFilms()) {
+    filmFailed();
     return make("section", {}, make("h1", { tabIndex: -1 }, say("consent.title")),
       make("p", { role: "alert" }, say("film.failed")));
   }

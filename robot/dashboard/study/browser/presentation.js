@@ -1,5 +1,6 @@
 // What is judged: a film in the page, or the head in the room.
 
+import { filmFailed } from "./connection.js";
 import { button, make, say } from "./elements.js";
 
 // Return what stands before a presentation.
@@ -80,6 +81,7 @@ function filmed(page, send) {
     video.addEventListener("ended", () => over(video.currentTime), { once: true });
     video.addEventListener("error", () => {
       over();
+      filmFailed();
       sheet.replaceChildren(words);
       words.textContent = say("film.failed");
     }, { once: true });
