@@ -279,12 +279,25 @@ def test_more_than_a_page_of_answers_holds_is_not_read(pages: Pages, tab: Tab) -
 # --- the pages ----------------------------------------
 
 
-def test_uses_that_were_not_ticked_are_not_consented_to(pages: Pages, tab: Tab) -> None:
+def consented(pages: Pages, asked: list[str], ticked: list[str]) -> tuple[bool, bool, bool]:
+    """Whether taking part, pictures, and gaze were consented to."""
+    tab = Tab(pages.server.participant_url)
     page = tab.page()
-    assert (page["kind"], page["uses"]) == ("consent", ["gaze"])
-    tab.do(page["page"], do="consent", given=True, uses=["pictures"])  # which was not asked for
+    assert (page["kind"], page["uses"]) == ("consent", asked)
+    tab.do(page["page"], do="consent", given=True, uses=ticked)
     said = next(one for one in pages.journal.records if isinstance(one, Consented))
-    assert (said.given, said.pictures, said.gaze) == (True, False, False)
+    return said.given, said.pictures, said.gaze
+
+
+def test_uses_that_were_not_ticked_are_not_consented_to(
+    studies: dict[str, LoadedStudy], tmp_path: Path
+) -> None:
+    with serving(studies["nakamoto_2"], tmp_path / CODE, {}) as pages:  # pictures are not asked for
+        assert consented(pages, ["gaze"], ["pictures"]) == (True, False, False)
+
+
+def test_films_ask_for_no_use_of_a_camera(pages: Pages) -> None:
+    assert consented(pages, [], ["gaze", "pictures"]) == (True, False, False)
 
 
 def test_who_declines_is_thanked_and_has_no_code(pages: Pages, tab: Tab) -> None:

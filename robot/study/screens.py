@@ -15,7 +15,7 @@ Ending = Literal["finished", "declined", "withdrawn", "excluded"]
 class ConsentScreen:
     """What is kept, and whether the participant agrees.
 
-    pictures, gaze: the use is asked for
+    pictures, gaze: the use is asked for; of films never, as no camera sees who looks at them
     """
 
     pictures: bool

@@ -110,7 +110,7 @@ class StudySession:
             return PausedScreen()
         match place.step:
             case "consent":
-                return ConsentScreen(design.privacy.pictures, design.privacy.gaze)
+                return self._consent_screen()
             case "instructions":
                 trials = design.trials
                 return InstructionsScreen(len(self.order), trials.practice, trials.seconds)
@@ -195,10 +195,14 @@ class StudySession:
             WrongAnswer: another screen is shown.
         """
         self._require("consent")
-        asked = self.design.privacy
+        asked = self._consent_screen()
         uses = given and pictures and asked.pictures, given and gaze and asked.gaze
         said = Consented(given, *uses, utc)
         return (said,) if given else (said, Closed("withdrawn", "no consent", utc))
+
+    def _consent_screen(self) -> ConsentScreen:
+        camera, kept = self.design.presentation.on == "head", self.design.privacy
+        return ConsentScreen(camera and kept.pictures, camera and kept.gaze)
 
     def go_on(self) -> None:
         """Leave the instructions or a rest, of which nothing is recorded.
