@@ -96,10 +96,18 @@ def test_loom_within_10_per_cent(radius: float, loom: float) -> None:
 
 @pytest.mark.parametrize("at", [(5.0, 120.0), (315.0, 120.0), (160.0, 5.0), (160.0, 235.0)])
 def test_a_thing_that_the_edge_of_the_image_cuts_does_not_grow(at: tuple[float, float]) -> None:
-    inwards = tuple(np.sign(np.subtract((160.0, 120.0), at)) * 300.0)
-    for blob in seen(40, inwards, 0.0, 0.0, at=at):
+    inwards = tuple(np.sign(np.subtract((160.0, 120.0), at)) * 100.0)
+    cut = [blob for blob in seen(40, inwards, 0.0, 2.0, at=at) if reaches_edge(blob)]
+    assert cut
+    for blob in cut:
         assert blob.loom_1_s == 0.0 and blob.loom_sd_1_s == np.inf
         assert blob.v_camera_m_s is not None and blob.v_camera_m_s[2] == 0.0
+
+
+def reaches_edge(blob: MovingBlob) -> bool:
+    assert blob.box_px is not None
+    x, y, width, height = blob.box_px
+    return x <= 1.5 or y <= 1.5 or x + width >= WIDTH - 2.5 or y + height >= HEIGHT - 2.5
 
 
 def test_all_three_at_once() -> None:

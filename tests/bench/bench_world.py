@@ -22,6 +22,7 @@ import numpy as np
 TESTS = Path(__file__).parents[1]
 sys.path.insert(0, str(TESTS))
 
+from bench.gaze_misses import looked, text  # noqa: E402
 from posed_people import (  # noqa: E402
     CAMERA_M,
     OPTICAL,
@@ -36,22 +37,16 @@ from posed_people import (  # noqa: E402
 from rendering import why_not  # noqa: E402
 
 from gazerig.config.load import load, shipped  # noqa: E402
-from gazerig.config.schema import load_rig  # noqa: E402
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view  # noqa: E402
 from gazerig.drivers.types import FaceDetector  # noqa: E402
 from gazerig.drivers.vision.face.detector import face_detector  # noqa: E402
 from gazerig.drivers.vision.face.params import FaceDetectorParams  # noqa: E402
 from gazerig.gaze.angles import compose, rotation  # noqa: E402
 from gazerig.gaze.types import Mat3  # noqa: E402
-from gazerig.robot.app.assemble import assemble  # noqa: E402
-from gazerig.robot.app.options import RunOptions  # noqa: E402
-from gazerig.robot.control.loop import run  # noqa: E402
-from gazerig.robot.control.tick import Tick  # noqa: E402
 from gazerig.robot.model.intrinsics import project  # noqa: E402
 from gazerig.robot.model.scene_view import PinholeView  # noqa: E402
 from gazerig.sim_mock.cameras.optics import CameraMotion, OpticsParams, expose  # noqa: E402
 from gazerig.sim_mock.scenes.scene import ScenePerson  # noqa: E402
-from gazerig.sim_mock.true_gaze import gaze_off_rad, true_part  # noqa: E402
 from gazerig.sim_mock.world.script import Act, PersonScript, PlaceScript, WorldScript  # noqa: E402
 from gazerig.sim_mock.world.world_scene import WorldScene  # noqa: E402
 
@@ -313,47 +308,7 @@ def gaze(args: argparse.Namespace) -> None:
     seconds = 8.0 if args.quick else 24.0
     print(f"\ngaze off the true part of the face, deg, in {seconds:g} s of the conversation")
     for name, blind in (("rendered pictures", False), ("computed detections", True)):
-        off, spent_s, pictures = looked(seconds, blind)
-        median, most = np.percentile(off, (50, 95))
-        share = 100.0 * float(np.mean(np.array(off) < 2.0))
-        print(
-            f"{name:20} median {median:.2f}, 95 % {most:.2f}, below 2 deg {share:.0f} %; "
-            f"{len(off)} ticks on a face, {pictures} pictures, {spent_s:.1f} s of processor"
-        )
-
-
-def looked(seconds: float, blind: bool) -> tuple[list[float], float, int]:
-    """Return by how much each look at a face misses it [deg], processor time and pictures."""
-    rig = load_rig("desk")
-    began = time.process_time()
-    options = RunOptions(True, True, 0, world="conversation", no_pictures=blind)
-    made = assemble(rig, options)
-    off: list[float] = []
-    start: list[float] = []
-    pictures = 0
-
-    def watch(tick: Tick) -> None:
-        nonlocal pictures
-        start[:] = start or [tick.t_s]
-        begun = made.world_start_s()
-        if tick.detections is not None:
-            pictures = tick.detections.number
-        if begun is None or tick.target.kind != "face" or tick.gaze.phase == "saccade":
-            return
-        assert made.scene is not None
-        people = made.scene.people(tick.t_s - begun)
-        misses = [
-            degrees(gaze_off_rad(true_part(one, tick.target.part), tick.pose)) for one in people
-        ]
-        off.append(min(misses))
-
-    made.robot.start(made.clock)
-    try:
-        run(made.robot, made.clock, made.loop, lambda s: "over" if s > seconds else None, watch)
-    finally:
-        made.robot.stop()
-        made.close()
-    return off, time.process_time() - began, pictures
+        print(text(name, *looked(seconds, blind)))
 
 
 def _least_ms(work: Callable[[], object], rounds: int) -> float:

@@ -58,6 +58,8 @@ _SHAKES_ON_S = 0.5
 _LEAST_KNOWN = 0.4
 # So near to the image's edge, parts of its width, flow is not known where the camera turns.
 _EDGE_SHARE = 0.06
+# A patch that comes as near as this to the edge goes on beyond it.
+_CUT_PX = 2
 # Points enough for an affine fit.
 _SAMPLE = 400
 
@@ -247,6 +249,7 @@ class MotionDetector:
         fx, fy = (fastest_flow / dt_s).tolist()
         (sx, sy), (x, y, width, height) = now.scale, group.box
         left, top = to_given((x - 0.5, y - 0.5), now.scale)
+        edge_px = _EDGE_SHARE * now.grey.shape[1]
         return MovingBlob(
             follow.id,
             _KIND,
@@ -266,12 +269,12 @@ class MotionDetector:
             fastest_m=at,
             fastest_m_s=velocity(at, (fx, fy), loom, now.K),
             thickness_m=2.0 * far.z_m * inscribed_px(group, now.grey.shape) / float(now.K[0, 0]),
-            from_side=edges.left or edges.right,
+            from_side=x <= edge_px or x + width >= now.grey.shape[1] - edge_px,
         )
 
 
 class _Edges(NamedTuple):
-    """Beyond which edges of the image a patch may go on."""
+    """Beyond which edges of the image a patch goes on."""
 
     left: bool
     top: bool
@@ -280,9 +283,9 @@ class _Edges(NamedTuple):
 
 
 def _edges(group: Group, rows: int, columns: int) -> _Edges:
-    """Return the edges of the small image that a patch is too near to for its flow to be known."""
+    """Return the edges of the small image that a patch reaches."""
     x, y, width, height = group.box
-    near = _EDGE_SHARE * columns
+    near = _CUT_PX
     return _Edges(x <= near, y <= near, x + width >= columns - near, y + height >= rows - near)
 
 
