@@ -11,6 +11,7 @@ let take = () => {};
 let tell = () => {};
 let retry = null;
 let heardAt = performance.now();
+let offline = false; // it was said that nothing is heard
 let current = "";
 
 // Begin to listen: ``page`` takes pages, ``state`` takes "", "saving", "not_saved", "offline",
@@ -20,9 +21,20 @@ export function connect(page, state) {
   tell = state;
   listen();
   setInterval(() => {
-    if (performance.now() - heardAt > SILENT_AFTER_MS) tell("offline");
+    if (performance.now() - heardAt > SILENT_AFTER_MS) lost();
   }, 1000);
   return refresh();
+}
+
+function lost() {
+  offline = true;
+  tell("offline");
+}
+
+function heard() {
+  heardAt = performance.now();
+  if (offline) tell("");
+  offline = false;
 }
 
 function taken(page) {
@@ -35,10 +47,12 @@ async function refresh() {
     const answer = await fetch("/study/page", { cache: "no-store" });
     if (answer.status === 403) return tell("not_open");
     if (!answer.ok) throw new Error(answer.statusText);
-    heardAt = performance.now();
-    taken(await answer.json());
+    heard();
+    const page = await answer.json();
+    // Asked for twice at once it may come twice: what is filled in by then stays.
+    if (page.page !== current) taken(page);
   } catch {
-    tell("offline");
+    lost();
     setTimeout(refresh, AGAIN_MS);
   }
 }
@@ -46,9 +60,7 @@ async function refresh() {
 function listen() {
   const news = new EventSource("/study/news");
   news.onmessage = (event) => {
-    const lost = performance.now() - heardAt > SILENT_AFTER_MS;
-    heardAt = performance.now();
-    if (lost) tell("");
+    heard();
     if (event.data !== current && !sending) refresh();
   };
   news.onerror = () => {
@@ -115,7 +127,7 @@ async function post(body, stay) {
     tell(status === 403 ? "not_open" : "not_saved");
     return 0;
   }
-  heardAt = performance.now();
+  heard();
   tell(status === 409 ? "moved_on" : "");
   if (stay && status === 200) current = page.page;
   else taken(page);
