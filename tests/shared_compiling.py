@@ -10,6 +10,7 @@ import os
 import py_compile
 import random
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -46,7 +47,9 @@ def compile_missing(worker: str, config: pytest.Config) -> None:
     modules = (file for room in ROOMS for file in ROOT.glob(f"{room}/**/*.py"))
     for file in order_of(worker, modules):
         if not Path(importlib.util.cache_from_source(str(file))).exists():
-            py_compile.compile(str(file))
+            # A fork may write the same one right now, under the same temporary name.
+            with suppress(FileExistsError):
+                py_compile.compile(str(file))
 
 
 def order_of(worker: str, files: Iterable[Path]) -> list[Path]:
