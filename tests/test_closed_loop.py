@@ -29,6 +29,8 @@ RIG = changed(
 """The gaze stays on the face, on which it is measured; the head turns nearly all the way."""
 ARRIVED_S = STEP_AT_S + STEP_S
 CORRECTED_S = 0.2
+FACE_DEG = 4.0
+"""Half of a face's width at the distance of the scene, 1.1 m."""
 Column = NDArray[np.float64]
 PlacedBy = Literal["capture", "newest"]
 
@@ -127,10 +129,16 @@ def test_the_step_is_of_40_deg_and_the_loop_sees_it_late(step: Seen) -> None:
 
 def test_eyes_are_on_the_face_a_quarter_second_after_the_picture_of_its_arrival(step: Seen) -> None:
     shown_s = step.t_s[step.captured_s >= ARRIVED_S][0]
-    there_s = step.t_s[(step.t_s >= ARRIVED_S) & (step.off_deg < 1.0)][0]
-    assert there_s - shown_s <= 0.25 + RIG.gaze.oculomotor.latency_ms / 1e3
-    # and not by chance in passing: they stay, but for the saccades between its parts; a landing
-    # that was planned while the face still moved is corrected by one more, with some seeds
+
+    def there_s(off_deg: float) -> float:
+        return float(step.t_s[(step.t_s >= ARRIVED_S) & (step.off_deg < off_deg)][0] - shown_s)
+
+    # The eyes follow the step by catch-up saccades, some .2 s apart. The one that is under way as
+    # the picture comes was planned while the face still moved: it lands on the face (seeds 0 to 9:
+    # after .11 s at the latest), and one more puts it right on the part (.43 s).
+    assert there_s(FACE_DEG) <= 0.25
+    assert there_s(1.0) <= 0.25 + CORRECTED_S
+    # and not by chance in passing: they stay, but for the saccades between its parts
     later = (step.t_s > shown_s + 0.25 + CORRECTED_S) & (step.jumps == 0.0)
     assert np.percentile(step.off_deg[later], 95) < 1.5
 
