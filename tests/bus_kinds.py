@@ -5,6 +5,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any
 
+import pytest
+
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.hobby_board.channel import Channel
@@ -53,6 +55,12 @@ PLACES: dict[str, dict[str, tuple[int, ...]]] = {
 """Kind -> the buses that it is made of -> the places of their servos in the whole."""
 KINDS = tuple(PLACES)
 TWINS = ("in-process", "pty")
+ON_EITHER = [
+    pytest.param((kind, twin), marks=[pytest.mark.own_timeouts] if twin == "pty" else [])
+    for kind in KINDS
+    for twin in TWINS
+]
+"""Each kind over both; a servo that another process emulates may answer late."""
 
 
 def _patience(patient: bool, give_up_s: float) -> dict[str, Any]:

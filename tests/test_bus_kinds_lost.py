@@ -1,7 +1,7 @@
 """What every kind of servo bus does when a servo, a port or a supply goes away, over both twins."""
 
 import pytest
-from bus_kinds import KINDS, TWINS, in_process, twin_of
+from bus_kinds import KINDS, ON_EITHER, in_process, twin_of
 
 from gazerig.testing import BusLossSuite
 
@@ -9,7 +9,7 @@ pytestmark = pytest.mark.usefixtures("branched_children")
 
 
 class TestEveryKindOfLoss(BusLossSuite):
-    @pytest.fixture(params=[(kind, place) for kind in KINDS for place in TWINS], ids="-".join)
+    @pytest.fixture(params=ON_EITHER, ids="-".join)
     def twin(self, request):
         with twin_of(*request.param) as made:
             yield made

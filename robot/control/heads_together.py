@@ -8,7 +8,7 @@ from gazerig.robot.control.gesture_choices import GestureInfo
 from gazerig.robot.control.loop import Robot
 from gazerig.robot.control.tick_text import doing
 from gazerig.robot.model.commands import Command, Resume, Stop
-from gazerig.robot.model.reply import Ticket
+from gazerig.robot.model.reply import CommandReply, Ticket
 from gazerig.robot.model.types import OtherHead
 
 
@@ -41,16 +41,18 @@ class HeadsTogether:
         """Queue a command for the next tick, a stop and its end for all heads.
 
         Returns:
-            Where the first head's reply comes.
+            Where the first head's reply comes; of a stop or its end, what any of them refuses.
 
         Raises:
             ValueError: it cannot be done.
         """
-        if isinstance(command, Stop | Resume):
-            for other in self._others:
-                with contextlib.suppress(ValueError):  # nothing may keep the others from stopping
-                    other.robot.command(command)
-        return self._first.command(command)
+        if not isinstance(command, Stop | Resume):
+            return self._first.command(command)
+        tickets: list[tuple[str, Ticket]] = []
+        for name, robot in self._others:
+            with contextlib.suppress(ValueError):  # nothing may keep the others from stopping
+                tickets.append((name, robot.command(command)))
+        return _TicketOfAll(self._first.command(command), tickets)
 
     def menus(self) -> dict[str, tuple[str, ...]]:
         """Return what the first head offers."""
@@ -59,3 +61,24 @@ class HeadsTogether:
     def gestures(self) -> tuple[GestureInfo, ...]:
         """Return the first head's gestures."""
         return self._first.gestures()
+
+
+class _TicketOfAll(Ticket):
+    """The first head's reply, unless another head refuses what the first has done."""
+
+    def __init__(self, first: Ticket, others: Sequence[tuple[str, Ticket]]) -> None:
+        self._first, self._others = first, tuple(others)
+
+    def wait(self, within_s: float) -> CommandReply | None:
+        """Wait so long for the reply of each; None where the first head's loop has given none."""
+        reply = self._first.wait(within_s)
+        if reply is None or reply.refused:
+            return reply
+        for name, ticket in self._others:
+            # Heads count a stop from ticks of their own: of two, one may still have to hold it.
+            theirs = ticket.wait(within_s)
+            if theirs is None:
+                return CommandReply(f"head {name} does not answer")
+            if theirs.refused:
+                return CommandReply(f"head {name}: {theirs.refused}")
+        return reply
