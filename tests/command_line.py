@@ -1,5 +1,6 @@
 """gazerig as it is typed: in a process of its own, or in this one, which saves its start."""
 
+import functools
 import json
 import subprocess
 import sys
@@ -10,11 +11,17 @@ from typing import Any, NamedTuple
 
 import pytest
 import typer
+import typer.testing
 from typer.core import TyperGroup
 from typer.testing import CliRunner
 
 from gazerig.robot.cli.calibrate.group import DEFAULT, JointsUnlessNamed
 from gazerig.robot.cli.main import app, main
+
+# Each call in one process would build all commands anew, which one typed in a shell does once.
+_once = functools.cache(typer.main.get_command)
+for _module, _name in ((typer.main, "get_command"), (typer.testing, "_get_command")):
+    setattr(_module, _name, _once)
 
 _START = "import sys; from gazerig.robot.cli.main import main; sys.argv[0] = 'gazerig'; main()"
 GAZERIG = [sys.executable, "-c", _START]
