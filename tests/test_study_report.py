@@ -136,6 +136,7 @@ def test_the_page_says_what_a_reviewer_asks(page: str, ratings: StudyAnalysis) -
     assert page.count("data:image/png") == 5  # effects; of each item counts and participants
 
 
+@pytest.mark.usefixtures("unlaid_figures")
 def test_too_few_are_said_first() -> None:
     small = study(design(), 4)
     assert any(
@@ -146,6 +147,7 @@ def test_too_few_are_said_first() -> None:
     assert "Too few: with n = 4 nothing can be said of whether the walk exceeds" in said
 
 
+@pytest.mark.usefixtures("unlaid_figures")
 def test_who_is_left_out_is_listed_with_the_reason() -> None:
     four = replace(design(participants=4), trials=Trials(repetitions=2))
     careless = study(four, 3, Population(1.0, careless=1.0))
@@ -154,6 +156,7 @@ def test_who_is_left_out_is_listed_with_the_reason() -> None:
     assert "3 came, 0 count" in said
 
 
+@pytest.mark.usefixtures("unlaid_figures")
 def test_exclusions_and_switches_are_told() -> None:
     whole = study()
     lost = replace(whole.people[0], left_out="did not finish")
@@ -166,6 +169,7 @@ def test_exclusions_and_switches_are_told() -> None:
     assert "data of 2 more were deleted" in said
 
 
+@pytest.mark.usefixtures("unlaid_figures")
 def test_simulated_ones_do_not_count_beside_people() -> None:
     of = design()
     found = [records(of, k) for k in range(1, 5)]
@@ -183,6 +187,7 @@ def test_choices_have_a_table_and_a_scale() -> None:
     assert re.search(r"% of direct choices\) \(Bradley-Terry model\), χ²\(1\) = ", said)
 
 
+@pytest.mark.usefixtures("unlaid_figures")
 def test_scales_have_their_reliability_and_the_counts_of_their_items() -> None:
     of = design(
         questionnaires=("calmness",), hypotheses=(Hypothesis("calmness.ease", "walk", "centre"),)
@@ -198,6 +203,7 @@ def test_a_study_without_hypotheses_is_a_description() -> None:
     assert "states no hypothesis" in text_of(page_of(study(design(hypotheses=()), 6)))
 
 
+@pytest.mark.usefixtures("unlaid_figures")
 def test_remarks_are_shown_as_they_were_written() -> None:
     of = design()
     found = [
