@@ -19,8 +19,6 @@ from gazerig.robot.study.preregistration import canonical
 from gazerig.robot.study.records import Record
 from gazerig.robot.study.simulation import Population
 
-pytestmark = pytest.mark.usefixtures("unlaid_figures")  # test_study_report draws them whole
-
 SHOWN = {"walk": {"gaze.scanpath.model": "markov"}, "centre": {"gaze.scanpath.model": "simple"}}
 
 
