@@ -238,6 +238,18 @@ def ran(
     return session.run(composed, lambda: None, said.append)
 
 
+def test_who_asks_while_another_reason_is_looked_for_is_heard() -> None:
+    def thread() -> None:
+        asked.request("the program")  # as another thread does, in the middle of the look
+
+    def signalled() -> None:
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    for comes, expected in ((thread, "the program"), (signalled, "SIGTERM")):
+        with Interrupts(also=comes) as asked:
+            assert asked() == expected and asked.requests == 1
+
+
 @pytest.mark.parametrize("rig", ["desk", "feetech", "maker"])
 def test_no_memory_in_the_loop_leaves_by_the_door(
     rig: str, devices: list[Device], monkeypatch: pytest.MonkeyPatch

@@ -92,7 +92,10 @@ class Interrupts:
     def __call__(self) -> str | None:
         """Return the name of the first signal or the other reason to end, None before any."""
         if self._first is None and self._also is not None:
-            self._first = self._also()
+            other = self._also()
+            # Meanwhile a signal or another thread may have asked: that is not to be forgotten.
+            if other is not None and self._first is None:
+                self._first = other
         return self._first
 
     def request(self, reason: str) -> None:
