@@ -18,6 +18,7 @@ ALLOWED = {
     # for the rig's file, which is read and written while running
     *("ruamel", "pydantic", "pydantic_core", "annotated_types", "typing_inspection"),
     *("typing_extensions", "cython_runtime"),
+    *("sitecustomize", "usercustomize"),  # the machine's own, with every Python: Debian has one
 }
 """Packages that are imported: no other."""
 
