@@ -115,8 +115,6 @@ CHROMIUM_FLAGS = (
     *("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--hide-scrollbars"),
     # No name resolves: a page that needed anything from elsewhere would stay empty.
     "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1, EXCLUDE 127.0.0.2",
-    # Of the program's own bubbles one is drawn in advance, in a process of its own.
-    "--disable-features=WebUIOmniboxPopup,WebUIOmniboxAimPopup",
     "--remote-debugging-port=0",
 )
 
