@@ -209,7 +209,9 @@ class RunningHead(LocalHead):
         """Run from torque on to torque off; the thread of the loop."""
         ended = "fault: unexpected error"
         try:
-            figures = session.run(composed, self._interrupts, self._say, watch=self._update)
+            figures = session.run(
+                composed, self._interrupts, self._say, watch=self._update, summarised=False
+            )
             ended = str(figures["stopped_by"])
         except BaseException as error:
             self._failure = error
@@ -256,7 +258,11 @@ class SimulatedHead(LocalHead):
         with stack:
             stack.callback(composed.made.close)
             self._session = session.Session(
-                composed, Interrupts(signals=False), self._say, watch=self._feed.update
+                composed,
+                Interrupts(signals=False),
+                self._say,
+                watch=self._feed.update,
+                summarised=False,
             )
             self._loop: TickLoop = stack.enter_context(self._session.powered())
             self._stack = stack.pop_all()

@@ -213,7 +213,7 @@ class TargetPrediction:
         """Return the swing of the recent past, None where there is none."""
         sine = self.sine
         if sine is None:
-            if self._past_m() < 2.0 * _LEAST_M:
+            if not self._has_moved(2.0 * _LEAST_M):
                 return None
             # One stretch a frame, in turn.
             self._turn = (self._turn + 1) % len(_IN_TURN_S)
@@ -231,11 +231,14 @@ class TargetPrediction:
         past = np.array([seen for seen in self._past if seen[0] > since_s])
         return fitted(past, at_s, _FITS if sine is None else _STILL_FITS)
 
-    def _past_m(self) -> float:
-        """Return how far apart the target's places have been, along the axis of most."""
-        _, *axes = zip(*islice(self._past, 0, None, _SPARSE), strict=True)
-        spans: list[float] = [max(axis) - min(axis) for axis in axes[:3]]
-        return max(spans)
+    def _has_moved(self, least_m: float) -> bool:
+        """Return whether the target's places have been so far apart along any axis."""
+        past = [*islice(self._past, 0, None, _SPARSE)]
+        for axis in (1, 2, 3):  # of _Seen
+            places = [seen[axis] for seen in past]
+            if max(places) - min(places) >= least_m:
+                return True
+        return False
 
 
 def _no_longer(v: Vec3, most: float) -> Vec3:

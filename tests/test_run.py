@@ -12,6 +12,9 @@ from command_line import figures, gazerig, typed
 from ideal_bus import ideal_buses
 from slow_rigs import at_rate
 
+from gazerig.robot.app import session
+from gazerig.robot.app.options import RunOptions
+
 
 @pytest.fixture(scope="module")
 def half(tmp_path_factory: pytest.TempPathFactory) -> str:
@@ -36,6 +39,18 @@ def test_summary_tells_all_it_promises(visitor: dict[str, Any]) -> None:
     assert {"tx_bytes", "rx_bytes", "errors"} <= set(visitor["bus"])
     assert visitor["stopped_by"] == "seconds" and visitor["overruns"] == 0
     assert visitor["ticks"] == pytest.approx(44 * 100, abs=2)
+
+
+def test_who_asks_for_no_figures_gets_the_same_bytes_and_how_it_ended() -> None:
+    asked = RunOptions(True, True, scene="boxing", seconds=0.5, rig="desk").checked()
+    whole, less = (
+        session.run(session.compose(asked), lambda: None, lambda line: None, summarised=summarised)
+        for summarised in (True, False)
+    )
+    assert less["bus"] == whole["bus"] and {*less} < {*whole}
+    assert less["stopped_by"] == "seconds" and less["ticks"] == whole["ticks"] > 90
+    summed_up = {"seconds", "gaze_error_deg", "target_share", "behaviours"}
+    assert summed_up <= {*whole} and not summed_up & {*less}
 
 
 def test_the_head_looks_at_the_visitor(visitor: dict[str, Any]) -> None:

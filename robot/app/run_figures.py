@@ -26,13 +26,13 @@ class SceneScore(NamedTuple):
 
 def run_figures(
     made: Assembly,
-    summary: Summary,
+    summary: Summary | None,
     score: SceneScore | None,
     count: LoopCount,
     wall_s: float,
     faults: JointFaults,
 ) -> dict[str, object]:
-    """Join the figures of the ticks, the loop, the frames and the bus."""
+    """Join the figures of the ticks, where they were summed up, the loop, frames and bus."""
     robot = made.robot
     health = robot.body.bus.health()
     bus: dict[str, object] = {
@@ -43,13 +43,14 @@ def run_figures(
     digest = made.sent_digest()
     if digest is not None:
         bus["tx_sha256"] = digest
-    ticks = summary.figures()
+    ticks = summary.figures() if summary is not None else {}
     if score is not None and (behaviours := score.behaviours.figures()):
         ticks["behaviours"] = behaviours
     if score is not None and (planner := score.planner.figures()):
         ticks["planner"] = planner
+    seconds = {"seconds": ticks.pop("seconds")} if ticks else {}
     return {
-        "seconds": ticks.pop("seconds"),
+        **seconds,
         "wall_seconds": round(wall_s, 3),
         "ticks": count.ticks,
         "overruns": count.overruns,

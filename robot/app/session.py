@@ -141,6 +141,7 @@ def run(
     watch: Callable[[Tick], object] | None = None,
     browse: Callable[[str], object] | None = None,
     ends: Callable[[str], object] | None = None,
+    summarised: bool = True,
 ) -> dict[str, object]:
     """Run until the time is over, a signal comes or something fails; return the figures.
 
@@ -152,12 +153,14 @@ def run(
         watch: gets every tick.
         browse: opens the page in the user's browser; None: leaves that to the user.
         ends: gets the reason as soon as it ends, before the head parks.
+        summarised: also sum up every tick, for figures of the gaze and of a scene's events.
 
     Raises:
         SetupError: before anything moved.
     """
     try:
-        return Session(composed, stopped, say, status, watch, browse).whole(ends)
+        session = Session(composed, stopped, say, status, watch, browse, summarised)
+        return session.whole(ends)
     finally:
         composed.made.close()
 
@@ -176,6 +179,7 @@ class Session:
         status: Callable[[str], None] | None = None,
         watch: Callable[[Tick], object] | None = None,
         browse: Callable[[str], object] | None = None,
+        summarised: bool = True,
     ) -> None:
         options, made = composed.options, composed.made
         self._options, self._made, self._stopped = options, made, stopped
@@ -183,10 +187,10 @@ class Session:
         self._run_observers = RunObservers(
             made, options, say, status, composed.tuning, composed.recorder, browse=browse
         )
-        self._summary = Summary()
+        self._summary = Summary() if summarised else None
         self._faults = JointFaults(say, self._run_observers.busy)
         scene = made.scene
-        self._score = SceneScore.of(scene) if scene is not None else None
+        self._score = SceneScore.of(scene) if summarised and scene is not None else None
         self._face_gaze = GazeOnFace() if options.heatmap is not None else None
         self._start_s = 0.0
         self.stopped_by = "fault: unexpected error"
@@ -201,7 +205,8 @@ class Session:
 
     def _all_observers(self) -> Observers:
         observers = Observers(self._say)
-        observers.add("the summary", self._summary.update)
+        if self._summary is not None:
+            observers.add("the summary", self._summary.update)
         observers.add("the watch for faults", self._faults.update)
         self._run_observers.join(observers)
         _observe_scene(observers, self._made, self._score, self._face_gaze)

@@ -83,9 +83,11 @@ def run(
         opening = Opening("" if fast else what_runs(asked))
         with tidied_up():
             group = _group(asked)
-            carry_out = (
-                group.run if group is not None else partial(session.run, session.compose(asked))
-            )
+            if group is not None:
+                carry_out = group.run
+            else:
+                told = summary is not None
+                carry_out = partial(session.run, session.compose(asked), summarised=told)
         with signals() as stopped:
             figures = carry_out(stopped, opening.say, shows, opening.saw, browse)
         _write_summary(figures, summary, force)

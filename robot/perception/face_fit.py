@@ -10,7 +10,6 @@ Frame: of a camera that looks at the face with its eyes level; x right, y down, 
 are seen on the plane z = 1.
 """
 
-from collections.abc import Iterator
 from math import cos, hypot, radians, sin, sqrt
 from typing import NamedTuple
 
@@ -240,6 +239,9 @@ def _sums(
 ) -> _Sums:
     """Return the normal equations at a pose.
 
+    A point P turned by a small w moves by w x P; a row of the equations is how its picture moves.
+    Each point has a row of x, of weight k, and one of y, of weight h.
+
     Args:
         nose: as seen.
         others: eyes and corners of the mouth as seen.
@@ -249,6 +251,7 @@ def _sums(
         p_m: its position.
         length: its length.
     """
+    (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = R
     px, py, pz = p_m
     q = 1.0 / pz
     nx, ny, u, v = q * q, q * q, px * q, py * q
@@ -258,8 +261,20 @@ def _sums(
     x0 = x1 = x2 = x4 = y0 = y1 = y2 = y4 = 0.0
     a00 = a01 = a02 = a03 = a04 = a11 = a12 = a13 = a14 = 0.0
     a22 = a23 = a24 = a34 = a44 = b0 = b1 = b2 = b4 = 0.0
-    rows = _rows(others, frontal, height_weight, R, p_m, length)
-    for k, h, x, y, u, v, c0, c1, c4, d0, d1, d4, eu, ev in rows:
+    weights = 1.0, 1.0, height_weight, height_weight
+    for (fx, fy, fz), (seen_u, seen_v), weight in zip(frontal, others, weights, strict=True):
+        tall = fy * length
+        x = r00 * fx + r01 * tall + r02 * fz  # the turned point
+        y = r10 * fx + r11 * tall + r12 * fz
+        z = r20 * fx + r21 * tall + r22 * fz
+        q = 1.0 / (pz + z)
+        k, u, v = q * q, (px + x) * q, (py + y) * q
+        h = weight * k
+        # Coefficients of the turn's first two components and the length, in the row of x and in
+        # that of y. Those of its third are -y and x, those of the distance -u and -v.
+        c0, c1, c4 = -u * y, z + u * x, fy * (r01 - u * r21)
+        d0, d1, d4 = -z - v * y, v * x, fy * (r11 - v * r21)
+        eu, ev = (seen_u - u) * q, weight * (seen_v - v) * q  # the weighted errors
         kc0, kc1, kc2, kc3, kc4 = k * c0, k * c1, -k * y, -k * u, k * c4
         kd0, kd1, kd2, kd3, kd4 = h * d0, h * d1, h * x, -h * v, h * d4
         nx, ny, ex, ey = nx + k, ny + h, ex + eu, ey + ev
@@ -288,37 +303,6 @@ def _sums(
     products = a00, a01, a02, a03, a04, a11, a12, a13, a14, a22, a23, a24, a33, a34, a44
     to_x, to_y = (x0, x1, x2, x3, x4), (y0, y1, y2, y3, y4)
     return _Sums(nx, ny, to_x, to_y, products, (b0, b1, b2, b3, b4), ex, ey)
-
-
-def _rows(
-    others: Points,
-    frontal: tuple[Vec3, ...],
-    height_weight: float,
-    R: Mat3,
-    p_m: Vec3,
-    length: float,
-) -> Iterator[tuple[float, ...]]:
-    """Yield the two equations of each point, one of x and one of y; arguments as of ``_sums``.
-
-    A point P turned by a small w moves by w x P; a row of the equations is how its picture moves.
-    Each: their weights k and h; the turned point's x and y; where it is seen, u and v; the
-    coefficients of the turn's first two components and the length, c0, c1, c4 of x and d0, d1, d4
-    of y (those of its third are -y and x, those of the distance -u and -v); the weighted errors.
-    """
-    (r00, r01, r02), (r10, r11, r12), (r20, r21, r22) = R
-    px, py, pz = p_m
-    weights = 1.0, 1.0, height_weight, height_weight
-    for (fx, fy, fz), (seen_u, seen_v), weight in zip(frontal, others, weights, strict=True):
-        tall = fy * length
-        x = r00 * fx + r01 * tall + r02 * fz
-        y = r10 * fx + r11 * tall + r12 * fz
-        z = r20 * fx + r21 * tall + r22 * fz
-        q = 1.0 / (pz + z)
-        k, u, v = q * q, (px + x) * q, (py + y) * q
-        c0, c1, c4 = -u * y, z + u * x, fy * (r01 - u * r21)
-        d0, d1, d4 = -z - v * y, v * x, fy * (r11 - v * r21)
-        eu, ev = (seen_u - u) * q, weight * (seen_v - v) * q
-        yield k, weight * k, x, y, u, v, c0, c1, c4, d0, d1, d4, eu, ev
 
 
 def _step(sums: _Sums, turn: Vec3, length: float, variance: float) -> Five | None:

@@ -172,7 +172,7 @@ def looping(asked: dict[str, Any]) -> dict[str, Any]:
             more["record"] = Path(folder) / "run.mcap"
         composed = session.compose(RunOptions(mock=True, scene="visitor", **more))
         elsewhere(os.getpid(), "gazerig.sim_mock.pty.server")
-        run = session.Session(composed, lambda: None, lambda line: None)
+        run = session.Session(composed, lambda: None, lambda line: None, summarised=False)
         begun_s: list[float] = []
         with run.powered() as loop:
             page: Any = run._run_observers._page

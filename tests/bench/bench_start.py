@@ -27,7 +27,7 @@ from gazerig.robot.app.options import RunOptions
 imported = time.process_time()
 composed = session.compose(RunOptions(mock=True, {options}).checked())
 made = time.process_time()
-run = session.Session(composed, lambda: None, lambda line: None)
+run = session.Session(composed, lambda: None, lambda line: None, summarised=False)
 with run.powered() as loop:
     loop.step()
     ticked = time.process_time()

@@ -164,7 +164,7 @@ def measure(args: argparse.Namespace, folder: Path) -> dict[str, Any]:
     kind = "feetech" if args.rig == "feetech" else "dynamixel"
     rate_hz = composed.made.loop.rate_hz
     beside = peers(kind, rate_hz, PEERS_S)
-    run = session.Session(composed, lambda: None, lines.append)
+    run = session.Session(composed, lambda: None, lines.append, summarised=False)
     try:
         with run.powered() as loop:
             timers = Timers(loop)
@@ -250,7 +250,7 @@ def simulated(args: argparse.Namespace, folder: Path) -> dict[str, Any]:
     wall, cpu = [], []
     for _ in range(3):
         composed = session.compose(options_of(args, folder))
-        run = session.Session(composed, lambda: None, lambda line: None)
+        run = session.Session(composed, lambda: None, lambda line: None, summarised=False)
         with run.powered() as loop:
             gc.collect()
             began = time.monotonic(), time.process_time()

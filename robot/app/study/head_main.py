@@ -52,7 +52,7 @@ def main() -> int:
     threading.Thread(target=wait, daemon=True).start()
     try:
         composed = session.compose(options)
-        figures = session.run(composed, lambda: ended[0] if ended else None, _say)
+        figures = session.run(composed, lambda: ended[0] if ended else None, _say, summarised=False)
     except Error as error:
         _say(str(error))
         return 1
