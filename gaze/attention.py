@@ -118,7 +118,11 @@ class Attention:
         """Return the target in force at ``t_s``."""
         stale_s = self._params.stale_ms / 1e3
         fresh = percept is not None and t_s - percept.captured_s <= stale_s
-        if percept is not None and fresh and percept.captured_s != self._seen_s:
+        new = percept is not None and percept.captured_s != self._seen_s
+        target = self._target
+        if fresh and not new and target is not None and not self._reaction.waits:
+            return target  # as decided on the frame
+        if percept is not None and fresh and new:
             self._seen_s = percept.captured_s
             self._target = self._decide(percept, state, t_s)
         if fresh:

@@ -80,6 +80,11 @@ class Reaction:
         """Drop what waits: it no longer wins."""
         self._next = None
 
+    @property
+    def waits(self) -> bool:
+        """Return whether a target waits for its time."""
+        return self._next is not None
+
     def take(self, t_s: float) -> Target | None:
         """Return the target whose time is over, once; None while there is none."""
         target = self._next
