@@ -96,6 +96,15 @@ def test_vendor_packages_have_owners(module: str, path: Path) -> None:
             assert module.startswith(owners), f"{module} must not import {package}"
 
 
+def test_no_class_name_stands_for_two_things() -> None:
+    found: dict[str, set[str]] = {}
+    for path in [*(path for _, path in modules()), *sorted((ROOT / "api").rglob("*.py"))]:
+        for node in ast.walk(parsed(path)):
+            if isinstance(node, ast.ClassDef):
+                found.setdefault(node.name, set()).add(str(path.relative_to(ROOT)))
+    assert not {name: files for name, files in found.items() if len(files) > 1}
+
+
 def linted(folder: Path) -> subprocess.CompletedProcess[str]:
     """Check the contracts on the package ``gazerig`` that lies in a folder."""
     command = [sys.executable, "-c", "from importlinter.cli import lint_imports_command as c; c()"]

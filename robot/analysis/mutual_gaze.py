@@ -56,7 +56,7 @@ class MutualLooks(NamedTuple):
     second: Mask
 
 
-class _Seen(NamedTuple):
+class _SeenHead(NamedTuple):
     """A head at an instant, in the common world; size: of its face, an adult's being 1."""
 
     eyes_m: Vec3
@@ -76,12 +76,12 @@ class MutualGazeTrace:
 
     def __init__(self, first: HeadPlace, second: HeadPlace) -> None:
         self._places = first, second
-        self._newest: list[_Seen | None] = [None, None]
+        self._newest: list[_SeenHead | None] = [None, None]
         self._rows: list[tuple[float, bool, bool]] = []
 
     def update(self, number: int, tick: Tick) -> None:
         """Add a tick of the first head (0) or of the other (1)."""
-        self._newest[number] = _seen(self._places[number], tick)
+        self._newest[number] = _seen_head(self._places[number], tick)
         first, second = self._newest
         if number == 0 and first is not None and second is not None:
             looks = _looks_at(first, second), _looks_at(second, first)
@@ -140,12 +140,12 @@ def mutual_gaze(t_s: Floats, first: Mask, second: Mask) -> dict[str, object]:
     }
 
 
-def _seen(place: HeadPlace, tick: Tick) -> _Seen:
+def _seen_head(place: HeadPlace, tick: Tick) -> _SeenHead:
     pose = tick.pose
     middle = scale(add(pose.p_world_eye_left_m, pose.p_world_eye_right_m), 0.5)
     measures = measures_of(pose.p_world_eye_left_m, pose.p_world_eye_right_m)
     nose = add(pose.p_world_head_m, rotate(pose.R_world_head, measures.nose_m))
-    return _Seen(
+    return _SeenHead(
         add(place.p_m, rotate(place.R, middle)),
         rotate(place.R, cyclopean(tick)),
         compose(place.R, pose.R_world_head),
@@ -154,7 +154,7 @@ def _seen(place: HeadPlace, tick: Tick) -> _Seen:
     )
 
 
-def _looks_at(one: _Seen, other: _Seen) -> bool:
+def _looks_at(one: _SeenHead, other: _SeenHead) -> bool:
     """Return whether a gaze passes through the oval of a face that it sees from before."""
     point = on_face(one.eyes_m, one.gaze, other.nose_m, other.R)
     if point is None:

@@ -54,7 +54,7 @@ class _Begin(ParticipantEvent, tag="begin"):
         run.begin(self.page)
 
 
-class _Seen(ParticipantEvent, tag="seen"):
+class _FilmSeen(ParticipantEvent, tag="seen"):
     seconds: float
 
     def tell(self, run: StudyRun) -> None:
@@ -62,7 +62,7 @@ class _Seen(ParticipantEvent, tag="seen"):
         run.film_ended(self.page, self.seconds)
 
 
-class _Answer(msgspec.Struct):
+class _GivenAnswer(msgspec.Struct):
     """An answer; key: number of the question on the page; ms: since the page appeared."""
 
     key: str
@@ -71,7 +71,7 @@ class _Answer(msgspec.Struct):
 
 
 class _Answers(ParticipantEvent, tag="answer"):
-    answers: list[_Answer]
+    answers: list[_GivenAnswer]
 
     def tell(self, run: StudyRun) -> None:
         """Record the answers."""
@@ -85,7 +85,7 @@ class _Withdraw(ParticipantEvent, tag="withdraw"):
         run.withdraw()
 
 
-_DECODER = msgspec.json.Decoder(_Consent | _Next | _Begin | _Seen | _Answers | _Withdraw)
+_DECODER = msgspec.json.Decoder(_Consent | _Next | _Begin | _FilmSeen | _Answers | _Withdraw)
 
 
 def event_of(body: bytes) -> ParticipantEvent:
@@ -105,7 +105,7 @@ def event_of(body: bytes) -> ParticipantEvent:
     return event
 
 
-def _number(answer: _Answer) -> int:
+def _number(answer: _GivenAnswer) -> int:
     if not (answer.key.isascii() and answer.key.isdigit() and len(answer.key) <= 3):
         raise Malformed(f"{answer.key!r:.20} is no question")
     return int(answer.key)
