@@ -38,6 +38,8 @@ MUTANTS = (
            "interest that was lost never recovers", ("habituation",)),
     Mutant("gaze/top_down.py", "self._params.stay_with_person**self._params.nearness", "1.0",
            "the gaze does not stay with a person", ("attention", "attention_choice", "habituation")),
+    Mutant("gaze/attention.py", " and not self._reaction.waits:", ":",
+           "what has won is looked at with the next frame at the soonest", ("attention_choice", "reaction")),
     Mutant("gaze/field_of_view.py", "before = (along > 0.0) & ", "before = ",
            "what is behind the eye hides things", ("attention", "attention_choice")),
     # ---- gaze: eyes, head, lids
