@@ -48,7 +48,7 @@ def test_who_asks_for_no_figures_gets_the_same_bytes_and_how_it_ended() -> None:
         for summarised in (True, False)
     )
     assert less["bus"] == whole["bus"] and {*less} < {*whole}
-    assert less["stopped_by"] == "seconds" and less["ticks"] == whole["ticks"] > 90
+    assert less["stopped_by"] == "seconds" and less["ticks"] == whole["ticks"] != 0
     summed_up = {"seconds", "gaze_error_deg", "target_share", "behaviours"}
     assert summed_up <= {*whole} and not summed_up & {*less}
 
