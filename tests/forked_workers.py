@@ -20,6 +20,8 @@ from typing import Any, NoReturn
 
 import child_processes
 import pytest
+import running_order
+import time_slices
 
 START, REPORT, FINISH, WARNING, READY = "start", "report", "finish", "warning", "ready"
 """What a worker tells."""
@@ -174,6 +176,7 @@ def _serve(session: pytest.Session, line: Connection) -> NoReturn:
             if not items:
                 break
             for item, following in zip(items, [*items[1:], None], strict=True):
+                time_slices.ask_for(None if running_order.waits(item) else time_slices.LONG_S)
                 item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
         code = 0
     finally:

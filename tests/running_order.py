@@ -13,6 +13,9 @@ import pytest
 WAITING = {"browser", "own_timeouts", "pty"}
 """Marks of what mostly waits for other processes."""
 
+_WAITING_NAMES = {"Branch", "commands_started", "subprocess", "threading", "time"}
+"""Who imports one of these waits for another process, a thread or the time."""
+
 COSTS_S = {
     "bus_kinds_faults": 12,
     "seeing_camera_motion": 10,
@@ -71,7 +74,7 @@ def spread(items: Sequence[pytest.Item]) -> list[pytest.Item]:
     waiting, costly, others = [], [], []
     for file, tests in files.items():
         cost_s = _cost_s(file, tests)
-        if any(_marks(item) & WAITING for item in tests):
+        if any(waits(item) for item in tests):
             waiting.append((cost_s, tests))
         elif cost_s:
             costly.append((cost_s, tests))
@@ -81,6 +84,12 @@ def spread(items: Sequence[pytest.Item]) -> list[pytest.Item]:
     nothing: tuple[float, list[pytest.Item]] = (0.0, [])
     turns = zip_longest(*by_cost, fillvalue=nothing)
     return [item for turn in turns for _, tests in turn for item in tests]
+
+
+def waits(item: pytest.Item) -> bool:
+    """Return whether a test mostly waits rather than computes."""
+    names = vars(getattr(item, "module", object)).keys()
+    return bool(_marks(item) & WAITING or _WAITING_NAMES & names)
 
 
 def _cost_s(file: str, tests: Sequence[pytest.Item]) -> float:
