@@ -172,7 +172,12 @@ def test_a_target_is_dragged_through_the_scene(at_the_rig: tuple[Rig, Person]) -
         lambda: person.run(f"{saying('attack')}.ariaPressed") == "true",
         "the page knowing of the look",
     )
-    person.click(beside("drag a target", "input"))
+    box = beside("drag a target", "input")
+
+    def shown() -> bool:  # a second click would hide it
+        return person.run(f"{box}?.checked") is True or (person.clicked(box) and False)
+
+    wait_for(shown, "the target")
     # Charts in the drawers are canvases too.
     scene = f"{view}.document.querySelector('canvas[data-engine]')"
     rect = f"(() => {{ const r = {scene}.getBoundingClientRect();"

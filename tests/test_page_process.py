@@ -1,6 +1,7 @@
 """The page's process: it holds up nobody, ends with its parent and finds itself a port."""
 
 import itertools
+import json
 import os
 import signal
 import socket
@@ -15,11 +16,13 @@ from urllib.parse import urlsplit
 import child_processes
 import pytest
 import shown_page
-from page_visitor import PATIENCE_S, Visitor
+from page_visitor import LOOKING, PATIENCE_S, Visitor, unpacked
 from shown_page import AHEAD, free_port, running_page, wait_for
 
 from gazerig.robot.dashboard.feed.page_process import PageProcess
 from gazerig.robot.dashboard.page_main import free_port as first_free_port
+from gazerig.robot.dashboard.view.views import BOTH, NAMES, view
+from gazerig.robot.dashboard.widgets.widgets import PANELS
 from gazerig.robot.model.types import SeenFace
 
 REPOSITORY = Path(__file__).parents[1]
@@ -99,7 +102,7 @@ def test_more_than_the_page_can_show_is_passed_over() -> None:
     assert page.dropped == 101
 
 
-# A page for the four that follow.
+# A page for the five that follow.
 
 
 def test_busy_port_moves_on_and_says_so(shared: tuple[PageProcess, str, int]) -> None:
@@ -125,6 +128,32 @@ def test_page_is_on_the_loopback_alone_and_ignores_ctrl_c(
     assert Visitor(url).get()
     assert page.notice() is None
     assert page_here() == process
+
+
+def test_a_view_chosen_before_the_scene_has_loaded_is_taken(
+    shared: tuple[PageProcess, str, int],
+) -> None:
+    visitor = Visitor(shared[1])
+    position_m, look_at_m, *_ = view(BOTH)
+    with visitor.open("/rig/panels") as panels:
+        panels.send(json.dumps({"seen": list(PANELS)}))
+        told: list[tuple[int, dict[str, object]]] = []
+        while not (found := [n for n, props in told if props.get("options") == list(NAMES)]):
+            message = panels.recv(timeout=PATIENCE_S)
+            told = json.loads(message).get("put", []) if isinstance(message, str) else []
+        panels.send(json.dumps({"set": [found[0], BOTH]}))
+        # Messages of one browser are taken in their order: this one has an answer.
+        panels.send(json.dumps({"set": [found[0], "from the moon"]}))
+        while "from above" not in str(panels.recv(timeout=PATIENCE_S)):
+            pass
+    with visitor.open("/view") as scene:
+        scene.send(LOOKING)
+        sent: dict[str, object] = {}
+        while len(sent) < 2:
+            for one in unpacked(scene.recv(timeout=PATIENCE_S, decode=False))["messages"]:
+                if one["type"].startswith("SetCamera") and not one.get("initial"):
+                    sent |= {w: one[w] for w in ("position", "look_at") if w in one}
+    assert sent == {"position": pytest.approx(position_m), "look_at": pytest.approx(look_at_m)}
 
 
 def test_frozen_page_holds_up_nobody_and_wakes_again(shared: tuple[PageProcess, str, int]) -> None:

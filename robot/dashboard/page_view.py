@@ -57,7 +57,7 @@ class PageView:
         self._server, self._widgets = server, widgets
         self._outbox = outbox
         self._tell = tell
-        self._viewpoints = Viewpoints(server)
+        self._viewpoints = Viewpoints(server, lambda number: browser_of(server, number))
         furnish(server.scene)
         _arrange(server)
         self._head = HeadView(server.scene)
@@ -95,10 +95,7 @@ class PageView:
 
     def _look_from(self, name: str, client: str) -> None:
         """Show another view in the tabs of a client's browser."""
-        browser = self._widgets.browser(client)
-        for number, one in self._server.get_clients().items():
-            if browser_of(self._server, number) == browser:
-                self._viewpoints.take(one, name)
+        self._viewpoints.choose(self._widgets.browser(client), name)
 
     def show(self, news: News) -> None:
         """Draw the newest of what came; without a spectator it is kept until one comes."""

@@ -1,21 +1,30 @@
 """Where each browser's camera stands in the page's scene, whatever the shape of its window."""
 
+from collections.abc import Callable
+
 import viser
 
 from gazerig.robot.dashboard.view.views import FACE, View, view
 from gazerig.robot.model.types import Snapshot
 
 _FOV_STEP_RAD = 0.01
+_KEPT = 64
+"""Of so many browsers a view is kept that they asked for before their scene had loaded."""
 
 
 class Viewpoints:
     """Begins every browser with the face, and fits its field of view to its window."""
 
-    def __init__(self, server: viser.ViserServer) -> None:
-        self._server = server
+    def __init__(self, server: viser.ViserServer, browser_of: Callable[[int], str]) -> None:
+        """Greet who comes.
+
+        browser_of: the name of a client's browser by the client's number
+        """
+        self._server, self._browser_of = server, browser_of
         self._face = view(FACE)
         self._snapshot: Snapshot | None = None
         self._views: dict[int, str] = {}
+        self._asked_early: dict[str, str] = {}
         self._begin_with(self._face)
         server.on_client_connect(self._greet)
         server.on_client_disconnect(self._forget)
@@ -30,10 +39,22 @@ class Viewpoints:
         self._begin_with(face)
         for client in self._server.get_clients().values():
             if self._views.get(client.client_id, FACE) == FACE:
-                self.take(client, FACE)
+                self._take(client, FACE)
 
-    def take(self, client: viser.ClientHandle, name: str) -> None:
-        """Move a browser's camera to a view."""
+    def choose(self, browser: str, name: str) -> None:
+        """Move the cameras of a browser's tabs to a view, or the first one that comes."""
+        if not browser:  # it has left
+            return
+        # Noted first: the scene may finish loading in between.
+        self._asked_early[browser] = name
+        while len(self._asked_early) > _KEPT:
+            self._asked_early.pop(next(iter(self._asked_early)), None)
+        for number, client in self._server.get_clients().items():
+            if self._browser_of(number) == browser:
+                self._asked_early.pop(browser, None)
+                self._take(client, name)
+
+    def _take(self, client: viser.ClientHandle, name: str) -> None:
         self._views[client.client_id] = name
         seen = view(name, self._snapshot)
         with client.atomic():
@@ -54,6 +75,11 @@ class Viewpoints:
         def _(camera: viser.CameraHandle) -> None:
             name = self._views.get(client.client_id, FACE)
             _fit_field(camera, view(name, self._snapshot))
+
+        # Viser knows a client once its scene has loaded; the buttons are there before.
+        early = self._asked_early.pop(self._browser_of(client.client_id), None)
+        if early is not None:
+            self._take(client, early)
 
 
 def _fit_field(camera: viser.CameraHandle, seen: View) -> None:
