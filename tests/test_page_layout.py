@@ -101,10 +101,15 @@ def shown() -> Iterator[Shown]:
         yield shown
 
 
-@pytest.mark.parametrize("size", SIZES)
+@pytest.fixture(scope="module", params=SIZES)
+def size(shown: Shown, request: pytest.FixtureRequest) -> str:
+    """Set the window's size; pytest runs all tests of one size before it sets the next."""
+    shown.size(str(request.param))
+    return str(request.param)
+
+
 @pytest.mark.parametrize("state", LEADS)
 def test_nothing_is_cut_off_covered_or_too_small(shown: Shown, state: str, size: str) -> None:
-    shown.size(size)
     shown.state(state)
     assert faults(shown.browser) == []
     # STOP is where it always is, whatever else there is to say.
@@ -119,10 +124,8 @@ def apart(one: tuple[float, ...] | None, other: tuple[float, ...] | None) -> boo
     return beside or one[3] <= other[1] + 1 or other[3] <= one[1] + 1
 
 
-@pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("tab", TABS)
 def test_a_drawer_leaves_head_stop_and_buttons_in_sight(shown: Shown, tab: str, size: str) -> None:
-    shown.size(size)
     shown.state("awake")
     shown.tab(tab)
     try:
@@ -140,8 +143,10 @@ def test_a_drawer_leaves_head_stop_and_buttons_in_sight(shown: Shown, tab: str, 
         shown.tab(tab)
 
 
-def test_on_a_phone_the_head_is_on_top_then_stop_then_the_buttons(shown: Shown) -> None:
-    shown.size("phone")
+@pytest.mark.parametrize("size", ["phone"], indirect=True)
+def test_on_a_phone_the_head_is_on_top_then_stop_then_the_buttons(
+    shown: Shown, size: str
+) -> None:
     shown.state("awake")
     found = {name: box or (0.0,) * 4 for name, box in boxes(shown.browser).items()}
     order = ("stage", "rig-stop", "moves", "extras", "camera", "tabs")
@@ -151,9 +156,8 @@ def test_on_a_phone_the_head_is_on_top_then_stop_then_the_buttons(shown: Shown) 
     assert 0.4 <= share <= 0.5
 
 
-@pytest.mark.parametrize("size", ["desk", "laptop"])
+@pytest.mark.parametrize("size", ["desk", "laptop"], indirect=True)
 def test_the_camera_picture_is_large_and_leaves_the_head_free(shown: Shown, size: str) -> None:
-    shown.size(size)
     shown.state("awake")
     found = {name: box or (0.0,) * 4 for name, box in boxes(shown.browser).items()}
     stage, camera = found["stage"], found["camera"]
@@ -202,15 +206,11 @@ def head_share(shown: Shown) -> float:
     return (chin - first) / len(widths)
 
 
-@pytest.mark.parametrize("size", SIZES)
 def test_the_head_fills_most_of_its_canvas(shown: Shown, size: str) -> None:
-    shown.size(size)
     assert 0.6 <= head_share(shown) <= 0.8
 
 
-@pytest.mark.parametrize("size", SIZES)
 def test_picture_and_head_change_places_with_one_click(shown: Shown, size: str) -> None:
-    shown.size(size)
     shown.state("awake")
     before = boxes(shown.browser)
     swap = "document.querySelector('#swap').click()"
@@ -230,11 +230,10 @@ def test_picture_and_head_change_places_with_one_click(shown: Shown, size: str) 
         shown.browser.run(swap)
 
 
-@pytest.mark.parametrize("size", ["desk", "laptop"])
+@pytest.mark.parametrize("size", ["desk", "laptop"], indirect=True)
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize("tab", ["", *TABS])
 def test_axe_finds_nothing_serious(shown: Shown, tab: str, theme: str, size: str) -> None:
-    shown.size(size)
     shown.state("awake")
     shown.theme(theme)
     if tab:
@@ -247,10 +246,8 @@ def test_axe_finds_nothing_serious(shown: Shown, tab: str, theme: str, size: str
         shown.theme("light")
 
 
-@pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("state", [state for state in LEADS if state != "awake"])
 def test_axe_finds_nothing_serious_in_other_states(shown: Shown, state: str, size: str) -> None:
-    shown.size(size)
     shown.state(state)
     assert violations(shown.browser) == []
 
@@ -265,8 +262,8 @@ BAD = """(() => {
 })()"""
 
 
-def test_what_is_measured_finds_faults_that_are_there(shown: Shown) -> None:
-    shown.size("laptop")
+@pytest.mark.parametrize("size", ["laptop"], indirect=True)
+def test_what_is_measured_finds_faults_that_are_there(shown: Shown, size: str) -> None:
     shown.state("awake")
     shown.browser.run(BAD)
     try:
@@ -280,9 +277,9 @@ def test_what_is_measured_finds_faults_that_are_there(shown: Shown) -> None:
 
 
 # The last: a page that has shown a recording shows no rig any more.
-@pytest.mark.parametrize("size", SIZES)
-def test_a_recording_has_its_controls_and_no_stop(shown: Shown, size: str) -> None:
-    shown.size(size)
+@pytest.mark.parametrize("window", SIZES)
+def test_a_recording_has_its_controls_and_no_stop(shown: Shown, window: str) -> None:
+    shown.size(window)
     state = {"at_s": 2.5, "duration_s": 60.0, "playing": True, "speed": 1.0, "sought_s": None}
     shown.page.send(REPLAY + json.dumps(state).encode())
     hidden = "document.querySelector('#rig-stop').hidden"
@@ -292,4 +289,4 @@ def test_a_recording_has_its_controls_and_no_stop(shown: Shown, size: str) -> No
     assert faults(shown.browser) == []
     assert violations(shown.browser) == []
     stage = present(boxes(shown.browser)["stage"])
-    assert stage[3] - stage[1] > 0.25 * SIZES[size][1]
+    assert stage[3] - stage[1] > 0.25 * SIZES[window][1]
