@@ -6,15 +6,18 @@ from types import TracebackType
 from typing import Literal, Protocol, Self
 
 from gazerig.robot.control.tick_feed import Progress
-from gazerig.robot.model.lead import GestureState
+from gazerig.robot.model.lead import ARRIVED_RAD, GestureState
 from gazerig.robot.model.reply import CommandReply
 
-Outcome = Literal["arrived", "refused", "taken over", "timed out"]
+Outcome = Literal["arrived", "refused", "out of reach", "taken over", "timed out"]
 """How an order ended.
 
 arrived: the gaze was measured within 1 degree of the point, the joint of its angle; a gesture has
     come to its end; of other orders, the head has taken them up
 refused: nothing was done; ``Order.why`` says why
+out of reach: the gaze will rest more than 1 degree beside the point, as far as the joints reach;
+    known as soon as the reply is there. ``Order.why`` says how far beside, and which joints keep
+    it from there. The lead stays: the head goes as far as it can
 taken over: something else moves the head now, or the lead ended; ``Order.why`` says what
 timed out: none of these within the time given
 """
@@ -104,11 +107,14 @@ class Order:
 
     @property
     def why(self) -> str:
-        """Return why the order was refused or taken over, "" where it was not."""
+        """Return why the order was refused, taken over or out of reach, "" if it was not."""
         return self._why
 
     def wait(self, timeout_s: float | None = 10.0) -> Outcome:
         """Wait until the order has ended; of a head in simulated time, step it until then.
+
+        For a point that is out of reach this returns as soon as the reply says so; the head is
+        then still moving.
 
         Args:
             timeout_s: seconds of the head's own clock; None: for ever.
@@ -150,6 +156,8 @@ class Order:
             self._see_gesture(played, now.gesture)
         elif reply.lead == 0:  # it takes no lead: done as soon as taken up
             self._end("arrived", "")
+        elif reply.error_rad > ARRIVED_RAD:
+            self._end("out of reach", reply.text())
         elif now.lead.number == reply.lead:
             if now.lead.arrived:
                 self._end("arrived", "")

@@ -1,7 +1,7 @@
 """What a program asks of a head in simulated time: orders and their ends, values, parameters."""
 
 from collections.abc import Iterator
-from math import degrees, nan
+from math import cos, degrees, nan, radians, sin
 from pathlib import Path
 
 import numpy as np
@@ -50,11 +50,35 @@ def gaze_error(head: gazerig.Head, point: Vec3) -> float:
     return float(np.arccos(np.dot(sight, to / np.linalg.norm(to))))
 
 
-def test_a_point_out_of_reach_is_told_and_never_arrived_at(head: gazerig.SimulatedHead) -> None:
+def test_a_point_out_of_reach_is_told_at_once_and_the_head_goes_as_far_as_it_can(
+    head: gazerig.SimulatedHead,
+) -> None:
+    began_s = head.time_s
     order = head.look_at(-1.0, 0.1, 0.3)
-    assert order.wait(2.0) == "timed out" and order.active
-    assert order.reply.error_deg > 30.0
-    assert {one.joint for one in order.reply.limited} >= {"neck_yaw"}
+    assert order.wait() == "out of reach" and head.time_s - began_s < 0.1
+    off_deg = order.reply.error_deg
+    assert off_deg > 30.0 and f"it looks {off_deg:.0f} deg beside it" in order.why
+    assert "neck_yaw" in order.why and order.active
+    head.step(3.0)
+    assert order.active and order.outcome == "out of reach"
+    rests = gaze_error(head, (-1.0, 0.1, 0.3))
+    assert degrees(rests) == pytest.approx(off_deg, abs=3.0)
+
+
+@pytest.mark.parametrize(("beside_deg", "outcome"), [(0.9, "arrived"), (1.1, "out of reach")])
+def test_what_rests_within_the_tolerance_of_arrival_is_in_reach(
+    head: gazerig.SimulatedHead, beside_deg: float, outcome: str
+) -> None:
+    """The direction at which the rig looks so far beside the point, found by bisection."""
+    low, high = 20.0, 170.0
+    while high - low > 1e-3:
+        middle = radians(0.5 * (low + high))
+        point = (3.0 * cos(middle), 3.0 * sin(middle), 0.3)
+        beyond = gazerig.inverse("desk", point).error_deg > beside_deg
+        low, high = (low, degrees(middle)) if beyond else (degrees(middle), high)
+    order = head.look_at(*point)
+    assert order.wait() == outcome
+    assert order.reply.error_deg == pytest.approx(beside_deg, abs=0.05)
 
 
 def test_the_next_order_takes_over_and_the_first_says_by_whom(head: gazerig.SimulatedHead) -> None:

@@ -79,6 +79,7 @@ def test_the_end_of_the_block(said: list[str], opened: Open) -> None:
             signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
         ] == handlers
         assert head.look_at(1.0, 0.4, 0.3).wait(100.0) == "arrived"
+        assert head.look_at(-1.0, 0.1, 0.3).wait(100.0) == "out of reach"
     assert_let_go(said)
     assert sys.getswitchinterval() == pytest.approx(switching_s)
 
@@ -222,6 +223,7 @@ def test_another_program_has_the_same_orders(head: gazerig.Head) -> None:
         assert mine.outcome == "arrived" and not mine.active
         assert head.state.led.startswith("a show (process ")
         assert far.look_at_person(99).wait(100.0) == "refused"
+        assert far.look_at(-1.0, 0.1, 0.3).wait(100.0) == "out of reach"
         assert far.look_at_person(far.people[0].id).wait(100.0) == "arrived"
         with pytest.raises(gazerig.Refused, match="three finite numbers"):
             far.look_at(float("nan"), 0.0, 0.0)
