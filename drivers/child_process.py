@@ -81,6 +81,15 @@ def run(module: str, given: bytes, timeout_s: float) -> subprocess.CompletedProc
     )
 
 
+def is_suspended(pid: int) -> bool:
+    """Return whether a process was suspended (SIGSTOP); False where the system does not tell."""
+    try:
+        with open(f"/proc/{pid}/stat", "rb") as file:
+            return file.read().rpartition(b")")[2].split()[0] == b"T"
+    except (OSError, IndexError):
+        return False
+
+
 def _command(module: str, arguments: Sequence[str]) -> list[str]:
     return [sys.executable, "-P", "-m", module, *arguments]
 

@@ -1,11 +1,10 @@
-"""Servos without a watchdog are released when the loop that drives them dies or hangs."""
+"""Servos are released when the loop that drives them dies or hangs."""
 
 import os
 import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -16,11 +15,12 @@ from present import present
 from sts_rig import Rig as StsRig
 
 from gazerig.config.schema import load_rig
+from gazerig.drivers import child_process
 from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.robot.app.bus_wiring import ports_of, release_plans
 from gazerig.robot.calibration.smart_servo_access import SingleServo
 from gazerig.robot.guardian.guarded_bus import RETRY_S, GuardedBus
-from gazerig.robot.guardian.guardian import Guardian
+from gazerig.robot.guardian.guardian import HUNG_S, Guardian
 from gazerig.robot.guardian.hang_detector import HANG_S, HangDetector
 from gazerig.robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, SIZE, Heartbeat, shared_file
 from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe, encode
@@ -33,7 +33,7 @@ PLAN = ReleasePlan("feetech", "/tmp/no such port", 1_000_000, (1, 2))
 
 
 @pytest.mark.own_timeouts
-@pytest.mark.parametrize("kind", ["feetech", "maestro", "pca9685"])
+@pytest.mark.parametrize("kind", ["dynamixel", "feetech", "maestro", "pca9685"])
 def test_a_loop_that_hangs_and_dies_leaves_limp_servos(kind):
     with driven(kind) as it:
         assert all(it.holding())
@@ -51,17 +51,6 @@ def test_a_loop_that_hangs_and_dies_leaves_limp_servos(kind):
         assert "started again" in it.line("event the guardian")
         assert it.guardians() != [guardian]
         assert it.limp_after_s(it.strike(signal.SIGKILL), PATIENCE_S) is not None
-
-
-@pytest.mark.own_timeouts
-def test_a_dynamixel_without_its_watchdog_is_guarded_too():
-    with driven("dynamixel", watchdog=False) as it:
-        assert all(it.holding())
-        assert it.limp_after_s(it.strike(signal.SIGKILL), PATIENCE_S) is not None
-
-
-def test_a_dynamixel_with_its_watchdog_needs_no_guardian():
-    assert not release_plans(load_rig("desk"), ports_of(load_rig("desk"), None))
 
 
 def test_a_servo_by_itself_is_let_go_of_when_its_program_stands_still():
@@ -83,17 +72,14 @@ def test_a_servo_by_itself_is_let_go_of_when_its_program_stands_still():
 # --- which ports
 
 
-def test_ports_of_servos_without_watchdog_are_guarded(tmp_path):
+def test_all_ports_are_guarded(tmp_path):
     file = tmp_path / "mixed.yaml"
     file.write_text(mixed_text(), encoding="utf-8")
     rig = load_rig(str(file))
     plans = release_plans(rig, ports_of(rig, None))
-    assert {name: plan.kind for name, plan in plans.items()} == {"": "maestro", "tilt": "feetech"}
+    kinds = {name: plan.kind for name, plan in plans.items()}
+    assert kinds == {"": "maestro", "neck": "dynamixel", "tilt": "feetech"}
     assert plans["tilt"].ids == (1,) and plans["tilt"].baud == rig.bus_named("tilt").baud
-    dynamixel = replace(rig.buses["neck"].dynamixel, watchdog_ms=0)
-    neck = replace(rig.buses["neck"], dynamixel=dynamixel)
-    without = replace(rig, buses={**rig.buses, "neck": neck})
-    assert set(release_plans(without, ports_of(without, None))) == {"", "neck", "tilt"}
 
 
 def test_plans_go_through_a_command_line():
@@ -243,6 +229,16 @@ def _refuse():
 # --- the process, without any port
 
 
+@pytest.fixture
+def guarding():
+    guardian = Guardian((PLAN,))
+    guardian.join(0)
+    guardian.arm(0)
+    yield guardian
+    guardian.disarm(0)
+    guardian.leave(0)
+
+
 def test_it_ends_silently_when_all_is_off(capfd):
     guardian = Guardian((PLAN,))
     guardian.join(0)
@@ -277,21 +273,49 @@ def test_without_a_guardian_there_is_no_torque(monkeypatch):
     guardian.leave(0)
 
 
-def test_one_that_dies_is_started_again_and_said(monkeypatch):
-    guardian = Guardian((PLAN,))
-    guardian.join(0)
-    guardian.arm(0)
-    first = guardian.pid
+def test_one_that_dies_is_started_again_and_said(guarding):
+    first = guarding.pid
     os.kill(present(first), signal.SIGKILL)
     now_s, end_s = 0.0, time.monotonic() + PATIENCE_S
-    while guardian.pid == first and time.monotonic() < end_s:
+    while guarding.pid == first and time.monotonic() < end_s:
         time.sleep(0.01)
         now_s += 1.0
-        guardian.check(now_s)
-    assert guardian.pid != first
-    assert [line for line in guardian.events() if "signal 9" in line]
-    guardian.disarm(0)
-    guardian.leave(0)
+        guarding.check(now_s)
+    assert guarding.pid != first
+    assert [line for line in guarding.events() if "signal 9" in line]
+
+
+def suspend(guardian):
+    """Suspend a guardian that is at work; return its process id."""
+    pid, looks = present(guardian.pid), guardian._heartbeat.looks
+    end_s = time.monotonic() + PATIENCE_S
+    while guardian._heartbeat.looks == looks and time.monotonic() < end_s:
+        time.sleep(0.01)
+    os.kill(pid, signal.SIGSTOP)
+    while not child_process.is_suspended(pid) and time.monotonic() < end_s:
+        time.sleep(0.01)
+    return pid
+
+
+def test_one_that_is_suspended_is_replaced_at_the_next_check(guarding):
+    first = suspend(guarding)
+    guarding.check(100.0)
+    assert guarding.pid != first and not os.path.exists(f"/proc/{first}")
+    assert guarding.events() == ("the guardian did not respond: started again",)
+    guarding.wait_until_ready()
+
+
+def test_one_that_looks_at_nothing_is_replaced(guarding, monkeypatch):
+    guarding.check(0.0)
+    first = suspend(guarding)
+    monkeypatch.setattr(child_process, "is_suspended", lambda pid: False)
+    guarding.check(100.0)
+    guarding.check(100.0 + 0.9 * HUNG_S)
+    assert guarding.pid == first
+    guarding.check(100.1 + HUNG_S)
+    assert guarding.pid != first
+    guarding.check(200.0)  # the new one may still be starting
+    assert len(guarding.events()) == 1
 
 
 def test_both_sides_see_the_same_memory():

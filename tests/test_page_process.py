@@ -1,6 +1,5 @@
 """The page's process: it holds up nobody, ends with its parent and finds itself a port."""
 
-import itertools
 import json
 import os
 import signal
@@ -102,7 +101,7 @@ def test_more_than_the_page_can_show_is_passed_over() -> None:
     assert page.dropped == 101
 
 
-# A page for the five that follow.
+# A page for the four that follow.
 
 
 def test_busy_port_moves_on_and_says_so(shared: tuple[PageProcess, str, int]) -> None:
@@ -156,32 +155,6 @@ def test_a_view_chosen_before_the_scene_has_loaded_is_taken(
     assert sent == {"position": pytest.approx(position_m), "look_at": pytest.approx(look_at_m)}
 
 
-def test_frozen_page_holds_up_nobody_and_wakes_again(shared: tuple[PageProcess, str, int]) -> None:
-    page = shared[0]
-    times_s = itertools.count(100.0)
-
-    def taken() -> bool:
-        before = page.dropped
-        page.show(replace(SNAPSHOT, t_s=next(times_s)))
-        return page.dropped == before
-
-    def show_many() -> None:
-        for tick in range(3000):
-            page.show(replace(SNAPSHOT, t_s=0.01 * tick))
-
-    process = page_here()
-    assert process is not None
-    os.kill(process, signal.SIGSTOP)
-    assert in_time(show_many)
-    assert 2000 < page.dropped < 3000
-    assert in_time(lambda: page.show_frame(bytes(100_000)))
-    assert page.frames_dropped == 1
-    os.kill(process, signal.SIGCONT)
-    wait_for(taken, "room for a snapshot")
-    page.show_frame(b"no picture at all")
-    assert page.url() is not None
-
-
 def test_close_ends_even_a_frozen_page(shared: tuple[PageProcess, str, int]) -> None:
     page = shared[0]
     process = page_here()
@@ -219,6 +192,23 @@ def test_a_page_that_died_is_started_again_at_its_address_and_told_all() -> None
         os.kill(second, signal.SIGKILL)
         wait_for(lambda: page.started == 3, "the third page")
         assert page.notice() is None
+
+
+@pytest.mark.usefixtures("branched_children")
+def test_a_suspended_page_holds_up_nobody_and_is_replaced() -> None:
+    def show_many() -> None:
+        for tick in range(3000):
+            page.show(replace(SNAPSHOT, t_s=0.01 * tick))
+
+    with running_page() as (page, url):
+        process = page_here()
+        assert process is not None
+        os.kill(process, signal.SIGSTOP)
+        assert in_time(show_many)
+        assert 2000 < page.dropped <= 3000
+        in_time(lambda: page.show_frame(bytes(100_000)))
+        wait_for(lambda: page.show(SNAPSHOT) or page.started == 2, "another page")
+        assert page.url() == url and page_here() not in (None, process)
 
 
 @pytest.mark.usefixtures("branched_children")

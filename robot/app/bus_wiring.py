@@ -68,10 +68,11 @@ def rig_bus(rig: Rig, ports: Mapping[str, BusPort]) -> ServoBus:
 
 
 def guarded_rig_bus(rig: Rig, paths: Mapping[str, str]) -> ServoBus:
-    """Return the bus of a rig on serial ports, guarded where servos have no watchdog.
+    """Return the bus of a rig on serial ports, guarded.
 
-    A program that switches torque on through it may die: a guardian process, started as the
-    bus is opened, then lets go. Nothing is opened here.
+    A program that switches torque on through it may die or hang: a guardian process, started as
+    the bus is opened, then switches torque off. A servo's own watchdog would only stop its
+    motion and keep the torque. Nothing is opened here.
 
     Args:
         rig: the rig.
@@ -92,7 +93,9 @@ def guarded_rig_bus(rig: Rig, paths: Mapping[str, str]) -> ServoBus:
 
 
 def release_plans(rig: Rig, paths: Mapping[str, str]) -> dict[str, ReleasePlan]:
-    """Return how to let go of the servos that have no watchdog, by the name of their bus.
+    """Return how to switch the servos' torque off, by the name of their bus.
+
+    A bus of another package that releases its servos by itself has no plan.
 
     Args:
         rig: the rig.
@@ -101,7 +104,7 @@ def release_plans(rig: Rig, paths: Mapping[str, str]) -> dict[str, ReleasePlan]:
     return {
         name: release_plan(rig, name, paths[name])
         for name in bus_names(rig)
-        if not has_watchdog(rig, name)
+        if can_be_released(rig, name)
     }
 
 
@@ -131,12 +134,21 @@ def release_plan(rig: Rig, name: str, path: str) -> ReleasePlan:
     )
 
 
+def can_be_released(rig: Rig, name: str) -> bool:
+    """Return whether a guardian can switch off the servos of one bus.
+
+    It can for all kinds of this package; another package says how, or that it need not.
+    """
+    kind = rig.bus_named(name).kind
+    return is_ours(BUS, kind) or load(BUS, kind, BusPlugin).release is not None
+
+
 def has_watchdog(rig: Rig, name: str) -> bool:
-    """Return whether the servos of one bus stop by themselves when their program dies."""
+    """Return whether the servos of one bus stop their motion when their program dies."""
     config = rig.bus_named(name)
     if is_ours(BUS, config.kind):
         return bool(getattr(config.section, "watchdog_ms", 0))
-    return load(BUS, config.kind, BusPlugin).release is None
+    return not can_be_released(rig, name)
 
 
 def _joined(shares: list[BusShare]) -> ServoBus:

@@ -10,7 +10,7 @@ from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoConfig
-from gazerig.robot.app.bus_wiring import has_watchdog, release_plan
+from gazerig.robot.app.bus_wiring import can_be_released, release_plan
 from gazerig.robot.bringup.doctor import maestro as doctor_maestro
 from gazerig.robot.bringup.doctor import pca9685 as doctor_pca9685
 from gazerig.robot.bringup.doctor import run as checkup
@@ -76,7 +76,7 @@ def _examined(rig: Rig, lines: Mapping[str, BusPort], tell: Tell) -> dict[str, l
     findings = {}
     for bus, line in lines.items():
         findings[bus] = _examine(rig, bus, line)
-        if not has_watchdog(rig, bus):
+        if can_be_released(rig, bus):
             findings[bus].append(checkup.examine_guardian(release_plan(rig, bus, line.port_name)))
         wipe()
         if len(lines) > 1:

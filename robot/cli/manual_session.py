@@ -6,7 +6,12 @@ from collections.abc import Callable, Iterator, Mapping
 import typer
 
 from gazerig.config.schema import Rig
-from gazerig.robot.app.bus_wiring import bus_names, guarded_rig_bus, has_watchdog
+from gazerig.robot.app.bus_wiring import (
+    bus_names,
+    can_be_released,
+    guarded_rig_bus,
+    has_watchdog,
+)
 from gazerig.robot.app.rig_limits import limits, park_rad
 from gazerig.robot.bringup.manual_control import JogParams, ManualControl, parked
 from gazerig.robot.bringup.move_result import Step
@@ -92,6 +97,8 @@ def _left_alone(rig: Rig, bus: str) -> str:
     if kind in BOARDS:
         return f"{BOARDS[kind]} goes on with its last pulses {until}"
     title = KINDS[kind].title if kind in KINDS else kind
-    if has_watchdog(rig, bus):
+    if not can_be_released(rig, bus):
         return f"the {title} servos' own watchdog stops them"
+    if has_watchdog(rig, bus):
+        return f"{title} servos stop by their own watchdog and hold {until}"
     return f"{title} servos hold their last goal {until}"

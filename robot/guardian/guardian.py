@@ -3,6 +3,7 @@
 import os
 import select
 import subprocess
+from math import inf
 
 from gazerig.drivers import child_process
 from gazerig.drivers.errors import SetupError
@@ -27,9 +28,12 @@ CHECK_S = 0.25
 RESTART_S = 5.0
 """Time between two starts of a guardian that does not stay alive."""
 
+HUNG_S = 2.0
+"""A guardian that has looked at nothing for so long hangs; it looks 50 times a second."""
+
 
 class Guardian:
-    """One process for all ports of a rig whose servos have no watchdog of their own.
+    """One process for all ports of a rig.
 
     Args:
         plans: what it releases, by port.
@@ -48,6 +52,7 @@ class Guardian:
         self._ready = False
         self._users: set[int] = set()
         self._check_s = self._restart_s = 0.0
+        self._looks = (0, inf)
         self._events: list[str] = []
         self.beat = self._heartbeat.beat
         """Show a sign of life; for the control loop's thread alone."""
@@ -117,7 +122,7 @@ class Guardian:
         self._heartbeat.set_state(plan, IDLE)
 
     def check(self, now_s: float) -> None:
-        """See now and then whether it is alive, and start it again where it is not.
+        """Check four times a second whether it works, and replace it if it has ended or hangs.
 
         Args:
             now_s: monotonic seconds.
@@ -126,11 +131,17 @@ class Guardian:
             return
         self._check_s = now_s + CHECK_S
         code = self._process.poll()
-        if code is None or now_s < self._restart_s:
+        hangs = code is None and self._hangs(self._process.pid, now_s)
+        if code is None and not hangs or now_s < self._restart_s:
             return
         self._restart_s = now_s + RESTART_S
+        if hangs:
+            self._process.kill()
+            self._process.wait()
+        self._close_pipes(self._process)
         self._end_unfinished()
-        self._events.append(f"the guardian ended by itself ({_ending(code)}): started again")
+        why = "did not respond" if code is None else f"ended by itself ({_ending(code)})"
+        self._events.append(f"the guardian {why}: started again")
         try:
             self._start()
         except OSError as error:
@@ -154,9 +165,7 @@ class Guardian:
         if self._users or self._process is None:
             return
         ending, self._process = self._process, None
-        for pipe in (ending.stdin, ending.stdout):
-            if pipe is not None:
-                pipe.close()
+        self._close_pipes(ending)
         if any(self._heartbeat.armed(i) for i in range(len(self.plans))):
             return
         try:
@@ -165,9 +174,25 @@ class Guardian:
             ending.kill()
             ending.wait()
 
+    def _hangs(self, pid: int, now_s: float) -> bool:
+        """Return whether it was suspended, or has looked at nothing for too long."""
+        looks, since_s = self._looks
+        if self._heartbeat.looks != looks:
+            self._looks = self._heartbeat.looks, now_s
+            return child_process.is_suspended(pid)
+        # A guardian that is still starting has not looked yet: since_s is infinite.
+        return now_s - since_s > HUNG_S or child_process.is_suspended(pid)
+
+    @staticmethod
+    def _close_pipes(process: "subprocess.Popen[bytes]") -> None:
+        for pipe in (process.stdin, process.stdout):
+            if pipe is not None:
+                pipe.close()
+
     def _start(self) -> None:
         """Start the process; raises OSError where the system refuses."""
         self._ready = False
+        self._looks = self._heartbeat.looks, inf
         self._process = child_process.start(
             process.__name__,
             str(self._fd),

@@ -1,8 +1,9 @@
-"""The memory that a program and its guardian share: a counter, and one record for each port.
+"""The memory that a program and its guardian share: two counters, and one record for each port.
 
     offset 0     uint64   beats: counted up by the control loop's thread
     offset 8+2i  uint8    armed: the servos of plan i may be under torque   (the loop writes)
     offset 9+2i  uint8    state: what the guardian did with plan i          (both write)
+    offset 136   uint64   looks: counted up by the guardian
 
 Nothing is locked: every field has one writer at a time. The guardian sets ``RELEASING``
 before its first byte and ``RELEASED`` after the last; the loop alone sets ``IDLE`` again.
@@ -29,6 +30,7 @@ class Heartbeat:
         view = memoryview(self._map)
         self._beats = view[:8].cast("Q")
         self._flags = view[8 : 8 + 2 * MAX_PLANS]
+        self._looks = view[8 + 2 * MAX_PLANS : 16 + 2 * MAX_PLANS].cast("Q")
         self._count = self._beats[0]
 
     def beat(self) -> None:
@@ -40,6 +42,15 @@ class Heartbeat:
     def beats(self) -> int:
         """Return the counter."""
         return self._beats[0]
+
+    def look(self) -> None:
+        """Count one look of the guardian; called by the guardian alone."""
+        self._looks[0] += 1
+
+    @property
+    def looks(self) -> int:
+        """Return how often a guardian has looked at the beats."""
+        return self._looks[0]
 
     def arm(self, plan: int, armed: bool) -> None:
         """Record that servos may be under torque from now on, or are not any more."""

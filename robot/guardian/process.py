@@ -1,4 +1,4 @@
-"""The guardian itself: releases servos that have no watchdog when their program dies or hangs.
+"""The guardian itself: releases the servos when their program dies or hangs.
 
 Run by gazerig.robot.guardian.guardian as
 
@@ -60,6 +60,7 @@ class ProgramWatch:
     def run(self) -> None:
         """Watch until the program is gone or says goodbye, and release what is armed then."""
         while not self._gone():
+            self._heartbeat.look()
             self._watch(self._clock.now_s())
         self._release_all()
 

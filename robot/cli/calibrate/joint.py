@@ -143,14 +143,8 @@ def _one(bench: CalibrationJob, name: str, bus: str) -> Made:
             return _smart(bench, single)
 
 
-def _guardian(bench: CalibrationJob, name: str, bus: str) -> Guardian | None:
-    """Return what switches one joint's servo off, None where its own watchdog does.
-
-    A watchdog is armed for calibrating whatever the rig says of it.
-    """
-    kind = KINDS.get(bench.rig.bus_named(bus).kind)
-    if kind is not None and kind.family.watchdog_unit_s is not None:
-        return None
+def _guardian(bench: CalibrationJob, name: str, bus: str) -> Guardian:
+    """Return what switches one joint's servo off if this program dies or hangs."""
     plan = release_plan(bench.rig, bus, bench.wire.paths[bus])
     return Guardian((plan._replace(ids=(bench.rig.joints[name].id,)),))
 
@@ -192,8 +186,7 @@ def _set_middle(single: SingleJoint, person: SteeringPerson) -> None:
 def _hobby(bench: CalibrationJob, name: str, bus: str) -> Made:
     config = bench.rig.bus_named(bus)
     guardian = _guardian(bench, name, bus)
-    beat = guardian.beat if guardian is not None else None
-    port = port_of(bench.wire.paths[bus], on_traffic=beat)
+    port = port_of(bench.wire.paths[bus], on_traffic=guardian.beat)
     joint, how, person = bench.rig.joints[name], bench.how, bench.person
     boards: dict[str, MaestroParams | Pca9685Params]
     boards = {"maestro": config.maestro, "pca9685": config.pca9685}

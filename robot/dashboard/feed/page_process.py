@@ -62,6 +62,7 @@ OnRequest = Callable[[dict[str, object]], str | None]
 """Carries out a request of a user of the page; returns the reply, or None."""
 
 _CLOSE_TIMEOUT_S = 2.0
+_CHECK_S = 0.25  # between two checks that the process was not suspended
 _LAST_LINES_BYTES = 4096
 _MOST_PIXELS = 1 << 23  # of a message, where images go along in it
 _MOST_WORDS = 20_000  # of one answer, in characters
@@ -139,7 +140,7 @@ class PageProcess:
         self._over = threading.Event()
         self._beginning = threading.Lock()
         self._clock = RealClock()
-        self._began_s = 0.0
+        self._began_s = self._check_s = 0.0
         self._wait_s = _AGAIN_AFTER_S
         self._mourned = self._welcomed = False
         self.started = 0
@@ -198,6 +199,7 @@ class PageProcess:
 
     def show(self, snapshot: Snapshot) -> None:
         """Hand over a snapshot; dropped and counted where the page does not take it."""
+        self._end_suspended()
         if abs(snapshot.t_s - self._shown_s) < SHOWN_EVERY_S:
             return
         self._shown_s = snapshot.t_s
@@ -332,6 +334,15 @@ class PageProcess:
                 self._begin()
             except OSError as error:  # no memory, no processes, no files
                 self._notices.append(f"the page cannot be started again: {error.strerror}")
+
+    def _end_suspended(self) -> None:
+        """Kill a page that was suspended: its STOP button does nothing. It is started again."""
+        now_s, process = self._clock.now_s(), self._process
+        if now_s < self._check_s or process is None or process.returncode is not None:
+            return
+        self._check_s = now_s + _CHECK_S
+        if child_process.is_suspended(process.pid):
+            process.kill()
 
     def _last_lines(self) -> str:
         if self._errors is None:
