@@ -1,21 +1,91 @@
 """Calls that must not hold up the control loop: made in another thread, waited for briefly."""
 
+import ctypes
 import threading
 from collections.abc import Callable
+from queue import SimpleQueue
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
+
+from gazerig.drivers.plugins import failure
+
+_FIRST_END_S, _NEXT_END_S, _LONGEST_END_S = 0.2, 0.05, 2.0
+"""A call that was given up is ended after the first; then again, at an interval that doubles."""
+
+FIRST_LINE_S, _LONGEST_SILENCE_S = 1.0, 60.0
+"""A call that lasts is reported after the first; then again, at an interval that doubles."""
+
+
+class CallEnded(SystemExit):
+    """Ends a call that was given up; raised in its thread, which then ends without a word."""
+
+
+class Lasting(Protocol):
+    """What may hold a thread for longer than it should."""
+
+    def lasts(self) -> tuple[float, str] | None:
+        """Return for how long it has done so [s] and what to say of it; None: it does not."""
+        ...
+
+
+LASTING: set[Lasting] = set()
+"""Everything in this program that may hold a thread for too long."""
+
+
+class LastingReport:
+    """What there is to say of ``LASTING``: again and again, ever more seldom."""
+
+    def __init__(self) -> None:
+        self._due_s: dict[Lasting, float] = {}
+
+    def lines(self) -> tuple[str, ...]:
+        """Return what is due now."""
+        lasting = _lasting()
+        self._due_s = {one: self._due_s.get(one, FIRST_LINE_S) for one, _, _ in lasting}
+        due = [found for found in lasting if found[1] >= self._due_s[found[0]]]
+        for one, for_s, _ in due:
+            self._due_s[one] = for_s + min(for_s, _LONGEST_SILENCE_S)
+        return tuple([text for _, _, text in due])
+
+
+def lasting_text() -> str:
+    """Return what lasts too long now, "" where nothing does."""
+    return "; ".join([text for _, for_s, text in _lasting() if for_s >= FIRST_LINE_S])
+
+
+def _lasting() -> list[tuple[Lasting, float, str]]:
+    found = [(one, one.lasts()) for one in tuple(LASTING)]
+    return [(one, *lasts) for one, lasts in found if lasts is not None]
 
 
 class CallResult(NamedTuple):
     """What came of a call.
 
-    error: what it raised; took_s: how long it ran, without the time until it was begun, which is
-    the machine's
+    error: what it raised, in words as ``why``; took_s: how long it ran, without the time until
+    it was begun, which is the machine's
     """
 
     value: Any = None
     error: BaseException | None = None
     took_s: float = 0.0
+    why: str = ""
+
+
+class _Call:
+    """One call; ``done`` is released at its end."""
+
+    def __init__(self, work: Callable[[], Any]) -> None:
+        self._work = work
+        self.outcome = CallResult()
+        self.begun_s: float | None = None
+        self.done = threading.Lock()
+        self.done.acquire()
+
+    def make(self) -> None:
+        begun_s = self.begun_s = perf_counter()
+        outcome = _outcome(self._work, BaseException)
+        self.outcome = outcome._replace(took_s=perf_counter() - begun_s)
+        self.done.release()
 
 
 class BoundedCall:
@@ -25,7 +95,7 @@ class BoundedCall:
     call is begun before. The thread ends with the program, or after ``close``.
 
     Args:
-        name: of the thread.
+        name: of what is called, for messages.
         longest_s: a call is waited for so long, real seconds; None: it is made in the caller's
             thread and waited for to its end, for simulated time, in which nothing is late.
     """
@@ -33,55 +103,114 @@ class BoundedCall:
     def __init__(self, name: str, longest_s: float | None) -> None:
         self._name, self._longest_s = name, longest_s
         self._thread: threading.Thread | None = None
-        self._begin, self._done = threading.Semaphore(0), threading.Semaphore(0)
-        self._work: Callable[[], Any] | None = None
-        self._outcome = CallResult()
-        self._under_way = False
-        self._begun_s: float | None = None
+        self._calls: SimpleQueue[_Call | None] = SimpleQueue()
+        self._late: _Call | None = None
+        self._leaving, self._left = threading.Lock(), False
+        self._closed_s = 0.0
 
     def running_s(self) -> float:
-        """Return for how long the present call has been running, 0 where none is."""
-        begun_s = self._begun_s
+        """Return for how long the late call has been running, 0 where none is."""
+        begun_s = self._late.begun_s if self._late is not None else None
         return 0.0 if begun_s is None else perf_counter() - begun_s
 
     def __call__(self, work: Callable[[], Any]) -> CallResult | None:
         """Make a call; return its outcome or that of the late one before, None while it lasts."""
         if self._longest_s is None:
-            return _outcome(work)
-        if not self._under_way:
-            if self._thread is None:
-                self._thread = threading.Thread(target=self._serve, name=self._name, daemon=True)
-                self._thread.start()
-            self._work, self._under_way = work, True
-            self._begin.release()
-            if not self._done.acquire(timeout=self._longest_s):
-                return None
-        elif not self._done.acquire(blocking=False):
+            return _outcome(work, (Exception, SystemExit))
+        call, patience_s = self._late, 0.0
+        if call is None:
+            call, patience_s = self._begun(work), self._longest_s
+        return self._waited_for(call, patience_s)
+
+    def in_turn(self, work: Callable[[], Any], longest_s: float) -> CallResult | None:
+        """Make a call after the late one before, whose outcome is forgotten; None while one lasts.
+
+        longest_s: each is waited for so long
+        """
+        if self._longest_s is None:
+            return self(work)
+        if self._late is not None and self._waited_for(self._late, longest_s) is None:
             return None
-        self._under_way = False
-        return self._outcome
+        return self._waited_for(self._begun(work), longest_s)
+
+    def _begun(self, work: Callable[[], Any]) -> _Call:
+        if self._thread is None:
+            self._thread = threading.Thread(target=self._serve, name=self._name, daemon=True)
+            self._thread.start()
+        call = _Call(work)
+        self._calls.put(call)
+        self._late = call
+        return call
+
+    def _waited_for(self, call: _Call, patience_s: float) -> CallResult | None:
+        if not call.done.acquire(timeout=patience_s):
+            return None
+        self._late = None
+        return call.outcome
 
     def close(self) -> None:
-        """Let the thread end as soon as it can; a call that lasts is not waited for."""
-        if self._thread is not None:
-            self._thread, self._work = None, None
-            self._begin.release()
+        """Let the thread end; a call that lasts is ended, and not waited for. No call comes after.
+
+        Python code that computes ends by a ``CallEnded``, raised again while something catches
+        it. What waits outside Python cannot be ended: it is in ``LASTING`` as long as it lasts.
+        """
+        thread, self._thread = self._thread, None
+        if thread is None:
+            return
+        self._calls.put(None)
+        if self._late is not None:
+            self._closed_s = perf_counter()
+            LASTING.add(self)
+            ending = threading.Thread(
+                target=self._end, args=(thread,), name=f"end of {self._name}", daemon=True
+            )
+            ending.start()
+
+    def lasts(self) -> tuple[float, str]:
+        """Return for how long [s] a call has been running on since it was given up."""
+        for_s = perf_counter() - self._closed_s
+        return for_s, (
+            f"{self._name} was given up {for_s:.0f} s ago and does not end: it may slow the loop "
+            "as long as this program runs"
+        )
+
+    def _end(self, thread: threading.Thread) -> None:
+        """End the thread, however often that takes."""
+        thread.join(_FIRST_END_S)
+        wait_s = _NEXT_END_S
+        while thread.is_alive():
+            # Never after it has left: another thread may have its number by then.
+            with self._leaving:
+                if not self._left:
+                    _raise_in(thread)
+            thread.join(wait_s)
+            wait_s = min(2.0 * wait_s, _LONGEST_END_S)
+        LASTING.discard(self)
 
     def _serve(self) -> None:
-        while True:
-            self._begin.acquire()
-            work = self._work
-            if work is None:
-                return
-            begun_s = self._begun_s = perf_counter()
-            outcome = _outcome(work)
-            self._begun_s = None
-            self._outcome = outcome._replace(took_s=perf_counter() - begun_s)
-            self._done.release()
+        try:
+            while (call := self._calls.get()) is not None:
+                call.make()
+        finally:
+            with self._leaving:
+                self._left = True
 
 
-def _outcome(work: Callable[[], Any]) -> CallResult:
+def _raise_in(thread: threading.Thread) -> None:
+    """Raise ``CallEnded`` in a thread, once it is back in Python code."""
+    if thread.ident is not None:
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(
+            ctypes.c_ulong(thread.ident), ctypes.py_object(CallEnded)
+        )
+
+
+def _outcome(
+    work: Callable[[], Any], caught: type[BaseException] | tuple[type[BaseException], ...]
+) -> CallResult:
     try:
         return CallResult(work())
-    except (Exception, SystemExit) as error:  # a package may do anything
-        return CallResult(None, error)
+    except caught as error:  # a package may do anything
+        try:
+            return CallResult(None, error, why=failure(error))
+        except Exception:  # nor can it say what
+            return CallResult(None, error, why=type(error).__name__)

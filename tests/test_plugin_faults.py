@@ -23,7 +23,7 @@ from gazerig.drivers.vision.face.detector import CheckedDetector
 from gazerig.gaze.types import Target
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.control.chooser import MOST_OVERRUNS, GuardedChooser
+from gazerig.robot.control.chooser import MOST_OVERRUNS, GuardedChooser, target_of
 
 LABEL = "attention 'odd' of odd 1.2"
 OWN: Any = Target((2.0, 0.0, 0.5), (0.0, 0.0, 0.0), 0.0, "face", 3, 1.0, True, None, 1, "own")
@@ -108,7 +108,8 @@ def test_a_rule_that_blocks_costs_the_loop_its_patience_only_and_is_dropped():
 def answering(took_s):
     """Return a chooser whose rule answers a point after these times."""
     chooser, said = guarded(lambda *_: None)
-    outcomes = iter(CallResult((1.0, 0.0, 0.5), None, one) for one in took_s)
+    point = target_of((1.0, 0.0, 0.5), 0.0)
+    outcomes = iter(CallResult(point, None, one) for one in took_s)
     chooser._call = type("Call", (), {
         "__call__": lambda self, work: next(outcomes), "running_s": lambda self: 0.0,
         "close": lambda self: None,

@@ -81,7 +81,7 @@ class CheckedSource:
             self._source.open()
         except SetupError:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise PluginError(f"{self._label} cannot be opened: {failure(error)}") from error
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
@@ -94,7 +94,7 @@ class CheckedSource:
             shot = self._source.take(now_s, stop)
         except CameraError:
             raise
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             raise CameraError(f"{self._label} failed ({failure(error)})") from error
         if shot is None or stop.is_set():
             return None

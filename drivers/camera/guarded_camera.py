@@ -1,5 +1,6 @@
 """A camera of another package: the control loop neither waits for it nor ends with it."""
 
+from collections.abc import Sequence
 from math import isfinite
 from typing import Any
 
@@ -13,8 +14,11 @@ from gazerig.drivers.types import Camera, DetectedFace, Detections, MovingBlob
 LONGEST_S = 0.001
 """It is waited for so long in a tick; after that the loop goes on with what it had."""
 
+OPEN_S, OPEN_PROCESS_S = 20.0, 70.0
+"""A camera, and a process that reads one and gives up by itself, may take so long to open."""
+
 CLOSE_S, CLOSE_PROCESS_S = 2.0, 15.0
-"""A camera, and a process that reads one and ends itself, are waited for so long as they close."""
+"""They may take so long to close."""
 
 SILENT_S = 1.0
 """A call that lasts longer is reported."""
@@ -32,6 +36,7 @@ class GuardedCamera:
         longest_s: it is waited for so long in a tick, real seconds; None: to the end of the call,
             for simulated time.
         close_s: it is waited for so long as it is closed, real seconds.
+        open_s: it is waited for so long as it is opened, real seconds.
     """
 
     def __init__(
@@ -40,11 +45,12 @@ class GuardedCamera:
         label: str,
         longest_s: float | None = LONGEST_S,
         close_s: float = CLOSE_S,
+        open_s: float = OPEN_S,
     ) -> None:
         self.camera = camera
         self._label = label
-        self._longest_s, self._close_s = longest_s, close_s
-        self._call = BoundedCall(f"camera {label}", longest_s)
+        self._longest_s, self._close_s, self._open_s = longest_s, close_s, open_s
+        self._call = BoundedCall(label, longest_s)
         self._log = EventLog()
         self._off_frame = OffFrameReport()
         self._newest: Detections | None = None
@@ -60,20 +66,24 @@ class GuardedCamera:
             SetupError: it cannot be opened.
             PluginError: it fails.
         """
-        try:
-            self.camera.open()
-        except SetupError:
-            raise
-        except Exception as error:
-            raise PluginError(f"{self._label} cannot be opened: {failure(error)}") from error
-        self._call = BoundedCall(f"camera {self._label}", self._longest_s)
+        self._call.close()
+        self._call = BoundedCall(self._label, self._longest_s)
+        outcome = self._call.in_turn(self.camera.open, self._open_s)
+        if outcome is None:
+            self._call.close()
+            raise PluginError(f"{self._label} has not opened within {self._open_s:g} s")
+        if isinstance(outcome.error, SetupError):
+            raise outcome.error
+        if outcome.error is not None:
+            error = outcome.error
+            raise PluginError(f"{self._label} cannot be opened: {outcome.why}") from error
         self._newest, self._failed, self._asked_s, self._late = None, False, None, False
 
     def latest(self, now_s: float) -> Detections | None:
         """Return the newest detections, None before the first and after a failure."""
         if self._failed:
             return None
-        outcome = self._call(lambda: (self.camera.latest(now_s), tuple(self.camera.events())))
+        outcome = self._call(lambda: self._look(now_s))
         if outcome is None:
             self._wait(now_s)
             return self._newest
@@ -81,13 +91,12 @@ class GuardedCamera:
             self._log.add(f"{self._label} answers again")
         self._asked_s, self._late = None, False
         if outcome.error is not None:
-            self._fail(f"failed ({failure(outcome.error)})")
+            self._fail(f"failed ({outcome.why})")
             return None
-        found, events = outcome.value
+        found, wrong, events = outcome.value
         for line in events:
-            self._log.add(str(line))
+            self._log.add(line)
         if found is not self._checked:
-            wrong = fault_of(found)
             if wrong:
                 self._fail(f"returned {wrong}")
                 return None
@@ -98,6 +107,12 @@ class GuardedCamera:
                     self._log.add(f"{self._label}: {line}")
         return self._newest
 
+    def _look(self, now_s: float) -> tuple[Detections | None, str, tuple[str, ...]]:
+        """Return what the camera has, what is wrong with it, and its events; may block."""
+        found = self.camera.latest(now_s)
+        wrong = "" if found is self._checked else fault_of(found)
+        return found, wrong, tuple(map(str, self.camera.events()))
+
     def events(self) -> tuple[str, ...]:
         """Return what happened since the last call, one line each."""
         return self._log.drain()
@@ -105,11 +120,13 @@ class GuardedCamera:
     def close(self) -> None:
         """Close the camera, whatever it does; safe to call twice."""
         self._call.close()
-        outcome = BoundedCall(f"close {self._label}", self._close_s)(self.camera.close)
+        closing = BoundedCall(f"close of {self._label}", self._close_s)
+        outcome = closing(self.camera.close)
+        closing.close()
         if outcome is None:
             self._log.add(f"{self._label} does not end: it is left behind")
         elif outcome.error is not None:
-            self._log.add(f"{self._label} failed as it was closed ({failure(outcome.error)})")
+            self._log.add(f"{self._label} failed as it was closed ({outcome.why})")
 
     def _wait(self, now_s: float) -> None:
         """Record that it has not answered, and report it once."""
@@ -142,6 +159,8 @@ def _fault(found: Any) -> str:
         return f"a frame of {found.width_px!r} x {found.height_px!r}"
     if found.turn is not None and not found.turn.is_rotation:
         return "a turn of the camera that is no rotation"
+    if not isinstance(found.faces, Sequence) or not isinstance(found.blobs, Sequence):
+        raise TypeError("faces and blobs must be tuples")
     for face in found.faces:
         if wrong := fault_of_face(face):
             return wrong

@@ -60,7 +60,7 @@ class CameraThread:
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
         self._newest: Detections | None = None
-        self._failure: Exception | None = None
+        self._failure: BaseException | None = None
         self.frames = 0
         self.frames_with_face = 0
 
@@ -131,7 +131,7 @@ class CameraThread:
                 self.frames_with_face += bool(found.faces)
                 self._newest = found
                 self._apply_requests()
-        except Exception as failure:  # handed to the loop by latest()
+        except BaseException as failure:  # handed to the loop by latest()
             self._failure = failure
         finally:
             # Freed by the thread that reads it: never under a frame being fetched.

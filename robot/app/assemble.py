@@ -44,7 +44,7 @@ from gazerig.robot.app.run_camera import run_camera, sight_of
 from gazerig.robot.app.run_rig import with_options
 from gazerig.robot.app.run_scene import scene_of
 from gazerig.robot.control.body import Body
-from gazerig.robot.control.chooser import TargetChooser
+from gazerig.robot.control.chooser import GuardedChooser, TargetChooser
 from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.control.heads_together import NamedRobot
 from gazerig.robot.control.loop import Robot
@@ -215,8 +215,14 @@ def assemble(
     except BaseException:
         wires.close()
         raise
+
+    def close() -> None:
+        if isinstance(robot.attention, GuardedChooser):
+            robot.attention.close()
+        wires.close()
+
     return Assembly(
-        robot, clock, sight.mount, sight.poses, scene, wires.digest, wires.close,
+        robot, clock, sight.mount, sight.poses, scene, wires.digest, close,
         (*notes, *_walk_notes(walk, rig, options)), live,
         wires.fault, None if world is None else world.shapes(), wires.world_start_s,
     )  # fmt: skip

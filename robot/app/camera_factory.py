@@ -12,7 +12,11 @@ from gazerig.drivers.camera import sources
 from gazerig.drivers.camera.browser_source import FIELD_DEG
 from gazerig.drivers.camera.camera_plugins import camera_part, is_source, plugin_source
 from gazerig.drivers.camera.frame_analysis import Motion
-from gazerig.drivers.camera.guarded_camera import CLOSE_PROCESS_S, GuardedCamera
+from gazerig.drivers.camera.guarded_camera import (
+    CLOSE_PROCESS_S,
+    OPEN_PROCESS_S,
+    GuardedCamera,
+)
 from gazerig.drivers.camera.orientation import FrameOrientation, upright
 from gazerig.drivers.camera.pose_buffer import PoseBuffer
 from gazerig.drivers.camera.process import CameraProcess
@@ -66,19 +70,16 @@ def scene_camera(
     if not options.pixels:
         params = SceneCameraParams(horizontal_field_deg=field_deg)
         return SceneCamera(params, scene, mount, where, rng, locate)
-    if clock is not None and not options.fast and own.detector is None:
-        field_rad, lens = radians(field_deg), rig.camera.lens
-        return drawn_camera(
-            rig, scene, mount, where, rng, clock, partial(face_detector, rig.detector),
-            partial(motion_finder, rig.motion, lens, field_rad, turns), locate,
-        )  # fmt: skip
+    if clock is not None and not options.fast:
+        motion = partial(motion_finder, rig.motion, rig.camera.lens, radians(field_deg), turns)
+        return drawn_camera(rig, scene, mount, where, rng, clock, own, motion, locate)
     # Drawing and detecting, with OpenCV.
     from gazerig.robot.app.drawn_motion import MotionOfDrawn
     from gazerig.sim_mock.cameras.rendered import PixelCamera, PixelCameraParams
 
     drawn = PixelCameraParams(horizontal_field_deg=field_deg)
-    motion = MotionOfDrawn(rig.motion)
-    return PixelCamera(drawn, scene, mount, where, own.find_faces(rig), rng, motion, locate)
+    faces, moves = own.find_faces(rig), MotionOfDrawn(rig.motion)
+    return PixelCamera(drawn, scene, mount, where, faces, rng, moves, locate)
 
 
 def scene_start_s(camera: Camera) -> float | None:
@@ -161,7 +162,7 @@ def real_camera(
         source = upright(partial(plugin_source, name, params), orientation_of(placed))
         parts = CameraParts(source, detector, motion, locate)
         process = CameraProcess(parts, clock.now_s, rig.camera_recovery)
-        return GuardedCamera(process, label, close_s=CLOSE_PROCESS_S)
+        return GuardedCamera(process, label, close_s=CLOSE_PROCESS_S, open_s=OPEN_PROCESS_S)
     return GuardedCamera(cast(Camera, camera), label)
 
 

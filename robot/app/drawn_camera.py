@@ -1,7 +1,8 @@
 """A drawn scene seen as through a real camera: drawn and looked at in the camera's own process.
 
 The control loop only says where the head is. The process draws what is seen from there and looks
-for faces and motion in it, so that neither can delay a tick.
+for faces and motion in it, so that neither can delay a tick. For a program's own detector, which
+only that program has, it is a thread.
 """
 
 import threading
@@ -16,9 +17,12 @@ from gazerig.drivers.camera.frame_analysis import Locate, Motion
 from gazerig.drivers.camera.pose_slot import PoseAt, PoseSlot
 from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.source import FrameSource, Shot
+from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.camera.worker import CameraParts
-from gazerig.drivers.types import DetectedFace, Detections, FaceDetector, ImageArray
+from gazerig.drivers.types import DetectedFace, Detections, ImageArray
+from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.gaze.types import Mat3, Vec3
+from gazerig.robot.app.program_parts import ProgramParts, watched
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.frames import CameraMount
 from gazerig.sim_mock.scenes.scene import Scene
@@ -137,12 +141,14 @@ class DrawnCamera:
     """A camera in a drawn scene, which is told at each look where the head is.
 
     Args:
-        process: draws and looks.
+        process: draws and looks; or a thread that does.
         poses: takes where the head is.
         where: returns rotation and place of the head in the world at a time.
     """
 
-    def __init__(self, process: CameraProcess, poses: PoseSlot, where: HeadPose) -> None:
+    def __init__(
+        self, process: CameraProcess | CameraThread, poses: PoseSlot, where: HeadPose
+    ) -> None:
         self.process = process
         self._poses, self._where = poses, where
 
@@ -181,7 +187,7 @@ def drawn_camera(
     where: HeadPose,
     rng: np.random.Generator,
     clock: Clock,
-    detector: Callable[[], FaceDetector],
+    own: ProgramParts,
     motion: Callable[[], Motion],
     locate: Locate,
 ) -> DrawnCamera:
@@ -194,12 +200,14 @@ def drawn_camera(
         where: rotation and place of the head in the world at a time.
         rng: for the noise.
         clock: the host's.
-        detector: makes what finds faces.
+        own: a program's own detector, if it has one.
         motion: makes what finds motion.
         locate: locates what is found in the camera's axes.
     """
     poses = PoseSlot()
     make = partial(scene_pixels, scene, mount, rig.camera.horizontal_field_deg, rng)
     source: Callable[[], FrameSource] = partial(DrawnSource, make, poses)
-    parts = CameraParts(source, detector, motion, locate)
+    if own.detector is not None:
+        return DrawnCamera(watched(rig, own, source(), clock, motion, locate), poses, where)
+    parts = CameraParts(source, partial(face_detector, rig.detector), motion, locate)
     return DrawnCamera(CameraProcess(parts, clock.now_s, rig.camera_recovery), poses, where)

@@ -74,7 +74,7 @@ def program_camera(
         raise SetupError(f"{label} gives frames in real time: in simulated time give detections")
     source = CheckedSource(cast(FrameSource, camera), label)
     turned = UprightSource(source, FrameOrientation(rig.camera.rotation, rig.camera.mirrored))
-    return watched(rig, parts, turned, clock, motion, locate)
+    return GuardedCamera(watched(rig, parts, turned, clock, motion, locate), label)
 
 
 def watched(
@@ -84,7 +84,7 @@ def watched(
     clock: Clock,
     motion: Callable[[], Motion | None],
     locate: Locate,
-) -> Camera:
+) -> CameraThread:
     """Return a source of frames with the detector looking in a thread of this program."""
     detector = parts.find_faces(rig)
     return CameraThread(source, detector, clock.now_s, rig.camera_recovery, motion(), locate)

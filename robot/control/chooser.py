@@ -9,7 +9,6 @@ from math import dist, isfinite
 from typing import Any, Protocol
 
 from gazerig.drivers.bounded_call import BoundedCall
-from gazerig.drivers.plugins import failure
 from gazerig.gaze.top_down import TopDown
 from gazerig.gaze.types import GazeState, Percept, Target, Vec3
 
@@ -88,7 +87,7 @@ class GuardedChooser:
         self._rule: Chooser | None = rule
         self._own, self._label, self._say = own, label, say
         self.top_down = own.top_down
-        self._call = BoundedCall(f"attention {label}", longest_s)
+        self._call = BoundedCall(label, longest_s)
         self._overruns: list[float] = []
         self._chosen: Target | None = None
         self._identity: tuple[str, int] | None = None
@@ -100,11 +99,11 @@ class GuardedChooser:
         self._own.reset(t_s)
         self._overruns.clear()
         self._chosen, self._identity = None, None
-        forget = getattr(self._rule, "reset", None)
-        if callable(forget):
-            outcome = self._call(lambda: forget(t_s))
+        rule = self._rule
+        if rule is not None:
+            outcome = self._call(lambda: _forget(rule, t_s))
             if outcome is not None and outcome.error is not None:
-                self._drop(f"failed ({failure(outcome.error)})")
+                self._drop(f"failed ({outcome.why})")
 
     def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
         """Return the target of the rule, else that of the rig's own attention."""
@@ -120,36 +119,56 @@ class GuardedChooser:
 
     def _ask(self, rule: Chooser, percept: Percept | None, state: GazeState, t_s: float) -> None:
         """Ask the rule, and keep what it chose until it answers again."""
-        outcome = self._call(lambda: rule.choose(percept, state, t_s))
+        outcome = self._call(lambda: _answer(rule, percept, state, t_s))
         if outcome is None:  # the machine may have been busy: only the rule's own time is blamed
             if self._call.running_s() > BLOCKED_S:
                 self._drop(f"has not answered for {BLOCKED_S:g} s")
             return
-        if outcome.took_s > LONGEST_S:
-            self._overrun(t_s)
         if outcome.error is not None:
-            self._drop(f"failed ({failure(outcome.error)})")
-        elif self._rule is not None:
-            try:
-                chosen = target_of(outcome.value, t_s)
-            except ValueError as error:
-                self._drop(f"returned {error}")
-                return
-            before = self._chosen
+            self._drop(f"failed ({outcome.why})")
+        elif isinstance(outcome.value, str):
+            self._drop(f"returned {outcome.value}")
+        elif outcome.took_s <= LONGEST_S or not self._overrun(t_s):
+            chosen, before = outcome.value, self._chosen
             if chosen is not None and before is not None and chosen.id < 0:
                 self._shift += dist(chosen.p_world_m, before.p_world_m) > _JUMP_M
             self._chosen = chosen
 
-    def _overrun(self, t_s: float) -> None:
+    def _overrun(self, t_s: float) -> bool:
+        """Count an answer that came late; return whether the rule is dropped for it."""
         self._overruns = [at_s for at_s in self._overruns if t_s - at_s < FORGIVEN_S]
         self._overruns.append(t_s)
-        if len(self._overruns) >= MOST_OVERRUNS:
-            self._drop(f"took longer than {LONGEST_S * 1e3:g} ms {MOST_OVERRUNS} times in a second")
+        if len(self._overruns) < MOST_OVERRUNS:
+            return False
+        self._drop(f"took longer than {LONGEST_S * 1e3:g} ms {MOST_OVERRUNS} times in a second")
+        return True
 
-    def _drop(self, why: str) -> None:
+    def close(self) -> None:
+        """Ask the rule no more, and end it where it is still at work."""
         self._rule, self._chosen = None, None
         self._call.close()
+
+    def _drop(self, why: str) -> None:
+        self.close()
         self._say(f"{self._label} {why}: dropped, the rig's own attention chooses")
+
+
+def _forget(rule: Chooser, t_s: float) -> None:
+    """Have a rule forget everything seen, where it can."""
+    forget = getattr(rule, "reset", None)
+    if callable(forget):
+        forget(t_s)
+
+
+def _answer(
+    rule: Chooser, percept: Percept | None, state: GazeState, t_s: float
+) -> Target | str | None:
+    """Return what a rule chooses, or what is wrong with it; the rule's code may block."""
+    answer = rule.choose(percept, state, t_s)
+    try:
+        return target_of(answer, t_s)
+    except ValueError as error:
+        return str(error)
 
 
 def target_of(answer: Any, t_s: float) -> Target | None:

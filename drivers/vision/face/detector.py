@@ -104,7 +104,7 @@ class CheckedDetector:
         try:
             faces = tuple(self._detector.find(image))
             wrong = next((f"returned {bad}" for face in faces if (bad := fault_of_face(face))), "")
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             wrong = f"failed ({failure(error)})"
         if not wrong:
             return faces
