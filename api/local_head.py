@@ -2,6 +2,8 @@
 
 import contextlib
 import logging
+import os
+import signal
 import threading
 from abc import abstractmethod
 from collections.abc import Callable, Mapping
@@ -13,6 +15,7 @@ from gazerig.config.faults import ConfigError
 from gazerig.errors import Error, HeadEnded, Refused
 from gazerig.head import Head
 from gazerig.order import Order
+from gazerig.program_signals import SIGNALS
 from gazerig.robot.app import session
 from gazerig.robot.app.assemble import Substitutes
 from gazerig.robot.app.options import RunOptions
@@ -139,8 +142,12 @@ class RunningHead(LocalHead):
     """A head whose loop runs in a thread beside the program, in real time.
 
     Whatever ends the block parks the head and switches the torque off, as ``gazerig run`` does:
-    its end, an exception, Ctrl-C (a second one skips the rest of parking), the end of the thread
-    that opened it or of the interpreter. Signals are left to the program.
+    its end, an exception, Ctrl-C, SIGTERM and SIGHUP (``ProgramSignals``), the end of the thread
+    that opened it or of the interpreter. Further signals skip the rest of parking. What ends the
+    program at once (SIGKILL, a crash) leaves the torque to the guardian.
+
+    Attributes:
+        closing: the block has ended, and waits until the head has parked.
     """
 
     def __init__(
@@ -154,25 +161,29 @@ class RunningHead(LocalHead):
         self._owner = threading.current_thread()
         self._begun, self._over = threading.Event(), threading.Event()
         self._failure: BaseException | None = None
-        self._thread: threading.Thread | None = None
+        self._pid = os.getpid()
         self._clock = RealClock()
+        self.closing = False
+        self._ended_by = ""
 
     def __enter__(self) -> Self:
         """Switch the torque on where the joints are, and run; return when the loop ticks."""
         self._owner = threading.current_thread()
         composed = self._compose()
-        # Not a daemon: at the end of the interpreter it parks before it ends.
-        self._thread = threading.Thread(target=self._run, args=(composed,), name=f"head {self.rig}")
-        self._thread.start()
+        # Never a daemon, whatever thread opens the head: the interpreter's end waits for parking.
+        self._thread = threading.Thread(
+            target=self._run, args=(composed,), name=f"head {self.rig}", daemon=False
+        )
+        SIGNALS.add(self)
         try:
+            self._thread.start()
             while not self._begun.wait(0.05) and not self._over.is_set():
                 pass
+            if not self._begun.is_set():
+                raise self._failure if self._failure is not None else HeadEnded(self._ended)
         except BaseException:
             self._close()
             raise
-        if not self._begun.is_set():
-            self._thread.join()
-            raise self._failure if self._failure is not None else HeadEnded(self._ended)
         return self
 
     def __exit__(
@@ -185,16 +196,28 @@ class RunningHead(LocalHead):
 
         Raises:
             HeadEnded: a fault has ended the head before, and the block did not fail by itself.
+            KeyboardInterrupt: Ctrl-C came meanwhile.
+            SystemExit: SIGTERM or SIGHUP came meanwhile.
         """
-        interrupted = self._close()
+        raised = self._close()
         if error is not None:
             return
-        if interrupted:
-            raise KeyboardInterrupt
+        if raised is not None:
+            raise raised
         if self._failure is not None:
             raise HeadEnded(f"the head has ended: {self._ended}") from self._failure
         if self._ended.startswith("fault"):
             raise HeadEnded(f"the head has ended: {self._ended}")
+
+    def end(self, reason: str) -> None:
+        """Ask the head to park, from any thread or a signal handler; again, to park no further.
+
+        Args:
+            reason: for the line that reports the end.
+        """
+        if self.closing and reason in signal.Signals.__members__:
+            self._ended_by = reason
+        self._interrupts.request(reason)
 
     def _pause(self, until: Callable[[], bool], seconds: float) -> None:
         end_s = self._clock.now_s() + seconds
@@ -231,17 +254,30 @@ class RunningHead(LocalHead):
             return "the end of the program"
         return None if self._owner.is_alive() else "the end of the thread that opened it"
 
-    def _close(self) -> bool:
-        """End the loop and wait for it; return whether Ctrl-C came meanwhile."""
-        interrupted = False
-        self._interrupts.request(_ENDED)
-        while self._thread is not None and self._thread.is_alive():
+    def _close(self) -> BaseException | None:
+        """End the loop and wait for it; return what a signal asked for meanwhile."""
+        if os.getpid() != self._pid:  # a fork has no loop, and the head is its parent's
+            return None
+        self.closing = True
+        if not self._interrupts.requests:  # one more would skip parking
+            self._interrupts.request(_ENDED)
+        raised: BaseException | None = None
+        # Not by the thread's join: when a signal interrupts it, CPython up to 3.12 takes the thread
+        # for ended, and the interpreter ends while the head parks.
+        while self._thread.ident is not None and not self._over.is_set():
             try:
-                self._thread.join()
-            except KeyboardInterrupt:
-                interrupted = True
+                self._over.wait()
+            except BaseException as error:  # of a signal handler of the program's own
+                raised = error
                 self._interrupts.request(_ENDED)
-        return interrupted
+        with contextlib.suppress(BaseException):
+            self._thread.join()  # it has no more than its last line to do
+        SIGNALS.remove(self)
+        if self._ended_by == "SIGINT":
+            return KeyboardInterrupt()
+        if self._ended_by:
+            return SystemExit(128 + signal.Signals[self._ended_by])
+        return raised
 
 
 class SimulatedHead(LocalHead):

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import textwrap
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from branch import Branch, script
 from slow_rigs import at_rate
 
 import gazerig
+from gazerig.robot.control.interrupts import SAME_REQUEST_S
 from gazerig.robot.control.loop import Robot, Tick
 
 LET_GO = "(not )?parked, torque off"
@@ -72,16 +74,56 @@ def assert_let_go(said: list[str], why: str = "the program") -> None:
 
 
 def test_the_end_of_the_block(said: list[str], opened: Open) -> None:
-    handlers = [signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)]
+    numbers = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+    handlers = [signal.getsignal(n) for n in numbers]
     switching_s = sys.getswitchinterval()
     with opened() as head:
-        assert [
-            signal.getsignal(n) for n in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-        ] == handlers
+        assert not {signal.getsignal(n) for n in numbers} & {*handlers}
         assert head.look_at(1.0, 0.4, 0.3).wait(100.0) == "arrived"
         assert head.look_at(-1.0, 0.1, 0.3).wait(100.0) == "out of reach"
     assert_let_go(said)
+    assert [signal.getsignal(n) for n in numbers] == handlers
     assert sys.getswitchinterval() == pytest.approx(switching_s)
+
+
+def test_handlers_of_the_program_stay(said: list[str], opened: Open) -> None:
+    def handle(number: int, frame: object) -> None:
+        said.append(signal.Signals(number).name)
+
+    before = signal.signal(signal.SIGTERM, handle)
+    try:
+        with opened() as head:
+            signal.raise_signal(signal.SIGTERM)
+            assert head.look_at(1.0, 0.4, 0.3).wait(100.0) == "arrived"
+        assert signal.getsignal(signal.SIGTERM) is handle and "SIGTERM" in said
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert_let_go(said)
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_a_request_to_end_parks_and_ends_the_program(
+    said: list[str], opened: Open, number: signal.Signals
+) -> None:
+    with pytest.raises(SystemExit) as caught, opened():
+        signal.raise_signal(number)
+    assert caught.value.code == 128 + number
+    assert_let_go(said, number.name)
+
+
+def test_a_fork_leaves_the_head_to_its_parent(said: list[str], opened: Open) -> None:
+    with opened() as head:
+        pid = os.fork()
+        if pid == 0:
+            code = 1
+            try:
+                head.__exit__(None, None, None)
+                code = 0 if signal.getsignal(signal.SIGTERM) == signal.SIG_DFL else 2
+            finally:
+                os._exit(code)
+        assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0
+        assert head.look_at(1.0, 0.4, 0.3).wait(100.0) == "arrived"
+    assert_let_go(said)
 
 
 def test_an_exception_in_the_block(said: list[str], opened: Open) -> None:
@@ -96,30 +138,73 @@ def test_an_interrupt_in_the_block(said: list[str], opened: Open) -> None:
     assert_let_go(said)
 
 
-def test_a_second_interrupt_skips_what_is_left_of_parking(
-    said: list[str], opened: Open, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("more", [1, 3])
+@pytest.mark.parametrize(
+    ("number", "raised"), [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, SystemExit)]
+)
+def test_more_signals_skip_what_is_left_of_parking(
+    said: list[str],
+    opened: Open,
+    number: signal.Signals,
+    raised: type[BaseException],
+    more: int,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    join, park, parking = threading.Thread.join, Robot.park, threading.Event()
-    waits = iter(range(1000))
-
-    def interrupted(self: threading.Thread, timeout: float | None = None) -> None:
-        if self.name.startswith("head ") and next(waits) == 0:
-            parking.wait()
-            raise KeyboardInterrupt
-        join(self, timeout)
+    park, parking, sent = Robot.park, threading.Event(), threading.Event()
 
     def parked(self: Robot, *given: Any) -> bool:
-        again = given[3]
         parking.set()
-        while not again():  # as far from the parking pose as can be
-            parking.wait(0.01)
+        sent.wait()
+        while not given[3]():  # as far from the parking pose as can be
+            time.sleep(0.01)
         return park(self, *given)
 
-    monkeypatch.setattr(Robot, "park", parked)
+    def send() -> None:
+        parking.wait()
+        for _ in range(more):
+            time.sleep(SAME_REQUEST_S + 0.05)
+            os.kill(os.getpid(), number)
+        sent.set()
 
+    monkeypatch.setattr(Robot, "park", parked)
+    sender = threading.Thread(target=send)
+    with pytest.raises(raised), opened():
+        sender.start()
+        signal.raise_signal(number)
+        pytest.fail("the signal raises")
+    sender.join()
+    why = "the program" if number == signal.SIGINT else "SIGTERM"
+    assert said[-1] == f"stopped by {why}: not parked (interrupted), torque off"
+
+
+def test_one_signal_that_comes_twice_still_parks(said: list[str], opened: Open) -> None:
     with pytest.raises(KeyboardInterrupt), opened():
-        monkeypatch.setattr(threading.Thread, "join", interrupted)
-    assert said[-1] == "stopped by the program: not parked (interrupted), torque off"
+        threading.Timer(0.03, os.kill, (os.getpid(), signal.SIGINT)).start()
+        signal.raise_signal(signal.SIGINT)
+    assert_let_go(said)
+
+
+def test_the_end_of_a_daemon_that_opened_it(tmp_path: Path) -> None:
+    file = tmp_path / "daemon.py"
+    file.write_text(textwrap.dedent(DAEMON), encoding="utf-8")
+    done = run_script(file, fresh=True)
+    last = done.stdout.splitlines()[-1]
+    assert re.fullmatch(f"stopped by the end of the program: {LET_GO}", last), done.stderr
+
+
+DAEMON = """
+import threading, time
+import gazerig
+from ideal_bus import ideal_buses
+ready = threading.Event()
+def work():
+    with ideal_buses():
+        with gazerig.open("desk", mock=True, say=lambda line: print(line, flush=True)):
+            ready.set()
+            time.sleep(60.0)
+threading.Thread(target=work, daemon=True).start()
+ready.wait()
+"""
 
 
 def test_the_death_of_the_thread_that_opened_it(said: list[str], opened: Open) -> None:

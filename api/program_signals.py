@@ -1,0 +1,96 @@
+"""Signals to a program that has heads open: its heads park before it ends."""
+
+import os
+import signal
+import threading
+from types import FrameType
+from typing import Protocol
+
+from gazerig.robot.control.interrupts import SAME_REQUEST_S, signals_of
+from gazerig.robot.model.clock import RealClock
+
+_ENDING = signals_of("SIGTERM", "SIGHUP")
+_DEFAULTS = (signal.SIG_DFL, signal.default_int_handler)
+
+
+class OpenHead(Protocol):
+    """A head whose loop runs."""
+
+    closing: bool
+    """Its block has ended, and waits until it has parked."""
+
+    def end(self, reason: str) -> None:
+        """Ask the head to park; asked again, to skip the rest of parking."""
+        ...
+
+
+class ProgramSignals:
+    """Handlers for SIGINT, SIGTERM and SIGHUP while heads are open.
+
+    Only handlers that the program has left at their defaults are replaced. Ctrl-C raises
+    KeyboardInterrupt as always; while a head parks it skips the rest of parking instead, so that
+    no number of signals ends the program with the torque on. SIGTERM and SIGHUP make every open
+    head park and raise SystemExit(128 + number) in the main thread.
+    """
+
+    def __init__(self) -> None:
+        self._heads: list[OpenHead] = []
+        self._installed: list[signal.Signals] = []
+        self._last_s = -SAME_REQUEST_S
+        self._clock = RealClock()
+
+    def add(self, head: OpenHead) -> None:
+        """Count a head as open; handlers can be set from the main thread alone."""
+        self._heads.append(head)
+        if threading.current_thread() is not threading.main_thread():
+            return
+        for number in (signal.SIGINT, *_ENDING):
+            if signal.getsignal(number) in _DEFAULTS:
+                signal.signal(number, self._handle)
+                self._installed.append(number)
+
+    def remove(self, head: OpenHead) -> None:
+        """Count a head as ended; after the last, restore the default handlers."""
+        if head in self._heads:
+            self._heads.remove(head)
+        if self._heads or threading.current_thread() is not threading.main_thread():
+            return
+        self._restore()
+
+    def forget(self) -> None:
+        """Leave the heads and signals to the parent; for a process that was forked."""
+        self._heads.clear()
+        self._restore()
+
+    def _restore(self) -> None:
+        while self._installed:
+            number = self._installed.pop()
+            if signal.getsignal(number) == self._handle:
+                default = signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL
+                signal.signal(number, default)
+
+    def _handle(self, number: int, frame: FrameType | None) -> None:
+        now_s, last_s = self._clock.now_s(), self._last_s
+        self._last_s = now_s
+        name = signal.Signals(number).name
+        # At the end of the interpreter an exception would end the loops of heads left open.
+        final = not threading.main_thread().is_alive()
+        closing = [head for head in self._heads if head.closing or final]
+        if closing and now_s - last_s < SAME_REQUEST_S:
+            return  # a shell and a runner each send their own
+        if number != signal.SIGINT and not closing:
+            closing = [*self._heads]
+            for head in closing:
+                head.end(name)
+            raise SystemExit(128 + number)
+        for head in closing:
+            head.end(name)
+        if not closing:
+            raise KeyboardInterrupt
+
+
+SIGNALS = ProgramSignals()
+"""Handlers belong to the whole program."""
+
+if hasattr(os, "register_at_fork"):  # not on Windows
+    os.register_at_fork(after_in_child=SIGNALS.forget)
