@@ -37,6 +37,9 @@ for number in (signal.SIGQUIT, signal.SIGHUP):
     if signal.getsignal(number) == signal.SIG_IGN:
         signal.signal(number, signal.SIG_DFL)
 
+# What the user of this machine has fetched is no test's.
+os.environ["GAZERIG_MODELS"] = os.path.join(os.devnull, "models")
+
 # Tests run side by side, one worker a core: threads of a numeric library in each of them would
 # only wait for each other. Read when the library loads, so before any test imports it.
 for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "OPENCV_FOR_THREADS_NUM"):

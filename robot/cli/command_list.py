@@ -118,6 +118,10 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
             "rig_check",
             "Export the JSON Schema of rig files, for editors; also of studies and questionnaires.",
         ),
+        "models": CommandEntry(
+            "models",
+            "List and fetch model files, with which the camera finds more: faces, people, eyes.",
+        ),
         "emulate": CommandEntry(
             "emulate",
             "Emulate servos on a pseudo-terminal; prints its path as JSON, takes fault commands.",

@@ -34,6 +34,12 @@ EXAMPLES: dict[str, tuple[tuple[str, str], ...]] = {
         ("kinds", "what buses, cameras, detectors and rules there are, and from which package"),
         ("kinds --json", "the same for a program"),
     ),
+    "models": (
+        ("models list", "what there is, its licence, and what is here"),
+        ("models fetch", "bring what is not here"),
+        ("models fetch yunet", "one of them"),
+        ("models fetch people --from ~/downloads", "without a network, out of downloaded files"),
+    ),
     "scan": (
         ("scan", "ports, and the servos on the only one"),
         ("scan --port /dev/ttyUSB0", "who answers on this port, of any kind, at every baud rate"),

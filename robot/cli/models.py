@@ -1,0 +1,84 @@
+"""The commands under models: which model files there are, and how they come here."""
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.vision.model_download import fetch
+from gazerig.drivers.vision.model_files import MODEL_FILES, models_folder
+from gazerig.robot.cli.progress_bar import progress_bar
+from gazerig.robot.cli.terminal import clear_errors
+from gazerig.robot.model.clock import RealClock
+
+app = typer.Typer()
+models = typer.Typer(
+    name="models",
+    help="List and fetch model files, with which the camera finds more: faces, people, eyes.",
+    no_args_is_help=True,
+)
+app.add_typer(models)
+
+_NAMES = list(dict.fromkeys(file.name for file in MODEL_FILES))
+
+
+@models.command("list")
+def list_models(
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+) -> None:
+    """List model files: what each is for, its licence, and whether it is here."""
+    rows = [file._asdict() | {"state": file.state()} for file in MODEL_FILES]
+    if as_json:
+        print(json.dumps({"folder": str(models_folder()), "models": rows}))
+        return
+    table = Table("name", "file", "purpose", "licence", "MB", "state")
+    for row in rows:
+        size = f"{row['size_bytes'] / 1e6:.1f}"
+        table.add_row(
+            *(row[key] for key in ("name", "file", "purpose", "licence")), size, row["state"]
+        )
+    Console().print(table)
+    print(f"folder: {models_folder()}")
+    if any(row["state"] != "there" for row in rows):
+        print("gazerig models fetch brings what is not there")
+
+
+@models.command("fetch")
+def fetch_models(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[NAME]...",
+            help=f"Which ones: {', '.join(_NAMES)}; all if none is named.",
+            autocompletion=lambda incomplete: [n for n in _NAMES if n.startswith(incomplete)],
+        ),
+    ] = None,
+    folder: Annotated[
+        Path | None,
+        typer.Option("--from", help="Folder with the downloads, on a machine that is offline."),
+    ] = None,
+) -> None:
+    """Download model files, verify them and put them into the folder of models."""
+    with clear_errors():
+        if unknown := sorted({*(names or ())} - {*_NAMES}):
+            raise SetupError(f"no model is called {unknown[0]!r}: there is {', '.join(_NAMES)}")
+        wanted = [file for file in MODEL_FILES if not names or file.name in names]
+        failed = []
+        with progress_bar(remaining=True) as progress:
+            for name in dict.fromkeys(file.name for file in wanted):
+                some = [file for file in wanted if file.name == name]
+                try:
+                    brought = fetch(some, RealClock().now_s, progress, folder)
+                except SetupError as error:
+                    failed.append(str(error))
+                    continue
+                for file in some:
+                    print(
+                        f"{file.name}: {file.path} {'fetched' if file in brought else 'is there'}"
+                    )
+        if failed:
+            raise SetupError("\n".join(failed))

