@@ -66,7 +66,7 @@ def design(
 def pairs(conditions: tuple[str, ...] = ("walk", "centre", "random")) -> StudyDesign:
     """Return a study of choices between pairs."""
     first, second = conditions[:2]
-    chosen = Hypothesis("choice.alive", first, second, "bradley_terry")
+    chosen = Hypothesis("choice.alive", first, second, "sign")
     return replace(design(conditions, ("choice",), (chosen,)), task="pairwise")
 
 

@@ -161,7 +161,7 @@ def test_what_is_allowed_and_should_be_known_is_said(elsewhere: Path) -> None:
 def test_pairs_are_stated_as_pairs(elsewhere: Path, capfd: Terminal) -> None:
     text = EXAMPLE.replace("[nakamoto_tsuruno]", "[choice]")
     text = text.replace("nakamoto_tsuruno.naturalness", "choice.alive")
-    text = text.replace("    than: stares", "    than: stares\n    test: bradley_terry")
+    text = text.replace("    than: stares", "    than: stares\n    test: sign")
     text = text.replace("title:", "task: pairwise\ntitle:").replace("26", "40")
     (elsewhere / "s.yaml").write_text(text, encoding="utf-8")
     assert typed("study", "design", "s.yaml") == 0

@@ -123,7 +123,7 @@ def test_the_pre_registration_says_what_is_averaged() -> None:
         ({"better": "gaze=away"}, ("better", "lids=stare")),
         ({"than": "lids=stare"}, ("than", "a level of the same factor")),
         ({"than": "centre_blink"}, ("than", "both are to be conditions")),
-        ({"test": "chi_square"}, ("test", "take signed_rank or rank_sum")),
+        ({"also": ("chi_square",)}, ("also.0", "take signed_rank or rank_sum")),
         ({"also": ("friedman",)}, ("also.0", "compares single conditions")),
     ],
 )  # fmt: skip
@@ -146,13 +146,12 @@ def test_levels_beside_other_levels_of_the_rest_are_refused() -> None:
 
 def test_a_factor_alone_names_its_conditions() -> None:
     """Where a level is one condition, it is that condition, whatever decides."""
-    study = design(hypotheses=(replace(GAZE, test="chi_square"),))
+    study = design(hypotheses=(replace(GAZE, also=("chi_square",)),))
     alone = {key: Condition(factors={"gaze": key}) for key in study.conditions}
     study = replace(study, conditions=alone)
     assert not list(asked_rules(study, QUESTIONS))
     (one,) = decisions(study, QUESTIONS, people_of(study, 24, 1.2))
-    named = replace(
-        study, hypotheses=(Hypothesis("paper.looked_at", "walk", "centre", "chi_square"),)
-    )
+    by_name = Hypothesis("paper.looked_at", "walk", "centre", also=("chi_square",))
+    named = replace(study, hypotheses=(by_name,))
     (same,) = decisions(named, QUESTIONS, people_of(named, 24, 1.2))
-    assert one.test == same.test
+    assert (one.test, one.also) == (same.test, same.also)

@@ -226,18 +226,22 @@ def test_faults_of_a_design_name_line_key_and_cure(tmp_path: Path, more: str, wa
         ("{measure: nakamoto_tsuruno.warmth, better: a, than: b}", "measure: nothing asks or"),
         ("{measure: nakamoto_tsuruno.looked_at, better: a, than: c}", "than: no condition 'c'"),
         ("{measure: nakamoto_tsuruno.looked_at, better: a, than: a}", "than: is the condition"),
-        ("{measure: nakamoto_tsuruno.looked_at, better: a, than: b, test: friedman}", "test: fri"),
         (
-            "{measure: nakamoto_tsuruno.looked_at, better: a, than: b, test: bradley_terry}",
-            "test: bradley_terry cannot decide on a rating; for example signed_rank can",
+            "{measure: nakamoto_tsuruno.looked_at, better: a, than: b, test: friedman}",
+            "test: friedman tests whether any of all conditions differ, so it cannot decide on these "
+            "two: write test: signed_rank, and also: [friedman]",
+        ),
+        (
+            "{measure: nakamoto_tsuruno.looked_at, better: a, than: b, test: sign}",
+            "test: sign cannot decide on a rating; for example signed_rank can",
         ),
         (
             "{measure: nakamoto_tsuruno.looked_at, better: a, than: b, also: [signed_rank]}",
             "also.0: signed_rank stands already",
         ),
         (
-            "{measure: rosas.warmth, better: a, than: b, test: chi_square}",
-            "test: chi_square counts the answers to one item; for the mean of a scale",
+            "{measure: rosas.warmth, better: a, than: b, also: [chi_square]}",
+            "also.0: chi_square counts the answers to one item; for the mean of a scale",
         ),
         ("{measure: godspeed.alive, better: a, than: b}", "measure: is asked once at the end"),
     ],
@@ -248,6 +252,7 @@ def test_hypotheses_that_cannot_be_tested_are_refused(
     text = f"{HEAD}{TWO}after: [godspeed]\nhypotheses:\n  - {hypothesis}\n"
     said = faults(tmp_path, text.replace("[nakamoto_tsuruno]", "[nakamoto_tsuruno, rosas]"))
     assert said[0].startswith(f"10: hypotheses.0.{wanted}"), said
+    assert len(said) == 1
 
 
 @pytest.mark.parametrize(

@@ -1,12 +1,14 @@
 """Power that is claimed is power that drawn studies have; sample sizes grow as they must."""
 
 from dataclasses import replace
+from math import sqrt
 
 import numpy as np
 import pytest
 from scipy import stats
 
 from gazerig.config.study_file import load_study
+from gazerig.robot.study.design import DECIDING, Test
 from gazerig.robot.study.measures import measures
 from gazerig.robot.study.power import (
     MOST,
@@ -18,8 +20,7 @@ from gazerig.robot.study.power import (
     sample_size,
 )
 from gazerig.robot.study.simulation import differences, effect_of, shift_of
-from gazerig.robot.study.statistics.bradley_terry import preferred
-from gazerig.robot.study.statistics.ranks import exact_signed_rank, rank_sum
+from gazerig.robot.study.statistics.ranks import exact_signed_rank, exact_swaps, sign
 
 SIGNED = PowerQuestion("signed_rank", 0.6, 0.05)
 STUDIES = 500
@@ -50,10 +51,10 @@ def test_the_joint_chances_are_those_of_the_effect() -> None:
     assert joint(0.0, 5) == pytest.approx(joint(0.0, 5).T)
 
 
-@pytest.mark.parametrize("test", ["signed_rank", "rank_sum", "chi_square", "ordinal_mixed"])
+@pytest.mark.parametrize("test", DECIDING)
 @pytest.mark.parametrize("points", [5, 9])
-def test_without_an_effect_it_is_the_chance_of_a_false_alarm(test: str, points: int) -> None:
-    asked = PowerQuestion(test, 0.0, 0.05, points=points)  # type: ignore[arg-type]
+def test_without_an_effect_it_is_the_chance_of_a_false_alarm(test: Test, points: int) -> None:
+    asked = PowerQuestion(test, 0.0, 0.05, points=points)
     assert 0.0 < power_of(asked, 40) < 0.056
     assert power_of(asked, 0) == 0.0
 
@@ -95,24 +96,28 @@ def test_what_would_take_too_many_has_no_size() -> None:
     assert by_formula(replace(SIGNED, effect=0.05), 0.95) > MOST
 
 
-def test_the_rank_sum_test_wastes_what_the_same_participants_share() -> None:
-    paired = power_of(SIGNED, 30)
-    unpaired = power_of(replace(SIGNED, test="rank_sum"), 30)
-    counts = power_of(replace(SIGNED, test="chi_square"), 30)
-    assert paired > unpaired + 0.05 > counts + 0.1
+@pytest.mark.parametrize("points", [5, 0])
+def test_the_rank_sum_test_has_the_power_of_its_swaps(points: int) -> None:
     rng = np.random.default_rng(2)
-    cells = joint(0.6, 5)
-    drawn = rng.choice(25, (200, 30), p=(cells / cells.sum()).ravel())
-    found = [rank_sum(row % 5, row // 5, paired=False).p <= 0.05 for row in drawn[:60]]
-    assert unpaired == pytest.approx(np.mean(found), abs=0.15)
+    if points:
+        cells = joint(0.6, 5)
+        drawn = rng.choice(25, (300, 20), p=(cells / cells.sum()).ravel())
+        above, below = drawn // 5, drawn % 5
+    else:
+        own = 0.8 * rng.normal(size=(300, 20))
+        above, below = (own + sqrt(0.98) * rng.normal(size=(300, 20)) for _ in range(2))
+        above = above + 0.6 * sqrt(2.0 * 0.98)
+    found = [exact_swaps(a, b) <= 0.05 for a, b in zip(above, below, strict=True)]
+    # The standard error of 300 studies is .026; the seed is fixed.
+    asked = replace(SIGNED, test="rank_sum", points=points)
+    assert power_of(asked, 20) == pytest.approx(np.mean(found), abs=0.06)
 
 
-def test_choices_have_the_binomial_tests_power() -> None:
-    asked = PowerQuestion("bradley_terry", 0.6, 0.05)
+def test_choices_have_the_sign_tests_power() -> None:
+    asked = PowerQuestion("sign", 0.6, 0.05)
     share = stats.norm.cdf(0.6)
     exact = [stats.binomtest(k, 30).pvalue <= 0.05 for k in range(31)]
     assert power_of(asked, 30) == pytest.approx(stats.binom.pmf(range(31), 30, share) @ exact)
-    assert power_of(replace(asked, choices=2), 15) == power_of(asked, 30)
     one = replace(asked, two_sided=False)
     exact = [stats.binomtest(k, 30, alternative="greater").pvalue <= 0.05 for k in range(31)]
     assert power_of(one, 30) == pytest.approx(stats.binom.pmf(range(31), 30, share) @ exact)
@@ -120,27 +125,13 @@ def test_choices_have_the_binomial_tests_power() -> None:
     assert n is not None and 30 < n < 45
 
 
-def test_all_choices_decide_between_two_of_several_conditions() -> None:
-    asked = PowerQuestion("bradley_terry", 0.6, 0.05, heights=(0.5, -0.5, -0.5))
-    alone = replace(asked, heights=(0.5, -0.5))
-    assert power_of(asked, 24) > power_of(alone, 24) + 0.1
-    rng, chance, found = np.random.default_rng(3), stats.norm.cdf(0.6), 0
-    for _ in range(150):
-        wins = np.zeros((3, 3), np.int64)
-        for i, j, p in ((0, 1, chance), (0, 2, chance), (1, 2, 0.5)):
-            wins[i, j] = rng.binomial(24, p)
-            wins[j, i] = 24 - wins[i, j]
-        found += preferred(wins, 0, 1, two_sided=True).deciding_p <= 0.05
-    # The standard error of 150 studies is .033; the seed is fixed.
-    assert power_of(asked, 24) == pytest.approx(found / 150, abs=0.07)
-    assert power_of(replace(asked, effect=0.0), 24) == pytest.approx(0.05, abs=1e-3)
-
-
-def test_friedmans_power_is_that_of_its_test() -> None:
-    asked = PowerQuestion("friedman", 0.6, 0.05, heights=(0.5, -0.5, -0.5))
-    assert power_of(replace(asked, effect=0.0), 20) == pytest.approx(0.05, abs=0.015)
-    assert power_of(asked, 12) < power_of(asked, 24) < power_of(asked, 40)
-    assert power_of(replace(asked, heights=(0.5, -0.5, 0.0)), 24) < power_of(asked, 24)
+def test_repeated_choices_have_the_power_of_participants_and_not_of_choices() -> None:
+    asked = PowerQuestion("sign", 0.3, 0.05, choices=4)
+    more = np.random.default_rng(3).binomial(4, stats.norm.cdf(0.3), (400, 24)) - 2
+    found = np.mean([sign(row).deciding_p <= 0.05 for row in more])
+    # The standard error of 400 studies is .025; the seed is fixed.
+    assert power_of(asked, 24) == pytest.approx(found, abs=0.06)
+    assert power_of(asked, 24) < power_of(replace(asked, choices=1), 96)
 
 
 def test_a_hypothesis_gets_its_share_of_the_false_alarms() -> None:

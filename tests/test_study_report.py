@@ -13,6 +13,7 @@ from study_records import QUESTIONS, design, pairs, records
 
 from gazerig.robot.report.study import apa, figures
 from gazerig.robot.report.study.page import banners, study_page
+from gazerig.robot.report.study.r_script import r_script
 from gazerig.robot.report.study.tables import ANSWERS, answers_csv, results_json, trials_csv
 from gazerig.robot.study.analysis import StudyAnalysis, analysed, within_halves
 from gazerig.robot.study.design import Condition, Hypothesis, StudyDesign, Trials
@@ -181,10 +182,12 @@ def test_simulated_ones_do_not_count_beside_people() -> None:
     assert any("3 of 4 participants are simulated" in words for words in banners(one))
 
 
-def test_choices_have_a_table_and_a_scale() -> None:
+def test_choices_have_a_table_and_a_sign_test() -> None:
     said = text_of(page_of(study(pairs(), 12, Population(0.8))))
     assert "the first of two was chosen" in said and "triples of conditions go in a circle" in said
-    assert re.search(r"% of direct choices\) \(Bradley-Terry model\), χ²\(1\) = ", said)
+    assert re.search(
+        r"% of direct choices\) \(exact sign test of participants\), K = \d+, p ", said
+    )
 
 
 @pytest.mark.usefixtures("unlaid_figures")
@@ -240,6 +243,19 @@ def test_pairs_and_factors_have_columns_of_their_own() -> None:
         ("centre", "1"),
         ("", ""),
     }
+
+
+def test_an_r_script_has_a_model_for_each_hypothesis_and_reads_columns_of_the_table() -> None:
+    rated, chosen = r_script(study(count=2)), r_script(study(pairs(), 2))
+    call = (
+        'ratings("paper.looked_at: walk > centre", "paper", c("looked_at"), c("walk"), c("centre"))'
+    )
+    assert call in rated and "(1 + better | participant)" in rated and "BTm" not in rated
+    assert 'choices("alive", "choice", "alive", c("walk", "centre", "random"))' in chosen
+    assert "BTm" in chosen and "clmm" not in chosen
+    for script in (rated, chosen):
+        assigned = set(re.findall(r"one\$(\w+) <-", script))
+        assert set(re.findall(r"(?:answers|one)\$(\w+)", script)) <= {*ANSWERS, *assigned}
 
 
 def test_presentations_are_a_table_too(ratings: StudyAnalysis) -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import nan, sqrt
+from math import comb, nan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,6 @@ from gazerig.robot.study.measures import Measure, measures
 from gazerig.robot.study.participation import AnswerRow, Participation
 from gazerig.robot.study.questionnaire import Questionnaire
 from gazerig.robot.study.scores import Scores, item_answers, scores, wins
-from gazerig.robot.study.statistics.bradley_terry import BradleyTerryFit, circular_triples, fit
 from gazerig.robot.study.statistics.contingency import Counts, counts_of
 from gazerig.robot.study.statistics.reliability import cronbachs_alpha
 from gazerig.robot.study.statistics.results import EffectSize
@@ -63,7 +62,6 @@ class ChoiceSummary:
 
     measure: Measure
     wins: NDArray[np.int64]
-    fit: BradleyTerryFit
     circles: tuple[int, int]
     first: tuple[int, int]
 
@@ -215,4 +213,11 @@ def _choices(
         if row.questionnaire == measure.questionnaire and row.item in measure.items
     ]
     first = sum(value == "first" for value in made), len(made)
-    return ChoiceSummary(measure, table, fit(table, conditions), circular_triples(table), first)
+    return ChoiceSummary(measure, table, circular_triples(table), first)
+
+
+def circular_triples(wins: NDArray[np.int64]) -> tuple[int, int]:
+    """Return how many triples of conditions go in a circle by majority, and how many there are."""
+    majority = (wins > wins.T).astype(np.int64)
+    circles = int(np.trace(np.linalg.matrix_power(majority, 3))) // 3
+    return circles, comb(len(wins), 3)

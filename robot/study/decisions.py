@@ -13,23 +13,20 @@ from gazerig.robot.study.design import Hypothesis, StudyDesign, Test
 from gazerig.robot.study.measures import Measure, measures
 from gazerig.robot.study.participation import Participation
 from gazerig.robot.study.questionnaire import Questionnaire
-from gazerig.robot.study.scores import Scores, scores, wins
+from gazerig.robot.study.scores import Scores, choice_differences, scores, wins
 from gazerig.robot.study.statistics.assumptions import (
     AssumptionCheck,
     difference_checks,
-    proportional_odds,
     range_check,
 )
-from gazerig.robot.study.statistics.bradley_terry import preferred
 from gazerig.robot.study.statistics.contingency import chi_square, counts_of
 from gazerig.robot.study.statistics.effects import cohens_dz
-from gazerig.robot.study.statistics.mixed_ordinal import ordinal_mixed
 from gazerig.robot.study.statistics.multiplicity import corrected
-from gazerig.robot.study.statistics.ranks import friedman, rank_sum, signed_rank
+from gazerig.robot.study.statistics.ranks import friedman, rank_sum, sign, signed_rank
 from gazerig.robot.study.statistics.results import EffectSize, StatisticalTest
 
 Verdict = Literal["supported", "not supported", "against", "too few"]
-"""against: a difference beyond chance, but of the other sign."""
+"""against: a difference beyond chance, but the test's effect has the other sign."""
 
 _LEAST_PEOPLE = 2
 
@@ -41,7 +38,8 @@ class Decision:
     test: the one that was planned, None where nothing could be tested; also: further ones
     corrected_p: of the planned test, over all hypotheses
     n: participants with all conditions of both sides; standardised: d_z of their differences
-    medians, means: of the better and of the other condition, nan for choices
+    medians, means: of the better and of the other condition; of choices the shares in all direct
+        choices, and no medians
     too_few: why no result could have been significant, "" where one could
     """
 
@@ -87,21 +85,12 @@ def decisions(
 
 
 def _verdict(one: Decision, alpha: float) -> Verdict:
-    if one.too_few or not isfinite(one.corrected_p):
+    if one.test is None or one.too_few or not isfinite(one.corrected_p):
         return "too few"
     if one.corrected_p > alpha:
         return "not supported"
-    return "supported" if _above(one) else "against"
-
-
-def _above(one: Decision) -> bool:
-    """Whether the condition that was expected above lies there."""
-    if one.measure.kind == "choice":
-        effect = one.test.effect.value if one.test else nan
-        # Without finite scores one side was chosen always: by the direct choices.
-        return effect > 0.0 if isfinite(effect) else one.means[0] > one.means[1]
-    better, than = one.means
-    return better > than
+    # Means may have another sign than the ranks that the test compares.
+    return "supported" if one.test.effect.value > 0.0 else "against"
 
 
 def _tested(
@@ -126,7 +115,7 @@ def _tested(
     return Decision(
         one, measure, tests[0], tuple(tests[1:]), nan, "not supported", n,
         (float(np.median(better)), float(np.median(than))), (float(better.mean()),
-        float(than.mean())), cohens_dz(better - than), _checks(one, measure, sides),
+        float(than.mean())), cohens_dz(better - than), _checks(measure, sides),
         _too_few(tests[0], design.plan.alpha),
     )  # fmt: skip
 
@@ -171,24 +160,15 @@ def _run(key: Test, one: Hypothesis, sides: _Sides, measure: Measure) -> Statist
     if key == "chi_square":
         rows = [counts_of(found.answers(*c), measure.points) for c in (sides.better, sides.than)]
         return chi_square(rows, paired=True)
-    if key == "ordinal_mixed":
-        better_at, than_at = found.columns(sides.better), found.columns(sides.than)
-        single = found.single[np.isin(found.single[:, 1], better_at + than_at)]
-        return ordinal_mixed(
-            single[:, 2].astype(np.int64), np.isin(single[:, 1], better_at),
-            single[:, 0].astype(np.int64), one.two_sided,
-        )  # fmt: skip
     raise ValueError(f"{key} cannot decide on a rating")
 
 
-def _checks(one: Hypothesis, measure: Measure, sides: _Sides) -> tuple[AssumptionCheck, ...]:
+def _checks(measure: Measure, sides: _Sides) -> tuple[AssumptionCheck, ...]:
     better, than = sides.means
     checks = difference_checks(better - than, sides.better_first)
     answers: list[Floats] = [sides.found.answers(*side) for side in (sides.than, sides.better)]
     if measure.kind in ("item", "scale"):
         checks.append(range_check(np.concatenate(answers), measure.points))
-    if "ordinal_mixed" in (one.test, *one.also):
-        checks.append(proportional_odds(answers[0], answers[1], measure.points))
     return tuple(checks)
 
 
@@ -202,16 +182,16 @@ def _chosen(
         conditions.index(key) for name in (one.better, one.than) for key in design.side(name)
     )
     direct = int(table[better, than] + table[than, better])
-    n = sum(any(r.item in measure.items for r in p.counted) for p in people)
-    if not table.any():
+    leans = choice_differences(measure, people, conditions[better], conditions[than])
+    if not direct:
         why = "nobody has chosen"
         nothing = (nan, nan)
         return Decision(one, measure, None, (), nan, "too few", 0, nothing, nothing, None, (), why)
-    test = preferred(table, better, than, one.two_sided, conditions)
-    shares = (table[better, than] / direct, table[than, better] / direct) if direct else (nan, nan)
+    test = sign(leans, one.two_sided)
+    share = float(table[better, than]) / direct
     return Decision(
-        one, measure, test, (), nan, "not supported", n, (nan, nan),
-        (float(shares[0]), float(shares[1])), None, (), _too_few(test, design.plan.alpha),
+        one, measure, test, (), nan, "not supported", len(leans), (nan, nan), (share, 1.0 - share),
+        None, (), _too_few(test, design.plan.alpha),
     )  # fmt: skip
 
 

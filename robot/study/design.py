@@ -12,10 +12,10 @@ from gazerig.params import Bounds, Choices
 Language = Literal["en", "ja", "de"]
 Task = Literal["rating", "pairwise"]
 """rating: each condition is rated after it was seen; pairwise: two are seen, one is chosen."""
-Test = Literal[
-    "chi_square", "rank_sum", "signed_rank", "friedman", "ordinal_mixed", "bradley_terry"
-]
+Test = Literal["signed_rank", "rank_sum", "sign", "chi_square", "friedman"]
 """Tests of one hypothesis (gazerig.robot.study.statistics)."""
+DECIDING: tuple[Test, ...] = ("signed_rank", "rank_sum", "sign")
+"""Tests with a measured rate of false positives (docs/study-analysis.md); others explore."""
 
 
 # fmt: off
@@ -74,8 +74,8 @@ class Hypothesis:
     measure: Annotated[str, "questionnaire.item, questionnaire.scale or an objective measure"]
     better: Annotated[str, "condition, or level of a factor (gaze=moving), for which more is expected"]
     than: Annotated[str, "condition, or level of the same factor, that it is compared with"]
-    test: Annotated[Test, "what decides"] = "signed_rank"
-    also: Annotated[tuple[Test, ...], "further tests that are printed beside it"] = ()
+    test: Annotated[Test, "what decides: signed_rank, rank_sum; sign for choices"] = "signed_rank"
+    also: Annotated[tuple[Test, ...], "exploratory tests, printed beside it; they decide nothing"] = ()
     two_sided: Annotated[bool, "differences of either sign count"] = True
 
 

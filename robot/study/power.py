@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import optimize, special, stats
+from scipy import stats
 
 from gazerig.gaze.types import Floats
 from gazerig.robot.study.design import Hypothesis, StudyDesign, Test
@@ -24,7 +24,6 @@ from gazerig.robot.study.simulation import (
     BETWEEN_SD,
     ITEM_SD,
     TRIAL_SD,
-    levels,
     preference,
     shift_of,
     thresholds,
@@ -52,8 +51,6 @@ class PowerQuestion:
         alpha: Of this one test.
         two_sided: Differences of either sign count.
         points: Steps of the rating; 0 for what is continuous, as means of scales nearly are.
-        heights: How many shifts each condition lies above the middle, the better one first and the
-            one that it is compared with second.
         choices: Direct choices between both that a participant makes, where choices are made.
     """
 
@@ -62,7 +59,6 @@ class PowerQuestion:
     alpha: float
     two_sided: bool = True
     points: int = 5
-    heights: tuple[float, ...] = (0.5, -0.5)
     choices: int = 1
 
 
@@ -101,35 +97,27 @@ def claim(design: StudyDesign, hypothesis: Hypothesis, measure: Measure) -> Powe
 
 def _question(design: StudyDesign, one: Hypothesis, measure: Measure) -> PowerQuestion:
     many = len(design.hypotheses) if design.plan.correction != "none" else 1
-    at, repetitions = levels(design), design.trials.repetitions
+    repetitions = design.trials.repetitions
     sides = (*design.side(one.better), *design.side(one.than))
-    middle = 0.5 * max(at.values())
-    others = [at[key] - middle for key in at if key not in sides]
     whole = measure.kind == "item" and repetitions == 1 and len(sides) == 2
-    heights: tuple[float, ...] = (0.5, -0.5)
-    if one.test == "friedman":
-        heights = (*[at[key] - middle for key in sides], *others)
-    if one.test == "bradley_terry":  # the others say something of both, wherever they are
-        heights = (0.5, -0.5, *others)
     return PowerQuestion(
         one.test, design.plan.effect, design.plan.alpha / many, one.two_sided,
-        measure.points if whole else 0,
-        heights, repetitions,
+        measure.points if whole else 0, repetitions,
     )  # fmt: skip
 
 
 def by_formula(asked: PowerQuestion, power: float) -> int:
     """Return participants by the normal approximation, ties left out of account.
 
-    n = ((z_alpha + z_power) / d)^2, of rank tests over 3/pi; of choices d is the root of the
-    likelihood ratio that one participant's choices are expected to have.
+    n = ((z_alpha + z_power) / d)^2, of rank tests over 3/pi; of choices that of the sign test.
     """
     sides = 2 if asked.two_sided else 1
     z_null, z_power = float(stats.norm.isf(asked.alpha / sides)), float(stats.norm.ppf(power))
-    if asked.test == "bradley_terry":
-        return ceil(((z_null + z_power) / _mean_of_one(asked)) ** 2)
-    ranks = 1.0 if asked.test == "ordinal_mixed" else pi / 3.0
-    return ceil(((z_null + z_power) / asked.effect) ** 2 * ranks)
+    if asked.test == "sign":
+        above, below = _leans(asked)
+        mean, lean = above - below, above + below
+        return ceil(((z_null * sqrt(lean) + z_power * sqrt(lean - mean**2)) / mean) ** 2)
+    return ceil(((z_null + z_power) / asked.effect) ** 2 * pi / 3.0)
 
 
 def sample_size(asked: PowerQuestion, power: float, multiple: int = 1) -> int | None:
@@ -158,23 +146,12 @@ def sample_size(asked: PowerQuestion, power: float, multiple: int = 1) -> int | 
 
 @lru_cache(maxsize=4096)
 def power_of(asked: PowerQuestion, n: int) -> float:
-    """Return the chance that a test of ``n`` participants is significant.
-
-    That of a mixed ordinal model is the normal approximation for paired answers, which needs its
-    differences' d_z alone; that of choices is the binomial test's where there is one pair, and
-    else the normal approximation of the difference of scores.
-    """
+    """Return the chance that a deciding test of ``n`` participants is significant."""
     if n < 1:
         return 0.0
-    if asked.test == "bradley_terry" and len(asked.heights) == 2:
-        return _binomial(asked, n * asked.choices)
-    if asked.test in ("ordinal_mixed", "bradley_terry"):
-        return _normal(asked, n)
+    if asked.test == "sign":
+        return _sign(asked, n)
     rng = np.random.default_rng((_SEED, n))
-    if asked.test == "friedman":
-        return _friedman(asked, n, rng)
-    if asked.test == "chi_square":
-        return _chi_square(asked, n, rng)
     if asked.test == "rank_sum":
         return _rank_sum(asked, n, rng)
     return _signed_rank(asked, n, rng)
@@ -268,94 +245,44 @@ def _coins(n: int) -> Floats:
 
 
 def _rank_sum(asked: PowerQuestion, n: int, rng: np.random.Generator) -> float:
-    """Return the power of the rank-sum test where the same participants gave both answers."""
+    """Return the power of the rank-sum test of the same participants' answers, by their swaps."""
     if asked.points:
         drawn = _drawn(asked, n, rng)
-        above, below = drawn.sum(axis=2), drawn.sum(axis=1)
+        size = drawn.sum(axis=2) + drawn.sum(axis=1)
+        midrank = np.cumsum(size, axis=1) - 0.5 * (size - 1)
+        scores = midrank[:, :, None] - midrank[:, None, :]
+        total, spread = (np.sum(drawn * one, axis=(1, 2)) for one in (scores, scores**2))
     else:
         own = BETWEEN_SD**2 / (BETWEEN_SD**2 + TRIAL_SD**2 + ITEM_SD**2)
         shift = asked.effect * sqrt(2.0 * (1.0 - own))
         person = sqrt(own) * rng.normal(size=(_STUDIES, n))
         both = [person + sqrt(1.0 - own) * rng.normal(size=(_STUDIES, n)) for _ in range(2)]
-        order = np.argsort(np.concatenate([both[0] + shift, both[1]], axis=1), axis=1)
-        above = (order < n).astype(np.int64)
-        below = 1 - above
-    size = above + below
-    midrank = np.cumsum(size, axis=1) - 0.5 * (size - 1)
-    u = np.sum(above * midrank, axis=1) - 0.5 * n * (2 * n + 1)
-    ties = np.sum(size.astype(float) ** 3 - size, axis=1)
-    variance = n * n / 12.0 * (2 * n + 1 - ties / (2.0 * n * (2 * n - 1)))
-    z = (np.abs(u) - 0.5) / np.sqrt(np.maximum(variance, 1e-12))
+        ranks = stats.rankdata(np.concatenate([both[0] + shift, both[1]], axis=1), axis=1)
+        scores = ranks[:, :n] - ranks[:, n:]
+        total, spread = (np.sum(one, axis=1) for one in (scores, scores**2))
+    z = (np.abs(total) - 0.5) / np.sqrt(np.maximum(spread, 1e-12))
     alpha = asked.alpha / (2.0 if asked.two_sided else 1.0)
     found = stats.norm.sf(z) <= alpha
-    return float(np.mean(found if asked.two_sided else found & (u > 0.0)))
+    return float(np.mean(found if asked.two_sided else found & (total > 0.0)))
 
 
-def _chi_square(asked: PowerQuestion, n: int, rng: np.random.Generator) -> float:
-    """Return the power of Pearson's chi-square of the counts, empty columns dropped."""
-    drawn = _drawn(asked, n, rng)
-    above, below = drawn.sum(axis=2), drawn.sum(axis=1)
-    size = above + below
-    squares = np.divide((above - below) ** 2, size, out=np.zeros(size.shape), where=size > 0)
-    freedom = np.maximum(np.count_nonzero(size, axis=1) - 1, 1)
-    return float(np.mean(stats.chi2.sf(squares.sum(axis=1), freedom) <= asked.alpha))
+def _leans(asked: PowerQuestion) -> tuple[float, float]:
+    """Return the chances that a participant chooses the better one more often, and less often."""
+    chances = stats.binom.pmf(np.arange(asked.choices + 1), asked.choices, preference(asked.effect))
+    half = 0.5 * asked.choices
+    at = np.arange(asked.choices + 1)
+    return float(chances[at > half].sum()), float(chances[at < half].sum())
 
 
-def _friedman(asked: PowerQuestion, n: int, rng: np.random.Generator) -> float:
-    """Return the power of Friedman's test over all conditions."""
-    k, studies = len(asked.heights), max(500, min(_STUDIES, 2_000_000 // (n * len(asked.heights))))
-    noise = sqrt(TRIAL_SD**2 + ITEM_SD**2)
-    shift = shift_of(asked.effect, asked.points) if asked.points else asked.effect * sqrt(2) * noise
-    latent = BETWEEN_SD * rng.normal(size=(studies, n, 1)) + shift * np.array(asked.heights)
-    latent = latent + noise * rng.normal(size=(studies, n, k))
-    seen = np.digitize(latent, thresholds(asked.points)) if asked.points else latent
-    found = seen[..., :, None] - seen[..., None, :]
-    ranks = 0.5 * (1 + k) + 0.5 * np.sign(found).sum(axis=-1)
-    sums = ranks.sum(axis=1)
-    between = np.sum((sums - 0.5 * n * (k + 1)) ** 2, axis=1)
-    within = np.sum((ranks - 0.5 * (k + 1)) ** 2, axis=(1, 2)) / (k - 1)
-    statistic = np.divide(between, within, out=np.zeros(studies), where=within > 0.0)
-    return float(np.mean(stats.chi2.sf(statistic, k - 1) <= asked.alpha))
-
-
-def _mean_of_one(asked: PowerQuestion) -> float:
-    """Return the mean of a normal statistic of one participant; that of n is sqrt(n) times it.
-
-    Of answers it is d_z. Of choices between all pairs it is the root of the likelihood ratio that
-    is expected: of the true scores over the best ones in which both are alike (Self, Mauritsen &
-    Ohara 1992).
-    """
-    if asked.test != "bradley_terry":
-        return asked.effect
-    scores = special.logit(preference(asked.effect)) * np.array(asked.heights)
-    i, j = np.triu_indices(len(scores), 1)
-    true = special.expit(scores[i] - scores[j])
-
-    def lost(others: Floats) -> float:
-        guessed = special.expit(np.subtract(*np.array([0.0, 0.0, *others])[[i, j]]))
-        return float(
-            np.sum(special.rel_entr(true, guessed) + special.rel_entr(1 - true, 1 - guessed))
-        )
-
-    others = scores[2:] - scores[:2].mean()
-    least = optimize.minimize(lost, others).fun if len(others) else lost(others)
-    return sqrt(2.0 * asked.choices * float(least))
-
-
-def _normal(asked: PowerQuestion, n: int) -> float:
-    """Return the power of a test whose statistic is normal with variance 1."""
-    z = stats.norm.isf(asked.alpha / (2.0 if asked.two_sided else 1.0))
-    mean = _mean_of_one(asked) * sqrt(n)
-    return float(stats.norm.sf(z - mean) + (stats.norm.cdf(-z - mean) if asked.two_sided else 0.0))
-
-
-def _binomial(asked: PowerQuestion, choices: int) -> float:
-    """Return the power of the binomial test of the direct choices between both."""
+def _sign(asked: PowerQuestion, n: int) -> float:
+    """Return the power of the exact sign test of participants' choices."""
     alpha = asked.alpha / (2.0 if asked.two_sided else 1.0)
-    # More than this number chosen has a chance of at most alpha where both are alike.
-    most = int(stats.binom.isf(alpha, choices, 0.5))
-    share = preference(asked.effect)
-    found = float(stats.binom.sf(most, choices, share))
-    return found + (
-        float(stats.binom.cdf(choices - most - 1, choices, share)) if asked.two_sided else 0.0
-    )
+    above, below = _leans(asked)
+    kept = np.arange(n + 1)
+    share = above / (above + below)
+    # More than this number above has a chance of at most alpha where both sides are alike.
+    most = stats.binom.isf(alpha, kept, 0.5)
+    found = stats.binom.sf(most, kept, share)
+    if asked.two_sided:
+        found = found + stats.binom.cdf(kept - most - 1, kept, share)
+    return float(stats.binom.pmf(kept, n, above + below) @ found)

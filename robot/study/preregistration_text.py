@@ -15,11 +15,10 @@ from gazerig.robot.study.questionnaire import Item, Questionnaire, Texts
 
 TESTS: Mapping[Test, str] = {
     "signed_rank": "Wilcoxon's signed-rank test of participants' differences, zeros left out",
-    "rank_sum": "Wilcoxon's rank-sum test, which treats both answers of a participant as strangers'",
+    "rank_sum": "Wilcoxon's rank-sum statistic, by all swaps of participants' two answers",
+    "sign": "the exact sign test of participants, by which of both each chose more often",
     "chi_square": "Pearson's chi-square test of the counts of each point",
     "friedman": "Friedman's test over all conditions",
-    "ordinal_mixed": "a cumulative-link mixed model with a random intercept for each participant",
-    "bradley_terry": "the Bradley-Terry model of all choices, a likelihood ratio of equal scores",
 }
 """What each test is, in words."""
 _QUESTION_S, _SHOWN_ROWS = 6.0, 12
@@ -94,7 +93,7 @@ def size_words(design: StudyDesign, found: PowerClaim) -> str:
     needed = f"{found.needed}" if found.needed is not None else f"more than {MOST}"
     few = found.needed is None or found.participants < found.needed
     ties = (
-        f"by the formula without ties {found.formula}" if asked.test != "bradley_terry"
+        f"by the formula without ties {found.formula}" if asked.test != "sign"
         else f"by the normal approximation {found.formula}"
     )  # fmt: skip
     return (
@@ -117,7 +116,7 @@ def minutes(design: StudyDesign, questionnaires: Mapping[str, Questionnaire]) ->
 
 def _analysis(one: Hypothesis) -> str:
     also = "; ".join(TESTS[test] for test in one.also)
-    beside = f" Beside it, deciding nothing: {also}." if also else ""
+    beside = f" Exploratory, deciding nothing: {also}." if also else ""
     return f"`{one.measure}`, `{one.better}` against `{one.than}`: {TESTS[one.test]}.{beside}"
 
 

@@ -7,7 +7,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from itertools import chain
 
 from gazerig.robot.model.types import JOINT_NAME
-from gazerig.robot.study.design import Hypothesis, StudyDesign
+from gazerig.robot.study.design import DECIDING, Hypothesis, StudyDesign, Test
 from gazerig.robot.study.measures import GAZE_MEASURES, Measure, measures
 from gazerig.robot.study.order import rows
 from gazerig.robot.study.questionnaire import Item, Questionnaire
@@ -216,10 +216,13 @@ def _hypothesis_rules(
         key = "test" if i == 0 else f"also.{i - 1}"
         if test in (one.test, *one.also)[:i]:
             yield key, f"{test} stands already; once is enough"
-        if measure is not None and (rule := _misfit(test, measure, len(design.conditions))):
+        if i == 0 and test not in DECIDING:
+            right = "sign" if measure is not None and measure.kind == "choice" else "signed_rank"
+            yield key, f"{test} {_EXPLORATORY[test]}: write test: {right}, and also: [{test}]"
+        elif measure is not None and (rule := _misfit(test, measure, len(design.conditions))):
             yield key, rule
         elif len(design.side(one.better)) > 1 and test not in LEVEL_TESTS:
-            instead = "name two" if test == "bradley_terry" else f"take {' or '.join(LEVEL_TESTS)}"
+            instead = "name two" if test == "sign" else f"take {' or '.join(LEVEL_TESTS)}"
             yield key, f"{test} compares single conditions, not levels of a factor; {instead}"
 
 
@@ -253,16 +256,20 @@ def _factor_levels(design: StudyDesign) -> list[str]:
     return [f"{factor}={level}" for factor, level in dict.fromkeys(pairs)]
 
 
+_EXPLORATORY: Mapping[Test, str] = {
+    "friedman": "tests whether any of all conditions differ, so it cannot decide on these two",
+    "chi_square": "has no sign and treats each answer as another person's, so it cannot decide",
+}
 LEVEL_TESTS = ("signed_rank", "rank_sum")
 """Tests of a participant's means, which may go over several conditions."""
 
 
 def _misfit(test: str, measure: Measure, conditions: int) -> str:
     """Return why a test cannot decide on a measure, "" if it can."""
-    if (test == "bradley_terry") != (measure.kind == "choice"):
-        fit = "bradley_terry" if measure.kind == "choice" else "signed_rank"
+    if (test == "sign") != (measure.kind == "choice"):
+        fit = "sign" if measure.kind == "choice" else "signed_rank"
         return f"{test} cannot decide on {_KINDS[measure.kind]}; for example {fit} can"
-    if test in ("chi_square", "ordinal_mixed") and measure.kind != "item":
+    if test == "chi_square" and measure.kind != "item":
         return f"{test} counts the answers to one item; for {_KINDS[measure.kind]} take signed_rank"
     if test == "friedman" and conditions < 3:
         return "friedman compares three conditions or more; for two take signed_rank"

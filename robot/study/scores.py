@@ -139,8 +139,21 @@ def wins(
             if row.questionnaire == measure.questionnaire and row.item in measure.items:
                 first, second = row.condition.split(PAIR)
                 chosen, other = (first, second) if row.value == "first" else (second, first)
-                out[columns[chosen], columns[other]] += 1
+                if chosen in columns and other in columns:
+                    out[columns[chosen], columns[other]] += 1
     return out
+
+
+def choice_differences(
+    measure: Measure, people: Sequence[Participation], better: str, than: str
+) -> Floats:
+    """Return how much more often each participant chose one condition than the other, (n,).
+
+    Participants who did not choose between these two are left out.
+    """
+    each = (wins(measure, [one], (better, than)) for one in people)
+    found = [int(table[0, 1]) - int(table[1, 0]) for table in each if table.any()]
+    return np.array(found, float)
 
 
 def _place(order: Sequence[str], condition: str) -> float:

@@ -45,6 +45,8 @@ class Population:
     careless: Annotated[float, Bounds(0, 1), "share who give one answer to everything"] = 0.0
     hasty: Annotated[float, Bounds(0, 1), "share who answer faster than anybody reads"] = 0.0
     seed: Annotated[int, Bounds(0, 2**31 - 1), "seed of all participants"] = 0
+    preference_sd: Annotated[float, Bounds(0, 10), "spread of each one's preferences for conditions, latent"] = 0.0
+    contrast_sd: Annotated[float, Bounds(0, 10), "spread of each one's preference for the first condition, latent"] = 0.0
 # fmt: on
 
 
@@ -194,7 +196,7 @@ class SimulatedParticipant:
         if asked.kind == "text":
             return "", ms
         if asked.kind == "choice":
-            return self._choice(condition, rng), ms
+            return self._choice(condition, questionnaire, rng), ms
         return self._rating(trial, condition, questionnaire, item, asked, rng), ms
 
     def measured(self, trial: int, condition: str) -> dict[str, float]:
@@ -208,12 +210,22 @@ class SimulatedParticipant:
             values[name] = _OBJECTIVE_MIDDLE + _OBJECTIVE_SD * latent
         return values
 
-    def _choice(self, pair: str, rng: np.random.Generator) -> str:
+    def _preference(self, condition: str, construct: str) -> float:
+        """Return how much more than others this participant likes a condition, latent units."""
+        if condition not in self._levels:
+            return 0.0
+        one, first = self._population, condition == next(iter(self._levels))
+        found = one.preference_sd * self._rng(f"{condition} {construct}").normal()
+        contrast = one.contrast_sd * self._rng(f"contrast {construct}").normal()
+        return float(found + (0.5 if first else -0.5) * contrast)
+
+    def _choice(self, pair: str, questionnaire: str, rng: np.random.Generator) -> str:
         if self.careless:
             return "first"
         first, second = pair.split(PAIR)
         apart = self._levels[first] - self._levels[second]
-        chance = special.expit(apart * special.logit(preference(self._population.effect)))
+        own = self._preference(first, questionnaire) - self._preference(second, questionnaire)
+        chance = special.expit(apart * special.logit(preference(self._population.effect)) + own)
         return "first" if rng.random() < chance else "second"
 
     def _rating(
@@ -237,6 +249,7 @@ class SimulatedParticipant:
             + TRIAL_SD * self._rng(f"{trial} {construct}").normal()
             + ITEM_SD * rng.normal()
             + shift * self._height(condition)
+            + self._preference(condition, construct)
         )
         rating = int(rated(np.array([latent]), item.points)[0])
         return item.points + 1 - rating if item.reverse else rating

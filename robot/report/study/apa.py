@@ -14,12 +14,11 @@ from gazerig.robot.study.measures import Measure
 from gazerig.robot.study.statistics.results import EffectSize, StatisticalTest
 
 TEST_NAMES: dict[Test, str] = {
-    "chi_square": "chi-square test of the counts",
-    "rank_sum": "Wilcoxon rank-sum test",
     "signed_rank": "Wilcoxon signed-rank test",
+    "rank_sum": "Wilcoxon rank-sum test",
+    "sign": "exact sign test of participants",
+    "chi_square": "chi-square test of the counts",
     "friedman": "Friedman test",
-    "ordinal_mixed": "cumulative-link mixed model",
-    "bradley_terry": "Bradley-Terry model",
 }
 _CORRECTIONS = {"holm": "Holm-corrected ", "bonferroni": "Bonferroni-corrected ", "none": ""}
 _MINUS = "\N{MINUS SIGN}"
@@ -72,7 +71,7 @@ def statistic(test: StatisticalTest) -> Markup:
         if isfinite(test.df):
             many = Markup(", <i>N</i> = {}").format(test.n) if test.key == "chi_square" else ""
             symbol += Markup("({:.0f}{})").format(test.df, many)
-    decimals = 2 if test.symbol in ("χ²", "W") else 1
+    decimals = {"χ²": 2, "K": 0}.get(test.symbol, 1)
     return Markup("{} = {}").format(symbol, unbounded(test.statistic, decimals))
 
 
@@ -88,8 +87,7 @@ def sentence(one: Decision, study: StudyAnalysis) -> Markup:
     figures += [effect(one.test.effect)]
     if one.standardised is not None:
         figures.append(effect(one.standardised))
-    if one.test.key != "chi_square":
-        figures.append(Markup("<i>n</i> = {}").format(one.n))
+    figures.append(Markup("<i>n</i> = {}").format(one.n))
     listed = Markup(", ").join(part for part in figures if part)
     found = _finding(one, better, than, what)
     return Markup("{} ({}), {}.").format(found, TEST_NAMES[one.test.key], listed)
@@ -120,9 +118,15 @@ def _finding(one: Decision, better: str, than: str, what: str) -> Markup:
     verb = {"supported": "was above", "against": "was below"}.get(
         one.verdict, "did not differ significantly from"
     )
-    return Markup("{} {} {} {} {} in {}").format(
+    found = Markup("{} {} {} {} {} in {}").format(
         better, next(places), verb, than, next(places), what
     )
+    assert one.test is not None
+    if one.test.effect.value * (one.means[0] - one.means[1]) < 0.0:
+        found += Markup("; the means, <i>M</i> = {} and {}, have the other sign").format(
+            *map(plain, one.means)
+        )
+    return found
 
 
 def plain(value: float) -> str:

@@ -1,4 +1,4 @@
-"""Figures of a study: counts, participants and means, effects, and the scale of choices."""
+"""Figures of a study: counts, participants and means, and effects."""
 
 from collections.abc import Sequence
 from math import isfinite
@@ -7,7 +7,7 @@ from textwrap import fill
 import numpy as np
 
 from gazerig.robot.report.plotting import HUMAN, INK, Axes, Figure, Patch, label, nothing, png_of
-from gazerig.robot.study.analysis import ChoiceSummary, MeasureSummary, StudyAnalysis
+from gazerig.robot.study.analysis import MeasureSummary, StudyAnalysis
 from gazerig.robot.study.decisions import Decision
 from gazerig.robot.study.statistics.results import EffectSize
 
@@ -141,8 +141,8 @@ def forest_png(study: StudyAnalysis, names: list[str]) -> bytes:
 def _forest(figure: Figure, found: tuple[Decision, ...], names: list[str]) -> None:
     standard, bounded = figure.subplots(1, 2, sharey=True)
     for axes, which, title in (
-        (standard, [_wide(one) for one in found], "d_z, or difference of scores (logits)"),
-        (bounded, [_within(one) for one in found], "r, δ, W or V of the planned test"),
+        (standard, [one.standardised for one in found], "d_z"),
+        (bounded, [one.test.effect if one.test else None for one in found], "r, δ, Δ of the test"),
     ):
         for row, size in enumerate(which):
             if size is not None and isfinite(size.value):
@@ -154,42 +154,9 @@ def _forest(figure: Figure, found: tuple[Decision, ...], names: list[str]) -> No
     bounded.set_xlim(-1.05, 1.05)
 
 
-def _wide(one: Decision) -> EffectSize | None:
-    if one.standardised is not None:
-        return one.standardised
-    return one.test.effect if one.test is not None and not one.test.effect.bounded else None
-
-
-def _within(one: Decision) -> EffectSize | None:
-    return one.test.effect if one.test is not None and one.test.effect.bounded else None
-
-
 def _whisker(axes: Axes, row: int, size: EffectSize) -> None:
     if isfinite(size.low95):
         axes.plot([size.low95, size.high95], [row, row], color=_ACCENT, lw=2.2)
     axes.plot(size.value, row, "s", color=_ACCENT, ms=7)
     axes.annotate(f"{size.symbol} = {size.value:.2f}", (size.value, row), (0, 7),
                   textcoords="offset points", ha="center", fontsize=8)  # fmt: skip
-
-
-def choices_png(one: ChoiceSummary, study: StudyAnalysis) -> bytes:
-    """Draw the conditions on one scale, by Bradley-Terry, with their intervals."""
-    names = [study.label(key) for key in study.design.conditions]
-    size = (_WIDE_IN, _HEAD_IN + _ROW_IN * len(names))
-    return png_of(lambda figure: _scale(figure, one, names), size)
-
-
-def _scale(figure: Figure, one: ChoiceSummary, names: list[str]) -> None:
-    axes = figure.subplots()
-    if one.fit.fault:
-        nothing(axes, one.fit.fault)
-        return
-    intervals = one.fit.intervals()
-    order = np.argsort(-one.fit.scores)
-    for row, k in enumerate(order):
-        axes.plot(intervals[k], [row, row], color=_ACCENT, lw=2.2)
-        axes.plot(one.fit.scores[k], row, "s", color=_ACCENT, ms=7)
-    axes.axvline(0.0, color=INK, lw=0.8)
-    axes.set_yticks(range(len(names)), [names[k] for k in order])
-    axes.set_ylim(len(names) - 0.5, -0.5)
-    label(axes, "score in logits (1 apart: chosen in 73 % of choices)", "")

@@ -75,7 +75,6 @@ class ChoiceSection(NamedTuple):
     facts: tuple[str, ...]
     names: tuple[str, ...]
     table: tuple[tuple[str, ...], ...]
-    figures: tuple[StudyFigure, ...]
 
 
 def study_page(study: StudyAnalysis, made_by: str, progress: Progress) -> str:
@@ -305,13 +304,7 @@ def _choice_section(one: ChoiceSummary, study: StudyAnalysis) -> ChoiceSection:
     facts = [f"the first of two was chosen {one.first[0]} of {one.first[1]} times"]
     if one.circles[1]:
         facts.append(f"{one.circles[0]} of {one.circles[1]} triples of conditions go in a circle")
-    if one.fit.fault:
-        facts.append(one.fit.fault)
-    scale = StudyFigure(
-        "One scale", figures.choices_png(one, study),
-        "Scores by Bradley & Terry (1952), their sum 0, with 95 % intervals.",
-    )  # fmt: skip
     names = tuple(study.label(key) for key in keys)
     return ChoiceSection(
-        apa.measure_words(one.measure), _asked(one, study), tuple(facts), names, table, (scale,)
+        apa.measure_words(one.measure), _asked(one, study), tuple(facts), names, table
     )

@@ -7,6 +7,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_output import make_folder, write_file
 from gazerig.robot.report.study.bids import StudyDataSet, write_study
 from gazerig.robot.report.study.page import Progress, study_page
+from gazerig.robot.report.study.r_script import r_script
 from gazerig.robot.report.study.tables import answers_csv, results_json, trials_csv
 from gazerig.robot.study.analysis import StudyAnalysis, analysed
 from gazerig.robot.study.collected import collected
@@ -54,6 +55,7 @@ def write_report(data: Path, out: Path, made_by: str, progress: Progress) -> Stu
         ("answers.csv", answers_csv(study)),
         ("trials.csv", trials_csv(study)),
         ("results.json", results_json(study)),
+        ("exploratory.R", r_script(study)),
     ):
         write_file(out / name, text, force=True)
     data_set = write_study(study, out / DATA_SET, found.folders, made_by, progress)

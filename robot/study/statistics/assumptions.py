@@ -50,7 +50,7 @@ def _symmetry(d: Floats) -> Iterator[AssumptionCheck]:
     p = float(stats.skewtest(d).pvalue)
     words = f"skewness {float(stats.skew(d)):.2f}"
     if p < _LEVEL:
-        words += ": the signed-rank test may answer to the skew; see the mixed model or the counts"
+        words += ": the signed-rank test may answer to the skew; see the counts"
     yield AssumptionCheck("differences are symmetric (signed-rank)", p, p >= _LEVEL, words)
 
 
@@ -98,31 +98,3 @@ def range_check(ratings: Floats, points: int) -> AssumptionCheck:
     if share > _AT_AN_END:
         words += ": differences beyond the end cannot be seen"
     return AssumptionCheck("the scale has room at both ends", nan, share <= _AT_AN_END, words)
-
-
-def proportional_odds(a: Floats, b: Floats, points: int) -> AssumptionCheck:
-    """Check whether one shift describes all points (ordinal model): the odds ratio of each cut.
-
-    Half an answer is added to each cell (Haldane 1956; Anscombe 1956). The test of their equality
-    is Woolf's (1955), for independent cuts, which these are not: it is an indication.
-
-    Args:
-        a: (n,) ratings of one condition.
-        b: (m,) of the other.
-        points: steps of the rating.
-    """
-    logs, weights = [], []
-    for cut in range(1, points):
-        cells = np.array([(b > cut).sum(), (b <= cut).sum(), (a > cut).sum(), (a <= cut).sum()])
-        if cells[0] + cells[2] and cells[1] + cells[3]:
-            up_b, down_b, up_a, down_a = cells + 0.5
-            logs.append(float(np.log(up_b * down_a / (down_b * up_a))))
-            weights.append(1.0 / float((1.0 / (cells + 0.5)).sum()))
-    what = "one shift describes all points (ordinal model)"
-    if len(logs) < 2:
-        return AssumptionCheck(what, nan, True, "two points alone were answered")
-    mean = float(np.average(logs, weights=weights))
-    distance = float(np.dot(weights, (np.array(logs) - mean) ** 2))
-    p = float(stats.chi2.sf(distance, len(logs) - 1))
-    words = f"log odds ratios of the cuts {', '.join(f'{one:.2f}' for one in logs)}"
-    return AssumptionCheck(what, p, p >= _LEVEL, words)

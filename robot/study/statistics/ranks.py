@@ -1,4 +1,4 @@
-"""Rank tests: Wilcoxon's rank-sum and signed-rank, and Friedman's, with exact chances under ties.
+"""Rank tests: Wilcoxon's rank-sum and signed-rank, Friedman's, and the sign test.
 
 The chances of large samples are SciPy's, corrected for ties and for continuity; exact ones count
 the permutations of the ranks that were seen, midranks and all (Streitberg & Roehmel 1986).
@@ -13,7 +13,7 @@ from scipy import special, stats
 
 from gazerig.gaze.types import Floats
 from gazerig.robot.study.statistics import effects
-from gazerig.robot.study.statistics.results import StatisticalTest, no_effect
+from gazerig.robot.study.statistics.results import EffectSize, StatisticalTest, no_effect
 
 Zeros = Literal["wilcox", "pratt"]
 """Differences of zero: left out (Wilcoxon 1945), or ranked and then left out (Pratt 1959)."""
@@ -31,8 +31,8 @@ def rank_sum(a: Floats, b: Floats, two_sided: bool = True, paired: bool = False)
         a: (n,) answers.
         b: (m,) answers.
         two_sided: differences of either sign count.
-        paired: the same participants gave both, which this test does not use; it is said, and
-            the effect's interval resamples participants.
+        paired: the same participants in the same order gave both. The exact chance then swaps each
+            participant's two answers, and the effect's interval resamples participants.
 
     Raises:
         ValueError: one side has no answer.
@@ -41,15 +41,15 @@ def rank_sum(a: Floats, b: Floats, two_sided: bool = True, paired: bool = False)
     if not len(a) or not len(b):
         raise ValueError("a rank-sum test needs answers on both sides")
     effect = effects.cliffs_delta(a, b, paired)
-    sides = 2 if two_sided else 1
-    least = min(1.0, sides / float(special.binom(len(a) + len(b), len(a))))
-    notes = ("the same participants saw both: the test treats them as others",) if paired else ()
+    ways = 2.0 ** len(a) if paired else float(special.binom(len(a) + len(b), len(a)))
+    least = min(1.0, (2 if two_sided else 1) / ways)
+    notes = ("the chance of large samples treats both answers as other persons'",) * paired
     if np.ptp(np.concatenate([a, b])) == 0.0:
         same = (*notes, "all answers are the same")
         half = 0.5 * len(a) * len(b)
         return StatisticalTest("rank_sum", "U", half, nan, 1.0, 1.0, least, len(a), effect, same)
     found = stats.mannwhitneyu(b, a, alternative=_side(two_sided), method="asymptotic")
-    exact = exact_rank_sum(a, b, two_sided)
+    exact = (exact_swaps if paired else exact_rank_sum)(a, b, two_sided)
     return StatisticalTest(
         "rank_sum", "U", float(found.statistic), nan, float(found.pvalue), exact, least,
         len(a) if paired else len(a) + len(b), effect, notes,
@@ -76,6 +76,20 @@ def exact_rank_sum(a: Floats, b: Floats, two_sided: bool = True) -> float:
     sums = np.arange(len(chances))
     centre = m * (len(whole) + 1)
     return float(min(1.0, chances[np.abs(sums - centre) >= abs(seen - centre)].sum()))
+
+
+def exact_swaps(a: Floats, b: Floats, two_sided: bool = True) -> float:
+    """Return the share of all swaps of participants' answers with as extreme a rank sum.
+
+    It holds however the two answers of a participant depend on each other.
+
+    Args:
+        a: (n,) answers, one per participant.
+        b: (n,) other answers of the same participants.
+        two_sided: differences of either sign count.
+    """
+    doubled = np.rint(2.0 * stats.rankdata(np.concatenate([a, b]))).astype(np.int64)
+    return _all_signs(doubled[len(a) :] - doubled[: len(a)], two_sided)
 
 
 def signed_rank(
@@ -122,19 +136,53 @@ def exact_signed_rank(
     d = np.asarray(differences, float)
     if zeros == "wilcox":
         d = d[d != 0.0]
-    ranks = np.rint(2.0 * stats.rankdata(np.abs(d))).astype(np.int64)[d != 0.0]
-    d = d[d != 0.0]
-    if len(d) > _MOST_EXACT:
+    ranks = np.rint(2.0 * stats.rankdata(np.abs(d))).astype(np.int64)
+    return _all_signs(np.sign(d).astype(np.int64) * ranks, two_sided)
+
+
+def _all_signs(scores: NDArray[np.int64], two_sided: bool) -> float:
+    """Return the share of all signs of scores (n,) whose sum is as extreme; nan above 200."""
+    scores = scores[scores != 0]
+    if len(scores) > _MOST_EXACT:
         return nan
-    chances = np.zeros(int(ranks.sum()) + 1)
+    sizes = np.abs(scores)
+    chances = np.zeros(int(sizes.sum()) + 1)
     chances[0] = 1.0
-    for rank in ranks:
+    for size in sizes:
         moved = np.zeros_like(chances)
-        moved[rank:] = chances[: len(chances) - rank]
+        moved[size:] = chances[: len(chances) - size]
         chances = 0.5 * (chances + moved)
-    seen = int(ranks[d > 0.0].sum())
+    seen = int(sizes[scores > 0].sum())
     above, below = float(chances[seen:].sum()), float(chances[: seen + 1].sum())
     return min(1.0, 2.0 * min(above, below) if two_sided else above)
+
+
+def sign(differences: Floats, two_sided: bool = True) -> StatisticalTest:
+    """Test whether more participants lean to one side than to the other: the exact sign test.
+
+    A participant counts once, however many choices he or she made.
+
+    Args:
+        differences: (n,) one per participant; only their signs are used.
+        two_sided: differences of either sign count.
+    """
+    d = np.asarray(differences, float)
+    above, kept = int(np.count_nonzero(d > 0.0)), int(np.count_nonzero(d))
+    notes: tuple[str, ...] = ()
+    if kept < len(d):
+        notes = (f"{len(d) - kept} of {len(d)} participants lean to neither side: left out",)
+    least = min(1.0, (2.0 if two_sided else 1.0) * 0.5 ** len(d))
+    name, symbol = "net share of participants", "Δ"
+    if not kept:
+        nothing = no_effect(name, symbol)
+        return StatisticalTest("sign", "K", 0.0, nan, 1.0, 1.0, least, len(d), nothing, notes)
+    p = float(stats.binomtest(above, kept, alternative=_side(two_sided)).pvalue)
+    low, high = stats.binomtest(above, kept).proportion_ci(0.95)
+    effect = EffectSize(
+        name, symbol, 2.0 * above / kept - 1.0, 2.0 * float(low) - 1.0, 2.0 * float(high) - 1.0,
+        "Clopper-Pearson",
+    )  # fmt: skip
+    return StatisticalTest("sign", "K", above, nan, p, p, least, len(d), effect, notes)
 
 
 def friedman(rows: Floats) -> StatisticalTest:
