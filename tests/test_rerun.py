@@ -3,11 +3,13 @@
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from inspect import signature
 from math import inf, nextafter
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from stand_in import StandIn
 
 from gazerig.config.schema import load_rig
 from gazerig.config.text import rig_text, walk_text
@@ -17,14 +19,17 @@ from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import Resimulation, recorded_rig, rerun
 from gazerig.robot.app.session import leave
+from gazerig.robot.control.body import Body
 from gazerig.robot.control.loop import Tick, run
 from gazerig.robot.model.commands import Ask, Command, Jog, LookAt, Resume, Stop, Tune
+from gazerig.robot.recording.joint_recorder import JointRecorder
 from gazerig.robot.recording.playback_devices import PlaybackBody
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text
 from gazerig.robot.recording.run_writer import RunWriter
 from gazerig.robot.recording.tick_record import (
+    BodyRecord,
     MeasuredJoints,
     TickRecord,
     TorqueEnabled,
@@ -283,6 +288,48 @@ def test_a_refused_resumption_is_refused_again() -> None:
     assert body.read(0.010) is tick.joints  # more readings than there were
     body.leave_off()
     assert body.read(0.015) is not tick.joints
+
+
+class CalledBody(StandIn):
+    """A body that notes what is called, and whose torque is refused."""
+
+    def __init__(self) -> None:
+        self.bus, self.names, self.called = None, (), list[str]()
+
+    def __getattr__(self, name: str) -> Callable[..., str]:
+        def call(*given: object) -> str:
+            self.called.append(name)
+            if name == "enable_torque":
+                raise SetupError("servo 7 is mute")
+            return name
+
+        return call
+
+
+@pytest.mark.parametrize("way", ["recorded", "played"])
+def test_whatever_is_asked_of_a_body_reaches_the_machine(way: str) -> None:
+    asked = {
+        name: len(signature(member).parameters) - 1
+        for name, member in vars(Body).items()
+        if callable(member) and not name.startswith("_")
+    }
+    assert {"disable_torque", "stop", "write"} <= asked.keys()
+    machine, notes = CalledBody(), list[BodyRecord]()
+    body = JointRecorder(machine, notes.append) if way == "recorded" else PlaybackBody(machine)
+    for name, count in asked.items():
+        try:
+            given = getattr(body, name)(*range(count))
+        except SetupError:
+            assert name == "enable_torque"
+        else:
+            assert given in (None, name)
+    assert machine.called == list(asked)
+    if way == "recorded":
+        assert notes == [
+            TorqueEnabled("start"),  # type: ignore[arg-type]
+            MeasuredJoints(0, "read"),  # type: ignore[arg-type]
+            TorqueRefused("servo 7 is mute"),
+        ]
 
 
 def test_a_recording_without_ticks_is_refused(once: Once, tmp_path: Path) -> None:

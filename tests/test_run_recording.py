@@ -2,6 +2,7 @@
 
 import base64
 import json
+from collections.abc import Iterable
 from datetime import datetime
 from math import inf, nan
 from pathlib import Path
@@ -24,17 +25,20 @@ from recorded_run import (
     record,
     with_picture,
 )
+from scipy.spatial.transform import Rotation
 
 from gazerig.config.load import load
 from gazerig.config.schema import Rig, load_rig
 from gazerig.config.text import rig_text
 from gazerig.drivers.types import Detections
+from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.scanpath import Walk
 from gazerig.gaze.types import Bodies, Face, Percept
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.dashboard.feed.camera_overlay import encode
 from gazerig.robot.model import stop_latch
 from gazerig.robot.model.commands import Ask, Jog, LookAt, Resume, Stop, Tune
+from gazerig.robot.model.lead import GestureState, LeadState
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording import tick_record as moments
 from gazerig.robot.recording.frame_picker import FramePicker
@@ -146,6 +150,33 @@ def test_no_pictures_where_none_are_asked_for(recorded: Recorded) -> None:
     assert FramePicker(2.0).picks(found)
 
 
+def picked_s(rate_hz: float, times_s: Iterable[float]) -> list[float]:
+    """Return the times of the frames that are picked of these."""
+    picker, picture = FramePicker(rate_hz), np.zeros((2, 2, 3), np.uint8)
+    return [
+        at_s
+        for number, at_s in enumerate(times_s, 1)
+        if picker.picks(Detections(at_s, number, 2, 2, image=picture))
+    ]
+
+
+def test_a_late_frame_does_not_delay_those_that_follow() -> None:
+    camera = (k / 100.0 for k in range(200) if not 40 <= k < 45 and not 100 <= k < 170)
+    wanted = [0.0, 0.2, 0.45, 0.6, 0.8, 1.7, 1.9]  # after a long gap it begins anew
+    assert picked_s(5.0, camera) == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize(("rate_hz", "every"), [(30.0, 1), (10.0, 3), (15.0, 2)])
+def test_frames_whose_times_are_rounded_are_picked_at_the_rate(rate_hz: float, every: int) -> None:
+    dice = np.random.default_rng(1)
+    times = [round(k / 30.0 + dice.uniform(-4e-4, 4e-4), 4) for k in range(3000)]
+    assert picked_s(rate_hz, times) == times[::every]
+
+
+def test_pictures_are_not_more_than_were_asked_for() -> None:
+    assert len(picked_s(10.0, (k / 200.0 for k in range(20_000)))) == 1000
+
+
 def test_a_picture_larger_than_a_message_arrives_whole(tmp_path: Path) -> None:
     made = assembly()
     path = tmp_path / "large.mcap"
@@ -184,6 +215,10 @@ def test_health_comes_once_a_second(recorded: Recorded) -> None:
     assert len(found) == 2
     assert found[1]["tx_bytes"] > found[0]["tx_bytes"] > 0
     assert len(found[1]["temperature_c"]) == len(GAZE_JOINTS) and found[1]["lost_ticks"] == 0
+    for at_s, one in zip((0.0, 1.0), found, strict=True):
+        tick = next(t for t in recorded.ticks if t.t_s - recorded.ticks[0].t_s > at_s - 1e-6)
+        assert one["load"] == list(tick.joints.load)
+    assert found[0]["load"] != found[1]["load"]
 
 
 def test_other_programs_open_it(recorded: Recorded) -> None:
@@ -214,6 +249,75 @@ def test_other_programs_open_it(recorded: Recorded) -> None:
     assert tuple(states) == GAZE_JOINTS
     frames = {one["child_frame_id"] for one in seen[fmt.TRANSFORMS]["transforms"]}
     assert frames == {"head", "left_eye", "right_eye"}
+
+
+def sent_to_viewers(recorded: Recorded, topic: str) -> list[tuple[Tick, dict[str, Any]]]:
+    """Return the messages of a topic, each with the tick that it is of."""
+    start_ns = datetime.fromisoformat(STARTED).timestamp() * 1e9
+    of = {round(1e3 * (t.t_s - recorded.ticks[0].t_s)): t for t in recorded.ticks}
+    with recorded.path.open("rb") as file:
+        return [
+            (of[round((message.log_time - start_ns) / 1e6)], json.loads(message.data))
+            for _, _, message in make_reader(file).iter_messages([topic])
+        ]
+
+
+@pytest.mark.parametrize("topic", [fmt.JOINT_STATES, fmt.TRANSFORMS, fmt.SCENE])
+def test_viewers_are_sent_25_messages_a_second(recorded: Recorded, topic: str) -> None:
+    assert len(sent_to_viewers(recorded, topic)) == pytest.approx(25 * 1.49, abs=2)
+
+
+def vector(of: dict[str, float]) -> list[float]:
+    return [of[axis] for axis in "xyz"]
+
+
+def test_a_viewer_sees_head_and_eyes_as_they_stand_in_space(recorded: Recorded) -> None:
+    turned = 0.0
+    for tick, data in sent_to_viewers(recorded, fmt.TRANSFORMS):
+        frames = {one["child_frame_id"]: one for one in data["transforms"]}
+        ahead = {}
+        for name, one in frames.items():
+            assert one["parent_frame_id"] == "world"
+            quaternion = [one["rotation"][axis] for axis in "xyzw"]
+            ahead[name] = Rotation.from_quat(quaternion).apply((1.0, 0.0, 0.0))
+        pose = tick.pose
+        assert ahead["head"] == pytest.approx(np.array(pose.R_world_head)[:, 0])
+        for left, name in ((True, "left_eye"), (False, "right_eye")):
+            assert ahead[name] == pytest.approx(line_of_sight(pose, left))
+        assert vector(frames["head"]["translation"]) == pytest.approx(pose.p_world_head_m)
+        places = pose.p_world_eye_left_m, pose.p_world_eye_right_m
+        for name, place in zip(("left_eye", "right_eye"), places, strict=True):
+            assert vector(frames[name]["translation"]) == pytest.approx(place)
+        turned = max(turned, abs(ahead["left_eye"] @ ahead["head"] - 1.0), abs(pose.head_rad[0]))
+    assert turned > 0.05  # the frames differ
+
+
+def test_lines_of_sight_are_drawn_from_the_eyes_as_far_as_the_point(recorded: Recorded) -> None:
+    for tick, data in sent_to_viewers(recorded, fmt.SCENE):
+        (entity,), pose = data["entities"], tick.pose
+        # The lists of a SceneEntity in Foxglove's documentation; viewers want to find them all.
+        assert entity.keys() == {
+            "timestamp", "frame_id", "id", "lifetime", "frame_locked", "metadata", "arrows",
+            "cubes", "spheres", "cylinders", "lines", "triangles", "texts", "models",
+        }  # fmt: skip
+        points = np.array([vector(point) for point in entity["lines"][0]["points"]])
+        aim = np.array(tick.gaze.gaze_point_world_m)
+        assert vector(entity["spheres"][-1]["pose"]["position"]) == pytest.approx(aim)
+        for (begin, end), left in ((points[:2], True), (points[2:], False)):
+            eye = np.array(pose.p_world_eye_left_m if left else pose.p_world_eye_right_m)
+            assert begin == pytest.approx(eye)
+            assert np.linalg.norm(end - begin) == pytest.approx(np.linalg.norm(aim - eye))
+            sight = (end - begin) / np.linalg.norm(end - begin)
+            assert sight == pytest.approx(line_of_sight(pose, left))
+
+
+def test_a_viewer_shows_a_frame_at_its_exposure(recorded: Recorded) -> None:
+    start_s = datetime.fromisoformat(STARTED).timestamp() - recorded.ticks[0].t_s
+    found = sent_to_viewers(recorded, fmt.FRAME)
+    for tick, data in found:
+        shown_s = data["timestamp"]["sec"] + data["timestamp"]["nsec"] / 1e9
+        assert shown_s == pytest.approx(start_s + tick.t_s - 0.03, abs=1e-6)
+    assert len(found) == 6
 
 
 def unexplained(data: Any, schema: dict[str, Any], at: str = "") -> list[str]:
@@ -249,6 +353,15 @@ def test_any_float_comes_back(recorded: Recorded, odd: float) -> None:
     back = moments.from_json(values, {})
     assert exact(back.tick) == exact(tick)
     assert repr(back.dt_s) == repr(odd)
+
+
+def test_leads_and_gestures_come_back(recorded: Recorded) -> None:
+    gesture = GestureState(2, "nod", "", "somebody", 3.5)
+    lead = LeadState(4, True, False, 0.01, "", "pointer", "somebody", "look", ("neck_yaw",), 1.5)
+    tick = recorded.ticks[-1]._replace(lead=lead, gesture=gesture, percept=None)
+    data = orjson.loads(orjson.dumps(moments.as_json(handed_over(tick)[1])))
+    back = moments.from_json(data, {}).tick
+    assert (back.lead, back.gesture) == (lead, gesture)
 
 
 def test_a_level_in_an_older_recording_has_its_present_name(recorded: Recorded) -> None:

@@ -1,11 +1,14 @@
 """Recordings of runs that cannot be read, and what goes wrong while one is written."""
 
+import json
+import os
 import resource
 from collections.abc import Iterator
 from pathlib import Path
 
 import branch
 import pytest
+from mcap.reader import make_reader
 from mcap.writer import Writer
 from recorded_run import Recorded, assembly, exact, info_for, ordered, record
 from typer.testing import CliRunner
@@ -14,8 +17,11 @@ from gazerig.drivers.errors import SetupError
 from gazerig.robot.cli.main import app
 from gazerig.robot.cli.terminal import BAD_INPUT, FAULT, _writer
 from gazerig.robot.model import stop_latch
+from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording.read import BadRecording, RunRecording
 from gazerig.robot.recording.recorder import Recorder
+from gazerig.robot.recording.run_info import RunEnd, as_text
+from gazerig.robot.recording.run_writer import RunWriter
 
 pytestmark = pytest.mark.usefixtures("branched_children")
 
@@ -66,6 +72,23 @@ def test_damage_is_told_in_one_line(recorded: Recorded, tmp_path: Path) -> None:
     with pytest.raises(BadRecording, match="damaged") as found:
         list(RunRecording(broken).ticks())
     assert "\n" not in str(found.value)
+
+
+def test_time_that_runs_back_or_leaps_is_no_run(recorded: Recorded, tmp_path: Path) -> None:
+    with recorded.path.open("rb") as file:
+        found = [json.loads(m.data) for *_, m in make_reader(file).iter_messages([fmt.TICK])][:3]
+    for number, (moved_s, right) in enumerate(((0.0, True), (-0.006, False), (4000.0, False))):
+        path = tmp_path / f"{number}.mcap"
+        writer = RunWriter(os.open(path, os.O_WRONLY | os.O_CREAT), as_text(recorded.info), 0)
+        for nth, tick in enumerate(found):
+            t_s = tick["t_s"] + moved_s * (nth == 2)
+            writer.add(fmt.Message(fmt.TICK, 0.0, {**tick, "t_s": t_s, "percept": None}))
+        writer.close(RunEnd("seconds"))
+        if right:
+            assert len(list(RunRecording(path).ticks())) == 3
+            continue
+        with pytest.raises(BadRecording, match="damaged .a tick at"):
+            list(RunRecording(path).ticks())
 
 
 def written(path: Path, profile: str) -> Path:
@@ -178,6 +201,18 @@ def test_an_older_recording_stays_until_a_run_has_begun(tmp_path: Path) -> None:
     assert path.read_bytes() != b"older" and path.stat().st_mode & 0o777 == 0o600
     assert [one.name for one in tmp_path.iterdir()] == ["older.mcap"]
     recorder.close("seconds")
+
+
+def test_a_link_to_an_older_recording_stays_a_link(tmp_path: Path) -> None:
+    older, link = tmp_path / "older.mcap", tmp_path / "newest.mcap"
+    older.write_bytes(b"older")
+    link.symlink_to(older.name)
+    recorder = Recorder(link, info_for(), over=True)
+    recorder.open()
+    recorder.begin()
+    assert link.is_symlink() and older.read_bytes() != b"older"
+    assert recorder.close("fault") == f"nothing was recorded: {link} is not made"
+    assert [path.name for path in tmp_path.iterdir()] == ["newest.mcap"] and link.is_symlink()
 
 
 def test_a_robot_that_cannot_start_leaves_an_older_recording(tmp_path: Path) -> None:

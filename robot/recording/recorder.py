@@ -57,7 +57,7 @@ class Recorder:
         over: an existing file is written over
         patient: wait for the writer where it is behind, as a run in simulated time may
         """
-        self._path = path
+        self._path, self._target = path, Path(os.path.realpath(path))
         self._info = info
         self._health: Callable[[], BusHealth] = _no_counts
         self._over = over
@@ -89,8 +89,8 @@ class Recorder:
             SetupError: the file exists or cannot be made.
         """
         if self._over and self._path.is_file():
-            target = Path(os.path.realpath(self._path))
-            self._beside = target.with_name(f".{target.name[:80]}-{secrets.token_hex(4)}")
+            beside = f".{self._target.name[:80]}-{secrets.token_hex(4)}"
+            self._beside = self._target.with_name(beside)
         file_fd = _created(self._beside or self._path, self._over)
         self._opened = True
         try:
@@ -107,9 +107,8 @@ class Recorder:
         """
         if self._beside is None:
             return
-        target = Path(os.path.realpath(self._path))
-        shutil.copymode(target, self._beside)
-        os.replace(self._beside, target)
+        shutil.copymode(self._target, self._beside)
+        os.replace(self._beside, self._target)
         self._beside = None
 
     def recorded(self, body: Body) -> Body:
@@ -209,8 +208,8 @@ class Recorder:
             if self._beside is not None:
                 self._beside.unlink(missing_ok=True)
                 return f"nothing was recorded: {self._path} is as it was"
-            if self._opened:  # else it is another program's
-                self._path.unlink(missing_ok=True)
+            if self._opened and self._target.is_file():  # else another program's, or a device
+                self._target.unlink()
             return f"nothing was recorded: {self._path} is not made"
         done = self._link.done
         if done is None:

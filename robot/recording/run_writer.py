@@ -106,7 +106,7 @@ class RunWriter:
         if channel is None:
             channel = self._channels[message.topic] = self._register(message.topic)
         at_ns = self.time_ns(message.at_s)
-        data = orjson.dumps(message.data, default=_plain)
+        data = orjson.dumps(message.data)
         self._writer.add_message(channel, at_ns, data, at_ns, self._counts[message.topic])
 
     def _register(self, topic: str) -> int:
@@ -173,10 +173,3 @@ class _Straight:
 
     def close(self) -> None:
         os.close(self._fd)
-
-
-def _plain(value: Any) -> Any:
-    """Return a number of numpy's as Python's own."""
-    if hasattr(value, "item"):
-        return value.item()
-    raise TypeError(f"{type(value).__name__} is no part of a recording")
