@@ -125,6 +125,33 @@ def test_file_that_cannot_be_made_is_named(tmp_path):
         RecordingWriter(tmp_path / "nowhere" / "x.mcap", {})
 
 
+def test_depth_whose_picture_is_missing_belongs_to_no_other(tmp_path):
+    path = tmp_path / "r.mcap"
+    writer = RecordingWriter(path, {})
+    parts = [fmt.encoded(shot(k), None) for k in range(3)]
+    writer.add(TIMES_S[0], 1, parts[0][:-1])  # all but the picture
+    writer.add(TIMES_S[1], 2, parts[1][-1:])  # the picture alone
+    writer.add(TIMES_S[2], 3, parts[2])
+    writer.close()
+    recording = Recording(path)
+    assert len(recording.times_s) == 2
+    found = recording.shot(0)
+    assert np.array_equal(found.image, shot(1).image)
+    assert (found.depth_m, found.lens, found.faces, found.turn) == (None, None, None, None)
+    assert_same(recording.shot(1), shot(2))
+
+
+def test_frames_are_put_on_the_disk_every_second(tmp_path, monkeypatch):
+    written, synced = [0], list[int]()
+    monkeypatch.setattr(os, "fsync", lambda fd: synced.append(written[0]))
+    writer = RecordingWriter(tmp_path / "r.mcap", {})
+    for k in range(95):
+        written[0] = k + 1
+        writer.write(Shot(5000.0 + k / 30.0, k + 1, np.zeros((4, 4, 3), np.uint8)))
+    writer.close()
+    assert np.diff([0, *synced, 95]).max() <= 31
+
+
 @pytest.mark.parametrize("share", [0.999, 0.9, 0.5, 0.3])
 def test_cut_file_gives_its_whole_pictures(file, share):
     data = file.read_bytes()
@@ -254,6 +281,21 @@ def test_replay_in_real_time_has_the_times_of_the_recording(file):
     )  # late: pictures are skipped
     clock.stopped = True
     assert replay.take(clock, clock) is None
+
+
+def test_a_picture_taken_late_does_not_delay_those_that_follow(file):
+    replay, clock = CameraReplay(file), Clock()
+    replay.open()
+    due_s = [70.0 + t - TIMES_S[0] for t in TIMES_S]
+    present(replay.take(clock, clock))
+    clock.now_s = due_s[2] + 0.01  # nobody has looked meanwhile
+    late = present(replay.take(clock, clock))
+    assert late.number == 3 and late.captured_s == pytest.approx(due_s[2], abs=1e-6)
+    for number in (4, 5, 6):
+        following = present(replay.take(clock, clock))
+        assert following.number == number
+        assert following.captured_s == pytest.approx(due_s[number - 1], abs=1e-6)
+        assert clock.now_s == pytest.approx(due_s[number - 1], abs=1e-6)
 
 
 def test_recording_of_one_picture_can_be_played(tmp_path):

@@ -18,10 +18,8 @@ from gazerig.robot.model.commands import Jog, Stop
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.robot.model.types import JointState
 from gazerig.robot.recording.export_csv import EVENTS, columns, write_csv
-from gazerig.robot.recording.gaze_angles import in_space, trace_of
-from gazerig.robot.recording.gaze_labels import (
-    lag_of,
-)
+from gazerig.robot.recording.gaze_angles import MOVEMENTS, in_space, trace_of
+from gazerig.robot.recording.gaze_labels import labels_of, lag_of, speed_deg_s, stretches_of
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -136,6 +134,50 @@ def test_what_is_looked_at_changes_only_with_the_gaze(face: Run) -> None:
     assert {"LE", "RE", "N"} <= parts
 
 
+LONG, SHORT = 40, 12
+"""Ticks, 200 and 60 ms: a pursuit that counts, and one that may be a flicker."""
+
+
+@pytest.mark.parametrize(
+    ("planned", "found"),
+    [
+        # However short it is, what lies between two saccades is a fixation.
+        ((("fixation", LONG), ("saccade", 8), ("fixation", SHORT), ("saccade", 8),
+          ("fixation", LONG)), None),
+        # A flicker of the target's velocity is part of what is around it.
+        ((("pursuit", LONG), ("fixation", SHORT), ("pursuit", LONG)), (("pursuit", 92),)),
+        ((("fixation", LONG), ("pursuit", SHORT), ("fixation", LONG)), (("fixation", 92),)),
+        ((("fixation", LONG), ("pursuit", LONG), ("fixation", LONG)), None),
+        ((("pursuit", LONG), ("fixation", SHORT), ("saccade", 8), ("pursuit", LONG)), None),
+    ],
+)  # fmt: skip
+def test_short_movements_are_what_they_are(
+    face: Run, planned: tuple[tuple[str, int], ...], found: tuple[tuple[str, int], ...] | None
+) -> None:
+    """A gaze that stands still has no lag; movements are planned as (what, ticks)."""
+    movement = [code for what, ticks in planned for code in [MOVEMENTS.index(what)] * ticks]
+    still = trace_of(face.ticks[: len(movement)])
+    trace = still._replace(
+        movement=np.array(movement), blink=np.zeros(len(movement), bool),
+        looked_at=np.zeros(len(movement), int), cyclopean_deg=np.zeros((len(movement), 2)),
+    )  # fmt: skip
+    stretches = stretches_of(trace, labels_of(trace))
+    wanted = found or planned
+    assert [s.event for s in stretches] == [what for what, _ in wanted]
+    # Each lasts to where the next begins, the last one as long as its ticks, too.
+    assert [s.duration_s for s in stretches] == pytest.approx([0.005 * n for _, n in wanted])
+
+
+@pytest.mark.parametrize(("pitch_deg", "share"), [(0.0, 1.0), (60.0, 0.5), (-60.0, 0.5)])
+def test_a_gaze_that_is_up_turns_about_the_upright_axis_by_less(
+    pitch_deg: float, share: float
+) -> None:
+    """Angles of Fick: at 60 deg of pitch a degree of yaw is half a degree of gaze."""
+    t = np.arange(0.0, 1.0, 0.005)
+    gaze = np.column_stack([80.0 * t, np.full(len(t), pitch_deg)])
+    assert speed_deg_s(t, gaze) == pytest.approx(np.full(len(t), 80.0 * share))
+
+
 def test_what_hands_do_is_no_eye_movement(face: Run) -> None:
     ticks = list(face.ticks[1000:1600])
     ticks[100] = ticks[100]._replace(commands=(Jog((("neck_yaw", 0.1),)),))
@@ -149,6 +191,15 @@ def test_what_hands_do_is_no_eye_movement(face: Run) -> None:
         "asked: jog angles_rad=(('neck_yaw', 0.1),)", "asked: jog angles_rad=()",
         "asked: stop why=hand",
     ]  # fmt: skip
+
+
+def test_joints_whose_lead_has_lapsed_are_moved_by_the_models_again(face: Run) -> None:
+    """No command tells of a lapse."""
+    ticks = list(face.ticks[1000:1400])
+    ticks[100] = ticks[100]._replace(commands=(Jog((("neck_yaw", 0.1),)),))
+    ticks[100:200] = [tick._replace(led="somebody: neck_yaw") for tick in ticks[100:200]]
+    known = trace_of(ticks).movement > 0
+    assert known[:100].all() and not known[100:200].any() and known[200:].all()
 
 
 # --- tables

@@ -101,6 +101,23 @@ def test_saccades_blinks_and_orders_can_be_stepped_to(
     assert asked.at_s == pytest.approx(2.0, abs=0.011) and asked.kind == "event"
 
 
+@pytest.mark.parametrize("rate_hz", [90.0, 120.0, 333.0])
+def test_50_snapshots_a_second_are_kept_at_any_rate(ticks: list[Tick], rate_hz: float) -> None:
+    ticked = [tick._replace(t_s=nth / rate_hz) for nth, tick in enumerate(ticks[:1000])]
+    made = SnapshotIndex(ticked, (), rate_hz)
+    assert len(made) == pytest.approx(min(50.0, rate_hz) * made.duration_s, abs=2)
+    made.close()
+
+
+def test_the_conversation_is_shown_from_when_it_was_asked_for(ticks: list[Tick]) -> None:
+    asked = list(ticks[:400])
+    asked[200] = asked[200]._replace(commands=(Ask("conversation", "talk"),))
+    made = SnapshotIndex(asked, (), RATE_HZ)
+    found = [unpack(made.message(made.at(at_s))).conversation for at_s in (0.5, 0.95, 1.05, 1.5)]
+    assert found == ["", "", "talk", "talk"]
+    made.close()
+
+
 def test_a_guard_that_holds_is_an_event_once(ticks: list[Tick]) -> None:
     held = [
         tick._replace(
@@ -217,6 +234,21 @@ def test_nothing_is_recalled_while_the_slider_is_in_the_hand(frames: SnapshotInd
     assert all(not unpack(m).trail for m in screen.messages if m[:1] == SNAPSHOT)
 
 
+def test_after_two_leaps_in_a_row_the_page_is_told_what_both_passed_over(
+    frames: SnapshotIndex,
+) -> None:
+    screen, time_ = Screen(), SimulatedClock()
+    replay = Replay(frames, time_)
+    replay.show(screen, 0.0)
+    screen.messages.clear()
+    for place_s in (2.5, 5.0):
+        replay.ask({"seek_s": place_s})
+        shown(replay, screen, time_, 0.04)
+    shown(replay, screen, time_, 2.0)
+    wanted = [e for n in range(1, frames.at(5.0) + 1) for e in unpack(frames.message(n)).events]
+    assert events_of(screen) == wanted and len(wanted) > 10
+
+
 def test_what_is_recalled_fits_into_a_message(frames: SnapshotIndex, ticks: list[Tick]) -> None:
     long = [
         tick._replace(t_s=tick.t_s + k * (SECONDS + 0.01), gaze=tick.gaze)
@@ -271,6 +303,18 @@ def test_the_page_is_told_once_what_there_is_and_in_one_message(frames: Snapshot
     crowded = SimpleNamespace(duration_s=600.0, has_pictures=False, marks=[frames.marks[0]._replace(
         kind="event", words="x" * 500)] * 5000)  # fmt: skip
     assert len(json.dumps(introduction(crowded))) < 190_000  # type: ignore[arg-type]
+
+
+def test_a_page_that_takes_the_place_of_another_is_told_what_there_is(
+    frames: SnapshotIndex,
+) -> None:
+    screen, time_ = Screen(), SimulatedClock()
+    replay = Replay(frames, time_)
+    shown(replay, screen, time_, 0.5)
+    screen.messages.clear()
+    replay.begin_anew()
+    shown(replay, screen, time_, 0.5)
+    assert ["marks" in state for state in screen.states()].count(True) == 1
 
 
 def test_requests_are_obeyed_or_refused_in_words(frames: SnapshotIndex) -> None:
