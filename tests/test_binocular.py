@@ -230,6 +230,19 @@ def test_e29_reflex_without_a_target(hz: float, phase: float, residual: float) -
     assert abs(1.0 - z) == pytest.approx(residual, abs=0.02)
 
 
+@pytest.mark.parametrize("gain", [0.0, 0.5, 0.95, 1.3])
+def test_a_reflex_of_another_gain_takes_back_its_share_of_the_heads_turn(gain: float) -> None:
+    """Without a target nothing else moves the eyes: the head turns 10 deg, they turn -gain 10."""
+    lost = aim(0.0, 0.0, 100.0)._replace(v_world_m_s=(0.0, 1e-9, 0.0), at_s=0.0)
+    trace = eyes(
+        lambda t: lost, 2.0, begin=aim(0.0, 0.0, 100.0, -4.0),
+        turning=lambda t: radians(10.0) * min(max(t - 0.5, 0.0), 1.0),
+        pursuit=replace(MITAKE.pursuit, reflex_gain=gain),
+    )  # fmt: skip
+    assert trace.version[trace.t < 0.45] == pytest.approx(0.0, abs=0.01)
+    assert trace.version[-1] == pytest.approx(-10.0 * gain, abs=0.1)
+
+
 def test_e31_eyes_hold_the_gaze_through_any_turn_of_the_head() -> None:
     exact = PursuitParams(model="binocular", reflex_delay_ms=0.0, gain_1_s=0.0, velocity_gain=0.0)
     rig = Rig(geometry=DESK, params=NO_SACCADES, pursuit=exact)

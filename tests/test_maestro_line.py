@@ -117,6 +117,16 @@ def test_long_after_the_last_goal_a_pulse_must_be_there():
     assert not channel.implausible(6604, 1.0)
 
 
+def test_a_board_that_is_behind_still_gives_the_pulse_of_the_goal_before():
+    channel = held()
+    channel.aim(7600, 0.0)
+    channel.aim(7600, 0.09)
+    # By now it would be far from there, had it heard of the goal at once.
+    assert abs(channel.ramp.pulse_steps - 6000) > 1.2 * channel.room_steps()
+    assert not channel.implausible(6000, 0.095)
+    assert channel.implausible(6000, 1.0)
+
+
 def test_an_end_of_the_board_is_believed_when_it_was_met_twice():
     channel = held()
     channel.aim(7600, 0.0)

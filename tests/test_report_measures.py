@@ -14,7 +14,7 @@ from gazerig.robot.analysis.blink_finder import BlinkEvent
 from gazerig.robot.analysis.event_detector import Commanded, SaccadeEvent
 from gazerig.robot.analysis.reaction_finder import ReactionFinder
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.report import blinks, landing, rests
+from gazerig.robot.report import blinks, eye_contact, landing, rests
 from gazerig.robot.report.gaze_trace import GazeTrace, TraceRow
 from gazerig.robot.report.lid_closure import blinks_of
 
@@ -89,6 +89,26 @@ def test_the_highest_gain_knows_how_uncertain_it_is(gain: float, verdict: str) -
     assert most.value > gain + 0.01  # the largest of many is beyond the truth
     assert most.low95 < gain + 0.02 and most.high95 - most.low95 > 0.03
     assert most.verdict == verdict
+
+
+def looked(*looks_s: tuple[float, float]) -> GazeTrace:
+    """Make a run of 30 s in which the gaze is on the face at these times."""
+    t = np.arange(0.0, 30.0, 0.01)
+    rows = np.full((len(t), len(TraceRow._fields)), np.nan)
+    rows[:, TraceRow._fields.index("t")] = t
+    on = np.any([(t >= begin) & (t < end) for begin, end in looks_s], axis=0)
+    for name in ("face_y", "face_z"):
+        rows[:, TraceRow._fields.index(name)] = np.where(on, 0.0, 1.0)
+    return GazeTrace(rows, (), (), ())
+
+
+@pytest.mark.parametrize("cut", [(0.0, 6.0), (22.0, 31.0)], ids=["begins", "ends"])
+def test_a_look_that_the_run_cuts_off_is_no_whole_bout(cut: tuple[float, float]) -> None:
+    """How long it would have lasted is not known, only that it was at least so long."""
+    found = {m.key: m for m in eye_contact.measures(looked((10.0, 12.0), (15.0, 19.0), cut))}
+    for key in ("bout_none", "bout_talk", "bout_listen"):
+        assert sorted(found[key].rows) == pytest.approx([2.0, 4.0], abs=0.02)
+    assert found["longest_look"].rows.max() == pytest.approx(min(cut[1], 30.0) - cut[0], abs=0.02)
 
 
 def test_a_blink_that_comes_with_a_glance_begins_when_it_does() -> None:

@@ -131,6 +131,16 @@ def test_mutual_gaze_is_counted() -> None:
     assert found["answered_after_s"] == pytest.approx(0.5) and found["answers"] == 1
 
 
+@pytest.mark.parametrize("cut", [(0.0, 3.0), (6.0, 10.0)], ids=["begins", "ends"])
+def test_a_mutual_gaze_that_the_run_cuts_off_has_no_length(cut: tuple[float, float]) -> None:
+    t_s = np.arange(1000) / 100.0
+    both = (t_s >= 4.0) & (t_s < 5.0) | (t_s >= cut[0]) & (t_s < cut[1])
+    found = mutual_gaze(t_s, both, both)
+    assert found["mutual_gazes"] == 2 and found["ended"] == 1
+    assert found["mean_s"] == found["median_s"] == pytest.approx(1.0)
+    assert found["longest_s"] == pytest.approx(cut[1] - cut[0], abs=0.011)
+
+
 def test_short_gaps_in_a_look_are_bridged_and_short_looks_are_none() -> None:
     t_s = np.arange(1000) / 100.0
     looks = (t_s >= 2.0) & (t_s < 5.0) & ~((t_s >= 3.0) & (t_s < 3.1)) | (t_s >= 8.0) & (t_s < 8.1)

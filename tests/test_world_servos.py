@@ -1,5 +1,6 @@
 """Emulated servos whose mechanics are a world's: motion and registers as before, and gravity."""
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,9 @@ from world_rigs import WorldBench, arm, mujoco_or_skip, read, write
 mujoco_or_skip()
 
 from gazerig.drivers.errors import SetupError  # noqa: E402
+from gazerig.robot.app import emulation  # noqa: E402
 from gazerig.sim_mock.devices import PluginLine  # noqa: E402
+from gazerig.sim_mock.smart_servo.physics import Physics  # noqa: E402
 from gazerig.sim_mock.world.physics import WorldUnstable  # noqa: E402
 
 STEP = 200
@@ -207,6 +210,20 @@ def test_supply_and_motor_feel_a_stall() -> None:
     assert servo.shaft.effort > 0.85
     assert read(servo, "present_input_voltage") <= volts - 2
     assert servo.temperature_c > warm + 0.5
+
+
+def test_a_shaft_without_torque_turns_as_fast_as_its_viscous_friction_lets_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Dry friction takes .03 of the stall torque, the other half of it at no-load speed."""
+    monkeypatch.setattr(emulation, "Physics", partial(Physics, viscous_share=0.5))
+    bench = WorldBench("desk")
+    for servo in bench.both("left_eye_pan"):
+        servo.set_load(-0.05 * servo.model.stall_torque_nm)
+    bench.pass_ms(500)
+    for servo in bench.both("left_eye_pan"):
+        no_load = servo.model.no_load_rpm * 4096 / 60_000  # steps/ms
+        assert servo.shaft.v == pytest.approx(-(0.05 - 0.03) / 0.5 * no_load, rel=0.03)
 
 
 def test_a_restart_lets_go_of_the_joint_until_torque_comes_on_again() -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from present import present
 
 pytest.importorskip("mujoco", reason="worlds need MuJoCo: pip install 'gazerig[world]'")
 
@@ -93,6 +94,26 @@ def test_everybody_is_where_mujoco_has_them() -> None:
             body = model.body(name).id
             assert np.allclose(turn, data.xquat[body], atol=1e-9), name
             assert np.allclose(p_world_m, data.xpos[body], atol=1e-9), name
+
+
+def test_limbs_collide_from_joint_to_joint() -> None:
+    spec = shapes("conversation").spec
+    figures, model = present(spec.figures), spec.compiled().mj
+    data = mujoco.MjData(model)
+    PlacedPeople(model, figures).place(data, 0.0)
+    mujoco.mj_kinematics(model, data)
+    for who in figures.script.people:
+        for upper, lower in (("upper_arm", "forearm"), ("forearm", "hand"), ("thigh", "shank"),
+                             ("shank", "foot")):  # fmt: skip
+            body, below = (model.body(f"{who}/left_{part}").id for part in (upper, lower))
+            (geom,) = np.flatnonzero(
+                (model.geom_bodyid == body) & (model.geom_type == mujoco.mjtGeom.mjGEOM_CAPSULE)
+            )
+            half = model.geom_size[geom, 1] * data.geom_xmat[geom].reshape(3, 3)[:, 2]
+            ends = [data.geom_xpos[geom] - half, data.geom_xpos[geom] + half]
+            ends.sort(key=lambda end: float(np.linalg.norm(end - data.xpos[body])))
+            assert ends[0] == pytest.approx(data.xpos[body], abs=2e-3), (who, upper)
+            assert ends[1] == pytest.approx(data.xpos[below], abs=2e-3), (who, upper)
 
 
 def test_a_users_world_is_shown_without_the_rig_and_what_mujoco_hides(tmp_path: Path) -> None:
