@@ -96,6 +96,7 @@ class Noisy:
         self.bus = self._bus(kind)
         self._command: list[float] = []
         self._since, self._since_s = self.truth(), self.now
+        self._runs = False
 
     def _sleep_until(self, t_s: float) -> None:
         self.now = max(self.now, t_s)
@@ -110,6 +111,11 @@ class Noisy:
     def strike(self, packet: int, fault: str) -> None:
         """Let a fault begin with the ``packet``-th packet from now on."""
         self._writes, self._strike = 0, (packet, fault)
+
+    @property
+    def struck(self) -> bool:
+        """Return whether the fault of ``strike`` has begun."""
+        return self._strike is not None and self._writes >= self._strike[0]
 
     def _emulated(self, kind: str) -> Emulated:
         middle = (self.low + self.high) // 2
@@ -188,6 +194,7 @@ class Noisy:
         self.bus.events()
         for _ in range(200):
             self._tick(None)
+        assert self._runs, f"{self.kind} does not run before the fault"
 
     def run(self, fault: str, rate: float, cycles: int, timeout_s: float = 20.0) -> Outcome:
         """Tick with a fault of the line, then without it until all is well again."""
@@ -219,7 +226,10 @@ class Noisy:
             outcome.said += self.bus.events()
         if self.now - self._since_s >= 2.0 * TICK_S - 1e-9:  # in steps of which boards count
             truth = self.truth()
-            way = max(abs(b - a) for a, b in zip(self._since, truth, strict=True))
+            ways = [abs(b - a) for a, b in zip(self._since, truth, strict=True)]
+            way = max(ways)
+            on = all(one is not None and one.torque and not one.fault for one in readings)
+            self._runs = on and sum(ways) > 0.0
             if outcome is not None:
                 speed = way / (self.now - self._since_s) / SPEED_STEPS_S[self._make]
                 outcome.fastest = max(outcome.fastest, speed)

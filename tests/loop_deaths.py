@@ -76,7 +76,12 @@ class Driven(NamedTuple):
     ids: frozenset[int]
 
     def strike(self, number: int) -> float:
-        """Send the loop a signal; return when."""
+        """Send the loop a signal; return when.
+
+        Raises:
+            AssertionError: the loop has ended, or holds nothing: there is nothing to strike.
+        """
+        assert self.loop.poll() is None and all(self.holding()), "the loop does not run"
         at_s = time.monotonic()
         os.kill(self.loop.pid, number)
         return at_s

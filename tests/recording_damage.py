@@ -209,6 +209,7 @@ def judge(data: bytes, folder: Path, count: int, seed: int, uses: tuple[str, ...
     whole, file, tally = folder / "whole.mcap", folder / "damaged.mcap", Tally()
     whole.write_bytes(data)
     truth = {name: USES[name](whole) for name in uses}
+    assert all(truth.values()), f"nothing to damage: {truth}"
     for number in range(count):
         rng = random.Random(f"{seed} {number}")
         damage, name = rng.choice(DAMAGES), uses[number % len(uses)]

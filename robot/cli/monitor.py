@@ -61,7 +61,9 @@ def monitor(
     port: PortOption = None,
 ) -> None:
     """Watch all servos; reads alone: nothing is written, torque stays as it is."""
-    with clear_errors(rig, port, mock), signals() as stopped:
+    leaving = contextlib.suppress(KeyboardInterrupt)
+    with clear_errors(rig, port, mock), signals() as stopped, leaving:
+        stopped.tolerated = 0  # nothing to park: what waits for a stopped terminal ends at once
         found, clock = load_rig(rig), RealClock()
         refuse_packages(found, "monitor")
         with rig_ports(found, mock, port) as wire, _readers(found, wire) as readers:

@@ -7,6 +7,8 @@ another process; meanwhile the loop's rate is counted, then STOP is pressed 20 t
 page's script does, over the connection that stands, and then over a new one each time. "taken"
 counts those that the rig acknowledged at the first try, "slowest" is from the press to that;
 "loop" is the rate beside that without an attack, "page" and "rig" are the most memory in MB.
+An attack counts only if its loop ticked and was not stopped before it, its first request was
+answered as it should be, and it was still going on at the end; any other ends the script.
 """
 
 import contextlib
@@ -21,6 +23,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryFile
 from urllib.parse import urlsplit
 
 from page_visitor import LOOKING, Visitor
@@ -35,14 +38,22 @@ PRESSES = 20
 # --- attacks: each runs until its process is killed -------------------------------------------
 
 
-def post(visitor: Visitor, body: bytes, token: bool = True) -> None:
-    """Post the same again and again over connections that are kept as long as they may."""
+def post(visitor: Visitor, body: bytes, token: bool = True, code: int = 204) -> None:
+    """Post the same again and again over connections that are kept as long as they may.
+
+    code: what the first one is answered with
+    """
     parts = urlsplit(visitor.url)
     cookie = f"Cookie: {visitor.headers['Cookie']}\r\n" if token else ""
     head = (
         f"POST /rig/ask HTTP/1.1\r\nHost: {parts.netloc}\r\nOrigin: {visitor.url}\r\n{cookie}"
         f"Content-Length: {len(body)}\r\n\r\n"
     ).encode()
+
+    with _connection(visitor) as there:
+        there.sendall(head + body)
+        answer = there.recv(1 << 16)
+        assert answer.startswith(b"HTTP/1.1 %d" % code), answer
 
     def one() -> None:
         while True:
@@ -67,12 +78,12 @@ def work_alone(visitor: Visitor) -> None:
 
 def big_posts(visitor: Visitor) -> None:
     """60 kB objects."""
-    post(visitor, json.dumps({"pick": "x" * 60_000}).encode())
+    post(visitor, json.dumps({"pick": "x" * 60_000}).encode(), code=413)
 
 
 def stranger_posts(visitor: Visitor) -> None:
     """60 kB objects without the token."""
-    post(visitor, json.dumps({"pick": "x" * 60_000}).encode(), token=False)
+    post(visitor, json.dumps({"pick": "x" * 60_000}).encode(), token=False, code=403)
 
 
 def orders(visitor: Visitor) -> None:
@@ -294,12 +305,16 @@ def attacked(rig: Rig, name: str, seconds: float, quiet_hz: float) -> float:
     """Attack, and print one line; return the rate of the loop."""
     visitor = Visitor(rig.address)
     standing = visitor.open("/rig/line")
+    visitor.open().close()
+    assert not rig.remote.status()["stopped"] and rate_hz(rig, 0.5) > 0.0, "the rig does not run"
     attacker = None
+    errors = TemporaryFile()  # noqa: SIM115
     if name != "nothing":
         command = [sys.executable, __file__, "--attack", name, rig.address]
-        attacker = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+        attacker = subprocess.Popen(command, stderr=errors)
         time.sleep(1.5)
     before = rig.pids()
+    assert before[0] is not None, "there is no page"
     most = [0.0, 0.0]
     over = threading.Event()
 
@@ -315,12 +330,16 @@ def attacked(rig: Rig, name: str, seconds: float, quiet_hz: float) -> float:
         took, failed = press(visitor, standing)
         standing.close()
         obeyed = bool(rig.remote.status()["stopped"])
+        errors.seek(0)
+        ended = attacker is not None and attacker.poll() is not None
+        assert not ended, f"{name}: the attack had ended: {errors.read().decode()}"
     finally:
         over.set()
         scales.join()
         if attacker is not None:
             attacker.kill()
             attacker.wait()
+        errors.close()
     same = rig.pids()[0] == before[0]
     beside = f"{100 * hz / quiet_hz:4.0f} %" if quiet_hz else f"{hz:4.0f} Hz"
     slowest = f"{max(took):7.0f}" if took else "      -"
@@ -330,12 +349,11 @@ def attacked(rig: Rig, name: str, seconds: float, quiet_hz: float) -> float:
         f"{'lives' if same else 'DIED'}",
         flush=True,
     )
-    time.sleep(2.2)
     for _ in range(20):
+        time.sleep(2.0)
         with contextlib.suppress(Exception):
             rig.remote.resume(confirmed=True)
             break
-        time.sleep(1.2)
     time.sleep(1.5)
     return hz
 

@@ -47,6 +47,7 @@ LATES: dict[str, Callable[[], Late]] = {
     "1-400 slots, 1 %": lambda: sometimes_late(3, 0.01, 400),
 }
 STALE_ROOM_RAD = 0.004
+STILL_DEG_S = 0.5
 
 out = Console(width=120)
 
@@ -106,9 +107,11 @@ def one(rig: Rig, scene: str, late: Late, seconds: float) -> tuple[int, Judge]:
     choice = RunOptions(mock=True, fast=True, seed=0, scene="visitor" if looks else scene)
     with looked_at(rig, choice) as (made, shafts):
         judge = Judge(rig)
-        if looks:
-            return run(made, shafts, judge, seconds, late, all_around(0)), judge
-        return run(made, shafts, judge, seconds, late), judge
+        orders = (all_around(0),) if looks else ()
+        ticks = run(made, shafts, judge, seconds, late, *orders)
+    still = [name for name, worst in judge.worst.items() if worst.speed_deg_s < STILL_DEG_S]
+    assert ticks and not still, f"{scene}: after {ticks} ticks these have not moved: {still}"
+    return ticks, judge
 
 
 def soak(args: argparse.Namespace) -> None:

@@ -4,8 +4,10 @@
 
 Servos are emulated on a pseudo-terminal, and asked there what they really do. A row is one
 command on one rig that was ended one way: servos left on, how far the joints are from their
-parking pose, seconds until the program was gone, its exit code and how many lines told of the
-end. A command that takes longer than 20 s to end counts as hanging and is killed.
+parking pose, seconds until the program was gone, its exit code and the last line that it said. A
+command that takes longer than 20 s to end counts as hanging and is killed. A case proves nothing,
+and is counted as void, unless torque was on and the program spoke to its servos right before the
+blow, and the program told of a blow that it can tell of.
 """
 
 import argparse
@@ -47,14 +49,21 @@ BOARDS = ("maker", "pca9685")
 LONGEST_S = 20.0
 # Broken on purpose, from outside: what a plug-in, a small machine or a bug of ours would do.
 BROKEN = {
-    "observer raises": "import gazerig.robot.analysis.summary as m\n"
-    "def update(self, tick):\n    raise RuntimeError('plug-in')\nm.Summary.update = update\n",
+    "observer raises": "import gazerig.robot.control.joint_faults as m\n"
+    "def update(self, tick):\n    raise RuntimeError('plug-in')\nm.JointFaults.update = update\n",
     "MemoryError in the loop": "import gazerig.robot.control.loop as m\n"
     "tick, n = m.Robot.tick, []\n"
     "def update(self, *words):\n    n.append(0)\n"
     "    if len(n) > 200:\n        raise MemoryError\n"
-    "    return tick(self, *words)\nm.Robot.tick = note\n",
+    "    return tick(self, *words)\nm.Robot.tick = update\n",
 }
+TOLD = {
+    "observer raises": "plug-in",
+    "MemoryError in the loop": "unexpected MemoryError",
+    "page killed": "the page has stopped",
+    "recorder's disk full": "recording",
+}
+"""What the program says of a blow that it notices."""
 START = (
     "import sys; sys.argv[0] = 'gazerig'; from gazerig.robot.cli.entry_point import main; main()"
 )
@@ -96,6 +105,15 @@ class Bench(NamedTuple):
         """Count the servos with torque, or with pulses."""
         return sum(bool(servo.get("torque", servo.get("target"))) for servo in self.servos())
 
+    def busy(self) -> bool:
+        """Return whether a program goes on speaking to the servos: its loop ticks."""
+        before = self._read_bytes()
+        return wait_until(lambda: self._read_bytes() > before, 2.0)
+
+    def _read_bytes(self) -> int:
+        """Return what the emulator has read so far; a status that is asked for counts too."""
+        return int(Path(f"/proc/{self.buses.pid}/io").read_text().split()[1])
+
     def off_park_deg(self) -> float:
         """Return how far the worst joint is from its parking pose."""
         at = {servo["id"]: servo.get("place", servo.get("position")) for servo in self.servos()}
@@ -119,11 +137,13 @@ class Started(NamedTuple):
     """A command at work.
 
     errors: where its standard error can be read, -1 nowhere; master: of its terminal, or -1
+    reader: who reads what it says, where that is another process
     """
 
     process: "subprocess.Popen[bytes]"
     errors: int
     master: int
+    reader: "subprocess.Popen[bytes] | None" = None
 
     @property
     def pid(self) -> int:
@@ -149,13 +169,15 @@ def started(words: list[str], way: str, begin: Begin = fresh) -> Started:
     breaks = BROKEN.get(way, "")
     command = typed(words, breaks)
     pipe = subprocess.PIPE
-    if way == "| head -1":
-        with subprocess.Popen(["head", "-1"], stdin=pipe, stdout=subprocess.DEVNULL) as reader:
+    if way == "reader killed":
+        reader = subprocess.Popen(["cat"], stdin=pipe, stdout=subprocess.DEVNULL)
+        assert reader.stdin is not None
+        with reader.stdin as into:
             process = begin(
-                words, breaks, stdin=subprocess.DEVNULL, stdout=reader.stdin, stderr=reader.stdin,
+                words, breaks, stdin=subprocess.DEVNULL, stdout=into, stderr=into,
                 env=env, preexec_fn=os.setsid,
             )  # fmt: skip
-        return Started(process, -1, -1)
+        return Started(process, -1, -1, reader)
     if way.startswith("tty"):
         master, slave = pty.openpty()
 
@@ -200,12 +222,17 @@ def _shelled(shell: list[str], *_: object, **options: Any) -> "subprocess.Popen[
     return subprocess.Popen(shell, **options)
 
 
-def wait_until(true: Callable[[], bool], within_s: float = 60.0) -> bool:
+def wait_until(true: Callable[[], bool], within_s: float = 60.0, master: int = -1) -> bool:
+    """Wait, and read meanwhile what the program shows on its terminal, as a terminal does."""
     end_s = time.monotonic() + within_s
     while time.monotonic() < end_s:
         if true():
             return True
-        time.sleep(0.05)
+        if master < 0:
+            time.sleep(0.05)
+        elif select.select([master], [], [], 0.05)[0]:
+            with contextlib.suppress(OSError):  # nobody is there any more
+                os.read(master, 65536)
     return False
 
 
@@ -234,9 +261,14 @@ def stop_tty(run: Started) -> None:
 
 
 def kill_page(run: Started) -> None:
-    for child in children(run.pid):
-        if b"gazerig.robot.dashboard.page_main" in Path(f"/proc/{child}/cmdline").read_bytes():
-            os.kill(child, signal.SIGKILL)
+    """The page dies; a while later a request to end."""
+    pages = [
+        child
+        for child in children(run.pid)
+        if b"gazerig.robot.dashboard.page_main" in Path(f"/proc/{child}/cmdline").read_bytes()
+    ]
+    for page in pages:
+        os.kill(page, signal.SIGKILL)
     time.sleep(1.0)
     run.process.send_signal(signal.SIGTERM)
 
@@ -255,6 +287,14 @@ def later(run: Started) -> None:
         run.process.send_signal(signal.SIGTERM)
 
 
+def kill_reader(run: Started) -> None:
+    """The other end of the pipe goes away; then a request to end."""
+    assert run.reader is not None
+    run.reader.kill()
+    run.reader.wait()
+    later(run)
+
+
 def broken_pipe(run: Started) -> None:
     """The reader of standard error goes away; then a request to end."""
     assert run.process.stderr is not None
@@ -271,7 +311,7 @@ WAYS: dict[str, Callable[[Started], None]] = {
     "6x SIGINT": send(*[signal.SIGINT] * 6, gap_s=0.1),
     "tty closed": close_tty,
     "tty stopped (Ctrl-S)": stop_tty,
-    "| head -1": nothing,
+    "reader killed": kill_reader,
     "stderr broken": broken_pipe,
     "stderr and stdout closed": later,
     "stderr on a full disk": later,
@@ -285,7 +325,10 @@ ONLY_RUN = {"observer raises", "MemoryError in the loop", "page killed", "record
 
 
 class Row(NamedTuple):
-    """What became of it."""
+    """What became of it.
+
+    void: why the case proves nothing, "" where its target was running and the blow landed
+    """
 
     on: int
     of: int
@@ -294,6 +337,7 @@ class Row(NamedTuple):
     code: int | None
     lines: int
     said: str
+    void: str
 
 
 def attack(at: Bench, name: str, way: str, begin: Begin = fresh) -> Row:
@@ -310,10 +354,15 @@ def attack(at: Bench, name: str, way: str, begin: Begin = fresh) -> Row:
             run.process.stdin.write(b"1500\n+40\n")
             run.process.stdin.flush()
     needs = 0 if name == "monitor" else 1
-    up = wait_until(lambda: at.on() >= needs or run.process.poll() is not None)
-    time.sleep(1.2 if up else 0.0)
-    if way == "recorder's disk full":
-        time.sleep(3.0)
+    # What takes the memory away counts ticks; everything else comes when the program is at work.
+    ended = lambda: run.process.poll() is not None  # noqa: E731
+    ticks = lambda: at.on() >= needs and at.busy() and at.on() >= needs  # noqa: E731
+    up = wait_until(lambda: ticks() or ended(), master=run.master)
+    void = "" if up and not ended() else "no torque, or no loop that ticks"
+    if way != "MemoryError in the loop":
+        wait_until(ended, 4.2 if way == "recorder's disk full" else 1.2, run.master)
+        if ended() or not ticks():
+            void = void or "it had ended before the blow"
     began_s = time.monotonic()
     WAYS[way](run)
     said = b""
@@ -340,15 +389,18 @@ def attack(at: Bench, name: str, way: str, begin: Begin = fresh) -> Row:
     if run.master >= 0:
         with contextlib.suppress(OSError):
             os.close(run.master)
+    if run.reader is not None:
+        run.reader.wait()
     for pipe in (run.process.stdin, run.process.stdout, run.process.stderr):
         with contextlib.suppress(OSError):
             if pipe is not None:
                 pipe.close()
     folder.cleanup()
     lines = [line for line in said.decode(errors="replace").splitlines() if line.strip(". ")]
-    last = lines[-1] if lines else ""
-    of = len(at.rig.joints)
-    return Row(left, of, off, took_s, code, len(lines), re.sub(r"\x1b\[K|\r", "", last)[:70])
+    last = re.sub(r"\x1b\[K|\r", "", lines[-1])[:70] if lines else ""
+    if TOLD.get(way, "") not in said.decode(errors="replace"):
+        void = void or f"nothing was said of: {way}"
+    return Row(left, len(at.rig.joints), off, took_s, code, len(lines), last, void)
 
 
 def main() -> int:
@@ -359,7 +411,7 @@ def main() -> int:
     asked = parser.parse_args()
     print("| rig | command | way out | left on | off park | s | code | last line |")
     print("|--|--|--|--|--|--|--|--|")
-    left = hung = cases = 0
+    left = hung = cases = void = 0
     for name in asked.rig or RIGS:
         for command, way in product(asked.command or commands(name), asked.way or WAYS):
             if way in ONLY_RUN and command != "run":
@@ -367,11 +419,13 @@ def main() -> int:
             with bench(name) as at:
                 row = attack(at, command, way)
             cases, left, hung = cases + 1, left + row.on, hung + (row.code is None)
+            void += bool(row.void)
             what = (RIGS[name], command, way, f"{row.on} of {row.of}")
-            how = (f"{row.off_park_deg:.1f} deg", f"{row.seconds:.1f}", row.code, row.said)
+            last = f"VOID: {row.void}: {row.said}" if row.void else row.said
+            how = (f"{row.off_park_deg:.1f} deg", f"{row.seconds:.1f}", row.code, last)
             print("|", *[f"{cell} |" for cell in (*what, *how)], flush=True)
-    print(f"\n{cases} ways out: {left} servos left on, {hung} hung")
-    return 1 if left or hung else 0
+    print(f"\n{cases} ways out: {left} servos left on, {hung} hung, {void} void")
+    return 1 if left or hung or void else 0
 
 
 if __name__ == "__main__":
