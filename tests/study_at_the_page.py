@@ -2,6 +2,7 @@
 
 import itertools
 import json
+import time
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
@@ -30,7 +31,8 @@ UTC = "2026-11-23T04:00:00Z"
 class Pages:
     """The pages of one session, and what is on disk of it.
 
-    now_s: the session's clock, which a test moves; finished: how often the program was to end
+    now_s: the session's clock, which a test moves with a head; with films 1 us is 1 s
+    finished: how often the program was to end
     """
 
     def __init__(
@@ -50,11 +52,15 @@ class Pages:
         self.journal.write([session.opened(CODE, study.sha256, "test", UTC)])
         self.session = session
         self.run = StudyRun(
-            CODE, session, self.journal, presenter or FilmPresenter(), lambda: self.now_s, lambda: UTC
-        )  # fmt: skip
+            CODE, session, self.journal, presenter or FilmPresenter(), self._clock, lambda: UTC
+        )
         self._made_of = study.design, films, head
         self._port = free_port()
         self.server = self._new_server()
+
+    def _clock(self) -> float:
+        films = self.session.design.presentation.on == "film"
+        return 1e6 * time.monotonic() if films else self.now_s
 
     def _new_server(self) -> StudyServer:
         design, films, head = self._made_of

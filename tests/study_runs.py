@@ -1,6 +1,7 @@
 """Participants who answer in tests: a study run without a browser or a head."""
 
 from collections.abc import Callable
+from itertools import count
 from pathlib import Path
 
 from gazerig.config.study_file import LoadedStudy
@@ -28,14 +29,18 @@ def run_of(
     folder: Path,
     number: int = 1,
     presenter: Presenter | None = None,
-    now_s: Callable[[], float] = lambda: 0.0,
+    now_s: Callable[[], float] | None = None,
 ) -> tuple[StudyRun, Journal]:
-    """Return a session that is begun or resumed, and its open journal."""
+    """Return a session that is begun or resumed, and its open journal.
+
+    now_s: its clock, None: one that is a minute later at each look
+    """
     journal = Journal(folder)
     known = journal.records
     session = StudySession(study.design, study.questionnaires, number, b"secret", known)
     journal.write((session.opened(f"P{number:03d}", "0" * 64, "test", UTC),))
     shows = presenter or FilmPresenter()
+    now_s = now_s or count(0.0, 60.0).__next__
     return StudyRun(f"P{number:03d}", session, journal, shows, now_s, lambda: UTC), journal
 
 
@@ -50,6 +55,7 @@ def step(run: StudyRun, value: int = 2) -> Screen:
         case ReadyScreen():
             run.begin(page)
         case PresentationScreen():
+            run.film_fetched(screen.film)
             run.film_ended(page, screen.seconds)
         case QuestionsScreen():
             values: dict[int, int | str] = {}

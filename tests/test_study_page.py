@@ -326,6 +326,18 @@ def test_a_film_that_was_not_seen_to_its_end_counts_as_an_attempt(pages: Pages, 
     assert (again.trial, again.attempt) == (began.trial, began.attempt + 1)
 
 
+def test_a_film_that_was_not_fetched_was_not_seen(pages: Pages, tab: Tab) -> None:
+    page = to(tab, "presentation")
+    asked = HTTPConnection(urlsplit(tab.url).netloc)
+    asked.request("HEAD", page["film"], headers=tab.headers)
+    assert asked.getresponse().status == 200
+    asked.close()
+    ready = tab.do(page["page"], do="seen", seconds=page["seconds"])
+    assert ready["kind"] == "ready" and ready["again"]
+    ended = pages.journal.records[-1]
+    assert isinstance(ended, TrialEnded) and ended.reason == "the film was not fetched"
+
+
 def test_questions_have_numbers_and_no_names_of_items_or_scales(pages: Pages, tab: Tab) -> None:
     page = to(tab, "questions")
     page = page if len(page["items"]) == 24 else tab.goes_through(page)

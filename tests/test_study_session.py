@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from math import nan
 from pathlib import Path
 
 import pytest
@@ -309,11 +310,76 @@ def test_a_film_that_was_not_shown_whole_is_shown_again(tmp_path: Path) -> None:
     run, journal = run_of(rating(practice=0, seconds=20.0), tmp_path)
     while not isinstance(run.now()[1], PresentationScreen):
         step(run)
-    for seconds in (3.0, float("nan")):
+    for seconds in (3.0, float("nan"), float("inf"), -20.0):
+        run.film_fetched(run.now()[1].film)  # type: ignore[union-attr]
         run.film_ended(run.now()[0], seconds)
         screen = run.now()[1]
         assert isinstance(screen, ReadyScreen) and screen.again
         step(run)
+    run.film_fetched(run.now()[1].film)  # type: ignore[union-attr]
     run.film_ended(run.now()[0], 19.9)
     assert isinstance(run.now()[1], QuestionsScreen)
+    journal.close()
+
+
+@pytest.mark.parametrize(
+    ("fetched", "waited_s", "claimed_s", "outcome", "shown_s"),
+    [
+        (True, 0.0, 1e300, "interrupted", 0.0),
+        (True, 17.0, 20.0, "interrupted", 17.0),
+        (False, 60.0, 20.0, "interrupted", 0.0),
+        (True, 21.0, 1e300, "complete", 21.0),
+        (True, 21.0, 20.0, "complete", 20.0),
+    ],
+)
+def test_a_film_is_seen_by_the_hosts_clock_and_only_if_it_was_fetched(
+    fetched: bool, waited_s: float, claimed_s: float, outcome: str, shown_s: float, tmp_path: Path
+) -> None:
+    now = [0.0]
+    study = rating(practice=0, seconds=20.0)
+    run, journal = run_of(study, tmp_path, now_s=lambda: now[0])
+    while not isinstance(run.now()[1], PresentationScreen):
+        step(run)
+    now[0] += 100.0  # the film takes long to come
+    if fetched:
+        run.film_fetched(run.now()[1].film)  # type: ignore[union-attr]
+    run.film_fetched("guessed")
+    now[0] += waited_s
+    run.film_ended(run.now()[0], claimed_s)
+    ended = journal.records[-1]
+    assert isinstance(ended, TrialEnded)
+    assert (ended.outcome, ended.seconds) == (outcome, shown_s)
+    journal.close()
+
+
+@pytest.mark.parametrize(
+    ("claimed_ms", "kept_ms"),
+    [(900.0, 900.0), (1e300, 4000.0), (-1.0, nan), (float("inf"), nan), (nan, nan)],
+)
+def test_a_response_time_is_never_longer_than_the_page_was_shown(
+    claimed_ms: float, kept_ms: float, tmp_path: Path
+) -> None:
+    now = [0.0]
+    run, journal = run_of(rating(practice=0, seconds=20.0), tmp_path, now_s=lambda: now[0])
+    while not isinstance(run.now()[1], QuestionsScreen):
+        if isinstance(screen := run.now()[1], PresentationScreen):
+            run.film_fetched(screen.film)
+            now[0] += 25.0
+        step(run)
+    now[0] += 4.0
+    run.answer(run.now()[0], {0: 1, 1: 1}, {0: claimed_ms, 1: 100.0})
+    answered = [one.ms for one in journal.records if isinstance(one, ItemAnswered)]
+    assert answered == pytest.approx([kept_ms, 100.0], nan_ok=True)
+    journal.close()
+
+
+def test_a_response_time_on_a_page_of_an_earlier_program_is_not_known(tmp_path: Path) -> None:
+    run, journal = run_of(rating(practice=0), tmp_path)
+    while not isinstance(run.now()[1], QuestionsScreen):
+        step(run)
+    journal.close()
+    run, journal = run_of(rating(practice=0), tmp_path)
+    run.answer(run.now()[0], {0: 1, 1: 1}, {0: 700.0, 1: 900.0})
+    answered = [one.ms for one in journal.records if isinstance(one, ItemAnswered)]
+    assert answered == pytest.approx([nan, nan], nan_ok=True)
     journal.close()

@@ -251,9 +251,19 @@ class StudySession:
         return self._cut(outcome, seconds, utc, reason, recording, span_s)
 
     def answer(
-        self, values: Mapping[int, AnswerValue], ms: Mapping[int, float], utc: str
+        self,
+        values: Mapping[int, AnswerValue],
+        ms: Mapping[int, float],
+        utc: str,
+        longest_ms: float,
     ) -> tuple[Record, ...]:
         """Return the records of a page of answers, by the questions' numbers.
+
+        Args:
+            values: answers.
+            ms: response times as the browser reports them.
+            utc: when.
+            longest_ms: for how long the page was shown by the host's clock, nan: not known.
 
         Raises:
             WrongAnswer: no questions are shown, one is not answered, or not as it can be.
@@ -268,7 +278,8 @@ class StudySession:
         for number, (key, item) in enumerate(items):
             value = checked(number, item, values.get(number))
             late = ms.get(number, nan)
-            late = late if isfinite(late) and late >= 0.0 else nan
+            known = isfinite(late) and late >= 0.0 and isfinite(longest_ms)
+            late = min(late, longest_ms) if known else nan
             records.append(ItemAnswered(*at, key, value, late, utc))
         return tuple(records)
 

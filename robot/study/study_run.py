@@ -76,8 +76,11 @@ class StudyRun:
         self._presenter, self._now_s, self._utc = presenter, now_s, utc
         self._lock = threading.RLock()
         self._began_s = 0.0
+        self._fetched_s = nan
         self._fault = ""
         self._keep(session.resumed(utc()))
+        # How long a page was shown by a program that has ended is not known.
+        self._asked_s = nan
 
     def now(self) -> tuple[str, Screen]:
         """Return the name of the page that the participant is on, and its screen."""
@@ -136,14 +139,21 @@ class StudyRun:
                 self._fault, self._session.paused = str(lost), True
                 return
             self._keep(self._session.begin(self._utc()))
-            self._began_s = self._now_s()
+            self._began_s, self._fetched_s = self._now_s(), nan
+
+    def film_fetched(self, token: str) -> None:
+        """Note that the participant's browser has the whole film of this name."""
+        with self._lock:
+            if not isfinite(self._fetched_s) and self._session.film_of(token) is not None:
+                self._fetched_s = self._now_s()
 
     def film_ended(self, page: str, seconds: float) -> None:
         """Record that the browser has shown the film; one cut short begins again.
 
         Args:
             page: on which it was shown.
-            seconds: how much of it was played, as the browser says.
+            seconds: how much of it was played, as the browser reports. The time since the browser
+                has the film bounds it; a film that was not fetched was not played.
 
         Raises:
             NotKept: it could not be written.
@@ -154,9 +164,12 @@ class StudyRun:
                 return
             if not screen.film:
                 return  # the head's own time decides
-            whole = isfinite(seconds) and seconds >= WHOLE_SHARE * screen.seconds
-            reason = "" if whole else "the film was not shown whole"
-            self._end("complete" if whole else "interrupted", reason, seconds)
+            fetched = isfinite(self._fetched_s)
+            longest_s = self._now_s() - self._fetched_s if fetched else 0.0
+            seconds = min(max(seconds, 0.0), longest_s) if isfinite(seconds) else 0.0
+            whole = seconds >= WHOLE_SHARE * screen.seconds
+            reason = "the film was not shown whole" if fetched else "the film was not fetched"
+            self._end("complete" if whole else "interrupted", "" if whole else reason, seconds)
 
     def poll(self) -> None:
         """End the presentation when its time is over or the head was lost; call it often.
@@ -179,13 +192,19 @@ class StudyRun:
     def answer(self, page: str, values: Mapping[int, AnswerValue], ms: Mapping[int, float]) -> None:
         """Record a page of answers; when this returns, they are on disk.
 
+        Args:
+            page: on which they were given.
+            values: by the questions' numbers.
+            ms: response times as the browser reports them; none is longer than the page was shown.
+
         Raises:
             NotKept: they could not be written, and the page is still to be answered.
             WrongAnswer: one is missing, or not as it can be.
         """
         with self._lock:
             if page == self._session.page:
-                self._keep(self._session.answer(values, ms, self._utc()))
+                longest_ms = 1000.0 * (self._now_s() - self._asked_s)
+                self._keep(self._session.answer(values, ms, self._utc(), longest_ms))
 
     def withdraw(self) -> None:
         """Record that the participant leaves.
@@ -252,6 +271,7 @@ class StudyRun:
         """Have records on disk, then take effect; at the end of all, that as well."""
         self._journal.write(records)
         self._session.add(records)
+        self._asked_s = self._now_s()
         end = self._session.finish(self._utc())
         self._journal.write(end)
         self._session.add(end)

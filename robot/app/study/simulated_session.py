@@ -91,11 +91,14 @@ def _simulate(
             case ReadyScreen():
                 run.begin(page)
             case PresentationScreen():
+                run.film_fetched(screen.film)
                 now_s[0] += screen.seconds
                 run.film_ended(page, screen.seconds)
                 run.poll()
             case QuestionsScreen():
-                now_s[0] += _answer(run, page, session, person)
+                values, ms = _answers(session, person)
+                now_s[0] += sum(ms.values()) / 1000.0
+                run.answer(page, values, ms)
             case EndScreen():
                 break
     ended = [one for one in journal.records if isinstance(one, TrialEnded)]
@@ -108,8 +111,10 @@ def _simulate(
         ])  # fmt: skip
 
 
-def _answer(run: StudyRun, page: str, session: StudySession, person: SimulatedParticipant) -> float:
-    """Answer a page; return the seconds that it took."""
+def _answers(
+    session: StudySession, person: SimulatedParticipant
+) -> tuple[dict[int, AnswerValue], dict[int, float]]:
+    """Return the answers to a page and the milliseconds that each took, by number."""
     asked = session.asked
     assert asked is not None  # of a page of questions
     values: dict[int, AnswerValue] = {}
@@ -117,5 +122,4 @@ def _answer(run: StudyRun, page: str, session: StudySession, person: SimulatedPa
     for number, item in enumerate(asked.items):
         said = person.answer(asked.trial, asked.condition, asked.questionnaire, item)
         values[number], ms[number] = said
-    run.answer(page, values, ms)
-    return sum(ms.values()) / 1000.0
+    return values, ms

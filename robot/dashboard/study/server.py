@@ -250,7 +250,7 @@ class StudyServer:
         await self._watch(request, _PARTICIPANT, tell, _BEAT_S)
         return stream
 
-    async def _film(self, request: web.Request) -> web.Response:
+    async def _film(self, request: web.Request) -> web.StreamResponse:
         """Send a film's bytes without name, date or tag of the file, which could be told apart."""
         token = request.match_info["token"]
         condition = await asyncio.to_thread(self._study_run.film_of, token)
@@ -266,6 +266,10 @@ class StudyServer:
         self._connections.lasting(request)  # as long as a slow network takes
         answer = web.Response(body=body, content_type="video/webm", headers=HEADERS)
         answer.force_close()
+        await answer.prepare(request)
+        await answer.write_eof()
+        if request.method == "GET":
+            self._study_run.film_fetched(token)  # before anything that the browser sends next
         return answer
 
     async def _film_failed(self, request: web.Request) -> web.Response:
