@@ -208,6 +208,21 @@ def test_overheating_takes_the_torque_and_cooling_brings_it_back(rig):
     assert rig.chain[2].torque
 
 
+def test_one_that_is_too_hot_keeps_no_other_without_torque_after_a_replug(rig):
+    rig.run(0.5, [2000] * 4)
+    rig.command("overheat 2")
+    rig.command("unplug for 0.1")
+    rig.run(0.3, [2000] * 4)
+    for servo_id in IDS:
+        rig.chain.here(servo_id).write(40, b"\x00")
+    rig.run(2.0, [2100] * 4)
+    assert [servo.torque for servo in rig.chain.servos] == [True, False, True, True]
+    assert rig.bus.faults() == ("jaw (servo 2): overheating",)
+    rig.command("temperature 2 40")
+    rig.run(2.0, [2100] * 4)
+    assert all(servo.torque for servo in rig.chain.servos) and rig.bus.faults() == ()
+
+
 def test_input_voltage_is_named_and_the_torque_stays(rig):
     """A servo for 7.4 V on 12 V says so in every answer; its answers are good all the same."""
     rig.command("voltage all 12.0")

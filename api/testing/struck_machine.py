@@ -135,7 +135,7 @@ class Machine:
         self.guard = Guard(rig.guard, self.limits, self.names, self.body.reach, self.period_s)
         self.setups = rig_setups(rig)
         self._linkages = [rig.joints[name].made() for name in self.names]
-        self._at = [(rig.joints[name].bus, place_of(rig, name)) for name in self.names]
+        self.places = [(rig.joints[name].bus, place_of(rig, name)) for name in self.names]
         self._kinds = [rig.bus_of(name).kind for name in self.names]
         self.heard: tuple[bool, ...] = ()
         self.said: list[str] = []
@@ -166,12 +166,12 @@ class Machine:
         steps = {name: device.positions_steps() for name, device in self.devices.items()}
         return [
             linkage.angle_rad(steps[bus][place])
-            for linkage, (bus, place) in zip(self._linkages, self._at, strict=True)
+            for linkage, (bus, place) in zip(self._linkages, self.places, strict=True)
         ]
 
     def true_goal(self, i: int) -> int | None:
         """Return the goal that joint's servo follows; None where it is limp."""
-        bus, place = self._at[i]
+        bus, place = self.places[i]
         device = self.devices[bus]
         if isinstance(device, EmulatedMaestro):
             return device.body.channels[place].target or None

@@ -81,7 +81,7 @@ class Recovery:
         torque = line.ask(ids, "torque_enable")
         if not torque:
             return None
-        whole = self._without_latched(self._same_models(tuple(torque)))
+        whole = self._without_faults(self._same_models(tuple(torque)), torque if engaged else {})
         try:
             self._provisioning.apply(whole)
             well = tuple(
@@ -122,12 +122,19 @@ class Recovery:
                 self._health.name(servo_id, f"is not {model} any more: exchanged?")
         return tuple(i for i in ids if numbers.get(i) == expected[i])
 
-    def _without_latched(self, ids: tuple[int, ...]) -> tuple[int, ...]:
-        """Leave out servos that have latched an error, as they take no torque."""
-        latched = find_faults(self._line, ids) if self._family.faults_latch else {}
-        for servo_id, bits in latched.items():
-            self._health.latched(servo_id, self._family.name_errors(bits))
-        return tuple(i for i in ids if i not in latched)
+    def _without_faults(self, ids: tuple[int, ...], torque: Mapping[int, int]) -> tuple[int, ...]:
+        """Leave out servos whose errors deny them their torque: the others would wait for them.
+
+        torque: of each servo that is to have its torque
+        """
+        family = self._family
+        found = find_faults(self._line, ids)
+        if family.faults_latch:
+            for servo_id, bits in found.items():
+                self._health.latched(servo_id, family.name_errors(bits))
+            return tuple(i for i in ids if i not in found)
+        denied = {i for i, bits in found.items() if bits & family.torque_faults}
+        return tuple(i for i in ids if i not in denied or torque.get(i, 1))
 
     def _on_this_side(self, ids: tuple[int, ...]) -> tuple[int, ...]:
         """Leave those without torque that would go the wrong way round into their range.
