@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from gazerig.config.load import ConfigError, ConfigFault, shipped_names
 from gazerig.config.save import SaveResult, copy_shipped, rig_file, save
 from gazerig.config.schema import Rig, layers_of, load_rig
-from gazerig.drivers.file_input import read_limited
+from gazerig.drivers.file_input import kind_of, read_limited
 
 _LARGEST = 1_000_000  # bytes, as gazerig.config.entries reads
 
@@ -81,6 +81,25 @@ def save_over(
     return saved, RigFiles(paths, _texts(paths))
 
 
+def refuse_copy(to: str) -> None:
+    """Check that a rig can be copied to a path; nothing is opened.
+
+    Raises:
+        gazerig.config.load.ConfigError: the path is taken, or is no YAML file.
+    """
+    rule = ""
+    if os.path.isdir(to):
+        rule = "is a directory; name a new .yaml file in it"
+    elif os.path.exists(to) and not os.path.isfile(to):
+        rule = f"is {kind_of(os.stat(to))}; name a new .yaml file"
+    elif not to.endswith((".yaml", ".yml")):
+        rule = "a rig's file ends in .yaml; name it so"
+    elif os.path.lexists(to):
+        rule = "already exists and is not overwritten; choose another name"
+    if rule:
+        raise ConfigError([ConfigFault(to, None, "", "", rule)])
+
+
 def save_copy(
     layers: RigLayers, good: bytes, to: str, wanted: Mapping[str, Any], now: datetime
 ) -> tuple[SaveResult, RigFiles]:
@@ -93,8 +112,7 @@ def save_copy(
         gazerig.config.load.ConfigError: see gazerig.config.save.save; or ``to`` exists or is no
             YAML file.
     """
-    if not to.endswith((".yaml", ".yml")):
-        raise ConfigError([ConfigFault(to, None, "", "", "a rig's file ends in .yaml; name it so")])
+    refuse_copy(to)
     if layers.name in shipped_names("rigs"):
         copy_shipped(layers.name, to)
     else:
@@ -132,9 +150,6 @@ def _copy(text: bytes, to: Path) -> None:
     try:
         with to.open("xb") as new:
             new.write(text)
-    except FileExistsError:
-        rule = "already exists and is not overwritten; choose another name"
-        raise ConfigError([ConfigFault(str(to), None, "", "", rule)]) from None
     except OSError as error:
         rule = f"cannot be written: {error.strerror}; check it and its folder"
         raise ConfigError([ConfigFault(str(to), None, "", "", rule)]) from error

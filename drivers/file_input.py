@@ -29,6 +29,11 @@ _KINDS = {
 }
 
 
+def kind_of(found: os.stat_result) -> str:
+    """Return what is at a path that is neither a file nor a folder: "a named pipe"."""
+    return _KINDS.get(stat.S_IFMT(found.st_mode), "no file")
+
+
 def open_regular(path: Path | str) -> BinaryIO:
     """Open a regular file for reading; never waits for a writer.
 
@@ -70,5 +75,4 @@ def _refuse_other_kinds(found: os.stat_result, path: Path | str) -> None:
         return
     if stat.S_ISDIR(found.st_mode):
         raise IsADirectoryError(21, "is a directory", str(path))
-    kind = _KINDS.get(stat.S_IFMT(found.st_mode), "no file")
-    raise NotRegularFile(22, f"is {kind}, not a regular file", str(path))
+    raise NotRegularFile(22, f"is {kind_of(found)}, not a regular file", str(path))

@@ -1,7 +1,8 @@
 """Writing files that a user named: nothing that is there is lost, whatever goes wrong.
 
 A file appears whole or not at all: it is written beside its place and then takes it in one
-step. One that already exists is kept unless the user forces it.
+step. One that already exists is kept unless the user forces it. Named pipes and devices are
+refused: opening a pipe without a reader waits forever, and a full device takes nothing.
 """
 
 import contextlib
@@ -9,29 +10,35 @@ import io
 import os
 import secrets
 import shutil
-import stat
 from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO, TextIO
 
 from gazerig.drivers.errors import SetupError
+from gazerig.drivers.file_input import kind_of
+
+_OWN_OUTPUT = ("/dev/fd/", "/proc/self/fd/")
 
 
 def refuse_existing(*paths: Path, force: bool = False) -> None:
     """Refuse before any work what could not be written in the end.
 
-    Pipes and devices (``/dev/stdout``) hold nothing that could be lost, and pass.
+    The program's own output (``/dev/stdout``, ``/dev/fd/3``) and ``/dev/null`` hold nothing that
+    could be lost, and pass.
 
     Raises:
-        SetupError: a file is there and not forced, or is a directory, or its
-            folder is absent or not writable.
+        SetupError: a file is there and not forced; or the path is a directory, a named pipe, a
+            device or a socket, or its folder is not writable.
     """
     for path in paths:
         with _clear(path):
-            if _is_stream(path):
+            if _is_own_output(path):
                 continue
             if path.is_dir():
                 raise SetupError(f"{path} is a directory: name a file in it")
+            if path.exists() and not path.is_file():
+                kind = kind_of(path.stat())
+                raise SetupError(f"{path} is {kind}: name a file, or /dev/stdout")
             if not force and (path.exists() or path.is_symlink()):
                 raise SetupError(_there(path))
             folder = path.parent
@@ -46,7 +53,7 @@ def output_file(path: Path, force: bool = False) -> Iterator[BinaryIO]:
     """Return a file to write to, which takes its place only when all of it is on the disk.
 
     Args:
-        path: the file wanted; a pipe or a device is written to directly.
+        path: the file wanted; the program's own output is written to directly.
         force: Replace a file that is there; else it is refused.
 
     Raises:
@@ -55,7 +62,7 @@ def output_file(path: Path, force: bool = False) -> Iterator[BinaryIO]:
     """
     refuse_existing(path, force=force)
     with _clear(path):
-        if _is_stream(path):
+        if _is_own_output(path):
             with path.open("wb") as stream:
                 yield stream
             return
@@ -129,13 +136,11 @@ def _there(path: Path) -> str:
     return f"{path} already exists: name another file, or use --force"
 
 
-def _is_stream(path: Path) -> bool:
-    """Whether a path is there and neither a file nor a folder."""
-    try:
-        mode = path.stat().st_mode
-    except (FileNotFoundError, NotADirectoryError):
-        return False
-    return not (stat.S_ISREG(mode) or stat.S_ISDIR(mode))
+def _is_own_output(path: Path) -> bool:
+    """Whether a path is an open pipe or terminal of this program, or the null device."""
+    whole = os.path.abspath(path)
+    own = whole in ("/dev/stdout", "/dev/stderr") or whole.startswith(_OWN_OUTPUT)
+    return whole == os.devnull or (own and path.exists() and not (path.is_file() or path.is_dir()))
 
 
 @contextlib.contextmanager

@@ -23,7 +23,7 @@ from gazerig.drivers.camera.recorder import CameraRecorder
 from gazerig.drivers.camera.recording_reader import Recording
 from gazerig.drivers.camera.recording_writer import RecordingWriter
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.errors import CameraError
+from gazerig.drivers.errors import CameraError, SetupError
 from gazerig.drivers.types import CameraTurn, DetectedFace
 
 GO_ON = threading.Event()
@@ -113,7 +113,7 @@ def test_jpeg_is_smaller_and_nearly_the_same(tmp_path):
 
 def test_existing_file_is_kept_unless_told_otherwise(file):
     before = file.read_bytes()
-    with pytest.raises(CameraError, match="already exists"):
+    with pytest.raises(SetupError, match="already exists"):
         RecordingWriter(file, {})
     assert file.read_bytes() == before
     write(file, [shot(0)], over=True)

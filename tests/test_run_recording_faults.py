@@ -121,7 +121,7 @@ def test_what_is_no_recording_of_a_run_is_refused_in_one_line(tmp_path: Path) ->
 def test_a_file_is_not_written_over_unasked(tmp_path: Path) -> None:
     there = tmp_path / "there.mcap"
     there.write_text("precious")
-    with pytest.raises(SetupError, match="already exists: choose another name or --force"):
+    with pytest.raises(SetupError, match="already exists: name another file, or use --force"):
         refused = Recorder(there, info_for())
         refused.open()
     refused.close()

@@ -1,5 +1,6 @@
 """Tuning: values set, saved, reverted and read again while a rig runs."""
 
+import os
 import re
 from collections.abc import Callable
 from datetime import datetime
@@ -99,6 +100,33 @@ def test_save_keeps_comments_and_a_backup_and_reload_finds_nothing_new(mine: Pat
     assert bench.tuning.unsaved() == ()
     version = bench.tuning.version
     assert bench.tuning.reload(mine) == () and bench.tuning.version == version
+
+
+def test_what_is_no_new_file_is_no_copy_and_starts_no_process(tmp_path: Path) -> None:
+    bench = Bench("desk")
+    bench.tuning._elsewhere = None  # type: ignore[assignment]  # cannot be called
+    pipe, folder, full = (tmp_path / f"{name}.yaml" for name in ("pipe", "folder", "full"))
+    os.mkfifo(pipe)
+    folder.mkdir()
+    full.symlink_to("/dev/full")
+    for path, what in {
+        pipe: "is a named pipe; name a new .yaml file",
+        folder: "is a directory; name a new .yaml file in it",
+        full: "is a device; name a new .yaml file",
+        Path("/dev/full"): "is a device; name a new .yaml file",
+        tmp_path / "mine.txt": "ends in .yaml; name it so",
+    }.items():
+        with pytest.raises(ConfigError, match=f"{path}: .*{what}"):
+            bench.tuning.save(path)
+    assert bench.tuning.name == "desk"
+
+
+def test_a_file_replaced_by_a_pipe_is_not_waited_for(mine: Path) -> None:
+    bench = Bench(str(mine))
+    mine.unlink()
+    os.mkfifo(mine)
+    with pytest.raises(ConfigError, match="is a named pipe"):
+        bench.tuning.save()
 
 
 SPOILT = ["loop:\n  rate_hz: fast\n", "name: [\n", "", "\x00\xff", "root:*:19000:\n", None]

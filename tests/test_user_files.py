@@ -3,21 +3,25 @@
 import os
 import resource
 import signal
-import threading
+import socket
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 from command_line import typed
+from recorded_run import info_for
 
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig, load_rules, load_walk
+from gazerig.drivers.camera.recording_writer import RecordingWriter
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_input import FileTooLarge, NotRegularFile, read_limited
 from gazerig.drivers.file_output import output_file, output_text, refuse_existing, write_file
 from gazerig.robot.analysis.eye_tracker_csv import read_recording
 from gazerig.robot.analysis.heatmap import face_from
+from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.remote.file_watch import look
 from gazerig.robot.report.files import files_of, write_all
 from gazerig.robot.report.gaze_trace import GazeTrace, TraceRow
@@ -199,17 +203,36 @@ def test_a_link_is_followed_and_stays_one(tmp_path: Path) -> None:
     assert link.is_symlink() and file.read_text() == "new"
 
 
-def test_pipes_and_devices_are_written_to(pipe: Path) -> None:
-    refuse_existing(pipe, Path("/dev/null"))
+@pytest.mark.parametrize("force", [False, True])
+def test_a_named_pipe_a_device_or_a_socket_is_refused_at_once(pipe: Path, force: bool) -> None:
+    link = pipe.with_name("link.yaml")
+    link.symlink_to("/dev/full")
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(str(pipe.with_name("socket")))
+        for path, what in (
+            (pipe, "a named pipe"),
+            (Path("/dev/full"), "a device"),
+            (link, "a device"),
+            (pipe.with_name("socket"), "a socket"),
+        ):
+            for write in (
+                partial(refuse_existing, path, force=force),
+                partial(write_file, path, "x", force),
+                Recorder(path, info_for(), over=force).open,
+                partial(RecordingWriter, path, {}, over=force),
+            ):
+                assert f"{path} is {what}: name a file" in refused(write)
+
+
+def test_the_output_of_the_program_itself_is_written_to() -> None:
     write_file(Path("/dev/null"), "x")
-    got: list[bytes] = []
-    reader = threading.Thread(target=lambda: got.append(pipe.read_bytes()), daemon=True)
-    reader.start()
-    write_file(pipe, "through")
-    reader.join(20)
-    assert got == [b"through"]
-    with pytest.raises(SetupError, match="No space left on device"):
-        write_file(Path("/dev/full"), "x" * 100_000)
+    source, sink = os.pipe()
+    with os.fdopen(source) as reader:
+        write_file(Path(f"/dev/fd/{sink}"), "through")
+        os.close(sink)
+        assert reader.read() == "through"
+    with open("/dev/full", "wb") as full, pytest.raises(SetupError, match="No space left"):
+        write_file(Path(f"/dev/fd/{full.fileno()}"), "x" * 100_000)
 
 
 @pytest.fixture

@@ -14,6 +14,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 from gazerig.drivers.camera.recording_format import PROFILE, SCHEMAS, encoded, nanoseconds
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
+from gazerig.drivers.file_output import refuse_existing
 
 # What the system has may be lost with the power; so often it is put on the disk.
 _SYNC_NS = 1_000_000_000
@@ -95,9 +96,8 @@ class RecordingWriter:
 
 def _create(path: Path, over: bool) -> IO[bytes]:
     """Create the file."""
+    refuse_existing(path, force=over)
     try:
         return path.open("wb" if over else "xb")
-    except FileExistsError as error:
-        raise CameraError(f"{path} already exists: name another file, or use --force") from error
     except OSError as error:
         raise CameraError(f"cannot write {path} ({error.strerror}): name another file") from error

@@ -107,10 +107,10 @@ class RunOptions:
         return None if self.no_page or self.fast else address
 
     @property
-    def written_at_the_end(self) -> tuple[Path, ...]:
+    def written(self) -> tuple[Path, ...]:
         """Return the files whose names must be free before the run starts."""
         named = None if self.summary is None or self.summary == "-" else Path(self.summary)
-        return tuple(path for path in (self.heatmap, named) if path is not None)
+        return tuple(path for path in (self.record, self.heatmap, named) if path is not None)
 
     @property
     def choices(self) -> tuple[tuple[str, str], ...]:

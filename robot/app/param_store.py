@@ -31,7 +31,14 @@ from gazerig.config.parameters import (
 )
 from gazerig.config.parameters import parameters as described
 from gazerig.config.renamed import renamed_key
-from gazerig.config.rig_files import RigFiles, RigLayers, read_all, save_copy, save_over
+from gazerig.config.rig_files import (
+    RigFiles,
+    RigLayers,
+    read_all,
+    refuse_copy,
+    save_copy,
+    save_over,
+)
 from gazerig.config.save import SaveResult, ValueChange, rig_file
 from gazerig.config.save_text import EditRefused, written
 from gazerig.config.schema import Rig, load_rig
@@ -189,6 +196,9 @@ class ParamStore:
                 exists or cannot be written, or another layer overrides a value.
         """
         with self._changing:
+            copied = path is not None and os.path.realpath(path) != os.path.realpath(self.path)
+            if copied:
+                refuse_copy(str(path))  # before another process is started for it
             if self._state.files.changed():
                 # An edit that is not in force yet counts; one with faults does not.
                 with contextlib.suppress(ConfigError):
@@ -198,7 +208,7 @@ class ParamStore:
             _refuse_lists(wanted)
             layers, good = self._layers(state), state.files.own
             target = rig_file(state.name)
-            if path is not None and os.path.realpath(path) != os.path.realpath(target):
+            if copied:
                 done = self._elsewhere(save_copy, layers, good, str(path), wanted, self._now())
                 state = state._replace(name=str(path))
             else:

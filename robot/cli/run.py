@@ -72,7 +72,7 @@ def run(
     asked = replace(asked, camera=camera_of(camera))
     with clear_errors(rig, port, mock):
         asked = asked.checked()
-        refuse_existing(*asked.written_at_the_end, force=force)
+        refuse_existing(*asked.written, force=force)
         shows = status if not fast and sys.stderr.isatty() else None
         if shows is not None:
             shows("loading: a few seconds ...")

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import typer
 
-from gazerig.drivers.errors import ServoMissing, SetupError
+from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.event_log import EventLog
+from gazerig.drivers.file_output import write_file
 from gazerig.drivers.maestro.board import MaestroBoard
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.maestro.probe import USB_CHANNELS
@@ -75,10 +76,7 @@ def write_settings(
     Raises:
         SetupError: the file cannot be written.
     """
-    try:
-        file.write_text(settings_file(params, setups, on_usb(port)), encoding="utf-8")
-    except OSError as error:
-        raise SetupError(f"--settings {file}: cannot be written ({error.strerror})") from error
+    write_file(file, settings_file(params, setups, on_usb(port)), force=True)
     say(f"   all that is to be set is in {file}: in Pololu's Maestro Control Center File, Open")
     say(f"   settings file, then Apply Settings; or without it: UscCmd --configure {file}")
 

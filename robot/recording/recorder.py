@@ -14,6 +14,7 @@ from math import inf
 from pathlib import Path
 
 from gazerig.drivers.errors import SetupError
+from gazerig.drivers.file_output import refuse_existing
 from gazerig.drivers.passed_image import copied
 from gazerig.drivers.types import BusHealth, Detections
 from gazerig.robot.control.body import Body
@@ -235,11 +236,10 @@ def _created(path: Path, over: bool) -> int:
     Raises:
         SetupError: it exists or cannot be made.
     """
+    refuse_existing(path, force=over)
     flags = os.O_WRONLY | os.O_CREAT | (os.O_TRUNC if over else os.O_EXCL)
     try:
         return os.open(path, flags, 0o644)
-    except FileExistsError:
-        raise SetupError(f"{path} already exists: choose another name or --force") from None
     except OSError as error:
         raise SetupError(
             f"cannot write {path} ({error.strerror}): choose a folder you may write to"
