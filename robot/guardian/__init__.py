@@ -1,1 +1,1 @@
-"""A process beside the program that releases servos without a watchdog when the program dies."""
+"""A process beside the program that releases the servos when the program dies or hangs."""

@@ -18,7 +18,7 @@ class GuardedBus:
     after a restart of the servos, and their answers are marked ``rearmed``.
 
     Args:
-        bus: of servos without a watchdog.
+        bus: of the servos.
         count: how many servos.
         guardian: the process that watches the loop.
         plan: the number of its plan for this bus's port.

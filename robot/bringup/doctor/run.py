@@ -234,7 +234,7 @@ def apply_fixes(
             )
 
 
-# --- the guardian, which stands in for a watchdog that servos lack
+# --- the guardian
 
 
 def examine_guardian(plan: ReleasePlan) -> Diagnostic:

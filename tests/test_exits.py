@@ -1,0 +1,51 @@
+"""Whatever ends a program that holds heads: no servo keeps its torque.
+
+All exits of all interfaces on all kinds of bus: tests/attack/exits.py.
+"""
+
+import faulthandler
+import subprocess
+import sys
+from typing import Any
+
+import pytest
+from attack.exits import EXITS, INTERFACES, case, meets
+from branch import Branch
+
+pytestmark = pytest.mark.own_timeouts
+
+
+def begin(code: str, words: list[str], **options: Any) -> "subprocess.Popen[bytes]":
+    """Start a program in a branch of this process."""
+
+    def work() -> None:
+        faulthandler.disable()  # pytest's, of which a program knows nothing
+        sys.argv = ["-c", *words]
+        exec(code, {"__name__": "__main__"})
+
+    return Branch(work, **options)
+
+
+@pytest.mark.parametrize(
+    ("kind", "interface", "exit_"),
+    [
+        ("desk", "command", "SIGKILL"),
+        ("desk", "python", "SIGTERM"),
+        ("desk", "python", "SIGSEGV"),
+        ("desk", "python", "all descriptors closed"),
+        ("feetech", "python", "guardian suspended, then SIGKILL"),
+        ("feetech", "python", "2x SIGINT, .3 s"),
+        ("maker", "daemon thread", "the main thread ends"),
+        ("maker", "two heads", "SIGUSR1"),
+        ("pca9685", "study", "the study's program killed"),
+    ],
+)
+def test_no_servo_keeps_its_torque(kind: str, interface: str, exit_: str) -> None:
+    row = case(kind, interface, exit_, begin)
+    assert row.void == "" and row.of > 0
+    assert row.powered == 0
+
+
+def test_the_table_meets_every_interface_and_exit() -> None:
+    assert all(any(meets(one, exit_) for one in INTERFACES) for exit_ in EXITS)
+    assert all(sum(meets(one, exit_) for exit_ in EXITS) > 8 for one in INTERFACES)
