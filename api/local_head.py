@@ -22,6 +22,7 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.param_store import ParamStore
 from gazerig.robot.control.head_state import HeadEvent, HeadState, head_state
 from gazerig.robot.control.interrupts import Interrupts
+from gazerig.robot.control.line_queue import LineQueue
 from gazerig.robot.control.loop import TickLoop
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_feed import Progress, TickFeed
@@ -232,9 +233,11 @@ class RunningHead(LocalHead):
         """Run from torque on to torque off; the thread of the loop."""
         ended = "fault: unexpected error"
         try:
-            figures = session.run(
-                composed, self._interrupts, self._say, watch=self._update, summarised=False
-            )
+            name = "the logger gazerig" if self._say == _LOG.info else "say of the program"
+            with LineQueue(self._say, name) as said:
+                figures = session.run(
+                    composed, self._interrupts, said.line, watch=self._update, summarised=False
+                )
             ended = str(figures["stopped_by"])
         except BaseException as error:
             self._failure = error

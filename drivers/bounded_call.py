@@ -1,5 +1,6 @@
 """Calls that must not hold up the control loop: made in another thread, waited for briefly."""
 
+import contextlib
 import ctypes
 import threading
 from collections.abc import Callable
@@ -77,12 +78,11 @@ class _Call:
     def __init__(self, work: Callable[[], Any]) -> None:
         self._work = work
         self.outcome = CallResult()
-        self.begun_s: float | None = None
         self.done = threading.Lock()
         self.done.acquire()
 
     def make(self) -> None:
-        begun_s = self.begun_s = perf_counter()
+        begun_s = perf_counter()
         outcome = _outcome(self._work, BaseException)
         self.outcome = outcome._replace(took_s=perf_counter() - begun_s)
         self.done.release()
@@ -105,22 +105,32 @@ class BoundedCall:
         self._thread: threading.Thread | None = None
         self._calls: SimpleQueue[_Call | None] = SimpleQueue()
         self._late: _Call | None = None
-        self._leaving, self._left = threading.Lock(), False
-        self._closed_s = 0.0
+        self._begun_s: float | None = None
+        self._starting, self._leaving = threading.Lock(), threading.Lock()
+        self._left = False
+        self._closed_s: float | None = None
 
     def running_s(self) -> float:
-        """Return for how long the late call has been running, 0 where none is."""
-        begun_s = self._late.begun_s if self._late is not None else None
+        """Return for how long the present call has been running, 0 where none is."""
+        begun_s = self._begun_s
         return 0.0 if begun_s is None else perf_counter() - begun_s
+
+    def waiting(self) -> int:
+        """Return how many calls wait behind the present one."""
+        return self._calls.qsize()
 
     def __call__(self, work: Callable[[], Any]) -> CallResult | None:
         """Make a call; return its outcome or that of the late one before, None while it lasts."""
         if self._longest_s is None:
             return _outcome(work, (Exception, SystemExit))
-        call, patience_s = self._late, 0.0
-        if call is None:
-            call, patience_s = self._begun(work), self._longest_s
-        return self._waited_for(call, patience_s)
+        if self._late is not None:
+            return self._waited_for(self._late, 0.0)
+        return self._waited_for(self._begun(work), self._longest_s)
+
+    def begin(self, work: Callable[[], Any]) -> None:
+        """Make a call after all those before, and do not ask what comes of it; never waits."""
+        with contextlib.suppress(RuntimeError):  # no memory for a thread: the next one tries again
+            self._begun(work)
 
     def in_turn(self, work: Callable[[], Any], longest_s: float) -> CallResult | None:
         """Make a call after the late one before, whose outcome is forgotten; None while one lasts.
@@ -133,13 +143,19 @@ class BoundedCall:
             return None
         return self._waited_for(self._begun(work), longest_s)
 
+    def idle(self, longest_s: float) -> bool:
+        """Wait until all calls so far are made, no longer than this [s]; return whether they are."""
+        return self._late is None or self._waited_for(self._begun(_nothing), longest_s) is not None
+
     def _begun(self, work: Callable[[], Any]) -> _Call:
-        if self._thread is None:
-            self._thread = threading.Thread(target=self._serve, name=self._name, daemon=True)
-            self._thread.start()
         call = _Call(work)
         self._calls.put(call)
         self._late = call
+        with self._starting:
+            if self._thread is None:
+                thread = threading.Thread(target=self._serve, name=self._name, daemon=True)
+                thread.start()
+                self._thread = thread
         return call
 
     def _waited_for(self, call: _Call, patience_s: float) -> CallResult | None:
@@ -149,7 +165,7 @@ class BoundedCall:
         return call.outcome
 
     def close(self) -> None:
-        """Let the thread end; a call that lasts is ended, and not waited for. No call comes after.
+        """Let the thread end; a call that lasts is ended, and not waited for. No other is begun.
 
         Python code that computes ends by a ``CallEnded``, raised again while something catches
         it. What waits outside Python cannot be ended: it is in ``LASTING`` as long as it lasts.
@@ -157,9 +173,9 @@ class BoundedCall:
         thread, self._thread = self._thread, None
         if thread is None:
             return
+        self._closed_s = perf_counter()
         self._calls.put(None)
         if self._late is not None:
-            self._closed_s = perf_counter()
             LASTING.add(self)
             ending = threading.Thread(
                 target=self._end, args=(thread,), name=f"end of {self._name}", daemon=True
@@ -168,7 +184,7 @@ class BoundedCall:
 
     def lasts(self) -> tuple[float, str]:
         """Return for how long [s] a call has been running on since it was given up."""
-        for_s = perf_counter() - self._closed_s
+        for_s = perf_counter() - (self._closed_s or 0.0)
         return for_s, (
             f"{self._name} was given up {for_s:.0f} s ago and does not end: it may slow the loop "
             "as long as this program runs"
@@ -189,11 +205,17 @@ class BoundedCall:
 
     def _serve(self) -> None:
         try:
-            while (call := self._calls.get()) is not None:
+            while (call := self._calls.get()) is not None and self._closed_s is None:
+                self._begun_s = perf_counter()
                 call.make()
+                self._begun_s = None
         finally:
             with self._leaving:
                 self._left = True
+
+
+def _nothing() -> None:
+    """Do nothing, when all calls before it are made."""
 
 
 def _raise_in(thread: threading.Thread) -> None:

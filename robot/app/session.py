@@ -11,6 +11,7 @@ import numpy as np
 
 from gazerig.config.schema import Rig
 from gazerig.config.text import gestures_text, rig_text, walk_text
+from gazerig.drivers.bounded_call import LastingReport
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.analysis.gaze_on_face import GazeOnFace
 from gazerig.robot.analysis.summary import Summary
@@ -192,6 +193,7 @@ class Session:
         scene = made.scene
         self._score = SceneScore.of(scene) if summarised and scene is not None else None
         self._face_gaze = GazeOnFace() if options.heatmap is not None else None
+        self._lasting = LastingReport()
         self._start_s = 0.0
         self.stopped_by = "fault: unexpected error"
         self._count = LoopCount(0, 0, self.stopped_by)
@@ -220,6 +222,9 @@ class Session:
             events = tuple(drawn_together(events))
         for event in (*events, *self._run_observers.events()):
             self._say(f"{tick.t_s - self._start_s:.2f} s: {event}")
+        if not self._options.fast:
+            for line in self._lasting.lines():
+                self._made.robot.report(line)
 
     def _stop(self, seconds: float) -> str | None:
         """Return why the run ends now, None while it goes on."""

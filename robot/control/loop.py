@@ -151,6 +151,10 @@ class Robot:
         refuse_impossible(command, self.menus, self.body.names, self._animation, self._gestures)
         return self._commands.add(command)
 
+    def report(self, line: str) -> None:
+        """Add a line to the events of the next tick; for the loop's thread."""
+        self._messages.append(line)
+
     def ask(self, menu: str, choice: str) -> None:
         """Choose a behaviour, a mode of conversation or a wink, from the next tick on.
 

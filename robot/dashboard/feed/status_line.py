@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from math import inf
 
+from gazerig.drivers.bounded_call import lasting_text
 from gazerig.drivers.types import BusHealth
 from gazerig.robot.control.loop_timing import busy_text
 from gazerig.robot.control.tick import Tick
@@ -46,6 +47,7 @@ class StatusLine:
             self._rate = f"{timing.rate_hz:5.1f} Hz" if timing is not None and known else ""
             self._busy = busy_text(timing)
         parts = [
+            lasting_text(),
             self._busy,
             self._rate,
             doing(tick).headline,

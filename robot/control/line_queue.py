@@ -1,0 +1,96 @@
+"""Lines for people, handed on by a thread: who takes none, or only slowly, delays no caller."""
+
+import contextlib
+import sys
+from collections.abc import Callable
+from functools import partial
+from types import TracebackType
+from typing import Self
+
+from gazerig.drivers.bounded_call import LASTING, BoundedCall
+from gazerig.drivers.plugins import failure
+
+_MOST = 500
+"""So many lines wait; more are dropped."""
+_END_S = 1.0
+"""The last lines have so long to be delivered."""
+
+
+class LineQueue:
+    """Hands lines to a function that may block or fail, in the order of the calls.
+
+    While its block lasts, a function that does not return is in ``LASTING``. The end of the block
+    waits for a second at most, and tells standard error of lines that were not delivered.
+
+    Args:
+        deliver: takes one line after another, in one thread.
+        name: of what takes them, for messages.
+        most: so many lines wait; more are dropped.
+
+    dropped: lines that were not delivered
+    """
+
+    def __init__(self, deliver: Callable[[str], object], name: str, most: int = _MOST) -> None:
+        self._deliver, self._name, self._most = deliver, name, most
+        self._call = BoundedCall(name, 0.0)
+        self._missing = 0
+        self._failure = ""
+        self.dropped = 0
+
+    def line(self, text: str) -> None:
+        """Deliver this; returns at once."""
+        if self._call.waiting() >= self._most:
+            self.dropped += 1
+            self._missing += 1
+        else:
+            self._call.begin(partial(self._hand_on, text))
+
+    def flush(self, timeout_s: float) -> bool:
+        """Wait until everything is delivered, no longer than this; return whether it is."""
+        return self._call.idle(timeout_s)
+
+    def lasts(self) -> tuple[float, str] | None:
+        """Return for how long [s] a line has not been taken, None where all are."""
+        for_s = self._call.running_s()
+        if for_s == 0.0:
+            return None
+        waiting = f"{self._call.waiting()} lines wait, {self.dropped} are lost"
+        return for_s, f"{self._name} has not returned for {for_s:.0f} s: {waiting}"
+
+    def __enter__(self) -> Self:
+        """Begin to watch what takes the lines."""
+        LASTING.add(self)
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Wait for what is under way, and end it where it lasts."""
+        blocked = not self.flush(_END_S)
+        LASTING.discard(self)
+        lost = self.dropped + self._call.waiting() * blocked
+        self._call.close()
+        if lost:
+            why = f"{self._name} does not return" if blocked else self._failure or "it was slow"
+            last = LineQueue(_to_stderr, "standard error")
+            last.line(f"gazerig: {lost} lines were not delivered: {why}\n")
+            last.flush(_END_S)
+
+    def _hand_on(self, text: str) -> None:
+        """Deliver a line, and before it how many are missing."""
+        missing, self._missing = self._missing, 0
+        try:
+            if missing:
+                self._deliver(f"{missing} lines are missing here: {self._name} was too slow")
+            self._deliver(text)
+        except BaseException as error:
+            self.dropped += 1
+            self._failure = f"{self._name} failed ({failure(error)})"
+
+
+def _to_stderr(line: str) -> None:
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        sys.stderr.write(line)
