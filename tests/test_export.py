@@ -18,8 +18,14 @@ from gazerig.robot.model.commands import Jog, Stop
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.robot.model.types import JointState
 from gazerig.robot.recording.export_csv import EVENTS, columns, write_csv
-from gazerig.robot.recording.gaze_angles import MOVEMENTS, in_space, trace_of
-from gazerig.robot.recording.gaze_labels import labels_of, lag_of, speed_deg_s, stretches_of
+from gazerig.robot.recording.gaze_angles import MOVEMENTS, GazeTarget, in_space, trace_of
+from gazerig.robot.recording.gaze_labels import (
+    LabelledInterval,
+    labels_of,
+    lag_of,
+    speed_deg_s,
+    stretches_of,
+)
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -261,6 +267,22 @@ def test_the_fixations_are_what_fit_scanpath_reads(face: Run, tables: tuple[Path
     assert sum(row.duration_s for row in table.rows) + jumping_s == pytest.approx(
         face.trace.time_s[-1] + 0.005, abs=0.01
     )
+
+
+def test_a_blink_ends_no_stay_and_a_saccade_does(face: Run, tmp_path: Path) -> None:
+    eye, nose = GazeTarget("face 1", "LE"), GazeTarget("face 1", "N")
+    stretches = [
+        LabelledInterval(0.0, 1.0, "fixation", 0.1, 3.0, eye),
+        LabelledInterval(0.4, 0.2, "blink", None, None, eye),
+        LabelledInterval(1.0, 0.5, "pursuit", 2.0, 6.0, eye),
+        LabelledInterval(1.5, 0.05, "saccade", 8.0, 200.0, nose),
+        LabelledInterval(1.55, 0.4, "fixation", 0.1, 3.0, nose),
+        LabelledInterval(1.95, 0.05, "saccade", 0.5, 30.0, nose),
+        LabelledInterval(2.0, 0.3, "fixation", 0.1, 3.0, nose),
+    ]
+    read = rows(write_csv(face.trace, face.labels, stretches, tmp_path / "b")[2])
+    found = [(float(row["start_s"]), float(row["duration_s"]), row["part"]) for row in read]
+    assert found == [(0.0, 1.5, "LE"), (1.55, 0.4, "N"), (2.0, 0.3, "N")]
 
 
 # --- pymovements judges

@@ -3,12 +3,12 @@
 from pathlib import Path
 
 import pytest
-from mutants.mutants import MUTANTS, Mutant
+from mutants import ALL, Mutant
 
 ROOT = Path(__file__).parents[1]
 
 
-@pytest.mark.parametrize("mutant", MUTANTS, ids=lambda mutant: mutant.effect)
+@pytest.mark.parametrize("mutant", ALL, ids=lambda mutant: mutant.effect)
 def test_a_mutant_breaks_one_place_that_named_tests_judge(mutant: Mutant) -> None:
     source = (ROOT / mutant.file).read_text(encoding="utf-8")
     assert source.count(mutant.old) == 1 and mutant.new != mutant.old
@@ -18,4 +18,4 @@ def test_a_mutant_breaks_one_place_that_named_tests_judge(mutant: Mutant) -> Non
 
 
 def test_no_two_mutants_are_one() -> None:
-    assert len({(mutant.file, mutant.old, mutant.new) for mutant in MUTANTS}) == len(MUTANTS)
+    assert len({(mutant.file, mutant.old, mutant.new) for mutant in ALL}) == len(ALL)

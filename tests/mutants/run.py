@@ -3,7 +3,7 @@
     python tests/mutants/run.py            all mutants, one after the other
     python tests/mutants/run.py scanpath   those with that word in file or effect
 
-By hand, as it takes minutes. Each of `MUTANTS` replaces one piece of text, which has to stand in
+By hand, as it takes minutes. Each of `ALL` replaces one piece of text, which has to stand in
 its file exactly once, in a copy of the sources; the test files that it names run on the copy,
 and one of them has to fail. Before that they have to pass on the copy as it is. The guard has a
 hundred mutants of its own, which are cheap enough for the suite: tests/test_safety_mutants.py.
@@ -18,9 +18,11 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from mutants import MUTANTS, Mutant
-
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tests"))
+
+from mutants import ALL, Mutant  # noqa: E402
+
 COPIED = ("api", "config", "docs", "drivers", "gaze", "robot", "sim_mock", "tests")
 
 
@@ -51,7 +53,7 @@ def survives(mutant: Mutant, copy: Path) -> bool:
     found = source.count(mutant.old)
     if found != 1:
         raise SystemExit(
-            f"{mutant.file}: {mutant.old!r} stands there {found} times: mend mutants.py"
+            f"{mutant.file}: {mutant.old!r} stands there {found} times: mend its line in tests/mutants"
         )
     path.write_text(source.replace(mutant.old, mutant.new), encoding="utf-8")
     try:
@@ -62,7 +64,7 @@ def survives(mutant: Mutant, copy: Path) -> bool:
 
 def main(words: list[str]) -> int:
     """Try the mutants that have all the words; return how many survive."""
-    chosen = [m for m in MUTANTS if all(word in f"{m.file} {m.effect}" for word in words)]
+    chosen = [m for m in ALL if all(word in f"{m.file} {m.effect}" for word in words)]
     with tempfile.TemporaryDirectory(prefix="mutants-") as name:
         copy = Path(name)
         copied(copy)

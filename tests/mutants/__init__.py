@@ -1,0 +1,6 @@
+"""Lines of the product to break on purpose, and the tests of which one has to notice."""
+
+from mutants.mutants import MUTANTS, Mutant
+from mutants.recording import RECORDING
+
+ALL: tuple[Mutant, ...] = (*MUTANTS, *RECORDING)
