@@ -144,7 +144,7 @@ class BoundedCall:
         return self._waited_for(self._begun(work), longest_s)
 
     def idle(self, longest_s: float) -> bool:
-        """Wait until all calls so far are made, no longer than this [s]; return whether they are."""
+        """Wait until all calls so far are made, for so long [s] at most; return whether so."""
         return self._late is None or self._waited_for(self._begun(_nothing), longest_s) is not None
 
     def _begun(self, work: Callable[[], Any]) -> _Call:

@@ -1,10 +1,11 @@
 """A servo bus of another package: what it returns is checked, what it raises is one named line."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import chain
 from math import isfinite
 from typing import Any, TypeVar
 
+from gazerig.drivers.bounded_call import BoundedCall, CallResult
 from gazerig.drivers.errors import BusLost, DriverError
 from gazerig.drivers.event_log import EventLog, RateLimitedLog, servo_label
 from gazerig.drivers.plugins import PluginError, failure
@@ -15,12 +16,18 @@ T = TypeVar("T")
 _COLUMNS = 10  # of Feedback, all but the indices of the missing
 _NUMBERS = 4  # of them the first are numbers that must be finite
 
+_USUAL_S, _BLOCKED_S = 2.0, 0.2
+"""A call is waited for so long, real seconds; the second while one before has not returned."""
+_LONGEST_S: Mapping[str, float] = {"open": 60.0, "enable_torque": 20.0, "disable_torque": 10.0}
+"""Calls that may take longer."""
+
 
 class CheckedBus:
     """Implements ``ServoBus`` over the bus of a package.
 
     A servo whose position, speed, load or time is not finite counts as missing. What is no
-    feedback of all servos ends the run, with torque off, as a lost port does.
+    feedback of all servos ends the run, with torque off, as a lost port does; so does a call that
+    does not return. Torque is then off by the guardian or the servos' watchdog.
 
     Args:
         bus: of the package.
@@ -38,6 +45,7 @@ class CheckedBus:
     ) -> None:
         self._bus, self._label, self._setups = bus, label, tuple(setups)
         self._count, self._now_s = len(self._setups), now_s
+        self._call, self._blocked = BoundedCall(label, _USUAL_S), False
         self._log = EventLog()
         self._seldom = RateLimitedLog(self._log)
         self._last_s: float | None = None
@@ -49,12 +57,13 @@ class CheckedBus:
             SetupError: it says itself why it cannot.
             PluginError: it fails.
         """
-        try:
-            self._bus.open()
-        except DriverError:
-            raise
-        except Exception as error:
-            raise PluginError(f"{self._label} cannot be opened: {failure(error)}") from error
+        outcome = self._made(self._bus.open, "open")
+        if outcome is None:
+            raise PluginError(f"{self._label} has not opened within {_LONGEST_S['open']:g} s")
+        if isinstance(outcome.error, DriverError):
+            raise outcome.error
+        if (error := outcome.error) is not None:
+            raise PluginError(f"{self._label} cannot be opened: {outcome.why}") from error
 
     def read(self, now_s: float) -> Feedback:
         """Read all servos.
@@ -147,11 +156,12 @@ class CheckedBus:
 
     def faults(self) -> tuple[str, ...]:
         """Name every latched servo fault found so far."""
-        return tuple(map(str, self._tried(self._bus.faults, "faults")))
+        return self._tried(lambda: tuple(map(str, self._bus.faults())), "faults")
 
     def events(self) -> tuple[str, ...]:
         """Return what happened since the last call."""
-        return (*self._log.drain(), *map(str, self._tried(self._bus.events, "events")))
+        events = self._tried(lambda: tuple(map(str, self._bus.events())), "events")
+        return (*self._log.drain(), *events)
 
     def retune(self, setups: Sequence[ServoConfig]) -> None:
         """Set the servos up so when the torque comes on the next time.
@@ -162,7 +172,9 @@ class CheckedBus:
         same = [(s.id, s.model) for s in setups] == [(s.id, s.model) for s in self._setups]
         if not same:
             raise ValueError("other servos need another bus: ids and models must stay")
-        self._bus.retune(setups)
+        outcome = self._made(lambda: self._bus.retune(setups), "retune")
+        if outcome is not None and outcome.error is not None:
+            raise outcome.error
 
     def disable_torque(self) -> None:
         """Torque off on every servo.
@@ -179,19 +191,32 @@ class CheckedBus:
 
     def close(self) -> None:
         """Close the port; safe to call twice."""
-        try:
-            self._bus.close()
-        except Exception as error:
-            self._log.add(f"{self._label} failed as it was closed ({failure(error)})")
+        outcome = self._made(self._bus.close, "close")
+        if outcome is None:
+            self._log.add(f"{self._label} does not end: it is left behind")
+        elif outcome.error is not None:
+            self._log.add(f"{self._label} failed as it was closed ({outcome.why})")
+        self._call.close()
+        self._call, self._blocked = BoundedCall(self._label, _USUAL_S), False
 
     def _tried(self, call: Callable[[], T], name: str, remedy: str = "") -> T:
-        try:
-            return call()
-        except DriverError:
-            raise
-        except Exception as error:
-            hint = f": {remedy}" if remedy else ""
-            raise BusLost(f"{self._label}: {name} failed ({failure(error)}){hint}") from error
+        outcome = self._made(call, name)
+        hint = f": {remedy}" if remedy else ""
+        if outcome is None:
+            raise BusLost(f"{self._label}: {name} does not return{hint}")
+        if isinstance(outcome.error, DriverError):
+            raise outcome.error
+        if (error := outcome.error) is not None:
+            raise BusLost(f"{self._label}: {name} failed ({outcome.why}){hint}") from error
+        value: T = outcome.value
+        return value
+
+    def _made(self, call: Callable[[], object], name: str) -> CallResult | None:
+        """Make a call after all before; return None where one of them does not return."""
+        longest_s = _BLOCKED_S if self._blocked else _LONGEST_S.get(name, _USUAL_S)
+        outcome = self._call.in_turn(call, longest_s)
+        self._blocked = outcome is None
+        return outcome
 
     def _release_quietly(self) -> None:
         try:
