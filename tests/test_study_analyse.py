@@ -2,23 +2,28 @@
 
 import csv
 import json
+import random
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from study_records import QUESTIONS, design, records
+from study_records import QUESTIONS, UTC, design, pairs, records
 
 from gazerig.drivers.errors import SetupError
 from gazerig.robot.cli.study_analyse import verdicts
-from gazerig.robot.report.study.report import write_report
+from gazerig.robot.report.study.page import banners
+from gazerig.robot.report.study.report import with_looks, write_report
+from gazerig.robot.report.study.tables import results_json
+from gazerig.robot.study.analysis import analysed
 from gazerig.robot.study.collected import collected
 from gazerig.robot.study.data_folder import StudyData, code_of
 from gazerig.robot.study.design import Condition, Exclusion, StudyDesign
 from gazerig.robot.study.journal import FILE, Journal
 from gazerig.robot.study.preregistration import canonical
-from gazerig.robot.study.records import Record
+from gazerig.robot.study.records import Opened, Record
 from gazerig.robot.study.simulation import Population
 
+TWO = ("walk", "centre")
 SHOWN = {"walk": {"gaze.scanpath.model": "markov"}, "centre": {"gaze.scanpath.model": "simple"}}
 
 
@@ -39,7 +44,11 @@ def kept(folder: Path, study: StudyDesign, count: int, cut: int | None = None) -
 
 
 def analyse(folder: Path) -> None:
-    write_report(folder, folder / "report", "gazerig 0.1.0", lambda _, __: None)
+    write_report(folder, folder / "report", "gazerig 0.1.0", UTC, nothing)
+
+
+def nothing(what: str, share: float) -> None:
+    pass
 
 
 @pytest.fixture(scope="module")
@@ -128,6 +137,108 @@ def test_a_damaged_line_is_named_with_its_number(tmp_path: Path) -> None:
         analyse(tmp_path)
 
 
+JUNK: tuple[object, ...] = (None, -1, 99, "x", "a|b", [], {})
+
+
+def test_whatever_a_damaged_journal_holds_is_one_message_and_nothing_is_lost(
+    tmp_path: Path,
+) -> None:
+    """Every field of every record, taken out or replaced by what is not expected."""
+    of = pairs(TWO)
+    data = kept(tmp_path, of, 1)
+    path = data.participant(1) / FILE
+    whole = json.loads(path.read_bytes())
+    each = {one["kind"]: at for at, one in enumerate(whole)}
+    whole.insert(0, whole.pop(each["Opened"]))
+    refused = 0
+    for at in {*each.values(), len(whole) - 2}:
+        for field in whole[at]:
+            for value in (*JUNK, "taken out"):
+                changed = {**whole[at], field: value}
+                if value == "taken out":
+                    del changed[field]
+                line = json.dumps([*whole[:at], changed, *whole[at + 1 :]]).encode() + b"\n"
+                path.write_bytes(line)
+                try:
+                    found = collected(tmp_path)
+                    analysed("m", found.design, found.questionnaires, "ab", found.people)
+                except SetupError as error:
+                    assert "P001" in str(error) and "\n" not in str(error)
+                    refused += 1
+                assert path.read_bytes() == line
+    assert refused > 100
+
+
+def test_bytes_of_a_journal_that_are_wrong_are_one_message_and_nothing_is_lost(
+    tmp_path: Path,
+) -> None:
+    data = kept(tmp_path, design(), 1)
+    path = data.participant(1) / FILE
+    whole, rng = path.read_bytes(), random.Random(0)
+    refused = 0
+    for _ in range(150):
+        at, length = rng.randrange(len(whole)), rng.choice((0, 1, 1, 40))
+        junk = rng.choice((b"", b"\x00", b"\xff", b"\n", b"[" * 2000, b'"', b"}", b"1e999"))
+        damaged = whole[:at] + junk + whole[at + length :]
+        path.write_bytes(damaged)
+        try:
+            collected(tmp_path)
+        except SetupError as error:
+            refused += "\n" not in str(error)
+        assert path.read_bytes() == damaged
+        try:
+            with Journal(path.parent) as journal:
+                torn = b"" if journal.torn is None else journal.torn.read_bytes()
+                assert path.read_bytes() + torn == damaged
+        except SetupError:
+            assert path.read_bytes() == damaged
+    assert refused > 100
+
+
+def real(folder: Path, count: int) -> StudyData:
+    """Write the data of people of a study of 12."""
+    of = design(participants=12)
+    data = StudyData(folder)
+    sha256 = data.claim("mine", text_of(of))
+    for number in range(len(data.numbers()) + 1, count + 1):
+        first, *rest = records(of, number, Population(1.2), sha256=sha256)
+        assert isinstance(first, Opened)
+        with Journal(data.participant(number)) as journal:
+            journal.write([replace(first, simulated=False), *rest])
+    return data
+
+
+def test_a_look_before_the_planned_sample_is_kept_in_the_data_and_reported(tmp_path: Path) -> None:
+    # The same people once more are no other look, and the whole sample is none.
+    for day, count in ((1, 3), (2, 3), (3, 5), (9, 12)):
+        data, found = real(tmp_path, count), collected(tmp_path)
+        study = analysed("m", found.design, found.questionnaires, "ab", found.people)
+        study = with_looks(study, data, f"2026-11-0{day}T10:00:00Z")
+    looks = [("2026-11-01T10:00:00Z", 3, 3, 12), ("2026-11-03T10:00:00Z", 5, 5, 12)]
+    assert list(data.looks()) == looks
+    (said,) = banners(study)
+    assert "2026-11-01, n = 3; 2026-11-03, n = 5" in said
+    results = json.loads(results_json(study))
+    assert [tuple(look.values()) for look in results["interim_looks"]] == looks
+    (tmp_path / "interim-looks.jsonl").write_text("{}\n")
+    with pytest.raises(SetupError, match=r"interim-looks.jsonl cannot be read"):
+        with_looks(study, data, UTC)
+
+
+@pytest.mark.usefixtures("unlaid_figures")
+def test_the_command_records_a_look_once(tmp_path: Path) -> None:
+    data = real(tmp_path, 2)
+    analyse(tmp_path)
+    assert [look[1:] for look in data.looks()] == [(2, 2, 12)]
+
+
+def test_a_look_at_simulated_participants_is_none(tmp_path: Path) -> None:
+    data = kept(tmp_path, design(), 2)
+    found = collected(tmp_path)
+    study = analysed("m", found.design, found.questionnaires, "ab", found.people)
+    assert not with_looks(study, data, UTC).looks and not data.looks()
+
+
 def test_data_of_two_designs_are_refused_with_both_hashes(tmp_path: Path) -> None:
     data = kept(tmp_path, design(), 2)
     with Journal(data.participant(3)) as journal:
@@ -163,7 +274,7 @@ def test_a_folder_of_somebody_else_is_not_written_to(tmp_path: Path) -> None:
 
 
 def test_the_terminal_says_what_became_of_each_hypothesis(data: Path) -> None:
-    report = write_report(data, data / "report", "gazerig 0.1.0", lambda _, __: None)
+    report = write_report(data, data / "report", "gazerig 0.1.0", UTC, lambda _, __: None)
     lines = verdicts(report.study)
     assert lines[0] == "12 of 12 participants count"
     assert lines[1].startswith("naturalness: walk > centre: supported (corrected p = ")

@@ -109,6 +109,16 @@ def test_deleting_a_participant_leaves_nothing_but_the_code(
         opened_journal(study, data, 2, study.sha256)
 
 
+def test_a_participant_with_a_damaged_journal_can_be_deleted(
+    study: LoadedStudy, tmp_path: Path
+) -> None:
+    data = simulated(study, tmp_path)
+    (data.participant(2) / FILE).write_bytes(b"nonsense\n")
+    with pytest.raises(SetupError, match="damaged"):
+        opened_journal(study, data, 2, study.sha256)
+    assert data.delete(2) and data.numbers() == (1, 3)
+
+
 def test_participants_have_numbers_and_no_names() -> None:
     assert [code_of(7), code_of(1234)] == ["P007", "P1234"]
     for number in (0, -1, 1_000_000):

@@ -141,6 +141,42 @@ def test_scales_are_means_with_reversed_items_turned_round() -> None:
     assert item_answers(measure, [one], QUESTIONS).tolist() == [[4, 4, 5], [4, 4, 5]]
 
 
+def test_what_was_not_answered_is_left_out_and_the_rest_counts() -> None:
+    study = replace(design(questionnaires=("paper", "calmness")), may_skip=True)
+    measured = measures(study, QUESTIONS)
+    found = records(study, 1)
+    skipped = {("looked_at", "walk"), ("calm", "walk"), ("calm", "centre"), ("easy", "centre")}
+    found = [
+        replace(r, value=None if (r.item, r.condition) in skipped else 2)
+        if isinstance(r, ItemAnswered) and r.trial is not None else r
+        for r in found
+    ]  # fmt: skip
+    one = participation(found, study, QUESTIONS)
+    assert [row.left_out for row in one.answers].count("not answered") == 4
+
+    def means(name: str) -> list[float]:
+        table = scores(measured[name], [one], tuple(study.conditions), QUESTIONS)
+        found: list[float] = table.means[0].tolist()
+        return found
+
+    assert means("paper.looked_at") == pytest.approx([np.nan, 2.0], nan_ok=True)
+    # Tense is turned round; a scale counts with at least half of its items.
+    assert means("calmness.ease") == pytest.approx([3.0, np.nan], nan_ok=True)
+    decided = decisions(study, QUESTIONS, [one, *people_of(study, 13)[1:]])
+    assert [d.n for d in decided] == [13, 12]
+
+
+def test_choices_that_were_not_made_are_left_out() -> None:
+    study = replace(pairs(TWO), may_skip=True)
+    people = []
+    for number in range(1, 11):
+        found = records(study, number)
+        if number == 1:
+            found = [replace(r, value=None) if isinstance(r, ItemAnswered) else r for r in found]
+        people.append(participation(found, study, QUESTIONS))
+    assert decisions(study, QUESTIONS, people)[0].n == 9
+
+
 def test_repetitions_are_averaged_and_counted_one_by_one() -> None:
     study = replace(design(), trials=Trials(repetitions=3))
     table = scores(

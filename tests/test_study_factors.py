@@ -55,7 +55,8 @@ def test_the_figures_are_those_of_scipy_on_the_means_of_each_participant() -> No
     people = people_of(study, 24, 0.9)
     gaze, lids = decisions(study, QUESTIONS, people)
     answers = {
-        (p.participant, row.condition, row.item): float(row.value) for p in people for row in p.counted
+        (p.participant, row.condition, row.item): float(row.value or 0)
+        for p in people for row in p.counted
         if row.trial is not None
     }  # fmt: skip
 

@@ -12,7 +12,7 @@ from gazerig.config.study_file import LoadedStudy, load_study
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.study.head_main import as_line, options_in
 from gazerig.robot.app.study.head_presenter import HeadPresenter
-from gazerig.robot.app.study.trial_measures import measured
+from gazerig.robot.app.study.trial_measures import SWITCH_S, measured
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.study.presenter import HeadLost
@@ -79,7 +79,10 @@ def test_conditions_switch_without_a_jump_and_a_lost_bus_is_told_and_mended(
     found = measured(study, records, tmp_path, said.append)
     assert [(one.trial, one.condition) for one in found] == [*enumerate((*keys, keys[0]))]
     ticks = list(RunRecording(tmp_path / "run-01.mcap").ticks())
-    steps = np.abs(np.diff([tick.guard_result.command_rad for tick in ticks[100:]], axis=0))
+    (_, _, _, second, *_) = records
+    assert isinstance(second, TrialEnded)
+    later = [tick for tick in ticks if tick.t_s >= second.from_s - SWITCH_S]
+    steps = np.abs(np.diff([tick.guard_result.command_rad for tick in later], axis=0))
     for one in found[1:]:
         assert 0.0 < one.values[STEP_DEG] <= np.degrees(steps.max())
         assert 0.2 <= one.values["participant_gaze_share"] <= 1.0

@@ -345,6 +345,21 @@ def test_questions_have_numbers_and_no_names_of_items_or_scales(pages: Pages, ta
     assert set(page["items"][0]) == {"key", "kind", "points", "language", "text", "low", "high"}
 
 
+def test_a_page_says_that_questions_may_be_skipped_and_takes_none(
+    studies: dict[str, LoadedStudy], tmp_path: Path
+) -> None:
+    study = studies["nakamoto_1"]
+    study = replace(study, design=replace(study.design, may_skip=True))
+    with serving(study, tmp_path / CODE, films_of(study, tmp_path)) as pages:
+        tab = Tab(pages.server.participant_url)
+        page = to(tab, "questions")
+        assert page["may_skip"]
+        left = [{"key": one["key"], "value": None, "ms": 5.0} for one in page["items"]]
+        assert tab.do(page["page"], do="answer", answers=left)["page"] != page["page"]
+        kept = [one.value for one in pages.journal.records if isinstance(one, ItemAnswered)]
+    assert kept == [None, None]
+
+
 def test_items_that_are_not_translated_are_english_and_say_so(
     studies: dict[str, LoadedStudy], tmp_path: Path
 ) -> None:

@@ -16,7 +16,7 @@ from study_at_the_page import CODE, Pages, Tab, serving
 
 from gazerig.config.study_file import LoadedStudy, load_study
 from gazerig.robot.study.journal import NotKept
-from gazerig.robot.study.records import ItemAnswered, TrialBegan, TrialEnded
+from gazerig.robot.study.records import AnswerValue, ItemAnswered, TrialBegan, TrialEnded
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
@@ -95,7 +95,7 @@ class Participant:
         assert (wide, violations(self.tab)) == (0, [])
 
 
-def kept(pages: Pages) -> list[int | str]:
+def kept(pages: Pages) -> list[AnswerValue]:
     return [one.value for one in pages.journal.records if isinstance(one, ItemAnswered)]
 
 
@@ -141,6 +141,26 @@ def test_a_whole_session_by_keyboard_alone(pages: Pages, desk: Browser) -> None:
     }
     assert all(url.startswith((pages.server.participant_url.partition("?")[0], "blob:"))
                for url in desk.asked_for if not url.startswith(("chrome", "about", "data")))  # fmt: skip
+
+
+def test_questions_stay_open_where_the_study_permits_it(
+    study: LoadedStudy, film: Path, tmp_path: Path, desk: Browser
+) -> None:
+    free = replace(study, design=replace(study.design, may_skip=True))
+    films = dict.fromkeys(study.design.conditions, film)
+    with serving(free, tmp_path / CODE, films) as pages:
+        tab = Tab(pages.server.participant_url)
+        page = tab.page()
+        while page["kind"] != "questions":
+            page = tab.goes_through(page)
+        person = Participant(desk)
+        desk.go(pages.server.participant_url)
+        person.sees("questions")
+        person.well_made()
+        person.key("4")
+        person.key("Enter")
+        person.sees("ready")
+        assert kept(pages) == [4, None]
 
 
 def test_a_reload_loses_no_answer_and_a_film_begins_again(pages: Pages, desk: Browser) -> None:

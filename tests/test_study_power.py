@@ -24,6 +24,8 @@ from gazerig.robot.study.statistics.ranks import exact_signed_rank, exact_swaps,
 
 SIGNED = PowerQuestion("signed_rank", 0.6, 0.05)
 STUDIES = 500
+SHIFTS = (0.6 * sqrt(2.0), 0.0)
+"""Means in units of the noise that give d_z = .6."""
 
 
 @pytest.mark.parametrize(
@@ -101,12 +103,11 @@ def test_the_rank_sum_test_has_the_power_of_its_swaps(points: int) -> None:
     rng = np.random.default_rng(2)
     if points:
         cells = joint(0.6, 5)
-        drawn = rng.choice(25, (300, 20), p=(cells / cells.sum()).ravel())
+        drawn = rng.choice(25, (300, 20), p=(cells / cells.sum()).ravel()).astype(float)
         above, below = drawn // 5, drawn % 5
     else:
         own = 0.8 * rng.normal(size=(300, 20))
-        above, below = (own + sqrt(0.98) * rng.normal(size=(300, 20)) for _ in range(2))
-        above = above + 0.6 * sqrt(2.0 * 0.98)
+        above, below = (own + sqrt(0.98) * rng.normal(shift, size=(300, 20)) for shift in SHIFTS)
     found = [exact_swaps(a, b) <= 0.05 for a, b in zip(above, below, strict=True)]
     # The standard error of 300 studies is .026; the seed is fixed.
     asked = replace(SIGNED, test="rank_sum", points=points)

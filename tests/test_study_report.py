@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 from html import unescape
 from html.parser import HTMLParser
+from io import StringIO
 from math import nan
 
 import pytest
@@ -226,6 +227,29 @@ def test_the_answers_are_a_tidy_table(ratings: StudyAnalysis) -> None:
     assert (one["participant"], one["simulated"], one["points"]) == ("P001", "yes", "5")
     assert {row["condition"] for row in rows} == {"walk", "centre", ""}
     assert all(1 <= int(row["value"]) <= 5 for row in rows if row["kind"] == "rating")
+
+
+@pytest.mark.parametrize("text", ["=1+1", "+1", "-1", "@SUM(A1)", "\t=1", "\r=1", "\n=1"])
+def test_a_text_that_a_spreadsheet_would_run_is_written_as_text(text: str) -> None:
+    of = design()
+    found = [
+        replace(r, value=text) if isinstance(r, ItemAnswered) and r.trial is None
+        else replace(r, ms=-1.5) if isinstance(r, ItemAnswered) else r
+        for r in records(of, 1)
+    ]  # fmt: skip
+    one = analysed("m", of, QUESTIONS, SHA, [participation(found, of, QUESTIONS)])
+    table = answers_csv(one)
+    rows = list(csv.DictReader(StringIO(table, newline="")))
+    assert len(rows) == 5 and rows[-1]["value"] == "'" + text.replace("\r", "\n")
+    assert rows[0]["ms"] == "-1.5" and not rows[0]["value"].startswith("'")
+
+
+def test_what_was_not_answered_is_an_empty_cell() -> None:
+    of = replace(design(), may_skip=True)
+    found = [replace(r, value=None) if isinstance(r, ItemAnswered) else r for r in records(of, 1)]
+    one = analysed("m", of, QUESTIONS, SHA, [participation(found, of, QUESTIONS)])
+    rows = list(csv.DictReader(answers_csv(one).splitlines()))
+    assert {(row["value"], row["left_out"]) for row in rows} == {("", "not answered")}
 
 
 def test_pairs_and_factors_have_columns_of_their_own() -> None:

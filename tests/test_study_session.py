@@ -163,6 +163,22 @@ def test_answers_that_cannot_be_are_refused_and_the_page_stays(
     journal.close()
 
 
+def test_questions_may_be_left_unanswered_where_the_study_permits_it(tmp_path: Path) -> None:
+    study = rating(practice=0)
+    study = replace(study, design=replace(study.design, may_skip=True))
+    run, journal = run_of(study, tmp_path)
+    while not isinstance(run.now()[1], QuestionsScreen):
+        step(run)
+    page = run.now()[0]
+    with pytest.raises(WrongAnswer, match="a whole number from 1 to 5"):
+        run.answer(page, {0: 9}, {})
+    run.answer(page, {0: None, 1: 3}, {0: 900.0, 1: 700.0})
+    assert run.now()[0] != page
+    answered = [one.value for one in read(tmp_path) if isinstance(one, ItemAnswered)]
+    assert answered == [None, 3]
+    journal.close()
+
+
 def test_a_text_has_a_longest_length(tmp_path: Path) -> None:
     run, journal = run_of(rating(practice=0), tmp_path)
     while not (

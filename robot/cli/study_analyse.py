@@ -1,5 +1,6 @@
 """The command ``gazerig study analyse``: what a study's participants have decided."""
 
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,7 +24,8 @@ def analyse(
     """Analyse a study: one page for reviewers, tidy tables and a BIDS data set.
 
     Tests, effects, figures and a sentence in APA form for each hypothesis; what the design leaves
-    out is left out, and listed. Run it again whenever there are more data.
+    out is left out, and listed. Run it again whenever there are more data. An analysis before the
+    planned number of participants is recorded in the data with its date, and reported.
     """
     with clear_errors():
         import gazerig
@@ -32,7 +34,8 @@ def analyse(
 
         made_by = f"gazerig {gazerig.__version__}"
         with progress_bar() as tell:
-            made = write_report(data, out or data / "report", made_by, tell)
+            now = datetime.now(UTC).isoformat(timespec="seconds")
+            made = write_report(data, out or data / "report", made_by, now, tell)
         for words in banners(made.study):
             say(words)
         for line in verdicts(made.study):

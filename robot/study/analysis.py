@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from gazerig.gaze.types import Floats
+from gazerig.robot.study.data_folder import InterimLook
 from gazerig.robot.study.decisions import Decision, decisions
 from gazerig.robot.study.design import StudyDesign
 from gazerig.robot.study.measures import Measure, measures
@@ -71,7 +72,7 @@ class StudyAnalysis:
     """All that a report tells.
 
     name: of the study's file; design_sha256: which all data carry
-    deleted: how many had their data deleted
+    deleted: how many had their data deleted; looks: analyses before the planned sample was complete
     """
 
     name: str
@@ -83,6 +84,7 @@ class StudyAnalysis:
     measures: tuple[MeasureSummary, ...]
     choices: tuple[ChoiceSummary, ...]
     deleted: int = 0
+    looks: tuple[InterimLook, ...] = ()
 
     @property
     def counted(self) -> tuple[Participation, ...]:

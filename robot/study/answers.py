@@ -1,4 +1,4 @@
-"""Answers as they are kept: whole numbers of the scale, a side of a pair, or text."""
+"""Answers as they are kept: whole numbers of the scale, a side of a pair, text, or none."""
 
 from gazerig.robot.study.questionnaire import Item
 from gazerig.robot.study.records import AnswerValue
@@ -12,8 +12,14 @@ class WrongAnswer(ValueError):
     """What a browser sent does not fit the page that is shown."""
 
 
-def checked(number: int, item: Item, value: object) -> AnswerValue:
+def checked(number: int, item: Item, value: object, may_skip: bool) -> AnswerValue:
     """Return an answer as it is kept.
+
+    Args:
+        number: of the question on its page, for messages.
+        item: that was asked.
+        value: what was answered, None for nothing.
+        may_skip: the study permits unanswered questions.
 
     Raises:
         WrongAnswer: it is missing, or not as the item can be answered.
@@ -23,6 +29,8 @@ def checked(number: int, item: Item, value: object) -> AnswerValue:
         if not isinstance(text, str) or len(text) > LONGEST_TEXT:
             raise WrongAnswer(f"question {number}: a text of up to {LONGEST_TEXT} characters")
         return text
+    if value is None and may_skip:
+        return None
     if value is None:
         raise WrongAnswer(f"question {number} is not answered")
     if item.kind == "choice":

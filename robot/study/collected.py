@@ -13,7 +13,7 @@ from gazerig.drivers.file_input import read_limited
 from gazerig.robot.study import journal
 from gazerig.robot.study.data_folder import StudyData
 from gazerig.robot.study.design import Condition, StudyDesign
-from gazerig.robot.study.participation import Participation, participation
+from gazerig.robot.study.participation import Participation, participation, require_fit
 from gazerig.robot.study.questionnaire import Questionnaire
 from gazerig.robot.study.records import Opened, Record
 
@@ -60,7 +60,8 @@ def collected(folder: Path) -> CollectedStudy:
         each = data.participant(number)
         records = journal.read(each)
         _require_design(records, sha256, each, path)
-        if any(isinstance(one, Opened) for one in records):  # else nothing was kept of it
+        if records:  # else nothing was kept of it
+            require_fit(records, design, questionnaires, each)
             people.append(participation(records, design, questionnaires))
             folders.append(each)
     if not people:
@@ -121,6 +122,8 @@ def _require_design(
         SetupError: they are such data.
     """
     for one in records:
+        if isinstance(one, Opened) and one.participant != participant.name:
+            raise SetupError(f"{participant} has the journal of {one.participant}: move it back")
         if isinstance(one, Opened) and one.design_sha256 != sha256:
             raise SetupError(
                 f"{participant} was recorded with another design ({one.design_sha256[:12]}) than "

@@ -6,6 +6,7 @@ DATA/films/                         one film for each condition
 DATA/participants/P007/journal.jsonl  what happened (gazerig.robot.study.journal)
 DATA/participants/P007/run-01.mcap    recordings of the head
 DATA/deleted.txt                    codes whose data were deleted
+DATA/interim-looks.jsonl            analyses before the planned sample was complete
 """
 
 import json
@@ -14,17 +15,31 @@ import re
 import secrets
 import shutil
 from pathlib import Path
+from typing import NamedTuple
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_input import read_limited
 from gazerig.drivers.file_output import make_folder, write_file
-from gazerig.robot.study.journal import FILE, Journal
+from gazerig.robot.study.journal import FILE, session_lock
 from gazerig.robot.study.preregistration import design_sha256
 
 _DESIGN, _SECRET, _DELETED = "design.json", "secret", "deleted.txt"
+_LOOKS = "interim-looks.jsonl"
 _CODE = re.compile(r"P(\d{3,6})")
 _LARGEST = 10_000_000
 _SECRET_BYTES = 32
+
+
+class InterimLook(NamedTuple):
+    """An analysis before the planned sample was complete.
+
+    utc: when; came, counted: participants then; planned: by the design
+    """
+
+    utc: str
+    came: int
+    counted: int
+    planned: int
 
 
 class StudyData:
@@ -87,7 +102,7 @@ class StudyData:
             raise SetupError(f"{self.folder} has no data of a study: there is no {_DESIGN}")
         try:
             stated = json.loads(read_limited(path, _LARGEST))
-            said, design = str(stated["sha256"]), stated["design"]
+            said, design, _ = str(stated["sha256"]), stated["design"], stated["name"]
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise SetupError(f"{path} cannot be read ({error}): put a copy in its place") from error
         text = json.dumps(design, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
@@ -128,6 +143,34 @@ class StudyData:
         path = self.folder / _DELETED
         return tuple(path.read_text(encoding="utf-8").split()) if path.exists() else ()
 
+    def looks(self) -> tuple[InterimLook, ...]:
+        """Return the analyses before the planned sample was complete.
+
+        Raises:
+            SetupError: their file is damaged.
+        """
+        path = self.folder / _LOOKS
+        if not path.exists():
+            return ()
+        try:
+            return tuple(
+                InterimLook(**json.loads(line))
+                for line in read_limited(path, _LARGEST).splitlines()
+            )
+        except (OSError, ValueError, TypeError) as error:
+            raise SetupError(f"{path} cannot be read ({error}): put a copy in its place") from error
+
+    def add_look(self, look: InterimLook) -> None:
+        """Record an analysis, unless the last one had the same participants.
+
+        Raises:
+            SetupError: it cannot be written.
+        """
+        known = self.looks()
+        if not known or known[-1][1:] != look[1:]:
+            lines = [json.dumps(one._asdict()) + "\n" for one in (*known, look)]
+            write_file(self.folder / _LOOKS, "".join(lines), force=True)
+
     def delete(self, number: int) -> int:
         """Delete all of a participant; return how many files that were.
 
@@ -140,7 +183,8 @@ class StudyData:
         if not folder.is_dir():
             there = ", ".join(map(code_of, self.numbers())) or "nobody"
             raise SetupError(f"{self.folder} has nothing of {code_of(number)}; there is {there}")
-        Journal(folder).close()  # refuses while a session is under way
+        with session_lock(folder):
+            pass  # a damaged journal can be deleted too
         made = [self.folder / name for name in ("report", "bids")]
         gone = [one for place in (folder, *made) for one in place.rglob("*") if one.is_file()]
         try:

@@ -125,6 +125,7 @@ class StudyDesign:
     translations: Annotated[Mapping[str, StudyTexts], "welcome and debriefing by other languages"] = field(default_factory=dict)
     language: Annotated[Language, Choices("en", "ja", "de"), "of questions and pages"] = "en"
     task: Annotated[Task, "what participants do"] = "rating"
+    may_skip: Annotated[bool, "participants may leave questions unanswered"] = False
     presentation: Presentation = field(default_factory=Presentation)
     trials: Trials = field(default_factory=Trials)
     hypotheses: tuple[Hypothesis, ...] = ()

@@ -7,7 +7,7 @@ step, such as all answers of a page: after a crash it is there as a whole or not
 import contextlib
 import fcntl
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, fields
 from math import nan
 from pathlib import Path
@@ -158,12 +158,27 @@ def decoded(data: bytes, path: Path) -> tuple[Record, ...]:
             records += [
                 _record(said) for said in msgspec.json.decode(line, type=list[dict[str, Any]])
             ]
-        except (msgspec.MsgspecError, KeyError) as error:
+        except (msgspec.MsgspecError, LookupError, TypeError, AttributeError, ValueError,
+                RecursionError) as error:  # fmt: skip
             raise SetupError(
                 f"{path}:{number}: no records of a session ({error}): the file was changed or "
                 "damaged; put a copy of it in its place"
             ) from error
     return tuple(records)
+
+
+@contextlib.contextmanager
+def session_lock(folder: Path) -> Iterator[None]:
+    """Hold the lock of a participant's folder.
+
+    Raises:
+        SetupError: a session has it.
+    """
+    lock = _locked(folder)
+    try:
+        yield
+    finally:
+        os.close(lock)
 
 
 def _record(said: dict[str, Any]) -> Record:

@@ -3,8 +3,13 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, isnan, nan
+from pathlib import Path
 
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.study.answers import WrongAnswer, checked
 from gazerig.robot.study.design import Exclusion, StudyDesign
+from gazerig.robot.study.journal import FILE
+from gazerig.robot.study.order import PAIR
 from gazerig.robot.study.questionnaire import Questionnaire
 from gazerig.robot.study.records import (
     AnswerValue,
@@ -123,6 +128,56 @@ def participation(
     return replace(whole, left_out=why)
 
 
+def require_fit(
+    records: Sequence[Record],
+    design: StudyDesign,
+    questionnaires: Mapping[str, Questionnaire],
+    folder: Path,
+) -> None:
+    """Refuse records that no session of this design can have written.
+
+    Args:
+        records: of one journal in order.
+        design: of the study.
+        questionnaires: by the keys in the design.
+        folder: of the participant, for the message.
+
+    Raises:
+        SetupError: the journal was changed or damaged; it is as it was.
+    """
+    for number, one in enumerate(records, start=1):
+        if why := _misfit(number, one, design, questionnaires):
+            raise SetupError(
+                f"{folder / FILE}: record {number}, {type(one).__name__}: {why}: the file was "
+                "changed or damaged; put a copy of it in its place"
+            )
+
+
+def _misfit(
+    number: int, one: Record, design: StudyDesign, questionnaires: Mapping[str, Questionnaire]
+) -> str:
+    """Return why a record is none of this design's sessions, "" if it may be one."""
+    if number == 1 and not isinstance(one, Opened):
+        return "a journal begins with Opened"
+    shown: list[str] = []
+    if isinstance(one, TrialBegan):
+        shown = [one.condition]
+    if isinstance(one, ItemAnswered):
+        asked = questionnaires.get(one.questionnaire)
+        if asked is None or one.item not in asked.items:
+            return f"{one.questionnaire}.{one.item} is not asked"
+        item = asked.items[one.item]
+        try:
+            checked(0, item, one.value, may_skip=True)
+        except WrongAnswer as error:
+            return str(error)
+        shown = one.condition.split(PAIR) if one.trial is not None else []
+        if len(shown) not in ((2,) if item.kind == "choice" else (0, 1, 2)):
+            return f"{one.condition!r} is no pair"
+    unknown = [key for key in shown if key not in design.conditions]
+    return f"there is no condition {unknown[0]!r}" if unknown else ""
+
+
 def _rows(participant: str, records: Iterable[Record]) -> list[AnswerRow]:
     """Return the answers; of an item that was answered again, the last."""
     found: dict[tuple[int | None, str, str], AnswerRow] = {}
@@ -156,15 +211,13 @@ def _trials(records: Iterable[Record]) -> tuple[TrialRow, ...]:
 
 
 def _judged(row: AnswerRow, trials: Sequence[TrialRow]) -> AnswerRow:
-    """Leave out practice, and answers to a presentation that was not completed."""
-    if row.trial is None:
-        return row
-    if row.trial < 0:
+    """Leave out practice, presentations that were not completed, and what was not answered."""
+    if row.trial is not None and row.trial < 0:
         return replace(row, left_out="practice")
     ends = [t.outcome for t in trials if t.trial == row.trial]
     if broken := next((outcome for outcome in ends if outcome != "complete"), ""):
         return replace(row, left_out=f"presentation {broken.replace('_', ' ')}")
-    return row
+    return replace(row, left_out="not answered") if row.value is None else row
 
 
 def _without_hasty(rows: Iterable[AnswerRow], rules: Exclusion) -> list[AnswerRow]:
@@ -210,6 +263,7 @@ def _all_the_same(one: Participation, questionnaires: Mapping[str, Questionnaire
         for row in one.answers
         if row.trial is not None
         and row.trial >= 0
+        and row.value is not None
         and questionnaires[row.questionnaire].items[row.item].kind == "rating"
     ]
     return len(ratings) >= LEAST_SAME and len(set(ratings)) == 1

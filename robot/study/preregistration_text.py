@@ -281,6 +281,11 @@ def _exclusions(design: StudyDesign) -> Iterator[str]:
         yield "Who did not finish is left out."
     else:
         yield "Who did not finish is kept, with the trials that were answered."
+    if design.may_skip:
+        yield (
+            "Questions may be left unanswered. A scale counts if at least half of its items are "
+            "answered; a participant counts in a comparison with answers on both sides."
+        )
 
 
 def _privacy(design: StudyDesign) -> Iterator[str]:

@@ -13,8 +13,8 @@ from typing import Literal
 STEP_DEG = "largest_step_deg"
 """Largest step of any joint's goal, from tick to tick, in the switch to the condition."""
 Outcome = Literal["complete", "head_lost", "interrupted", "withdrawn"]
-AnswerValue = int | str
-"""A rating 1..points, "first"/"second", or free text."""
+AnswerValue = int | str | None
+"""A rating 1..points, "first"/"second", free text, or None: not answered."""
 
 
 @dataclass(frozen=True)

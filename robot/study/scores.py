@@ -92,7 +92,10 @@ def scores(
 def _values(
     measure: Measure, one: Participation, questionnaires: Mapping[str, Questionnaire]
 ) -> list[tuple[str, float]]:
-    """Return (condition, value) of each trial; of a scale the mean of its items, turned round."""
+    """Return (condition, value) of each trial; of a scale the mean of its items, turned round.
+
+    A scale of which fewer than half of the items are answered has no value.
+    """
     if measure.kind == "objective":
         return [
             (t.condition, t.measured[measure.name])
@@ -104,12 +107,17 @@ def _values(
         if row.questionnaire == measure.questionnaire and row.item in measure.items:
             value = turned(row, questionnaires)
             by_trial.setdefault((row.trial, row.condition), []).append(value)
-    return [(condition, _mean(values)) for (_, condition), values in by_trial.items()]
+    return [
+        (condition, _mean(values))
+        for (_, condition), values in by_trial.items()
+        if 2 * len(values) >= len(measure.items)
+    ]
 
 
 def turned(row: AnswerRow, questionnaires: Mapping[str, Questionnaire]) -> float:
     """Return a rating with reversed items turned round, so that more is more of the scale."""
     item = questionnaires[row.questionnaire].items[row.item]
+    assert row.value is not None  # such rows are left out
     return item.points + 1.0 - float(row.value) if item.reverse else float(row.value)
 
 

@@ -276,7 +276,7 @@ class StudySession:
         at = (asked.trial, asked.condition, asked.questionnaire)
         records = []
         for number, (key, item) in enumerate(items):
-            value = checked(number, item, values.get(number))
+            value = checked(number, item, values.get(number), self.design.may_skip)
             late = ms.get(number, nan)
             known = isfinite(late) and late >= 0.0 and isfinite(longest_ms)
             late = min(late, longest_ms) if known else nan

@@ -16,6 +16,7 @@ from gazerig.robot.dashboard.study.server import StudyServer
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.study.data_folder import StudyData, code_of
 from gazerig.robot.study.journal import Journal, NotKept
+from gazerig.robot.study.participation import require_fit
 from gazerig.robot.study.presenter import FilmPresenter
 from gazerig.robot.study.records import Opened
 from gazerig.robot.study.session import StudySession
@@ -55,21 +56,25 @@ def opened_journal(study: LoadedStudy, data: StudyData, number: int, sha256: str
     """Return the journal of a participant who has not finished yet, of this design.
 
     Raises:
-        SetupError: the participant's data were deleted or are of another design, or a session is
-            under way.
+        SetupError: the participant's data were deleted, are of another design or damaged, or a
+            session is under way.
     """
     code = code_of(number)
     if code in data.deleted():
         raise SetupError(f"the data of {code} were deleted on request: take another participant")
-    journal = Journal(data.participant(number))
-    for one in journal.records:
-        if isinstance(one, Opened) and one.design_sha256 != sha256:
-            journal.close()
-            raise SetupError(
-                f"{data.participant(number)} was begun with another design "
-                f"({one.design_sha256[:12]}; this one is {sha256[:12]}): begin a new study with "
-                "--data NEW_FOLDER"
-            )
+    folder = data.participant(number)
+    journal = Journal(folder)
+    try:
+        for one in journal.records:
+            if isinstance(one, Opened) and one.design_sha256 != sha256:
+                raise SetupError(
+                    f"{folder} was begun with another design ({one.design_sha256[:12]}; this one "
+                    f"is {sha256[:12]}): begin a new study with --data NEW_FOLDER"
+                )
+        require_fit(journal.records, study.design, study.questionnaires, folder)
+    except SetupError:
+        journal.close()
+        raise
     return journal
 
 

@@ -66,7 +66,7 @@ class _GivenAnswer(msgspec.Struct):
     """An answer; key: number of the question on the page; ms: since the page appeared."""
 
     key: str
-    value: int | str
+    value: int | str | None
     ms: float
 
 

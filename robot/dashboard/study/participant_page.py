@@ -55,7 +55,7 @@ def page_json(screen: Screen, design: StudyDesign, code: str) -> Json:
             more: Json = {"on": design.presentation.on, "seconds": screen.seconds, "again": True}
             return {"kind": "presentation", **_place(screen), **more, "film": film}
         case QuestionsScreen():
-            return _questions(screen, design.language)
+            return _questions(screen, design)
         case RestScreen():
             return {"kind": "rest", "seconds": screen.seconds}
         case PausedScreen():
@@ -83,11 +83,13 @@ def _place(screen: ReadyScreen | PresentationScreen | QuestionsScreen) -> Json:
     return {"step": step if screen.of else None, "side": side}
 
 
-def _questions(screen: QuestionsScreen, language: str) -> Json:
+def _questions(screen: QuestionsScreen, design: StudyDesign) -> Json:
+    language = design.language
     return {
         "kind": "questions",
         **_place(screen),
         "after": screen.once,
+        "may_skip": design.may_skip,
         "instruction": _in(screen.instruction, language),
         "instruction_language": language if language in screen.instruction else "en",
         "items": [_item(str(one.number), one.item, language) for one in screen.questions],

@@ -25,6 +25,7 @@ from gazerig.robot.recording.gaze_angles import trace_of
 from gazerig.robot.recording.gaze_labels import labels_of, stretches_of
 from gazerig.robot.recording.read import RunRecording, used
 from gazerig.robot.report.study.page import Progress
+from gazerig.robot.report.study.tables import as_text
 from gazerig.robot.study.analysis import StudyAnalysis
 from gazerig.robot.study.participation import AnswerRow, Participation
 
@@ -131,7 +132,7 @@ def _row(row: AnswerRow, one: Participation) -> list[str]:
     time = f"{row.ms / 1000.0:.3f}" if isfinite(row.ms) else _MISSING
     return [
         trial, _text(row.condition), row.questionnaire, f"{row.questionnaire}.{row.item}",
-        _text(str(row.value)), time,
+        _MISSING if row.value is None else _text(str(row.value)), time,
         _text(one.left_out or row.left_out),
     ]  # fmt: skip
 
@@ -192,8 +193,8 @@ def _tsv(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def _text(value: str) -> str:
-    """Return a text as one cell: without tabs and line ends, n/a where it is empty."""
-    return " ".join(value.split()) or _MISSING
+    """Return a text as one cell: without tabs, line ends and formulas, n/a if it is empty."""
+    return as_text(" ".join(value.split())) or _MISSING
 
 
 def _json(value: object) -> str:

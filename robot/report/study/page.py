@@ -135,6 +135,12 @@ def banners(study: StudyAnalysis) -> tuple[str, ...]:
             f"{counted} of the {planned} participants who were planned count, as others are left "
             "out: effects are found more seldom than the plan says."
         )
+    if study.looks:
+        when = "; ".join(f"{look.utc[:10]}, n = {look.counted}" for look in study.looks)
+        found.append(
+            f"Interim looks: the data were analysed before the planned number came ({when}). Report "
+            "them: each look is one more chance of a false positive if the study could stop there."
+        )
     programs = {one.program for one in study.people}
     if len(programs) > 1:
         found.append(f"The data were taken by several versions: {', '.join(sorted(programs))}.")

@@ -1,5 +1,6 @@
 """A study's report as files: the page, tidy tables, results for programs, and a BIDS data set."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,6 +12,7 @@ from gazerig.robot.report.study.r_script import r_script
 from gazerig.robot.report.study.tables import answers_csv, results_json, trials_csv
 from gazerig.robot.study.analysis import StudyAnalysis, analysed
 from gazerig.robot.study.collected import collected
+from gazerig.robot.study.data_folder import InterimLook, StudyData
 
 PAGE, DATA_SET = "index.html", "bids"
 _MARK = b'name="generator" content="gazerig"'
@@ -28,15 +30,17 @@ class StudyReport(NamedTuple):
     data_set: StudyDataSet
 
 
-def write_report(data: Path, out: Path, made_by: str, progress: Progress) -> StudyReport:
+def write_report(data: Path, out: Path, made_by: str, utc: str, progress: Progress) -> StudyReport:
     """Analyse the data of a study and write all that is made of them.
 
-    An earlier report in the folder is replaced; files of others are kept, and refused.
+    An earlier report in the folder is replaced; files of others are kept, and refused. An analysis
+    before the planned number of people came is recorded in the data: an interim look.
 
     Args:
         data: folder of the study's data.
         out: folder to write to.
         made_by: program and version.
+        utc: now.
         progress: told what is done.
 
     Raises:
@@ -49,6 +53,7 @@ def write_report(data: Path, out: Path, made_by: str, progress: Progress) -> Stu
         found.name, found.design, found.questionnaires, found.design_sha256, found.people,
         len(found.deleted),
     )  # fmt: skip
+    study = with_looks(study, StudyData(data), utc)
     page = study_page(study, made_by, progress)
     make_folder(out)
     for name, text in (
@@ -61,6 +66,18 @@ def write_report(data: Path, out: Path, made_by: str, progress: Progress) -> Stu
     data_set = write_study(study, out / DATA_SET, found.folders, made_by, progress)
     write_file(out / PAGE, page, force=True)
     return StudyReport(study, out / PAGE, data_set)
+
+
+def with_looks(study: StudyAnalysis, data: StudyData, utc: str) -> StudyAnalysis:
+    """Return a study with its interim looks; this one is recorded if the sample is not complete.
+
+    Raises:
+        SetupError: it cannot be recorded.
+    """
+    came, planned = sum(not one.simulated for one in study.people), study.design.plan.participants
+    if 0 < came < planned:
+        data.add_look(InterimLook(utc, came, len(study.counted), planned))
+    return replace(study, looks=data.looks())
 
 
 def refuse_foreign_folder(out: Path) -> None:

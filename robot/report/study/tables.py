@@ -27,6 +27,10 @@ TRIALS = (
 """Columns of trials.csv; those of the objective measures stand after them."""
 
 
+_FORMULAS = ("=", "+", "-", "@", "\t", "\n")
+"""Beginnings of a cell that spreadsheets run as a formula, or skip to find one."""
+
+
 def factors(study: StudyAnalysis) -> tuple[str, ...]:
     """Return the names of a design's factors."""
     return tuple(
@@ -91,6 +95,7 @@ def results_json(study: StudyAnalysis) -> str:
             "counted": len(study.counted),
             "left_out": {one.participant: one.left_out for one in study.people if one.left_out},
         },
+        "interim_looks": [look._asdict() for look in study.looks],
         "hypotheses": [_decided(one) for one in study.decisions],
     }
     return json.dumps(_known(said), indent=1, ensure_ascii=False) + "\n"
@@ -137,7 +142,14 @@ def _cell(value: object) -> str:
     """Return a value as short as it is exact; what is not known is empty."""
     if value is None or (isinstance(value, float) and not isfinite(value)):
         return ""
+    if isinstance(value, str):
+        return as_text(value.replace("\r\n", "\n").replace("\r", "\n"))  # csv does not quote CR
     return f"{value:.10g}" if isinstance(value, float) else str(value)
+
+
+def as_text(value: str) -> str:
+    """Return a text that no spreadsheet takes for a formula: such a one gets an apostrophe."""
+    return f"'{value}" if value.startswith(_FORMULAS) else value
 
 
 def _yes(value: bool) -> str:

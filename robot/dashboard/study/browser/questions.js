@@ -41,12 +41,13 @@ export function questions(page, send) {
     count();
   }));
 
-  const missing = () => fields.filter(({ item }) => needed(item) && !(item.key in answers));
+  const unanswered = () => fields.filter(({ item }) => needed(item) && !(item.key in answers));
+  const missing = () => (page.may_skip ? [] : unanswered());
 
   function count() {
-    const open = missing();
+    const open = unanswered();
     left.textContent = open.length ? say("questions.left", { count: open.length }) : say("questions.all");
-    next.setAttribute("aria-disabled", String(open.length > 0));
+    next.setAttribute("aria-disabled", String(missing().length > 0));
     for (const one of fields) if (!open.includes(one)) one.complain(false);
   }
 
@@ -54,6 +55,7 @@ export function questions(page, send) {
     "form", { noValidate: true, className: "questions" },
     make("h1", { tabIndex: -1 }, say(page.after ? "questions.after" : "questions.title")),
     ...(page.instruction ? [make("p", { lang: page.instruction_language }, page.instruction)] : []),
+    ...(page.may_skip ? [make("p", { className: "note" }, say("questions.may_skip"))] : []),
     ...fields.map((one) => one.element),
     make("div", { className: "foot" }, left, next),
   );
@@ -66,7 +68,7 @@ export function questions(page, send) {
       do: "answer",
       answers: fields.map(({ item }) => ({
         key: item.key,
-        value: answers[item.key]?.value ?? "",
+        value: answers[item.key]?.value ?? (needed(item) ? null : ""),
         ms: answers[item.key]?.ms ?? Math.round(performance.now() - since),
       })),
     });
