@@ -12,6 +12,7 @@ from gazerig.gaze.types import Mat3, Vec3
 from gazerig.robot.model.description.links import IDENTITY, ORIGIN
 from gazerig.sim_mock.world.figure import Figures
 from gazerig.sim_mock.world.figure_model import add_people
+from gazerig.sim_mock.world.mjcf_limits import refuse_excessive
 from gazerig.sim_mock.world.rig_in_world import RigInWorld
 from gazerig.sim_mock.world.room_model import add_room
 
@@ -117,8 +118,9 @@ def _spec_of(path: Path) -> Any:
     """Return a user's MJCF file.
 
     Raises:
-        SetupError: it is not there or no MJCF.
+        SetupError: it is not there, no MJCF, or too large.
     """
+    refuse_excessive(path)
     try:
         return mujoco.MjSpec.from_file(str(path))
     except (ValueError, OSError) as error:
