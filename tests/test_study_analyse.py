@@ -20,7 +20,7 @@ from gazerig.robot.study.data_folder import StudyData, code_of
 from gazerig.robot.study.design import Condition, Exclusion, StudyDesign
 from gazerig.robot.study.journal import FILE, Journal
 from gazerig.robot.study.preregistration import canonical
-from gazerig.robot.study.records import Opened, Record
+from gazerig.robot.study.records import Opened, Record, TrialBegan
 from gazerig.robot.study.simulation import Population
 
 TWO = ("walk", "centre")
@@ -167,6 +167,18 @@ def test_whatever_a_damaged_journal_holds_is_one_message_and_nothing_is_lost(
                     refused += 1
                 assert path.read_bytes() == line
     assert refused > 100
+
+
+def test_a_journal_that_lost_a_line_is_refused(tmp_path: Path) -> None:
+    """Else the recording of a presentation that did not begin would be measured."""
+    data = StudyData(tmp_path)
+    of = design()
+    sha256 = data.claim("mine", text_of(of))
+    without = [r for r in records(of, 1, sha256=sha256) if not isinstance(r, TrialBegan)]
+    with Journal(data.participant(1)) as journal:
+        journal.write(without)
+    with pytest.raises(SetupError, match="record 3, TrialEnded: the presentation did not begin"):
+        collected(tmp_path)
 
 
 def test_bytes_of_a_journal_that_are_wrong_are_one_message_and_nothing_is_lost(

@@ -109,6 +109,20 @@ def test_the_exact_rank_sum_chance_is_that_of_all_divisions(
     assert ranks.exact_rank_sum(whole[:n], whole[n:], False) == pytest.approx(one)
 
 
+@pytest.mark.parametrize("people", [60, 300])
+def test_the_rank_sum_of_the_same_people_has_the_chance_of_their_swaps(people: int) -> None:
+    """Answers that go together: as strangers' they would hide the difference, of many people too."""
+    rng = np.random.default_rng(people)
+    own = rng.normal(0.0, 3.0, people)
+    a, b = own + rng.normal(size=people), own + rng.normal(0.15, 1.0, people)
+    found = ranks.rank_sum(a, b, paired=True)
+    rank = stats.rankdata(np.concatenate([a, b]))
+    score = rank[people:] - rank[:people]
+    swapped = np.abs(rng.choice((-1.0, 1.0), (4000, people)) @ score)
+    assert found.deciding_p == pytest.approx(np.mean(swapped >= abs(score.sum())), abs=0.03)
+    assert ranks.rank_sum(a, b).deciding_p > found.deciding_p + 0.1
+
+
 def test_without_ties_the_exact_chances_are_scipys() -> None:
     rng = np.random.default_rng(3)
     a, b = rng.normal(size=9), rng.normal(0.8, 1.0, 11)

@@ -145,8 +145,14 @@ def require_fit(
     Raises:
         SetupError: the journal was changed or damaged; it is as it was.
     """
+    began: set[tuple[int, int, int]] = set()
     for number, one in enumerate(records, start=1):
-        if why := _misfit(number, one, design, questionnaires):
+        why = _misfit(number, one, design, questionnaires)
+        if isinstance(one, TrialBegan):
+            began.add((one.trial, one.attempt, one.side))
+        if isinstance(one, TrialEnded) and (one.trial, one.attempt, one.side) not in began:
+            why = "the presentation did not begin"
+        if why:
             raise SetupError(
                 f"{folder / FILE}: record {number}, {type(one).__name__}: {why}: the file was "
                 "changed or damaged; put a copy of it in its place"

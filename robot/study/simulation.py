@@ -214,10 +214,13 @@ class SimulatedParticipant:
         """Return how much more than others this participant likes a condition, latent units."""
         if condition not in self._levels:
             return 0.0
-        one, first = self._population, condition == next(iter(self._levels))
-        found = one.preference_sd * self._rng(f"{condition} {construct}").normal()
-        contrast = one.contrast_sd * self._rng(f"contrast {construct}").normal()
-        return float(found + (0.5 if first else -0.5) * contrast)
+        one, found = self._population, 0.0
+        if one.preference_sd:
+            found += one.preference_sd * self._rng(f"{condition} {construct}").normal()
+        if one.contrast_sd:
+            half = 0.5 if condition == next(iter(self._levels)) else -0.5
+            found += half * one.contrast_sd * self._rng(f"contrast {construct}").normal()
+        return found
 
     def _choice(self, pair: str, questionnaire: str, rng: np.random.Generator) -> str:
         if self.careless:

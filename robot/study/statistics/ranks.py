@@ -4,7 +4,7 @@ The chances of large samples are SciPy's, corrected for ties and for continuity;
 the permutations of the ranks that were seen, midranks and all (Streitberg & Roehmel 1986).
 """
 
-from math import factorial, nan
+from math import factorial, isfinite, nan
 from typing import Literal
 
 import numpy as np
@@ -49,9 +49,14 @@ def rank_sum(a: Floats, b: Floats, two_sided: bool = True, paired: bool = False)
         half = 0.5 * len(a) * len(b)
         return StatisticalTest("rank_sum", "U", half, nan, 1.0, 1.0, least, len(a), effect, same)
     found = stats.mannwhitneyu(b, a, alternative=_side(two_sided), method="asymptotic")
-    exact = (exact_swaps if paired else exact_rank_sum)(a, b, two_sided)
+    exact, p = (exact_swaps if paired else exact_rank_sum)(a, b, two_sided), float(found.pvalue)
+    if paired and not isfinite(exact):  # so many that the swaps' sum is normal
+        scores = _swap_scores(a, b).astype(float)
+        z = float(scores.sum() / np.sqrt((scores**2).sum()))
+        p = float(2.0 * stats.norm.sf(abs(z)) if two_sided else stats.norm.sf(z))
+        notes = ("the chance of large samples is that of all swaps",)
     return StatisticalTest(
-        "rank_sum", "U", float(found.statistic), nan, float(found.pvalue), exact, least,
+        "rank_sum", "U", float(found.statistic), nan, p, exact, least,
         len(a) if paired else len(a) + len(b), effect, notes,
     )  # fmt: skip
 
@@ -88,8 +93,14 @@ def exact_swaps(a: Floats, b: Floats, two_sided: bool = True) -> float:
         b: (n,) other answers of the same participants.
         two_sided: differences of either sign count.
     """
+    return _all_signs(_swap_scores(a, b), two_sided)
+
+
+def _swap_scores(a: Floats, b: Floats) -> NDArray[np.int64]:
+    """Return by how much each participant's swap changes the doubled rank sum, (n,)."""
     doubled = np.rint(2.0 * stats.rankdata(np.concatenate([a, b]))).astype(np.int64)
-    return _all_signs(doubled[len(a) :] - doubled[: len(a)], two_sided)
+    found: NDArray[np.int64] = doubled[len(a) :] - doubled[: len(a)]
+    return found
 
 
 def signed_rank(
