@@ -111,7 +111,7 @@ def test_the_exact_rank_sum_chance_is_that_of_all_divisions(
 
 @pytest.mark.parametrize("people", [60, 300])
 def test_the_rank_sum_of_the_same_people_has_the_chance_of_their_swaps(people: int) -> None:
-    """Answers that go together: as strangers' they would hide the difference, of many people too."""
+    """Answers that go together: taken as strangers', they would hide the difference."""
     rng = np.random.default_rng(people)
     own = rng.normal(0.0, 3.0, people)
     a, b = own + rng.normal(size=people), own + rng.normal(0.15, 1.0, people)
