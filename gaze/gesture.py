@@ -17,6 +17,8 @@ MIN_SPEED, MAX_SPEED = 0.1, 4.0
 """Factors on the speed of a gesture as written."""
 MAX_COUNT = 20
 """A gesture is not repeated more often by one command."""
+MAX_FRAMES = 2000
+"""Of a gesture as written: 33 a second for a minute."""
 HEAD_TRACKS = ("head_yaw", "head_pitch", "head_roll")
 EYE_TRACKS = ("eyes_yaw", "eyes_pitch")
 LID_TRACKS = ("left_upper_lid", "right_upper_lid", "left_lower_lid", "right_lower_lid")
@@ -103,10 +105,13 @@ class Gesture:
         """Check that there is something to play.
 
         Raises:
-            ValueError: there are no frames.
+            ValueError: there are no frames, or too many.
         """
         if not self.frames:
             raise ValueError("a gesture needs at least one frame")
+        most = max(len(self.frames), len(self.frames_without_neck))
+        if most > MAX_FRAMES:
+            raise ValueError(f"{most} frames: a gesture has at most {MAX_FRAMES}; leave some out")
 
 
 @dataclass(frozen=True)
@@ -167,22 +172,24 @@ def keys_of(gesture: Gesture, frames: tuple[KeyFrame, ...], count: int) -> dict[
         count: how often.
     """
     tracks: dict[str, list[tuple[float, float]]] = {}
-    for time_s, frame in _repeated(frames, gesture.loop_s, count):
-        for name, value in frame.values().items():
+    for time_s, values in _repeated(frames, gesture.loop_s, count):
+        for name, value in values.items():
             tracks.setdefault(name, []).append((time_s, value))
     return {name: _ended(name, keys, gesture.return_s) for name, keys in tracks.items()}
 
 
 def _repeated(
     frames: tuple[KeyFrame, ...], loop_s: tuple[float, float] | None, count: int
-) -> list[tuple[float, KeyFrame]]:
+) -> list[tuple[float, dict[str, float]]]:
+    """Return the times and the values of all frames, those of the loop as often as it is done."""
     begin_s, end_s = loop_s or (0.0, frames[-1].time_s)
-    before = [(f.time_s, f) for f in frames if f.time_s <= begin_s]
-    again = [f for f in frames if begin_s < f.time_s <= end_s]
+    keys = [(frame.time_s, frame.values()) for frame in frames]
+    before = [key for key in keys if key[0] <= begin_s]
+    again = [key for key in keys if begin_s < key[0] <= end_s]
     period_s = end_s - begin_s
-    rounds = [(i * period_s + f.time_s, f) for i in range(count) for f in again]
+    rounds = [(i * period_s + t_s, values) for i in range(count) for t_s, values in again]
     later_s = (count - 1) * period_s
-    return [*before, *rounds, *((later_s + f.time_s, f) for f in frames if f.time_s > end_s)]
+    return [*before, *rounds, *((later_s + t_s, values) for t_s, values in keys if t_s > end_s)]
 
 
 def _ended(name: str, keys: list[tuple[float, float]], return_s: float) -> TrackKeys:

@@ -9,7 +9,7 @@ slower through the values in between. Any unit; speed and acceleration are per s
 """
 
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -97,6 +97,10 @@ def _states(position: Floats, span: Floats) -> tuple[Floats, Floats]:
     return speed, acceleration
 
 
+_DENSE_KEYS = 64
+"""Up to so many keys between two stops a dense system is solved faster."""
+
+
 def _passing(position: Floats, span: Floats) -> tuple[Floats, Floats]:
     """Return speed and acceleration at the keys between two stops.
 
@@ -131,11 +135,46 @@ def _least_jerk(position: Floats, span: Floats) -> tuple[Floats, Floats]:
         return np.concatenate((jerk[:-1] - 6.0 * c3[1:], snap[:-1] - 24.0 * c4[1:]))
 
     at_zero = gaps(np.zeros(2 * count))
-    matrix = np.stack([gaps(one) - at_zero for one in np.eye(2 * count)], axis=1)
+    solve = _dense_solution if count <= _DENSE_KEYS else _banded_solution
+    gaps(solve(lambda one: gaps(one) - at_zero, -at_zero))
+    return speed, acceleration
+
+
+def _dense_solution(product: Callable[[Floats], Floats], right: Floats) -> Floats:
+    """Return the solution of a linear system whose matrix is known by its products."""
+    matrix = np.stack([product(one) for one in np.eye(len(right))], axis=1)
     # Jerk and snap differ in size by a power of the time; each row gets a largest entry of 1.
     scale = np.abs(matrix).max(axis=1)
-    gaps(np.linalg.solve(matrix / scale[:, None], -at_zero / scale))
-    return speed, acceleration
+    solution: Floats = np.linalg.solve(matrix / scale[:, None], right / scale)
+    return solution
+
+
+def _banded_solution(product: Callable[[Floats], Floats], right: Floats) -> Floats:
+    """Return the same where a key's gaps depend on that key and its two neighbours alone.
+
+    Time and memory grow with the number of keys, and not with its cube and square.
+    """
+    from scipy.linalg import solve_banded  # a fifth of a second, which few gestures need
+
+    count = len(right) // 2
+    keys = np.arange(count)
+    # Rows and columns in the order of the keys: the gaps in jerk and snap, speed and acceleration.
+    bands = np.zeros((7, 2 * count))
+    for first in range(3):
+        # Every third key moves no gap that another one of them moves.
+        moved = keys[first::3]
+        for of in (0, 1):
+            probe = np.zeros(2 * count)
+            probe[of * count + moved] = 1.0
+            jumps = product(probe).reshape(2, count)
+            for neighbour in (-1, 0, 1):
+                key = moved[(moved + neighbour >= 0) & (moved + neighbour < count)]
+                for gap in (0, 1):
+                    column, row = 2 * key + of, 2 * (key + neighbour) + gap
+                    bands[3 + row - column, column] = jumps[gap, key + neighbour]
+    mixed = right.reshape(2, count).T.ravel()
+    solution: Floats = solve_banded((3, 3), bands, mixed).reshape(count, 2).T.ravel()
+    return solution
 
 
 def _ends(position: Floats, speed: Floats, acceleration: Floats) -> tuple[Floats, ...]:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from gazerig.config.gestures import gestures_of, load_gesture, shipped_gestures
 from gazerig.config.load import ConfigError, shipped, shipped_names
 from gazerig.config.schema import load_rig
+from gazerig.gaze import minimum_jerk_curve
 from gazerig.gaze.gesture import POSE_TRACKS, Gesture, KeyFrame, keys_of
 from gazerig.gaze.minimum_jerk_curve import MinimumJerkCurve
 from gazerig.gaze.types import Floats
@@ -89,6 +90,41 @@ def test_most_even_curves_are_those_of_least_jerk() -> None:
         curve = MinimumJerkCurve(0.0, times.tolist(), values.tolist())
         least, rate = spline_of_least_jerk(times, values, at)
         assert np.abs(curve.sampled(at)[0] - least).max() < 1e-9
+
+
+def test_many_keys_give_the_curve_of_few_and_take_time_in_proportion(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rng = np.random.default_rng(1)
+    times, values = np.cumsum(rng.uniform(0.01, 0.1, 300)), np.cumsum(rng.uniform(1.0, 1.2, 300))
+    at = np.linspace(0.0, times[-1], 5000)
+    banded = MinimumJerkCurve(0.0, times.tolist(), values.tolist())
+    monkeypatch.setattr(minimum_jerk_curve, "_DENSE_KEYS", 300)
+    dense = MinimumJerkCurve(0.0, times.tolist(), values.tolist())
+    for one, other in zip(banded.sampled(at), dense.sampled(at), strict=True):
+        assert np.abs(one - other).max() < 1e-9 * np.abs(other).max()
+    monkeypatch.undo()
+    solved: list[int] = []
+    coefficients = minimum_jerk_curve._coefficients
+
+    def counted(span: Floats, *states: Floats) -> Floats:
+        solved.append(len(span))
+        return coefficients(span, *states)
+
+    monkeypatch.setattr(minimum_jerk_curve, "_coefficients", counted)
+    for count in (500, 20_000):
+        solved.clear()
+        MinimumJerkCurve(0.0, np.arange(1, count + 1).tolist(), np.arange(1.0, count + 1).tolist())
+        assert sum(solved) <= 10 * count
+
+
+def test_a_gesture_of_too_many_frames_is_refused() -> None:
+    frames = tuple(KeyFrame(0.02 * (k + 1), head_pitch_deg=1.0) for k in range(2001))
+    Gesture("long", frames[:2000])
+    with pytest.raises(ValueError, match="2001 frames: a gesture has at most 2000"):
+        Gesture("long", frames)
+    with pytest.raises(ValueError, match="2001 frames: a gesture has at most 2000"):
+        Gesture("long", frames[:1], frames_without_neck=frames)
 
 
 def test_a_curve_rests_where_it_turns_and_never_swings_past() -> None:
