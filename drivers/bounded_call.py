@@ -175,7 +175,9 @@ class BoundedCall:
             return
         self._closed_s = perf_counter()
         self._calls.put(None)
-        if self._late is not None:
+        if self._late is None:
+            thread.join(_NEXT_END_S)  # it has nothing left to do
+        else:
             LASTING.add(self)
             ending = threading.Thread(
                 target=self._end, args=(thread,), name=f"end of {self._name}", daemon=True

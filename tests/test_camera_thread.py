@@ -154,7 +154,7 @@ def test_close_ends_the_thread_and_frees_the_source(source, camera):
     feed(source, camera, 1)
     camera.close()
     assert source.closed == 1
-    assert not [t for t in threading.enumerate() if t.name == "camera"]
+    wait_for(lambda: not [t for t in threading.enumerate() if t.name == "camera"])
     camera.close()
     assert camera.latest(0.0).number == 1
 
@@ -248,7 +248,7 @@ def test_close_does_not_wait_for_a_lost_camera(source):
     lose(source)
     wait_for(lambda: source.closed)
     camera.close()
-    assert not [t for t in threading.enumerate() if t.name == "camera"]
+    wait_for(lambda: not [t for t in threading.enumerate() if t.name == "camera"])
     assert camera.latest(0.0) is None
 
 

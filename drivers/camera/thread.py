@@ -8,6 +8,7 @@ import threading
 from collections import deque
 from collections.abc import Callable
 
+from gazerig.drivers.bounded_call import BoundedCall
 from gazerig.drivers.camera.capture_loop import CaptureLoop, failed
 from gazerig.drivers.camera.frame_analysis import Locate, Motion
 from gazerig.drivers.camera.params import CameraRecoveryParams
@@ -58,7 +59,7 @@ class CameraThread:
         )
         self._requests: deque[Retune] = deque()
         self._stop = threading.Event()
-        self._thread: threading.Thread | None = None
+        self._watching: BoundedCall | None = None
         self._newest: Detections | None = None
         self._failure: BaseException | None = None
         self.frames = 0
@@ -70,15 +71,15 @@ class CameraThread:
         Raises:
             CameraError: the source cannot be opened, or is open already.
         """
-        if self._thread is not None:
+        if self._watching is not None:
             raise CameraError("the camera thread runs already: close() it before opening it again")
         self._events.clear()
         self._camera.open()
         self._stop.clear()
         self._newest, self._failure = None, None
         self.frames = self.frames_with_face = 0
-        self._thread = threading.Thread(target=self._watch, name="camera", daemon=True)
-        self._thread.start()
+        self._watching = BoundedCall("camera", 0.0)
+        self._watching.begin(self._watch)
 
     def latest(self, now_s: float) -> Detections | None:
         """Return what the newest frame showed, or None before the first.
@@ -116,12 +117,13 @@ class CameraThread:
         return tuple(messages)
 
     def close(self) -> None:
-        """Stop looking and free the source; safe to call twice."""
+        """Stop looking and free the source; what does not stop is ended. Safe to call twice."""
         self._stop.set()
-        if self._thread is not None:
-            self._thread.join(_LONGEST_WAIT_S)
-            if not self._thread.is_alive():
-                self._thread = None
+        if self._watching is not None:
+            stopped = self._watching.idle(_LONGEST_WAIT_S)
+            self._watching.close()
+            if stopped:
+                self._watching = None
 
     def _watch(self) -> None:
         """Analyse one frame after another until stopped."""
