@@ -1,5 +1,6 @@
 """A camera of another package: the control loop neither waits for it nor ends with it."""
 
+import threading
 from collections.abc import Sequence
 from math import isfinite
 from typing import Any
@@ -68,8 +69,10 @@ class GuardedCamera:
         """
         self._call.close()
         self._call = BoundedCall(self._label, self._longest_s)
-        outcome = self._call.in_turn(self.camera.open, self._open_s)
+        given_up = threading.Event()
+        outcome = self._call.in_turn(lambda: self._open(given_up), self._open_s)
         if outcome is None:
+            given_up.set()
             self._call.close()
             raise PluginError(f"{self._label} has not opened within {self._open_s:g} s")
         if isinstance(outcome.error, SetupError):
@@ -78,6 +81,12 @@ class GuardedCamera:
             error = outcome.error
             raise PluginError(f"{self._label} cannot be opened: {outcome.why}") from error
         self._newest, self._failed, self._asked_s, self._late = None, False, None, False
+
+    def _open(self, given_up: threading.Event) -> None:
+        """Open the camera; may block, and closes it where that took too long."""
+        self.camera.open()
+        if given_up.is_set():
+            self.camera.close()
 
     def latest(self, now_s: float) -> Detections | None:
         """Return the newest detections, None before the first and after a failure."""
