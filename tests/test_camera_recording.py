@@ -1,6 +1,7 @@
 """What a camera gives goes into a file and comes out the same, whatever happens to the writer."""
 
 import contextlib
+import json
 import os
 import signal
 import subprocess
@@ -92,6 +93,10 @@ def test_standard_tools_read_the_file(file):
         assert [m.metadata["source"] for m in reader.iter_metadata()] == ["test"]
         _, _, message = next(iter(reader.iter_messages(topics=[fmt.PICTURE])))
         assert message.log_time == round(TIMES_S[0] * 1e9)
+        _, _, message = next(iter(reader.iter_messages(topics=[fmt.LENS])))
+        lens = json.loads(message.data)
+        assert (lens["width"], lens["height"]) == (64, 48)
+        assert lens["K"] == [310.5, 0.0, 31.5, 0.0, 311.25, 23.5, 0.0, 0.0, 1.0]
 
 
 def test_what_the_camera_does_not_give_is_not_there(tmp_path):
@@ -109,6 +114,8 @@ def test_jpeg_is_smaller_and_nearly_the_same(tmp_path):
     assert small.stat().st_size < 0.3 * exact.stat().st_size
     difference = Recording(small).shot(0).image.astype(int) - smooth
     assert np.abs(difference).mean() < 2.0
+    smallest = write(tmp_path / "c.mcap", shots, jpeg_quality=20)
+    assert smallest.stat().st_size < 0.5 * small.stat().st_size
 
 
 def test_existing_file_is_kept_unless_told_otherwise(file):
@@ -139,6 +146,17 @@ def test_depth_whose_picture_is_missing_belongs_to_no_other(tmp_path):
     assert np.array_equal(found.image, shot(1).image)
     assert (found.depth_m, found.lens, found.faces, found.turn) == (None, None, None, None)
     assert_same(recording.shot(1), shot(2))
+
+
+def test_a_frame_that_is_no_later_than_the_one_before_is_left_out(tmp_path):
+    """A clock that was set back: frames are played by their times, which rise."""
+    shots = [
+        shot(k)._replace(captured_s=5000.0 + t) for k, t in enumerate((0.0, 0.2, 0.1, 0.2, 0.3))
+    ]
+    recording = Recording(write(tmp_path / "back.mcap", shots))
+    assert recording.times_s == pytest.approx([0.0, 0.2, 0.3])
+    for index, k in enumerate((0, 1, 4)):
+        assert np.array_equal(recording.shot(index).image, shots[k].image)
 
 
 def test_frames_are_put_on_the_disk_every_second(tmp_path, monkeypatch):

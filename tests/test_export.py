@@ -10,10 +10,12 @@ import pytest
 from desk import GAZE_JOINTS, LIDS
 from exported_run import RATE_HZ, Run, seen
 from present import present
+from scipy.spatial.transform import Rotation
 
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import GazeState
 from gazerig.robot.analysis.eye_tracker_csv import FixationTable, read_recording
+from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Jog, Stop
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 from gazerig.robot.model.types import JointState
@@ -172,6 +174,50 @@ def test_short_movements_are_what_they_are(
     assert [s.event for s in stretches] == [what for what, _ in wanted]
     # Each lasts to where the next begins, the last one as long as its ticks, too.
     assert [s.duration_s for s in stretches] == pytest.approx([0.005 * n for _, n in wanted])
+
+
+def test_a_target_that_changes_under_way_does_not_make_two_saccades(face: Run) -> None:
+    still = trace_of(face.ticks[:100])
+    trace = still._replace(
+        movement=np.repeat([1, 2, 1], [40, 10, 50]), blink=np.zeros(100, bool),
+        looked_at=np.repeat([0, 1, 2], [40, 5, 55]), cyclopean_deg=np.zeros((100, 2)),
+        names=tuple(GazeTarget("face 1", part) for part in ("LE", "RE", "N")),
+    )  # fmt: skip
+    found = [(s.event, s.looked_at.part) for s in stretches_of(trace, labels_of(trace))]
+    assert found == [("fixation", "LE"), ("saccade", "RE"), ("fixation", "N")]
+
+
+def test_what_is_near_is_looked_at_without_a_saccade_and_what_is_far_is_not(face: Run) -> None:
+    """The gaze is on a target that is nearer to it than half a degree."""
+    tick = face.ticks[1000]
+    head = np.array(tick.pose.p_world_head_m)
+    way = np.array(tick.gaze.gaze_point_world_m) - head
+
+    def at(off_deg: float, shift: int, part: str, saccades: int = 0) -> Tick:
+        turned = Rotation.from_euler("z", off_deg, degrees=True).apply(way)
+        x, y, z = (head + turned).tolist()
+        target = tick.target._replace(p_world_m=(x, y, z), shift=shift, part=part)
+        gaze = tick.gaze._replace(phase="fixate", saccades=saccades)
+        return tick._replace(target=target, gaze=gaze, t_s=tick.t_s + 0.005 * shift)
+
+    ticks = [at(0.0, 1, "LE"), at(0.4, 2, "RE"), at(5.0, 3, "N"), at(5.0, 4, "N", saccades=1)]
+    trace = trace_of(ticks)
+    assert [trace.names[k].part for k in trace.looked_at] == ["LE", "RE", "RE", "N"]
+
+
+def test_what_is_planned_is_the_direction_in_which_the_eyes_then_look(face: Run) -> None:
+    rests = (face.trace.movement == 1) & (face.trace.time_s > SETTLED_S)
+    off_deg = face.trace.planned_deg[rests] - face.trace.cyclopean_deg[rests]
+    assert np.abs(np.median(off_deg, axis=0)).max() < 0.3
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_a_gaze_of_which_one_eye_is_estimated_is_so_in_part(face: Run, side: str) -> None:
+    trace = face.trace._replace(estimated=(f"{side}_eye_pan",))
+    other = "left" if side == "right" else "right"
+    assert [trace.basis(of) for of in (side, other, "cyclopean", "head")] == [
+        "partly estimated", "measured", "partly estimated", "measured",
+    ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("pitch_deg", "share"), [(0.0, 1.0), (60.0, 0.5), (-60.0, 0.5)])

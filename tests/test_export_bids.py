@@ -62,6 +62,8 @@ def test_a_recording_is_headerless_and_even(face: Run, bids: Path, eye: int, rec
     assert sidecar["PhysioType"] == "eyetrack" and sidecar["RecordedEye"] == recorded
     assert sidecar["SamplingFrequency"] == RATE_HZ and sidecar["StartTime"] == 0.0
     assert sidecar["SampleCoordinateSystem"] == "gaze-in-world"
+    assert sidecar["RecordingStartUTC"] == "2026-01-01T00:00:00+00:00"
+    assert 0.005 <= sidecar["EventLag"] <= 0.03  # two to six ticks from a goal to its motion
     columns = sidecar["Columns"]
     assert columns[:3] == ["timestamp", "x_coordinate", "y_coordinate"]
     assert {sidecar[name]["Units"] for name in columns[1:3]} == {"deg"}
@@ -83,6 +85,41 @@ def test_events_are_indexed_by_the_timestamps(face: Run, bids: Path) -> None:
     onsets = [float(line[0]) for line in lines]
     assert onsets == sorted(onsets)
     assert {"LE", "RE"} <= {line[sidecar["Columns"].index("part")] for line in lines}
+
+
+def test_a_message_of_any_text_is_one_cell(face: Run, tmp_path: Path) -> None:
+    short = Run(face.ticks[:50])
+    trace = short.trace._replace(messages=((0.1, "a servo\tsays\r\nthis \u2028 and that"),))
+    write_bids(trace, short.labels, (), ABOUT, tmp_path)
+    (path,) = tmp_path.rglob("*eye1_physioevents.tsv.gz")
+    (line,) = gzip.decompress(path.read_bytes()).decode().splitlines()
+    cells = line.split("\t")
+    assert cells[0] == "0.100000" and cells[1:-1] == ["n/a"] * 6
+    assert cells[-1] == "a servo says this and that"
+
+
+@pytest.mark.parametrize(
+    "there",
+    [
+        {"GeneratedBy": [{"Name": "another program"}]},
+        {"Name": "mine"},
+        {"GeneratedBy": "gazerig"},
+        ["gazerig"],
+        "no JSON",
+    ],
+)
+def test_a_run_is_not_put_into_the_data_set_of_another_program(
+    face: Run, tmp_path: Path, there: object
+) -> None:
+    short = Run(face.ticks[:50])
+    about = tmp_path / "dataset_description.json"
+    about.write_text(there if isinstance(there, str) else json.dumps(there))
+    before = about.read_bytes()
+    with pytest.raises(SetupError, match="is no data set of gazerig: name another folder"):
+        write_bids(short.trace, short.labels, short.stretches, ABOUT, tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == [about.name]
+    write_bids(short.trace, short.labels, short.stretches, ABOUT, tmp_path, force=True)
+    assert about.read_bytes() == before and list(tmp_path.rglob("*_physio.tsv.gz"))
 
 
 def test_a_missed_slot_is_a_row_without_values(face: Run, tmp_path: Path) -> None:

@@ -2,6 +2,8 @@
 
 import base64
 import json
+import os
+from collections import Counter
 from collections.abc import Iterable
 from datetime import datetime
 from math import inf, nan
@@ -35,6 +37,7 @@ from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.scanpath import Walk
 from gazerig.gaze.types import Bodies, Face, Percept
 from gazerig.robot.control.loop import Tick
+from gazerig.robot.control.tick_stream import TickStream
 from gazerig.robot.dashboard.feed.camera_overlay import encode
 from gazerig.robot.model import stop_latch
 from gazerig.robot.model.commands import Ask, Jog, LookAt, Resume, Stop, Tune
@@ -43,9 +46,12 @@ from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording import tick_record as moments
 from gazerig.robot.recording.frame_picker import FramePicker
 from gazerig.robot.recording.read import RunRecording
+from gazerig.robot.recording.record_router import RecordRouter
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text, end_of, info_of
+from gazerig.robot.recording.run_writer import RunWriter
 from gazerig.robot.recording.viewer_messages import orientation
+from gazerig.robot.recording.world_info import WorldInfo
 from gazerig.robot.recording.writer_process import PIECE_BYTES
 
 pytestmark = pytest.mark.usefixtures("branched_children")
@@ -173,6 +179,14 @@ def test_frames_whose_times_are_rounded_are_picked_at_the_rate(rate_hz: float, e
     assert picked_s(rate_hz, times) == times[::every]
 
 
+def test_a_tick_without_an_image_is_no_frame() -> None:
+    picker, picture = FramePicker(5.0), np.zeros((2, 2, 3), np.uint8)
+    assert not picker.picks(None)
+    assert not picker.picks(Detections(0.0, 1, 2, 2))
+    assert picker.picks(Detections(0.01, 2, 2, 2, image=picture))
+    assert not picker.picks(Detections(0.01, 2, 2, 2, image=picture))
+
+
 def test_pictures_are_not_more_than_were_asked_for() -> None:
     assert len(picked_s(10.0, (k / 200.0 for k in range(20_000)))) == 1000
 
@@ -235,8 +249,11 @@ def test_other_programs_open_it(recorded: Recorded) -> None:
         schemas = {c.topic: json.loads(summary.schemas[c.schema_id].data)
                    for c in summary.channels.values()}  # fmt: skip
         seen: dict[str, Any] = {}
+        count: Counter[str] = Counter()
         for _, channel, message in reader.iter_messages():
             assert channel.message_encoding == "json"
+            count[channel.topic] += 1
+            assert message.sequence == count[channel.topic]  # whoever misses one can tell
             data = seen[channel.topic] = json.loads(message.data)
             assert unexplained(data, schemas[channel.topic]) == []
             if channel.topic == fmt.TICK:
@@ -267,6 +284,13 @@ def test_viewers_are_sent_25_messages_a_second(recorded: Recorded, topic: str) -
     assert len(sent_to_viewers(recorded, topic)) == pytest.approx(25 * 1.49, abs=2)
 
 
+def test_a_viewer_sees_joints_as_they_are_measured(recorded: Recorded) -> None:
+    for tick, data in sent_to_viewers(recorded, fmt.JOINT_STATES):
+        joints = data["joints"]
+        assert [one["position"] for one in joints] == list(tick.joints.position_rad)
+        assert [one["velocity"] for one in joints] == list(tick.joints.velocity_rad_s)
+
+
 def vector(of: dict[str, float]) -> list[float]:
     return [of[axis] for axis in "xyz"]
 
@@ -292,7 +316,8 @@ def test_a_viewer_sees_head_and_eyes_as_they_stand_in_space(recorded: Recorded) 
     assert turned > 0.05  # the frames differ
 
 
-def test_lines_of_sight_are_drawn_from_the_eyes_as_far_as_the_point(recorded: Recorded) -> None:
+def test_faces_and_lines_of_sight_as_far_as_the_point_are_drawn(recorded: Recorded) -> None:
+    shown = 0
     for tick, data in sent_to_viewers(recorded, fmt.SCENE):
         (entity,), pose = data["entities"], tick.pose
         # The lists of a SceneEntity in Foxglove's documentation; viewers want to find them all.
@@ -302,13 +327,17 @@ def test_lines_of_sight_are_drawn_from_the_eyes_as_far_as_the_point(recorded: Re
         }  # fmt: skip
         points = np.array([vector(point) for point in entity["lines"][0]["points"]])
         aim = np.array(tick.gaze.gaze_point_world_m)
-        assert vector(entity["spheres"][-1]["pose"]["position"]) == pytest.approx(aim)
+        faces = tick.percept.faces if tick.percept is not None else ()
+        balls = [vector(ball["pose"]["position"]) for ball in entity["spheres"]]
+        assert np.array(balls) == pytest.approx(np.array([*(f.p_world_m for f in faces), aim]))
+        shown += len(faces)
         for (begin, end), left in ((points[:2], True), (points[2:], False)):
             eye = np.array(pose.p_world_eye_left_m if left else pose.p_world_eye_right_m)
             assert begin == pytest.approx(eye)
             assert np.linalg.norm(end - begin) == pytest.approx(np.linalg.norm(aim - eye))
             sight = (end - begin) / np.linalg.norm(end - begin)
             assert sight == pytest.approx(line_of_sight(pose, left))
+    assert shown > 10
 
 
 def test_a_viewer_shows_a_frame_at_its_exposure(recorded: Recorded) -> None:
@@ -391,6 +420,64 @@ def test_info_of_another_version_is_read_as_far_as_it_is_known() -> None:
     assert end_of({"lost": "3"}) == RunEnd(lost=3)
     with pytest.raises(ValueError, match="config_yaml"):
         info_of({"rig": '"desk"'})
+
+
+@pytest.mark.parametrize(
+    ("name", "nonsense"),
+    [
+        *(("seed", value) for value in ("-1", "1.5", "true", "null")),
+        *(("rate_hz", value) for value in ("0", "1e9", "NaN", '"200"')),
+        *(("pictures_hz", value) for value in ("-1", "Infinity")), ("mock", "1"), ("fast", '"no"'),
+        ("rig", "5"), ("scene", "[]"), ("versions", "[]"), ("started_utc", '"yesterday"'),
+        ("stands", "[1.0, 2.0]"), ("stands", json.dumps([1e9] * 12)), ("eyes", "{"),
+    ],
+)  # fmt: skip
+def test_a_beginning_that_no_run_has_is_refused(name: str, nonsense: str) -> None:
+    text = as_text(info_for())
+    assert info_of(text).seed == 7
+    with pytest.raises(ValueError, match="."):
+        info_of({**text, name: nonsense})
+
+
+@pytest.mark.parametrize(
+    ("name", "nonsense"),
+    [("stopped_by", "3"), ("tx_sha256", "null"), ("lost", '"3"'), ("lost", "1.0"), ("ran_s", "-1"),
+     ("ran_s", '"1"'), ("ran_s", "NaN")],
+)  # fmt: skip
+def test_an_end_that_no_run_has_is_refused(name: str, nonsense: str) -> None:
+    text = as_text(RunEnd("seconds", 3, 1.5, "ab"))
+    assert end_of(text) == RunEnd("seconds", 3, 1.5, "ab")
+    with pytest.raises(ValueError, match="."):
+        end_of({**text, name: nonsense})
+
+
+def test_the_world_is_written_once_when_its_beginning_is_known(
+    recorded: Recorded, tmp_path: Path
+) -> None:
+    path, begun = tmp_path / "world.mcap", WorldInfo("room", "people: {}", 3, 0.25)
+    recorder = Recorder(path, info_for(), patient=True)
+    worlds = iter([None, None, begun, begun, begun])
+    recorder.in_world(lambda: next(worlds))
+    recorder.open()
+    for tick in recorded.ticks[:5]:
+        recorder.record(tick)
+    recorder.close("seconds")
+    assert RunRecording(path).world == begun
+    with path.open("rb") as file:
+        names = [one.name for one in make_reader(file).iter_metadata()]
+    assert names == [fmt.RUN, fmt.WORLD, fmt.END]
+
+
+def test_percepts_that_are_over_take_no_memory(recorded: Recorded, tmp_path: Path) -> None:
+    writer = RunWriter(os.open(tmp_path / "r", os.O_WRONLY | os.O_CREAT), {}, 0)
+    router, stream = RecordRouter(writer), TickStream(print)
+    stream.add("test", lambda batch: router.ticks(batch.data) is None)
+    for tick in recorded.ticks:
+        stream.append(tick, 0.005, ())
+    stream.flush()
+    writer.close(RunEnd())
+    assert len({id(tick.percept) for tick in recorded.ticks}) > 20
+    assert len(router._percepts) <= 1
 
 
 def test_a_rotation_as_a_quaternion() -> None:

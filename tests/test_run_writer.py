@@ -2,6 +2,7 @@
 
 import errno
 import os
+import select
 import socket
 from collections.abc import Iterator
 from itertools import islice
@@ -176,3 +177,24 @@ def test_what_has_been_sent_takes_no_room(
     for _ in range(50):
         assert client.post(writer.TICKS, bytes(10_000))
         assert len(theirs.recv(writer.PIECE_BYTES + 1)) == 10_002
+
+
+@pytest.mark.parametrize("taking", [True, False], ids=["reads", "does not read"])
+def test_a_writer_that_does_not_go_on_is_waited_for_once(
+    line: tuple[socket.socket, socket.socket], monkeypatch: pytest.MonkeyPatch, taking: bool
+) -> None:
+    waited_s = []
+
+    def never(*given: object) -> tuple[list[int], ...]:
+        waited_s.append(given[-1])
+        assert len(waited_s) < 4
+        return [], [], []
+
+    monkeypatch.setattr(select, "select", never)
+    (ours, _), client = line, client_of(line[0])
+    while not taking and not client._queue:
+        client.post(writer.TICKS, bytes(50_000))
+    client.close()
+    words = "its writer does not end" if taking else "its writer does not go on"
+    assert client.failed == words and not client.alive and ours.fileno() == -1
+    assert waited_s == [15.0] and not client._queue
