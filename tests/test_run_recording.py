@@ -37,7 +37,7 @@ from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.scanpath import Walk
 from gazerig.gaze.types import Bodies, Face, Percept
 from gazerig.robot.control.loop import Tick
-from gazerig.robot.control.tick_stream import TickStream
+from gazerig.robot.control.tick_stream import TickBatch, TickStream
 from gazerig.robot.dashboard.feed.camera_overlay import encode
 from gazerig.robot.model import stop_latch
 from gazerig.robot.model.commands import Ask, Jog, LookAt, Resume, Stop, Tune
@@ -471,7 +471,12 @@ def test_the_world_is_written_once_when_its_beginning_is_known(
 def test_percepts_that_are_over_take_no_memory(recorded: Recorded, tmp_path: Path) -> None:
     writer = RunWriter(os.open(tmp_path / "r", os.O_WRONLY | os.O_CREAT), {}, 0)
     router, stream = RecordRouter(writer), TickStream(print)
-    stream.add("test", lambda batch: router.ticks(batch.data) is None)
+
+    def take(batch: TickBatch) -> bool:
+        router.ticks(batch.data)
+        return True
+
+    stream.add("test", take)
     for tick in recorded.ticks:
         stream.append(tick, 0.005, ())
     stream.flush()
