@@ -3,9 +3,11 @@
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.linalg import expm
 
 from gazerig.drivers.dynamixel.control_table import MODELS
 from gazerig.sim_mock.smart_servo.controller import DISABLED, Loop
@@ -101,6 +103,18 @@ def test_d_damps_the_overshoot():
     tops = [max(go(shaft(loop=Loop(p=P, d=k * D)), 200, 500)) for k in (0.0, 1.0, 3.0)]
     assert tops[0] > tops[1] + 20 > tops[2] + 20
     assert tops[2] < 210
+
+
+@pytest.mark.parametrize(("more_p", "more_d"), [(1.0, 0.0), (1.0, 1.0), (2.0, 1.0), (1.0, 3.0)])
+def test_pd_control_moves_a_shaft_as_its_differential_equation_says(more_p, more_d):
+    # x'' = a (P (goal - x) - D x') - x' / T, a the no-load speed over the time T to reach it.
+    p, d, model = more_p * P, more_d * D, MODELS["xl330-m077"]
+    path = np.array(go(shaft(model.name, Loop(p=p, d=d), **SMOOTH), 40, 300))
+    T = Physics().rotor_s
+    a = model.no_load_steps_s / T
+    step = expm(0.001 * np.array([(0.0, 1.0), (-a * p, -a * d / 1000.0 - 1.0 / T)]))
+    exact = [40.0 + (np.linalg.matrix_power(step, k + 1) @ (-40.0, 0.0))[0] for k in range(300)]
+    assert path == pytest.approx(np.array(exact), abs=3.0)
 
 
 def test_the_first_feed_forward_gain_shortens_the_lag():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from desk import GAZE_JOINTS, LIDS
 from oak_packets import R_CAMERA_IMU, at_rest, readings
-from seeing.moving_room import CLOSE, frames, pan, rotation, shake
+from seeing.moving_room import CLOSE, Board, frames, pan, rotation, shake
 from seeing.row_02_camera_motion import judged
 
 import gazerig
@@ -243,12 +243,23 @@ def gyro_of(motion, seconds):
     return turn
 
 
+HALF_OF_THE_IMAGE = (Board((0.0, 0.2, 0.9), (0.55, 0.8), 4, True, 0.5, 0.4),)
+
+
 @pytest.mark.parametrize("motion", [shake, pan])
 def test_e94_things_are_told_from_a_moved_camera_even_if_somebody_fills_the_image(motion):
     score = judged(frames(motion, 0.8, CLOSE), turn_of=gyro_of(motion, 0.8))
     figures = score.figures("close")
     assert figures["close: false things a picture"] <= 0.05
     assert figures["close: recall"] >= 0.95
+
+
+@pytest.mark.parametrize("motion", [shake, pan])
+def test_e94_what_the_gyro_adds_where_somebody_fills_half_of_the_image(motion):
+    seen = list(frames(motion, 0.8, HALF_OF_THE_IMAGE))
+    with_gyro, without = judged(seen, turn_of=gyro_of(motion, 0.8)), judged(seen)
+    assert with_gyro.false <= 0.05 * with_gyro.pictures
+    assert without.false >= 0.3 * without.pictures
 
 
 def test_turn_of_the_gyro_goes_before_that_of_the_joints():

@@ -212,7 +212,7 @@ def test_e27_vergence_comes_from_geometry() -> None:
     assert degrees(right[0]) == pytest.approx(1.773, abs=0.01)
 
 
-def test_small_errors_are_followed_and_large_ones_jumped_to() -> None:
+def test_small_errors_are_followed_and_not_jumped_to() -> None:
     rig = Rig()
     walk = 0.2  # m/s at 1 m: 11 deg/s
 

@@ -153,7 +153,7 @@ def spot_at(direction: Floats, width: int, height: int, field_rad: float) -> Ima
 
 
 @pytest.mark.parametrize("orientation", ALL, ids=NAMES)
-def test_e95_a_person_is_at_one_place_however_the_camera_is_mounted_and_whatever_its_size(
+def test_e100_a_person_is_at_one_place_however_the_camera_is_mounted_and_whatever_its_size(
     orientation: FrameOrientation,
 ) -> None:
     """Sizes change from frame to frame, as a camera's may that another program sets."""

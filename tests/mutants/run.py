@@ -2,10 +2,11 @@
 
     python tests/mutants/run.py            all mutants, one after the other
     python tests/mutants/run.py scanpath   those with that word in file or effect
+    python tests/mutants/run.py E17        those of a row of docs/checks.md
 
 By hand, as it takes minutes. Each of `ALL` replaces one piece of text, which has to stand in
-its file exactly once, in a copy of the sources; the test files that it names run on the copy,
-and one of them has to fail. Before that they have to pass on the copy as it is. The guard has a
+its file exactly once, in a copy of the sources; the tests that it names run on the copy, and one
+of them has to fail. Before that they have to pass on the copy as it is. The guard has a
 hundred mutants of its own, which are cheap enough for the suite: tests/test_safety_mutants.py.
 Ends with 1 if a mutant survives.
 """
@@ -23,7 +24,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 from mutants import ALL, Mutant  # noqa: E402
 
-COPIED = ("api", "config", "docs", "drivers", "gaze", "robot", "sim_mock", "tests")
+COPIED = ("api", "config", "docs", "drivers", "examples", "gaze", "robot", "sim_mock", "tests")
 
 
 def copied(to: Path) -> None:
@@ -35,10 +36,16 @@ def copied(to: Path) -> None:
     subprocess.run(["make", "-s", "links"], cwd=to, check=True)
 
 
+def node(name: str) -> str:
+    """Return what pytest calls a test file, or a function in it."""
+    file, *function = name.split("::")
+    return "::".join([f"tests/test_{file}.py", *function])
+
+
 def passes(copy: Path, tests: Iterable[str]) -> bool:
     """Return whether the tests pass on the copy."""
     environ = {**os.environ, "PYTHONPATH": str(copy / ".links"), "PYTHONDONTWRITEBYTECODE": "1"}
-    files = [f"tests/test_{name}.py" for name in tests]
+    files = [node(name) for name in tests]
     command = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", *files]
     done = subprocess.run(command, cwd=copy, env=environ, capture_output=True, text=True)
     if done.returncode not in (0, 1):
@@ -64,7 +71,11 @@ def survives(mutant: Mutant, copy: Path) -> bool:
 
 def main(words: list[str]) -> int:
     """Try the mutants that have all the words; return how many survive."""
-    chosen = [m for m in ALL if all(word in f"{m.file} {m.effect}" for word in words)]
+    chosen = [
+        mutant
+        for mutant in ALL
+        if all(word in mutant.rows or word in f"{mutant.file} {mutant.effect}" for word in words)
+    ]
     with tempfile.TemporaryDirectory(prefix="mutants-") as name:
         copy = Path(name)
         copied(copy)
@@ -76,7 +87,9 @@ def main(words: list[str]) -> int:
             lives = survives(mutant, copy)
             alive += lives
             print(
-                f"{'SURVIVES' if lives else 'killed  '}  {mutant.file}: {mutant.effect}", flush=True
+                f"{'SURVIVES' if lives else 'killed  '}  {mutant.file}: {mutant.effect}"
+                f"{'; '.join(['', *mutant.rows])}",
+                flush=True,
             )
     print(f"{len(chosen) - alive} of {len(chosen)} killed")
     return alive
