@@ -74,14 +74,14 @@ def commands(name: str, rig: str = "") -> dict[str, list[str]]:
     rig = rig or name
     joint = "eyes_pan" if name in BOARDS else "left_eye_pan"
     by = [] if name in BOARDS else ["--by", "motion"]
+    out = ["--out", "/tmp/ways_out_face.yaml"] if rig == name else []
     return {
         "run": ["run", rig, "--scene", "visitor", "--no-page"],
         "jog": ["jog", rig, joint, "8", "--hold", "--yes"],
         "look-at": ["look-at", rig, "1", "0.1", "0.3", "--seconds", "60", "--yes"],
         "home": ["home", rig, "--hold", "--yes"],
         "calibrate": ["calibrate", rig, "--dry-run", "--joint", joint, *by, "--yes"],
-        "calibrate face": ["calibrate", "face", rig, "--scene", "sits-still", "--no-page",
-                           "--out", "/tmp/ways_out_face.yaml"],
+        "calibrate face": ["calibrate", "face", rig, "--scene", "sits-still", "--no-page", *out],
         "monitor": ["monitor", rig, "--json"],
     }  # fmt: skip
 
@@ -174,7 +174,7 @@ def started(words: list[str], way: str, begin: Begin = fresh) -> Started:
         assert reader.stdin is not None
         with reader.stdin as into:
             process = begin(
-                words, breaks, stdin=subprocess.DEVNULL, stdout=into, stderr=into,
+                words, breaks, stdin=pipe, stdout=into, stderr=into,
                 env=env, preexec_fn=os.setsid,
             )  # fmt: skip
         return Started(process, -1, -1, reader)
@@ -349,10 +349,10 @@ def attack(at: Bench, name: str, way: str, begin: Begin = fresh) -> Row:
     if way == "recorder's disk full":
         words += ["--record", f"{folder.name}/full.mcap", "--force"]
     run = started(words, way, begin)
-    if name == "calibrate" and at.name in BOARDS and run.process.stdin is not None:
+    if name == "calibrate" and at.name in BOARDS:
+        keys = run.master if run.process.stdin is None else run.process.stdin.fileno()
         with contextlib.suppress(OSError):
-            run.process.stdin.write(b"1500\n+40\n")
-            run.process.stdin.flush()
+            os.write(keys, b"1500\n+40\n")
     needs = 0 if name == "monitor" else 1
     # What takes the memory away counts ticks; everything else comes when the program is at work.
     ended = lambda: run.process.poll() is not None  # noqa: E731
@@ -364,7 +364,8 @@ def attack(at: Bench, name: str, way: str, begin: Begin = fresh) -> Row:
         if ended() or not ticks():
             void = void or "it had ended before the blow"
     began_s = time.monotonic()
-    WAYS[way](run)
+    if not ended():
+        WAYS[way](run)
     said = b""
     took_s = LONGEST_S
     while time.monotonic() - began_s < LONGEST_S:
