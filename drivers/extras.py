@@ -9,6 +9,6 @@ def extra_hint(package: str, extra: str, error: ImportError) -> str:
         extra: The extra of gazerig that brings it, e.g. "oak".
         error: What its import raised.
     """
-    absent = isinstance(error, ModuleNotFoundError) and error.name == package
+    absent = isinstance(error, ModuleNotFoundError) and error.name == package.replace("-", "_")
     reason = "is not installed" if absent else f"cannot be loaded ({' '.join(str(error).split())})"
     return f"{package} {reason}: pip install 'gazerig[{extra}]'"

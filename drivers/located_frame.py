@@ -39,6 +39,7 @@ class DetectionInCamera(NamedTuple):
     fastest_m, fastest_m_s: of what moves, place and velocity of its fastest part, None where
         they are not known
     signs: of a face, what eyes and mouth do, None where they are not found
+    upper_m: of what moves and is upright, place of its upper end, where a person's head is
     compact: of what moves, whether its patch is about as wide as high and full, as a fist's or a
         hand's alone is and an arm's is not
     thickness_m: of what moves, diameter of the largest disc within its patch, as far away as its
@@ -68,12 +69,14 @@ class DetectionInCamera(NamedTuple):
     compact: bool = False
     thickness_m: float = 0.0
     from_side: bool = False
+    upper_m: tuple[float, float, float] | None = None
 
 
 class LocatedFrame(NamedTuple):
     """What one image shows, located in the camera's axes by one calibration.
 
     intrinsics: the calibration; things: what moves, with a place
+    faces: behind those seen, the heads of people whose face is not; they have no ``R_camera_face``
     """
 
     intrinsics: Intrinsics

@@ -223,6 +223,23 @@ class DetectedFace:
 
 
 @dataclass(frozen=True, slots=True)
+class DetectedPerson:
+    """A person in an image, whose face need not be visible.
+
+    box_px: x, y, width, height of the body from the top of the head to the hips, which may be
+        below the image
+    head_px: middle of the head
+    trunk_px: distance from the hips to the top of the head
+    confidence: 0..1
+    """
+
+    box_px: tuple[float, float, float, float]
+    head_px: tuple[float, float]
+    trunk_px: float
+    confidence: float
+
+
+@dataclass(frozen=True, slots=True)
 class MovingBlob:
     """Something that moves, with its place in the camera frame (x right, y down, z forward).
 
@@ -310,6 +327,8 @@ class Detections:
     located: faces and things in the camera's axes; None: whoever needs them computes them
     turn: how the camera was turned by its own gyro, None where it has none
     scene: counts the scenes that were shown: another one than before, and there was a cut
+    people: with and without a visible face; only some frames are searched for them, and of each
+        only a part
     """
 
     captured_s: float
@@ -324,6 +343,7 @@ class Detections:
     located: LocatedFrame | None = None
     turn: CameraTurn | None = None
     scene: int = 0
+    people: tuple[DetectedPerson, ...] = ()
 
     def located_by(self, locate: "Callable[[Detections], LocatedFrame] | None") -> "Detections":
         """Return the same with what it shows located in the camera's axes; None: as it is."""
@@ -342,6 +362,7 @@ class Detections:
             locate(self),
             self.turn,
             self.scene,
+            self.people,
         )
 
 

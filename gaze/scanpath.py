@@ -248,7 +248,10 @@ class Scanpath:
         return -inf if settled and not look.moved else inf
 
     def _find(self, face_id: int, percept: Percept | None) -> tuple[Face | None, bool]:
-        """Return the face, the last known while it is out of sight, and whether it is new."""
+        """Return the face, the last known while it is out of sight, and whether it is new.
+
+        None for a person who is in sight and has turned the face away.
+        """
         known = self._face
         if known is not None and known.id != face_id:
             known = None
@@ -256,7 +259,9 @@ class Scanpath:
             return known, False
         self._searched = percept
         seen = () if percept is None else percept.faces
-        self._face = next((face for face in seen if face.id == face_id), known)
+        turned_away = percept is not None and face_id in percept.bodies.ids
+        missed = None if turned_away else known
+        self._face = next((face for face in seen if face.id == face_id), missed)
         return self._face, known is None and self._face is not None
 
 

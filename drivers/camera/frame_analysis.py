@@ -38,8 +38,10 @@ class FrameAnalyzer:
         self._off_frame = OffFrameReport()
 
     def look(self, shot: Shot) -> Detections:
-        """Find and locate the faces of a frame, unless the camera itself has, and what moves."""
+        """Find and locate faces, unless the camera itself has, people, and what moves."""
         faces = self._faces(shot)
+        find_people = getattr(self._detector, "people", None)
+        people = () if find_people is None else find_people(shot.image, shot.captured_s)
         blobs = self._motion(shot) if self._motion is not None else ()
         height, width = shot.image.shape[:2]
         for line in self._off_frame.told_of(faces, width, height):
@@ -56,6 +58,7 @@ class FrameAnalyzer:
             shot.lens,
             turn=shot.turn,
             scene=self._cuts.scene(shot.image),
+            people=people,
         )
         if (fault := getattr(self._locate, "fault", None)) is not None and (line := fault(found)):
             self._faults.setdefault(line, False)

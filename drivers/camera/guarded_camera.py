@@ -170,6 +170,9 @@ def _fault(found: Any) -> str:
         return "a turn of the camera that is no rotation"
     if not isinstance(found.faces, Sequence) or not isinstance(found.blobs, Sequence):
         raise TypeError("faces and blobs must be tuples")
+    for person in found.people:
+        if not (all(map(_finite, (*person.head_px, person.trunk_px))) and person.trunk_px > 0.0):
+            return f"a person at {person.head_px!r} of {person.trunk_px!r} px"
     for face in found.faces:
         if wrong := fault_of_face(face):
             return wrong

@@ -144,3 +144,14 @@ def models_folder() -> Path:
     """Return the folder of models."""
     named = os.environ.get(FOLDER_VARIABLE)
     return Path(named).expanduser() if named else data_folder() / "models"
+
+
+def yunet_file() -> str:
+    """Return the newest YuNet file of the user, "" if there is none.
+
+    It is in the folder of models, or in the one above, where a file was put by hand.
+    """
+    for folder in (models_folder(), data_folder()):
+        if found := max(map(str, folder.glob("face_detection_yunet_*.onnx")), default=""):
+            return found
+    return ""

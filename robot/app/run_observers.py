@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from gazerig.config.faults import ConfigError
+from gazerig.drivers.vision.detector_status import detector_status
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.camera_factory import scene_start_s
@@ -85,6 +86,8 @@ class RunObservers:
         self._made, self._fast, self._say = made, options.fast, say
         self._timing = LoopTiming(made.loop.rate_hz)
         self._emulated = options.mock and steer is None
+        computed = options.no_pictures or (made.scene is not None and not options.pixels)
+        self._detector = "" if computed else str(detector_status(made.live.rig.detector))
         self._tuning, self._recorder = tuning, recorder
         self._commanded = HeadsTogether(made.robot, made.others)
         about = {"rig": options.rig, "pid": os.getpid()}
@@ -146,7 +149,9 @@ class RunObservers:
     def _live_rig(self) -> LiveRig:
         made = self._made
         picture = ScenePicture(made.scene) if made.scene is not None else None
-        return LiveRig(made.loop.rate_hz, made.shown(), self._emulated, picture, made.world)
+        return LiveRig(
+            made.loop.rate_hz, made.shown(), self._emulated, picture, made.world, self._detector
+        )
 
     def _run_state(self) -> RunState:
         """Return what the page shows and ticks do not tell."""

@@ -10,6 +10,8 @@ from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoConfig
+from gazerig.drivers.vision.detector_status import detector_status
+from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.robot.app.bus_wiring import can_be_released, release_plan
 from gazerig.robot.bringup.doctor import maestro as doctor_maestro
 from gazerig.robot.bringup.doctor import pca9685 as doctor_pca9685
@@ -61,14 +63,23 @@ def doctor(
                 _fix(model, lines, findings, tell)
                 tell("after that:")
                 findings = _examined(model, lines, tell)
+        detector = examine_detector(model.detector)
+        show_findings([detector], tell)
         if as_json:
             rows = [as_plain(one, bus) for bus, some in findings.items() for one in some]
+            rows.append(as_plain(detector, ""))
             rows = [row | {"cure": completed(str(row["cure"]))} for row in rows]
             print(json.dumps(rows))
-        whole = [one for some in findings.values() for one in some]
+        whole = [*(one for some in findings.values() for one in some), detector]
         tell(summed_up(whole, rig, fix))
     if worst(whole) == "error":
         raise typer.Exit(FAULT)
+
+
+def examine_detector(params: FaceDetectorParams) -> Diagnostic:
+    """Return what finds faces and people, and what brings what is missing."""
+    text, cure = detector_status(params)
+    return Diagnostic("note" if cure else "ok", text, "detector", cure)
 
 
 def _examined(rig: Rig, lines: Mapping[str, BusPort], tell: Tell) -> dict[str, list[Diagnostic]]:

@@ -30,6 +30,8 @@ class TrackParams:
         "a person whose face is turned to the head within this angle looks at it, where the detector finds no gaze of the eyes"] = 10.0
     eyes_at_head_deg: Annotated[float, Bounds(1, 60), "the same of the gaze of the eyes, where the detector finds it"] = 6.0
     coast_ms: Annotated[float, Bounds(0, 5000), "a track without a detection is still reported for this long"] = 250.0
+    coast_person_ms: Annotated[float, Bounds(0, 10000),
+        "a person whose face is not visible is still reported for this long: detector.people_hz searches seldom"] = 1200.0
     forget_ms: Annotated[float, Bounds(0, 60000),
         "a track without a detection is deleted after this long; what returns later gets a new id"] = 1500.0
     remember_face_s: Annotated[float, Bounds(0, 3600),

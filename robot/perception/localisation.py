@@ -9,7 +9,7 @@ from gazerig.robot.perception.tracker import LocalisedDetection
 def placed(found: DetectionInCamera, R_world_camera: Mat3, p_world_m: Vec3) -> LocalisedDetection:
     """Return a detection placed in the world by the camera's pose at the exposure."""
     R, v, gaze = found.R_camera_face, found.v_camera_m_s, found.gaze_camera
-    fastest, faster = found.fastest_m, found.fastest_m_s
+    fastest, faster, upper = found.fastest_m, found.fastest_m_s, found.upper_m
     return LocalisedDetection(
         found.kind,
         add(p_world_m, rotate(R_world_camera, found.p_camera_m)),
@@ -34,4 +34,5 @@ def placed(found: DetectionInCamera, R_world_camera: Mat3, p_world_m: Vec3) -> L
         found.compact,
         found.thickness_m,
         found.from_side,
+        None if upper is None else add(p_world_m, rotate(R_world_camera, upper)),
     )

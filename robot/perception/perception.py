@@ -6,6 +6,7 @@ that of other things (hand_ownership); a tracker gives all of them identities an
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from math import cos, hypot, radians, sqrt
 
 import numpy as np
@@ -36,7 +37,7 @@ from gazerig.robot.perception.kalman import Variances
 from gazerig.robot.perception.localisation import placed
 from gazerig.robot.perception.mesh_reading import EYES_SHUT
 from gazerig.robot.perception.own_body import OwnParts, own_named
-from gazerig.robot.perception.tracker import Track, Tracker
+from gazerig.robot.perception.tracker import UNNAMED, LocalisedDetection, Track, Tracker
 
 # The head's turn at a capture is taken over so long before and after it.
 _HALF_TURN_S = 0.015
@@ -126,13 +127,14 @@ class Perception:
             known = self._known(t_s)
             things = self._hands.named(things, known_faces(faces, known), p, t_s)
             faces, things = without_own_motion(faces, things, known, p)
+            things = [_at_head(thing) for thing in things]
         self._tracks = tracks = self._tracker.step([*faces, *things], p, t_s)
         self._p_camera = p
         self._note_residual(t_s, poses)
         self._percept = Percept(
             t_s,
             _bodies(tracks),
-            tuple(self._face(track) for track in tracks if track.detection.kind == "face"),
+            tuple(self._face(track) for track in tracks if self._tracker.shows_face(track)),
             self._cuts,
         )
         return self._percept
@@ -175,7 +177,7 @@ class Perception:
         return [
             (add(t.p_world_m, scale(t.v_world_m_s, t_s - t.at_s)), t.v_world_m_s)
             for t in self._tracks
-            if t.detection.kind == "face"
+            if t.is_person
         ]
 
     def _note_residual(self, t_s: float, poses: PoseHistory) -> None:
@@ -199,7 +201,7 @@ class Perception:
     def _face(self, track: Track) -> Face:
         """Return a tracked face with its eight parts."""
         R = track.R_world_face
-        assert R is not None  # faces are tracked with their pose
+        assert R is not None  # faces that are seen are tracked with their pose
         p = track.p_world_m
         across_sd, along_sd = _deviations(track)
         found = track.detection
@@ -255,6 +257,13 @@ class Perception:
             for at, own in self._parts
         ]
         return tuple(parts)
+
+
+def _at_head(thing: LocalisedDetection) -> LocalisedDetection:
+    """Return a patch that may be somebody who walks where their head is: not at the feet."""
+    if thing.kind != UNNAMED or thing.upper_m is None:
+        return thing
+    return replace(thing, p_world_m=thing.upper_m)
 
 
 def _deviations(track: Track) -> tuple[float, float]:

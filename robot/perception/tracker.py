@@ -7,6 +7,7 @@ the detection by a Kalman filter of direction and range (kalman).
 """
 
 from dataclasses import dataclass
+from math import inf
 
 from gazerig.drivers.located_frame import FaceSigns
 from gazerig.gaze.angles import add, cross, scale, sub, unit
@@ -24,6 +25,8 @@ from gazerig.robot.perception.gaze_at_head import SeenEyes
 from gazerig.robot.perception.kalman import ProcessNoise, TrackFilter, sight
 from gazerig.robot.perception.speech import NO_SPEECH, Speech
 
+FACE = "face"
+"""What people are called, also while their face is not seen."""
 UNNAMED = "thing"
 """What a moving patch is called whose kind is not known; a named one is always itself."""
 
@@ -32,7 +35,7 @@ UNNAMED = "thing"
 class LocalisedDetection:
     """One thing as one frame shows it, placed in the world.
 
-    R_world_face: axes of a face, None of anything else
+    R_world_face: axes of a face, None of anything else and of a person whose face is not seen
     face_length: of a face, in lengths of the canonical one
     depth_measured: whether the distance was measured by the camera; else a face's is from
         its size and a thing's is assumed
@@ -46,6 +49,7 @@ class LocalisedDetection:
     gaze_world: of a face, direction of the gaze of the eyes, None where it is unknown
     fastest_m, fastest_m_s: of what moves, place and velocity of its fastest part
     signs: of a face, what eyes and mouth do, None where they are not found
+    upper_m: of what moves and is upright, place of its upper end, where a person's head is
     compact: of what moves, whether its patch is about as wide as high and full, as a fist's or a
         hand's alone is and an arm's is not
     thickness_m: of what moves, diameter of the largest disc within its patch, as far away as its
@@ -75,13 +79,16 @@ class LocalisedDetection:
     compact: bool = False
     thickness_m: float = 0.0
     from_side: bool = False
+    upper_m: Vec3 | None = None
 
 
 @dataclass(slots=True)
 class Track:
     """One thing through time.
 
+    R_world_face: axes of a face; None of anything else, and while the person's face is not seen
     seen_s, at_s: capture times of its last detection and of its place
+    faced_s: of a person, capture time of the last detection of the face
     face_size: of a face, its size over an adult's, learned where the camera measures depth
     depth_s: capture time of the last measured distance, None before the first
     looks_at_head: of a face, whether the person looked at the head in its last frame; None where
@@ -102,6 +109,7 @@ class Track:
     looks_at_head: bool | None = None
     speech: Speech = NO_SPEECH
     eyes: SeenEyes | None = None
+    faced_s: float = -inf
 
     @property
     def p_world_m(self) -> Vec3:
@@ -115,10 +123,18 @@ class Track:
 
     @property
     def depth_from(self) -> str:
-        """Return the source of its distance: "camera", "face size" or "assumed"."""
+        """Return the source of its distance: "camera", "face size" or "assumed".
+
+        That of a person whose face is not seen is from the size of the body.
+        """
         if self.detection.depth_measured:
             return "camera"
-        return "face size" if self.R_world_face is not None else "assumed"
+        return "face size" if self.is_person else "assumed"
+
+    @property
+    def is_person(self) -> bool:
+        """Return whether it is a person, with a visible face or without."""
+        return self.detection.kind == FACE
 
 
 class Tracker:
@@ -136,8 +152,7 @@ class Tracker:
         self._of_faces = ProcessNoise(params.quiet_accel_m_s2, lively)
         self._of_things = ProcessNoise(params.things_accel_m_s2, lively)
         for track in self._tracks:
-            is_face = track.detection.R_world_face is not None
-            track.filter.retune(self._of_faces if is_face else self._of_things)
+            track.filter.retune(self._of_faces if track.is_person else self._of_things)
 
     def forget(self) -> None:
         """End all identities: another scene is shown. Numbers are not used again."""
@@ -174,14 +189,22 @@ class Tracker:
             for t in self._tracks
             if t_s - t.seen_s <= self._kept_s(t) and not _became_another(t, renamed)
         ]
+        return tuple([t for t in self._tracks if t_s - t.seen_s <= self._coasts_s(t)])
+
+    def shows_face(self, track: Track) -> bool:
+        """Return whether the face of a person was seen a short while ago."""
         coast_s = self._params.coast_ms / 1e3
-        return tuple([t for t in self._tracks if t_s - t.seen_s <= coast_s])
+        return track.R_world_face is not None and track.at_s - track.faced_s <= coast_s
+
+    def _coasts_s(self, track: Track) -> float:
+        """Return how long a track without a detection is still reported."""
+        by_body = track.is_person and track.seen_s > track.faced_s
+        return (self._params.coast_person_ms if by_body else self._params.coast_ms) / 1e3
 
     def _kept_s(self, track: Track) -> float:
         """Return how long a track is kept without a detection."""
         par = self._params
-        is_face = track.R_world_face is not None
-        return max(par.forget_ms / 1e3, par.remember_face_s if is_face else 0.0)
+        return max(par.forget_ms / 1e3, par.remember_face_s if track.is_person else 0.0)
 
     def _remembered(self, track: Track) -> bool:
         """Return whether a track is so long out of sight that it is taken to stay where it was."""
@@ -198,7 +221,7 @@ class Tracker:
                 found.across_sd_m,
                 found.along_sd_m,
                 found.radius_m,
-                not found.depth_measured,
+                not found.depth_measured and found.R_world_face is not None,
             )
             for found in detections
         ]
@@ -235,12 +258,13 @@ class Tracker:
                 p_camera,
                 (detection.across_sd_m, detection.along_sd_m),
                 self._params.first_speed_m_s,
-                self._of_faces if detection.R_world_face is not None else self._of_things,
+                self._of_faces if detection.kind == FACE else self._of_things,
             ),
             detection.R_world_face,
             t_s,
             t_s,
             detection.face_length,
+            faced_s=t_s if detection.R_world_face is not None else -inf,
         )
         self._next_id += 1
         self._learn_size(track, detection, 1.0)
@@ -252,14 +276,22 @@ class Tracker:
         place = sized(track, detection, p_camera)
         track.filter.correct(place, detection.across_sd_m, detection.along_sd_m)
         _correct_velocity(track, detection)
+        track.seen_s = track.at_s
+        R = detection.R_world_face
+        if R is None and self.shows_face(track):
+            return  # the face was missed in this frame
         gain = self._params.shape_gain
-        if track.R_world_face is not None and detection.R_world_face is not None:
-            track.R_world_face = blended(
-                track.R_world_face, detection.R_world_face, self._params.turn_gain
-            )
-            track.face_length += gain * (detection.face_length - track.face_length)
+        if R is None:
+            track.R_world_face = track.looks_at_head = None
+        else:
+            before, track.faced_s = track.R_world_face, track.at_s
+            if before is None:
+                track.R_world_face, track.face_length = R, detection.face_length
+            else:
+                track.R_world_face = blended(before, R, self._params.turn_gain)
+                track.face_length += gain * (detection.face_length - track.face_length)
         self._learn_size(track, detection, gain)
-        track.detection, track.seen_s = detection, track.at_s
+        track.detection = detection
 
     def _learn_size(self, track: Track, detection: LocalisedDetection, gain: float) -> None:
         """Learn how large a face is where its distance is known otherwise."""
@@ -293,7 +325,8 @@ def _sight(p_m: Vec3, p_camera: Vec3) -> tuple[float, float, float, float]:
 
 def sized(track: Track, detection: LocalisedDetection, p_camera: Vec3) -> Vec3:
     """Return a detection's position with its distance corrected by the learned size of the face."""
-    if detection.depth_measured or track.depth_s is None:
+    by_face = detection.R_world_face is not None
+    if detection.depth_measured or track.depth_s is None or not by_face:
         return detection.p_world_m
     return add(p_camera, scale(sub(detection.p_world_m, p_camera), track.face_size))
 

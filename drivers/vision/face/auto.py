@@ -28,7 +28,8 @@ from gazerig.drivers.vision.face.mtcnn_networks import (
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.face.preprocess import Prepared, as_bgr, largest_first, prepare
 from gazerig.drivers.vision.face.search_plan import Tile, far_tiles
-from gazerig.drivers.vision.face.yunet_network import YunetNetwork, face_of_row, found_file
+from gazerig.drivers.vision.face.yunet_network import YunetNetwork, face_of_row
+from gazerig.drivers.vision.model_files import yunet_file
 
 # Confidence that passes MTCNN's first network in a tile. At 0.8 twice as many pass, and no face
 # is found more.
@@ -109,7 +110,7 @@ class AutoDetector:
 
     def _optional_yunet(self) -> YunetNetwork | None:
         """Return YuNet where the user has its file."""
-        file = self._params.model_file or found_file()
+        file = self._params.model_file or yunet_file()
         if not file:
             return None
         try:

@@ -53,18 +53,22 @@ YUNET = DetectorPlugin(_yunet, FaceDetectorParams, ("landmarks",))
 
 
 def face_detector(params: FaceDetectorParams) -> FaceDetector:
-    """Make the detector that the parameters name, with meshes of the nearest faces where wanted.
+    """Make the detector that the parameters name, with meshes and people where wanted.
 
     Raises:
         ModelFileError: a model file is missing or not what it should be.
         PluginError: the detector is another package's and cannot be made.
     """
     detector = _finder(params)
-    if params.mesh_faces == 0:
-        return detector
-    from gazerig.drivers.vision.face.mesh import MeshedDetector
+    if params.mesh_faces > 0:
+        from gazerig.drivers.vision.face.mesh import MeshedDetector
 
-    return MeshedDetector(detector, params.mesh_faces)
+        detector = MeshedDetector(detector, params.mesh_faces)
+    if params.people_hz > 0.0:
+        from gazerig.drivers.vision.people import with_people
+
+        detector = with_people(detector, params)
+    return detector
 
 
 def _finder(params: FaceDetectorParams) -> FaceDetector:

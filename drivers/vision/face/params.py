@@ -1,4 +1,4 @@
-"""Parameters of every face detector."""
+"""Parameters of every detector of faces and people."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -8,7 +8,7 @@ from gazerig.params import Bounds, Choices
 
 @dataclass(frozen=True)
 class FaceDetectorParams:
-    """Which network looks for faces, and how small, how sure and how thorough it is."""
+    """Which network looks for faces and people, and how small, how sure and how thorough it is."""
 
     # fmt: off
     kind: Annotated[str, Choices("auto", "mtcnn", "yunet"),
@@ -24,4 +24,7 @@ class FaceDetectorParams:
         "auto: width of the frame in which far faces of 12 pixels are searched, tile by tile; 0: none"] = 768
     mesh_faces: Annotated[int, Bounds(0, 4),
         "of so many faces, the largest first, a dense mesh tells pose, gaze, lids and lips; needs gazerig models fetch mesh"] = 0
+    people_hz: Annotated[float, Bounds(0, 30),
+        "searches a second for people whose face is not visible; 0: none; needs gazerig models fetch people and gazerig[people]"] = 2.0
+    people_confidence: Annotated[float, Bounds(0.1, 1), "people detected with a lower confidence are discarded"] = 0.6
     # fmt: on

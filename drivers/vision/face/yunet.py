@@ -5,7 +5,8 @@ import numpy as np
 from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.face.preprocess import largest_first, prepare
-from gazerig.drivers.vision.face.yunet_network import YunetNetwork, face_of_row, found_file
+from gazerig.drivers.vision.face.yunet_network import YunetNetwork, face_of_row
+from gazerig.drivers.vision.model_files import yunet_file
 
 
 class YunetDetector:
@@ -18,7 +19,7 @@ class YunetDetector:
             ModelFileError: the file is missing or is not YuNet.
         """
         self._params = params
-        self._network = YunetNetwork(model_file or found_file())
+        self._network = YunetNetwork(model_file or yunet_file())
 
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
         """Find faces, the largest first, in pixels of the image given."""

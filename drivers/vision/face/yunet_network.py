@@ -10,7 +10,7 @@ from gazerig.drivers.camera.quiet_opencv import quiet_opencv
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.types import DetectedFace, ImageArray
 from gazerig.drivers.vision.face.preprocess import with_contrast
-from gazerig.drivers.vision.model_files import YUNET, data_folder, models_folder
+from gazerig.drivers.vision.model_files import YUNET
 
 _CURE = f"{YUNET.cure}, or name a YuNet file of the OpenCV zoo as model_file"
 # Boxes that share more than this part of their union are the same face, and the most
@@ -56,17 +56,6 @@ class YunetNetwork:
             return np.zeros((0, 15))
         found = np.asarray(rows, dtype=np.float64)
         return found[np.isfinite(found).all(axis=1)]
-
-
-def found_file() -> str:
-    """Return the newest YuNet file of the user, "" if there is none.
-
-    It is in the folder of models, or in the one above, where a file was put by hand.
-    """
-    for folder in (models_folder(), data_folder()):
-        if found := max(map(str, folder.glob("face_detection_yunet_*.onnx")), default=""):
-            return found
-    return ""
 
 
 def face_of_row(row: NDArray[np.float64]) -> DetectedFace:

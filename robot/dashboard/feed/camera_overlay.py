@@ -6,7 +6,14 @@ import cv2
 import numpy as np
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.types import Depth, DetectedFace, Detections, ImageArray, MovingBlob
+from gazerig.drivers.types import (
+    Depth,
+    DetectedFace,
+    DetectedPerson,
+    Detections,
+    ImageArray,
+    MovingBlob,
+)
 from gazerig.gaze.types import Floats
 from gazerig.robot.dashboard.feed.gaze_heat import draw_heat
 from gazerig.robot.model.intrinsics import project
@@ -48,6 +55,8 @@ def draw_detections(
     drawn = _small(image, detections, scale)
     if heat_px is not None:
         draw_heat(drawn, scale * heat_px)
+    for person in detections.people if faces else ():
+        _draw_person(drawn, person, scale)
     for face in detections.faces if faces else ():
         _draw_face(drawn, face, scale)
     for blob in detections.blobs if faces else ():
@@ -138,6 +147,14 @@ def _draw_face(drawn: ImageArray, face: DetectedFace, scale: float) -> None:
     _write(drawn, f"{face.confidence:.2f}", corner, _FACE)
     for landmark_x, landmark_y in face.landmarks_px:
         cv2.circle(drawn, _pixel(landmark_x, landmark_y, scale), 2, _LANDMARK, -1, cv2.LINE_AA)
+
+
+def _draw_person(drawn: ImageArray, person: DetectedPerson, scale: float) -> None:
+    x, y, width, height = person.box_px
+    corners = _pixel(x, y, scale), _pixel(x + width, y + height, scale)
+    cv2.rectangle(drawn, *corners, _FACE, 1, cv2.LINE_AA)
+    cv2.circle(drawn, _pixel(*person.head_px, scale), 4, _FACE, 1, cv2.LINE_AA)
+    _write(drawn, f"person {person.confidence:.2f}", corners[0], _FACE)
 
 
 def _draw_blob(drawn: ImageArray, blob: MovingBlob, lens: Intrinsics, scale: float) -> None:

@@ -15,7 +15,14 @@ from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.passed_image import PassedImage, taken
-from gazerig.drivers.types import BusHealth, DetectedFace, Detections, ImageArray, MovingBlob
+from gazerig.drivers.types import (
+    BusHealth,
+    DetectedFace,
+    DetectedPerson,
+    Detections,
+    ImageArray,
+    MovingBlob,
+)
 from gazerig.gaze.types import Floats, Mat3, Percept, Vec3
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickRow, decode_plain, decode_rows, encode
@@ -45,6 +52,7 @@ class LiveRig(NamedTuple):
     emulated: its servos are, and nobody calibrates them
     picture: draws what a simulated camera sees; None where there is none, or it gives images
     world: how the simulated world about the rig looks; None without one
+    detector: what finds faces and people, and what it lacks; "" if none runs
     """
 
     rate_hz: float
@@ -52,6 +60,7 @@ class LiveRig(NamedTuple):
     emulated: bool = False
     picture: SceneView | None = None
     world: WorldShapes | None = None
+    detector: str = ""
 
 
 class WorldNow(NamedTuple):
@@ -83,6 +92,7 @@ class FrameHead(NamedTuple):
     """What was found in a frame, as far as it is drawn, and what goes along with it.
 
     faces: box, landmarks and confidence; blobs: id, kind, position and radius
+    people: box, middle of the head, size of the trunk and confidence
     lens: by which the frame was located, else as the camera reports it: fx, fy, cx, cy in pixels
         and five numbers of distortion
     shape, dtype: of the array in the memory that goes along; None, "" without one
@@ -100,6 +110,7 @@ class FrameHead(NamedTuple):
     dtype: str
     depth: bool
     wants_depth: bool
+    people: Sequence[tuple[Any, Any, float, float]] = ()
 
 
 def rig_message(rig: LiveRig) -> bytes:
@@ -129,6 +140,7 @@ def frame_message(
         image.dtype if image is not None else "",
         depth,
         wants_depth,
+        [(one.box_px, one.head_px, one.trunk_px, one.confidence) for one in found.people],
     )
     return DETECTED + encode(head)
 
@@ -158,6 +170,7 @@ class LiveFeed:
         self.shown_s: float | None = None
         self._picture: SceneView | None = None
         self._world: WorldShapes | None = None
+        self._detector = ""
         self._trail = GazeTrail()
         self._builder: SnapshotBuilder | None = None
         self._poses: PoseHistory | None = None
@@ -195,7 +208,8 @@ class LiveFeed:
             return None
         self._new_ticks = False
         state, tick = self._state, self._newest
-        perception = perception_text(tick, ResidualFigures(*state.residual))
+        seen = perception_text(tick, ResidualFigures(*state.residual))
+        perception = " | ".join(filter(None, (seen, self._detector)))
         health = health_text(BusHealth(0, 0, state.errors))
         return self._builder.take(
             SnapshotTexts(
@@ -264,7 +278,7 @@ class LiveFeed:
         self._builder.rig = rig.shown
         self._builder.retune(rig.rate_hz)
         self.emulated = rig.emulated
-        self._picture = rig.picture
+        self._picture, self._detector = rig.picture, rig.detector
         # Sent again with every change of the rig; what is equal stays, for it is drawn already.
         if pickle.dumps(rig.world) != pickle.dumps(self._world):
             self._world = rig.world
@@ -300,6 +314,7 @@ class LiveFeed:
             tuple([DetectedFace(box, np.array(marks), sure) for box, marks, sure in head.faces]),
             tuple([MovingBlob(*blob) for blob in head.blobs]),
             lens=None if head.lens is None else _intrinsics(*head.lens),
+            people=tuple([DetectedPerson(*one) for one in head.people]),
         )
         if head.shape is not None and (fd >= 0 or pixels is not None):
             if pixels is None:

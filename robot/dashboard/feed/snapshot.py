@@ -271,14 +271,20 @@ def _faces(tick: Tick) -> tuple[SeenFace, ...]:
 
 
 def _bodies(tick: Tick) -> tuple[SeenBody, ...]:
-    """Return what moves and is no face."""
+    """Return what has no visible face: what moves, and people who are turned away."""
     if tick.percept is None:
         return ()
     bodies = tick.percept.bodies
+    faces = {face.id for face in tick.percept.faces}
     return tuple(
-        SeenBody(bodies.ids[i], kind, _vec(bodies.p_world_m[i]), float(bodies.radius_m[i]))
+        SeenBody(
+            bodies.ids[i],
+            "person" if kind == "face" else kind,
+            _vec(bodies.p_world_m[i]),
+            float(bodies.radius_m[i]),
+        )
         for i, kind in enumerate(bodies.kinds)
-        if kind != "face"
+        if bodies.ids[i] not in faces
     )
 
 

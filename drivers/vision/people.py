@@ -1,0 +1,258 @@
+"""People whose face need not be visible: turned away, in profile, hands before the face.
+
+The network is the person detector of MediaPipe's BlazePose, run by LiteRT. It sees one person
+well in a square of 224 pixels, so a search looks at overlapping squares as high as the frame, one
+in each frame, and of each counts what is in the strip that no other square shows better.
+
+Source: Bazarevsky et al., "BlazePose: on-device real-time body pose tracking" (2020). Input and
+output: opencv_zoo, models/person_detection_mediapipe.
+"""
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from math import ceil, hypot
+from typing import Any, NamedTuple, Protocol
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.drivers.errors import ModelFileError
+from gazerig.drivers.event_log import EventLog
+from gazerig.drivers.extras import extra_hint
+from gazerig.drivers.types import DetectedFace, DetectedPerson, FaceDetector, ImageArray
+from gazerig.drivers.vision.face.crops import cut_square
+from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.drivers.vision.face.preprocess import as_bgr
+from gazerig.drivers.vision.model_files import PEOPLE
+
+Floats = NDArray[np.float32]
+
+_SIDE_PX = 224
+# Cells of the anchors: pixels of a cell, and anchors in each.
+_CELLS = ((8, 2), (16, 2), (32, 6))
+# Neighbouring squares lie this part of their side apart.
+_STEP = 0.5
+# People within this part of the side of the border of two squares count in both, one frame apart.
+_BOTH = 0.05
+# Heads nearer to each other than this part of the trunk are one person's.
+_SAME = 0.35
+# A body reaches this part of the trunk, from head to hips, to either side.
+_HALF_WIDTH = 0.35
+
+
+class Network(Protocol):
+    """Runs the network."""
+
+    def __call__(self, square: Floats) -> tuple[Floats, Floats]:
+        """Return boxes with points (2254, 12) and scores (2254,) of an RGB square, -1..1."""
+        ...
+
+
+class _Square(NamedTuple):
+    """A square of a frame, and from where to where across it its people count, in pixels."""
+
+    left: float
+    side: float
+    least_x: float
+    most_x: float
+
+
+class PeopleDetector:
+    """Finds people in frames, a part of each frame at a time.
+
+    Args:
+        params: how often, and how sure.
+        network: runs the network.
+    """
+
+    def __init__(self, params: FaceDetectorParams, network: Network) -> None:
+        self._params, self._network = params, network
+        self._anchors = _anchors()
+        self._next = 0
+        self._due_s = self._started_s = -np.inf
+
+    def find(self, image: ImageArray, captured_s: float) -> tuple[DetectedPerson, ...]:
+        """Return the people in the part of a frame whose turn it is; none while no search is due.
+
+        Args:
+            image: the frame.
+            captured_s: when it was taken; searches are counted by it.
+        """
+        if captured_s < self._due_s or image.size == 0:
+            return ()
+        frame = as_bgr(image)
+        squares = _squares(frame.shape[1], frame.shape[0])
+        self._next %= len(squares)
+        if self._next == 0:
+            self._started_s = captured_s
+        square = squares[self._next]
+        self._next = (self._next + 1) % len(squares)
+        if self._next == 0:
+            self._due_s = self._started_s + 1.0 / self._params.people_hz
+        return self._in_square(frame, square)
+
+    def _in_square(self, frame: ImageArray, square: _Square) -> tuple[DetectedPerson, ...]:
+        """Return the people in a square, the surest first."""
+        box = np.array([square.left, 0.0, square.left + square.side, square.side])
+        part, where = cut_square(frame, box, _SIDE_PX)
+        rgb = cv2.cvtColor(part, cv2.COLOR_BGR2RGB).astype(np.float32)
+        boxes, scores = self._network(rgb / np.float32(127.5) - np.float32(1.0))
+        sure = 1.0 / (1.0 + np.exp(-np.clip(scores, -50.0, 50.0).astype(np.float64)))
+        rows = np.flatnonzero(sure >= self._params.people_confidence)
+        # Face centre, hips and the top of the body's circle, from the anchor.
+        points = boxes[rows][:, (0, 1, 4, 5, 6, 7)].reshape(-1, 3, 2) / _SIDE_PX
+        points = (points + self._anchors[rows][:, None]) * (where[2] - where[0]) + where[:2] - 0.5
+        found: list[DetectedPerson] = []
+        for row in np.argsort(-sure[rows], kind="stable"):
+            person = _person(points[row], float(sure[rows[row]]))
+            if person is None or not square.least_x <= person.head_px[0] < square.most_x:
+                continue
+            if not any(_is_same(person, other) for other in found):
+                found.append(person)
+        return tuple(found)
+
+
+def _squares(width: int, height: int) -> list[_Square]:
+    """Return overlapping squares as high as a frame that cover it."""
+    count = max(1, ceil((width - height) / (_STEP * height)) + 1)
+    if count == 1:
+        side = float(max(width, height))
+        return [_Square((width - side) / 2.0, side, -np.inf, np.inf)]
+    apart = (width - height) / (count - 1)
+    edges = [-np.inf, *[(i + 0.5) * apart + height / 2.0 for i in range(count - 1)], np.inf]
+    both = _BOTH * height
+    return [
+        _Square(i * apart, float(height), edges[i] - both, edges[i + 1] + both)
+        for i in range(count)
+    ]
+
+
+def _anchors() -> NDArray[np.float64]:
+    """Return the places (2254, 2) from which boxes and points count, in sides of the square."""
+    levels = []
+    for cell, count in _CELLS:
+        across = (np.arange(_SIDE_PX // cell) + 0.5) * cell / _SIDE_PX
+        y, x = np.meshgrid(across, across, indexing="ij")
+        levels.append(np.column_stack([x.ravel(), y.ravel()]).repeat(count, axis=0))
+    return np.concatenate(levels)
+
+
+def _person(points: NDArray[np.float64], confidence: float) -> DetectedPerson | None:
+    """Return a person, None where the points are none of an upright body.
+
+    Args:
+        points: (3, 2) the face's centre, the middle of the hips, and the top of the circle about
+            them that holds the body, in pixels.
+        confidence: 0..1.
+    """
+    (face_x, face_y), (hips_x, hips_y), (top_x, top_y) = points.tolist()
+    trunk = hypot(top_x - hips_x, top_y - hips_y)
+    head = (face_x + top_x) / 2.0, (face_y + top_y) / 2.0
+    if not (np.isfinite(points).all() and trunk > 1.0 and head[1] < hips_y):
+        return None
+    half = _HALF_WIDTH * trunk
+    left, right = min(head[0], hips_x) - half, max(head[0], hips_x) + half
+    return DetectedPerson((left, top_y, right - left, hips_y - top_y), head, trunk, confidence)
+
+
+def _is_same(one: DetectedPerson, other: DetectedPerson) -> bool:
+    """Return whether two detections are of one person."""
+    apart = hypot(one.head_px[0] - other.head_px[0], one.head_px[1] - other.head_px[1])
+    return apart < _SAME * max(one.trunk_px, other.trunk_px)
+
+
+class DetectorWithPeople:
+    """A face detector that also finds people whose face is not visible.
+
+    Args:
+        detector: finds faces.
+        people: finds people; None: it cannot.
+        fault: why it cannot, as one line.
+    """
+
+    def __init__(
+        self, detector: FaceDetector, people: PeopleDetector | None, fault: str = ""
+    ) -> None:
+        self._detector, self._people = detector, people
+        self._log = EventLog()
+        if fault:
+            self._log.add(fault)
+
+    def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
+        """Find faces, the largest first, in pixels of the image given."""
+        return self._detector.find(image)
+
+    def people(self, image: ImageArray, captured_s: float) -> tuple[DetectedPerson, ...]:
+        """Find people; see ``PeopleDetector.find``."""
+        return () if self._people is None else self._people.find(image, captured_s)
+
+    def meshed(
+        self, image: ImageArray, faces: tuple[DetectedFace, ...]
+    ) -> tuple[DetectedFace, ...]:
+        """Return faces that a camera itself has found, with meshes where they are wanted."""
+        meshed: Callable[..., Any] | None = getattr(self._detector, "meshed", None)
+        return faces if meshed is None else tuple(meshed(image, faces))
+
+    def events(self) -> tuple[str, ...]:
+        """Return what happened since the last call, one line each."""
+        events = getattr(self._detector, "events", None)
+        return (*self._log.drain(), *(events() if events is not None else ()))
+
+
+def with_people(detector: FaceDetector, params: FaceDetectorParams) -> FaceDetector:
+    """Return a detector that also finds people, or the one given if there is no file for that.
+
+    A file that cannot be used is reported as an event.
+    """
+    try:
+        network = _load()
+    except ModelFileError as error:
+        fault = f"{error}; until then people without a visible face are not found"
+        return DetectorWithPeople(detector, None, fault)
+    if network is None:
+        return detector
+    return DetectorWithPeople(detector, PeopleDetector(params, network))
+
+
+def _load() -> Network | None:
+    """Return the network, None if the user has no file of it.
+
+    Raises:
+        ModelFileError: the file is damaged, or LiteRT is not installed.
+    """
+    try:
+        content = PEOPLE.read()
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError as error:
+        raise ModelFileError(f"cannot read {PEOPLE.path} ({error.strerror})") from error
+    try:
+        from ai_edge_litert.interpreter import Interpreter
+    except ImportError as error:
+        raise ModelFileError(extra_hint("ai-edge-litert", "people", error)) from error
+    with _quiet_stderr():
+        net = Interpreter(model_content=content, num_threads=1)
+        net.allocate_tensors()
+    (given,), (boxes, scores) = net.get_input_details(), net.get_output_details()
+
+    def run(square: Floats) -> tuple[Floats, Floats]:
+        net.set_tensor(given["index"], square[np.newaxis])
+        net.invoke()
+        return net.get_tensor(boxes["index"])[0], net.get_tensor(scores["index"])[0, :, 0]
+
+    return run
+
+
+@contextmanager
+def _quiet_stderr() -> Iterator[None]:
+    """Keep LiteRT's greeting, which native code writes, off the terminal."""
+    kept = os.dup(2)
+    with open(os.devnull, "w") as nothing:
+        os.dup2(nothing.fileno(), 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)

@@ -1,0 +1,343 @@
+"""People whose face is not visible: found a part of a frame at a time, tracked, and looked at."""
+
+import pickle
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from math import radians
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from present import present
+from test_perception import HEIGHT, LENS, STILL, WIDTH, face_at
+from test_perception import seen as percept_at
+from test_scanpath import walker
+
+from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
+from gazerig.drivers.camera.guarded_camera import fault_of
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.types import DetectedPerson, ImageArray, MovingBlob
+from gazerig.drivers.vision.detector_status import detector_status
+from gazerig.drivers.vision.face.auto import AutoDetector
+from gazerig.drivers.vision.face.detector import face_detector
+from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.drivers.vision.model_files import FOLDER_VARIABLE, PEOPLE, YUNET
+from gazerig.drivers.vision.people import DetectorWithPeople, PeopleDetector, _anchors, with_people
+from gazerig.gaze.angles import norm
+from gazerig.gaze.types import Percept, Target, Vec3
+from gazerig.robot.dashboard.feed.camera_overlay import draw_detections
+from gazerig.robot.model.intrinsics import project
+from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.perception.frame_locator import FrameLocator, Reading
+from gazerig.robot.perception.perception import Perception
+from gazerig.robot.perception.tracker import Tracker
+
+MODELS = Path(sys.prefix) / "models"
+FILM = Path(__file__).parents[2] / "shared" / "media" / "people_from_behind.mp4"
+NEEDS_NETWORK = pytest.mark.skipif(
+    not (MODELS / PEOPLE.file).exists(), reason=f"needs {PEOPLE.file}: make test fetches it"
+)
+ANCHORS = _anchors()
+TRUNK_M = 0.83
+
+
+class Seen:
+    """A network that sees people at given places of a frame; it counts how often it is run.
+
+    people: (head x, head y, trunk, score) in pixels of the frame
+    """
+
+    def __init__(self, people: Sequence[tuple[float, float, float, float]], side: float) -> None:
+        self.people, self.side = people, side
+        self.left_of: list[float] = []
+        self.runs = 0
+
+    def __call__(self, square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        assert square.shape == (224, 224, 3) and square.min() >= -1.0 and square.max() <= 1.0
+        left = self.left_of[self.runs % len(self.left_of)]
+        self.runs += 1
+        boxes, scores = np.zeros((2254, 12), np.float32), np.full(2254, -9.0, np.float32)
+        for row, (x, y, trunk, score) in enumerate(self.people):
+            for again in (0, 1):  # neighbouring anchors see the same person
+                at = 300 + 10 * row + again
+                # The face's centre, unused sizes, hips, and the top of the circle.
+                head = np.array([x - left, y])
+                three = head + [(0.0, 0.1 * trunk), (0.0, 0.9 * trunk), (0.0, -0.1 * trunk)]
+                spots = (three + 0.5) / self.side - ANCHORS[at]
+                boxes[at, (0, 1, 4, 5, 6, 7)] = 224.0 * spots.ravel()
+                scores[at] = np.log(score / (1.0 - score)) - 0.01 * again
+        return boxes, scores
+
+
+def found_in(
+    size: tuple[int, int], lefts: list[float], *people: tuple[float, float, float, float]
+) -> list[list[DetectedPerson]]:
+    """What is found in each square of a frame."""
+    network = Seen(people, float(max(size[1], size[0] if len(lefts) == 1 else 0)))
+    network.left_of = lefts
+    detector = PeopleDetector(FaceDetectorParams(), network)
+    frame = np.full((size[1], size[0], 3), 90, np.uint8)
+    return [list(detector.find(frame, 0.03 * i)) for i in range(len(lefts))]
+
+
+# ---- the detector -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("size", "lefts"),
+    [((640, 480), [0.0, 160.0]), ((768, 432), [0.0, 168.0, 336.0]), ((480, 640), [-80.0])],
+)
+def test_people_are_found_where_they_are_in_one_of_the_squares(
+    size: tuple[int, int], lefts: list[float]
+) -> None:
+    for x in np.linspace(0.1, 0.9, 7) * size[0]:
+        one, *again = [p for some in found_in(size, lefts, (x, 90.0, 200.0, 0.9)) for p in some]
+        assert len(again) <= 1
+        assert one.head_px == pytest.approx((x, 90.0), abs=0.01)
+        assert one.trunk_px == pytest.approx(200.0, abs=0.01)
+        assert one.confidence == pytest.approx(0.9, abs=1e-3)
+        left, top, width, height = one.box_px
+        assert left < x < left + width and top == pytest.approx(70.0, abs=0.01)
+        assert top + height == pytest.approx(270.0, abs=0.01)
+
+
+def test_two_people_are_two_and_one_who_is_unsure_or_upside_down_is_none() -> None:
+    near, far, unsure = (
+        (200.0, 90.0, 200.0, 0.9),
+        (290.0, 90.0, 150.0, 0.8),
+        (60.0, 90.0, 99.0, 0.5),
+    )
+    left, right = found_in((640, 480), [0.0, 160.0], far, near, unsure)
+    assert [p.head_px[0] for p in left] == pytest.approx([200.0, 290.0]) and right == []
+    assert found_in((640, 480), [0.0, 160.0], (200.0, 90.0, -200.0, 0.9)) == [[], []]
+    assert found_in((640, 480), [0.0, 160.0], (200.0, np.nan, 200.0, 0.9)) == [[], []]
+
+
+def test_a_square_is_looked_at_in_each_frame_until_the_search_is_done() -> None:
+    network = Seen((), 432.0)
+    network.left_of = [0.0]
+    detector = PeopleDetector(FaceDetectorParams(people_hz=2.0), network)
+    frame = np.zeros((432, 768, 3), np.uint8)
+    runs = []
+    for i in range(33):
+        before = network.runs
+        assert detector.find(frame, 10.0 + i / 30.0) == ()
+        runs.append(network.runs - before)
+    assert runs == [*[1] * 3, *[0] * 12, *[1] * 3, *[0] * 12, *[1] * 3]
+    assert detector.find(np.zeros((0, 0, 3), np.uint8), 99.0) == ()
+
+
+class Faceless:
+    def find(self, image: ImageArray) -> tuple[()]:
+        return ()
+
+
+def test_frames_carry_people_between_processes_and_the_page_draws_them() -> None:
+    network = Seen([(200.0, 90.0, 200.0, 0.9)], 480.0)
+    network.left_of = [0.0, 160.0]
+    detector = DetectorWithPeople(Faceless(), PeopleDetector(FaceDetectorParams(), network))
+    frames = FrameAnalyzer(detector, None, FrameLocator(None, radians(69.0)))
+    shown = np.full((480, 640, 3), 90, np.uint8)
+    found = frames.look(Shot(0.0, 1, shown))
+    assert pickle.loads(pickle.dumps(found.people)) == found.people and len(found.people) == 1
+    (head,) = present(found.located).faces
+    assert head.kind == "face" and head.R_camera_face is None
+    assert frames.look(Shot(0.03, 2, shown)).people == () and fault_of(found) == ""
+    drawn = draw_detections(shown, found, None, present(found.located).intrinsics)
+    assert (drawn != shown).any()
+    bad = replace(found, people=(replace(found.people[0], trunk_px=0.0),))
+    assert "a person at" in fault_of(bad)
+
+
+def test_without_the_file_the_detector_is_the_plain_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert isinstance(face_detector(FaceDetectorParams()), AutoDetector)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
+    return tmp_path
+
+
+def test_a_damaged_file_is_told_once_and_faces_are_found(folder: Path) -> None:
+    PEOPLE.path.write_bytes(b"half of it")
+    detector = with_people(Faceless(), FaceDetectorParams())
+    assert isinstance(detector, DetectorWithPeople)
+    (line,) = detector.events()
+    assert "damaged" in line and "gazerig models fetch people" in line
+    assert detector.events() == () and detector.find(np.zeros((9, 9, 3), np.uint8)) == ()
+    assert detector.people(np.zeros((9, 9, 3), np.uint8), 0.0) == ()
+    off = face_detector(FaceDetectorParams(people_hz=0.0))
+    assert isinstance(off, AutoDetector) and off.events() == ()
+
+
+def test_a_file_without_its_package_names_the_extra(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(type(PEOPLE), "is_content", lambda self, content: True)
+    PEOPLE.path.write_bytes(b"network")
+    monkeypatch.setitem(sys.modules, "ai_edge_litert.interpreter", None)
+    detector = with_people(Faceless(), FaceDetectorParams())
+    assert isinstance(detector, DetectorWithPeople)
+    (line,) = detector.events()
+    assert "pip install 'gazerig[people]'" in line
+
+
+def test_the_status_names_what_runs_and_what_brings_the_rest(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_DATA_HOME", str(folder))
+    monkeypatch.setattr(type(PEOPLE), "is_content", lambda self, content: content == b"right")
+    monkeypatch.setattr("gazerig.drivers.vision.detector_status.find_spec", lambda name: None)
+    status = detector_status(FaceDetectorParams(mesh_faces=1))
+    assert status.text == "faces by auto (MTCNN alone), people by their faces alone"
+    assert status.cure == "gazerig models fetch; pip install 'gazerig[people]'"
+    YUNET.path.write_bytes(b"wrong")
+    assert "MTCNN alone" in detector_status(FaceDetectorParams()).text
+    for file in (YUNET, PEOPLE):
+        file.path.write_bytes(b"right")
+    lacking = detector_status(FaceDetectorParams())
+    assert lacking.cure == "pip install 'gazerig[people]'" and "(YuNet and MTCNN)" in lacking.text
+    monkeypatch.setattr("gazerig.drivers.vision.detector_status.find_spec", lambda name: object())
+    assert str(detector_status(FaceDetectorParams())) == (
+        "faces by auto (YuNet and MTCNN), people also turned away"
+    )
+    assert detector_status(FaceDetectorParams(kind="mtcnn", people_hz=0.0)).cure == ""
+
+
+# ---- where they are, and who ---------------------------------------------------------------
+
+
+def person_at(p_camera_m: Vec3) -> DetectedPerson:
+    x, y = project([p_camera_m], LENS)[0].tolist()
+    trunk = LENS.fx_px * TRUNK_M / p_camera_m[2]
+    return DetectedPerson((x - 50.0, y - 0.1 * trunk, 100.0, trunk), (x, y), trunk, 0.9)
+
+
+def seeing(depth: Reading | None = None) -> Perception:
+    depth_at = None if depth is None else (lambda image, box: depth)
+    return Perception(STILL, 69.0, Tracker(TrackParams()), depth_at=depth_at)
+
+
+def at_30_hz(perception: Perception, first: int, count: int, **found: object) -> Percept:
+    """See the same in some frames; people are found in every fifteenth alone."""
+    people = found.pop("people", ())
+    for number in range(first, first + count):
+        some = people if number % 15 == 1 else ()
+        percept = percept_at(perception, number, people=some, **found)
+    return percept
+
+
+@pytest.mark.parametrize("p_m", [(0.0, 0.0, 2.0), (-0.6, -0.3, 1.2), (0.9, 0.2, 4.0)])
+def test_a_person_who_is_turned_away_is_a_body_where_the_head_is_and_no_face(p_m: Vec3) -> None:
+    percept = at_30_hz(seeing(), 1, 30, people=(person_at(p_m),))
+    assert percept.faces == () and percept.bodies.kinds == ("face",)
+    (place,) = percept.bodies.p_world_m
+    assert place == pytest.approx((p_m[2], -p_m[0], -p_m[1]), abs=0.02)  # x ahead, y left, z up
+
+
+def test_a_measured_depth_places_the_head() -> None:
+    percept = at_30_hz(seeing((1.4, 0.02, 1.0)), 1, 1, people=(person_at((0.0, 0.0, 2.0)),),
+                       depth_m=np.ones((HEIGHT, WIDTH), np.float32))  # fmt: skip
+    assert percept.bodies.p_world_m[0, 0] == pytest.approx(1.5, abs=0.01)
+    unsure = at_30_hz(seeing((1.4, 0.5, 1.0)), 1, 1, people=(person_at((0.0, 0.0, 2.0)),),
+                      depth_m=np.ones((HEIGHT, WIDTH), np.float32))  # fmt: skip
+    assert unsure.bodies.p_world_m[0, 0] == pytest.approx(2.0, abs=0.01)
+
+
+def test_a_person_with_a_visible_face_is_not_there_twice() -> None:
+    p_m = (0.2, 0.0, 1.5)
+    percept = at_30_hz(seeing(), 1, 16, people=(person_at(p_m),), faces=(face_at(p_m),))
+    assert len(percept.bodies) == len(percept.faces) == 1
+    other = at_30_hz(seeing(), 1, 16, people=(person_at((-0.5, 0.0, 1.5)),), faces=(face_at(p_m),))
+    assert len(other.bodies) == 2 and len(other.faces) == 1
+
+
+def test_a_person_who_turns_away_and_back_stays_the_same() -> None:
+    perception, p_m = seeing(), (0.2, 0.0, 1.5)
+    there = {"people": (person_at(p_m),)}
+    (face,) = at_30_hz(perception, 1, 45, **there, faces=(face_at(p_m),)).faces
+    assert face.looks_at_head
+    # The face was missed where a person is found: it is not gone.
+    (missed,) = at_30_hz(perception, 46, 1, **there).faces
+    assert missed.id == face.id
+    away = at_30_hz(perception, 47, 75, **there)
+    assert away.faces == () and away.bodies.ids == (face.id,)
+    back = at_30_hz(perception, 122, 15, **there, faces=(face_at(p_m),))
+    assert [one.id for one in back.faces] == [face.id] == list(back.bodies.ids)
+
+
+def test_a_person_who_is_gone_is_reported_for_a_while_only() -> None:
+    perception = seeing()
+    at_30_hz(perception, 1, 31, people=(person_at((0.0, 0.0, 2.0)),))
+    assert len(percept_at(perception, 60).bodies) == 1
+    assert len(percept_at(perception, 75).bodies) == 0
+
+
+def test_what_moves_below_the_head_of_a_person_who_is_turned_away_is_theirs() -> None:
+    legs = MovingBlob(7, "thing", (0.0, 0.9, 2.0), 0.2, v_camera_m_s=(0.1, 0.0, 0.0),
+                      depth_known=False, depth_sd_m=1.0)  # fmt: skip
+    percept = at_30_hz(seeing(), 1, 20, people=(person_at((0.0, 0.0, 2.0)),), blobs=(legs,))
+    assert percept.bodies.kinds == ("face",)
+    assert "thing" in at_30_hz(seeing(), 1, 20, blobs=(legs,)).bodies.kinds
+
+
+def test_somebody_who_walks_is_looked_at_at_the_upper_end_and_not_at_the_feet() -> None:
+    def place(width: float, kind: str = "thing") -> Vec3:
+        blob = MovingBlob(1, kind, (0.0, 0.0, 2.0), 0.3, depth_known=False, depth_sd_m=1.0,
+                          box_px=(320.0 - width / 2, 100.0, width, 200.0),
+                          area_px=100.0 * width)  # fmt: skip
+        percept = percept_at(seeing(), 1, blobs=(blob,))
+        x, y, z = percept.bodies.p_world_m[0].tolist()
+        return x, y, z
+
+    x, _, z = place(100.0)
+    ray = (100.0 + 200.0 / 14.0 - LENS.cy_px) / LENS.fy_px
+    assert z / x == pytest.approx(-ray, abs=1e-3) and norm((x, 0.0, z)) == pytest.approx(2.0)
+    assert place(190.0)[2] == place(100.0, "hand")[2] == pytest.approx(0.0)
+
+
+def test_the_gaze_follows_the_head_and_not_the_face_that_was_there() -> None:
+    perception, p_m = seeing(), (0.2, 0.0, 1.5)
+    with_face = at_30_hz(perception, 1, 30, faces=(face_at(p_m),))
+    id = with_face.faces[0].id
+    walk = walker()
+
+    def looked_at(percept: Percept) -> Target:
+        place = tuple(percept.bodies.p_world_m[0].tolist())
+        target = Target(
+            place, (0.0, 0.0, 0.0), percept.captured_s, "face", id, 1.0, True, None, 1, "a rule"
+        )
+        return walk.wander(target, percept, percept.captured_s, True)
+
+    assert looked_at(with_face).part is not None
+    away = at_30_hz(perception, 31, 60, people=(person_at((0.25, 0.0, 1.5)),))
+    target = looked_at(away)
+    assert target.part is None and target.p_world_m == tuple(away.bodies.p_world_m[0].tolist())
+
+
+# ---- the network ----------------------------------------------------------------------------
+
+
+@NEEDS_NETWORK
+@pytest.mark.skipif(not FILM.exists(), reason=f"no {FILM}")
+def test_people_who_stand_with_their_back_to_the_camera_are_found_and_no_table(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv(FOLDER_VARIABLE, str(MODELS))
+    detector = with_people(Faceless(), FaceDetectorParams(people_hz=30.0))
+    assert isinstance(detector, DetectorWithPeople)
+    film = cv2.VideoCapture(str(FILM))
+    found: dict[int, list[DetectedPerson]] = {}
+    for number in range(520):
+        assert film.grab()
+        if number in (10, 110, 210, 300, 400, 480):
+            frame = np.asarray(film.retrieve()[1], np.uint8)
+            squares = [detector.people(frame, number + 0.1 * i) for i in range(3)]
+            found[number] = [person for some in squares for person in some]
+    assert [n for n, people in found.items() if people] == [110, 300, 400]
+    for person in found[110]:
+        assert 440 < person.head_px[0] < 475 and 20 < person.head_px[1] < 75
+    assert capfd.readouterr().err == ""
