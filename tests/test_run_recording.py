@@ -168,7 +168,7 @@ def picked_s(rate_hz: float, times_s: Iterable[float]) -> list[float]:
 
 def test_a_late_frame_does_not_delay_those_that_follow() -> None:
     camera = (k / 100.0 for k in range(200) if not 40 <= k < 45 and not 100 <= k < 170)
-    wanted = [0.0, 0.2, 0.45, 0.6, 0.8, 1.7, 1.9]  # after a long gap it begins anew
+    wanted = [0.0, 0.2, 0.45, 0.6, 0.8, 1.7, 1.9]  # after a long gap the count starts again
     assert picked_s(5.0, camera) == pytest.approx(wanted)
 
 

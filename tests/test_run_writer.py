@@ -87,7 +87,7 @@ def test_a_full_disk_leaves_whole_chunks_alone(
     assert cut.failed == "No space left on device"
     assert cut.data == whole.data[:end]
     at = len(MAGIC)
-    while at < end:  # a kind, a length, and so many bytes
+    while at < end:  # kind, length and content
         at += 9 + int.from_bytes(cut.data[at + 1 : at + 9], "little")
     assert at == end
 
