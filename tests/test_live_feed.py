@@ -25,6 +25,7 @@ from gazerig.robot.dashboard.feed.page_feed import drain
 from gazerig.robot.dashboard.feed.page_process import URL, PageProcess
 from gazerig.robot.dashboard.feed.publisher import Publisher
 from gazerig.robot.dashboard.feed.snapshot import SnapshotBuilder, SnapshotTexts
+from gazerig.robot.dashboard.panels.servo_health import health
 from gazerig.robot.model.commands import Tune
 from gazerig.robot.model.types import Snapshot
 from gazerig.sim_mock.scenes.picture import ScenePicture
@@ -59,6 +60,7 @@ class Page:
         self.rigs = 0
         self.picture: ScenePicture | None = None
         self.world: SmallWorld | None = None
+        self.detector = ""
         self.publisher = Publisher(
             self.page, lambda: self._rig(made), lambda: self.state, None, self.said.append
         )
@@ -68,7 +70,7 @@ class Page:
 
     def _rig(self, made: Assembly) -> LiveRig:
         self.rigs += 1
-        return LiveRig(200.0, made.shown(), picture=self.picture, world=self.world)
+        return LiveRig(200.0, made.shown(), False, self.picture, self.world, self.detector)
 
     def comes_up(self) -> None:
         before = self.page.started
@@ -253,3 +255,12 @@ def test_before_a_world_has_begun_there_is_none(ran: Run, page: Page) -> None:
     page.stream.flush()
     news = drain(page.feed, page.live)
     assert news.snapshots and news.world is None
+
+
+def test_the_page_names_the_detector_and_what_it_lacks(ran: Run, page: Page) -> None:
+    page.detector = "faces by auto (MTCNN alone): gazerig models fetch yunet"
+    page.comes_up()
+    page.stream.update(ran.ticks[0])
+    page.stream.flush()
+    (shot,) = page.shown()
+    assert shot.perception.endswith(f" | {page.detector}") and page.detector in health(shot)

@@ -27,6 +27,7 @@ from gazerig.drivers.vision.model_files import FOLDER_VARIABLE, PEOPLE, YUNET
 from gazerig.drivers.vision.people import DetectorWithPeople, PeopleDetector, _anchors, with_people
 from gazerig.gaze.angles import norm
 from gazerig.gaze.types import Percept, Target, Vec3
+from gazerig.robot.cli.doctor import examine_detector
 from gazerig.robot.dashboard.feed.camera_overlay import draw_detections
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.track_params import TrackParams
@@ -205,6 +206,13 @@ def test_the_status_names_what_runs_and_what_brings_the_rest(
         "faces by auto (YuNet and MTCNN), people also turned away"
     )
     assert detector_status(FaceDetectorParams(kind="mtcnn", people_hz=0.0)).cure == ""
+
+
+def test_the_doctor_names_what_is_missing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_DATA_HOME", str(folder))
+    found = examine_detector(FaceDetectorParams())
+    assert found.level == "note" and found.remedy.startswith("gazerig models fetch")
+    assert examine_detector(FaceDetectorParams(kind="mtcnn", people_hz=0.0)).level == "ok"
 
 
 # ---- where they are, and who ---------------------------------------------------------------
