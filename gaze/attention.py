@@ -50,6 +50,9 @@ class AttentionParams:
     stale_ms: Annotated[float, Bounds(20, 10000), "a frame older than this is not used"] = 400.0
     looks_elsewhere_ratio: Annotated[float, Bounds(0, 1),
         "share of its salience that a face keeps while the person does not look at the head; 1: all"] = 0.85
+    own_motion_ratio: Annotated[float, Bounds(0, 1),
+        "share of their salience that a person's own hands and clothes keep beside the face, unless they are raised to it or held "
+        "out; the rest counts for the face; 1: all"] = 0.3
     face_memory_s: Annotated[float, Bounds(0, 600),
         "a face that leaves the view while something else is looked at is remembered where it was for this time; 0: not at all"] = 15.0
     habituation: Annotated[HabituationParams, "habituation and inhibition of return"] = field(default_factory=HabituationParams)
@@ -102,6 +105,7 @@ class Attention:
         self._reaction.reset(t_s)
         self._memory.reset()
         self._persons.reset()
+        self._gestures: dict[int, float] = {}
         self._seen_s = -inf
         self._scene = 0
         self._target: Target | None = None
@@ -166,6 +170,8 @@ class Attention:
         attended = self._identity[1] if self._identity is not None else -1
         lasts_s = self._params.face_memory_s
         bodies = self._memory.step(percept.bodies, attended, percept.captured_s, lasts_s)
+        if "face" in percept.bodies.kinds:  # a remembered face never wins against a visible one
+            bodies = percept.bodies
         self._persons.update(percept, state.p_world_head_m)
         if self.top_down.plans:
             self.top_down.plan(percept, state.p_world_head_m, t_s)
@@ -174,8 +180,12 @@ class Attention:
         compare = self._compare_few if len(bodies) <= _FEW else self._compare
         ratio = self._params.looks_elsewhere_ratio
         elsewhere = [face.id for face in percept.faces if face.looks_at_head is False]
-        worth = [ratio if id in elsewhere else 1.0 for id in bodies.ids]
+        worth = [
+            (ratio if id in elsewhere else 1.0) * (1.0 + self._gestures.get(id, 0.0))
+            for id in bodies.ids
+        ]
         made = compare(bodies, worth, state, t_s)
+        self._note_gestures(made)
         if self._unnoticed(made):
             self._reaction.drop()
             seen = [row for row in range(len(made.bodies)) if made.total[row] > -inf]
@@ -215,7 +225,9 @@ class Attention:
         n, eye, rows = len(bodies), state.p_world_head_m, bodies.rows()
         seen = self._field_of_view.visible_rows(bodies, rows, state)
         v_eye = self._eye_velocity(eye, t_s)
-        motion = self._bottom_up.step_rows(rows, eye, t_s, v_eye, self._gaze(state), seen)
+        motion = self._bottom_up.step_rows(
+            rows, eye, t_s, v_eye, self._gaze(state), seen, *self._motion_limits(bodies)
+        )
         rule_target = self.top_down.step_rows(rows, seen, eye)
         attended = self._identity[1] if self._identity is not None else -1
         left = self._habituation.step_rows(rows, eye, attended, t_s)
@@ -252,7 +264,9 @@ class Attention:
         n, eye = len(bodies), state.p_world_head_m
         seen = self._field_of_view.visible(bodies, state)
         v_eye = self._eye_velocity(eye, t_s)
-        motion = self._bottom_up.step(bodies, eye, t_s, v_eye, self._gaze(state), seen)
+        motion = self._bottom_up.step(
+            bodies, eye, t_s, v_eye, self._gaze(state), seen, *self._motion_limits(bodies)
+        )
         rule_target = self.top_down.step(bodies, seen, eye)
         attended = self._identity[1] if self._identity is not None else -1
         habituation, rule = np.ones(n + 1), np.zeros(n + 1)
@@ -274,6 +288,27 @@ class Attention:
         return TargetComparison(
             bodies, motion.row, rule_target, rule, habituation, total, best, plan
         )
+
+    def _motion_limits(self, bodies: Bodies) -> tuple[list[float], list[float]]:
+        """Return of each body what its motion cannot exceed, and the share of it that counts."""
+        parts, ratio = self._persons.parts, self._params.own_motion_ratio
+        usual, of_hands = self._bottom_up.limit(), self._bottom_up.limit(hand=True)
+        most, worth = [], []
+        for id, kind in zip(bodies.ids, bodies.kinds, strict=True):
+            most.append(of_hands if kind == "hand" and id not in parts else usual)
+            worth.append(ratio if id in parts else 1.0)
+        return most, worth
+
+    def _note_gestures(self, made: TargetComparison) -> None:
+        """Note how much each person's own body moves; it counts in the next decision."""
+        ratio, self._gestures = self._params.own_motion_ratio, {}
+        if ratio == 0.0 or ratio == 1.0:
+            return
+        for row, id in enumerate(made.bodies.ids):
+            owner = self._persons.parts.get(id)
+            if owner is not None:
+                moved = sum(made.motion(row)[:3]) * (1.0 / ratio - 1.0)
+                self._gestures[owner] = max(self._gestures.get(owner, 0.0), moved)
 
     def _shares(
         self,

@@ -13,15 +13,21 @@ retinal   What the paper's reason, the image on the retina, demands: e from the 
 none      No motion attracts: all that is looked at is what a rule names.
 
 What has just come into view has a further, decaying term: the paper's behaviour
-(e), a hand that reaches in from outside the field, is not in eq 1.
+(e), a hand that reaches in from outside the field, is not in eq 1. So has what begins to move,
+which captures attention as what appears does (Abrams & Christ 2003), where motion saturates. Onsets that follow each other
+weigh less, as people stop looking at what appears again and again (Neo & Chua 2006).
+
+In the retinal form the sum saturates: no motion alone outweighs a face for long. What comes nearer
+so fast that it would arrive within two seconds is exempt, as a hand that reaches for the head.
 
 All bodies are computed at once; what is remembered of each is a row of an array. Of the few that
 there usually are each is computed by itself, in plain arithmetic: a handful of numbers costs
 less so than one call of NumPy.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import exp, sqrt
+from math import exp, expm1, inf, sqrt
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
@@ -36,6 +42,10 @@ Ids = NDArray[np.int64]
 _BLINK_S = 0.3
 """A body unseen for no longer than this was missed by the detector and did not leave."""
 
+_MOVES, _STILL_BELOW = 0.5, 0.15
+"""Sums of eq 1 from which a body moves, and below which it has come to rest."""
+_SETTLED_S = 0.5
+"""What has just come into view does not begin to move as well."""
 _NEAREST_M = 0.05
 _STILL: Vec3 = (0.0, 0.0, 0.0)
 _AHEAD: Vec3 = (1.0, 0.0, 0.0)
@@ -53,14 +63,19 @@ class BottomUpParams:
     looming_reference_1_s: Annotated[float, Bounds(0.01, 20),
         "speed along the line of sight divided by distance that gives salience 1"] = 0.5
     rotation_reference_rad_s: Annotated[float, Bounds(0.01, 100), "angular speed about the line of sight that gives salience 1"] = 3.0
+    saturation: Annotated[float, Bounds(0, 10),
+        "salience that motion alone cannot exceed, unless it comes nearer fast; 0: no limit"] = 0.35
+    hand_saturation: Annotated[float, Bounds(0, 10), "the same of a hand that waves or is held out; 0: no limit"] = 0.9
     smoothing_s: Annotated[float, Bounds(0, 2), "time constant of the low-pass filter of salience"] = 0.1
-    onset_salience: Annotated[float, Bounds(0, 10), "extra salience of a body that has just come into view; 0: none"] = 1.0
-    onset_s: Annotated[float, Bounds(0.02, 10), "time constant with which onset_salience decays"] = 0.5
+    onset_salience: Annotated[float, Bounds(0, 10), "extra salience of a body that has just come into view or begun to move; 0: none"] = 1.0
+    onset_s: Annotated[float, Bounds(0.02, 10), "time constant with which onset_salience decays"] = 0.25
+    onset_recovery_s: Annotated[float, Bounds(0, 60),
+        "time constant with which the next onset regains its full salience; 0: every onset has it"] = 3.0
     # fmt: on
 
 
 class MotionTerms(NamedTuple):
-    """The terms of eq 1 for each body: (n,) arrays."""
+    """The terms of eq 1 for each body: (n,) arrays; looming is negative of what goes away."""
 
     translation: Floats
     looming: Floats
@@ -105,13 +120,46 @@ def motion_terms(v: Floats, w: Floats, e: Floats) -> MotionTerms:
     Source: Mitake et al., eq 1, with e normalised.
     """
     e = columns(e if e.ndim == 2 else e[None, :])
-    return _eq_1(columns(v), columns(w), e / np.maximum(_length(e), 1e-300))
+    terms = _eq_1(columns(v), columns(w), e / np.maximum(_length(e), 1e-300))
+    return terms._replace(looming=np.abs(terms.looming))
 
 
 def _eq_1(v: Floats, w: Floats, e: Floats) -> MotionTerms:
-    """Return the terms of (3, n) vectors, e being of length 1."""
+    """Return the terms of (3, n) vectors, e being of length 1; looming with its sign."""
     along = (v * e).sum(axis=0)
-    return MotionTerms(_length(v - along * e), np.abs(along), np.abs((w * e).sum(axis=0)))
+    return MotionTerms(_length(v - along * e), -along, np.abs((w * e).sum(axis=0)))
+
+
+_FAST, _FASTEST = 1.0, 3.0
+"""Looming beyond the first is exempt from saturation, up to the second."""
+
+
+def limited(terms: Floats, most: Floats) -> Floats:
+    """Return the terms of eq 1 with their sum saturated: most (1 - exp(-sum / most)).
+
+    Args:
+        terms: (3, n) slide, loom and spin; loom is positive of what comes nearer.
+        most: (n,) what motion cannot exceed; inf: no limit.
+    """
+    slide, loom, spin = terms
+    free = np.isinf(most)
+    exempt = np.where(free, 0.0, np.clip(loom, _FAST, _FASTEST) - _FAST)
+    rest = np.abs(loom) - np.where(free, 0.0, np.maximum(loom - _FAST, 0.0))
+    total = np.maximum(slide + rest + spin, 1e-9)
+    bound = np.where(free, 1.0, most)
+    share = np.where(free, 1.0, -np.expm1(-total / bound) * bound / total)
+    return np.stack((slide * share, rest * share + exempt, spin * share))
+
+
+def limited_row(slide: float, loom: float, spin: float, most: float) -> tuple[float, float, float]:
+    """Return what ``limited`` does, of one body."""
+    if most == inf:
+        return slide, abs(loom), spin
+    exempt = min(max(loom, _FAST), _FASTEST) - _FAST
+    rest = abs(loom) - max(loom - _FAST, 0.0)
+    total = max(slide + rest + spin, 1e-9)
+    share = -expm1(-total / most) * most / total
+    return slide * share, rest * share + exempt, spin * share
 
 
 def _length(v: Floats) -> Floats:
@@ -126,21 +174,25 @@ _UNSEEN = SalienceRow(0.0, 0.0, 0.0, 0.0)
 class _Memory(NamedTuple):
     """State of m bodies, in any order: (m,) arrays, terms (3, m).
 
-    terms: smoothed slide, loom and spin; entered_s, seen_s: came into view, was last seen
+    terms: smoothed slide, loom (with its sign) and spin; entered_s, seen_s: came into view, was
+    last seen; onset: share of the onset's salience at entry; moving: whether it moves, 0 or 1
     """
 
     ids: Ids
     terms: Floats
     entered_s: Floats
     seen_s: Floats
+    onset: Floats
+    moving: Floats
 
     def rows(self) -> "_Rows":
         """Return the same, body by body."""
-        return _Rows(self.ids, self.terms.T.tolist(), self.entered_s.tolist(), self.seen_s.tolist())
+        terms, *others = (one.tolist() for one in (self.terms.T, *self[2:]))
+        return _Rows(self.ids, terms, *others)
 
     def only(self, mask: NDArray[np.bool_]) -> "_Memory":
         """Return the memory of the bodies in the mask."""
-        return _Memory(self.ids[mask], self.terms[:, mask], self.entered_s[mask], self.seen_s[mask])
+        return _Memory(self.ids[mask], self.terms[:, mask], *[one[mask] for one in self[2:]])
 
 
 class _Rows(NamedTuple):
@@ -150,17 +202,20 @@ class _Rows(NamedTuple):
     terms: list[list[float]]
     entered_s: list[float]
     seen_s: list[float]
+    onset: list[float]
+    moving: list[float]
 
     def arrays(self) -> _Memory:
         """Return the same as arrays."""
         terms = np.array(self.terms).reshape(-1, 3).T
-        return _Memory(self.ids, terms, np.array(self.entered_s), np.array(self.seen_s))
+        return _Memory(self.ids, terms, *[np.array(one) for one in self[2:]])
 
 
 def _never_seen(ids: Ids) -> _Memory:
     """Return what is known of bodies that nothing is known of."""
     n = len(ids)
-    return _Memory(ids, np.zeros((3, n)), np.full(n, -np.inf), np.full(n, -np.inf))
+    never, none = np.full(n, -np.inf), np.zeros(n)
+    return _Memory(ids, np.zeros((3, n)), never, never.copy(), none, none.copy())
 
 
 class BottomUp:
@@ -185,6 +240,7 @@ class BottomUp:
         self._gone = _never_seen(np.zeros(0, dtype=np.int64))
         self._memory: _Memory | _Rows = self._gone
         self._at_s = t_s
+        self._onset_s = -inf
         self._started_s: float | None = None
 
     def step(
@@ -195,6 +251,8 @@ class BottomUp:
         v_world_eye_m_s: Vec3 = _STILL,
         gaze_world: Vec3 = _AHEAD,
         seen: NDArray[np.bool_] | None = None,
+        most: Sequence[float] | None = None,
+        worth: Sequence[float] | None = None,
     ) -> SalienceTerms:
         """Return the smoothed salience of all bodies, in their order; 0 for those not in view.
 
@@ -203,6 +261,8 @@ class BottomUp:
         v_world_eye_m_s: velocity of the eye itself; the literal form does not know it
         gaze_world: where the eyes look, any length; only the literal form needs it
         seen: (n,) which bodies are in view; None: all
+        most: of each body, what its motion cannot exceed; None: ``saturation``
+        worth: of each body, the share of its salience that counts; None: all
         """
         if self._params.form == "none":
             return SalienceTerms(*np.zeros((4, len(bodies))))
@@ -212,7 +272,14 @@ class BottomUp:
         self._pause(t_s)
         if bodies.ids != self._ids:
             self._remember(bodies.ids, t_s)
-        return self._blend(now, seen, t_s)
+        limits = np.full(len(bodies), self.limit()) if most is None else np.array(most)
+        return self._blend(now, seen, t_s, limits, 1.0 if worth is None else np.array(worth))
+
+    def limit(self, hand: bool = False) -> float:
+        """Return what motion cannot exceed; inf: no limit, as in the paper's own form."""
+        par = self._params
+        most = par.hand_saturation if hand else par.saturation
+        return most if most > 0.0 and par.form == "retinal" else inf
 
     def step_rows(
         self,
@@ -222,6 +289,8 @@ class BottomUp:
         v_world_eye_m_s: Vec3,
         gaze_world: Vec3,
         seen: list[bool],
+        most: Sequence[float],
+        worth: Sequence[float],
     ) -> list[SalienceRow]:
         """Return what ``step`` does for few bodies, one row a body."""
         if self._params.form == "none":
@@ -232,7 +301,8 @@ class BottomUp:
         par, memory = self._params, self._memory
         if isinstance(memory, _Memory):
             memory = self._memory = memory.rows()
-        _, past, entered_s, seen_s = memory  # changed in place
+        _, past, entered_s, seen_s, strength, moving = memory  # changed in place
+        fresh = self._onset_share(t_s)
         keep = exp(min(0.0, self._at_s - t_s) / par.smoothing_s) if par.smoothing_s > 0.0 else 0.0
         found = []
         for i, in_view in enumerate(seen):
@@ -242,15 +312,23 @@ class BottomUp:
                 continue
             now = self._row(rows, i, p_world_eye_m, v_world_eye_m_s, gaze_world)
             if t_s - seen_s[i] > _BLINK_S:
-                past[i], entered_s[i] = [0.0, 0.0, 0.0], self._entry_s(t_s)
+                past[i], entered_s[i], strength[i] = [0.0, 0.0, 0.0], self._entry_s(t_s), fresh
+                moving[i] = float(now[0] + abs(now[1]) + now[2] > _MOVES)
+                self._onset_s = max(self._onset_s, entered_s[i])
             seen_s[i] = t_s
             slide, loom, spin = past[i]
             slide += (1.0 - keep) * (now[0] - slide)
             loom += (1.0 - keep) * (now[1] - loom)
             spin += (1.0 - keep) * (now[2] - spin)
             past[i] = [slide, loom, spin]
-            onset = par.onset_salience * exp((entered_s[i] - t_s) / par.onset_s)
-            found.append(SalienceRow(slide, loom, spin, onset))
+            moved = slide + abs(loom) + spin
+            if most[i] < inf and moved > _MOVES and not moving[i] and t_s - entered_s[i] > _SETTLED_S:
+                entered_s[i] = self._onset_s = t_s
+                strength[i] = fresh
+            moving[i] = float(moved > (_STILL_BELOW if moving[i] else _MOVES))
+            onset = strength[i] * par.onset_salience * exp((entered_s[i] - t_s) / par.onset_s)
+            terms = *limited_row(slide, loom, spin, most[i]), onset
+            found.append(SalienceRow(*[worth[i] * term for term in terms]))
         self._at_s = t_s
         return found
 
@@ -273,11 +351,11 @@ class BottomUp:
         ax, ay, az = vx - along * x, vy - along * y, vz - along * z
         across, spin = sqrt(ax * ax + ay * ay + az * az), abs(wx * x + wy * y + wz * z)
         if par.form == "literal":
-            return across, abs(along), spin
+            return across, -along, spin
         distance = max(length, _NEAREST_M)
         return (
             across / (distance * par.translation_reference_rad_s),
-            abs(along) / (distance * par.looming_reference_1_s),
+            -along / (distance * par.looming_reference_1_s),
             spin / par.rotation_reference_rad_s,
         )
 
@@ -288,7 +366,8 @@ class BottomUp:
             some = slice(start, start + BLOCK)
             v, w = bodies.v_world_m_s[some], bodies.w_world_rad_s[some]
             if self._params.form == "literal":
-                now[0, some], now[1, some], now[2, some] = motion_terms(v, w, np.asarray(gaze))
+                e = np.asarray(gaze)[:, None]
+                now[:, some] = _eq_1(columns(v), columns(w), e / max(_length(e)[0], 1e-300))
             else:
                 rel, v, w = columns(bodies.p_world_m[some]), columns(v), columns(w)
                 rel -= np.array(p_eye)[:, None]
@@ -306,27 +385,50 @@ class BottomUp:
         out[1] = raw.looming / (distance * par.looming_reference_1_s)
         out[2] = raw.rotation / par.rotation_reference_rad_s
 
-    def _blend(self, now: Floats, seen: NDArray[np.bool_], t_s: float) -> SalienceTerms:
+    def _onset_share(self, t_s: float) -> float:
+        """Return the share of its salience that an onset has now."""
+        recovery_s = self._params.onset_recovery_s
+        return -expm1((self._onset_s - t_s) / recovery_s) if recovery_s > 0.0 else 1.0
+
+    def _blend(
+        self,
+        now: Floats,
+        seen: NDArray[np.bool_],
+        t_s: float,
+        most: Floats,
+        worth: Floats | float,
+    ) -> SalienceTerms:
         """Return the low-passed terms and the onset term; a new body starts at 0."""
         tau, old = self._params.smoothing_s, self._arrays()
         keep = exp(min(0.0, self._at_s - t_s) / tau) if tau > 0.0 else 0.0
-        past, entered_s, seen_s = old.terms, old.entered_s, old.seen_s.copy()
+        past, (entered_s, seen_s, strength, moves) = old.terms, (one.copy() for one in old[2:])
+        fresh = self._onset_share(t_s)
         new = seen & (t_s - seen_s > _BLINK_S)
         if new.any():
-            past, entered_s = past.copy(), entered_s.copy()
-            past[:, new], entered_s[new] = 0.0, self._entry_s(t_s)
+            past, entry_s = past.copy(), self._entry_s(t_s)
+            past[:, new], entered_s[new], strength[new] = 0.0, entry_s, fresh
+            moves[new] = now[0, new] + np.abs(now[1, new]) + now[2, new] > _MOVES
+            self._onset_s = max(self._onset_s, entry_s)
         smooth = now  # becomes past + (1 - keep) (now - past), without new arrays
         smooth -= past
         smooth *= 1.0 - keep
         smooth += past
-        onset = self._params.onset_salience * np.exp((entered_s - t_s) / self._params.onset_s)
+        moved = smooth[0] + np.abs(smooth[1]) + smooth[2]
+        begins = (moved > _MOVES) & (moves == 0.0) & (t_s - entered_s > _SETTLED_S)
+        begins &= seen & np.isfinite(most)
+        if begins.any():
+            entered_s[begins], strength[begins], self._onset_s = t_s, fresh, t_s
+        moving = (moved > np.where(moves, _STILL_BELOW, _MOVES)).astype(np.float64)
+        onset = np.exp((entered_s - t_s) / self._params.onset_s)
+        onset *= self._params.onset_salience * strength
         if not seen.all():
             smooth *= seen
             onset *= seen
         np.copyto(seen_s, t_s, where=seen)
-        self._memory = _Memory(old.ids, smooth, entered_s, seen_s)
+        self._memory = _Memory(old.ids, smooth, entered_s, seen_s, strength, moving)
         self._at_s = t_s
-        return SalienceTerms(smooth[0], smooth[1], smooth[2], onset)
+        slide, loom, spin = limited(smooth, most) * worth
+        return SalienceTerms(slide, loom, spin, onset * worth)
 
     def _arrays(self) -> _Memory:
         """Return the memory as arrays."""
@@ -362,7 +464,8 @@ class BottomUp:
         known[known] = old.ids[order[at[known]]] == now.ids[known]
         rows = order[at[known]]
         now.terms[:, known] = old.terms[:, rows]
-        now.entered_s[known], now.seen_s[known] = old.entered_s[rows], old.seen_s[rows]
+        for mine, its in zip(now[2:], old[2:], strict=True):
+            mine[known] = its[rows]
         away = np.ones(len(order), dtype=np.bool_)
         away[rows] = False
         self._ids, self._memory, self._gone = ids, now, old.only(away)
@@ -370,9 +473,4 @@ class BottomUp:
 
 def _joined(a: _Memory, b: _Memory) -> _Memory:
     """Return two memories of different bodies as one."""
-    return _Memory(
-        np.concatenate((a.ids, b.ids)),
-        np.concatenate((a.terms, b.terms), axis=1),
-        np.concatenate((a.entered_s, b.entered_s)),
-        np.concatenate((a.seen_s, b.seen_s)),
-    )
+    return _Memory(*[np.concatenate((x, y), axis=-1) for x, y in zip(a, b, strict=True)])

@@ -3,14 +3,15 @@
 Rules can name people so (gazerig.gaze.top_down), however the tracker numbers them.
 
 A hand waves when its velocity across the view has changed sides twice within a little more than a
-second, faster than a hand that only gestures; the person who waves is the one with the face
-nearest to it.
+second, faster than a hand that only gestures, at the height of the face; the person who waves is
+the one with the face nearest to it.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import dist, inf
 
+from gazerig.gaze.angles import add, scale, sub
 from gazerig.gaze.types import Percept, Vec3
 
 NEAREST, WAVING, LOOKING, NEWEST = "nearest", "waving", "looking", "newest"
@@ -21,6 +22,10 @@ _TURNS, _TURNS_WITHIN_S = 2, 1.2
 _WAVED_S = 1.5
 """Time for which a person counts as waving after the hand has turned the last time."""
 _ARM_M = 0.9
+_HELD_OUT = 0.65
+"""A hand nearer than this share of the face's distance is held out; signs and gestures are not."""
+_RAISED_M = 0.13
+"""A hand is raised at the height of the face, at most so far below its centre; signs are lower."""
 _OWN = "own"
 """The robot's own body waves to nobody."""
 _TOGETHER_S = 0.5
@@ -39,7 +44,12 @@ class _Hand:
 
 
 class Persons:
-    """What the people in view do."""
+    """What the people in view do.
+
+    Attributes:
+        parts: of what moves within a person's reach, the id of that person's face; without what is
+            held out towards the head or raised to the face.
+    """
 
     def __init__(self) -> None:
         self.reset()
@@ -50,6 +60,7 @@ class Persons:
         self._seen_s: dict[int, float] = {}
         self._waved_s: dict[int, float] = {}
         self._hands: dict[int, _Hand] = {}
+        self.parts: dict[int, int] = {}
         self._looking: frozenset[int] = frozenset()
         self._nearest = -1
         self._at_s = -inf
@@ -73,11 +84,13 @@ class Persons:
             self._seen_s[id] = self._at_s
         self._looking = frozenset(face.id for face in percept.faces if face.looks_at_head)
         self._update_nearest(faces, p_world_eye_m)
+        self.parts = {}
         for row, id in enumerate(bodies.ids):
             if faces and id not in faces and bodies.kinds[row] != _OWN:
                 x, y, z = rows[row]
                 vx, vy, _ = bodies.v_world_m_s[row].tolist()
                 self._update_hand(id, (x, y, z), (vx, vy), faces, p_world_eye_m)
+                self._update_part(id, (x, y, z), faces, p_world_eye_m)
         self._drop_old()
 
     def named(self, trait: str) -> frozenset[int]:
@@ -119,8 +132,24 @@ class Persons:
         away = max((ahead * ahead + aside * aside) ** 0.5, 1e-6)
         if self._turns(id, (velocity_m_s[1] * ahead - velocity_m_s[0] * aside) / away):
             owner = min(faces, key=lambda face: dist(faces[face], place))
-            if dist(faces[owner], place) < _ARM_M:
+            raised = place[2] > faces[owner][2] - _RAISED_M
+            if raised and dist(faces[owner], place) < _ARM_M:
                 self._waved_s[owner] = self._at_s
+
+    def _update_part(self, id: int, place: Vec3, faces: Mapping[int, Vec3], p_eye: Vec3) -> None:
+        """Update whose body something is part of: who is nearest to its line of sight.
+
+        The distance of what moves is often only assumed, so it is compared as far away as the face.
+        """
+        away, towards = dist(place, p_eye), sub(place, p_eye)
+        beside = {
+            face: dist(add(p_eye, scale(towards, dist(p, p_eye) / max(away, 1e-3))), p)
+            for face, p in faces.items()
+        }
+        owner = min(beside, key=lambda face: beside[face])
+        held_out = away < _HELD_OUT * dist(faces[owner], p_eye)
+        if beside[owner] < _ARM_M and not held_out and place[2] < faces[owner][2] - _RAISED_M:
+            self.parts[id] = owner
 
     def _turns(self, id: int, across_m_s: float) -> bool:
         """Return whether a hand has just changed sides in a wave."""

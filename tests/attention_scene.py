@@ -15,6 +15,11 @@ from gazerig.gaze.types import Bodies, GazeState, Percept
 
 IDENTITY = rotation((0.0, 0.0, 0.0))
 
+UNBOUNDED = BottomUpParams(
+    smoothing_s=0.0, saturation=0.0, hand_saturation=0.0, onset_s=0.5, onset_recovery_s=0.0
+)
+"""Eq 1 as it is, with an onset."""
+
 
 def looking(eye_yaw_deg: float = 0.0) -> GazeState:
     eye = (radians(eye_yaw_deg), 0.0)
@@ -49,7 +54,7 @@ def attention(**params: Any) -> Attention:
     return Attention(
         AttentionParams(**params),
         FieldOfView(FieldOfViewParams()),
-        BottomUp(BottomUpParams(smoothing_s=0.0)),
+        BottomUp(UNBOUNDED),
         TopDown(TopDownParams()),
         Idle(IdleParams()),
     )

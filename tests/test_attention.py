@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from attention_scene import FACE, attention, body, looking, percept, waving
+from attention_scene import FACE, UNBOUNDED, attention, body, looking, percept, waving
 
 from gazerig.gaze.attention import Attention, AttentionParams
 from gazerig.gaze.bottom_up import BottomUp, BottomUpParams, motion_terms
@@ -32,7 +32,7 @@ def test_terms_of_eq_1_are_translation_looming_and_rotation() -> None:
 
 
 def test_far_motion_pulls_less_than_near_motion() -> None:
-    model = BottomUp(BottomUpParams(smoothing_s=0.0))
+    model = BottomUp(UNBOUNDED)
     seen = percept(
         0.0, body(1, "hand", (1, 0, 0), (0, 1, 0)), body(2, "hand", (4, 0, 0), (0, 1, 0))
     )
@@ -45,7 +45,7 @@ def test_what_spins_about_the_line_of_view_is_attended_to_and_what_spins_across_
     things = percept(0.0, *(body(n, "thing", (far, 0, 0)) for n, far in ((1, 1), (2, 4), (3, 1))))
     spins = np.array([[0.0, 0, 0], [-6.0, 0, 0], [0, 6.0, 0]])
     turning = replace(things.bodies, w_world_rad_s=spins)
-    params = BottomUpParams(smoothing_s=0.0, onset_salience=0.0)
+    params = replace(UNBOUNDED, onset_salience=0.0)
     found = BottomUp(params).step(turning, (0, 0, 0), 0.0)
     expected = 6.0 / params.rotation_reference_rad_s
     assert found.rotation == pytest.approx([0.0, expected, 0.0])
@@ -70,7 +70,7 @@ def test_what_is_behind_the_eye_hides_nothing_before_it() -> None:
 
 
 def test_pulls_rise_with_the_time_constant() -> None:
-    model = BottomUp(BottomUpParams(smoothing_s=0.1))
+    model = BottomUp(replace(UNBOUNDED, smoothing_s=0.1))
     seen = percept(0.0, body(1, "hand", (1, 0, 0), (0, 1, 0)))
     for k in range(11):
         total = model.step(seen.bodies, (0, 0, 0), k * 0.01).total
@@ -245,7 +245,7 @@ def test_literal_form_is_eq_1_as_printed_with_e_the_direction_of_gaze() -> None:
 
 
 def test_retinal_form_is_relative_to_the_moving_eye() -> None:
-    model = BottomUp(BottomUpParams(smoothing_s=0.0))
+    model = BottomUp(UNBOUNDED)
     seen = bodies(body(1, "x", (2, 0, 0), (0, 1, 0)), body(2, "x", (2, 0, 0)))
     with_it = model.step(seen, (0, 0, 0), 0.0, (0, 1, 0))
     assert with_it.total.tolist() == [0.0, 1.0]  # what stands still slides by 0.5 rad/s
@@ -277,7 +277,7 @@ def test_what_has_just_come_into_view_pulls_and_that_wears_off() -> None:
 
 def test_nothing_is_new_in_the_first_moments_but_later_after_an_empty_view() -> None:
     for arrives, onset in ((0.2, 0.0), (0.4, 1.0)):
-        model = BottomUp(BottomUpParams())
+        model = BottomUp(UNBOUNDED)
         for k in range(round(arrives * 20)):
             model.step(bodies(), (0, 0, 0), k / 20)
         assert model.step(bodies(FACE), (0, 0, 0), arrives).onset.tolist() == [onset]
@@ -286,7 +286,7 @@ def test_nothing_is_new_in_the_first_moments_but_later_after_an_empty_view() -> 
 @pytest.mark.parametrize(("gap_s", "onset"), [(0.1, 0.0), (0.29, 0.0), (0.4, 1.0)])
 @pytest.mark.parametrize("how", ["missed", "out of the field"])
 def test_a_blink_of_the_detector_makes_nothing_new(how: str, gap_s: float, onset: float) -> None:
-    model = BottomUp(BottomUpParams(smoothing_s=1.0))
+    model = BottomUp(replace(UNBOUNDED, smoothing_s=1.0))
     moving = bodies(body(1, "hand", (1, 0, 0), (0, 1, 0)))
     for k in range(21):
         before = model.step(moving, (0, 0, 0), k / 10).translation[0]
@@ -303,7 +303,7 @@ def test_a_blink_of_the_detector_makes_nothing_new(how: str, gap_s: float, onset
 
 
 def test_nothing_is_new_after_a_pause_of_the_camera() -> None:
-    model = BottomUp(BottomUpParams())
+    model = BottomUp(UNBOUNDED)
     for k in range(11):
         model.step(bodies(FACE), (0, 0, 0), k / 10)
     back = model.step(bodies(FACE, body(8, "face", (1, 1, 0))), (0, 0, 0), 3.0)
@@ -313,7 +313,7 @@ def test_nothing_is_new_after_a_pause_of_the_camera() -> None:
 def test_arrays_remember_what_a_memory_body_by_body_would() -> None:
     """Bodies come, go, and change places in the list; each keeps its own low-pass."""
     rng = np.random.default_rng(5)
-    model, tau = BottomUp(BottomUpParams(smoothing_s=0.2)), 0.2
+    model, tau = BottomUp(replace(UNBOUNDED, smoothing_s=0.2)), 0.2
     known: dict[int, tuple[float, float, float]] = {}  # id -> smoothed translation, entered, seen
     for k in range(200):
         t = k * 0.03
@@ -338,11 +338,11 @@ def test_many_bodies_at_once_are_as_one_by_one() -> None:
     ids = tuple(range(n))
     crowd = Bodies(ids, ("x",) * n, p, v, w, np.full(n, 0.1))
     state = looking(20.0)
-    view, model = FieldOfView(FieldOfViewParams()), BottomUp(BottomUpParams(smoothing_s=0.0))
+    view, model = FieldOfView(FieldOfViewParams()), BottomUp(UNBOUNDED)
     seen, total = view.visible(crowd, state), model.step(crowd, (0, 0, 0), 0.0).total
     for i in range(0, n, 997):
         alone = Bodies((1,), ("x",), p[i : i + 1], v[i : i + 1], w[i : i + 1], np.full(1, 0.1))
-        one = BottomUp(BottomUpParams(smoothing_s=0.0)).step(alone, (0, 0, 0), 0.0).total[0]
+        one = BottomUp(UNBOUNDED).step(alone, (0, 0, 0), 0.0).total[0]
         assert view.visible(alone, state)[0] == seen[i] and one == pytest.approx(total[i])
 
 

@@ -201,12 +201,45 @@ def test_e46_c_the_face_is_kept_while_the_opponent_steps_left_and_right() -> Non
 
 def test_e46_d_a_waved_hand_is_seen_within_400_ms() -> None:
     def waved(t: float) -> list[Row]:
-        swing = 0.15 * sin(2 * pi * 1.5 * (t - 2.0)) if 2.0 <= t < 4.0 else 0.0
-        return moved(boxer(t), 2, (0.0, swing, 0.0))
+        if not 2.0 <= t < 4.0:
+            return boxer(t)
+        return moved(boxer(t), 2, (0.0, 0.15 * sin(2 * pi * 1.5 * (t - 2.0)), 0.1))
 
     looks = lived(waved, 5.0)
     assert first(looks, "hand", 2.0) <= 0.4
     assert first(looks, "face", 4.0) <= 0.6
+
+
+def test_a_lowered_hand_that_moves_counts_for_the_person() -> None:
+    def signs(t: float) -> list[Row]:
+        return moved(boxer(t), 2, (0.0, 0.15 * sin(2 * pi * 1.5 * t), -0.1))
+
+    looks = lived(signs, 5.0)
+    assert {look.kind for _, look in looks} == {"face"}
+    hand = next(one for one in looks[60][1].saliences if one.kind == "hand")
+    assert 0.0 < hand.translation < 0.3 * 0.35
+
+
+def test_something_that_keeps_moving_behind_a_person_gets_a_glance() -> None:
+    def moving(t: float) -> list[Row]:
+        swing = 0.6 * sin(2 * pi * 0.5 * (t - 2.0)) if t >= 2.0 else 0.0
+        return [boxer(t)[0], body(4, "thing", (1.5, 1.0 + swing, 0.0))]
+
+    looks = lived(moving, 8.0)
+    away = [t for t, look in looks if look.kind == "thing"]
+    assert away and 2.0 <= away[0] <= 2.5
+    assert 0.2 <= len(away) / 30 <= 1.2
+
+
+def test_onsets_that_follow_each_other_lose_their_salience() -> None:
+    def flickering(t: float) -> list[Row]:
+        seen = t >= 1.0 and t % 1.0 < 0.5
+        return [boxer(t)[0], *([body(int(9 + t), "thing", (1.5, 1.0, 0.0))] if seen else [])]
+
+    looks = lived(flickering, 12.0)
+    away = [t for t, look in looks if look.kind == "thing"]
+    assert away and away[0] < 1.1
+    assert sum(t >= 4.0 for t in away) / 30 < 0.1 * 8.0
 
 
 def test_a_hand_that_reaches_in_is_noticed_though_it_holds_still() -> None:
@@ -223,7 +256,7 @@ def test_a_hand_that_reaches_in_is_noticed_though_it_holds_still() -> None:
 def test_e48_the_face_again_within_a_second_of_a_distraction() -> None:
     def distracted(t: float) -> list[Row]:
         out = sin(pi * (t - 2.0) / 0.3) if 2.0 <= t < 2.3 else 0.0
-        return moved(boxer(t), 2, (0.0, 0.3 * out, 0.0))
+        return moved(boxer(t), 2, (0.0, 0.3 * out, 0.1 * (out > 0.0)))
 
     looks = lived(distracted, 5.0)
     away = [t for t, look in looks if look.kind != "face"]

@@ -292,7 +292,7 @@ def test_a_feint_draws_the_gaze_for_less_than_a_second(boxing: Lived) -> None:
 
 
 class Distracted:
-    """A still person, and a hand beside that moves for 0.3 s now and then."""
+    """A still person, and a raised hand beside that moves for 0.3 s now and then."""
 
     name = "distracted"
     round_s = 20.0
@@ -307,7 +307,7 @@ class Distracted:
 
     def things(self, t_s: float) -> tuple[Thing, ...]:
         moved = sum(there_and_back(t_s - start_s, 0.15, 0.0, 0.15) for start_s in self.starts_s)
-        x, y, z = (a + moved * b for a, b in zip((0.8, 0.2, 0.05), self._way_m, strict=True))
+        x, y, z = (a + moved * b for a, b in zip((0.8, 0.2, 0.2), self._way_m, strict=True))
         return (Thing(0, "hand", (x, y, z), 0.06),)
 
     def events(self) -> tuple[Event, ...]:

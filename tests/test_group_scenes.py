@@ -112,9 +112,9 @@ def test_e80_what_spins_draws_the_gaze_by_its_spin_alone(reference: float, looks
     if not looks:
         assert len(on) / 50.0 < 0.3
     else:
-        assert len(on) / 50.0 > 1.0
+        assert len(on) / 50.0 > 0.5
         first = on[0].target
         assert first.p_world_m == pytest.approx(PINWHEEL, abs=0.03)
         salience = first.saliences[0]
-        assert salience.rotation > 0.5 and salience.onset < 0.1
+        assert salience.rotation > 0.2 and salience.onset > 0.2  # it has begun to spin
         assert salience.rotation > 3.0 * (salience.translation + salience.looming)
