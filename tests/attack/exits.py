@@ -15,7 +15,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -123,7 +123,7 @@ def send(*numbers: signal.Signals, gap_s: float = 0.03) -> Strike:
         for i, number in enumerate(numbers):
             if i:
                 time.sleep(gap_s)
-            if target.program.poll() is None:
+            with suppress(ProcessLookupError) if i else nullcontext():
                 os.kill(target.pid, number)
 
     return strike
@@ -215,7 +215,11 @@ Begin = Callable[..., "subprocess.Popen[bytes]"]
 
 def fresh(code: str, words: list[str], **options: Any) -> "subprocess.Popen[bytes]":
     """Start it as a shell does."""
-    return subprocess.Popen([sys.executable, "-c", code, *words], **options)
+    return subprocess.Popen(
+        [sys.executable, "-c", code, *words],
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_DFL),  # nohup has it ignored
+        **options,
+    )
 
 
 @contextmanager
