@@ -28,7 +28,7 @@ import struck_rigs
 from board_rig import on_pca9685
 from mixed_rig import mixed_text
 from struck_rigs import CASES, quick
-from true_shafts import Judge, Late, looked_at, on_time, run, sometimes_late
+from true_shafts import Judge, Late, group_of, looked_at, on_time, run, sometimes_late
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import DriverError
@@ -109,8 +109,8 @@ def one(rig: Rig, scene: str, late: Late, seconds: float) -> tuple[int, Judge]:
         judge = Judge(rig)
         orders = (all_around(0),) if looks else ()
         ticks = run(made, shafts, judge, seconds, late, *orders)
-    still = [name for name, worst in judge.worst.items() if worst.speed_deg_s < STILL_DEG_S]
-    assert ticks and not still, f"{scene}: after {ticks} ticks these have not moved: {still}"
+    eyes = [one.speed_deg_s for name, one in judge.worst.items() if group_of(name) == "eyes"]
+    assert ticks and max(eyes) > STILL_DEG_S, f"{scene}: after {ticks} ticks no eye has moved"
     return ticks, judge
 
 
