@@ -64,6 +64,7 @@ I2C = [
     Case(("foreign on",), ("foreign off",)),
     Case(("brown-out",)),
     Case(("nack 3", "brown-out")),
+    *(Case(("brown-out", f"corrupt {{i}} {bit}")) for bit in (10, 24)),
     Case(("absent on", "brown-out"), ("absent off",)),
     Case(("lose all", "brown-out")),
     Case(("unplug", "brown-out"), ("plug",)),

@@ -215,7 +215,11 @@ class Channel:
 
     def inside(self) -> bool:
         """Return whether the pulse is within the limits."""
-        return self.setup.min_steps <= self.ramp.pulse_steps <= self.setup.max_steps
+        return self.fits(self.ramp.pulse_steps)
+
+    def fits(self, pulse_steps: float) -> bool:
+        """Return whether a pulse lies within the limits."""
+        return self.setup.min_steps <= pulse_steps <= self.setup.max_steps
 
     def rearm(self) -> None:
         """Record that it was enabled again: plans begin at its pulse."""

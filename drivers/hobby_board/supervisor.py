@@ -270,14 +270,25 @@ class BoardSupervisor:
         found = self._board.pulses((channel.id,))
         if found is None:
             return
-        channel.found(found[0])
-        outcome = take(self._board, channel, found[0])
+        pulse = found[0]
+        if self._never_sent(channel, pulse, now_s):
+            pulse = 0
+        channel.found(pulse)
+        outcome = take(self._board, channel, pulse)
         if outcome is HoldResult.HELD:
             channel.rearm()
             self.pending.remove(channel)
         elif outcome is HoldResult.ELSEWHERE and channel.on:
+            if self._never_sent(channel, round(channel.ramp.pulse_steps), now_s):
+                self._line.errors["damaged"] += 1
+                channel.gives(0)  # tried again at the next read
+                return
             # It does give pulses, only others: that is reported once, and it is held so.
             self._off_goal(channel, round(channel.ramp.pulse_steps))
             channel.hold()
             channel.rearm()
             self.pending.remove(channel)
+
+    def _never_sent(self, channel: Channel, pulse: int, now_s: float) -> bool:
+        """Return whether a pulse cannot be one of this driver, as on a line that hits one bit."""
+        return self._led and not channel.fits(pulse) and channel.implausible(pulse, now_s)
