@@ -1,9 +1,15 @@
 """Which positions are believed, from how far a joint can have come."""
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.plausibility import AGREEING, DISTURBED_S, Plausibility
+from gazerig.drivers.servo_bus.feedback import FeedbackColumns
+from gazerig.drivers.servo_bus.read_windows import Sample
+from gazerig.drivers.servo_bus.sync_read import ServoReply
+from gazerig.drivers.types import ServoConfig
 
 SPEED = 4000.0
 STEP = 47_835 * 4096 // 360
@@ -68,3 +74,19 @@ def test_two_answers_right_after_one_another_agree_within_the_motor_s_way():
     assert plausible.pair(0, 1000, 2.0, 1008, 2.0)
     assert not plausible.pair(0, 1000, 2.0, 1009, 2.0)
     assert plausible.pair(0, 1000, 2.0, 1011, 2.001)
+
+
+@pytest.mark.parametrize(
+    ("second", "kept"),
+    [((30, 74), (30, 74)), ((31, 73), (30, 74)), ((32, 74), (None, 74)), ((30, 71), (30, None))],
+)
+def test_a_temperature_or_voltage_that_two_answers_differ_on_is_not_taken(
+    second: tuple[int, int], kept: tuple[int | None, int | None]
+) -> None:
+    columns = FeedbackColumns(FEETECH, [ServoConfig(1, "sts3215", 1000, 3000, 3000.0)])
+    answers = [
+        ServoReply(Sample(0, 2000, temperature=warm, voltage=tenths), at_s)
+        for (warm, tenths), at_s in (((30, 74), 1.0), (second, 1.002))
+    ]
+    both = columns.confirmed(0, *answers)
+    assert both is not None and (both.sample.temperature, both.sample.voltage) == kept

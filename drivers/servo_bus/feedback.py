@@ -20,6 +20,9 @@ from gazerig.drivers.types import Feedback, ServoConfig
 ALIKE_C, ALIKE_TENTH_V = 3, 10
 """So far apart temperatures and voltages of two answers right after one another may be."""
 
+EQUAL_C, EQUAL_TENTH_V = 1, 1
+"""So far apart both are the same value; if they are farther apart, neither is taken."""
+
 MOST_CELSIUS = 125
 """A temperature above is none."""
 
@@ -179,9 +182,11 @@ class FeedbackColumns:
     def confirmed(self, slot: int, first: ServoReply, second: ServoReply) -> ServoReply | None:
         """Return the values that two consecutive answers agree on, None if they differ."""
         one, other = first.sample, second.sample
+        warmer = abs((one.temperature or 0) - (other.temperature or 0))
+        stronger = abs((one.voltage or 0) - (other.voltage or 0))
         alike = (
-            abs((one.temperature or 0) - (other.temperature or 0)) <= ALIKE_C
-            and abs((one.voltage or 0) - (other.voltage or 0)) <= ALIKE_TENTH_V
+            warmer <= ALIKE_C
+            and stronger <= ALIKE_TENTH_V
             and self.places.pair(slot, one.position, first.at_s, other.position, second.at_s)
         )
         if not alike:
@@ -194,6 +199,8 @@ class FeedbackColumns:
                 position=(one.position + other.position) // 2,
                 velocity=min(one.velocity, other.velocity, key=abs),
                 effort=min(one.effort, other.effort, key=abs),
+                temperature=one.temperature if warmer <= EQUAL_C else None,
+                voltage=one.voltage if stronger <= EQUAL_TENTH_V else None,
             )
         )
 
