@@ -134,7 +134,7 @@ class Machine:
         self.limits = limits(rig.joints)
         self.guard = Guard(rig.guard, self.limits, self.names, self.body.reach, self.period_s)
         self.setups = rig_setups(rig)
-        self._linkages = [rig.joints[name].made() for name in self.names]
+        self.linkages = [rig.joints[name].made() for name in self.names]
         self.places = [(rig.joints[name].bus, place_of(rig, name)) for name in self.names]
         self._kinds = [rig.bus_of(name).kind for name in self.names]
         self.heard: tuple[bool, ...] = ()
@@ -166,7 +166,7 @@ class Machine:
         steps = {name: device.positions_steps() for name, device in self.devices.items()}
         return [
             linkage.angle_rad(steps[bus][place])
-            for linkage, (bus, place) in zip(self._linkages, self.places, strict=True)
+            for linkage, (bus, place) in zip(self.linkages, self.places, strict=True)
         ]
 
     def true_goal(self, i: int) -> int | None:
