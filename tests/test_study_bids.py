@@ -46,7 +46,7 @@ def root(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         for r in records(design(), 1)
     ]
     second = [
-        replace(r, value="a\ttab\nand a line") if isinstance(r, ItemAnswered) and r.trial is None
+        replace(r, value="=a\ttab\nand a line") if isinstance(r, ItemAnswered) and r.trial is None
         else replace(r, recording="gone.mcap") if isinstance(r, TrialEnded) else r
         for r in records(design(), 2)
     ]  # fmt: skip
@@ -78,7 +78,7 @@ def test_answers_are_one_row_each_and_every_column_is_described(root: Path) -> N
     found, sidecar = rows(table), json.loads(table.with_suffix(".json").read_text())
     assert len(found) == 5 and set(found[0]) <= set(sidecar)
     assert {row["question"] for row in found} <= set(sidecar["question"]["Levels"])
-    assert found[-1]["response"] == "a tab and a line" and found[-1]["trial"] == "n/a"
+    assert found[-1]["response"] == "'=a tab and a line" and found[-1]["trial"] == "n/a"
     assert all(float(row["response_time"]) > 0.0 for row in found)
 
 

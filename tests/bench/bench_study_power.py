@@ -189,8 +189,9 @@ def main() -> None:
             hypothesis = study.hypotheses[0]
             known = measures(study, QUESTIONS)[hypothesis.measure]
             said = claim(replace(study, plan=plan), hypothesis, known).power
+            found = share(one)
             took = time.perf_counter() - began
-            print(f"{one.name:68}{said:8.3f}{share(one):8.3f}{took:7.1f}", flush=True)
+            print(f"{one.name:68}{said:8.3f}{found:8.3f}{took:7.1f}", flush=True)
 
 
 if __name__ == "__main__":
