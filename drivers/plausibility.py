@@ -95,7 +95,11 @@ class Plausibility:
         return True
 
     def _near(self, slot: int, before: int, before_s: float, now: int, now_s: float) -> bool:
-        reach = self._free[slot] + self._pace[slot] * max(0.0, now_s - before_s)
+        since_s = max(0.0, now_s - before_s)
+        if self.disturbed(now_s):  # two servos with one id say the same wrong thing twice
+            reach = PAIR_STEPS + self._fastest[slot] * (LATE_S + since_s)
+        else:
+            reach = self._free[slot] + self._pace[slot] * since_s
         return abs(now - before) <= reach
 
     # --- a line on which answers have been damaged of late

@@ -5,7 +5,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.drivers.feetech.family import FEETECH
-from gazerig.drivers.plausibility import AGREEING, DISTURBED_S, Plausibility
+from gazerig.drivers.plausibility import (
+    AGREEING,
+    DISTURBED_S,
+    LATE_S,
+    PAIR_STEPS,
+    Plausibility,
+)
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.read_windows import Sample
 from gazerig.drivers.servo_bus.sync_read import ServoReply
@@ -59,6 +65,16 @@ def test_no_motion_that_the_motor_can_make_is_refused(speeds, data):
         dt_s = data.draw(st.floats(0.001, 0.05))
         at_s, place = at_s + dt_s, place + speed * dt_s
         assert plausible.whole((round(place), 2000), at_s)
+
+
+def test_on_a_disturbed_line_a_joint_comes_no_farther_than_its_motor_can_turn_it():
+    """Two servos with one id answer at the same time: what both say passes the sum twice."""
+    within, beyond = SPEED * (0.019 + LATE_S), SPEED * (0.019 + LATE_S) + PAIR_STEPS + 1
+    assert known(1000).one(0, round(1000 + beyond), 1.019)
+    for way, believed in ((within, True), (beyond, False), (-beyond, False)):
+        plausible = known(1000)
+        plausible.damaged(1.0)
+        assert plausible.one(0, round(1000 + way), 1.019) == believed
 
 
 def test_a_line_is_disturbed_for_a_while_after_a_damaged_answer():

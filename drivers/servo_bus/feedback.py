@@ -169,7 +169,7 @@ class FeedbackColumns:
             return False
         answers = [replies[i] for i in self._ids]
         at_s = answers[0].at_s
-        if any(one.at_s != at_s for one in answers):
+        if self.places.disturbed(at_s) or any(one.at_s != at_s for one in answers):
             return False
         return self.places.whole(
             [self._near(slot, one.sample.position) for slot, one in enumerate(answers)], at_s

@@ -29,7 +29,6 @@ from struck_rigs import CASES, VOLTS, quick  # noqa: E402
 from gazerig.drivers.errors import DriverError  # noqa: E402
 from gazerig.robot.model.types import JointState  # noqa: E402
 from gazerig.sim_mock.smart_servo.chain import ServoChain  # noqa: E402
-from gazerig.sim_mock.smart_servo.servo import EmulatedServo  # noqa: E402
 from gazerig.testing import struck_machine  # noqa: E402
 from gazerig.testing.struck_machine import NEAR_RAD, Broken, Case, Machine  # noqa: E402
 
@@ -96,9 +95,8 @@ class Watch:
             if not isinstance(device, ServoChain):
                 continue
             servos, linkage = device.servos, machine.linkages[i]
-            own, others = servos[place], list[EmulatedServo]()
-            if len(servos) > len(machine.names) or own.id != setup.id:
-                others = [one for one in servos if one.id == setup.id and one is not own]
+            own = servos[place]
+            others = [one for one in servos if one.id == setup.id and one is not own]
             true[i] += [linkage.angle_rad(one.position_steps) for one in others]
             around.append([(float(one.warmth_c), 0.1 * one.voltage_01v) for one in (own, *others)])
         self._past.append((now_s, true, around))
