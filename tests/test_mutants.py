@@ -25,8 +25,11 @@ def test_no_two_mutants_are_one() -> None:
 
 
 def claims() -> dict[str, set[str]]:
-    """Return the rows of both papers, and the tests that each names: test files, or functions."""
-    found = {}
+    """Return the rows of both papers, and the tests that each names: test files, or functions.
+
+    The sections of gaze.md name none.
+    """
+    found: dict[str, set[str]] = {}
     for line in (ROOT / "docs/checks.md").read_text("utf-8").splitlines():
         if number := re.match(r"\| ([ESRBA]\d+) \|", line):
             assert number[1] not in found, f"{number[1]} twice"
@@ -36,6 +39,8 @@ def claims() -> dict[str, set[str]]:
         cells = [cell.strip() for cell in line.split("|")]
         if len(cells) == 6 and not cells[1].startswith("-") and cells[4].startswith("test_"):
             found[f"{cells[1]}: {cells[2]}"] = set(cells[4].split(", "))
+    sections = re.findall(r"^## (.+)$", (ROOT / "docs/gaze.md").read_text("utf-8"), re.M)
+    found |= {title: set() for title in sections[: sections.index("Profiles and characters")]}
     return found
 
 
@@ -46,4 +51,6 @@ def test_every_claim_has_a_mutant_that_its_tests_notice() -> None:
     for mutant in ALL:
         for row in mutant.rows:
             parts = {part for test in mutant.tests for part in test.split("::")}
-            assert parts & named[row], f"{row} names none of {', '.join(mutant.tests)}"
+            assert not named[row] or parts & named[row], (
+                f"{row} names none of {', '.join(mutant.tests)}"
+            )

@@ -38,6 +38,12 @@ def follow(speed_deg_s: float, seconds: float, dt: float = DT) -> tuple[float, f
     return (yaw(gaze) - before) / dt, speed_deg_s * seconds - yaw(gaze)
 
 
+def test_following_and_closing_together_are_no_faster_than_people() -> None:
+    pursuit, most = Pursuit(PursuitParams()), PursuitParams().max_speed_deg_s
+    gaze = pursuit.step(point(0.0), *circling(5.0, most), EYE, DT)
+    assert yaw(gaze) / DT == pytest.approx(most, rel=5e-3)
+
+
 @pytest.mark.parametrize("speed", [10.0, 20.0, 30.0, 50.0])
 @pytest.mark.parametrize("dt", [0.010, 0.005, 0.002])
 def test_ramp_is_followed_at_its_speed_with_the_lag_of_the_gains(speed: float, dt: float) -> None:

@@ -18,7 +18,7 @@ from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo
 
-TICK_S = 0.01
+TICK_S = 0.05
 
 
 def rig(path: Path) -> None:
