@@ -9,7 +9,7 @@ slower through the values in between. Any unit; speed and acceleration are per s
 """
 
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -97,10 +97,6 @@ def _states(position: Floats, span: Floats) -> tuple[Floats, Floats]:
     return speed, acceleration
 
 
-_DENSE_KEYS = 64
-"""Up to so many keys between two stops a dense system is solved faster."""
-
-
 def _passing(position: Floats, span: Floats) -> tuple[Floats, Floats]:
     """Return speed and acceleration at the keys between two stops.
 
@@ -135,45 +131,56 @@ def _least_jerk(position: Floats, span: Floats) -> tuple[Floats, Floats]:
         return np.concatenate((jerk[:-1] - 6.0 * c3[1:], snap[:-1] - 24.0 * c4[1:]))
 
     at_zero = gaps(np.zeros(2 * count))
-    solve = _dense_solution if count <= _DENSE_KEYS else _banded_solution
-    gaps(solve(lambda one: gaps(one) - at_zero, -at_zero))
-    return speed, acceleration
-
-
-def _dense_solution(product: Callable[[Floats], Floats], right: Floats) -> Floats:
-    """Return the solution of a linear system whose matrix is known by its products."""
-    matrix = np.stack([product(one) for one in np.eye(len(right))], axis=1)
-    # Jerk and snap differ in size by a power of the time; each row gets a largest entry of 1.
-    scale = np.abs(matrix).max(axis=1)
-    solution: Floats = np.linalg.solve(matrix / scale[:, None], right / scale)
-    return solution
-
-
-def _banded_solution(product: Callable[[Floats], Floats], right: Floats) -> Floats:
-    """Return the same where a key's gaps depend on that key and its two neighbours alone.
-
-    Time and memory grow with the number of keys, and not with its cube and square.
-    """
-    from scipy.linalg import solve_banded  # a fifth of a second, which few gestures need
-
-    count = len(right) // 2
     keys = np.arange(count)
-    # Rows and columns in the order of the keys: the gaps in jerk and snap, speed and acceleration.
-    bands = np.zeros((7, 2 * count))
+    # Of each key's gaps: what the key before, itself and the key behind add to them.
+    before, own, behind = blocks = np.zeros((3, count, 2, 2))
     for first in range(3):
-        # Every third key moves no gap that another one of them moves.
-        moved = keys[first::3]
+        moved = keys[first::3]  # no two of them move the same gap
         for of in (0, 1):
             probe = np.zeros(2 * count)
             probe[of * count + moved] = 1.0
-            jumps = product(probe).reshape(2, count)
-            for neighbour in (-1, 0, 1):
-                key = moved[(moved + neighbour >= 0) & (moved + neighbour < count)]
-                for gap in (0, 1):
-                    column, row = 2 * key + of, 2 * (key + neighbour) + gap
-                    bands[3 + row - column, column] = jumps[gap, key + neighbour]
-    mixed = right.reshape(2, count).T.ravel()
-    solution: Floats = solve_banded((3, 3), bands, mixed).reshape(count, 2).T.ravel()
+            jumps = (gaps(probe) - at_zero).reshape(2, count)
+            for block, offset in zip(blocks, (1, 0, -1), strict=True):
+                gap = moved + offset
+                gap = gap[(gap >= 0) & (gap < count)]
+                block[gap, :, of] = jumps[:, gap].T
+    gaps(_solved(before, own, behind, -at_zero.reshape(2, count).T[..., None]).T.ravel())
+    return speed, acceleration
+
+
+def _solved(before: Floats, own: Floats, behind: Floats, right: Floats) -> Floats:
+    """Return the solution (n, 2) of a block tridiagonal system by cyclic reduction.
+
+    The system is that of a minimum and so positive definite: no pivot is needed.
+
+    Args:
+        before: (n, 2, 2) factors of the unknowns of the key before.
+        own: of its own.
+        behind: of those of the key behind.
+        right: (n, 2, 1) right sides.
+    """
+    if len(own) == 1:
+        return np.asarray(np.linalg.solve(own, right)[..., 0], dtype=np.float64)
+    if len(own) % 2 == 0:  # one more that is 0, so that every second one has two neighbours
+        zero, one = np.zeros((1, 2, 2)), np.eye(2)[None]
+        before, behind = np.concatenate((before, zero)), np.concatenate((behind, zero))
+        own, right = np.concatenate((own, one)), np.concatenate((right, np.zeros((1, 2, 1))))
+        return _solved(before, own, behind, right)[:-1]
+    kept, gone = slice(1, None, 2), slice(0, None, 2)
+    there = np.concatenate((before[gone], behind[gone], right[gone]), axis=2)
+    reduced = np.linalg.solve(own[gone], there)
+    by_before, by_behind, by_right = reduced[..., :2], reduced[..., 2:4], reduced[..., 4:]
+    a, c = before[kept], behind[kept]
+    inner = _solved(
+        -a @ by_before[:-1],
+        own[kept] - a @ by_behind[:-1] - c @ by_before[1:],
+        -c @ by_behind[1:],
+        right[kept] - a @ by_right[:-1] - c @ by_right[1:],
+    )
+    solution = np.empty((len(own), 2))
+    solution[kept] = inner
+    padded = np.concatenate((np.zeros((1, 2)), inner, np.zeros((1, 2))))[..., None]
+    solution[gone] = (by_right - by_before @ padded[:-1] - by_behind @ padded[1:])[..., 0]
     return solution
 
 
