@@ -3,7 +3,7 @@
 A rig moves on emulated buses of one kind in simulated time while up to three faults at once strike
 its line, its board or its servos: noise, collisions, lost bytes, delays, echoes, unplugged
 adapters, brown-outs. After each mix the machine must come back, or name what a person has to do.
-Every fresh value is compared with the true servo between the question and the answer:
+Every fresh value is compared with the true servo, from the first request of a read to its end:
 
 wrong: a position that the joint did not have then, a temperature or a voltage that it has not had
 stale: a position that the joint had within the last second, and has left
@@ -35,8 +35,8 @@ from gazerig.testing.struck_machine import NEAR_RAD, Broken, Case, Machine  # no
 ROOM_RAD = 0.004
 ROOM_C, ROOM_V = 2.0, 0.15
 PAST_S = 1.0
-TOLD = 3
-"""Values of one mix of faults that are printed."""
+MOST_PRINTED = 3
+"""Wrong values of one mix of faults that are printed."""
 EPISODES = 40
 """Mixes of faults until another machine is built."""
 
@@ -46,8 +46,8 @@ STATIC = [Case((f"static {percent}",)) for percent in (0.1, 0.5, 2.0, 10.0)]
 class Struck(Machine):
     """A machine whose line may be noisy.
 
-    noisy: noise hits bytes on their way to the servos, too. A goal that it makes and that their
-        check lets pass stays in a servo for a tick; the range that is armed in it still holds
+    noisy: noise also hits bytes to the servos. A damaged goal can pass their check and stays for
+        a tick; the servo's own range still limits it
     """
 
     noisy = False
@@ -64,12 +64,12 @@ class Watch:
     """Compares every reading of a machine with its true servos, and counts.
 
     counts: by "fresh", "wrong", "stale", "outside" and "off"
-    where: what is being done, for what is printed
+    where: the machine and its faults, for printed lines
     """
 
     def __init__(self, machine: Machine, counts: Counter[str]) -> None:
         self.where, self._counts, self._machine = "", counts, machine
-        self._told = Counter[str]()
+        self._printed = Counter[str]()
         self._past: deque[tuple[float, list[list[float]], list[list[tuple[float, float]]]]] = (
             deque()
         )
@@ -77,16 +77,16 @@ class Watch:
         self._read = machine.body.read
         machine.body.read = self.read  # type: ignore[method-assign]
         self._seen: list[list[list[float]]] = []
-        machine.body.bus._port._tap = self._asked  # type: ignore[attr-defined]
+        machine.body.bus._port._tap = self._record_request  # type: ignore[attr-defined]
 
-    def _asked(self, data: bytes) -> None:
-        """Record the true state when anything is asked: an answer tells one of these."""
+    def _record_request(self, data: bytes) -> None:
+        """Record the true state at each request: a right answer holds one of these."""
         self._seen.append(self._note())
 
     def _note(self) -> list[list[float]]:
-        """Record the true state now; return where each joint is.
+        """Record the true state now; return the possible angles of each joint.
 
-        A second servo with a joint's id is there as well: nothing on a line tells them apart.
+        A second servo with the id of a joint counts as well: no driver can tell them apart.
         """
         machine, now_s = self._machine, self._machine.clock.now_s()
         true, around = [[angle] for angle in machine.true_rad()], list[list[tuple[float, float]]]()
@@ -123,7 +123,7 @@ class Watch:
             if not _between(now, seen, ROOM_RAD):
                 stale = any(abs(now - one) <= ROOM_RAD for past in self._past for one in past[1][i])
                 self._counts["stale" if stale else "wrong"] += 1
-                self._tell(
+                self._report(
                     f"{t_s:.3f} s {name} at {now:.4f} rad, truly {seen}; heard "
                     f"{joints.measured_s[i] - t_s:+.4f} s, rearmed {joints.rearmed[i]}, "
                     f"torque {joints.torque[i]}{', stale' if stale else ''}"
@@ -141,14 +141,14 @@ class Watch:
             was = [one[nth] for past in self._past for one in past[2][i]]
             if value is not None and not min(was) - room <= value <= max(was) + room:
                 self._counts["wrong"] += 1
-                self._tell(
+                self._report(
                     f"{self._machine.names[i]} has {value:.2f} {'CV'[nth]}, truly "
                     f"{min(was):.2f} to {max(was):.2f}"
                 )
 
-    def _tell(self, text: str) -> None:
-        self._told[self.where] += 1
-        if self._told[self.where] <= TOLD:
+    def _report(self, text: str) -> None:
+        self._printed[self.where] += 1
+        if self._printed[self.where] <= MOST_PRINTED:
             print(f"{self.where}: {text}", flush=True)
 
 
@@ -165,7 +165,7 @@ def mix(kind: str, dice: random.Random, only: str = "") -> Case:
     some = dice.sample(cases, min(len(cases), dice.choice((1, 1, 2, 3))))
     if any("reset" in case.name for case in some):  # no servo has that id any more
         some = [c for c in some if "reset" in c.name or "{i}" not in str(c)]
-    # A script in a board moves a servo beyond its range while the line keeps it from being ended.
+    # A script in a board moves a servo out of its range until the driver can end it.
     some = [case for case in some if "script {i}" in case.name] or some
     begins = tuple(text for case in some for text in case.begins)
     ends = tuple(text for case in some for text in case.ends)
@@ -176,7 +176,7 @@ def soak(kind: str, hours: float, seed: int, first: int = 0, only: str = "") -> 
     """Strike one machine after the other and print what was found."""
     struck_machine.PATIENCE_S = 8.0  # a bus that was late long is slow for a while
     counts, ends, seen_s, faults, nth = Counter[str](), Counter[str](), 0.0, 0, first
-    began_s, told_h = time.process_time(), 0.0
+    start_cpu_s, printed_h = time.process_time(), 0.0
     while seen_s < 3600.0 * hours:
         dice = random.Random(f"{seed} {kind} {nth}")
         rig = struck_rigs.rig_of(kind)
@@ -208,14 +208,14 @@ def soak(kind: str, hours: float, seed: int, first: int = 0, only: str = "") -> 
             print(f"{watch.where}: {type(error).__name__}: {error}", flush=True)
         seen_s += machine.clock.now_s() - start_s
         nth += 1
-        if seen_s / 3600.0 - told_h >= 0.1 or seen_s >= 3600.0 * hours:
-            told_h = seen_s / 3600.0
+        if seen_s / 3600.0 - printed_h >= 0.1 or seen_s >= 3600.0 * hours:
+            printed_h = seen_s / 3600.0
             row = ", ".join(
                 f"{key} {counts[key]}" for key in ("fresh", "wrong", "stale", "outside", "off")
             )
             print(
-                f"== {kind} {told_h:.2f} h, {faults} faults, {row}; {dict(ends)}; machine {nth}, "
-                f"{time.process_time() - began_s:.0f} s of processor, "
+                f"== {kind} {printed_h:.2f} h, {faults} faults, {row}; {dict(ends)}; machine {nth}, "
+                f"{time.process_time() - start_cpu_s:.0f} s of processor, "
                 f"{getrusage(RUSAGE_SELF).ru_maxrss / 1024.0:.0f} MB, "
                 f"{len(os.listdir('/proc/self/fd'))} files",
                 flush=True,
