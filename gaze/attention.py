@@ -51,7 +51,7 @@ class AttentionParams:
     looks_elsewhere_ratio: Annotated[float, Bounds(0, 1),
         "share of its salience that a face keeps while the person does not look at the head; 1: all"] = 0.85
     own_motion_ratio: Annotated[float, Bounds(0, 1),
-        "share of their salience that a person's own hands and clothes keep beside the face, unless they are raised to it or held "
+        "share of their motion that a person's own hands and clothes keep beside the face, unless they are raised to it or held "
         "out; the rest counts for the face; 1: all"] = 0.3
     face_memory_s: Annotated[float, Bounds(0, 600),
         "a face that leaves the view while something else is looked at is remembered where it was for this time; 0: not at all"] = 15.0
@@ -180,10 +180,7 @@ class Attention:
         compare = self._compare_few if len(bodies) <= _FEW else self._compare
         ratio = self._params.looks_elsewhere_ratio
         elsewhere = [face.id for face in percept.faces if face.looks_at_head is False]
-        worth = [
-            (ratio if id in elsewhere else 1.0) * (1.0 + self._gestures.get(id, 0.0))
-            for id in bodies.ids
-        ]
+        worth = [ratio if id in elsewhere else 1.0 for id in bodies.ids]
         made = compare(bodies, worth, state, t_s)
         self._note_gestures(made)
         if self._unnoticed(made):
@@ -233,7 +230,7 @@ class Attention:
         left = self._habituation.step_rows(rows, eye, attended, t_s)
         habituation = [*map(mul, left, worth), 1.0]
         rule = [0.0] * (n + 1)
-        amount = [*[sum(terms) for terms in motion], 0.0]
+        amount = [*[terms.total for terms in motion], 0.0]
         point = rule_target is not None and rule_target.point_world_m is not None
         if rule_target is not None:
             wanted = [n] if point else rule_target.rows
@@ -307,7 +304,8 @@ class Attention:
         for row, id in enumerate(made.bodies.ids):
             owner = self._persons.parts.get(id)
             if owner is not None:
-                moved = sum(made.motion(row)[:3]) * (1.0 / ratio - 1.0)
+                motion = made.motion(row)
+                moved = (motion.total - motion.onset) * (1.0 / ratio - 1.0)
                 self._gestures[owner] = max(self._gestures.get(owner, 0.0), moved)
 
     def _shares(
@@ -320,7 +318,8 @@ class Attention:
     ) -> list[float]:
         """Return the factor 0..1 of each body that a rule points at, 1 for the strongest."""
         named = [ids[row] for row in rule_target.rows]
-        mine = [worth[row] for row in rule_target.rows]
+        moved = self._gestures
+        mine = [worth[row] * (1.0 + moved.get(ids[row], 0.0)) for row in rule_target.rows]
         weights = [float(near) * one for near, one in zip(rule_target.nearness, mine, strict=True)]
         shares = [
             factor * one * (rule_target.stay if id == self._favoured_id else 1.0)

@@ -14,11 +14,13 @@ none      No motion attracts: all that is looked at is what a rule names.
 
 What has just come into view has a further, decaying term: the paper's behaviour
 (e), a hand that reaches in from outside the field, is not in eq 1. So has what begins to move,
-which captures attention as what appears does (Abrams & Christ 2003), where motion saturates. Onsets that follow each other
-weigh less, as people stop looking at what appears again and again (Neo & Chua 2006).
+which captures attention as what appears does (Abrams & Christ 2003), where motion saturates.
+Onsets that follow each other weigh less, as people stop looking at what appears again and again
+(Neo & Chua 2006).
 
-In the retinal form the sum saturates: no motion alone outweighs a face for long. What comes nearer
-so fast that it would arrive within two seconds is exempt, as a hand that reaches for the head.
+In the retinal form the sum saturates where bodies are compared: no motion alone outweighs a face
+for long. What comes nearer so fast that it would arrive within two seconds is exempt, as a hand
+that reaches for the head.
 
 All bodies are computed at once; what is remembered of each is a row of an array. Of the few that
 there usually are each is computed by itself, in plain arithmetic: a handful of numbers costs
@@ -68,9 +70,9 @@ class BottomUpParams:
     hand_saturation: Annotated[float, Bounds(0, 10), "the same of a hand that waves or is held out; 0: no limit"] = 0.9
     smoothing_s: Annotated[float, Bounds(0, 2), "time constant of the low-pass filter of salience"] = 0.1
     onset_salience: Annotated[float, Bounds(0, 10), "extra salience of a body that has just come into view or begun to move; 0: none"] = 1.0
-    onset_s: Annotated[float, Bounds(0.02, 10), "time constant with which onset_salience decays"] = 0.25
+    onset_s: Annotated[float, Bounds(0.02, 10), "time constant with which onset_salience decays"] = 0.4
     onset_recovery_s: Annotated[float, Bounds(0, 60),
-        "time constant with which the next onset regains its full salience; 0: every onset has it"] = 3.0
+        "time constant with which the next onset regains its full salience; 0: every onset has it"] = 2.0
     # fmt: on
 
 
@@ -83,29 +85,23 @@ class MotionTerms(NamedTuple):
 
 
 class SalienceRow(NamedTuple):
-    """Amount of attention of one body, term by term."""
+    """Amount of attention of one body, term by term; total: what is compared."""
 
     translation: float
     looming: float
     rotation: float
     onset: float
+    total: float
 
 
 class SalienceTerms(NamedTuple):
-    """Amount of attention of each body, term by term: (n,) arrays."""
+    """Amount of attention of each body, term by term: (n,) arrays; total: what is compared."""
 
     translation: Floats
     looming: Floats
     rotation: Floats
     onset: Floats
-
-    @property
-    def total(self) -> Floats:
-        """Return A_i, the sum of all terms."""
-        total = self.translation + self.looming
-        total += self.rotation
-        total += self.onset
-        return total
+    total: Floats
 
     def row(self, index: int) -> SalienceRow:
         """Return the terms of one body."""
@@ -134,32 +130,30 @@ _FAST, _FASTEST = 1.0, 3.0
 """Looming beyond the first is exempt from saturation, up to the second."""
 
 
-def limited(terms: Floats, most: Floats) -> Floats:
-    """Return the terms of eq 1 with their sum saturated: most (1 - exp(-sum / most)).
+def limited(terms: Floats, most: Floats, worth: Floats) -> Floats:
+    """Return the sum of the terms of eq 1, saturated: worth most (1 - exp(-sum / most)).
 
     Args:
         terms: (3, n) slide, loom and spin; loom is positive of what comes nearer.
         most: (n,) what motion cannot exceed; inf: no limit.
+        worth: (n,) the share that counts, but of what comes nearer fast.
     """
     slide, loom, spin = terms
     free = np.isinf(most)
     exempt = np.where(free, 0.0, np.clip(loom, _FAST, _FASTEST) - _FAST)
     rest = np.abs(loom) - np.where(free, 0.0, np.maximum(loom - _FAST, 0.0))
-    total = np.maximum(slide + rest + spin, 1e-9)
-    bound = np.where(free, 1.0, most)
-    share = np.where(free, 1.0, -np.expm1(-total / bound) * bound / total)
-    return np.stack((slide * share, rest * share + exempt, spin * share))
+    total, bound = slide + rest + spin, np.where(free, 1.0, most)
+    out: Floats = exempt + worth * np.where(free, total, -np.expm1(-total / bound) * bound)
+    return out
 
 
-def limited_row(slide: float, loom: float, spin: float, most: float) -> tuple[float, float, float]:
+def limited_row(slide: float, loom: float, spin: float, most: float, worth: float) -> float:
     """Return what ``limited`` does, of one body."""
     if most == inf:
-        return slide, abs(loom), spin
+        return worth * (slide + abs(loom) + spin)
     exempt = min(max(loom, _FAST), _FASTEST) - _FAST
-    rest = abs(loom) - max(loom - _FAST, 0.0)
-    total = max(slide + rest + spin, 1e-9)
-    share = -expm1(-total / most) * most / total
-    return slide * share, rest * share + exempt, spin * share
+    total = slide + abs(loom) - max(loom - _FAST, 0.0) + spin
+    return exempt - worth * expm1(-total / most) * most
 
 
 def _length(v: Floats) -> Floats:
@@ -168,7 +162,7 @@ def _length(v: Floats) -> Floats:
     return out
 
 
-_UNSEEN = SalienceRow(0.0, 0.0, 0.0, 0.0)
+_UNSEEN = SalienceRow(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class _Memory(NamedTuple):
@@ -262,10 +256,10 @@ class BottomUp:
         gaze_world: where the eyes look, any length; only the literal form needs it
         seen: (n,) which bodies are in view; None: all
         most: of each body, what its motion cannot exceed; None: ``saturation``
-        worth: of each body, the share of its salience that counts; None: all
+        worth: of each body, the share of its motion that counts; None: all
         """
         if self._params.form == "none":
-            return SalienceTerms(*np.zeros((4, len(bodies))))
+            return SalienceTerms(*np.zeros((5, len(bodies))))
         if seen is None:
             seen = np.ones(len(bodies), dtype=np.bool_)
         now = self._terms(bodies, p_world_eye_m, v_world_eye_m_s, gaze_world)
@@ -273,7 +267,8 @@ class BottomUp:
         if bodies.ids != self._ids:
             self._remember(bodies.ids, t_s)
         limits = np.full(len(bodies), self.limit()) if most is None else np.array(most)
-        return self._blend(now, seen, t_s, limits, 1.0 if worth is None else np.array(worth))
+        shares = np.ones(len(bodies)) if worth is None else np.array(worth)
+        return self._blend(now, seen, t_s, limits, shares)
 
     def limit(self, hand: bool = False) -> float:
         """Return what motion cannot exceed; inf: no limit, as in the paper's own form."""
@@ -322,13 +317,18 @@ class BottomUp:
             spin += (1.0 - keep) * (now[2] - spin)
             past[i] = [slide, loom, spin]
             moved = slide + abs(loom) + spin
-            if most[i] < inf and moved > _MOVES and not moving[i] and t_s - entered_s[i] > _SETTLED_S:
+            if (
+                most[i] < inf
+                and moved > _MOVES
+                and not moving[i]
+                and t_s - entered_s[i] > _SETTLED_S
+            ):
                 entered_s[i] = self._onset_s = t_s
                 strength[i] = fresh
             moving[i] = float(moved > (_STILL_BELOW if moving[i] else _MOVES))
             onset = strength[i] * par.onset_salience * exp((entered_s[i] - t_s) / par.onset_s)
-            terms = *limited_row(slide, loom, spin, most[i]), onset
-            found.append(SalienceRow(*[worth[i] * term for term in terms]))
+            total = limited_row(slide, loom, spin, most[i], worth[i]) + onset
+            found.append(SalienceRow(slide, abs(loom), spin, onset, total))
         self._at_s = t_s
         return found
 
@@ -396,7 +396,7 @@ class BottomUp:
         seen: NDArray[np.bool_],
         t_s: float,
         most: Floats,
-        worth: Floats | float,
+        worth: Floats,
     ) -> SalienceTerms:
         """Return the low-passed terms and the onset term; a new body starts at 0."""
         tau, old = self._params.smoothing_s, self._arrays()
@@ -427,8 +427,8 @@ class BottomUp:
         np.copyto(seen_s, t_s, where=seen)
         self._memory = _Memory(old.ids, smooth, entered_s, seen_s, strength, moving)
         self._at_s = t_s
-        slide, loom, spin = limited(smooth, most) * worth
-        return SalienceTerms(slide, loom, spin, onset * worth)
+        total = limited(smooth, most, worth) + onset
+        return SalienceTerms(smooth[0], np.abs(smooth[1]), smooth[2], onset, total)
 
     def _arrays(self) -> _Memory:
         """Return the memory as arrays."""

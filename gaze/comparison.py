@@ -89,7 +89,7 @@ class TargetComparison(NamedTuple):
             kind = self.point_kind
             return Salience(NO_BODY, kind, 0.0, 0.0, 0.0, 0.0, rule, habituation, total)
         name, kind = self.bodies.ids[row], self.bodies.kinds[row]
-        translation, looming, rotation, onset = self.motion(row)
+        translation, looming, rotation, onset, _ = self.motion(row)
         return Salience(name, kind, translation, looming, rotation, onset, rule, habituation, total)
 
 

@@ -238,7 +238,7 @@ def test_literal_form_is_eq_1_as_printed_with_e_the_direction_of_gaze() -> None:
     seen = replace(seen, w_world_rad_s=np.array([[3.0, 0, 4.0], [3.0, 0, 4.0]]))
     for gaze in ((1.0, 0.0, 0.0), (7.0, 0.0, 0.0)):
         saliences = model.step(seen, (0, 0, 0), 0.0, (1.0, 1.0, 1.0), gaze)
-        for term, value in zip(saliences, (2.0, 1.0, 3.0, 0.0), strict=True):
+        for term, value in zip(saliences, (2.0, 1.0, 3.0, 0.0, 6.0), strict=True):
             assert term.tolist() == [value, value]
     aside = model.step(seen, (0, 0, 0), 0.0, gaze_world=(0.0, 1.0, 0.0))
     assert (aside.translation[0], aside.looming[0], aside.rotation[0]) == (1.0, 2.0, 0.0)
