@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.vision.motion.clustering import gathered
-from gazerig.drivers.vision.motion.detector import MotionDetector
+from gazerig.drivers.vision.motion.detector import MotionDetector, at_level
 from gazerig.drivers.vision.motion.ego_motion import own_motion
 from gazerig.drivers.vision.motion.image import made_small
-from gazerig.drivers.vision.motion.optical_flow import FlowSearch, turn_homography
+from gazerig.drivers.vision.motion.optical_flow import FlowSearch, laid, turn_homography
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.drivers.vision.motion.segmentation import what_moves
 
@@ -47,7 +47,7 @@ def measured(width: int, height: int) -> dict[str, list[float]]:
     lens = SimpleNamespace(fx_px=focal, fy_px=focal, cx_px=(width - 1) / 2, cy_px=(height - 1) / 2)
     c, s = np.cos(TURN_RAD), np.sin(TURN_RAD)
     R = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
-    search, whole = FlowSearch(params.preset, params.finest_level), MotionDetector(params)
+    search, whole = FlowSearch(params.preset), MotionDetector(params)
     dis = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_FAST)
     mog = cv2.createBackgroundSubtractorMOG2()
     times: dict[str, list[float]] = {}
@@ -55,13 +55,13 @@ def measured(width: int, height: int) -> dict[str, list[float]]:
     before, grey_before = None, None
     for k, picture in enumerate(pictures(width, height, focal)):
         t_s = k * DT_S
-        given = picture, params.work_px, lens, t_s
+        given = picture, params.work_px, lens, t_s, params.finest_level
         now = timed(times, "small and grey", made_small, *given)
         if before is not None:
             H = turn_homography(R, now, before)
-            pair = timed(times, "flow", search.compare, now, before, H)
+            pair = timed(times, "flow", search.search, laid(now, before, H))
             ego = timed(times, "own motion", own_motion, pair, now.K, True)
-            things = timed(times, "what moves", what_moves, pair, ego, params)
+            things = timed(times, "what moves", what_moves, pair, ego, at_level(params, now))
             timed(times, "grouping", gathered, things, params)
         before = now
         timed(times, "all, with slide, loom, spin, place", whole.find, picture, t_s, lens, R)

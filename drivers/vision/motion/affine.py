@@ -15,7 +15,7 @@ from gazerig.drivers.vision.motion.lucas_kanade import Back
 
 # Flow at neighbouring pixels is found from the same patches: so many square pixels count
 # as one measurement (8 px at half size).
-_PATCH_PX2 = 256.0
+_PATCH_PX2 = 64.0
 _TUKEY, _STEPS = 4.685, 4
 _LEAST_POINTS = 6
 # What flow is off by at best.
@@ -69,7 +69,7 @@ def affine_rest(places: Floats, flow: Floats) -> float:
     if len(places) < _LEAST_POINTS:
         return 0.0
     rows = np.column_stack((places - places.mean(axis=0), np.ones(len(places))))
-    numbers, *_ = np.linalg.lstsq(rows, flow, rcond=None)
+    numbers = np.linalg.solve(rows.T @ rows + 1e-9 * np.eye(3), rows.T @ flow)
     return float(np.sqrt(((flow - rows @ numbers) ** 2).sum(axis=1).mean()))
 
 

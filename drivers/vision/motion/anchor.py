@@ -11,7 +11,7 @@ from gazerig.drivers.vision.motion.clustering import Group
 from gazerig.drivers.vision.motion.image import Floats, Grey
 from gazerig.drivers.vision.motion.optical_flow import Mask
 
-_MARGIN_PX = 8
+_MARGIN_PX = 4
 # How far from the ground's brightness (standard deviations, grey levels) a thing's pixels are.
 _UNLIKE, _LEAST_LEVELS = 2.0, 12.0
 # A thing of which less stands out is not told from the ground by its looks at all.

@@ -23,9 +23,14 @@ _PARTING_SHARE = 0.8
 # ... and leave less than this of what one motion left unexplained.
 _BETTER_SHARE = 0.6
 _MOST_SPLITS = 3
-_SMOOTH_PX = 5
+# Patches that are looked at for each that may be reported.
+_LOOKED_AT = 3
+_SMOOTH_PX = 3
+# Relative change of brightness at the edges of a thing that is no faint shadow, and the share of
+# the image from which on less is enough: what is near is large, and its edges are soft.
+_LEAST_CHANGE, _SMALL_SHARE = 0.13, 0.008
 _SAMPLE = 400
-_HOLES = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (5, 5))
+_HOLES = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
 
 
 class Group(NamedTuple):
@@ -60,22 +65,42 @@ def gathered(things: Things, params: MotionParams) -> list[Group]:
     least = max(4, round(params.min_area_share * things.mask.size))
     pieces = [
         piece
-        for group in _connected(things.mask, things.flow, params.close_px, least)
+        for group in _connected(
+            things.mask, things.flow, params.close_px, least, _LOOKED_AT * params.max_blobs
+        )
         for piece in _parted(group, things, least, _MOST_SPLITS)
     ]
+    if things.change is not None:
+        small = _SMALL_SHARE * things.mask.size
+        pieces = [
+            piece
+            for piece in pieces
+            if _sharpest(things.change[piece.y, piece.x])
+            > (_LEAST_CHANGE * min(1.0, small / len(piece.x))) ** 2
+        ]
     pieces.sort(key=lambda group: (-len(group.x), group.x[0], group.y[0]))
     return pieces[: params.max_blobs]
 
 
-def _connected(mask: Mask, flow: Flow, close_px: int, least: int) -> list[Group]:
-    """Return the pixels of the mask by neighbourhood, gaps up to ``close_px`` being bridged."""
+def _sharpest(values: NDArray[np.float32]) -> float:
+    """Return what three in a hundred values exceed."""
+    at = int(0.97 * len(values))
+    return float(np.partition(values, at)[at])
+
+
+def _connected(mask: Mask, flow: Flow, close_px: int, least: int, most: int = 100) -> list[Group]:
+    """Return the pixels of the mask by neighbourhood, gaps up to ``close_px`` being bridged.
+
+    Of very many the ``most`` largest are returned.
+    """
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (close_px, close_px))
     closed = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, kernel)
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(closed)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(closed)
+    areas = stats[1:, cv2.CC_STAT_AREA]
     groups = []
-    for k in range(1, count):
-        if stats[k, cv2.CC_STAT_AREA] < least:
-            continue
+    for k in (np.argsort(-areas, kind="stable")[:most] + 1).tolist():
+        if areas[k - 1] < least:
+            break
         left, top, width, height = (int(v) for v in stats[k, :4])
         window = np.s_[top : top + height, left : left + width]
         y, x = np.nonzero((labels[window] == k) & mask[window])

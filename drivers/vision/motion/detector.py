@@ -1,14 +1,16 @@
 """Things that move, found in a image and the one before it, whatever the camera did itself.
 
-Small grey image -> flow to the older one, turned as the joints say (motion_flow) -> the
-camera's own motion (motion_ego) -> what moves besides (motion_things) -> patches
-(motion_groups) -> slide, growth and spin (motion_affine) -> place and velocity
-(motion_place) -> numbers that last (motion_tracks). No clock: times come with images.
+The newer image is compared with the older one, turned as the joints say. Where most of the room
+keeps its place flow is searched only where the images differ (optical_flow); else everywhere, and
+the camera's own motion is found in it (ego_motion). What moves besides (segmentation) is gathered
+to patches (clustering); their slide, growth and spin (affine, lucas_kanade) give place and velocity
+(backprojection), and numbers that last (tracking). No clock: times come with images.
 
 While the camera turns fast, and where the image does not tell its own motion from that
 of things, nothing is said, as our own eyes say nothing during a saccade.
 """
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,7 +28,7 @@ from gazerig.drivers.vision.motion.backprojection import (
     velocity,
 )
 from gazerig.drivers.vision.motion.clustering import Group, fastest, gathered, inscribed_px
-from gazerig.drivers.vision.motion.ego_motion import Ego, own_motion, turn_rad
+from gazerig.drivers.vision.motion.ego_motion import Ego, at_rest, own_motion, turn_rad
 from gazerig.drivers.vision.motion.gloves import GloveFinder, beside
 from gazerig.drivers.vision.motion.image import (
     Floats,
@@ -35,17 +37,19 @@ from gazerig.drivers.vision.motion.image import (
     made_small,
     to_given,
 )
-from gazerig.drivers.vision.motion.lucas_kanade import Blurred, Room, blurred, refined
+from gazerig.drivers.vision.motion.lucas_kanade import Level, Room, levels, refined
 from gazerig.drivers.vision.motion.optical_flow import (
     Compared,
     Flow,
     FlowSearch,
+    laid,
     searchable,
     turn_homography,
+    windows_of,
 )
 from gazerig.drivers.vision.motion.parallax import parallax
 from gazerig.drivers.vision.motion.params import MotionParams
-from gazerig.drivers.vision.motion.segmentation import what_moves
+from gazerig.drivers.vision.motion.segmentation import Unlike, unlike, what_moves
 from gazerig.drivers.vision.motion.tracking import MotionTracks, PatchTrack
 
 _KIND = "thing"
@@ -59,7 +63,7 @@ _LEAST_KNOWN = 0.4
 # So near to the image's edge, parts of its width, flow is not known where the camera turns.
 _EDGE_SHARE = 0.06
 # A patch that comes as near as this to the edge goes on beyond it.
-_CUT_PX = 2
+_CUT_PX = 1
 # Points enough for an affine fit.
 _SAMPLE = 400
 
@@ -88,7 +92,7 @@ class MotionDetector:
 
     def __init__(self, params: MotionParams) -> None:
         self._params = params
-        self._search = FlowSearch(params.preset, params.finest_level)
+        self._search = FlowSearch(params.preset)
         self._tracks = MotionTracks(params)
         self._gloves = GloveFinder()
         self._before: SmallImage | None = None
@@ -97,8 +101,8 @@ class MotionDetector:
 
     def retune(self, params: MotionParams) -> None:
         """Look more or less finely from the next image on; what is followed stays."""
-        if (params.preset, params.finest_level) != (self._params.preset, self._params.finest_level):
-            self._search = FlowSearch(params.preset, params.finest_level)
+        if params.preset != self._params.preset:
+            self._search = FlowSearch(params.preset)
         self._params = params
         self._tracks.retune(params)
 
@@ -130,7 +134,7 @@ class MotionDetector:
         Raises:
             ValueError: the image is none of those.
         """
-        now = made_small(image, self._params.work_px, lens, captured_s)
+        now = made_small(image, self._params.work_px, lens, captured_s, self._params.finest_level)
         before, self._before = self._before, now
         self.report = self._look(now, before, R_now_before, depth_m, t_now_before_m)
         if self._params.gloves:
@@ -163,31 +167,41 @@ class MotionDetector:
             return MotionReport(silent="no frame shortly before")
         depth = small_depth(depth_m, now.grey.shape)
         shift = parallax(depth, now.K, t_now_before_m)
-        pair, ego = self._compared(now, before, R_now_before, shift)
+        pair, ego, still = self._compared(now, before, R_now_before, shift)
         turn = float(np.degrees(turn_rad(ego, now.grey, now.K))) / dt_s
         why = self._cannot_tell(pair, ego, turn)
         if why:
             self._tracks.predict(ego.total, now.captured_s, dt_s)
             return MotionReport((), why, turn, ego.share, ego.noise_px)
-        things = what_moves(pair, ego, self._params, R_now_before is None)
-        groups = gathered(things, self._params)
-        blobs = self._blobs(groups, now, pair, ego, depth, dt_s)
+        params = at_level(self._params, now)
+        things = what_moves(pair, ego, params, R_now_before is None, still)
+        groups = gathered(things, params)
+        blobs = self._blobs(groups, now, pair, ego, depth, dt_s, params.min_flow_px)
         return MotionReport(blobs, "", turn, ego.share, ego.noise_px, things.threshold_px)
 
     def _compared(
         self, now: SmallImage, before: SmallImage, R_now_before: Floats | None, shift: Flow | None
-    ) -> tuple[Compared, Ego]:
-        """Find the flow and the camera's own motion; a large unforeseen one is taken out first."""
-        H = turn_homography(R_now_before, now, before)
-        pair = self._search.compare(now, before, H)._replace(shift=shift)
+    ) -> tuple[Compared, Ego, Unlike | None]:
+        """Find the flow and the camera's own motion; a large unforeseen one is taken out first.
+
+        Where the camera did what was predicted flow is searched only where the images differ, and
+        how they do is returned, too.
+        """
+        pair = laid(now, before, turn_homography(R_now_before, now, before))._replace(shift=shift)
         moved_before = now.captured_s - self._moved_s < _SHAKES_ON_S
+        if shift is None and not moved_before:
+            still = unlike(pair)
+            ego = at_rest(pair, still.changed)
+            if ego is not None:
+                return self._search.search(pair, windows_of(still.changed)), ego, still
+        pair = self._search.search(pair)
         ego = own_motion(pair, now.K, R_now_before is not None, moved_before)
         if ego.unforeseen_px > 0.0:
             self._moved_s = now.captured_s
         if ego.share < self._params.min_background_share or ego.unforeseen_px < _SEARCH_AGAIN_PX:
-            return pair, ego
-        again = self._search.compare(now, before, ego.total)._replace(shift=shift)
-        return again, own_motion(again, now.K, True)
+            return pair, ego, None
+        again = self._search.search(laid(now, before, ego.total)._replace(shift=shift))
+        return again, own_motion(again, now.K, True), None
 
     def _cannot_tell(self, pair: Compared, ego: Ego, turn_deg_s: float) -> str:
         """Return why ego-motion cannot be separated from the motion of objects, "" if it can."""
@@ -207,10 +221,15 @@ class MotionDetector:
         ego: Ego,
         depth: Plane | None,
         dt_s: float,
+        least_px: float,
     ) -> tuple[MovingBlob, ...]:
-        """Measure each patch and give it its number."""
-        frames = blurred(pair.now, pair.before) if groups else Blurred(())
-        motions = [_measured(group, frames, _room(group, pair, ego)) for group in groups]
+        """Measure each patch, and give those that move by more than ``least_px`` their numbers."""
+        frames = levels(pair) if groups else ()
+        measured = [(group, _measured(group, frames, _room(group, pair, ego))) for group in groups]
+        measured = [
+            one for one in measured if _goes_px(one[0], one[1][1], now.grey.shape) > least_px
+        ]
+        groups, motions = [group for group, _ in measured], [motion for _, motion in measured]
         follows = self._tracks.step(
             [centre for centre, _ in motions],
             [np.array(motion.slide_px) / dt_s for _, motion in motions],
@@ -273,6 +292,28 @@ class MotionDetector:
         )
 
 
+def at_level(params: MotionParams, now: SmallImage) -> MotionParams:
+    """Return the parameters with their lengths in pixels of the image that is searched."""
+    shrink = now.fine.shape[0] // now.grey.shape[0]
+    return replace(
+        params,
+        min_flow_px=params.min_flow_px / shrink,
+        close_px=params.close_px // shrink | 1,
+    )
+
+
+def _goes_px(group: Group, motion: PatchMotion, shape: tuple[int, ...]) -> float:
+    """Return how far the pixels of a patch move, about their root mean square."""
+    slide = float(np.hypot(*motion.slide_px))
+    if any(_edges(group, *shape[:2])):
+        return slide  # its growth is not known
+    growth = _believed(motion.growth, motion.growth_sd)
+    spin = _believed(motion.spin_rad, motion.spin_sd)
+    return float(
+        np.hypot(slide, 0.3 * np.sqrt(group.box[2] * group.box[3]) * np.hypot(growth, spin))
+    )
+
+
 class _Edges(NamedTuple):
     """Beyond which edges of the image a patch goes on."""
 
@@ -303,7 +344,7 @@ def _room(group: Group, pair: Compared, ego: Ego) -> Room:
     return Room(ego.B, np.median(pair.shift[group.y, group.x], axis=0).astype(np.float64))
 
 
-def _measured(group: Group, frames: Blurred, room: Room) -> tuple[Floats, PatchMotion]:
+def _measured(group: Group, frames: tuple[Level, ...], room: Room) -> tuple[Floats, PatchMotion]:
     """Return a patch's middle, and the motion there."""
     places = np.column_stack((group.x, group.y)).astype(np.float64)
     middle = places.mean(axis=0)

@@ -19,11 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.vision.motion.image import Floats, Grey, middle
-from gazerig.drivers.vision.motion.optical_flow import Compared, moved
+from gazerig.drivers.vision.motion.optical_flow import Compared, Mask, corners, gradients, moved
 
-_GRID_PX = 8
+_GRID_PX = 4
 # At the edge the flow is worst, and leads out of the image.
-_EDGE_PX = 6
+_EDGE_PX = 3
 # Corner strength (smaller eigenvalue of the gradients' matrix, at half size) for which
 # noise of a few grey levels does not pass.
 _CORNER_BLOCK = 5
@@ -46,6 +46,10 @@ _MIXED_PX = 0.25
 _SPREADS = np.array([0.1, 0.1, 0.2, 0.1, 0.1, 0.2, 0.05, 0.05])
 _PLAIN = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
 _POINT_NOISE = 1e-3
+# A camera at rest: of every third pixel, those with so much texture that keep their brightness,
+# and how far they may have slid together.
+_REST_STEP, _REST_GRADIENT, _REST_POINTS = 3, 2.0, 60
+_REST_SHARE, _REST_PX = 0.6, 0.05
 
 
 class _Need(NamedTuple):
@@ -127,16 +131,39 @@ def own_motion(pair: Compared, K: Floats, predicted: bool, moved_before: bool = 
     return Ego(B, total / total[2, 2], share, noise, way, unforeseen, fitted)
 
 
+def at_rest(pair: Compared, changed: Mask) -> Ego | None:
+    """Return that the camera did what was predicted, where most of the texture bears it out.
+
+    pair: whose flow need not have been searched
+    changed: (h, w) where the images differ by more than noise
+
+    None where that takes the flow to tell.
+    """
+    window = np.s_[::_REST_STEP, ::_REST_STEP]
+    gx, gy = (g[window].ravel() for g in gradients(pair.now))
+    off = (pair.now[window].astype(np.float32) - pair.before[window]).ravel()
+    good = (gx * gx + gy * gy > _REST_GRADIENT**2) & pair.known[window].ravel()
+    if np.count_nonzero(good) < _REST_POINTS:
+        return None
+    same = good & ~changed[window].ravel()
+    share = np.count_nonzero(same) / np.count_nonzero(good)
+    if share < _REST_SHARE:
+        return None
+    g: Floats = np.column_stack((gx[same], gy[same], np.ones(np.count_nonzero(same)))).astype(float)
+    slid = np.linalg.solve(g.T @ g + np.eye(3), -(g.T @ off[same]))
+    if np.hypot(*slid[:2]) > _REST_PX:
+        return None
+    way = _way(_inverse(pair.H), corners(pair.now.shape))
+    return Ego(np.eye(3), pair.H / pair.H[2, 2], float(share), _LEAST_NOISE_PX, way, 0.0, True)
+
+
 def _textured(pair: Compared) -> Floats:
     """Return the points of a grid, (n, 2), at which the flow can be believed."""
-    half = cv2.resize(pair.now, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA)
-    strength = cv2.cornerMinEigenVal(half, _CORNER_BLOCK)
+    strength = cv2.cornerMinEigenVal(pair.now, _CORNER_BLOCK)
     height, width = pair.now.shape
     y, x = np.mgrid[_EDGE_PX : height - _EDGE_PX : _GRID_PX, _EDGE_PX : width - _EDGE_PX : _GRID_PX]
     x, y = x.ravel(), y.ravel()
-    rows, columns = strength.shape[:2]
-    strong = strength[np.minimum(y // 2, rows - 1), np.minimum(x // 2, columns - 1)]
-    good = (strong > _LEAST_CORNER) & pair.known[y, x]
+    good = (strength[y, x] > _LEAST_CORNER) & pair.known[y, x]
     return np.column_stack((x[good], y[good])).astype(np.float64)
 
 
@@ -299,5 +326,5 @@ def turn_rad(ego: Ego, grey: Grey, K: Floats) -> float:
     height, width = grey.shape
     middle = np.array([[0.5 * (width - 1), 0.5 * (height - 1)]])
     rays = (np.concatenate((middle, moved(ego.total, middle))) - K[:2, 2]) / K[[0, 1], [0, 1]]
-    a, b = np.column_stack((rays, np.ones(2)))
-    return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+    a, b = np.column_stack((rays, np.ones(2))) / np.sqrt((rays**2).sum(axis=1) + 1.0)[:, None]
+    return float(2.0 * np.arcsin(min(1.0, 0.5 * float(np.linalg.norm(a - b)))))

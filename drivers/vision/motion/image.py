@@ -19,25 +19,33 @@ Plane = NDArray[np.float32]
 """(height, width)."""
 
 
+LEAST_SIDE_PX = 48
+"""Flow is not searched in images with a shorter side."""
+
+
 class SmallImage(NamedTuple):
     """A image made small and grey.
 
     scale: (x, y) small pixels per pixel of the image given
     K: (3, 3) camera matrix of the small image
+    fine: the image before it was halved for the search; ``grey`` itself where it was not
     """
 
     grey: Grey
     scale: tuple[float, float]
     K: Floats
     captured_s: float
+    fine: Grey
 
 
 def made_small(
-    image: NDArray[Any], work_px: int, lens: Intrinsics, captured_s: float
+    image: NDArray[Any], work_px: int, lens: Intrinsics, captured_s: float, level: int = 0
 ) -> SmallImage:
     """Scale a image so that its longer side is at most ``work_px``, and take its brightness.
 
     It is made small before it is made grey: less work on a large image.
+
+    level: how often it is halved then for the search, unless it becomes too small for that
 
     Raises:
         ValueError: it is no 8-bit image: grey, BGR or BGR with alpha.
@@ -48,8 +56,15 @@ def made_small(
     size = max(1, round(width * shrink)), max(1, round(height * shrink))
     if size != (width, height):
         image = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+    fine = grey_of(image)
+    while level and min(size) >> level < LEAST_SIDE_PX:
+        level -= 1
+    size = max(1, size[0] >> level), max(1, size[1] >> level)
+    grey = fine if level == 0 else cv2.resize(fine, size, interpolation=cv2.INTER_AREA)
     scale = size[0] / width, size[1] / height
-    return SmallImage(grey_of(image), scale, lens.scaled(*scale).matrix, captured_s)
+    return SmallImage(
+        np.asarray(grey, np.uint8), scale, lens.scaled(*scale).matrix, captured_s, fine
+    )
 
 
 def grey_of(image: NDArray[Any]) -> Grey:

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.vision.motion.image import Floats, Grey, Plane, middle
-from gazerig.drivers.vision.motion.optical_flow import moved
+from gazerig.drivers.vision.motion.optical_flow import Compared, moved
 
-# (blur in pixels, most steps): what is off by more than the blur is not found.
-_LEVELS = ((2.5, 8), (1.0, 6))
+# (blur in pixels, most steps) at the level of each image: what is off by more is not found.
+_LEVELS = ((1.25, 8), (1.0, 6))
 _TUKEY = 4.685
 _LEAST_POINTS = 24
 # Grey levels: what pixels are off by at best.
@@ -29,6 +29,9 @@ _SLIDE_SD_PX, _SLOPE_SD_PX = 2.0, 3.0
 _ALIKE = 12.0
 # Weak beliefs in the start; brightness may differ as it likes.
 _BELIEF = np.diag([_SLOPE_SD_PX**-2.0] * 4 + [_SLIDE_SD_PX**-2.0] * 2 + [1e-9])
+# A homography is taken to be affine within a patch; its slopes are found so far apart.
+_STEP_PX = 8.0
+_AROUND = np.array([(0.0, 0.0), (_STEP_PX, 0.0), (0.0, _STEP_PX)])
 _ONE_MAP: Plane = np.empty(0, dtype=np.float32)
 _EDGE = cv2.BORDER_REPLICATE
 
@@ -45,15 +48,23 @@ class Back(NamedTuple):
     slope_sd: float
 
 
-class Blurred(NamedTuple):
-    """Two images, blurred once for all patches: pairs (now, before), coarse first."""
+class Level(NamedTuple):
+    """Two blurred images, and how many of their pixels are one of those searched for flow."""
 
-    pairs: tuple[tuple[Plane, Plane], ...]
+    now: Plane
+    before: Plane
+    scale: float
+    steps: int
 
 
-def blurred(now: Grey, before: Grey) -> Blurred:
-    """Blur both images at every level."""
-    return Blurred(tuple((_blur(now, sigma), _blur(before, sigma)) for sigma, _ in _LEVELS))
+def levels(pair: Compared) -> tuple[Level, ...]:
+    """Blur the images once for all patches: as they were searched, then as fine as they are."""
+    (coarse_px, coarse_steps), (fine_px, fine_steps) = _LEVELS
+    fine, scale = pair.fine, pair.fine[0].shape[0] / pair.now.shape[0]
+    return (
+        Level(_blur(pair.now, coarse_px), _blur(pair.before, coarse_px), 1.0, coarse_steps),
+        Level(_blur(fine[0], fine_px), _blur(fine[1], fine_px), scale, fine_steps),
+    )
 
 
 class Room(NamedTuple):
@@ -65,16 +76,24 @@ class Room(NamedTuple):
     B: Floats
     shift: Floats
 
+    def near(self, centre: Floats) -> tuple[Floats, Floats]:
+        """Return (2, 2) and (2,): the map around a place, x -> there + slope (x - centre)."""
+        at = moved(self.B, centre + _AROUND)
+        return ((at[1:] - at[0]) / _STEP_PX).T, at[0] + self.shift
 
-def refined(start: Back, places: Floats, centre: Floats, frames: Blurred, room: Room) -> Back:
+
+def refined(
+    start: Back, places: Floats, centre: Floats, frames: tuple[Level, ...], room: Room
+) -> Back:
     """Refine a map on the pixels at ``places``, (n, 2); the start itself where that fails."""
     arms = places - centre
     size = max(1.0, float(np.sqrt((arms**2).sum(axis=1).mean())))
     if len(places) < _LEAST_POINTS:
         return start
+    slope, there = room.near(centre)
     best = start
-    for (now, before), (_, steps) in zip(frames.pairs, _LEVELS, strict=True):
-        fit = _aligned(best, arms, centre, size, now, before, room, steps)
+    for level in frames:
+        fit = _aligned(best, arms, centre, size, level, slope, there)
         if fit is None:
             return best
         best = fit
@@ -86,34 +105,50 @@ def _aligned(
     arms: Floats,
     centre: Floats,
     size: float,
-    now: Plane,
-    before: Plane,
-    room: Room,
-    steps: int,
+    level: Level,
+    slope: Floats,
+    there: Floats,
 ) -> Back | None:
     """Refine at one level; None where it leads away or to nothing better."""
-    wanted, slopes = _template(now, (arms + centre).astype(np.intp), arms / size)
+    scale = level.scale
+    at = _at(arms + centre, scale).astype(np.intp)
+    # Whole pixels: where they are exactly.
+    arms = (at + 0.5) / scale - 0.5 - centre
+    wanted, slopes = _template(level.now, at, arms / size)
     matrix, shift = start.matrix, start.shift
-    errors = wanted - _seen(before, room, centre + arms @ matrix.T + shift)
-    first, weights = _weighed(errors)
+
+    def errors() -> Floats:
+        seen = arms @ (slope @ matrix).T + (there + slope @ shift)
+        at = _at(seen, scale).astype(np.float32)[:, None]
+        found = cv2.remap(level.before, at, _ONE_MAP, cv2.INTER_LINEAR, None, _EDGE)
+        out: Floats = wanted - found.ravel()
+        return out
+
+    off = errors()
+    first, weights = _weighed(off)
     noise, normal = first, np.eye(7)
-    for _ in range(steps):
+    for _ in range(level.steps):
         weighted = slopes * weights[:, None]
         normal = slopes.T @ weighted + noise**2 * _BELIEF
-        step = np.linalg.solve(normal, weighted.T @ errors)
-        change = np.eye(2) + step[:4].reshape(2, 2) / size
+        step = np.linalg.solve(normal, weighted.T @ off)
+        change = np.eye(2) + step[:4].reshape(2, 2) / (size * scale)
         matrix = matrix @ change
-        shift = shift + matrix @ step[4:6]
-        errors = wanted - _seen(before, room, centre + arms @ matrix.T + shift)
-        noise, weights = _weighed(errors)
+        shift = shift + matrix @ step[4:6] / scale
+        off = errors()
+        noise, weights = _weighed(off)
         if np.abs(step[:6]).max() < _SMALL_PX:
             break
-    led_away = np.abs(matrix - start.matrix).max() * size > 3 * _SLOPE_SD_PX
-    led_away |= bool(np.abs(shift - start.shift).max() > 3 * _SLIDE_SD_PX)
+    led_away = np.abs(matrix - start.matrix).max() * size * scale > 3 * _SLOPE_SD_PX
+    led_away |= bool(np.abs(shift - start.shift).max() * scale > 3 * _SLIDE_SD_PX)
     if led_away or noise > first or not np.isfinite(matrix).all():
         return None
-    spread = noise * np.sqrt(_ALIKE * np.linalg.inv(normal).diagonal()[:4].mean()) / size
+    spread = noise * np.sqrt(_ALIKE * np.linalg.inv(normal).diagonal()[:4].mean()) / (size * scale)
     return Back(matrix, shift, float(spread))
+
+
+def _at(places: Floats, scale: float) -> Floats:
+    """Return places of the image that was searched in a level's pixels."""
+    return places if scale == 1.0 else (places + 0.5) * scale - 0.5
 
 
 def _template(now: Plane, at: NDArray[np.intp], arms: Floats) -> tuple[Floats, Floats]:
@@ -127,13 +162,6 @@ def _template(now: Plane, at: NDArray[np.intp], arms: Floats) -> tuple[Floats, F
     u, v = arms.T
     slopes = np.column_stack((gx * u, gx * v, gy * u, gy * v, gx, gy, np.ones(len(x))))
     return now[y, x].astype(np.float64), slopes
-
-
-def _seen(before: Plane, room: Room, places: Floats) -> Floats:
-    """Return the older image's brightness at places of the newer, (n,)."""
-    there = (moved(room.B, places) + room.shift).astype(np.float32)
-    seen = cv2.remap(before, there[:, None], _ONE_MAP, cv2.INTER_LINEAR, None, _EDGE)
-    return np.asarray(seen, dtype=np.float64).ravel()
 
 
 def _weighed(errors: Floats) -> tuple[float, Floats]:

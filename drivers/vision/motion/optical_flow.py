@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.vision.motion.image import Floats, Grey, Plane, SmallImage
+from gazerig.drivers.vision.motion.image import LEAST_SIDE_PX, Floats, Grey, Plane, SmallImage
 
 Mask = NDArray[np.bool_]
 Flow = NDArray[np.float32]
@@ -20,14 +20,20 @@ Flow = NDArray[np.float32]
 
 # Below 8 px at the finest level of its pyramid, a quarter of the image, DIS reads
 # outside its memory; how it counts its levels has changed with the versions of OpenCV.
-_LEAST_SIDE_PX, _LARGEST_ASPECT = 48, 4.0
+_LARGEST_ASPECT = 4.0
 _PRESETS = {
     "ultrafast": cv2.DISOPTICAL_FLOW_PRESET_ULTRAFAST,
     "fast": cv2.DISOPTICAL_FLOW_PRESET_FAST,
     "medium": cv2.DISOPTICAL_FLOW_PRESET_MEDIUM,
 }
+# So far around what has changed flow is searched, unless that is so much of the image.
+_AROUND_PX, _MOST_SHARE = 8, 0.7
 _STILL_PX = 0.02
 """A turn that moves no corner by more is none."""
+
+
+Window = tuple[slice, slice]
+"""Rows and columns of a part of an image."""
 
 
 class Compared(NamedTuple):
@@ -38,6 +44,8 @@ class Compared(NamedTuple):
     known: where it shows anything, and the flow does not lead out of it
     flow: what is at x in ``now`` is at x + flow in ``before``
     H: (3, 3) pixels of the older image to those of ``before``
+    fine: the same two images before they were made small for the search
+    windows: where flow was searched; elsewhere it is 0
     shift: (h, w, 2) part of the flow that still things have by their distance; None for none
     """
 
@@ -46,29 +54,85 @@ class Compared(NamedTuple):
     known: Mask
     flow: Flow
     H: Floats
+    fine: tuple[Grey, Grey]
+    windows: tuple[Window, ...] = ()
     shift: Flow | None = None
+
+    def part(self, window: Window) -> "Compared":
+        """Return a part of both images with its flow."""
+        return self._replace(
+            now=self.now[window],
+            before=self.before[window],
+            known=self.known[window],
+            flow=self.flow[window],
+            shift=None if self.shift is None else self.shift[window],
+        )
 
 
 class FlowSearch:
     """DIS with its memory, for images of any size that it can bear."""
 
-    def __init__(self, preset: str, finest_level: int) -> None:
+    def __init__(self, preset: str) -> None:
         self._dis = cv2.DISOpticalFlow.create(_PRESETS[preset])
-        self._dis.setFinestScale(finest_level)
+        self._dis.setFinestScale(0)
 
-    def compare(self, now: SmallImage, before: SmallImage, H: Floats) -> Compared:
-        """Find what moved, the older image being turned by ``H`` first."""
-        grey, known = _turned(before.grey, H)
-        flow: Flow = np.zeros((*grey.shape, 2), dtype=np.float32)  # the guess, then the answer
-        self._dis.calc(now.grey, grey, flow)
-        known &= _inside(flow)
-        return Compared(now.grey, grey, known, flow, H)
+    def search(self, pair: Compared, windows: tuple[Window, ...] | None = None) -> Compared:
+        """Find what moved within parts of the images; None: everywhere."""
+        if windows is None:
+            windows = ((slice(0, pair.now.shape[0]), slice(0, pair.now.shape[1])),)
+        flow: Flow = np.zeros((*pair.now.shape, 2), dtype=np.float32)
+        known = pair.known.copy()
+        for window in windows:
+            now, before = (np.ascontiguousarray(grey[window]) for grey in (pair.now, pair.before))
+            found: Flow = np.zeros((*now.shape, 2), dtype=np.float32)  # the guess, then the answer
+            self._dis.calc(now, before, found)
+            flow[window] = found
+            known[window] &= _inside(flow[window])
+        return pair._replace(flow=flow, known=known, windows=windows)
+
+
+def laid(now: SmallImage, before: SmallImage, H: Floats) -> Compared:
+    """Lay two images over each other, the older being turned by ``H``; their flow is 0 as yet."""
+    grey, known = _turned(before.grey, H)
+    fine = grey
+    if before.fine is not before.grey:
+        fine, _ = _turned(before.fine, _finer(H, before.fine.shape[0] / grey.shape[0]))
+    flow: Flow = np.zeros((*grey.shape, 2), dtype=np.float32)
+    return Compared(now.grey, grey, known, flow, H, (now.fine, fine))
+
+
+def windows_of(changed: Mask) -> tuple[Window, ...] | None:
+    """Return the parts of an image in which something changed, None for all of it.
+
+    Args:
+        changed: (h, w).
+    """
+    height, width = changed.shape
+    cells = cv2.resize(
+        changed.astype(np.uint8), None, fx=0.25, fy=0.25, interpolation=cv2.INTER_AREA
+    )
+    reach = 2 * (_AROUND_PX // 4) + 1
+    near = cv2.dilate(cells, np.ones((reach, reach), np.uint8))
+    count, _, stats, _ = cv2.connectedComponentsWithStats(near)
+    out, area = [], 0
+    for x, y, w, h, _ in stats[1:].tolist():
+        columns, rows = _widened(4 * x, 4 * w, width), _widened(4 * y, 4 * h, height)
+        out.append((rows, columns))
+        area += (rows.stop - rows.start) * (columns.stop - columns.start)
+    return tuple(out) if area < _MOST_SHARE * changed.size else None
+
+
+def _widened(start: int, length: int, most: int) -> slice:
+    """Return a stretch of an image, at least as long as flow can be searched in."""
+    more = max(0, LEAST_SIDE_PX - length)
+    start = max(0, min(start - more // 2, most - length - more))
+    return slice(start, min(most, start + length + more))
 
 
 def searchable(grey: Grey) -> bool:
     """Return whether a image is large enough, and shaped so, that flow can be found in it."""
     short, long = sorted(grey.shape)
-    return bool(short >= _LEAST_SIDE_PX and long <= _LARGEST_ASPECT * short)
+    return bool(short >= LEAST_SIDE_PX and long <= _LARGEST_ASPECT * short)
 
 
 def turn_homography(R_now_before: Floats | None, now: SmallImage, before: SmallImage) -> Floats:
@@ -98,6 +162,14 @@ def corners(shape: tuple[int, ...]) -> Floats:
     return np.array([(0, 0), (width - 1, 0), (0, height - 1), (width - 1, height - 1)], float)
 
 
+def gradients(grey: Grey) -> tuple[Plane, Plane]:
+    """Return how brightness changes with x and y, grey levels a pixel, (h, w) each."""
+    gx = cv2.Sobel(grey, cv2.CV_32F, 1, 0, scale=0.125)
+    return np.asarray(gx, np.float32), np.asarray(
+        cv2.Sobel(grey, cv2.CV_32F, 0, 1, scale=0.125), np.float32
+    )
+
+
 def _turned(grey: Grey, H: Floats) -> tuple[Grey, Mask]:
     """Turn a image, and tell which of its pixels are known afterwards."""
     at = corners(grey.shape)
@@ -109,6 +181,15 @@ def _turned(grey: Grey, H: Floats) -> tuple[Grey, Mask]:
     white = np.full(grey.shape, 255, dtype=np.uint8)
     known = cv2.warpPerspective(white, H, (width, height)) == 255
     return np.asarray(turned, dtype=np.uint8), known
+
+
+def _finer(H: Floats, scale: float) -> Floats:
+    """Return a homography of pixels in those of an image with so many more of them."""
+    S = np.array(
+        [[scale, 0.0, 0.5 * scale - 0.5], [0.0, scale, 0.5 * scale - 0.5], [0.0, 0.0, 1.0]]
+    )
+    out: Floats = S @ H @ np.linalg.inv(S)
+    return out
 
 
 def _inside(flow: Flow) -> Mask:

@@ -12,22 +12,30 @@ import cv2
 import numpy as np
 
 from gazerig.drivers.vision.motion.ego_motion import Ego
-from gazerig.drivers.vision.motion.image import Floats, Plane
-from gazerig.drivers.vision.motion.optical_flow import Compared, Flow, Mask
+from gazerig.drivers.vision.motion.image import Floats, Grey, Plane
+from gazerig.drivers.vision.motion.optical_flow import Compared, Flow, Mask, gradients
 from gazerig.drivers.vision.motion.params import MotionParams
 
 # Where brightness is compared: wide enough to average noise, narrow enough for a hand.
-_WINDOW_PX = 7
+_WINDOW_PX = 3
+# Where edges and light are.
+_NEAR_PX = 5
 # Wider changes than this are light, not things.
-_LIGHT_PX, _LIGHT_STEP = 41, 8.0
+_LIGHT_PX, _LIGHT_STEP = 21, 8.0
 # Of the change that the camera does not explain, what the flow may leave.
 _LEFT_SHARE = 0.5
 # How far above the noise a change must be (variances), and a grey level for rounding.
-_NOISE_RATIO, _ROUNDING = 2.5, 1.0
+_NOISE_RATIO, _ROUNDING = 3.0, 1.0
 # How much less far than the room a still thing moves that is behind most of it, as a share.
 _BEHIND = 0.03
+# Of a motion, the share that must lead across the edges there.
+_ACROSS = 0.15
 # How far flow smears over an edge.
-_SMEAR_PX = 17
+_SMEAR_PX = 9
+# Grey levels: darker than this, relative changes are noise.
+_DARK = np.float32(8.0)
+# A camera that moved the image by less stands.
+_STANDS_PX = 0.01
 _ONE_MAP: Plane = np.empty(0, dtype=np.float32)
 _EDGE = cv2.BORDER_REPLICATE
 
@@ -38,14 +46,49 @@ class Things(NamedTuple):
     flow: (h, w, 2) motion from the older image to the newer, the camera's taken out, pixels
     mask: (h, w) where that is believed
     threshold_px: least motion that was believed
+    change: (h, w) square of the relative change of brightness, light apart; None: not asked
     """
 
     flow: Flow
     mask: Mask
     threshold_px: float
+    change: Plane | None = None
 
 
-def what_moves(pair: Compared, ego: Ego, params: MotionParams, by_image: bool = False) -> Things:
+class Unlike(NamedTuple):
+    """How unlike the older image is where the room stands still.
+
+    squares: (h, w) local mean of squares, grey levels
+    noise: what is usual of them
+    """
+
+    squares: Plane
+    noise: float
+
+    @property
+    def changed(self) -> Mask:
+        """Return where more has changed than by noise."""
+        return self.squares > _NOISE_RATIO * self.noise
+
+
+def unlike(pair: Compared, there: Flow | None = None) -> Unlike:
+    """Compare two images.
+
+    Args:
+        pair: the images.
+        there: (h, w, 2) where still things are in the older one; None: at their place.
+    """
+    squares = _squares(pair.now, pair.before, there)
+    return Unlike(squares, _ROUNDING + float(np.quantile(squares[::4, ::4], 0.3)))
+
+
+def what_moves(
+    pair: Compared,
+    ego: Ego,
+    params: MotionParams,
+    by_image: bool = False,
+    still: Unlike | None = None,
+) -> Things:
     """Return the flow without ego-motion, where both frames confirm it.
 
     Args:
@@ -55,21 +98,72 @@ def what_moves(pair: Compared, ego: Ego, params: MotionParams, by_image: bool = 
         by_image: the image alone told that motion. What moves otherwise than a still thing nearer
             than the room would, against the room or across its motion, then counts from the
             least motion on.
+        still: how unlike they are, where the room keeps its place in the older image.
     """
+    there = None if still is not None and pair.shift is None else _there(pair, ego)
+    if still is None or pair.shift is not None:
+        still = unlike(pair, there)
+    threshold = max(params.min_flow_px, params.noise_factor * ego.noise_px)
+    if not by_image:
+        threshold += params.parallax_share * ego.way_px
+    shape = pair.now.shape
+    change = np.zeros(shape, np.float32)
+    flow = np.zeros((*shape, 2), np.float32)
+    things = Things(flow, np.zeros(shape, np.bool_), threshold, change)
+    for window in pair.windows:
+        part = pair.part(window)
+        corner = np.array((window[1].start, window[0].start), np.float32)
+        at = None if there is None else there[window] - corner
+        rest = -part.flow if at is None else at - _added(part.flow, 1.0)
+        moves = rest
+        if by_image and ego.way_px > _STANDS_PX:
+            moves = rest - _nearer(rest, ego, params.parallax_share)
+        mask = cv2.magnitude(moves[..., 0], moves[..., 1]) > threshold + _jumps(part.shift)
+        mask &= part.known
+        squares = still.squares[window]
+        mask &= squares > _NOISE_RATIO * still.noise
+        if mask.any():
+            mask &= _across(part.now, moves, threshold)
+            mask &= _borne_out(part, squares, still.noise, rest)
+        things.flow[window], things.mask[window] = rest, mask
+        if mask.any():
+            change[window] = _solid(part, at)
+    return things
+
+
+def _there(pair: Compared, ego: Ego) -> Flow:
+    """Return where still things are in the older image, (h, w, 2)."""
     there = _background(ego.B, pair.now.shape)
     if pair.shift is not None:
         there += pair.shift
-    rest = there - _added(pair.flow, 1.0)
-    least = max(params.min_flow_px, params.noise_factor * ego.noise_px)
-    if by_image:
-        threshold, moves = least, rest - _nearer(rest, ego, params.parallax_share)
-    else:
-        threshold, moves = least + params.parallax_share * ego.way_px, rest
-    mask = cv2.magnitude(moves[..., 0], moves[..., 1]) > threshold + _jumps(pair.shift)
-    mask &= pair.known
-    if mask.any():
-        mask &= _borne_out(pair, there, rest)
-    return Things(rest, mask, threshold)
+    return there
+
+
+def _solid(pair: Compared, there: Flow | None) -> Plane:
+    """Return the square of the relative change of brightness, light apart, (h, w).
+
+    A shadow darkens alike all that lies near each other; a thing brings its own edges.
+    """
+    seen = _through(pair.before, there)
+    change: Plane = np.log((pair.now + _DARK) / (seen + _DARK)).astype(np.float32)
+    change -= cv2.blur(change, (_NEAR_PX, _NEAR_PX))
+    return np.asarray(change * change, np.float32)
+
+
+def _across(now: Grey, moves: Flow, threshold_px: float) -> Mask:
+    """Return where things move across their edges: along a straight edge no motion shows.
+
+    Compression shifts what little texture there is along an edge to and fro.
+    """
+    gx, gy = gradients(now)
+    window = _NEAR_PX, _NEAR_PX
+    change = gx * moves[..., 0] + gy * moves[..., 1]
+    shown = cv2.blur(change * change, window)
+    most = cv2.blur(gx * gx + gy * gy, window)
+    way = cv2.blur(_dot(moves, moves), window)
+    least = np.maximum(np.float32(0.25 * threshold_px**2), np.float32(_ACROSS**2) * way)
+    out: Mask = shown > least * most
+    return out
 
 
 def _jumps(shift: Flow | None) -> Plane | float:
@@ -122,18 +216,15 @@ def _background(B: Floats, shape: tuple[int, ...]) -> Flow:
     return np.dstack(((a * x + b * y + c) / depth, (d * x + e * y + f) / depth))
 
 
-def _borne_out(pair: Compared, there: Flow, rest: Flow) -> Mask:
+def _borne_out(pair: Compared, still: Plane, noise: float, rest: Flow) -> Mask:
     """Return where the flow explains the newer image and the camera's motion does not.
 
     Ground that a thing has left changed too, and plain ground is explained by any flow; but
     it "came" from where nothing has changed, while a thing has left where it came from.
     """
-    now = pair.now.astype(np.float32)
-    still = _unlike(now, pair, there)
-    moving = _unlike(now, pair, _added(pair.flow, 1.0))
+    moving = _squares(pair.now, pair.before, _added(pair.flow, 1.0))
     left = cv2.remap(still, _added(rest, -1.0), _ONE_MAP, cv2.INTER_LINEAR, None, _EDGE)
-    noise = _ROUNDING + float(np.quantile(still[::4, ::4], 0.3))
-    out: Mask = np.minimum(still, left) > _NOISE_RATIO * noise
+    out: Mask = left > _NOISE_RATIO * noise
     out &= moving < _LEFT_SHARE * (still - noise) + noise
     return out
 
@@ -146,10 +237,17 @@ def _added(flow: Flow, sign: float) -> Flow:
     return out
 
 
-def _unlike(now: Plane, pair: Compared, there: Flow) -> Plane:
+def _squares(now: Grey, before: Grey, there: Flow | None) -> Plane:
     """Return how unlike the older image is, seen through a map: a local mean of squares."""
-    seen = cv2.remap(pair.before, there, _ONE_MAP, cv2.INTER_LINEAR, None, _EDGE)
-    off = now - seen
+    off = now.astype(np.float32) - _through(before, there)
     # Clipped, or a dark coat would darken all around it.
     off -= cv2.blur(np.clip(off, -_LIGHT_STEP, _LIGHT_STEP), (_LIGHT_PX, _LIGHT_PX))
     return np.asarray(cv2.blur(off * off, (_WINDOW_PX, _WINDOW_PX)), dtype=np.float32)
+
+
+def _through(before: Grey, there: Flow | None) -> Plane:
+    """Return the older image seen through a map; None: as it is."""
+    grey = before.astype(np.float32)
+    if there is None:
+        return grey
+    return np.asarray(cv2.remap(grey, there, _ONE_MAP, cv2.INTER_LINEAR, None, _EDGE), np.float32)

@@ -14,7 +14,7 @@ from gazerig.drivers.vision.motion.params import MotionParams
 
 # Farthest from its expected place, in sizes (the root of box width by height).
 _GATE_SIZES = 0.75
-_LEAST_GATE_PX = 8.0
+_LEAST_GATE_PX = 5.0
 # Two that are joined may differ so much in the root of their area: a thing shows more or
 # less of itself, a person does not become a hand.
 _LARGEST_GROWTH = 3.0
