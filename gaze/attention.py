@@ -292,7 +292,7 @@ class Attention:
         usual, of_hands = self._bottom_up.limit(), self._bottom_up.limit(hand=True)
         most, worth = [], []
         for id, kind in zip(bodies.ids, bodies.kinds, strict=True):
-            most.append(of_hands if kind == "hand" and id not in parts else usual)
+            most.append(of_hands if kind == "hand" and id in self._persons.raised else usual)
             worth.append(ratio if id in parts else 1.0)
         return most, worth
 

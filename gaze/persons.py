@@ -49,6 +49,7 @@ class Persons:
     Attributes:
         parts: of what moves within a person's reach, the id of that person's face; without what is
             held out towards the head or raised to the face.
+        raised: ids of what moves within a person's reach at the height of the face.
     """
 
     def __init__(self) -> None:
@@ -61,6 +62,7 @@ class Persons:
         self._waved_s: dict[int, float] = {}
         self._hands: dict[int, _Hand] = {}
         self.parts: dict[int, int] = {}
+        self.raised: set[int] = set()
         self._looking: frozenset[int] = frozenset()
         self._nearest = -1
         self._at_s = -inf
@@ -84,7 +86,7 @@ class Persons:
             self._seen_s[id] = self._at_s
         self._looking = frozenset(face.id for face in percept.faces if face.looks_at_head)
         self._update_nearest(faces, p_world_eye_m)
-        self.parts = {}
+        self.parts, self.raised = {}, set()
         for row, id in enumerate(bodies.ids):
             if faces and id not in faces and bodies.kinds[row] != _OWN:
                 x, y, z = rows[row]
@@ -147,8 +149,11 @@ class Persons:
             for face, p in faces.items()
         }
         owner = min(beside, key=lambda face: beside[face])
-        held_out = away < _HELD_OUT * dist(faces[owner], p_eye)
-        if beside[owner] < _ARM_M and not held_out and place[2] < faces[owner][2] - _RAISED_M:
+        if beside[owner] >= _ARM_M:
+            return
+        if place[2] > faces[owner][2] - _RAISED_M:
+            self.raised.add(id)
+        elif away > _HELD_OUT * dist(faces[owner], p_eye):
             self.parts[id] = owner
 
     def _turns(self, id: int, across_m_s: float) -> bool:

@@ -1,0 +1,115 @@
+"""Balance of attention: how much of the time outside saccades is spent on faces that are there.
+
+The time in which a frontal face within 1.5 m is there, and the share of it in which the measured
+gaze is on a face, that one or another. Looks away from a face, which end mutual gaze after some
+seconds as people do, are left out.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import acos, atan, degrees, radians
+from pathlib import Path
+from typing import NamedTuple
+
+from seeing.material import at_hand, carphone
+
+from gazerig.config.schema import load_rig
+from gazerig.gaze.angles import add, dot, norm, scale, sub, unit
+from gazerig.gaze.types import Face, Vec3
+from gazerig.robot.analysis.summary import cyclopean
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.control.loop import run
+from gazerig.robot.control.tick import Tick
+
+NEAR_M, FRONTAL_RAD = 1.5, radians(45.0)
+BESIDE_DEG, FACE_M = 3.0, 0.09
+SIGNERS = "webcam_sign_1.mkv", "webcam_sign_2.mkv", "webcam_sign_3.mkv"
+TALK_SEEDS = (0, 1, 2, 3, 4)
+
+WANTED = {
+    "talks in a car, % on the face": (75.0, 100.0),
+    **{f"{name}, % on the face": (75.0, 100.0) for name in SIGNERS},
+    "rendered conversation, % on a face": (85.0, 100.0),
+    "conversation, worst seed, %": (80.0, 100.0),
+}
+
+
+class Share(NamedTuple):
+    """Ticks outside saccades, those with a near frontal face, and those of them on a face."""
+
+    ticks: int
+    there: int
+    on_face: int
+
+    @property
+    def percent(self) -> float:
+        """Return the share of the ticks with such a face in which the gaze was on a face."""
+        return 100.0 * self.on_face / max(1, self.there)
+
+
+def _beside_deg(tick: Tick, eye: Vec3, face: Face) -> float:
+    """Return how far beside the outline of a face the measured gaze is."""
+    way = sub(face.p_world_m, eye)
+    off = acos(max(-1.0, min(1.0, dot(cyclopean(tick), unit(way)))))
+    return degrees(off - atan(FACE_M / norm(way)))
+
+
+def share_on_faces(options: RunOptions, rate_hz: float = 100.0) -> Share:
+    """Run the shipped desk rig; return how much of the time was spent on present faces."""
+    rig = load_rig(options.rig)
+    made = assemble(replace(rig, loop=replace(rig.loop, rate_hz=rate_hz)), options)
+    ticks = there = on_face = 0
+
+    def count(tick: Tick) -> None:
+        nonlocal ticks, there, on_face
+        if tick.gaze.phase == "saccade" or tick.percept is None or tick.target.kind == "away":
+            return
+        ticks += 1
+        left, right = tick.pose.p_world_eye_left_m, tick.pose.p_world_eye_right_m
+        eye = scale(add(left, right), 0.5)
+        faces = tick.percept.faces
+        if any(
+            norm(sub(face.p_world_m, eye)) < NEAR_M and (face.off_head_rad or 0.0) < FRONTAL_RAD
+            for face in faces
+        ):
+            there += 1
+            on_face += any(_beside_deg(tick, eye, face) <= BESIDE_DEG for face in faces)
+
+    made.robot.start(made.clock)
+    try:
+        run(made.robot, made.clock, made.loop, _ends_after(options.seconds), count)
+    finally:
+        made.robot.stop()
+        made.close()
+    return Share(ticks, there, on_face)
+
+
+def _ends_after(seconds: float | None) -> Callable[[float], str | None]:
+    return lambda now_s: "seconds" if seconds is not None and now_s >= seconds else None
+
+
+def film(path: Path, seconds: float) -> Share:
+    """Return the shares on a film."""
+    options = RunOptions(True, True, seed=0, bus="ideal", video=path, seconds=seconds)
+    return share_on_faces(options)
+
+
+def conversation(seed: int, seconds: float) -> Share:
+    """Return the shares in the rendered conversation."""
+    options = RunOptions(True, True, seed=seed, bus="ideal", world="conversation", seconds=seconds)
+    return share_on_faces(options)
+
+
+def measure(full: bool) -> dict[str, float]:
+    """Return the figures; full: on the films beside the project, and five seeds."""
+    figures = {"talks in a car, % on the face": film(carphone(), 8.0).percent}
+    for name in SIGNERS if full else ():
+        path = at_hand(name)
+        if path is not None:
+            figures[f"{name}, % on the face"] = film(path, 12.0).percent
+    seeds = TALK_SEEDS if full else TALK_SEEDS[:1]
+    talks = [conversation(seed, 24.0 if full else 8.0).percent for seed in seeds]
+    figures["rendered conversation, % on a face"] = sum(talks) / len(talks)
+    figures["conversation, worst seed, %"] = min(talks)
+    return figures
