@@ -22,8 +22,16 @@ class Mutant(NamedTuple):
 
 MUTANTS = (
     # ---- gaze: attention
-    Mutant("gaze/bottom_up.py", "        total += self.rotation\n", "",
+    Mutant("gaze/bottom_up.py", "total, bound = slide + rest + spin, ", "total, bound = slide + rest, ",
            "eq 1 without its third term, spin", ("attention", "attention_choice")),
+    Mutant("gaze/bottom_up.py", "return exempt - worth * expm1", "return -worth * expm1",
+           "what comes nearer fast saturates like other motion", ("behaviours",)),
+    Mutant("gaze/attention.py", "            bodies = percept.bodies\n", "            pass\n",
+           "a remembered face competes with visible ones", ("face_memory",)),
+    Mutant("gaze/persons.py", "            self.parts[id] = owner\n", "            pass\n",
+           "a person's gestures compete with the face", ("attention_choice", "seeing_balance")),
+    Mutant("gaze/bottom_up.py", "-expm1((self._onset_s - t_s) / recovery_s) if recovery_s > 0.0 else 1.0",
+           "1.0", "every onset draws the gaze in full", ("attention_choice",)),
     Mutant("robot/perception/perception.py", "scale(known.view, found.spin_rad_s)", "scale(known.view, 0.0)",
            "what spins is not perceived to", ("group_scenes",)),
     Mutant("sim_mock/cameras/detections.py", "thing.radius_m, thing.spin_rad_s),)", "thing.radius_m),)",
