@@ -207,7 +207,12 @@ def test_a_suspended_page_holds_up_nobody_and_is_replaced() -> None:
         assert in_time(show_many)
         assert 2000 < page.dropped <= 3000
         in_time(lambda: page.show_frame(bytes(100_000)))
-        wait_for(lambda: page.show(SNAPSHOT) or page.started == 2, "another page")
+
+        def replaced() -> bool:
+            page.show(SNAPSHOT)
+            return page.started == 2
+
+        wait_for(replaced, "another page")
         assert page.url() == url and page_here() not in (None, process)
 
 
