@@ -7,6 +7,7 @@ there, else as what is known of the size of faces.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from heapq import nlargest
 from math import degrees, hypot, isfinite, sqrt
 from typing import Any
 
@@ -60,6 +61,8 @@ _SHAPE_1_S = 0.3
 # A patch so many times as high as wide is a person who walks; the head's middle is this part of the
 # height below its upper edge.
 _UPRIGHT, _HEAD_DOWN = 1.4, 1.0 / 14.0
+# Things of a frame that are passed on; of more, the largest and fastest.
+_MOST_THINGS = 24
 # A patch so nearly square that so much of its box is full (of a disc's: .79) is compact.
 _LEAST_ASPECT, _LEAST_FILL = 0.87, 0.6
 # A place is all that is known of a face's motion; the fields stand for a velocity's errors.
@@ -112,7 +115,10 @@ class FrameLocator:
             for person in found.people
             if not any(_is_of(person, face) for face in inside)
         ]
-        things = [thing_in_camera(blob, intrinsics) for blob in found.blobs]
+        blobs = found.blobs
+        if len(blobs) > _MOST_THINGS:
+            blobs = tuple(nlargest(_MOST_THINGS, blobs, key=_swept_m))
+        things = [thing_in_camera(blob, intrinsics) for blob in blobs]
         return LocatedFrame(
             intrinsics,
             tuple([face for face in faces if face is not None]),
@@ -264,6 +270,11 @@ def _upper_end(blob: MovingBlob, lens: Intrinsics, far_m: float) -> Vec3 | None:
         return None
     x_ray, y_ray, z_ray = rays([(x + 0.5 * width, y + _HEAD_DOWN * height)], lens)[0].tolist()
     return scale((x_ray, y_ray, z_ray), far_m / norm((x_ray, y_ray, z_ray)))
+
+
+def _swept_m(blob: MovingBlob) -> float:
+    """Return how large a thing is with the way it makes in a tenth of a second."""
+    return blob.radius_m + (0.1 * norm(blob.v_camera_m_s) if blob.v_camera_m_s else 0.0)
 
 
 def _is_compact(blob: MovingBlob) -> bool:

@@ -39,7 +39,7 @@ _SMALL_PX = 0.01
 _TUKEY = 4.685
 _LEAST_NOISE_PX, _MOST_NOISE_PX = 0.02, 1.5
 # Joints at rest are right; in motion they may be wrong by all of the motion, at its onset.
-_STANDING_REACH_PX = 0.75
+_STANDING_REACH_PX = 0.4
 # A fit that leaves more lies between two motions.
 _MIXED_PX = 0.25
 # What a homography's last numbers may be, in focal lengths: keeps it tame between points.

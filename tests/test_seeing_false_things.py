@@ -1,0 +1,62 @@
+"""What compression, light and shadows do to a room that stands still is no moving thing.
+
+Numbered checks are listed in docs/checks.md.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from seeing.material import MEDIA, at_hand
+from seeing.row_04_perception_cost import moving
+from seeing.row_09_identities import SIZE, perception
+from seeing.row_11_false_things import ROOMS, TRIPOD, WANTED, changed, tripod
+
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.types import Detections
+from gazerig.drivers.vision.motion.params import MotionParams
+from gazerig.robot.perception.motion_source import MotionSource
+
+
+@pytest.mark.parametrize("name", ROOMS)
+def test_e101_a_room_that_stands_holds_no_moving_things(name: str) -> None:
+    false, recall = changed(ROOMS[name], True, 0.5)
+    assert false <= WANTED[f"{name}: false"][1]
+    assert recall >= WANTED[f"{name}: recall"][0]
+    assert changed(ROOMS[name], False, 0.5)[0] <= WANTED[f"{name}, nobody: false"][1]
+
+
+@pytest.mark.parametrize("film", TRIPOD)
+def test_e101_nor_does_a_room_before_a_webcam_on_a_tripod(film: str) -> None:
+    path = at_hand(film)
+    if path is None:
+        pytest.skip(f"no film {film} in {MEDIA}")
+    false, noticed = tripod(path, TRIPOD[film])
+    assert false <= 0.02
+    assert noticed >= 0.65
+
+
+def test_two_thousand_specks_are_no_more_things_than_may_be_reported() -> None:
+    rng, source = np.random.default_rng(0), MotionSource(MotionParams(), None, 1.2, None)
+    x, y = rng.uniform(0, 640, 2000), rng.uniform(0, 400, 2000)
+    way = rng.uniform(-4.0, 4.0, (2, 2000))
+    for k in range(4):
+        image = np.full((400, 640), 128, np.uint8)
+        columns, rows = ((at + k * v).astype(int) for at, v in zip((x, y), way, strict=True))
+        for dx, dy in np.ndindex(6, 6):
+            image[(rows + dy) % 400, (columns + dx) % 640] = 255 * (np.arange(2000) % 2)
+        assert len(source(Shot(k / 30, k + 1, image))) <= MotionParams().max_blobs
+
+
+def test_of_two_thousand_things_the_largest_and_fastest_are_tracked() -> None:
+    see, poses = perception()
+    large = moving(5000, 0.0)
+    for number in range(1, 4):
+        small = (moving(k % 8, number / 30) for k in range(2000))
+        blobs = tuple(replace(blob, id=k, radius_m=0.01) for k, blob in enumerate(small))
+        found = see.see(
+            Detections(number / 30, number, *SIZE, faces=(), blobs=(*blobs, large)), poses
+        )
+    assert found is not None
+    assert 1 <= len(found.bodies.ids) <= 3 * 24
+    assert found.bodies.radius_m.max() == pytest.approx(large.radius_m)
