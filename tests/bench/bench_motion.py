@@ -9,13 +9,13 @@ move. Nothing here passes or fails.
 
 import time
 from collections.abc import Callable
-from types import SimpleNamespace
 from typing import TypeVar
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.vision.motion.clustering import gathered
 from gazerig.drivers.vision.motion.detector import MotionDetector, at_level
 from gazerig.drivers.vision.motion.ego_motion import own_motion
@@ -44,7 +44,7 @@ def measured(width: int, height: int) -> dict[str, list[float]]:
     """Return milliseconds of each step, picture by picture."""
     params = MotionParams()
     focal = 0.73 * width
-    lens = SimpleNamespace(fx_px=focal, fy_px=focal, cx_px=(width - 1) / 2, cy_px=(height - 1) / 2)
+    lens = Intrinsics(focal, focal, (width - 1) / 2, (height - 1) / 2)
     c, s = np.cos(TURN_RAD), np.sin(TURN_RAD)
     R = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
     search, whole = FlowSearch(params.preset), MotionDetector(params)
