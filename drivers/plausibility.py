@@ -27,8 +27,11 @@ AGREEING = 3
 DISTURBED_S = 5.0
 """So long after a damaged answer the line counts as disturbed."""
 
-PAIR_STEPS = 8
+PAIR_STEPS = 4
 """Two answers right after one another may be so far apart, beyond what the motor can do."""
+
+PAIR_LATE_S = 0.005
+"""The first of two answers may have waited so much longer than the second."""
 
 
 class Plausibility:
@@ -112,7 +115,16 @@ class Plausibility:
         """Return whether answers have been damaged of late."""
         return now_s - self.damaged_s <= DISTURBED_S
 
-    def pair(self, slot: int, first: int, first_s: float, second: int, second_s: float) -> bool:
-        """Return whether two answers right after one another can both be true."""
-        reach = PAIR_STEPS + self._fastest[slot] * max(0.0, second_s - first_s)
-        return abs(second - first) <= reach
+    def pair(self, slot: int, way: int, since_s: float, speeds_steps_s: Sequence[float]) -> bool:
+        """Return whether two answers right after one another can both be true.
+
+        Args:
+            slot: the servo.
+            way: steps from the first to the second.
+            since_s: time from the first to the second.
+            speeds_steps_s: what both say of its speed.
+        """
+        fastest, room_s = self._fastest[slot], PAIR_LATE_S + max(0.0, since_s)
+        low = max(-fastest, min(0.0, *speeds_steps_s)) * room_s
+        high = min(fastest, max(0.0, *speeds_steps_s)) * room_s
+        return low - PAIR_STEPS <= way <= high + PAIR_STEPS

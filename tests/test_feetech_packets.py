@@ -75,7 +75,7 @@ params = st.binary(max_size=40)
 def test_statuses_come_out_as_they_went_in(sent, noise):
     noise = noise.replace(b"\xff", b"\x00")
     raw = noise + b"".join(status(i, p, e) for i, p, e in sent)
-    found = [s for s in statuses(raw) if s.intact]
+    found = [s._replace(at=0) for s in statuses(raw) if s.intact]
     wanted = [Status(i, e, p, True) for i, p, e in sent]
     # Data may look like a status inside or across others by chance: such are not believed.
     assert all(s in wanted for s in found)

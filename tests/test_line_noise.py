@@ -24,6 +24,16 @@ def test_noise_gives_no_wrong_value_moves_no_joint_out_and_ends_nothing(kind, pe
     assert outcome.recover_s < 2.0
 
 
+def test_a_servo_that_answers_as_its_neighbour_is_not_believed_where_noise_hides_that_one():
+    noisy = Noisy("feetech", seed=12)
+    noisy.start()
+    noisy.device.faults.command("wrong-id 2 3")
+    outcome = noisy.run("static 2.0", 2.0, 900)
+    assert outcome.wrong == 0, outcome
+    assert outcome.fresh > 300
+    assert outcome.recover_s is not None
+
+
 @pytest.mark.parametrize("kind", SMART)
 def test_a_line_that_says_its_last_answer_again_first_is_not_believed(kind):
     noisy = Noisy(kind)

@@ -9,6 +9,7 @@ from gazerig.drivers.plausibility import (
     AGREEING,
     DISTURBED_S,
     LATE_S,
+    PAIR_LATE_S,
     PAIR_STEPS,
     Plausibility,
 )
@@ -85,11 +86,17 @@ def test_a_line_is_disturbed_for_a_while_after_a_damaged_answer():
     assert not plausible.disturbed(1.1 + DISTURBED_S)
 
 
-def test_two_answers_right_after_one_another_agree_within_the_motor_s_way():
-    plausible = known(1000)
-    assert plausible.pair(0, 1000, 2.0, 1008, 2.0)
-    assert not plausible.pair(0, 1000, 2.0, 1009, 2.0)
-    assert plausible.pair(0, 1000, 2.0, 1011, 2.001)
+def test_two_answers_right_after_one_another_agree_within_the_way_of_their_speeds():
+    plausible, room = known(1000), PAIR_LATE_S + 0.02
+    for speeds, low, high in (
+        ((0.0, 0.0), 0.0, 0.0),
+        ((1000.0, 400.0), 0.0, 1000.0 * room),
+        ((-1000.0, 400.0), -1000.0 * room, 400.0 * room),
+        ((2.0 * SPEED, 0.0), 0.0, SPEED * room),
+    ):
+        low, high = low - PAIR_STEPS, high + PAIR_STEPS
+        for way, agree in ((low, True), (high, True), (low - 1, False), (high + 1, False)):
+            assert plausible.pair(0, way, 0.02, speeds) == agree
 
 
 @pytest.mark.parametrize(

@@ -198,6 +198,26 @@ def test_any_single_damaged_byte_of_a_whole_answer_is_found(at):
     assert group.whole(sts_status(5, CALM) + sts_status(2, CALM), {}) is None
 
 
+@pytest.mark.parametrize("header", [b"\xff\x00", b"\xff\xff"])
+def test_an_answer_in_the_place_of_another_servo_s_is_not_believed_where_one_is_missing(header):
+    """Servo 2 answers as its neighbour 5, whose own answer arrives damaged."""
+    group = feetech_read((2, 5, 9), SENSED)
+    lost, last = sts_status(5, bytes(15)), sts_status(9, BLOCK)
+    some = group.pieces(sts_status(5, BLOCK) + header + lost[2:-1] + b"\x01" + last)
+    assert set(some.samples) == {9} and some.stray
+    assert 5 in some.damaged | some.unproved
+    # The same behind an echo of the question; whole answers may come in any order.
+    assert set(group.pieces(group.request + sts_status(2, BLOCK)).samples) == {2}
+    whole = group.pieces(last + sts_status(5, BLOCK) + sts_status(2, BLOCK))
+    assert set(whole.samples) == {2, 5, 9} and not whole.stray
+
+
+def test_bytes_of_no_right_answer_are_stray_and_silence_is_not():
+    group = feetech_read((2, 5), SENSED)
+    assert group.pieces(sts_status(2, BLOCK) + sts_status(5, BLOCK)[:11]).stray
+    assert not group.pieces(sts_status(2, BLOCK)).stray
+
+
 def test_twice_the_same_is_an_echo_and_two_that_differ_are_nobodys():
     group = feetech_read((2, 5), SENSED)
     other = bytes(15)

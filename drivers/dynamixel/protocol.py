@@ -128,7 +128,7 @@ def statuses(raw: bytes) -> list[Status]:
             continue
         intact = umts(raw[at : end - 2]) == _CRC.unpack_from(raw, end - 2)[0]
         params = raw[at + 9 : end - 2].replace(STUFFED, RAW)
-        found.append(Status(raw[at + 4], raw[at + 8], params, intact))
+        found.append(Status(raw[at + 4], raw[at + 8], params, intact, at))
         at = raw.find(HEADER, end if intact else at + len(HEADER))
     return found
 

@@ -156,7 +156,8 @@ def statuses(raw: bytes) -> list[Status]:
         end = _end(raw, at)
         if end is not None and end <= len(raw):
             intact = checksum(raw[at + 2 : end - 1]) == raw[end - 1]
-            found.append((at, end, Status(raw[at + 2], raw[at + 4], raw[at + 5 : end - 1], intact)))
+            params = raw[at + 5 : end - 1]
+            found.append((at, end, Status(raw[at + 2], raw[at + 4], params, intact, at)))
         at = _header(raw, at + 1)
     return _apart(found)
 

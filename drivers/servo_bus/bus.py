@@ -158,7 +158,8 @@ class SmartServoBus(PortBus):
     def _disturbed(self, now_s: float) -> bool:
         """Return whether answers have been damaged of late."""
         places = self._feedback.places
-        if (damaged := self._line.errors.get("corrupt", 0)) != self._damaged:
+        damaged = self._line.errors.get("corrupt", 0)
+        if damaged != self._damaged or self._reader.stray_s == now_s:
             self._damaged = damaged
             places.damaged(now_s)
         return places.disturbed(now_s)

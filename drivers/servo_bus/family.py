@@ -17,12 +17,17 @@ if TYPE_CHECKING:  # the guardian starts without numpy
 
 
 class Status(NamedTuple):
-    """One answer of a servo as it arrived; ``intact``: its check sum is right."""
+    """One answer of a servo as it arrived.
+
+    intact: its check sum is right
+    at: byte of what was received at which it begins
+    """
 
     id: int
     error: int
     params: bytes
     intact: bool
+    at: int = 0
 
 
 class Register(Protocol):

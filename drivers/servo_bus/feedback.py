@@ -187,7 +187,12 @@ class FeedbackColumns:
         alike = (
             warmer <= ALIKE_C
             and stronger <= ALIKE_TENTH_V
-            and self.places.pair(slot, one.position, first.at_s, other.position, second.at_s)
+            and self.places.pair(
+                slot,
+                other.position - one.position,
+                second.at_s - first.at_s,
+                [one.velocity * self._velocity_unit, other.velocity * self._velocity_unit],
+            )
         )
         if not alike:
             return None

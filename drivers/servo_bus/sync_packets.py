@@ -25,11 +25,13 @@ class PartialReply(NamedTuple):
     samples: proved values by id
     damaged: servos whose bytes were spoilt
     unproved: servos whose bytes cannot be judged because of a damaged one before them
+    stray: bytes came that are of no right answer, and an answer is missing
     """
 
     samples: dict[int, Sample]
     damaged: frozenset[int]
     unproved: frozenset[int] = frozenset()
+    stray: bool = False
 
 
 class GroupRead(Protocol):
@@ -155,12 +157,22 @@ class SyncRead:
         return codec.bytes_missing(raw, len(found) + count - there, length)
 
     def pieces(self, raw: bytes) -> PartialReply:
-        """Return what can be proved right."""
+        """Return what can be proved right.
+
+        Servos answer in the order asked. Where an answer is missing, one in the place of another
+        servo's proves nothing: that servo may have lost its id, and the right answer its header.
+        """
         samples: dict[int, Sample] = {}
-        damaged, twofold = set[int](), set[int]()
+        damaged, twofold, in_place = set[int](), set[int](), set[int]()
+        begin = len(self.request) if raw.startswith(self.request) else 0  # an echo
+        stray = len(raw)
         for status in self._codec.statuses(raw):
+            stray -= status.intact * (len(status.params) + self._codec.STATUS_OVERHEAD)
             if status.id not in self.ids:
                 continue
+            place = begin + self.ids.index(status.id) * self._size
+            if status.intact and abs(status.at - place) < self._size // 2:
+                in_place.add(status.id)
             if not status.intact:
                 damaged.add(status.id)
             elif len(status.params) == self.window.length:
@@ -173,6 +185,11 @@ class SyncRead:
             else:
                 # An answer, but not what was asked for: late, or the servo is out of its mind.
                 damaged.add(status.id)
-        for servo_id in twofold:
+        missing = len(samples) < len(self.ids)
+        unproved = samples.keys() - in_place if missing else set[int]()
+        for servo_id in twofold | unproved:
             del samples[servo_id]
-        return PartialReply(samples, frozenset((damaged | twofold) - samples.keys()))
+        damaged = (damaged | twofold) - samples.keys()
+        return PartialReply(
+            samples, frozenset(damaged), frozenset(unproved - damaged), missing and stray > 0
+        )

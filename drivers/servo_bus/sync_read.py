@@ -37,6 +37,7 @@ class SyncReader:
         plan: how they are read.
 
     unanswered_s: when a servo left a question unanswered last, the time of reading
+    stray_s: when bytes that are of no right answer came instead of one last, the same
     """
 
     def __init__(self, line: Transactions, polled: PollList, plan: ReadPlan) -> None:
@@ -46,7 +47,7 @@ class SyncReader:
         self._packets, self._header = plan.packets, line.family.codec.HEADER
         self._until_s = inf
         self._sync_read = line.family.sync_read
-        self.unanswered_s = -inf
+        self.unanswered_s = self.stray_s = -inf
         self._unanswered_s: dict[int, float] = {}
         self._groups: dict[tuple[tuple[int, ...], int, int], GroupRead] = {}
         self._prepared_ids: tuple[int, ...] = ()
@@ -176,7 +177,9 @@ class SyncReader:
         """Save what is right of an answer; ask again those who lost theirs through another."""
         while True:
             raw = self._line.complete(raw, group.missing, self._line.deadline_s)
-            samples, damaged, unproved = group.pieces(raw)
+            samples, damaged, unproved, stray = group.pieces(raw)
+            if stray:
+                self.stray_s = now_s
             for servo_id, sample in samples.items():
                 replies[servo_id] = ServoReply(sample, at_s)
             if len(samples) == len(group.ids):
