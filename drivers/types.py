@@ -240,6 +240,20 @@ class DetectedPerson:
 
 
 @dataclass(frozen=True, slots=True)
+class DetectedPalm:
+    """A palm or the back of a hand in an image.
+
+    centre_px: middle between the wrist and the root of the middle finger
+    size_px: distance of these two, as if the palm faced the camera
+    confidence: 0..1
+    """
+
+    centre_px: tuple[float, float]
+    size_px: float
+    confidence: float
+
+
+@dataclass(frozen=True, slots=True)
 class MovingBlob:
     """Something that moves, with its place in the camera frame (x right, y down, z forward).
 
@@ -329,6 +343,7 @@ class Detections:
     scene: counts the scenes that were shown: another one than before, and there was a cut
     people: with and without a visible face; only some frames are searched for them, and of each
         only a part
+    palms: of the nearest person, None in a frame that was not searched for them
     """
 
     captured_s: float
@@ -344,6 +359,7 @@ class Detections:
     turn: CameraTurn | None = None
     scene: int = 0
     people: tuple[DetectedPerson, ...] = ()
+    palms: tuple[DetectedPalm, ...] | None = None
 
     def located_by(self, locate: "Callable[[Detections], LocatedFrame] | None") -> "Detections":
         """Return the same with what it shows located in the camera's axes; None: as it is."""
@@ -363,6 +379,7 @@ class Detections:
             self.turn,
             self.scene,
             self.people,
+            self.palms,
         )
 
 

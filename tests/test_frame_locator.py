@@ -96,7 +96,7 @@ def test_a_frame_comes_with_what_it_shows_located() -> None:
     frames = FrameAnalyzer(OneFace(), lambda shot: (BALL,), LOCATOR)
     found = frames.look(shot(1))
     assert found.located == LOCATOR(found)
-    assert [len(of) for of in present(found.located)[1:]] == [1, 1]
+    assert [len(of) for of in present(found.located)[1:3]] == [1, 1]
     other = FrameLocator(LENS, 1.0)
     frames.retune(None, None, other)
     assert frames.look(shot(2)).located == other(found)

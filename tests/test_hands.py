@@ -62,6 +62,34 @@ def test_what_is_no_hand_is_none(seen: LocalisedDetection) -> None:
     assert HAND not in kinds(Hands(), *[patch()] * 5, faces=())
 
 
+def led(tip: Vec3, middle: Vec3, **more: object) -> LocalisedDetection:
+    """Return a patch that is fastest at its tip."""
+    return patch(p=middle, fastest_m=tip, **more)  # type: ignore[arg-type]
+
+
+CURTAIN = led((2.0, 1.3, 0.1), (2.0, 1.5, -0.1), radius_m=0.45, thickness_m=0.5)
+
+
+@pytest.mark.parametrize(
+    "seen",
+    [CURTAIN, led((2.0, 1.1, -0.9), (2.0, 0.9, -0.2)), led((2.0, 0.4, -0.4), (2.0, 0.9, -0.9)),
+     patch(radius_m=0.08), patch(fastest_m_s=(0.0, 0.9, 0.0))],
+    ids=["a curtain", "a thing aside", "an elbow", "too small for an arm", "its end is slower"],
+)  # fmt: skip
+def test_what_moves_within_reach_is_a_thing_without_evidence_of_a_hand(
+    seen: LocalisedDetection,
+) -> None:
+    assert kinds(Hands(), *[seen] * 6) == ["thing"] * 6
+
+
+def test_what_is_left_of_an_arm_remains_a_hand_under_a_new_number() -> None:
+    """The hand moves on while the elbow has come to rest; far away it would be nothing known."""
+    left = patch(p=(2.0, 0.98, 0.4), fastest_m=(2.0, 0.98, 0.4), radius_m=0.12, mark=8)
+    arm = led((2.0, 0.9, 0.3), (2.0, 0.6, 0.0))
+    assert kinds(Hands(), *[arm] * 3, *[left] * 3)[-1] == HAND
+    assert kinds(Hands(), *[left] * 6) == ["thing"] * 6
+
+
 def test_the_legs_of_somebody_who_walks_are_no_hands_and_a_wave_while_walking_is() -> None:
     walks: Known = (FACE[0], (0.0, 1.0, 0.0))
     assert HAND not in kinds(Hands(), *[patch(v=(0.0, 0.4, 0.0))] * 4, faces=(walks,))
@@ -261,8 +289,8 @@ def test_other_arms_are_as_far_as_the_person_or_as_measured_however_wide(
     seen: LocalisedDetection,
 ) -> None:
     hands = Hands()
-    for k in range(4):
-        (found,) = hands.named([seen], [FACE], EYE, k / 30)
+    for k, one in enumerate([patch()] * 2 + [seen] * 4):
+        (found,) = hands.named([one], [FACE], EYE, k / 30)
     assert found.kind == HAND and level(found.p_world_m) == pytest.approx(1.0, abs=0.07)
 
 

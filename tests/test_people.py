@@ -23,8 +23,8 @@ from gazerig.drivers.vision.detector_status import detector_status
 from gazerig.drivers.vision.face.auto import AutoDetector
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
-from gazerig.drivers.vision.model_files import FOLDER_VARIABLE, PEOPLE, YUNET
-from gazerig.drivers.vision.people import DetectorWithPeople, PeopleDetector, _anchors, with_people
+from gazerig.drivers.vision.model_files import FOLDER_VARIABLE, PALMS, PEOPLE, YUNET
+from gazerig.drivers.vision.people import DetectorWithPeople, PeopleDetector, anchors, with_people
 from gazerig.gaze.angles import norm
 from gazerig.gaze.types import Percept, Target, Vec3
 from gazerig.robot.cli.doctor import examine_detector
@@ -40,7 +40,7 @@ FILM = Path(__file__).parents[2] / "shared" / "media" / "people_from_behind.mp4"
 NEEDS_NETWORK = pytest.mark.skipif(
     not (MODELS / PEOPLE.file).exists(), reason=f"needs {PEOPLE.file}: make test fetches it"
 )
-ANCHORS = _anchors()
+ANCHORS = anchors(224, ((8, 2), (16, 2), (32, 6)))
 TRUNK_M = 0.83
 
 
@@ -170,7 +170,7 @@ def test_a_damaged_file_is_told_once_and_faces_are_found(folder: Path) -> None:
     assert "damaged" in line and "gazerig models fetch people" in line
     assert detector.events() == () and detector.find(np.zeros((9, 9, 3), np.uint8)) == ()
     assert detector.people(np.zeros((9, 9, 3), np.uint8), 0.0) == ()
-    off = face_detector(FaceDetectorParams(people_hz=0.0))
+    off = face_detector(FaceDetectorParams(people_hz=0.0, hands_hz=0.0))
     assert isinstance(off, AutoDetector) and off.events() == ()
 
 
@@ -197,22 +197,24 @@ def test_the_status_names_what_runs_and_what_brings_the_rest(
     assert status.cure == "gazerig models fetch; pip install 'gazerig[people]'"
     YUNET.path.write_bytes(b"wrong")
     assert "MTCNN alone" in detector_status(FaceDetectorParams()).text
-    for file in (YUNET, PEOPLE):
+    for file in (YUNET, PEOPLE, PALMS):
         file.path.write_bytes(b"right")
     lacking = detector_status(FaceDetectorParams())
     assert lacking.cure == "pip install 'gazerig[people]'" and "(YuNet and MTCNN)" in lacking.text
     monkeypatch.setattr("gazerig.drivers.vision.detector_status.find_spec", lambda name: object())
     assert str(detector_status(FaceDetectorParams())) == (
-        "faces by auto (YuNet and MTCNN), people also turned away"
+        "faces by auto (YuNet and MTCNN), people also turned away, palms"
     )
-    assert detector_status(FaceDetectorParams(kind="mtcnn", people_hz=0.0)).cure == ""
+    PALMS.path.unlink()
+    assert detector_status(FaceDetectorParams()).cure == "gazerig models fetch hands"
+    assert detector_status(FaceDetectorParams("mtcnn", people_hz=0.0, hands_hz=0.0)).cure == ""
 
 
 def test_the_doctor_names_what_is_missing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_DATA_HOME", str(folder))
     found = examine_detector(FaceDetectorParams())
     assert found.level == "note" and found.remedy.startswith("gazerig models fetch")
-    assert examine_detector(FaceDetectorParams(kind="mtcnn", people_hz=0.0)).level == "ok"
+    assert examine_detector(FaceDetectorParams("mtcnn", people_hz=0.0, hands_hz=0.0)).level == "ok"
 
 
 # ---- where they are, and who ---------------------------------------------------------------

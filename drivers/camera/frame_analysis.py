@@ -38,10 +38,13 @@ class FrameAnalyzer:
         self._off_frame = OffFrameReport()
 
     def look(self, shot: Shot) -> Detections:
-        """Find and locate faces, unless the camera itself has, people, and what moves."""
+        """Find and locate faces, unless the camera itself has, people, palms, and what moves."""
         faces = self._faces(shot)
         find_people = getattr(self._detector, "people", None)
         people = () if find_people is None else find_people(shot.image, shot.captured_s)
+        find_palms = getattr(self._detector, "palms", None)
+        seen = shot.image, shot.captured_s, faces, people
+        palms = None if find_palms is None else find_palms(*seen)
         blobs = self._motion(shot) if self._motion is not None else ()
         height, width = shot.image.shape[:2]
         for line in self._off_frame.told_of(faces, width, height):
@@ -59,6 +62,7 @@ class FrameAnalyzer:
             turn=shot.turn,
             scene=self._cuts.scene(shot.image),
             people=people,
+            palms=palms,
         )
         if (fault := getattr(self._locate, "fault", None)) is not None and (line := fault(found)):
             self._faults.setdefault(line, False)

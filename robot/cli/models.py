@@ -18,7 +18,7 @@ from gazerig.robot.model.clock import RealClock
 app = typer.Typer()
 models = typer.Typer(
     name="models",
-    help="List and fetch model files, with which the camera finds more: faces, people, eyes.",
+    help="List and fetch model files, with which the camera finds more: faces, people, hands, eyes.",
     no_args_is_help=True,
 )
 app.add_typer(models)
@@ -69,8 +69,8 @@ def fetch_models(
         wanted = [file for file in MODEL_FILES if not names or file.name in names]
         failed = []
         with progress_bar(remaining=True) as progress:
-            for name in dict.fromkeys(file.name for file in wanted):
-                some = [file for file in wanted if file.name == name]
+            for address in dict.fromkeys(file.address for file in wanted):
+                some = [file for file in wanted if file.address == address]
                 try:
                     brought = fetch(some, RealClock().now_s, progress, folder)
                 except SetupError as error:

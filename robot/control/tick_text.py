@@ -41,7 +41,8 @@ def perception_text(tick: Tick, residual: ResidualFigures) -> str:
 
 def target_name(target: Target) -> str:
     """Return a target's name for people, e.g. "face 3: left eye"."""
-    name = target.kind if target.id < 0 else f"{target.kind} {target.id}"
+    kind = "motion" if target.kind == "thing" else target.kind
+    name = kind if target.id < 0 else f"{kind} {target.id}"
     return name if target.part is None else f"{name}: {PART_NAMES[target.part]}"
 
 

@@ -18,7 +18,7 @@ from gazerig.drivers.camera import depth_roi
 from gazerig.drivers.camera.off_frame import is_off_frame
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.located_frame import DetectionInCamera, LocatedFrame
-from gazerig.drivers.types import DetectedFace, DetectedPerson, Detections, MovingBlob
+from gazerig.drivers.types import DetectedFace, DetectedPalm, DetectedPerson, Detections, MovingBlob
 from gazerig.gaze.angles import norm, scale
 from gazerig.gaze.types import Vec3
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PUPIL_DISTANCE_M
@@ -39,6 +39,9 @@ _FACE_RADIUS_M = 0.1
 # and postures differ in it; how well the middle of the head is known. Measured on three people
 # before webcams, by the distance of their eyes: .76 to .87 m, and 2 cm.
 _TRUNK_M, _TRUNK_SPREAD, _HEAD_SD_M = 0.83, 0.15, 0.05
+# From the wrist of an adult to the root of the middle finger, how much people and postures differ
+# in it, and how well its middle is known; a hand.
+_PALM_M, _PALM_SPREAD, _PALM_SD_M, _HAND_RADIUS_M = 0.088, 0.15, 0.03, 0.07
 # A face so near to the middle of a person's head, in trunks, is theirs.
 _OWN_FACE = 0.25
 # Error of a face's centre from five landmarks: part of a pixel, and of the eyes' distance.
@@ -123,6 +126,9 @@ class FrameLocator:
             intrinsics,
             tuple([face for face in faces if face is not None]),
             tuple([thing for thing in things if thing is not None]),
+            None
+            if found.palms is None
+            else tuple([self._palm(palm, found, intrinsics) for palm in found.palms]),
         )
 
     def _face(
@@ -168,17 +174,35 @@ class FrameLocator:
     ) -> DetectionInCamera:
         """Locate the head of a person whose face is not seen."""
         z, sd = sqrt(lens.fx_px * lens.fy_px) * _TRUNK_M / person.trunk_px, _TRUNK_SPREAD
-        x, y = person.head_px
-        half = person.trunk_px * _FACE_RADIUS_M / _TRUNK_M
-        depth = self._depth(found, (x - half, y - half, 2.0 * half, 2.0 * half))
+        depth = self._depth_about(
+            found, person.head_px, person.trunk_px * _FACE_RADIUS_M / _TRUNK_M
+        )
         if depth is not None:
             z, sd = depth[0] + _FACE_RADIUS_M, hypot(_LEAST_SD, 0.5 * depth[1] / depth[0])
-        x_ray, y_ray, z_ray = rays(np.array([person.head_px]), lens)[0].tolist()
-        p_m = scale((x_ray, y_ray, z_ray), z)
+        p_m = _on_ray(person.head_px, z, lens)
         return DetectionInCamera(
             "face", p_m, None, _FACE_RADIUS_M, 0.0, person.confidence, 1.0, depth is not None,
             _HEAD_SD_M, norm(p_m) * sd, None, *_NO_SPEED_SDS, None, None,
         )  # fmt: skip
+
+    def _palm(self, palm: DetectedPalm, found: Detections, lens: Intrinsics) -> DetectionInCamera:
+        """Locate a palm, by its size where its depth is not measured."""
+        z, sd = sqrt(lens.fx_px * lens.fy_px) * _PALM_M / palm.size_px, _PALM_SPREAD
+        depth = self._depth_about(found, palm.centre_px, 0.25 * palm.size_px)
+        if depth is not None:
+            z, sd = depth[0], hypot(_LEAST_SD, 0.5 * depth[1] / depth[0])
+        p_m = _on_ray(palm.centre_px, z, lens)
+        return DetectionInCamera(
+            "hand", p_m, None, _HAND_RADIUS_M, 0.0, palm.confidence, 1.0, depth is not None,
+            _PALM_SD_M, norm(p_m) * sd, None, *_NO_SPEED_SDS, None, None,
+        )  # fmt: skip
+
+    def _depth_about(
+        self, found: Detections, at_px: tuple[float, float], half_px: float
+    ) -> tuple[float, float] | None:
+        """Return the measured depth in a square, by its middle and half its side; see _depth."""
+        (x, y), side = at_px, 2.0 * half_px
+        return self._depth(found, (x - half_px, y - half_px, side, side))
 
     def _depth(self, found: Detections, box: Box) -> tuple[float, float] | None:
         """Return the measured depth of what a box shows and its spread, None where it is unsure."""
@@ -210,6 +234,12 @@ class FrameLocator:
         if not _SMALLEST < share < _LARGEST:
             return None
         return share, hypot(_LEAST_SD, 0.5 * spread / z)
+
+
+def _on_ray(at_px: tuple[float, float], z_m: float, lens: Intrinsics) -> Vec3:
+    """Return the place that a pixel shows so far away along the optical axis."""
+    x, y, z = rays(np.array([at_px]), lens)[0].tolist()
+    return scale((x, y, z), z_m)
 
 
 def _is_of(person: DetectedPerson, face: DetectedFace) -> bool:

@@ -1,10 +1,15 @@
-"""Hands, as far as motion shows them: what moves otherwise than a person, within their reach.
+"""Hands: what moves otherwise than a person, within their reach, and is shown to be a hand.
 
 A camera without a hand detector shows a moving arm as one patch of flow. The quarter of it that
 moves fastest is taken to be the hand, as far away as the person's face is, unless the distance was
-measured. What a hand is called it keeps for as long as the detector's number of it lasts and it
-moves now and then; so a track does not break where a hand turns or passes before the face. A hand
-that has come to rest is still there for a while, though flow shows nothing that stands still.
+measured. A patch is a hand by evidence: it leads to the person's shoulder and is fastest at the
+other end, it reaches in from the side before everybody, it comes at the camera, or the detector of
+palms has found one there. Curtains, trunks and other people's sleeves stay things that move.
+
+What a hand is called it keeps for as long as the detector's number of it lasts and it moves now and
+then; so a track does not break where a hand turns or passes before the face. What is left of an arm
+that was a hand is one, too. A hand that has come to rest is still there for a while, though flow
+shows nothing that stands still. A palm is there whether it moves or not, from search to search.
 
 A hand that comes towards the camera, or reaches in from the side near it, is nearer than the person
 it is taken to be of. Where depth is not measured its size tells: what is compact, and not an arm,
@@ -13,8 +18,9 @@ comes in at the side of the image, and not from the person's shoulder, is as nea
 wide as a hand.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from math import hypot, inf
 from typing import NamedTuple
 
@@ -37,6 +43,15 @@ _HEAD_M = 0.25
 _SHOULDER_ASIDE_M, _SHOULDER_BELOW_M = 0.19, 0.17
 _SAME_M = 0.3
 """A face so near to where one was a frame ago is the same."""
+# The arm of a person leads to within this of the shoulder, and is no smaller than this (as
+# _LARGEST_M). Of rendered people who wave, point and box 98 % of the arms lead to within .26 m.
+_ATTACHED_M, _SMALLEST_M = 0.27, 0.04
+# Its end is as fast as all of it, within rounding, and hardly nearer to the shoulder than the
+# middle.
+_AS_FAST, _AS_FAR_M = 0.95, 0.1
+# A patch is at a palm that is so near to its end or, with its radius, to its middle. Between two
+# searches a palm goes on by the patch's flow, and is there for so long.
+_AT_PALM_M, _PALM_S, _SURE = 0.1, 0.3, 0.7
 # What is as large as a hand and surely grows in the image at this rate comes at the camera: a hand
 # from the first frame on, as nothing else of a person in view comes nearer so fast.
 _COMES_1_S, _SURE_SD = 2.5, 2.0
@@ -66,7 +81,8 @@ class _Moving:
     hand: where it was then
     large: frames in a row in which it was too large for a hand as far away as the person
     wide: in how many it came in at the side and was too wide for that
-    nearer: its distance over that of the person, by its size
+    nearer: its distance over that of the person, by its size or that of the palm
+    palm_s: when a palm was found there
     """
 
     at_s: float
@@ -76,6 +92,7 @@ class _Moving:
     large: int = 0
     wide: int = 0
     nearer: float = 1.0
+    palm_s: float = -inf
 
     def sized(self, thing: LocalisedDetection, arm: "_Arm") -> None:
         """Update how far away it is by its size.
@@ -87,8 +104,7 @@ class _Moving:
         if thing.depth_measured:
             return
         radius_m, wide_m = arm.ratio * thing.radius_m, arm.ratio * thing.thickness_m
-        comes_in = thing.from_side and arm.shoulder_m > _ANOTHERS_M
-        if comes_in and wide_m > _TOO_WIDE * _WIDE_M:
+        if arm.comes_in:
             # The first frames decide. An arm that slows down looks thinner, as less of it moves,
             # and does not go away; what changed its distance later would seem to come or to go.
             self.wide += 1
@@ -107,10 +123,10 @@ class _Moving:
 
 
 class _Held(NamedTuple):
-    """A hand that has come to rest, and when it was seen last."""
+    """A hand that does not move, and until when it is taken to be there."""
 
     hand: LocalisedDetection
-    seen_s: float
+    until_s: float
 
 
 class Hands:
@@ -119,6 +135,7 @@ class Hands:
     def __init__(self) -> None:
         self._moving: dict[int, _Moving] = {}
         self._held: dict[int, _Held] = {}
+        self._palm_mark, self._searched_s = 0, -inf
 
     def named(
         self,
@@ -126,6 +143,7 @@ class Hands:
         faces: list[Known],
         p_camera: Vec3,
         t_s: float,
+        palms: Sequence[LocalisedDetection] | None = None,
     ) -> list[LocalisedDetection]:
         """Return the things, those that are hands by this name and where the hand is.
 
@@ -136,17 +154,63 @@ class Hands:
             faces: of the people in view.
             p_camera: from where it was seen.
             t_s: when.
+            palms: of the nearest person, None in a frame that was not searched for them.
         """
         self._moving = {
             mark: one for mark, one in self._moving.items() if t_s - one.at_s <= _RESTS_S
         }
-        found = [self._named(thing, faces, p_camera, t_s) for thing in things]
+        if palms is not None:
+            self._searched_s = t_s
+        free = self._nearest(palms or (), faces, p_camera)
+        found = [self._named(thing, faces, p_camera, t_s, free) for thing in things]
+        for palm in free:
+            self._hold(palm, found, p_camera, t_s)
         return [*found, *self._at_rest(found, p_camera, t_s)] if self._held else found
 
     @property
     def held(self) -> bool:
         """Return whether there are hands that do not move any more."""
         return bool(self._held)
+
+    def _nearest(
+        self, palms: Sequence[LocalisedDetection], faces: list[Known], p_camera: Vec3
+    ) -> list[LocalisedDetection]:
+        """Return palms that are believed, no farther away than the nearest person.
+
+        A hand that is turned aside looks smaller. What is like one on the head, as necks are, or
+        hardly so is believed where a hand was.
+        """
+        if not palms or not faces:
+            return [one for one in palms if one.confidence >= _SURE]
+        p_face = min([face[0] for face in faces], key=partial(_level, p_camera=p_camera))
+        far, found = _level(p_face, p_camera), []
+        for palm in palms:
+            there = _place_as_far(palm, far, p_camera)
+            on_head = hypot(*_off(there, p_face)) < _HEAD_M
+            if _level(palm.p_world_m, p_camera) > far:
+                palm = replace(palm, p_world_m=there)
+            if (palm.confidence >= _SURE and not on_head) or self._known(palm, p_camera):
+                found.append(palm)
+        return found
+
+    def _known(self, thing: LocalisedDetection, p_camera: Vec3) -> bool:
+        """Return whether something is where a hand was just now."""
+        hands = [one.hand for one in self._moving.values() if one.frames >= _FRAMES]
+        hands += [one.hand for one in self._held.values()]
+        return any(_apart(thing, hand, p_camera) < _AGAIN_M for hand in hands)
+
+    def _hold(
+        self, palm: LocalisedDetection, found: list[LocalisedDetection], p_camera: Vec3, t_s: float
+    ) -> None:
+        """Take a palm that no patch is at to be there until the next search, as the hand it was."""
+        if any(_is_at(palm, thing, p_camera) for thing in found if thing.kind == HAND):
+            return
+        mark = next((m for m, o in self._held.items() if _is_at(palm, o.hand, p_camera)), None)
+        if mark is None:
+            self._palm_mark -= 1
+            mark = self._palm_mark
+        hand = replace(palm, mark=mark, v_world_m_s=(0.0, 0.0, 0.0))
+        self._held[mark] = _Held(hand, t_s + _PALM_S)
 
     def _at_rest(
         self, found: list[LocalisedDetection], p_camera: Vec3, t_s: float
@@ -159,13 +223,19 @@ class Hands:
             mark: one
             for mark, one in self._held.items()
             if mark in marks
-            or (t_s - one.seen_s <= _HELD_S and not _moves_again(one.hand, moving, p_camera))
+            or (t_s <= one.until_s and not _moves_again(one.hand, moving, p_camera))
         }
         return [one.hand for mark, one in self._held.items() if mark not in marks]
 
     def _named(
-        self, thing: LocalisedDetection, faces: list[Known], p_camera: Vec3, t_s: float
+        self,
+        thing: LocalisedDetection,
+        faces: list[Known],
+        p_camera: Vec3,
+        t_s: float,
+        palms: list[LocalisedDetection],
     ) -> LocalisedDetection:
+        """Return a patch as what it is; the palm that it is at is taken from those given."""
         if thing.kind != UNNAMED or thing.mark is None or not faces:
             return thing
         known = self._moving.get(thing.mark)
@@ -178,36 +248,85 @@ class Hands:
         begins = _BEFORE_HEAD_M_S if hypot(*_off(arm.tip_m, p_face)) < _HEAD_M else _BEGINS_M_S
         # Legs and parts of the trunk of somebody who walks are no faster than that, seen from them.
         comes = arm.ratio * thing.radius_m >= _ALONE_M and _comes(thing, p_camera)
-        if comes or speed > (_STAYS_M_S if named else max(begins, norm(v_face))):
+        palm = next((one for one in palms if _is_at(one, thing, p_camera)), None)
+        if (
+            palm is not None
+            or comes
+            or speed > (_STAYS_M_S if named else max(begins, norm(v_face)))
+        ):
             known = self._moving.setdefault(thing.mark, _Moving(t_s, p_face, thing))
-            known.sized(thing, arm)
-            known.at_s, known.p_face = t_s, p_face
-            known.hand = _as_hand(thing, arm, known.nearer, p_camera)
-            known.frames += _FRAMES if comes else 1
+            before_s, known.at_s, known.p_face = known.at_s, t_s, p_face
+            if palm is not None:
+                palms.remove(palm)
+                known.palm_s = t_s
+                known.nearer = _level(palm.p_world_m, p_camera) / _level(arm.tip_m, p_camera)
+            elif t_s - known.palm_s > _PALM_S:
+                known.sized(thing, arm)
+            hand = _as_hand(thing, arm, known.nearer, p_camera)
+            if palm is not None:
+                hand = replace(hand, p_world_m=palm.p_world_m, along_sd_m=palm.along_sd_m)
+            elif t_s - known.palm_s <= _PALM_S:
+                # The end of an arm is the hand less surely than the palm that was seen.
+                way = scale(hand.v_world_m_s or (0.0, 0.0, 0.0), t_s - before_s)
+                hand = replace(hand, p_world_m=add(known.hand.p_world_m, way))
+            known.hand = hand
+            if comes or palm is not None:
+                known.frames += _FRAMES
+            elif named or self._is_arm(thing, arm, p_camera):
+                known.frames += 1
         if known is None or known.frames < _FRAMES:
             return thing
         if speed >= _AT_REST_M_S:
             self._held.pop(thing.mark, None)
             return known.hand
-        # A patch that hardly moves may be all of the person: the hand is where it moved last.
+        # A patch that hardly moves may be all of the person: the hand is where it moved last, and
+        # is there no longer than a palm, where palms are searched.
+        until_s = t_s + _HELD_S
+        if t_s - self._searched_s < _HELD_S:
+            until_s = max(known.at_s, known.palm_s) + _PALM_S
+        if t_s > until_s:
+            self._held.pop(thing.mark, None)
+            return thing
         still = replace(known.hand, v_world_m_s=(0.0, 0.0, 0.0))
-        self._held[thing.mark] = _Held(still, t_s)
+        self._held[thing.mark] = _Held(still, until_s)
         return known.hand if known.at_s == t_s else still
+
+    def _is_arm(self, thing: LocalisedDetection, arm: "_Arm", p_camera: Vec3) -> bool:
+        """Return whether a patch is an arm, at a palm, or what is left of a hand of just now."""
+        if arm.attached or arm.comes_in:
+            return True
+        small = arm.ratio * thing.radius_m <= _TOO_LARGE * _ALONE_M
+        return (small and self._known(thing, p_camera)) or any(
+            _is_at(one.hand, thing, p_camera) for mark, one in self._held.items() if mark < 0
+        )
+
+
+def _is_at(palm: LocalisedDetection, thing: LocalisedDetection, p_camera: Vec3) -> bool:
+    """Return whether a patch or a hand is at a palm."""
+    far = _level(palm.p_world_m, p_camera)
+    if thing.depth_measured and abs(_level(thing.p_world_m, p_camera) - far) > _REACH_M:
+        return False
+    radius_m = thing.radius_m * far / _level(thing.p_world_m, p_camera)
+    if _apart(thing, palm, p_camera) < _AT_PALM_M + radius_m:
+        return True
+    if thing.kind != UNNAMED or thing.fastest_m is None:
+        return False
+    return _apart(replace(thing, p_world_m=thing.fastest_m), palm, p_camera) < _AT_PALM_M
+
+
+def _apart(thing: LocalisedDetection, hand: LocalisedDetection, p_camera: Vec3) -> float:
+    """Return how far something is from a hand, as far away as that unless it was measured."""
+    place = _place_as_far(thing, _level(hand.p_world_m, p_camera), p_camera)
+    return norm(sub(place, hand.p_world_m))
 
 
 def _moves_again(hand: LocalisedDetection, found: list[LocalisedDetection], p_camera: Vec3) -> bool:
-    """Return whether something moves where a hand has come to rest, as far as that is known.
-
-    Of distances that were not measured the farther one is taken for both.
-    """
-    far = _level(hand.p_world_m, p_camera)
-    for thing in found:
-        if thing.kind != HAND:
-            continue
-        farther = max(far, _level(thing.p_world_m, p_camera))
-        here, there = (_place_as_far(one, farther, p_camera) for one in (hand, thing))
-        if norm(sub(here, there)) < _AGAIN_M:
-            return True
+    """Return whether a hand moves where one has come to rest, as far as that is known."""
+    for one in found:
+        if one.kind == HAND:
+            nearer, farther = sorted((hand, one), key=lambda each: _level(each.p_world_m, p_camera))
+            if _apart(nearer, farther, p_camera) < _AGAIN_M:
+                return True
     return False
 
 
@@ -217,6 +336,8 @@ class _Arm(NamedTuple):
     face: of the person; tip_m, tip_m_s: place and velocity of its fastest part, as far away as they
     ratio: how many metres there one of the patch is
     shoulder_m: how far from the person's shoulder it leads
+    attached: it is one by its size, leads to the shoulder and is fastest at the other end
+    comes_in: it comes in at the side, not from the shoulder, too wide for an arm as far away
     """
 
     face: Known
@@ -224,6 +345,8 @@ class _Arm(NamedTuple):
     tip_m_s: Vec3
     ratio: float
     shoulder_m: float
+    attached: bool
+    comes_in: bool
 
 
 def _owned(
@@ -250,15 +373,29 @@ def _owned(
             continue
         # The arm goes on from the hand over the patch's middle to the shoulder.
         middle = add(p_camera, scale(sub(thing.p_world_m, p_camera), ratio))
-        aside, up = _off(sub(scale(middle, 2.0), tip), face[0])
-        shoulder_m = hypot(aside - _SHOULDER_ASIDE_M, up + _SHOULDER_BELOW_M)
+        shoulder_m = _off_shoulder(sub(scale(middle, 2.0), tip), face[0])
         off_m = shoulder_m
         if last is not None and norm(sub(last, face[0])) < _SAME_M:
             off_m -= _REACH_M
         if off_m < least:
             v = (0.0, 0.0, 0.0) if v_tip is None else scale(v_tip, ratio)
-            best, least = _Arm(face, tip, v, ratio, shoulder_m), off_m
+            slower_m_s = _AS_FAST * ratio * norm(thing.v_world_m_s or (0.0, 0.0, 0.0))
+            attached = (
+                shoulder_m < _ATTACHED_M
+                and ratio * thing.radius_m > _SMALLEST_M
+                and norm(v) >= slower_m_s
+                and _off_shoulder(tip, face[0]) > _off_shoulder(middle, face[0]) - _AS_FAR_M
+            )
+            wide = ratio * thing.thickness_m > _TOO_WIDE * _WIDE_M
+            comes_in = thing.from_side and shoulder_m > _ANOTHERS_M and wide
+            best, least = _Arm(face, tip, v, ratio, shoulder_m, attached, comes_in), off_m
     return best
+
+
+def _off_shoulder(p_m: Vec3, p_face: Vec3) -> float:
+    """Return how far from the shoulder on its side of a person a place is."""
+    aside, up = _off(p_m, p_face)
+    return hypot(aside - _SHOULDER_ASIDE_M, up + _SHOULDER_BELOW_M)
 
 
 def _as_hand(

@@ -121,11 +121,12 @@ class Perception:
         located = self._located(detections)
         faces = [placed(face, R, p) for face in located.faces]
         things = [placed(thing, R, p) for thing in located.things]
-        if things or self._hands.held:
+        palms = None if located.palms is None else [placed(one, R, p) for one in located.palms]
+        if things or palms or self._hands.held:
             if self._own_parts is not None:
                 things = own_named(things, self._own_parts(R_head, self._p_head), p)
             known = self._known(t_s)
-            things = self._hands.named(things, known_faces(faces, known), p, t_s)
+            things = self._hands.named(things, known_faces(faces, known), p, t_s, palms)
             faces, things = without_own_motion(faces, things, known, p)
             things = [_at_head(thing) for thing in things]
         self._tracks = tracks = self._tracker.step([*faces, *things], p, t_s)

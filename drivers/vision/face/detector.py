@@ -53,7 +53,7 @@ YUNET = DetectorPlugin(_yunet, FaceDetectorParams, ("landmarks",))
 
 
 def face_detector(params: FaceDetectorParams) -> FaceDetector:
-    """Make the detector that the parameters name, with meshes and people where wanted.
+    """Make the detector that the parameters name, with meshes, people and palms where wanted.
 
     Raises:
         ModelFileError: a model file is missing or not what it should be.
@@ -64,7 +64,7 @@ def face_detector(params: FaceDetectorParams) -> FaceDetector:
         from gazerig.drivers.vision.face.mesh import MeshedDetector
 
         detector = MeshedDetector(detector, params.mesh_faces)
-    if params.people_hz > 0.0:
+    if params.people_hz > 0.0 or params.hands_hz > 0.0:
         from gazerig.drivers.vision.people import with_people
 
         detector = with_people(detector, params)

@@ -1,4 +1,4 @@
-"""Parameters of every detector of faces and people."""
+"""Parameters of every detector of faces, people and palms."""
 
 from dataclasses import dataclass
 from typing import Annotated
@@ -8,7 +8,7 @@ from gazerig.params import Bounds, Choices
 
 @dataclass(frozen=True)
 class FaceDetectorParams:
-    """Which network looks for faces and people, and how small, how sure and how thorough it is."""
+    """Which networks look for faces, people and palms, and how small, sure and thorough they are."""
 
     # fmt: off
     kind: Annotated[str, Choices("auto", "mtcnn", "yunet"),
@@ -27,4 +27,6 @@ class FaceDetectorParams:
     people_hz: Annotated[float, Bounds(0, 30),
         "searches a second for people whose face is not visible; 0: none; needs gazerig models fetch people and gazerig[people]"] = 2.0
     people_confidence: Annotated[float, Bounds(0.1, 1), "people detected with a lower confidence are discarded"] = 0.6
+    hands_hz: Annotated[float, Bounds(0, 30),
+        "searches a second for palms of the nearest person; 0: none; needs gazerig models fetch hands and gazerig[people]"] = 5.0
     # fmt: on

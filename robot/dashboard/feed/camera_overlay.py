@@ -57,6 +57,9 @@ def draw_detections(
         draw_heat(drawn, scale * heat_px)
     for person in detections.people if faces else ():
         _draw_person(drawn, person, scale)
+    for palm in (detections.palms or ()) if faces else ():
+        radius = max(2, round(0.5 * palm.size_px * scale))
+        cv2.circle(drawn, _pixel(*palm.centre_px, scale), radius, _BLOB, 1, cv2.LINE_AA)
     for face in detections.faces if faces else ():
         _draw_face(drawn, face, scale)
     for blob in detections.blobs if faces else ():

@@ -1,0 +1,212 @@
+"""Palms of the nearest person: searched now and then, located by their size, and called hands."""
+
+import pickle
+import sys
+from dataclasses import replace
+from math import radians
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from present import present
+from test_perception import HEIGHT, LENS, STILL, WIDTH, face_at
+from test_perception import seen as percept_at
+
+from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
+from gazerig.drivers.camera.guarded_camera import fault_of
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.types import DetectedFace, DetectedPalm, DetectedPerson, ImageArray
+from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.drivers.vision.model_files import FOLDER_VARIABLE, PALMS
+from gazerig.drivers.vision.palms import PalmDetector
+from gazerig.drivers.vision.people import DetectorWithPeople, anchors, with_people
+from gazerig.gaze.angles import norm, sub
+from gazerig.gaze.types import Percept, Vec3
+from gazerig.robot.model.intrinsics import project
+from gazerig.robot.model.track_params import TrackParams
+from gazerig.robot.perception.frame_locator import FrameLocator, Reading
+from gazerig.robot.perception.perception import Perception
+from gazerig.robot.perception.tracker import Tracker
+
+MODELS = Path(sys.prefix) / "models"
+FILM = Path(__file__).parents[2] / "shared" / "media" / "webcam_sign_3.mkv"
+ANCHORS = anchors(192, ((8, 2), (16, 6)))
+FRAME = np.full((480, 640, 3), 90, np.uint8)
+FACE = DetectedFace((300.0, 60.0, 40.0, 65.2), np.zeros((5, 2)), 0.9)
+"""Its box is as high as one of a face is at 400 pixels a metre."""
+SIDE, LEFT, TOP = 520.0, 60.0, -63.4
+
+
+class Seen:
+    """A network that sees palms at given places of a frame; it counts how often it is run.
+
+    palms: (x, y of the wrist, x, y of the middle finger's root, width, score) in pixels
+    """
+
+    def __init__(self, *palms: tuple[float, float, float, float, float, float]) -> None:
+        self.palms, self.runs = palms, 0
+
+    def __call__(self, square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        assert square.shape == (192, 192, 3) and square.min() >= 0.0 and square.max() <= 1.0
+        self.runs += 1
+        boxes, scores = np.zeros((2016, 18), np.float32), np.full(2016, -9.0, np.float32)
+        for row, (x, y, u, v, wide, score) in enumerate(self.palms):
+            for again in (0, 1):  # neighbouring anchors see the same palm
+                at = 300 + 10 * row + again
+                points = np.full((7, 2), 1e3)
+                points[[0, 1, 2, 4]] = (x, y), (u - wide / 2, v), (u, v), (u + wide / 2, v)
+                spots = (points - (LEFT, TOP) + 0.5) / SIDE - ANCHORS[at]
+                boxes[at, 4:] = 192.0 * spots.ravel()
+                scores[at] = np.log(score / (1.0 - score)) - 0.01 * again
+        return boxes, scores
+
+
+def searched(*palms: tuple[float, float, float, float, float, float]) -> tuple[DetectedPalm, ...]:
+    found = PalmDetector(FaceDetectorParams(), Seen(*palms)).find(FRAME, 0.0, (FACE,), ())
+    return present(found)
+
+
+def test_palms_are_found_where_they_are_and_as_large_as_if_they_faced_the_camera() -> None:
+    first, second = searched((200.0, 300.0, 200.0, 260.0, 10.0, 0.8),
+                             (400.0, 300.0, 410.0, 300.0, 30.0, 0.9))  # fmt: skip
+    assert first.centre_px == pytest.approx((405.0, 300.0), abs=1.5)
+    assert first.size_px == pytest.approx(42.0, abs=0.1) and first.confidence > second.confidence
+    assert second.centre_px == pytest.approx((200.0, 280.0), abs=1.5)
+    assert second.size_px == pytest.approx(40.0, abs=0.1)
+
+
+@pytest.mark.parametrize("palm", [(200.0, 300.0, 200.0, 260.0, 10.0, 0.4),
+                                  (200.0, np.nan, 200.0, 260.0, 10.0, 0.9)])  # fmt: skip
+def test_what_is_unsure_or_no_place_is_no_palm(
+    palm: tuple[float, float, float, float, float, float],
+) -> None:
+    assert searched(palm) == ()
+
+
+def test_palms_are_searched_so_often_and_while_the_person_is_there() -> None:
+    network = Seen()
+    detector = PalmDetector(FaceDetectorParams(hands_hz=5.0), network)
+    assert detector.find(FRAME, 0.0, (), ()) is None
+    found = [detector.find(FRAME, 1.0 + i / 30.0, (FACE,) * (i == 0), ()) for i in range(60)]
+    assert [i for i, palms in enumerate(found) if palms is not None] == [0, 6, 12, 18, 24, 30]
+    person = DetectedPerson((0.0, 0.0, 9.0, 9.0), (320.0, 92.6), 332.0, 0.9)
+    assert detector.find(FRAME, 9.0, (), (person,)) == () and network.runs == 7
+    assert detector.find(np.zeros((0, 0, 3), np.uint8), 10.0, (FACE,), ()) is None
+
+
+def test_the_nearest_person_is_searched() -> None:
+    far = replace(FACE, box_px=(20.0, 20.0, 10.0, 12.0))
+    palm = (200.0, 300.0, 200.0, 260.0, 10.0, 0.8)
+    detector = PalmDetector(FaceDetectorParams(), Seen(palm))
+    (found,) = present(detector.find(FRAME, 0.0, (far, FACE), ()))
+    assert found.centre_px == pytest.approx((200.0, 280.0), abs=1.5)
+
+
+class OneFace:
+    def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
+        return (FACE,)
+
+
+def test_frames_carry_palms_between_processes() -> None:
+    palms = PalmDetector(FaceDetectorParams(), Seen((200.0, 300.0, 200.0, 260.0, 10.0, 0.8)))
+    frames = FrameAnalyzer(
+        DetectorWithPeople(OneFace(), None, palms), None, FrameLocator(None, radians(69.0))
+    )
+    found, later = (frames.look(Shot(0.03 * i, 1 + i, FRAME)) for i in (0, 1))
+    assert pickle.loads(pickle.dumps(found.palms)) == found.palms and later.palms is None
+    (palm,) = present(present(found.located).palms)
+    assert palm.kind == "hand" and present(later.located).palms is None and fault_of(found) == ""
+    bad = replace(found, palms=(DetectedPalm((1.0, np.nan), 20.0, 0.9),))
+    assert "a palm at" in fault_of(bad)
+
+
+# ---- what perception makes of them ---------------------------------------------------------
+
+
+def palm_at(p_camera_m: Vec3, confidence: float = 0.9) -> DetectedPalm:
+    x, y = project([p_camera_m], LENS)[0].tolist()
+    return DetectedPalm((x, y), LENS.fx_px * 0.088 / p_camera_m[2], confidence)
+
+
+P_FACE: Vec3 = (0.0, 0.0, 1.5)
+P_PALM: Vec3 = (0.35, 0.2, 1.1)
+
+
+def hands(*palms: DetectedPalm, frames: int = 30, depth: Reading | None = None) -> list[Percept]:
+    """See a face, and palms in every sixth frame."""
+    depth_at = None if depth is None else (lambda image, box: depth)
+    perception = Perception(STILL, 69.0, Tracker(TrackParams()), depth_at=depth_at)
+    more = {} if depth is None else {"depth_m": np.ones((HEIGHT, WIDTH), np.float32)}
+    return [
+        percept_at(
+            perception,
+            number,
+            faces=(face_at(P_FACE),),
+            palms=palms if number % 6 == 1 else None,
+            **more,
+        )  # fmt: skip
+        for number in range(1, frames + 1)
+    ]
+
+
+def places(percept: Percept) -> list[Vec3]:
+    rows = zip(percept.bodies.kinds, percept.bodies.p_world_m.tolist(), strict=True)
+    return [(p[0], p[1], p[2]) for kind, p in rows if kind == "hand"]
+
+
+def test_a_hand_that_is_held_still_is_one_hand_where_its_size_puts_it() -> None:
+    seen = hands(palm_at(P_PALM))
+    assert len({percept.bodies.ids for percept in seen}) == 1
+    for percept in seen:
+        (place,) = places(percept)
+        assert place == pytest.approx((1.1, -0.35, -0.2), abs=0.02)  # x ahead, y left, z up
+
+
+def test_a_palm_is_no_farther_than_its_person_unless_it_is_measured() -> None:
+    (aside,) = places(hands(palm_at((0.6, 0.3, 2.4)), frames=1)[-1])
+    assert np.hypot(*aside[:2]) == pytest.approx(1.5, abs=0.02)
+    (measured,) = places(hands(palm_at(P_PALM), frames=1, depth=(0.9, 0.01, 1.0))[-1])
+    assert measured[0] == pytest.approx(0.9, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    "palm", [palm_at(P_PALM, 0.6), palm_at((0.1, 0.12, 1.5))], ids=["unsure", "a neck"]
+)
+def test_what_is_hardly_a_palm_or_on_the_head_is_no_hand(palm: DetectedPalm) -> None:
+    assert [places(percept) for percept in hands(palm)] == [[]] * 30
+
+
+def test_a_hand_that_the_searches_no_longer_show_is_gone_soon() -> None:
+    perception = Perception(STILL, 69.0, Tracker(TrackParams()))
+    there = []
+    for number in range(1, 60):
+        palms = None if number % 6 != 1 else (palm_at(P_PALM),) * (number < 30)
+        percept = percept_at(perception, number, faces=(face_at(P_FACE),), palms=palms)
+        there.append(bool(places(percept)))
+    assert all(there[:30]) and not any(there[45:])
+
+
+# ---- the network ----------------------------------------------------------------------------
+
+
+@pytest.mark.skipif(
+    not (MODELS / PALMS.file).exists(), reason=f"needs {PALMS.file}: make test fetches it"
+)
+@pytest.mark.skipif(not FILM.exists(), reason=f"no {FILM}")
+def test_the_hands_of_a_person_who_signs_are_found_and_no_elbow(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The one hand is at the forehead, the other before the chest."""
+    monkeypatch.setenv(FOLDER_VARIABLE, str(MODELS))
+    detector = with_people(OneFace(), FaceDetectorParams(people_hz=0.0, hands_hz=30.0))
+    assert isinstance(detector, DetectorWithPeople)
+    film, face = cv2.VideoCapture(str(FILM)), replace(FACE, box_px=(276.0, 92.0, 52.0, 64.0))
+    for number in range(37):
+        assert film.grab()
+        if number in (30, 36):
+            frame = np.asarray(film.retrieve()[1], np.uint8)
+            found = present(detector.palms(frame, float(number), (face,), ()))
+            at = sorted(palm.centre_px for palm in found)
+            for place, (x, y) in zip(at, ((232.0, 142.0), (353.0, 294.0)), strict=True):
+                assert norm(sub((*place, 0.0), (x, y, 0.0))) < 20.0
