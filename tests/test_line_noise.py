@@ -83,6 +83,14 @@ def test_noise_on_an_i2c_bus_whose_bytes_carry_no_check_is_over_in_a_tick():
     assert outcome.recover_s < 3.0
 
 
+def test_noise_that_sets_a_board_to_an_external_clock_is_over_when_the_line_is_quiet():
+    noisy = Noisy("pca9685", seed=1)
+    noisy.start()
+    outcome = noisy.run("static 5.0", 5.0, 2000)
+    assert outcome.recover_s is not None
+    assert outcome.recover_s < 3.0
+
+
 @pytest.mark.parametrize("kind", ["maestro crc", "pca9685"])
 def test_a_board_of_which_only_damaged_answers_come_is_not_given_up_and_nothing_moves(kind):
     noisy = Noisy(kind)

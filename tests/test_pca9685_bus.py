@@ -240,16 +240,22 @@ def test_pulses_that_noise_has_made_are_put_right_while_the_board_is_not_heard(w
     assert world.widths() == pytest.approx([6000] * 3, abs=GRAIN)
 
 
-def test_a_board_that_lost_its_clock_on_the_way_is_named_and_nothing_is_said_to_be_held(world):
-    world.held().run(0.2, [6000] * 3)
+def test_a_board_set_to_an_external_clock_on_the_way_is_reset_and_held_where_it_was(world):
+    world.held().run(0.5, [5000] * 3)
     bus = EmulatedSMBus(world.device.body)
     bus.write_byte_data(0x40, MODE1, 0x30)
     bus.write_byte_data(0x40, MODE1, 0x70)
-    reported = world.run(0.5, [6000] * 3)
-    assert list(reported) == [None] * 3
-    assert "board 0x40: it was set to an external clock: switch its logic supply off and on" in (
-        world.bus.faults()
-    )
+    places = world.places()
+    assert not any(world.widths())
+    assert list(world.run(0.01, [5000] * 3))[1:] == [None] * 2
+    reported = world.run(0.1, [5000] * 3)
+    assert all(one is not None and one.torque for one in reported)
+    assert world.places() == pytest.approx(places, abs=GRAIN)
+    assert world.widths() == pytest.approx([5000] * 3, abs=GRAIN)
+    assert [text for text in world.bus.events() if "external clock" in text][1:] == [
+        "the board was sent home by an error (it was set to an external clock, so it was reset): "
+        "set up again"
+    ]
 
 
 def test_a_board_on_an_external_clock_is_refused(world):

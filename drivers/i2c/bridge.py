@@ -29,6 +29,11 @@ def write(address: int, register: int, data: bytes) -> bytes:
     return bytes((START, address << 1, len(data) + 1, register)) + data + bytes((STOP,))
 
 
+def write_all(data: int) -> bytes:
+    """Return a byte to all devices of the bus, by its general call address."""
+    return bytes((START, 0, 1, data, STOP))
+
+
 def read(address: int, register: int, length: int) -> bytes:
     """Return a read of some registers."""
     return bytes((START, address << 1, 1, register, START, address << 1 | 1, length, STOP))

@@ -28,6 +28,7 @@ from gazerig.drivers.pca9685.registers import (
     PRESCALE,
     RESTART,
     SLEEP,
+    SOFTWARE_RESET,
     START_S,
     TOTEM_POLE,
     counts_of,
@@ -48,7 +49,7 @@ FOLLOW_UP_S = 0.015
 SILENT = SLEEP | RESTART | EXTCLK
 """Modes without pulses."""
 
-NO_CLOCK = "it was set to an external clock: switch its logic supply off and on"
+NO_CLOCK = "it was set to an external clock, so it was reset"
 
 PRESCALE_EVERY = 8
 """The prescaler is looked at in every so many looks."""
@@ -130,7 +131,7 @@ class Pca9685Board:
         mode1, mode2, prescale = now
         if (mode1, mode2, prescale) == (AWAKE, TOTEM_POLE, self._clocks[address].prescale):
             return True
-        if mode1 & (SLEEP | RESTART) or prescale != self._clocks[address].prescale:
+        if mode1 & SILENT or prescale != self._clocks[address].prescale:
             return self._set_up(address)
         return self.line.write_confirmed(
             bridge.write(address, MODE1, bytes((AWAKE,))),
@@ -138,7 +139,10 @@ class Pca9685Board:
         )
 
     def _modes(self, address: int) -> tuple[int, int, int] | None:
-        """Read both modes and the prescaler, twice; None where that did not succeed."""
+        """Read both modes and the prescaler, twice; None where that did not succeed.
+
+        A board on an external clock has none, and only a reset of all boards ends that (7.3.1).
+        """
         questions = [(bridge.read(address, at, 1), 1) for at in (MODE1, MODE2, PRESCALE)]
         found = self.line.ask(questions * 2)
         if found is None:
@@ -148,6 +152,9 @@ class Pca9685Board:
             self.line.errors["damaged"] += 1
             return None
         mode1, mode2, prescale = (byte[0] for byte in first)
+        if mode1 & EXTCLK:
+            self._sent.clear()
+            self.line.send(bridge.write_all(SOFTWARE_RESET))
         return mode1, mode2, prescale
 
     def _set_up(self, address: int) -> bool:

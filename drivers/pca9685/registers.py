@@ -22,6 +22,9 @@ FULL_OFF = 0x10
 """In the high byte of OFF: no pulses, whatever ON holds (7.3.3)."""
 OFF = bytes((0, 0, 0, FULL_OFF))
 
+SOFTWARE_RESET = 0x06
+"""To all devices of the bus: every PCA9685 on it is as after power-up (7.6)."""
+
 CHANNELS, COUNTS = 16, 4096
 LEAST_PRESCALE, MOST_PRESCALE = 3, 255
 START_S = 0.001
