@@ -8,7 +8,7 @@ from gazerig.params import Bounds, Choices
 
 @dataclass(frozen=True)
 class FaceDetectorParams:
-    """Which networks look for faces, people and palms, and how small, sure and thorough they are."""
+    """Which networks look for faces, people and palms, how small, how sure and how thorough."""
 
     # fmt: off
     kind: Annotated[str, Choices("auto", "mtcnn", "yunet"),
