@@ -344,6 +344,7 @@ class Detections:
     people: with and without a visible face; only some frames are searched for them, and of each
         only a part
     palms: of the nearest person, None in a frame that was not searched for them
+    conditions: under which the camera sees badly, each with its remedy
     """
 
     captured_s: float
@@ -360,6 +361,7 @@ class Detections:
     scene: int = 0
     people: tuple[DetectedPerson, ...] = ()
     palms: tuple[DetectedPalm, ...] | None = None
+    conditions: tuple[str, ...] = ()
 
     def located_by(self, locate: "Callable[[Detections], LocatedFrame] | None") -> "Detections":
         """Return the same with what it shows located in the camera's axes; None: as it is."""
@@ -380,6 +382,7 @@ class Detections:
             self.scene,
             self.people,
             self.palms,
+            self.conditions,
         )
 
 

@@ -7,14 +7,16 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from present import present
 from shown_page import wait_for
 from world_shapes import SmallWorld
 
 from gazerig.config.schema import load_rig
-from gazerig.drivers.types import Detections
+from gazerig.drivers.types import BusHealth, Detections
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.camera_factory import scene_start_s
 from gazerig.robot.app.options import RunOptions
+from gazerig.robot.cli.tune import state_lines
 from gazerig.robot.control.loop import run
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_stream import TickStream
@@ -25,9 +27,11 @@ from gazerig.robot.dashboard.feed.page_feed import drain
 from gazerig.robot.dashboard.feed.page_process import URL, PageProcess
 from gazerig.robot.dashboard.feed.publisher import Publisher
 from gazerig.robot.dashboard.feed.snapshot import SnapshotBuilder, SnapshotTexts
+from gazerig.robot.dashboard.feed.status_line import StatusLine
 from gazerig.robot.dashboard.panels.servo_health import health
 from gazerig.robot.model.commands import Tune
 from gazerig.robot.model.types import Snapshot
+from gazerig.robot.remote.request_handler import Pulse
 from gazerig.sim_mock.scenes.picture import ScenePicture
 
 
@@ -264,3 +268,23 @@ def test_the_page_names_the_detector_and_what_it_lacks(ran: Run, page: Page) -> 
     page.stream.flush()
     (shot,) = page.shown()
     assert shot.perception.endswith(f" | {page.detector}") and page.detector in health(shot)
+
+
+def test_why_the_camera_sees_badly_is_shown_everywhere(ran: Run, page: Page) -> None:
+    why = "the picture is too dark: switch on a light"
+    tick = next(one for one in reversed(ran.ticks) if one.detections is not None)
+    found = replace(present(tick.detections), conditions=(why,))
+    dark = tick._replace(detections=found)
+    page.comes_up()
+    for one in (ran.ticks[0], dark, dark._replace(t_s=dark.t_s + 1.0)):
+        page.stream.update(one)
+    page.stream.flush()
+    shot = page.shown()[-1]
+    assert why in shot.perception and why in health(shot)
+    lines: list[str] = []
+    StatusLine(lines.append, lambda: BusHealth(0, 0, {}), lambda: None).update(dark)
+    assert "camera: the picture is too dark" in lines[0] and "switch on" not in lines[0]
+    pulse = Pulse(ran.made.clock)
+    pulse.update(dark)
+    now = {**pulse.as_json(), "unsaved": 0}
+    assert f"camera: {why}" in state_lines(now)

@@ -1,6 +1,8 @@
 """A camera that is absent, forbidden or silent is named; pictures carry their own times."""
 
+import errno
 import os
+import struct
 import threading
 from typing import Any
 
@@ -10,6 +12,7 @@ import pytest
 from present import present
 from stand_in import StandIn
 
+from gazerig.drivers.camera import v4l2_controls
 from gazerig.drivers.camera.params import WebcamParams
 from gazerig.drivers.camera.webcam import Webcam
 from gazerig.drivers.errors import CameraError
@@ -24,6 +27,7 @@ class Capture(StandIn):
         self.stamp_ms = stamp_ms
         self.works = works
         self.stated_hz = 0.0
+        self.format = "MJPG"
         self.picture = None
         self.failures = 0
         self.empty = 0
@@ -50,7 +54,12 @@ class Capture(StandIn):
         return True, np.full((4, 6, 3), self.grabs, np.uint8)
 
     def get(self, what: int) -> float:
-        return {cv2.CAP_PROP_POS_MSEC: self.stamp_ms, cv2.CAP_PROP_FPS: self.stated_hz}[what]
+        format_now = float(cv2.VideoWriter.fourcc(*self.format))
+        return {
+            cv2.CAP_PROP_POS_MSEC: self.stamp_ms,
+            cv2.CAP_PROP_FPS: self.stated_hz,
+            cv2.CAP_PROP_FOURCC: format_now,
+        }[what]
 
     def set(self, what: int, value: float) -> bool:
         self.wishes[what] = value
@@ -69,7 +78,7 @@ def device(tmp_path):
 
 
 def opened(device, capture: Capture) -> Webcam:
-    camera = Webcam(device, 800, 600, 25.0, capture=lambda name: capture)
+    camera = Webcam(device, WebcamParams(800, 600, 25.0), lambda name: capture)
     camera.open()
     return camera
 
@@ -169,7 +178,7 @@ def test_closed_camera_says_so(device):
 
 def test_latency_of_the_camera_is_taken_off(device):
     params = WebcamParams(latency_ms=35.0)
-    camera = Webcam.of(device, params)
+    camera = Webcam(device, params)
     camera._open_capture = lambda name: Capture(stamp_ms=49_970.0)
     camera.open()
     assert present(camera.take(lambda: 50.0, GO_ON)).captured_s == pytest.approx(49.935)
@@ -244,3 +253,91 @@ def test_pictures_of_no_known_kind_count_as_failures(device, picture):
     capture.picture = picture
     with pytest.raises(CameraError, match="no more frames"):
         camera.take(lambda: 1.0, GO_ON)
+
+
+class Device:
+    """What a camera answers to the controls of Video4Linux: those it has, with their ranges."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, **ranges: tuple[int, int]) -> None:
+        self.ranges = {getattr(v4l2_controls, name): span for name, span in ranges.items()}
+        self.values: dict[int, int] = {}
+        monkeypatch.setattr("fcntl.ioctl", self.ioctl)
+
+    def ioctl(self, file: int, request: int, argument: bytes) -> bytes:
+        assert request == v4l2_controls.SET_CONTROL and len(argument) == 8
+        control, value = struct.unpack("=Ii", argument)
+        if control not in self.ranges:
+            raise OSError(errno.EINVAL, "Invalid argument")
+        low, high = self.ranges[control]
+        if not low <= value <= high:
+            raise OSError(errno.ERANGE, "Numerical result out of range")
+        self.values[control] = value
+        return argument
+
+    def get(self, name: str) -> int:
+        return self.values[getattr(v4l2_controls, name)]
+
+
+WHOLE = {
+    "AUTO_EXPOSURE": (0, 3), "EXPOSURE": (3, 2047), "AUTO_GAIN": (0, 1), "GAIN": (0, 255),
+    "MAINS": (0, 2), "AUTO_FOCUS": (0, 1), "FOCUS": (0, 250),
+}  # fmt: skip
+
+
+def events_with(device, params: WebcamParams) -> tuple[str, ...]:
+    camera = Webcam(device, params, lambda name: Capture())
+    camera.open()
+    return camera.events()
+
+
+def test_controls_are_set_in_the_cameras_units(device, monkeypatch):
+    at = Device(monkeypatch, **WHOLE)
+    wanted = WebcamParams(exposure_ms=10.0, gain=64, anti_flicker="60hz", focus=30)
+    assert events_with(device, wanted) == ()
+    assert [at.get(name) for name in WHOLE] == [1, 100, 0, 64, 2, 0, 30]
+    # What an earlier run has fixed is automatic again.
+    assert events_with(device, WebcamParams()) == ()
+    assert [at.get(name) for name in ("AUTO_EXPOSURE", "AUTO_GAIN", "AUTO_FOCUS")] == [3, 1, 1]
+
+
+def test_each_thing_that_the_camera_does_not_take_is_one_line(device, monkeypatch):
+    at = Device(monkeypatch, AUTO_EXPOSURE=(0, 1), EXPOSURE=(3, 2047), MAINS=(0, 2))
+    wanted = WebcamParams(exposure_ms=900.0, gain=64, anti_flicker="auto", focus=30)
+    lines = events_with(device, wanted)
+    said = [line.removeprefix(f"camera {device} does not take webcam.") for line in lines]
+    assert [line.partition(")")[0] for line in said] == [
+        "exposure_ms: 900.0 (out of its range",
+        "gain: 64 (it has no such control",
+        "anti_flicker: auto (out of its range",
+        "focus: 30 (it has no such control",
+    ]
+    assert events_with(device, WebcamParams()) == () and at.get("AUTO_EXPOSURE") == 0
+
+
+def test_a_device_without_controls_is_asked_for_nothing_by_default(device):
+    assert events_with(device, WebcamParams()) == ()
+    assert len(events_with(device, WebcamParams(gain=3))) == 1
+
+
+def test_format_that_the_camera_does_not_take_is_told_once(device):
+    capture = Capture()
+    capture.format = "YUYV"
+    camera = opened(device, capture)
+    (line,) = camera.events()
+    assert "gives YUYV and not MJPG (webcam.format)" in line
+    assert list(capture.wishes)[0] == cv2.CAP_PROP_FOURCC  # sizes depend on it
+    camera.open()
+    assert camera.events() == ()
+    assert capture.wishes[cv2.CAP_PROP_FOURCC] == cv2.VideoWriter.fourcc(*"MJPG")
+
+
+def test_frames_that_came_while_the_reader_was_away_are_counted(device):
+    capture, clock = Capture(), [100.0]
+    capture.stated_hz = 30.0
+    camera = opened(device, capture)
+    numbers = []
+    for _ in range(10):
+        numbers.append(present(camera.take(lambda: clock[0], GO_ON)).number)
+        clock[0] += 0.1
+    assert numbers[-1] == pytest.approx(28, abs=9) and numbers[0] == 1
+    assert all(after - before >= 2 for before, after in zip(numbers, numbers[1:], strict=False))

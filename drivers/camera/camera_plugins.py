@@ -24,7 +24,7 @@ from gazerig.drivers.types import CameraTurn
 def _webcam(params: WebcamParams) -> FrameSource:
     from gazerig.drivers.camera.webcam import Webcam
 
-    return Webcam.of(0, params)
+    return Webcam(0, params)
 
 
 def _oak(params: OakParams) -> FrameSource:

@@ -40,7 +40,13 @@ class CaptureLoop:
         locate: Locate | None = None,
     ) -> None:
         self._source = source
-        self._frames = FrameAnalyzer(detector, motion, locate)
+        self._frames = FrameAnalyzer(
+            detector,
+            motion,
+            locate,
+            getattr(source, "rotation", 0),
+            getattr(source, "has_unknown_lens", False),
+        )
         self._now_s = now_s
         self._recovery = recovery
         self._counted = 0  # frames of the source before it was last opened

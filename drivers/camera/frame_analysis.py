@@ -1,8 +1,11 @@
 """What one frame shows: faces and what moves."""
 
 from collections.abc import Callable
+from math import degrees
+from time import perf_counter
 
 from gazerig.drivers.camera.off_frame import OffFrameReport
+from gazerig.drivers.camera.params import ASSUMED_FIELD_DEG
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.located_frame import LocatedFrame
 from gazerig.drivers.types import DetectedFace, Detections, FaceDetector, MovingBlob
@@ -24,28 +27,46 @@ class FrameAnalyzer:
         detector: finds faces.
         motion: finds what moves; None: nothing does.
         locate: locates faces and things; None: they are located by whoever needs them.
+        rotation_deg: by which frames have been turned clockwise already.
+        has_unknown_lens: the camera itself cannot tell its field of view.
     """
 
     def __init__(
-        self, detector: FaceDetector, motion: Motion | None = None, locate: Locate | None = None
+        self,
+        detector: FaceDetector,
+        motion: Motion | None = None,
+        locate: Locate | None = None,
+        rotation_deg: int = 0,
+        has_unknown_lens: bool = False,
     ) -> None:
         self._detector, self._motion, self._locate = detector, motion, locate
         self._faults: dict[str, bool] = {}  # and whether each has been reported
+        self._has_unknown_lens = has_unknown_lens
         # Here because the process of the loop imports this module too, and needs no OpenCV.
+        from gazerig.drivers.camera.health import CameraHealth
         from gazerig.drivers.vision.cut_detector import CutDetector
 
         self._cuts = CutDetector()
+        self._health = CameraHealth(rotation_deg)
         self._off_frame = OffFrameReport()
 
     def look(self, shot: Shot) -> Detections:
         """Find and locate faces, unless the camera itself has, people, palms, and what moves."""
+        began_s = perf_counter()
         faces = self._faces(shot)
+        faces_s = perf_counter()
         find_people = getattr(self._detector, "people", None)
         people = () if find_people is None else find_people(shot.image, shot.captured_s)
         find_palms = getattr(self._detector, "palms", None)
         seen = shot.image, shot.captured_s, faces, people
         palms = None if find_palms is None else find_palms(*seen)
+        bodies_s = perf_counter()
         blobs = self._motion(shot) if self._motion is not None else ()
+        spent_s = {
+            "faces": faces_s - began_s,
+            "people and hands": bodies_s - faces_s,
+            "motion": perf_counter() - bodies_s,
+        }
         height, width = shot.image.shape[:2]
         for line in self._off_frame.told_of(faces, width, height):
             self._faults.setdefault(line, False)
@@ -63,10 +84,20 @@ class FrameAnalyzer:
             scene=self._cuts.scene(shot.image),
             people=people,
             palms=palms,
+            conditions=self._health.look(shot, faces, spent_s, self._field_assumed(shot)),
         )
         if (fault := getattr(self._locate, "fault", None)) is not None and (line := fault(found)):
             self._faults.setdefault(line, False)
         return found.located_by(self._locate)
+
+    def _field_assumed(self, shot: Shot) -> bool:
+        """Return whether nobody has measured what the lens covers."""
+        if not self._has_unknown_lens or shot.lens is not None:
+            return False
+        if getattr(self._locate, "lens", None) is not None:
+            return False
+        field_rad = getattr(self._locate, "field_rad", None)
+        return field_rad is not None and abs(degrees(field_rad) - ASSUMED_FIELD_DEG) < 1e-6
 
     def _faces(self, shot: Shot) -> tuple[DetectedFace, ...]:
         if shot.faces is None:
@@ -79,7 +110,8 @@ class FrameAnalyzer:
         faults = tuple(line for line, told in self._faults.items() if not told)
         self._faults = dict.fromkeys(self._faults, True)
         events = getattr(self._detector, "events", None)
-        return (*faults, *(events() if events is not None else ()))
+        told = events() if events is not None else ()
+        return (*faults, *self._health.events(), *told)
 
     def retune(
         self,

@@ -170,6 +170,8 @@ def _fault(found: Any) -> str:
         return "a turn of the camera that is no rotation"
     if not isinstance(found.faces, Sequence) or not isinstance(found.blobs, Sequence):
         raise TypeError("faces and blobs must be tuples")
+    if not all(isinstance(line, str) for line in found.conditions):
+        return f"conditions that are no lines of text: {found.conditions!r}"
     for person in found.people:
         if not (all(map(_finite, (*person.head_px, person.trunk_px))) and person.trunk_px > 0.0):
             return f"a person at {person.head_px!r} of {person.trunk_px!r} px"

@@ -143,6 +143,16 @@ class UprightSource:
     def __init__(self, source: FrameSource, orientation: FrameOrientation) -> None:
         self._source, self._orientation = source, orientation
 
+    @property
+    def rotation(self) -> Rotation:
+        """Return by how many degrees frames are turned clockwise."""
+        return self._orientation.rotation
+
+    @property
+    def has_unknown_lens(self) -> bool:
+        """Return whether the camera itself cannot tell its field of view."""
+        return bool(getattr(self._source, "has_unknown_lens", False))
+
     def open(self) -> None:
         """Open the device or file.
 

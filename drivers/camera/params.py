@@ -1,9 +1,12 @@
 """Parameters of reopening a lost camera, and of a webcam."""
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 from gazerig.params import Bounds
+
+ASSUMED_FIELD_DEG = 69.0
+"""Horizontal field of view of a lens that nobody has measured: an OAK-D's."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +27,7 @@ class CameraRecoveryParams:
 
 @dataclass(frozen=True)
 class WebcamParams:
-    """The format requested of a webcam, which delivers its nearest one."""
+    """What is requested of a webcam, which delivers what comes nearest."""
 
     # fmt: off
     width_px: Annotated[int, Bounds(16, 16384), "image width requested from the camera"] = 640
@@ -32,4 +35,13 @@ class WebcamParams:
     rate_hz: Annotated[float, Bounds(1, 1000), "frame rate requested from the camera"] = 30.0
     latency_ms: Annotated[float, Bounds(0, 1000),
         "delay from the middle of the exposure to the frame's time stamp; measure it by filming a running clock"] = 0.0
+    format: Annotated[Literal["mjpg", "yuyv"],
+        "mjpg: compressed, which USB 2 carries at full size and rate; yuyv: not compressed"] = "mjpg"
+    exposure_ms: Annotated[float | None, Bounds(0.1, 1000),
+        "exposure: short ones blur less while the head turns, and need more light; null: automatic"] = None
+    gain: Annotated[int | None, Bounds(0, 65535), "gain in the camera's own units; null: as the camera does by itself"] = None
+    anti_flicker: Annotated[Literal["default", "off", "50hz", "60hz", "auto"],
+        "exposures of whole periods of the mains, against stripes under lamps; default: as the camera does by itself"] = "default"
+    focus: Annotated[int | None, Bounds(0, 65535),
+        "position of the lens in the camera's own units, held fixed; null: autofocus"] = None
     # fmt: on

@@ -35,4 +35,4 @@ def webcam(number: int, params: WebcamParams) -> FrameSource:
     """Return a webcam."""
     from gazerig.drivers.camera.webcam import Webcam
 
-    return Webcam.of(number, params)
+    return Webcam(number, params)

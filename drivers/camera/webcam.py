@@ -3,10 +3,12 @@
 import os
 import threading
 from collections.abc import Callable
+from math import isfinite
 from pathlib import Path
 
 import cv2
 
+from gazerig.drivers.camera import v4l2_controls
 from gazerig.drivers.camera.frame_rate import FrameRateMonitor
 from gazerig.drivers.camera.params import WebcamParams
 from gazerig.drivers.camera.quiet_opencv import quiet_opencv
@@ -18,6 +20,7 @@ from gazerig.drivers.errors import CameraError
 _MOST_FAILURES = 5
 # The kernel's stamp is believed if it is this young on the same clock.
 _OLDEST_STAMP_S = 1.0
+_FOURCC = {"mjpg": "MJPG", "yuyv": "YUYV"}
 # OpenCV waits 10 s for a frame unless told otherwise; it reads this once.
 _SELECT_TIMEOUT = ("OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT", "2")
 
@@ -29,43 +32,42 @@ def open_v4l2(device: str) -> cv2.VideoCapture:
 
 
 class Webcam:
-    """A camera at /dev/video<N>, or at a device file such as /dev/v4l/by-id/..."""
+    """A camera at /dev/video<N>, or at a device file such as /dev/v4l/by-id/...
+
+    has_unknown_lens: the camera itself cannot tell its field of view
+    """
+
+    has_unknown_lens = True
 
     def __init__(
         self,
         device: int | str | Path = 0,
-        width_px: int = 640,
-        height_px: int = 480,
-        rate_hz: float = 30.0,
+        params: WebcamParams | None = None,
         capture: Callable[[str], cv2.VideoCapture] = open_v4l2,
-        latency_s: float = 0.0,
     ) -> None:
         """Name the camera and what is asked of it; it gives what comes nearest.
 
         capture: opens a device file; another one serves where there is no camera
-        latency_s: from the middle of the exposure to the stamp of the frame
         """
         self._file = Path(f"/dev/video{device}" if isinstance(device, int) else device)
+        self._params = params = params or WebcamParams()
         self._wishes = {
-            cv2.CAP_PROP_FRAME_WIDTH: width_px,
-            cv2.CAP_PROP_FRAME_HEIGHT: height_px,
-            cv2.CAP_PROP_FPS: rate_hz,
+            # First, as sizes and rates depend on it.
+            cv2.CAP_PROP_FOURCC: cv2.VideoWriter.fourcc(*_FOURCC[params.format]),
+            cv2.CAP_PROP_FRAME_WIDTH: params.width_px,
+            cv2.CAP_PROP_FRAME_HEIGHT: params.height_px,
+            cv2.CAP_PROP_FPS: params.rate_hz,
             # One buffer: a frame fetched late is a fresh one, not an old one kept.
             cv2.CAP_PROP_BUFFERSIZE: 1,
         }
         self._open_capture = capture
-        self._latency_s = latency_s
         self._capture: cv2.VideoCapture | None = None
         self._number = 0
         self._rate = FrameRateMonitor("", 0.0)
+        self._rate_hz = 0.0
         self._left_s: float | None = None
         self._events: list[str] = []
-
-    @classmethod
-    def of(cls, device: int | str | Path, params: WebcamParams) -> "Webcam":
-        """Make a webcam as configured."""
-        size = params.width_px, params.height_px
-        return cls(device, *size, params.rate_hz, latency_s=params.latency_ms / 1e3)
+        self._told: set[str] = set()
 
     def open(self) -> None:
         """Open the camera and fetch one frame as a proof.
@@ -87,8 +89,12 @@ class Webcam:
                 "close that program or name another camera"
             )
         self._capture, self._number = capture, 0
-        self._rate = FrameRateMonitor(f"camera {self._file}", capture.get(cv2.CAP_PROP_FPS))
+        self._rate_hz = capture.get(cv2.CAP_PROP_FPS)
+        self._rate = FrameRateMonitor(f"camera {self._file}", self._rate_hz)
         self._left_s = None
+        self._tell_once(self._refused_format(capture))
+        for line in v4l2_controls.apply(self._file, self._params):
+            self._tell_once(f"camera {self._file} {line}")
 
     def take(self, now_s: Callable[[], float], stop: threading.Event) -> Shot | None:
         """Wait for the next frame; its time is the kernel's stamp, else that of its arrival.
@@ -109,16 +115,21 @@ class Webcam:
             pixels = bgr(image) if found and image is not None else None
             if pixels is not None:
                 captured_s = self._stamp_s(self._capture, arrived_s)
-                self._watch_rate(captured_s, came_s)
+                away_s = 0.0 if self._left_s is None else came_s - self._left_s
+                self._tell(self._rate.update(captured_s, away_s))
                 self._left_s = now_s()
-                self._number += 1
-                return Shot(captured_s - self._latency_s, self._number, pixels)
+                # Frames that came while the reader was away count as skipped.
+                rate_hz = self._rate.measured_hz or self._rate_hz
+                missed = away_s * rate_hz if isfinite(rate_hz) else 0.0
+                self._number += 1 + max(0, int(missed) - 1)
+                latency_s = self._params.latency_ms / 1e3
+                return Shot(captured_s - latency_s, self._number, pixels)
         raise CameraError(
             f"camera {self._file} delivers no more frames: check its cable, then start again"
         )
 
     def events(self) -> tuple[str, ...]:
-        """Return a line when the measured frame rate differs from the stated one."""
+        """Return what the camera did not take, and that its rate is not the stated one."""
         messages, self._events = tuple(self._events), []
         return messages
 
@@ -142,12 +153,27 @@ class Webcam:
                 "(sudo usermod -aG video $USER) and log in again"
             )
 
-    def _watch_rate(self, captured_s: float, came_s: float) -> None:
-        """Compare the times of frames with the rate that the camera states."""
-        away_s = 0.0 if self._left_s is None else came_s - self._left_s
-        line = self._rate.update(captured_s, away_s)
-        if line:
+    def _tell(self, line: str) -> None:
+        """Keep a line for ``events``."""
+        if line and line not in self._told:
             self._events.append(line)
+
+    def _tell_once(self, line: str) -> None:
+        """Do so once, however often the camera is opened again."""
+        self._tell(line)
+        self._told.add(line)
+
+    def _refused_format(self, capture: cv2.VideoCapture) -> str:
+        """Return that the camera gives another format than asked for, "" where it does not."""
+        given = int(capture.get(cv2.CAP_PROP_FOURCC))
+        name = "".join(chr(given >> 8 * k & 0xFF) for k in range(4)).strip("\0 ")
+        wanted = _FOURCC[self._params.format]
+        if not name or name == wanted:
+            return ""
+        return (
+            f"camera {self._file} gives {name} and not {wanted} (webcam.format): large frames may "
+            "come slowly"
+        )
 
     @staticmethod
     def _stamp_s(capture: cv2.VideoCapture, arrived_s: float) -> float:

@@ -13,6 +13,7 @@ from gazerig.drivers.types import ServoConfig
 from gazerig.drivers.vision.detector_status import detector_status
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.robot.app.bus_wiring import can_be_released, release_plan
+from gazerig.robot.bringup.doctor import camera as checkup_camera
 from gazerig.robot.bringup.doctor import maestro as doctor_maestro
 from gazerig.robot.bringup.doctor import pca9685 as doctor_pca9685
 from gazerig.robot.bringup.doctor import run as checkup
@@ -33,6 +34,7 @@ from gazerig.robot.cli.ports import (
 from gazerig.robot.cli.progress import JsonOption, console, progress, wipe
 from gazerig.robot.cli.suggestions import completed
 from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors
+from gazerig.robot.model.clock import RealClock
 
 app = typer.Typer()
 
@@ -46,6 +48,10 @@ def doctor(
     rig: RigArgument = "desk",
     port: PortOption = None,
     mock: MockOption = False,
+    camera: Annotated[
+        int | None,
+        typer.Option(min=0, metavar="N", help="Look through webcam N for some seconds, too."),
+    ] = None,
     fix: Annotated[
         bool, typer.Option("--fix", help="Mend what is safe; torque stays off, nothing moves.")
     ] = False,
@@ -64,13 +70,14 @@ def doctor(
                 tell("after that:")
                 findings = _examined(model, lines, tell)
         detector = examine_detector(model.detector)
-        show_findings([detector], tell)
+        eyes = [detector] if camera is None else [detector, *_examine_webcam(model, camera)]
+        show_findings(eyes, tell)
         if as_json:
             rows = [as_plain(one, bus) for bus, some in findings.items() for one in some]
-            rows.append(as_plain(detector, ""))
+            rows += [as_plain(one, "") for one in eyes]
             rows = [row | {"cure": completed(str(row["cure"]))} for row in rows]
             print(json.dumps(rows))
-        whole = [*(one for some in findings.values() for one in some), detector]
+        whole = [*(one for some in findings.values() for one in some), *eyes]
         tell(summed_up(whole, rig, fix))
     if worst(whole) == "error":
         raise typer.Exit(FAULT)
@@ -80,6 +87,15 @@ def examine_detector(params: FaceDetectorParams) -> Diagnostic:
     """Return what finds faces and people, and what brings what is missing."""
     text, cure = detector_status(params)
     return Diagnostic("note" if cure else "ok", text, "detector", cure)
+
+
+def _examine_webcam(rig: Rig, number: int) -> list[Diagnostic]:
+    """Look through a webcam, and return what it does not take and how it sees."""
+    from gazerig.drivers.camera.webcam import Webcam
+
+    progress(f"looking through webcam {number} for {checkup_camera.LOOK_S:g} s")
+    source = Webcam(number, rig.webcam)
+    return checkup_camera.examine_camera(source, rig.camera, rig.detector, RealClock().now_s)
 
 
 def _examined(rig: Rig, lines: Mapping[str, BusPort], tell: Tell) -> dict[str, list[Diagnostic]]:

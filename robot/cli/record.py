@@ -74,7 +74,7 @@ def _source(
     from gazerig.drivers.camera.webcam import Webcam
 
     wanted = WebcamParams(width_px=width, height_px=height or 480, rate_hz=rate_hz)
-    return Webcam.of(camera or 0, wanted), f"webcam {camera}"
+    return Webcam(camera or 0, wanted), f"webcam {camera}"
 
 
 def _record(

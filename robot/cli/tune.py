@@ -287,6 +287,7 @@ def state_lines(now: Mapping[str, Any]) -> list[str]:
         *([f"led by {now['lead']}"] if now["lead"] else []),
         f"looks at: {now['target']} - {now['why']} ({now['phase']})",
         f"guard: {'; '.join((now['level'], *now['reasons']))}",
+        *(f"camera: {text}" for text in now.get("camera", ())),
         f"joints in deg: {joints}",
         f"not saved: {_count(unsaved)}; gazerig ctl save keeps" if unsaved else "all saved",
         *(f"said: {text}" for text in now["said"][-_LAST_SAID:]),

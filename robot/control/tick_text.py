@@ -15,14 +15,14 @@ from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
 
 def perception_text(tick: Tick, residual: ResidualFigures) -> str:
-    """Return age of the frame, distance of faces and its source, and the ego-motion residual.
+    """Return age of the frame, distance of faces, how the camera sees, and the ego-motion residual.
 
     e.g. "frame 63 ms old | face 1 at 0.98 m by camera, +- 1 cm | still things seem to move
     0.3 deg/s while the head turns"
     """
     if tick.percept is None:
         return "no frame yet"
-    parts = [f"frame {1e3 * tick.percept.age_s(tick.t_s):.0f} ms old"]
+    parts = [f"frame {1e3 * tick.percept.age_s(tick.t_s):.0f} ms old", *camera_conditions(tick)]
     head = tick.pose.p_world_head_m
     for face in tick.percept.faces:
         by = f" by {face.distance_from}" if face.distance_from else ""
@@ -37,6 +37,11 @@ def perception_text(tick: Tick, residual: ResidualFigures) -> str:
             f"still things seem to move {residual.speed_deg_s:.1f} deg/s while the head turns"
         )
     return " | ".join(parts)
+
+
+def camera_conditions(tick: Tick) -> tuple[str, ...]:
+    """Return why the camera sees badly, each with its remedy."""
+    return tick.detections.conditions if tick.detections is not None else ()
 
 
 def target_name(target: Target) -> str:

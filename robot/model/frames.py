@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from math import degrees, inf, radians
 from typing import Annotated, Literal
 
+from gazerig.drivers.camera.params import ASSUMED_FIELD_DEG
 from gazerig.gaze.angles import add, angles_of, compose, rotate, rotation
 from gazerig.gaze.types import Angles2, Angles3, HeadGeometry, Mat3, Vec3
 from gazerig.params import Bounds
@@ -52,7 +53,7 @@ class CameraParams:
         "(mount base)"] = (20.0, 0.0, 45.0)
     yaw_deg: Annotated[float, Bounds(-180, 180), "rotation of the camera to the left"] = 0.0
     pitch_deg: Annotated[float, Bounds(-90, 90), "rotation of the camera upwards"] = 0.0
-    horizontal_field_deg: Annotated[float, Bounds(10, 150), "horizontal field of view of the lens"] = 69.0
+    horizontal_field_deg: Annotated[float, Bounds(10, 150), "horizontal field of view of the lens"] = ASSUMED_FIELD_DEG
     roll_deg: Annotated[float, Bounds(-180, 180), "rotation of the camera about its optical axis, right side down"] = 0.0
     rotation: Annotated[Literal[0, 90, 180, 270],
         "degrees clockwise by which the camera's frames are turned upright; everything else here counts in upright frames"] = 0

@@ -28,7 +28,7 @@ from gazerig.robot.control.head_state import head_state
 from gazerig.robot.control.loop_timing import busy_text
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_feed import TickFeed
-from gazerig.robot.control.tick_text import doing, lead_text, leader
+from gazerig.robot.control.tick_text import camera_conditions, doing, lead_text, leader
 from gazerig.robot.model.clock import Clock
 from gazerig.robot.model.command_json import signed
 from gazerig.robot.model.commands import REPEATED, Command
@@ -113,6 +113,7 @@ class Pulse:
                 }
                 for one in tick.gaze.limited
             ],
+            "camera": list(camera_conditions(tick)),
             "level": tick.guard_result.level,
             "reasons": list(tick.guard_result.reasons),
             "target": does.target,

@@ -67,7 +67,7 @@ class FilmCamera:
         if not delay_s >= 0.0:
             raise ValueError(f"detections cannot come before their frame: delay {delay_s} s")
         self._video = video
-        self._frames = FrameAnalyzer(detector, motion, locate)
+        self._frames = FrameAnalyzer(detector, motion, locate, orientation.rotation)
         self._orientation = orientation
         self._delay_s = delay_s
         self._start_s = start_s

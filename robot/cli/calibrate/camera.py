@@ -1,7 +1,7 @@
 """The commands that calibrate a camera: the board to print, then lens and place on the head."""
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from enum import StrEnum
 from math import degrees, radians
@@ -16,11 +16,13 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.camera.oak.calibration import OakCalibration
 from gazerig.drivers.camera.oak.source import OakSource
 from gazerig.drivers.camera.orientation import UprightSource
+from gazerig.drivers.camera.params import ASSUMED_FIELD_DEG
 from gazerig.drivers.camera.source import FrameSource, Shot
 from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.camera.webcam import Webcam
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.types import DetectedFace, ImageArray
+from gazerig.drivers.types import DetectedFace, ImageArray, Pixels
+from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.robot.app.camera_factory import orientation_of
 from gazerig.robot.app.rig_limits import lid_ends, neck_span
 from gazerig.robot.calibration.camera_calibration import LensCalibration
@@ -32,6 +34,7 @@ from gazerig.robot.calibration.camera_procedure import (
     neck_steps,
 )
 from gazerig.robot.calibration.charuco_page import RULER_MM, write_page
+from gazerig.robot.calibration.field_of_view import SIZE_SPREAD, field_by_face
 from gazerig.robot.calibration.hand_eye import HandEye, HandEyeParams, camera_on_head
 from gazerig.robot.cli.calibrate.difference_table import difference_table
 from gazerig.robot.cli.calibrate.oak import (
@@ -74,6 +77,8 @@ ColumnsOption = Annotated[int, typer.Option(min=3, max=20, help="Squares from le
 RowsOption = Annotated[int, typer.Option(min=3, max=20, help="Squares from top to bottom.")]
 SquareOption = Annotated[float, typer.Option(metavar="MM", help="Side of a square.")]
 _BOARD = BoardParams()
+# Frames with a face, some seconds of them, and how long none may be seen.
+_FACE_FRAMES, _NO_FACE_S = 120, 30.0
 
 
 def calibrate_board(
@@ -110,6 +115,15 @@ def calibrate_camera(
     columns: ColumnsOption = _BOARD.columns,
     rows: RowsOption = _BOARD.rows,
     square: SquareOption = _BOARD.square_mm,
+    face_at: Annotated[
+        float | None,
+        typer.Option(
+            metavar="M",
+            min=0.3,
+            max=5.0,
+            help="Without a board: the field of view alone, by your face so far from the lens.",
+        ),
+    ] = None,
     out: OutOption = None,
     dry_run: DryRunOption = False,
     yes: AllYesOption = False,
@@ -119,10 +133,14 @@ def calibrate_camera(
     ] = False,
     port: Annotated[str | None, typer.Option(help="Serial port instead of the rig's.")] = None,
 ) -> None:
-    """Measure the lens and where the camera sits, with the printed board."""
+    """Measure the lens and where the camera sits, with the printed board, or a face."""
     with clear_errors(rig, port, mock), signals() as stopped:
-        _refuse_contradictions(what, camera, oak, oak_calibration, mock)
+        _refuse_contradictions(what, camera, oak, oak_calibration, mock, face_at)
         loaded = load_rig(rig)
+        if face_at is not None:
+            changes = _field_changes(loaded, Webcam(camera or 0, loaded.webcam), face_at, stopped)
+            _write(rig, loaded, changes, out, dry_run, stopped, yes)
+            return
         board = CharucoBoard(_board(columns, rows, square, ruler))
         if loaded.camera.mount != "head" and what is not What.lens:
             raise SetupError(
@@ -135,7 +153,7 @@ def calibrate_camera(
         if oak_calibration is not None:
             changes = _oak_lens(job, calibration_of_file(oak_calibration, loaded.oak)).changes
         else:
-            source = OakSource(loaded.oak) if oak else Webcam(camera or 0)
+            source = OakSource(loaded.oak) if oak else Webcam(camera or 0, loaded.webcam)
             with _eye(job, None if mock else source, seed) as eye:
                 lens = _known_lens(job, eye, source, what)
                 changes = lens.changes
@@ -143,9 +161,69 @@ def calibrate_camera(
                     with moving_neck(loaded, eye.mock, port, stopped, yes) as neck:
                         found = _mount(job, eye, neck, lens.camera, lens.good)
                         changes |= mount_changes(found, lens.camera)
-        Console().print(difference_table(rig, loaded, changes))
-        if not dry_run:
-            write_found(rig, changes, out, TerminalPerson(Lines(None), stopped, yes))
+        _write(rig, loaded, changes, out, dry_run, stopped, yes)
+
+
+def _write(
+    rig: str,
+    loaded: Rig,
+    changes: Mapping[str, Any],
+    out: Path | None,
+    dry_run: bool,
+    stopped: Callable[[], str | None],
+    yes: bool,
+) -> None:
+    """Show what was found beside what the rig says, and write it after a yes."""
+    Console().print(difference_table(rig, loaded, changes))
+    if not dry_run:
+        write_found(rig, changes, out, TerminalPerson(Lines(None), stopped, yes))
+
+
+def _field_changes(
+    rig: Rig, source: FrameSource, face_at_m: float, stopped: Callable[[], str | None]
+) -> dict[str, Any]:
+    """Return the field of view by a face that is looked at for some seconds."""
+    if rig.camera.lens is not None:
+        raise SetupError(
+            "camera.lens is measured and tells the field of view: measure it again with the board "
+            "(--what lens), or take it out of the rig file"
+        )
+    clock = RealClock()
+    turned = UprightSource(source, orientation_of(rig.camera))
+    thread = CameraThread(turned, face_detector(rig.detector), clock.now_s)
+    say(
+        f"sit with your face {face_at_m:g} m before the lens (lens to tip of the nose), upright and "
+        "looking at it, and hold still"
+    )
+    thread.open()
+    try:
+        seen: list[Pixels] = []
+        number, seen_s, size_px = 0, clock.now_s(), (0, 0)
+        while len(seen) < _FACE_FRAMES:
+            go_on(stopped)
+            found = thread.latest(clock.now_s())
+            if found is None or found.number == number:
+                if clock.now_s() - seen_s > _NO_FACE_S:
+                    raise SetupError("no face is seen: more light, a face from its front, nearer")
+                clock.sleep_until(clock.now_s() + 0.01)
+                continue
+            number, size_px = found.number, (found.width_px, found.height_px)
+            if found.faces:
+                seen.append(found.faces[0].landmarks_px)
+                seen_s = clock.now_s()
+            status(f"face in {len(seen)} of {_FACE_FRAMES} frames")
+    finally:
+        thread.close()
+    field = field_by_face(seen, *size_px, face_at_m)
+    say(
+        f"horizontal field of view {field.horizontal_deg:.1f} deg, between {field.low_deg:.1f} and "
+        f"{field.high_deg:.1f} as faces differ in size by {100.0 * SIZE_SPREAD:.0f} %, and so far may "
+        "distances be off; the size varied by "
+        f"{100.0 * field.moved:.1f} %. The printed board measures it to 0.2 %"
+    )
+    field_deg = round(field.horizontal_deg, 1)
+    # 69 itself stands for a lens that nobody has measured.
+    return {"camera.horizontal_field_deg": field_deg + 0.05 * (field_deg == ASSUMED_FIELD_DEG)}
 
 
 def lens_changes(lens: LensCalibration) -> dict[str, Any]:
@@ -251,9 +329,19 @@ def _eye(job: _Job, source: FrameSource | None, seed: int) -> Iterator[_Eye]:
 
 
 def _refuse_contradictions(
-    what: What, camera: int | None, oak: bool, oak_calibration: Path | None, mock: bool
+    what: What,
+    camera: int | None,
+    oak: bool,
+    oak_calibration: Path | None,
+    mock: bool,
+    face_at: float | None,
 ) -> None:
     """Refuse options that cannot be together."""
+    if face_at is not None and (oak or oak_calibration is not None or mock or what is not What.all):
+        raise SetupError(
+            "--face-at measures a webcam's field of view alone: leave --what, --oak and --mock away "
+            "(an OAK camera knows its lens)"
+        )
     if oak and camera is not None:
         raise SetupError("--oak and --camera name two cameras: leave one away")
     if mock and (oak or oak_calibration is not None):

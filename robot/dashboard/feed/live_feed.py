@@ -93,6 +93,7 @@ class FrameHead(NamedTuple):
 
     faces: box, landmarks and confidence; blobs: id, kind, position and radius
     people: box, middle of the head, size of the trunk and confidence
+    conditions: why the camera sees badly
     lens: by which the frame was located, else as the camera reports it: fx, fy, cx, cy in pixels
         and five numbers of distortion
     shape, dtype: of the array in the memory that goes along; None, "" without one
@@ -111,6 +112,7 @@ class FrameHead(NamedTuple):
     depth: bool
     wants_depth: bool
     people: Sequence[tuple[Any, Any, float, float]] = ()
+    conditions: Sequence[str] = ()
 
 
 def rig_message(rig: LiveRig) -> bytes:
@@ -141,6 +143,7 @@ def frame_message(
         depth,
         wants_depth,
         [(one.box_px, one.head_px, one.trunk_px, one.confidence) for one in found.people],
+        found.conditions,
     )
     return DETECTED + encode(head)
 
@@ -315,6 +318,7 @@ class LiveFeed:
             tuple([MovingBlob(*blob) for blob in head.blobs]),
             lens=None if head.lens is None else _intrinsics(*head.lens),
             people=tuple([DetectedPerson(*one) for one in head.people]),
+            conditions=tuple(head.conditions),
         )
         if head.shape is not None and (fd >= 0 or pixels is not None):
             if pixels is None:

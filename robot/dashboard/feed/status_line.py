@@ -7,7 +7,7 @@ from gazerig.drivers.bounded_call import lasting_text
 from gazerig.drivers.types import BusHealth
 from gazerig.robot.control.loop_timing import busy_text
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.control.tick_text import doing, guard_text, health_text
+from gazerig.robot.control.tick_text import camera_conditions, doing, guard_text, health_text
 from gazerig.robot.model.types import LoopFigures
 
 _LINE_S = 0.2
@@ -53,5 +53,6 @@ class StatusLine:
             doing(tick).headline,
             guard_text(tick.guard_result),
             health_text(self._health()),
+            *[f"camera: {text.partition(':')[0]}" for text in camera_conditions(tick)],
         ]
         return " | ".join(filter(None, parts))

@@ -1,0 +1,425 @@
+"""Conditions under which a camera sees badly: each is told as it begins and as it ends.
+
+About once a second a frame is judged: too dark, out of focus, turned, through a lens whose field of
+view nobody has measured, or one of many that come too fast. What lasts is a condition, with its
+remedy; what comes and goes is none. Statistics are of the frame at most 640 pixels wide and cost
+2 ms; where faces are missing for a while, a frame is turned and searched every few seconds, 10 ms.
+"""
+
+from collections import Counter, deque
+from collections.abc import Mapping, Sequence
+from math import atan2, degrees, inf, isfinite
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.drivers.camera.params import ASSUMED_FIELD_DEG
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.types import DetectedFace, ImageArray
+
+if TYPE_CHECKING:
+    from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
+
+EVERY_S = 1.0
+"""A frame is judged so often; what follows is counted in such judgements."""
+PROBE_S = 3.0
+"""A turned frame is searched so often while no upright face is seen."""
+
+_BEGINS, _ENDS = 5, 3
+_WIDTH_PX = 640
+# 95 % of the pixels are darker. MTCNN finds faces down to about 12 of 255 where there is no noise;
+# a webcam adds so much of it there that 32 is the end.
+_DARK, _LIT, _BLACK = 32.0, 45.0, 6.0
+# An edge's width is the contrast in a window over the steepest slope in it. In a quarter of the
+# windows it is below 4.4 px in sharp frames, below 8.9 after a blur of 4 px, where faces of 60 px
+# are lost. Windows count where they show an edge: soft shadows on a wall are less steep.
+_WINDOW_PX, _CONTRAST, _STEEP = 48, 40.0, 3.0
+_LEAST_WINDOWS = 0.1
+_BLURRED_PX, _SHARP_PX = 8.5, 7.0
+_LEAST_SIDE_PX = 96
+# A face counts as upright up to so many degrees and from this confidence on: of upside-down faces
+# MTCNN takes one of six for an upright one, less surely. Judgements in which such faces count.
+_UPRIGHT_DEG, _SURE, _SAMPLES = 25.0, 0.9, 15
+# Searches of turned frames that must agree to so many degrees, and the width of the frame. A search
+# in all directions that found nothing is not repeated for so many times as long.
+_PROBES, _AGREE_DEG, _PROBE_PX, _FRUITLESS = 4, 30.0, 320, 10
+# One degree of roll costs a face as much as this of its confidence: in a frame turned by 120 deg
+# MTCNN finds some faces too, less surely and with landmarks that are not theirs.
+_PER_DEG = 0.003
+# How far from quarters frames are turned that camera.rotation can help.
+_QUARTER_DEG = 30.0
+# Fewer than this part of the frames offered, and fewer a second: too slow; and in time again.
+_SHARE, _SLOW_HZ, _SHARE_AGAIN, _AGAIN_HZ = 0.5, 15.0, 0.6, 18.0
+
+_OVER = {
+    "dark": "camera: the picture is bright enough again",
+    "turned": "camera: the picture is upright again",
+    "blurred": "camera: the picture is sharp again",
+    "field": "camera: the field of view is known now",
+    "slow": "camera: frames are looked at in time again",
+}
+_REMEDIES = {
+    "faces": "lower detector.work_width_px or detector.far_width_px",
+    "people and hands": "lower detector.people_hz and detector.hands_hz",
+    "motion": "lower motion.work_px, or set motion.enabled: false",
+    "reading": "lower the camera's rate_hz or width_px, or free the computer",
+}
+FIELD_TEXT = (
+    f"the field of view is not measured and taken as {ASSUMED_FIELD_DEG:g} deg (a lens of 84 deg "
+    "places people 1.3 times too far): gazerig calibrate camera --face-at 1.0 measures it with your "
+    "face in a minute"
+)
+
+
+class PictureStats(NamedTuple):
+    """How a frame looks.
+
+    bright: grey level, 0..255, below which 95 % of its pixels are
+    edge_px: width of its edges at a width of at most 640 px; None where it shows too few
+    """
+
+    bright: float
+    edge_px: float | None
+
+
+class Judged(NamedTuple):
+    """What is known of a camera at one judgement; None: nothing.
+
+    upright: whether a face that is about upright is seen
+    turned_deg: how far the frame is turned, clockwise, by the faces that it shows upright as it is
+        turned back; 0 where it is not
+    offered, looked_at: frames since the judgement before; over_s: the time between
+    spent_ms: of each stage, a frame
+    field_assumed: nobody has measured the field of view
+    """
+
+    picture: PictureStats | None = None
+    upright: bool = False
+    turned_deg: float | None = None
+    offered: int = 0
+    looked_at: int = 0
+    over_s: float = 0.0
+    spent_ms: Mapping[str, float] = {}
+    field_assumed: bool = False
+
+
+class _Lasting:
+    """One condition; it begins and ends once what says so has lasted."""
+
+    def __init__(self, over: str, begins: int = _BEGINS, ends: int = _ENDS) -> None:
+        self._over, self._lasts = over, (begins, ends)
+        self.text, self._run = "", 0
+
+    def step(self, text: str | None) -> str:
+        """Take a judgement, None: nothing is known; return the line to tell, "" for none."""
+        if text is None:
+            return ""
+        if bool(text) == bool(self.text):
+            self._run = 0
+            return ""
+        self._run += 1
+        if self._run < self._lasts[not text]:
+            return ""
+        self.text, self._run = text, 0
+        return f"camera: {text}" if text else self._over
+
+
+class HealthModel:
+    """Judgements in, conditions out; pure.
+
+    rotation_deg: camera.rotation in force, by which frames have been turned already
+    """
+
+    def __init__(self, rotation_deg: int = 0) -> None:
+        self._rotation = rotation_deg
+        self._on = {name: _Lasting(over) for name, over in _OVER.items()}
+        self._on["turned"] = _Lasting(_OVER["turned"], 1)  # what it rests on has lasted
+        self._on["field"] = _Lasting(_OVER["field"], 1, 1)
+        self._upright: deque[bool] = deque(maxlen=_SAMPLES)
+        self._turned: deque[float] = deque(maxlen=_PROBES)
+
+    @property
+    def conditions(self) -> tuple[str, ...]:
+        """Return what is bad now, each with its remedy."""
+        return tuple([one.text for one in self._on.values() if one.text])
+
+    @property
+    def lacks_upright(self) -> bool:
+        """Return whether few upright faces are seen, so that turned ones are worth a search."""
+        few = len(self._upright) >= _BEGINS and 2 * sum(self._upright) < len(self._upright)
+        return few and not self._on["turned"].text
+
+    def step(self, seen: Judged) -> tuple[str, ...]:
+        """Take a judgement; return what there is to tell of it, one line each."""
+        texts = {
+            "dark": self._dark(seen.picture),
+            "turned": self._roll(seen),
+            "blurred": self._blurred(seen.picture),
+            "field": FIELD_TEXT if seen.field_assumed else "",
+            "slow": self._slow(seen),
+        }
+        return tuple([line for name, text in texts.items() if (line := self._on[name].step(text))])
+
+    def _dark(self, picture: PictureStats | None) -> str | None:
+        if picture is None:
+            return None
+        if picture.bright >= (_LIT if self._on["dark"].text else _DARK):
+            return ""
+        if picture.bright < _BLACK:
+            return "the picture is black: uncover the lens, switch on a light"
+        return (
+            "the picture is too dark: switch on a light before the person, "
+            "or set webcam.exposure_ms and webcam.gain higher"
+        )
+
+    def _blurred(self, picture: PictureStats | None) -> str | None:
+        if picture is None or picture.edge_px is None:
+            return None
+        if picture.edge_px <= (_SHARP_PX if self._on["blurred"].text else _BLURRED_PX):
+            return ""
+        return (
+            "the picture is out of focus: clean or turn the lens, or set webcam.focus (oak.focus)"
+        )
+
+    def _roll(self, seen: Judged) -> str | None:
+        self._upright.append(seen.upright)
+        if 2 * sum(self._upright) > len(self._upright):
+            self._turned.clear()
+            return ""
+        if seen.turned_deg is None:
+            return None
+        self._turned.append(seen.turned_deg)
+        if len(self._turned) < _PROBES or 0.0 in self._turned:
+            return None
+        if any(abs(_within_half(one - seen.turned_deg)) > _AGREE_DEG for one in self._turned):
+            return None
+        return self._turned_text(seen.turned_deg)
+
+    def _turned_text(self, deg: float) -> str:
+        """Return by what frames are turned, clockwise, and what turns them upright."""
+        quarter = round(deg / 90.0) * 90 % 360
+        off = abs(_within_half(deg - quarter))
+        about = (
+            f"{quarter} deg" if off < 0.5 * _QUARTER_DEG else f"about {5 * round(deg / 5.0)} deg"
+        )
+        cure = "turn it upright on its mount"
+        if quarter and off < _QUARTER_DEG:
+            cure = f"set camera.rotation: {(self._rotation - quarter) % 360}"
+        return f"the camera is turned by {about}, by the faces that it shows: {cure}"
+
+    def _slow(self, seen: Judged) -> str | None:
+        if seen.over_s <= 0.0 or seen.offered <= 0:
+            return None
+        was = bool(self._on["slow"].text)
+        share, hz = (_SHARE_AGAIN, _AGAIN_HZ) if was else (_SHARE, _SLOW_HZ)
+        if seen.looked_at >= share * seen.offered or seen.looked_at >= hz * seen.over_s:
+            return ""
+        each_ms = 1e3 * seen.over_s / max(1, seen.looked_at)
+        spent = {**seen.spent_ms, "reading": each_ms - sum(seen.spent_ms.values())}
+        stage = max(spent, key=lambda name: spent[name])
+        return (
+            f"{seen.looked_at / seen.over_s:.0f} of {seen.offered / seen.over_s:.0f} frames a "
+            f"second are looked at; {stage} take{'s' * (stage in ('motion', 'reading'))} "
+            f"{spent[stage]:.0f} of {each_ms:.0f} ms a frame: {_REMEDIES[stage]}"
+        )
+
+
+class CameraHealth:
+    """Judges the frames of a camera as they are looked at.
+
+    Args:
+        rotation_deg: camera.rotation in force.
+        probe_s: time from one search of a turned frame to the next.
+    """
+
+    def __init__(self, rotation_deg: int = 0, probe_s: float = PROBE_S) -> None:
+        self._model, self._every_s = HealthModel(rotation_deg), probe_s
+        self._probe = TurnedFaces()
+        self._events: list[str] = []
+        self._due_s, self._probe_s, self._last_s = -inf, -inf, -inf
+        self._number = self._looked_at = 0
+        self._spent: Counter[str] = Counter()
+
+    def look(
+        self,
+        shot: Shot,
+        faces: Sequence[DetectedFace],
+        spent_s: Mapping[str, float],
+        field_assumed: bool = False,
+    ) -> tuple[str, ...]:
+        """Take a frame that was looked at; return the conditions in force.
+
+        Args:
+            shot: the frame.
+            faces: those found in it.
+            spent_s: on each stage.
+            field_assumed: nobody has measured the field of view.
+        """
+        t_s = shot.captured_s
+        if not isfinite(t_s):
+            return self._model.conditions
+        self._looked_at += 1
+        self._spent.update(spent_s)
+        if t_s < self._last_s:  # another beginning
+            self._due_s = self._probe_s = -inf
+        if t_s < self._due_s:
+            self._last_s = t_s
+            return self._model.conditions
+        over_s = t_s - self._due_s + EVERY_S if self._last_s <= t_s and self._number else 0.0
+        self._due_s, self._last_s = t_s + EVERY_S, t_s
+        seen = Judged(
+            picture_stats(shot.image),
+            _any_upright(faces),
+            self._turned(shot.image, t_s, bool(faces)),
+            shot.number - self._number,
+            self._looked_at,
+            over_s,
+            {name: 1e3 * s / self._looked_at for name, s in self._spent.items()},
+            field_assumed,
+        )
+        self._number, self._looked_at = shot.number, 0
+        self._spent.clear()
+        self._events += self._model.step(seen)
+        return self._model.conditions
+
+    def events(self) -> tuple[str, ...]:
+        """Return which conditions have begun and ended since the last call, one line each."""
+        told, self._events = tuple(self._events), []
+        return told
+
+    def _turned(self, image: ImageArray, t_s: float, tilted: bool) -> float | None:
+        """Search a turned frame, where that is worth it and due."""
+        if not self._model.lacks_upright or self._probe_s > t_s:
+            return None
+        found = self._probe.find(image, tilted)
+        fruitless = tilted and found == 0.0
+        self._probe_s = t_s + self._every_s * (_FRUITLESS if fruitless else 1)
+        return found
+
+
+class TurnedFaces:
+    """Looks for faces in frames that are turned, another way each time until one is found."""
+
+    def __init__(self) -> None:
+        self._detector: MtcnnDetector | None = None
+        self._ways = deque((180, 90, 270))
+        self._fails = False
+
+    def find(self, image: ImageArray, tilted: bool = False) -> float | None:
+        """Return how far a frame is turned clockwise, by its faces; 0.0: it is not, or shows none.
+
+        None where nothing can look for them.
+
+        tilted: the frame as it is shows faces
+        """
+        detector = self._made()
+        if detector is None or not _is_picture(image):
+            return None
+        small = _no_wider(image[..., :3], _PROBE_PX)
+        if tilted:
+            if _any_upright(detector.find(small)):
+                return 0.0
+        elif not _any_sure(detector.find(_turned_back(small, self._ways[0]))):
+            self._ways.rotate(-1)
+            return 0.0
+        found = [
+            (face.confidence - _PER_DEG * abs(roll_deg(face)), way, face)
+            for way in range(0, 360, 45)
+            for face in detector.find(_turned_back(small, way))
+        ]
+        if not found:
+            return 0.0
+        _, way, surest = max(found, key=lambda one: one[0])
+        turned_deg = _within_half(way + roll_deg(surest))
+        sure = surest.confidence >= _SURE and abs(turned_deg) > _UPRIGHT_DEG
+        return turned_deg if sure else 0.0
+
+    def _made(self) -> "MtcnnDetector | None":
+        if self._detector is None and not self._fails:
+            from gazerig.drivers.errors import ModelFileError
+            from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
+            from gazerig.drivers.vision.face.params import FaceDetectorParams
+
+            try:
+                self._detector = MtcnnDetector(FaceDetectorParams())
+            except ModelFileError:
+                self._fails = True
+        return self._detector
+
+
+def _turned_back(image: NDArray[Any], deg: float) -> ImageArray:
+    """Return a whole image turned counter-clockwise."""
+    if deg % 90 == 0:
+        return np.asarray(np.ascontiguousarray(np.rot90(image, int(deg) // 90)), np.uint8)
+    height, width = image.shape[:2]
+    side = round(np.hypot(height, width))
+    turn = cv2.getRotationMatrix2D((width / 2.0, height / 2.0), deg, 1.0)
+    turn[:, 2] += (side - width) / 2.0, (side - height) / 2.0
+    return np.asarray(cv2.warpAffine(image, turn, (side, side)), np.uint8)
+
+
+def _any_sure(faces: Sequence[DetectedFace]) -> bool:
+    return any(face.confidence >= _SURE for face in faces)
+
+
+def _any_upright(faces: Sequence[DetectedFace]) -> bool:
+    """Return whether there is a face that surely is one, and about upright."""
+    return _any_sure([face for face in faces if abs(roll_deg(face)) < _UPRIGHT_DEG])
+
+
+def _within_half(deg: float) -> float:
+    """Return the same angle within -180..180 deg."""
+    return (deg + 180.0) % 360.0 - 180.0
+
+
+def roll_deg(face: DetectedFace) -> float:
+    """Return how far a face is turned clockwise in the image, by its eyes; 0 where unknown."""
+    points: list[list[float]] = face.landmarks_px.tolist()
+    if len(points) < 2:
+        return 0.0
+    (ax, ay), (bx, by) = points[:2]
+    roll = degrees(atan2(by - ay, bx - ax))
+    return roll if isfinite(roll) else 0.0
+
+
+def picture_stats(image: NDArray[Any]) -> PictureStats | None:
+    """Return how a frame looks; None where it is no picture of 8 bits."""
+    if not _is_picture(image):
+        return None
+    green = _no_wider(image[..., 1], _WIDTH_PX)
+    bright = float(np.percentile(green[::4, ::4], 95))
+    return PictureStats(bright, _edge_px(green) if min(green.shape) >= _LEAST_SIDE_PX else None)
+
+
+def _edge_px(grey: NDArray[Any]) -> float | None:
+    """Return the width of the sharper edges, None where there are too few."""
+    smooth = cv2.GaussianBlur(grey, (0, 0), 1.2)  # noise is no edge
+    half = _WINDOW_PX // 2
+    window, middles = np.ones((_WINDOW_PX, _WINDOW_PX), np.uint8), slice(half, None, half)
+    across = cv2.convertScaleAbs(cv2.Sobel(smooth, cv2.CV_16S, 1, 0, ksize=1))
+    down = cv2.convertScaleAbs(cv2.Sobel(smooth, cv2.CV_16S, 0, 1, ksize=1))
+    steep = cv2.dilate(np.maximum(across, down), window)[middles, middles] / 2.0
+    lightest = cv2.dilate(smooth, window)[middles, middles].astype(np.float64)
+    contrast = lightest - cv2.erode(smooth, window)[middles, middles]
+    shown = (contrast > _CONTRAST) & (steep >= _STEEP)
+    if np.count_nonzero(shown) < _LEAST_WINDOWS * shown.size:
+        return None
+    return float(np.percentile(contrast[shown] / steep[shown], 25))
+
+
+def _no_wider(image: NDArray[Any], width_px: int) -> ImageArray:
+    """Return an image scaled down to a width where it is wider."""
+    height, width = image.shape[:2]
+    image = np.ascontiguousarray(image)
+    if width > width_px:
+        size = width_px, max(1, round(height * width_px / width))
+        image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA))
+    return image
+
+
+def _is_picture(image: Any) -> bool:
+    """Return whether an array is a colour picture of 8 bits."""
+    is_array = isinstance(image, np.ndarray) and image.dtype == np.uint8 and image.size > 0
+    return is_array and image.ndim == 3 and image.shape[2] >= 3 and min(image.shape[:2]) >= 4

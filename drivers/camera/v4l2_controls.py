@@ -1,0 +1,79 @@
+"""Exposure, gain, mains frequency and focus of a webcam, by the controls of Video4Linux.
+
+OpenCV knows some of them and not why one was refused, so they are set on the device file itself.
+A camera keeps them after the program ends: what is to be automatic is set so, too.
+"""
+
+import errno
+import os
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+
+from gazerig.drivers.camera.params import WebcamParams
+
+# From linux/v4l2-controls.h and videodev2.h.
+AUTO_GAIN, GAIN = 0x00980912, 0x00980913
+MAINS = 0x00980918
+AUTO_EXPOSURE, EXPOSURE = 0x009A0901, 0x009A0902
+FOCUS, AUTO_FOCUS = 0x009A090A, 0x009A090C
+SET_CONTROL = 0xC008561C
+"""The request VIDIOC_S_CTRL; its argument is the number of a control and a value."""
+
+_EXPOSURE_MANUAL, _EXPOSURE_AUTO, _EXPOSURE_BY_APERTURE = 1, 0, 3
+_EXPOSURE_UNIT_MS = 0.1
+_MAINS = {"off": 0, "50hz": 1, "60hz": 2, "auto": 3}
+
+
+def apply(device: Path, params: WebcamParams) -> Iterator[str]:
+    """Set what is asked for; yield one line for each thing that the camera does not take.
+
+    What is left to the camera is set to automatic without a word: many have nothing to set there.
+    """
+    try:
+        file = os.open(device, os.O_RDWR | os.O_NONBLOCK)
+    except OSError:
+        return  # the camera itself is refused with a message of its own
+    try:
+        if params.exposure_ms is None:
+            if _refused(file, AUTO_EXPOSURE, _EXPOSURE_BY_APERTURE):
+                _refused(file, AUTO_EXPOSURE, _EXPOSURE_AUTO)
+        else:
+            _refused(file, AUTO_EXPOSURE, _EXPOSURE_MANUAL)
+            units = max(1, round(params.exposure_ms / _EXPOSURE_UNIT_MS))
+            yield from _said("exposure_ms", params.exposure_ms, _refused(file, EXPOSURE, units))
+        if params.gain is None:
+            _refused(file, AUTO_GAIN, 1)
+        else:
+            _refused(file, AUTO_GAIN, 0)
+            yield from _said("gain", params.gain, _refused(file, GAIN, params.gain))
+        if params.anti_flicker != "default":
+            why = _refused(file, MAINS, _MAINS[params.anti_flicker])
+            yield from _said("anti_flicker", params.anti_flicker, why)
+        if params.focus is None:
+            _refused(file, AUTO_FOCUS, 1)
+        else:
+            _refused(file, AUTO_FOCUS, 0)
+            yield from _said("focus", params.focus, _refused(file, FOCUS, params.focus))
+    finally:
+        os.close(file)
+
+
+def _said(name: str, value: object, why: str) -> Iterator[str]:
+    if why:
+        yield f"does not take webcam.{name}: {value} ({why}): leave it away or give another value"
+
+
+def _refused(file: int, control: int, value: int) -> str:
+    """Set a control; return why that is not possible, "" where it was done."""
+    try:
+        import fcntl  # absent on Windows, where there is no Video4Linux
+    except ImportError:
+        return "this system has no Video4Linux"
+    try:
+        fcntl.ioctl(file, SET_CONTROL, struct.pack("=Ii", control, value))
+    except OSError as error:
+        if error.errno in (errno.EINVAL, errno.ENOTTY):
+            return "it has no such control"
+        return "out of its range" if error.errno == errno.ERANGE else str(error.strerror)
+    return ""
