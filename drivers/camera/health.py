@@ -1,9 +1,9 @@
-"""Conditions under which a camera sees badly: each is told as it begins and as it ends.
+"""Poor viewing conditions of a camera: each is reported once as it begins and once as it ends.
 
-About once a second a frame is judged: too dark, out of focus, turned, through a lens whose field of
-view nobody has measured, or one of many that come too fast. What lasts is a condition, with its
-remedy; what comes and goes is none. Statistics are of the frame at most 640 pixels wide and cost
-2 ms; where faces are missing for a while, a frame is turned and searched every few seconds, 10 ms.
+Once a second a frame is judged: too dark, out of focus, turned, of an unmeasured field of view, or
+one of many that come too fast. Only a condition that lasts is reported, with its remedy. The
+statistics use at most 640 pixels of width and cost 2 ms. While no upright faces are seen, a turned
+copy is searched for faces every few seconds, which costs 10 ms.
 """
 
 from collections import Counter, deque
@@ -23,27 +23,27 @@ if TYPE_CHECKING:
     from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 
 EVERY_S = 1.0
-"""A frame is judged so often; what follows is counted in such judgements."""
+"""Time between two judgements; the durations below are counts of judgements."""
 PROBE_S = 3.0
-"""A turned frame is searched so often while no upright face is seen."""
+"""Time between two searches of a turned copy while no upright faces are seen."""
 
 _BEGINS, _ENDS = 5, 3
 _WIDTH_PX = 640
-# 95 % of the pixels are darker. MTCNN finds faces down to about 12 of 255 where there is no noise;
-# a webcam adds so much of it there that 32 is the end.
+# 95 % of the pixels are darker. MTCNN finds faces down to about 12 of 255 without noise; 32
+# leaves room for the noise of a webcam in the dark.
 _DARK, _LIT, _BLACK = 32.0, 45.0, 6.0
 # An edge's width is the contrast in a window over the steepest slope in it. In a quarter of the
 # windows it is below 4.4 px in sharp frames, below 8.9 after a blur of 4 px, where faces of 60 px
-# are lost. Windows count where they show an edge: soft shadows on a wall are less steep.
+# are lost. Only windows with an edge count: soft shadows on a wall are less steep.
 _WINDOW_PX, _CONTRAST, _STEEP = 48, 40.0, 3.0
 _LEAST_WINDOWS = 0.1
 _BLURRED_PX, _SHARP_PX = 8.5, 7.0
 _LEAST_SIDE_PX = 96
-# A face counts as upright up to so many degrees and from this confidence on: of upside-down faces
-# MTCNN takes one of six for an upright one, less surely. Judgements in which such faces count.
+# Largest roll and lowest confidence of an upright face: MTCNN takes one of six upside-down faces for
+# upright, with a lower confidence. Number of judgements in which upright faces are counted.
 _UPRIGHT_DEG, _SURE, _SAMPLES = 25.0, 0.9, 15
-# Searches of turned frames that must agree to so many degrees, and the width of the frame. A search
-# in all directions that found nothing is not repeated for so many times as long.
+# Number of searches that must agree, and to how many degrees; width of the searched copy. After a
+# search in all directions without a result the next one comes later by the last factor.
 _PROBES, _AGREE_DEG, _PROBE_PX, _FRUITLESS = 4, 30.0, 320, 10
 # One degree of roll costs a face as much as this of its confidence: in a frame turned by 120 deg
 # MTCNN finds some faces too, less surely and with landmarks that are not theirs.
@@ -77,7 +77,7 @@ class PictureStats(NamedTuple):
     """How a frame looks.
 
     bright: grey level, 0..255, below which 95 % of its pixels are
-    edge_px: width of its edges at a width of at most 640 px; None where it shows too few
+    edge_px: width of its edges, scaled to at most 640 px of width; None: it has too few
     """
 
     bright: float
@@ -89,10 +89,10 @@ class Judged(NamedTuple):
 
     upright: whether a face that is about upright is seen
     turned_deg: how far the frame is turned, clockwise, by the faces that it shows upright as it is
-        turned back; 0 where it is not
+        turned back; 0: it is upright
     offered, looked_at: frames since the judgement before; over_s: the time between
     spent_ms: of each stage, a frame
-    field_assumed: nobody has measured the field of view
+    field_assumed: the field of view is not measured
     """
 
     picture: PictureStats | None = None
@@ -106,7 +106,7 @@ class Judged(NamedTuple):
 
 
 class _Lasting:
-    """One condition; it begins and ends once what says so has lasted."""
+    """One condition; it begins and ends after several equal judgements in a row."""
 
     def __init__(self, over: str, begins: int = _BEGINS, ends: int = _ENDS) -> None:
         self._over, self._lasts = over, (begins, ends)
@@ -129,7 +129,7 @@ class _Lasting:
 class HealthModel:
     """Judgements in, conditions out; pure.
 
-    rotation_deg: camera.rotation in force, by which frames have been turned already
+    rotation_deg: the present camera.rotation, by which frames have been turned already
     """
 
     def __init__(self, rotation_deg: int = 0) -> None:
@@ -230,7 +230,7 @@ class CameraHealth:
     """Judges the frames of a camera as they are looked at.
 
     Args:
-        rotation_deg: camera.rotation in force.
+        rotation_deg: the present camera.rotation.
         probe_s: time from one search of a turned frame to the next.
     """
 
@@ -249,13 +249,13 @@ class CameraHealth:
         spent_s: Mapping[str, float],
         field_assumed: bool = False,
     ) -> tuple[str, ...]:
-        """Take a frame that was looked at; return the conditions in force.
+        """Take a frame that was looked at; return the present conditions.
 
         Args:
             shot: the frame.
             faces: those found in it.
             spent_s: on each stage.
-            field_assumed: nobody has measured the field of view.
+            field_assumed: the field of view is not measured.
         """
         t_s = shot.captured_s
         if not isfinite(t_s):
@@ -290,7 +290,7 @@ class CameraHealth:
         return told
 
     def _turned(self, image: ImageArray, t_s: float, tilted: bool) -> float | None:
-        """Search a turned frame, where that is worth it and due."""
+        """Search a turned copy if upright faces are missing and a search is due."""
         if not self._model.lacks_upright or self._probe_s > t_s:
             return None
         found = self._probe.find(image, tilted)
@@ -310,7 +310,7 @@ class TurnedFaces:
     def find(self, image: ImageArray, tilted: bool = False) -> float | None:
         """Return how far a frame is turned clockwise, by its faces; 0.0: it is not, or shows none.
 
-        None where nothing can look for them.
+        None: the detector is missing.
 
         tilted: the frame as it is shows faces
         """
@@ -375,7 +375,7 @@ def _within_half(deg: float) -> float:
 
 
 def roll_deg(face: DetectedFace) -> float:
-    """Return how far a face is turned clockwise in the image, by its eyes; 0 where unknown."""
+    """Return how far a face is turned clockwise in the image, by its eyes; 0 if unknown."""
     points: list[list[float]] = face.landmarks_px.tolist()
     if len(points) < 2:
         return 0.0
@@ -385,7 +385,7 @@ def roll_deg(face: DetectedFace) -> float:
 
 
 def picture_stats(image: NDArray[Any]) -> PictureStats | None:
-    """Return how a frame looks; None where it is no picture of 8 bits."""
+    """Return statistics of a frame; None if it is no picture of 8 bits."""
     if not _is_picture(image):
         return None
     green = _no_wider(image[..., 1], _WIDTH_PX)
@@ -394,7 +394,7 @@ def picture_stats(image: NDArray[Any]) -> PictureStats | None:
 
 
 def _edge_px(grey: NDArray[Any]) -> float | None:
-    """Return the width of the sharper edges, None where there are too few."""
+    """Return the width of the sharper edges, None if there are too few."""
     smooth = cv2.GaussianBlur(grey, (0, 0), 1.2)  # noise is no edge
     half = _WINDOW_PX // 2
     window, middles = np.ones((_WINDOW_PX, _WINDOW_PX), np.uint8), slice(half, None, half)
@@ -410,7 +410,7 @@ def _edge_px(grey: NDArray[Any]) -> float | None:
 
 
 def _no_wider(image: NDArray[Any], width_px: int) -> ImageArray:
-    """Return an image scaled down to a width where it is wider."""
+    """Return an image, scaled down if it is wider than a width."""
     height, width = image.shape[:2]
     image = np.ascontiguousarray(image)
     if width > width_px:

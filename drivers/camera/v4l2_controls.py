@@ -1,7 +1,7 @@
 """Exposure, gain, mains frequency and focus of a webcam, by the controls of Video4Linux.
 
 OpenCV knows some of them and not why one was refused, so they are set on the device file itself.
-A camera keeps them after the program ends: what is to be automatic is set so, too.
+A camera keeps its settings after the program ends, so automatic modes are set as well.
 """
 
 import errno
@@ -26,9 +26,9 @@ _MAINS = {"off": 0, "50hz": 1, "60hz": 2, "auto": 3}
 
 
 def apply(device: Path, params: WebcamParams) -> Iterator[str]:
-    """Set what is asked for; yield one line for each thing that the camera does not take.
+    """Set the controls; yield one line for each setting that the camera does not take.
 
-    What is left to the camera is set to automatic without a word: many have nothing to set there.
+    Settings without a value become automatic; a camera that cannot do that is not reported.
     """
     try:
         file = os.open(device, os.O_RDWR | os.O_NONBLOCK)
@@ -65,9 +65,9 @@ def _said(name: str, value: object, why: str) -> Iterator[str]:
 
 
 def _refused(file: int, control: int, value: int) -> str:
-    """Set a control; return why that is not possible, "" where it was done."""
+    """Set a control; return why it failed, "" on success."""
     try:
-        import fcntl  # absent on Windows, where there is no Video4Linux
+        import fcntl  # absent on Windows
     except ImportError:
         return "this system has no Video4Linux"
     try:

@@ -164,7 +164,7 @@ class Webcam:
         self._told.add(line)
 
     def _refused_format(self, capture: cv2.VideoCapture) -> str:
-        """Return that the camera gives another format than asked for, "" where it does not."""
+        """Return that the camera gives another format than requested, "" if it does not."""
         given = int(capture.get(cv2.CAP_PROP_FOURCC))
         name = "".join(chr(given >> 8 * k & 0xFF) for k in range(4)).strip("\0 ")
         wanted = _FOURCC[self._params.format]

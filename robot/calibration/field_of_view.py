@@ -1,4 +1,4 @@
-"""The field of view of a camera by a face at a known distance, where there is no board at hand.
+"""The field of view of a camera by a face at a known distance, without a board.
 
 A face is as large in the image as its distance and the focal length make it. How far it would be by
 an assumed field of view, over how far it is, gives the true one. People's faces differ in size by

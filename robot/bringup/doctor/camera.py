@@ -1,4 +1,4 @@
-"""A camera examined: what it does not take, how many frames come, and how well it sees."""
+"""Examination of a camera: refused settings, frame rate and viewing conditions."""
 
 import threading
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from gazerig.robot.bringup.doctor.diagnostics import Diagnostic, Level
 from gazerig.robot.model.frames import CameraParams
 
 LOOK_S = 12.0
-"""It is looked through for so long: a condition counts once it has lasted."""
+"""Duration of the examination: longer than a condition must last to be reported."""
 
 _WHERE = "camera"
 _PROBE_S = 1.0
@@ -29,14 +29,14 @@ def examine_camera(
     now_s: Callable[[], float],
     look_s: float = LOOK_S,
 ) -> list[Diagnostic]:
-    """Look through a camera for a while; return what is wrong with it, each with its remedy.
+    """Watch the frames of a camera; return the problems, each with its remedy.
 
     Args:
         source: gives the frames as they come.
-        camera: how they are turned, and what is known of the lens.
-        faces: how faces are found.
+        camera: orientation and lens.
+        faces: parameters of the face detector.
         now_s: the host's clock.
-        look_s: how long to look, by the times of the frames.
+        look_s: duration, by the times of the frames.
     """
     turned = UprightSource(source, FrameOrientation(camera.rotation, camera.mirrored))
     health, detector = CameraHealth(camera.rotation, _PROBE_S), face_detector(faces)
