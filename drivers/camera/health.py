@@ -39,8 +39,8 @@ _WINDOW_PX, _CONTRAST, _STEEP = 48, 40.0, 3.0
 _LEAST_WINDOWS = 0.1
 _BLURRED_PX, _SHARP_PX = 8.5, 7.0
 _LEAST_SIDE_PX = 96
-# Largest roll and lowest confidence of an upright face: MTCNN takes one of six upside-down faces for
-# upright, with a lower confidence. Number of judgements in which upright faces are counted.
+# Largest roll and lowest confidence of an upright face: MTCNN takes one of six upside-down faces
+# for upright, with a lower confidence. Number of judgements in which upright faces are counted.
 _UPRIGHT_DEG, _SURE, _SAMPLES = 25.0, 0.9, 15
 # Number of searches that must agree, and to how many degrees; width of the searched copy. After a
 # search in all directions without a result the next one comes later by the last factor.
