@@ -70,7 +70,7 @@ class BottomUpParams:
     hand_saturation: Annotated[float, Bounds(0, 10), "the same of a hand raised to the face, as one that waves; 0: no limit"] = 0.9
     smoothing_s: Annotated[float, Bounds(0, 2), "time constant of the low-pass filter of salience"] = 0.1
     onset_salience: Annotated[float, Bounds(0, 10), "extra salience of a body that has just come into view or begun to move; 0: none"] = 1.0
-    onset_s: Annotated[float, Bounds(0.02, 10), "time constant with which onset_salience decays"] = 0.4
+    onset_s: Annotated[float, Bounds(0.02, 10), "time constant with which onset_salience decays"] = 0.5
     onset_recovery_s: Annotated[float, Bounds(0, 60),
         "time constant with which the next onset regains its full salience; 0: every onset has it"] = 2.0
     # fmt: on

@@ -41,7 +41,8 @@ def test_sigterm_while_jogging_parks_and_lets_go(desk: Served) -> None:
     process.send_signal(signal.SIGTERM)
     _, words = process.communicate(timeout=30)
     assert process.returncode == 1 and "SIGTERM" in words
-    assert "parked, torque off on all servos" in words
+    # A starved machine has no time left for the way.
+    assert re.search(r"parked( \(not there in time\))?, torque off on all servos", words)
     assert not any(status(desk.command, servo_id)["torque"] for servo_id in range(1, 10))
 
 
@@ -191,6 +192,6 @@ def test_look_at_of_a_maker_s_head_says_what_it_cannot_do() -> None:
 def test_what_servos_do_alone_is_said_for_the_kinds_that_there_are(rigs: dict[str, str]) -> None:
     mixed = left_alone(load_rig(rigs["mixed"]))
     assert "watchdog" in mixed and "Feetech" in mixed and "Maestro" in mixed
-    assert left_alone(load_rig("desk")) == "the Dynamixel servos' own watchdog stops them"
+    assert "own watchdog and hold" in left_alone(load_rig("desk"))
     assert "watchdog" not in left_alone(load_rig("feetech"))
     assert holding(load_rig("desk")) == "torque on: 9 servos hold where they are"

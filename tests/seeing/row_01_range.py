@@ -139,11 +139,14 @@ class Walkers:
         x, y = tan(yaw + jump[0]), tan(radians(2.0 * k - 4.0) + jump[1])
         loom, flow = rng.normal(0.0, 0.4), rate * (1.0 + rng.normal(0.0, 0.3))
         z = ASSUMED_M
+        width, height = SIZE
+        focal_px = 0.5 * width / tan(radians(0.5 * FIELD_DEG))
+        left_px, top_px = 0.5 * width + focal_px * x - 10.0, 0.5 * height + focal_px * y - 30.0
         return MovingBlob(
             k + 1, "thing", (z * x, z * y, z), 0.15, loom_1_s=loom,
             v_camera_m_s=(z * flow - loom * z * x, -loom * z * y, -loom * z),
             depth_known=False, depth_sd_m=ASSUMED_SD_M, loom_sd_1_s=0.4,
-            box_px=(0.0, 0.0, 20.0, 60.0),
+            box_px=(left_px, top_px, 20.0, 60.0),
         )  # fmt: skip
 
 
