@@ -7,6 +7,18 @@ from gazerig.drivers.camera.pinhole import Intrinsics
 _Row = tuple[float, float, float]
 
 
+class Clothing(NamedTuple):
+    """Colours of the clothes below a head, as gazerig.drivers.vision.clothing finds them.
+
+    colours: roots of the shares of 24 bins of colour; the inner product of two is their
+        Bhattacharyya coefficient, 1 where they are the same
+    share: of the place that counts, how much of it is seen, 0..1
+    """
+
+    colours: tuple[float, ...]
+    share: float
+
+
 class FaceSigns(NamedTuple):
     """What eyes and mouth of a face do, at an adult's size.
 
@@ -44,6 +56,10 @@ class DetectionInCamera(NamedTuple):
         hand's alone is and an arm's is not
     thickness_m: of what moves, diameter of the largest disc within its patch, as far away as its
         place; from_side: the patch goes on beyond the left or right edge of the image
+    clothing: of a person, colours of the clothes, None where they are not seen
+    box_m: of a face, size of its box as far away as its place, the root of its area
+    lower_face: of a face, width of the mouth over the distance of the eyes, times the part of the
+        way from the eyes to the mouth at which the nose is; 0 of anything else
     """
 
     kind: str
@@ -70,6 +86,9 @@ class DetectionInCamera(NamedTuple):
     thickness_m: float = 0.0
     from_side: bool = False
     upper_m: tuple[float, float, float] | None = None
+    clothing: Clothing | None = None
+    box_m: float = 0.0
+    lower_face: float = 0.0
 
 
 class LocatedFrame(NamedTuple):

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.located_frame import LocatedFrame
+from gazerig.drivers.located_frame import Clothing, LocatedFrame
 
 ImageArray = NDArray[np.uint8]
 """(height, width, 3) BGR."""
@@ -213,6 +213,7 @@ class DetectedFace:
     gaze_camera: unit vector along which the eyes look, in the camera frame (x right, y down,
         z forward); None where the detector does not find it
     mesh: its dense mesh, None where none was made
+    clothing: colours of the clothes below it, None where they were not looked at or are not seen
     """
 
     box_px: tuple[float, float, float, float]
@@ -220,6 +221,7 @@ class DetectedFace:
     confidence: float
     gaze_camera: tuple[float, float, float] | None = None
     mesh: FaceMesh | None = None
+    clothing: Clothing | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,12 +233,14 @@ class DetectedPerson:
     head_px: middle of the head
     trunk_px: distance from the hips to the top of the head
     confidence: 0..1
+    clothing: as of a face
     """
 
     box_px: tuple[float, float, float, float]
     head_px: tuple[float, float]
     trunk_px: float
     confidence: float
+    clothing: Clothing | None = None
 
 
 @dataclass(frozen=True, slots=True)

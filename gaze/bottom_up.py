@@ -136,14 +136,14 @@ def limited(terms: Floats, most: Floats, worth: Floats) -> Floats:
     Args:
         terms: (3, n) slide, loom and spin; loom is positive of what comes nearer.
         most: (n,) what motion cannot exceed; inf: no limit.
-        worth: (n,) the share that counts, but of what comes nearer fast.
+        worth: (n,) the share that counts.
     """
     slide, loom, spin = terms
     free = np.isinf(most)
     exempt = np.where(free, 0.0, np.clip(loom, _FAST, _FASTEST) - _FAST)
     rest = np.abs(loom) - np.where(free, 0.0, np.maximum(loom - _FAST, 0.0))
     total, bound = slide + rest + spin, np.where(free, 1.0, most)
-    out: Floats = exempt + worth * np.where(free, total, -np.expm1(-total / bound) * bound)
+    out: Floats = worth * (exempt + np.where(free, total, -np.expm1(-total / bound) * bound))
     return out
 
 
@@ -153,7 +153,7 @@ def limited_row(slide: float, loom: float, spin: float, most: float, worth: floa
         return worth * (slide + abs(loom) + spin)
     exempt = min(max(loom, _FAST), _FASTEST) - _FAST
     total = slide + abs(loom) - max(loom - _FAST, 0.0) + spin
-    return exempt - worth * expm1(-total / most) * most
+    return worth * (exempt - expm1(-total / most) * most)
 
 
 def _length(v: Floats) -> Floats:

@@ -24,7 +24,7 @@ _WAVED_S = 1.5
 _ARM_M = 0.9
 _HELD_OUT = 0.65
 """A hand nearer than this share of the face's distance is held out; signs and gestures are not."""
-_RAISED_M = 0.13
+_RAISED_M = 0.08
 """A hand is raised at the height of the face, at most so far below its centre; signs are lower."""
 _OWN = "own"
 """The robot's own body waves to nobody."""

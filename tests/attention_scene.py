@@ -64,4 +64,4 @@ FACE = body(1, "face", (1.0, 0.0, 0.0))
 
 
 def waving(t: float, speed: float) -> Percept:
-    return percept(t, FACE, body(2, "hand", (0.8, 0.3, -0.1), (0.0, speed, 0.0)))
+    return percept(t, FACE, body(2, "hand", (0.8, 0.3, -0.05), (0.0, speed, 0.0)))

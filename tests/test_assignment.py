@@ -124,7 +124,7 @@ def test_pairs_cost_the_same_one_by_one_and_all_at_once() -> None:
         tracks = [a_track(rng) for _ in range(rng.integers(1, 6))]
         found = [a_detection(rng) for _ in range(rng.integers(1, 6))]
         few = pair_costs(tracks, found, TrackParams())
-        many = data_association._all_pairs(tracks, found, TrackParams())
+        many = data_association._all_pairs(tracks, found, TrackParams(), None)
         np.testing.assert_allclose(few, many, rtol=1e-12, atol=1e-12)
         possible += sum(cost < FORBIDDEN for row in few for cost in row)
     assert possible > 500

@@ -32,7 +32,7 @@ def hands_about_a_face(t_s: float) -> Percept:
     w = 2 * pi * np.array([0.15, 0.9, 1.3])
     # Bursts of all sizes: from hardly a motion to a wild wave, never in step.
     size = np.array([0.01, 0.12 * max(0.0, sin(0.31 * t_s)) ** 2, 0.2 * sin(0.17 * t_s) ** 4])
-    p = np.array([[1.0, 0.0, 0.0], [0.8, 0.3, -0.1], [0.85, -0.3, -0.1]])
+    p = np.array([[1.0, 0.0, 0.0], [0.8, 0.3, -0.05], [0.85, -0.3, -0.05]])
     v = np.zeros((3, 3))
     p[:, 1] += size * np.sin(w * t_s)
     v[:, 1] = size * w * np.cos(w * t_s)

@@ -1,8 +1,8 @@
-"""Row 11 of seeing in a short form: on film, the gaze is on the face that is there."""
+"""Row 12 of seeing in a short form: on film, the gaze is on the face that is there."""
 
 import pytest
 from seeing.material import at_hand, carphone
-from seeing.row_11_balance import SIGNERS, WANTED, film
+from seeing.row_12_balance import SIGNERS, WANTED, film
 
 
 def test_a_man_who_talks_is_looked_at() -> None:

@@ -44,9 +44,10 @@ class FrameAnalyzer:
         self._has_unknown_lens = has_unknown_lens
         # Here because the process of the loop imports this module too, and needs no OpenCV.
         from gazerig.drivers.camera.health import CameraHealth
+        from gazerig.drivers.vision.clothing import ClothingReader
         from gazerig.drivers.vision.cut_detector import CutDetector
 
-        self._cuts = CutDetector()
+        self._cuts, self._clothing = CutDetector(), ClothingReader()
         self._health = CameraHealth(rotation_deg)
         self._off_frame = OffFrameReport()
 
@@ -60,6 +61,7 @@ class FrameAnalyzer:
         find_palms = getattr(self._detector, "palms", None)
         seen = shot.image, shot.captured_s, faces, people
         palms = None if find_palms is None else find_palms(*seen)
+        faces, people = self._clothing.dressed(shot.image, shot.captured_s, faces, people)
         bodies_s = perf_counter()
         blobs = self._motion(shot) if self._motion is not None else ()
         spent_s = {

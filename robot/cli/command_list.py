@@ -120,7 +120,7 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
         ),
         "models": CommandEntry(
             "models",
-            "List and fetch model files, with which the camera finds more: faces, people, eyes.",
+            "List and fetch model files, with which the camera finds more: faces, people, hands, eyes.",
         ),
         "emulate": CommandEntry(
             "emulate",

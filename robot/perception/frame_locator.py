@@ -167,6 +167,12 @@ class FrameLocator:
             pose.turn_sd_rad,
             gaze,
             signs=signs,
+            clothing=face.clothing,
+            box_m=sqrt(max(face.box_px[2] * face.box_px[3], 0.0))
+            / focal_px
+            * share
+            * pose.p_camera_m[2],
+            lower_face=_lower_face(face),
         )
 
     def _person(
@@ -182,7 +188,7 @@ class FrameLocator:
         p_m = _on_ray(person.head_px, z, lens)
         return DetectionInCamera(
             "face", p_m, None, _FACE_RADIUS_M, 0.0, person.confidence, 1.0, depth is not None,
-            _HEAD_SD_M, norm(p_m) * sd, None, *_NO_SPEED_SDS, None, None,
+            _HEAD_SD_M, norm(p_m) * sd, None, *_NO_SPEED_SDS, None, None, clothing=person.clothing,
         )  # fmt: skip
 
     def _palm(self, palm: DetectedPalm, found: Detections, lens: Intrinsics) -> DetectionInCamera:
@@ -240,6 +246,17 @@ def _on_ray(at_px: tuple[float, float], z_m: float, lens: Intrinsics) -> Vec3:
     """Return the place that a pixel shows so far away along the optical axis."""
     x, y, z = rays(np.array([at_px]), lens)[0].tolist()
     return scale((x, y, z), z_m)
+
+
+def _lower_face(face: DetectedFace) -> float:
+    """Return how large the lower half of a face is for its eyes; see ``DetectionInCamera``."""
+    (ax, ay), (bx, by), (x, y), (cx, cy), (dx, dy) = face.landmarks_px.tolist()
+    middle_x, middle_y = 0.5 * (ax + bx), 0.5 * (ay + by)
+    eyes, mouth = hypot(bx - ax, by - ay), hypot(dx - cx, dy - cy)
+    tall = hypot(0.5 * (cx + dx) - middle_x, 0.5 * (cy + dy) - middle_y)
+    if not (eyes > 0.0 and tall > 0.0):
+        return 0.0
+    return mouth / eyes * hypot(x - middle_x, y - middle_y) / tall
 
 
 def _is_of(person: DetectedPerson, face: DetectedFace) -> bool:

@@ -113,7 +113,9 @@ class TrackFilter:
         """Use another process noise; position and velocity stay."""
         self._noise = noise
 
-    def predict(self, dt_s: float, seen: bool = True, range_known: bool = True) -> None:
+    def predict(
+        self, dt_s: float, seen: bool = True, range_known: bool = True, level: bool = False
+    ) -> None:
         """Go on by a time; what is not seen slows down.
 
         Args:
@@ -121,9 +123,12 @@ class TrackFilter:
             seen: whether it was seen in the last frame.
             range_known: False where its range is only assumed: what crosses the view then
                 stays as far away, as neither a straight line nor its speed is known.
+            level: whether it stays as high while it is not seen, as people do.
         """
         if dt_s <= 0.0:
             return
+        if level and not seen:
+            self.v_m_s = (self.v_m_s[0], self.v_m_s[1], 0.0)
         v = self.v_m_s
         if range_known:
             self._place(add(self.p_m, scale(v, dt_s)))
@@ -229,6 +234,12 @@ class TrackFilter:
         self.along = Variances(B.p - along_p * B.pv, B.pv - along_p * B.v, B.v - along_v * B.v)
         self.v_m_s = add(self.v_m_s, add(scale(off, of_v), scale(here, along_v * deep)))
         self._move(scale(off, of_p), along_p * deep)
+
+    def slow_to(self, most_m_s: float) -> None:
+        """Believe no higher speed than this."""
+        speed = norm(self.v_m_s)
+        if speed > most_m_s:
+            self.v_m_s = scale(self.v_m_s, most_m_s / speed)
 
     def _place(self, p_m: Vec3) -> None:
         """Put it at a place, which is no nearer than things are believed."""

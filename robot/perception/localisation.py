@@ -35,4 +35,7 @@ def placed(found: DetectionInCamera, R_world_camera: Mat3, p_world_m: Vec3) -> L
         found.thickness_m,
         found.from_side,
         None if upper is None else add(p_world_m, rotate(R_world_camera, upper)),
+        found.clothing,
+        found.box_m,
+        found.lower_face,
     )

@@ -6,19 +6,23 @@ distance in these terms, all pairs together (data_association), and the track is
 the detection by a Kalman filter of direction and range (kalman).
 """
 
-from dataclasses import dataclass
-from math import inf
+from dataclasses import dataclass, field
+from math import inf, sqrt
 
-from gazerig.drivers.located_frame import FaceSigns
-from gazerig.gaze.angles import add, cross, scale, sub, unit
-from gazerig.gaze.types import Mat3, Vec3
+import numpy as np
+
+from gazerig.drivers.located_frame import Clothing, FaceSigns
+from gazerig.gaze.angles import add, cross, norm, scale, sub, unit
+from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.data_association import (
+    FORBIDDEN,
     NO_MARK,
     UNPAIRED,
     DetectionRow,
     TrackRow,
     assign,
+    clothing_costs,
     pair_costs,
 )
 from gazerig.robot.perception.gaze_at_head import SeenEyes
@@ -27,6 +31,22 @@ from gazerig.robot.perception.speech import NO_SPEECH, Speech
 
 FACE = "face"
 """What people are called, also while their face is not seen."""
+_FASTEST_M_S, _UPRIGHT_M2, _STOOPS_M_S = 4.0, 0.03**2, 0.03
+# How fast the colours of clothes are learned, and how fast if they do not fit; and in how many
+# frames they must have been seen to tell who somebody is.
+_COLOURS_GAIN, _UNFIT_GAIN, _PROVED, _OWN = 0.15, 0.005, 3, 60
+# Clothes that cost more than this do not fit; two people change their numbers when that costs so
+# much less, summed over frames, of each no more than the third number.
+_GAP_S, _LOST_S = 0.12, 0.25
+_CONFIRMED, _MOST_CONFIRMED, _MISFITS = 3.0, 6.0, 2.0
+_FITS, _SURE, _MOST_OF_FRAME = -1.0, 9.0, 6.0
+# Below this part of its usual measure the lower half of a face is covered; it must have been seen
+# bare in so many frames, and is learned so fast. The size of a box is believed up to this factor.
+_COVERED, _BARE, _SHAPE_GAIN, _MOST_OFF = 0.75, 8, 0.03, 1.5
+# Inner product of colours that are much alike.
+_LIKE = 0.9
+# A doubt goes within so many frames in which nothing speaks for it.
+_DOUBT_KEPT = 0.9
 UNNAMED = "thing"
 """What a moving patch is called whose kind is not known; a named one is always itself."""
 
@@ -54,6 +74,8 @@ class LocalisedDetection:
         hand's alone is and an arm's is not
     thickness_m: of what moves, diameter of the largest disc within its patch, as far away as its
         place; from_side: the patch goes on beyond the left or right edge of the image
+    clothing: of a person, colours of the clothes, None where they are not seen
+    box_m, lower_face: of a face, as in ``DetectionInCamera``
     """
 
     kind: str
@@ -80,9 +102,12 @@ class LocalisedDetection:
     thickness_m: float = 0.0
     from_side: bool = False
     upper_m: Vec3 | None = None
+    clothing: Clothing | None = None
+    box_m: float = 0.0
+    lower_face: float = 0.0
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Track:
     """One thing through time.
 
@@ -95,6 +120,13 @@ class Track:
         that was too uncertain
     speech: of a face, how its mouth has moved lately
     eyes: of a face, what its eyes did when they were seen last
+    colours: of a person, those of the clothes as they usually are seen, as in ``Clothing``
+    dressed: in how many frames they were seen, parts of them counting as such
+    doubts: how much more they are like those of others, by the numbers of these, as a cost
+    confirmed: in how many frames they were its own since it was out of sight
+    lost_sight: whether it was out of sight and they have not been seen to be its own since
+    box_m, lower_face: as of a detection, of the face as it usually is; bare: in how many frames
+        they were seen
     """
 
     id: int
@@ -110,6 +142,14 @@ class Track:
     speech: Speech = NO_SPEECH
     eyes: SeenEyes | None = None
     faced_s: float = -inf
+    colours: Floats | None = None
+    dressed: float = 0.0
+    confirmed: float = 0.0
+    lost_sight: bool = False
+    box_m: float = 0.0
+    lower_face: float = 0.0
+    bare: int = 0
+    doubts: dict[int, float] = field(default_factory=dict)
 
     @property
     def p_world_m(self) -> Vec3:
@@ -143,6 +183,7 @@ class Tracker:
     def __init__(self, params: TrackParams) -> None:
         self._tracks: list[Track] = []
         self._next_id = 1
+        self._worn: list[list[float]] | None = None
         self.retune(params)
 
     def retune(self, params: TrackParams) -> None:
@@ -170,13 +211,18 @@ class Tracker:
         for track in self._tracks:
             if not self._remembered(track):
                 track.filter.predict(
-                    t_s - track.at_s, track.seen_s == track.at_s, track.depth_from != "assumed"
+                    t_s - track.at_s,
+                    track.seen_s == track.at_s,
+                    track.depth_from != "assumed",
+                    track.is_person,
                 )
             track.filter.look_from(p_world_camera_m)
             track.at_s = t_s
         pairs = assign(self._costs(detections, p_world_camera_m), UNPAIRED)
         for i, j in pairs:
             self._update(self._tracks[i], detections[j], p_world_camera_m)
+        if self._worn is not None:
+            self._settle(self._worn, dict(pairs), detections)
         taken = {j for _, j in pairs}
         for j, detection in enumerate(detections):
             if j not in taken:
@@ -238,10 +284,107 @@ class Tracker:
                 1.0 if track.depth_s is None else track.face_size,
                 self._moved_m(track),
                 track.at_s - track.seen_s <= coast_s,
+                self._params.gate_speed_m_s * (track.at_s - track.seen_s),
+                _FASTEST_M_S * (track.at_s - track.seen_s) if track.is_person else inf,
+                _UPRIGHT_M2 + (_STOOPS_M_S * (track.at_s - track.seen_s)) ** 2
+                if track.is_person
+                else inf,
             )
             for track in self._tracks
         ]
-        return pair_costs(tracks, rows, self._params)
+        self._worn = clothing_costs(
+            [track.colours for track in self._tracks], [found.clothing for found in detections]
+        )
+        return pair_costs(tracks, rows, self._params, self._worn)
+
+    def _settle(
+        self,
+        worn: list[list[float]],
+        column: dict[int, int],
+        detections: list[LocalisedDetection],
+    ) -> None:
+        """Give people who were confused while they were hidden the numbers of their clothes.
+
+        Who comes out from behind another shows the face first, and the clothes later.
+
+        Args:
+            worn: what clothes tell of each pair of track and detection, as a cost.
+            column: the detection of each track that has one.
+            detections: of the frame.
+        """
+        tracks, sure = self._tracks, True
+        for i, j in column.items():
+            track, own = tracks[i], worn[i][j]
+            clothing = detections[j].clothing
+            if clothing is None or not track.is_person:
+                continue
+            new = max(own, 0.0) if track.dressed < _OWN else own  # may be one who was here before
+            share = clothing.share
+            if new < _FITS:
+                track.confirmed = min(track.confirmed + share, _MOST_CONFIRMED)
+            elif own > _MISFITS:
+                track.confirmed -= share
+            if track.confirmed >= _CONFIRMED:
+                track.doubts, track.lost_sight = {}, False
+                continue
+            before, track.doubts = track.doubts, {}
+            for k, other in enumerate(tracks):
+                lost = other.at_s - other.seen_s > _LOST_S
+                if not lost and not (k in column and (track.lost_sight or other.lost_sight)):
+                    continue
+                if k != i and other.dressed >= _PROVED and other.is_person:
+                    than = new if lost else own
+                    gain = max(than - worn[k][j], -_MOST_OF_FRAME)
+                    gain = min(gain, _MOST_OF_FRAME if worn[k][j] < _FITS else 0.0)
+                    doubt = _DOUBT_KEPT * before.get(other.id, 0.0) + gain
+                    if doubt > 1.0:
+                        track.doubts[other.id] = doubt
+                        sure = sure and doubt < _SURE
+        if not sure:
+            self._renumber(
+                [
+                    tracks[i]
+                    for i in column
+                    if tracks[i].is_person and tracks[i].confirmed < _CONFIRMED
+                ]
+            )
+
+    def _renumber(self, seen: list[Track]) -> None:
+        """Give the tracks in sight the numbers that fit all of them best; they exchange them."""
+        people = [
+            track
+            for track in self._tracks
+            if track.is_person and (track in seen or track.at_s - track.seen_s > _LOST_S)
+        ]
+        costs = [
+            [
+                0.0 if one is other else _SURE - one.doubts.get(other.id, 0.0)
+                if other.seen_s == other.at_s or self._reachable(one, other) else FORBIDDEN
+                for other in people
+            ]
+            for one in seen
+        ]  # fmt: skip
+        persons = [(one.id, one.colours, one.dressed) for one in people]
+        place = {column: seen[row] for row, column in assign(costs)}
+        free = [one for one in people if one not in place.values()]
+        for k, one in enumerate(people):
+            if k not in place and one in free:
+                place[k] = one
+                free.remove(one)
+        for k, person in enumerate(persons):
+            one = place[k] if k in place else free.pop()
+            if one is not people[k]:
+                one.id, one.colours, one.dressed = person
+                one.doubts, one.confirmed = {}, 0.0
+                if one.seen_s < one.at_s and one.dressed < _OWN:
+                    self._tracks.remove(one)  # nobody new came: that was this one
+
+    def _reachable(self, one: Track, other: Track) -> bool:
+        """Return whether a person out of sight can have come to where a track is."""
+        known = 2.0 * sqrt(one.filter.along.p + other.filter.along.p)
+        gone = self._params.gate_speed_m_s * (other.at_s - other.seen_s)
+        reach = self._params.gate_m * max(1.0, one.filter.range_m) + gone + known
+        return norm(sub(one.p_world_m, other.p_world_m)) < reach
 
     def _moved_m(self, track: Track) -> float:
         """Return how much farther a track may be from its expected place for every time unseen."""
@@ -268,15 +411,28 @@ class Tracker:
         )
         self._next_id += 1
         self._learn_size(track, detection, 1.0)
+        _learn_shape(track, detection)
+        _learn_colours(track, detection.clothing)
         _correct_velocity(track, detection)
         return track
 
     def _update(self, track: Track, detection: LocalisedDetection, p_camera: Vec3) -> None:
         """Update a track with a detection."""
         place = sized(track, detection, p_camera)
+        covered = _is_covered(track, detection)
+        if covered:
+            share = min(max(track.box_m / detection.box_m, 1.0 / _MOST_OFF), _MOST_OFF)
+            place = add(p_camera, scale(sub(place, p_camera), share))
+        else:
+            _learn_shape(track, detection)
         track.filter.correct(place, detection.across_sd_m, detection.along_sd_m)
         _correct_velocity(track, detection)
+        if track.is_person:
+            track.filter.slow_to(_FASTEST_M_S)
+        if track.at_s - track.seen_s > _GAP_S:
+            track.confirmed, track.lost_sight = 0.0, True
         track.seen_s = track.at_s
+        _learn_colours(track, detection.clothing)
         R = detection.R_world_face
         if R is None and self.shows_face(track):
             return  # the face was missed in this frame
@@ -289,7 +445,8 @@ class Tracker:
                 track.R_world_face, track.face_length = R, detection.face_length
             else:
                 track.R_world_face = blended(before, R, self._params.turn_gain)
-                track.face_length += gain * (detection.face_length - track.face_length)
+                if not covered:
+                    track.face_length += gain * (detection.face_length - track.face_length)
         self._learn_size(track, detection, gain)
         track.detection = detection
 
@@ -300,6 +457,47 @@ class Tracker:
         gain = 1.0 if track.depth_s is None else gain
         track.face_size += gain * (1.0 / detection.size_depth - track.face_size)
         track.depth_s = track.at_s
+
+
+def _is_covered(track: Track, found: LocalisedDetection) -> bool:
+    """Return whether the lower half of a face is covered, as by a hand, and its size misleads.
+
+    A network puts the points it does not see nearer to those it sees: the face seems to be farther
+    away. The box about the face stays as large.
+    """
+    return (
+        not found.depth_measured
+        and track.bare >= _BARE
+        and found.box_m > 0.0
+        and 0.0 < found.lower_face < _COVERED * track.lower_face
+    )
+
+
+def _learn_shape(track: Track, found: LocalisedDetection) -> None:
+    """Learn what the box and the lower half of a face measure while nothing covers it."""
+    if not (found.box_m > 0.0 and found.lower_face > 0.0):
+        return
+    track.bare += 1
+    gain = max(1.0 / track.bare, _SHAPE_GAIN)
+    track.box_m += gain * (found.box_m - track.box_m)
+    track.lower_face += gain * (found.lower_face - track.lower_face)
+
+
+def _learn_colours(track: Track, clothing: Clothing | None) -> None:
+    """Learn how a person is dressed, the slower the less of it is seen."""
+    if clothing is None:
+        return
+    track.dressed += clothing.share
+    seen, before = np.array(clothing.colours), track.colours
+    if before is None:
+        track.colours = seen
+        return
+    fits = float(before @ seen) > _LIKE
+    gain = clothing.share * (
+        max(_COLOURS_GAIN, 1.0 / (1.0 + track.dressed)) if fits else _UNFIT_GAIN
+    )
+    mean = before + gain * (seen - before)
+    track.colours = mean / sqrt(float(mean @ mean))
 
 
 def _became_another(track: Track, renamed: set[int]) -> bool:

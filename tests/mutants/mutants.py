@@ -24,7 +24,7 @@ MUTANTS = (
     # ---- gaze: attention
     Mutant("gaze/bottom_up.py", "total, bound = slide + rest + spin, ", "total, bound = slide + rest, ",
            "eq 1 without its third term, spin", ("attention", "attention_choice")),
-    Mutant("gaze/bottom_up.py", "return exempt - worth * expm1", "return -worth * expm1",
+    Mutant("gaze/bottom_up.py", "worth * (exempt - expm1", "worth * (-expm1",
            "what comes nearer fast saturates like other motion", ("behaviours",)),
     Mutant("gaze/attention.py", "            bodies = percept.bodies\n", "            pass\n",
            "a remembered face competes with visible ones", ("face_memory",)),
