@@ -144,9 +144,7 @@ def test_a_drawer_leaves_head_stop_and_buttons_in_sight(shown: Shown, tab: str, 
 
 
 @pytest.mark.parametrize("size", ["phone"], indirect=True)
-def test_on_a_phone_the_head_is_on_top_then_stop_then_the_buttons(
-    shown: Shown, size: str
-) -> None:
+def test_on_a_phone_the_head_is_on_top_then_stop_then_the_buttons(shown: Shown, size: str) -> None:
     shown.state("awake")
     found = {name: box or (0.0,) * 4 for name, box in boxes(shown.browser).items()}
     order = ("stage", "rig-stop", "moves", "extras", "camera", "tabs")

@@ -121,7 +121,7 @@ def clothes(
             right - left >= _LEAST_PX
             and left < width
             and right > 0
-            and 0 <= bottom
+            and bottom >= 0
             and top < height
         ):
             continue

@@ -26,7 +26,7 @@ from gazerig.robot.perception.data_association import (
     pair_costs,
 )
 from gazerig.robot.perception.gaze_at_head import SeenEyes
-from gazerig.robot.perception.kalman import ProcessNoise, TrackFilter, sight
+from gazerig.robot.perception.kalman import NEAREST_M, ProcessNoise, TrackFilter, sight
 from gazerig.robot.perception.speech import NO_SPEECH, Speech
 
 FACE = "face"
@@ -40,9 +40,10 @@ _COLOURS_GAIN, _UNFIT_GAIN, _PROVED, _OWN = 0.15, 0.005, 3, 60
 _GAP_S, _LOST_S = 0.12, 0.25
 _CONFIRMED, _MOST_CONFIRMED, _MISFITS = 3.0, 6.0, 2.0
 _FITS, _SURE, _MOST_OF_FRAME = -1.0, 9.0, 6.0
-# Below this part of its usual measure the lower half of a face is covered; it must have been seen
-# bare in so many frames, and is learned so fast. The size of a box is believed up to this factor.
-_COVERED, _BARE, _SHAPE_GAIN, _MOST_OFF = 0.75, 8, 0.03, 1.5
+# Below this part of its usual measure the lower half of a face is covered, until it is above the
+# other; it must have been seen bare in so many frames, and is learned so fast. What a cover does to
+# the distance is up to this factor, and is learned so fast, at first faster.
+_COVERED, _BARE_AGAIN, _BARE, _SHAPE_GAIN, _MOST_OFF, _COVER_GAIN = 0.8, 0.9, 8, 0.03, 1.5, 0.03
 # Inner product of colours that are much alike.
 _LIKE = 0.9
 # A doubt goes within so many frames in which nothing speaks for it.
@@ -127,6 +128,8 @@ class Track:
     lost_sight: whether it was out of sight and they have not been seen to be its own since
     box_m, lower_face: as of a detection, of the face as it usually is; bare: in how many frames
         they were seen
+    covered: for how many frames the lower half of the face has been covered; cover_share: by which
+        its distance is multiplied since
     """
 
     id: int
@@ -149,6 +152,8 @@ class Track:
     box_m: float = 0.0
     lower_face: float = 0.0
     bare: int = 0
+    covered: int = 0
+    cover_share: float = 1.0
     doubts: dict[int, float] = field(default_factory=dict)
 
     @property
@@ -421,9 +426,9 @@ class Tracker:
         place = sized(track, detection, p_camera)
         covered = _is_covered(track, detection)
         if covered:
-            share = min(max(track.box_m / detection.box_m, 1.0 / _MOST_OFF), _MOST_OFF)
-            place = add(p_camera, scale(sub(place, p_camera), share))
+            place = _held(track, detection, place, p_camera)
         else:
+            track.covered, track.cover_share = 0, 1.0
             _learn_shape(track, detection)
         track.filter.correct(place, detection.across_sd_m, detection.along_sd_m)
         _correct_velocity(track, detection)
@@ -463,14 +468,24 @@ def _is_covered(track: Track, found: LocalisedDetection) -> bool:
     """Return whether the lower half of a face is covered, as by a hand, and its size misleads.
 
     A network puts the points it does not see nearer to those it sees: the face seems to be farther
-    away. The box about the face stays as large.
+    away.
     """
-    return (
-        not found.depth_measured
-        and track.bare >= _BARE
-        and found.box_m > 0.0
-        and 0.0 < found.lower_face < _COVERED * track.lower_face
-    )
+    least = (_BARE_AGAIN if track.covered else _COVERED) * track.lower_face
+    return not found.depth_measured and track.bare >= _BARE and 0.0 < found.lower_face < least
+
+
+def _held(track: Track, found: LocalisedDetection, place: Vec3, p_camera: Vec3) -> Vec3:
+    """Return the place of a face that is covered: as far away as it was, but for how it has moved.
+
+    Half of that is told by its points and half by its box, whose error is the opposite one.
+    """
+    measured = sub(place, p_camera)
+    share = sqrt(track.box_m / found.box_m)
+    now = track.filter.range_m / (share * max(norm(measured), NEAREST_M))
+    track.covered += 1
+    gain = max(1.0 / track.covered, _COVER_GAIN)
+    track.cover_share += gain * (min(max(now, 1.0 / _MOST_OFF), _MOST_OFF) - track.cover_share)
+    return add(p_camera, scale(measured, share * track.cover_share))
 
 
 def _learn_shape(track: Track, found: LocalisedDetection) -> None:
