@@ -1,6 +1,7 @@
 """Pairs that cost least together, against every other way of pairing."""
 
 from itertools import permutations
+from math import inf
 
 import numpy as np
 from hypothesis import given
@@ -104,7 +105,8 @@ def a_track(rng: np.random.Generator) -> TrackRow:
     return TrackRow(
         int(kind), int(mark), *a_direction(rng), rng.uniform(1.0, 2.0), 10.0**across_m2,
         10.0**along_m2, rng.uniform(0.02, 0.4), rng.uniform(0.8, 1.2),
-        rng.choice([0.0, 0.2, 1.5]), bool(rng.integers(2)),
+        rng.choice([0.0, 0.2, 1.5]), bool(rng.integers(2)), rng.choice([0.0, 0.5]),
+        rng.choice([0.1, inf]), rng.choice([1e-3, inf]),
     )  # fmt: skip
 
 

@@ -130,3 +130,13 @@ def test_the_scene_comes_through_the_pipe_and_the_locator() -> None:
     found = Detections(0.0, 1, 640, 400, scene=3)
     assert pickle.loads(pickle.dumps(found)).scene == 3
     assert found.located_by(FrameLocator(None, radians(69.0))).scene == 3
+
+
+def test_six_who_walk_to_and_fro_keep_their_identities_by_their_clothes() -> None:
+    name = "six walk to and fro, turning behind others"
+    found = []
+    for seed in (0, 1):
+        rng = np.random.default_rng(seed)
+        ways, _ = row.crossings(rng)[name]
+        found.append(row.idf1(ways, 8.0, rng))
+    assert np.mean(found) >= row.WANTED[f"{name}: IDF1"][0]

@@ -165,7 +165,7 @@ def test_an_enter_is_dropped_with_a_reason_where_the_eyes_never_come(
 
 def test_eyes_in_a_saccade_are_not_on_the_part(made: Assembly, steered: FaceSteering) -> None:
     made.robot.start(made.clock)
-    tick = ticks(made, steered, 1.5)
+    tick = ticks(made, steered, 1.7)
     steered.update(tick._replace(gaze=tick.gaze._replace(phase="fixate")))
     assert steered.aimed
     steered.update(tick._replace(gaze=tick.gaze._replace(phase="saccade")))

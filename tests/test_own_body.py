@@ -89,7 +89,7 @@ def test_the_own_body_waves_to_nobody() -> None:
         for k in range(60):
             v = np.zeros((2, 3))
             v[1, 1] = 0.8 * np.cos(2 * np.pi * 1.5 * k / 30)
-            places = np.array([(1.0, 0.0, 0.2), (0.9, 0.3, 0.1)])
+            places = np.array([(1.0, 0.0, 0.2), (0.9, 0.3, 0.2)])
             seen = Bodies((1, 2), ("face", kind), places, v, np.zeros((2, 3)), np.full(2, 0.1))
             persons.update(Percept(k / 30, seen), (0.0, 0.0, 0.1))
         assert persons.named("waving") == named

@@ -5,13 +5,18 @@ from functools import partial
 from math import inf, radians
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from seeing.material import background, noisy, paste, portrait
 from stand_in import StandIn
 
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
-from gazerig.drivers.types import DetectedFace, Detections, MovingBlob
+from gazerig.drivers.located_frame import Clothing
+from gazerig.drivers.types import DetectedFace, DetectedPerson, Detections, MovingBlob
+from gazerig.drivers.vision.face.detector import face_detector
+from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.gaze.angles import norm, rotation
 from gazerig.gaze.types import Angles2, Angles3, Mat3, Percept, Vec3
 from gazerig.robot.model.face_geometry import LANDMARKS_FACE_M, PARTS_FACE_M
@@ -271,3 +276,49 @@ def test_perception_tells_its_residual() -> None:
     figures = perception.residual()
     assert figures.samples > 10 and figures.late_ms is not None and figures.speed_deg_s is not None
     assert abs(figures.late_ms) < 1.0 and figures.speed_deg_s < 0.5
+
+
+def test_who_walks_out_of_the_picture_is_no_longer_seen_but_remembered() -> None:
+    """A body without a visible face is reported for a second after it was found, inside."""
+    perception, outside = Perception(STILL, 69.0, Tracker(TrackParams())), 0
+    ids: set[int] = set()
+    for k in range(1, 90):
+        x = -0.6 + 2.0 * k / 30  # the picture ends at 1.37 m
+        inside = x < 1.3
+        body = body_at(x)
+        found = seen(perception, k, people=(body,) if inside else ())
+        ids |= set(found.bodies.ids)
+        places = found.bodies.p_world_m
+        outside += sum(abs(y / x) > 1.03 * WIDTH / 2.0 / LENS.fx_px for x, y, _ in places)
+        assert bool(len(places)) or not inside
+    assert outside == 0 and len(ids) == 1
+    assert set(seen(perception, 91, people=(body_at(1.3),)).bodies.ids) == ids
+
+
+def body_at(x: float) -> DetectedPerson:
+    """Return a person 2 m away who is turned away, so far to the right."""
+    ((x_px, y_px),) = project([(x, 0.0, 2.0)], LENS).tolist()
+    worn = Clothing((1.0, *[0.0] * 23), 1.0)
+    return DetectedPerson((0.0, 0.0, 1.0, 1.0), (x_px, y_px), 193.0, 0.9, worn)
+
+
+@pytest.mark.parametrize("who", ["astronaut", "hopper"])
+@pytest.mark.parametrize("eyes_px", [7.0, 16.0])
+def test_a_hand_before_the_mouth_moves_nobody(who: str, eyes_px: float) -> None:
+    rng, found = np.random.default_rng(0), face_detector(FaceDetectorParams(people_hz=0.0))
+    perception, image = Perception(STILL, 69.0, Tracker(TrackParams())), background(WIDTH, HEIGHT)
+    image = image.copy()
+    mouth = paste(image, portrait(who), (320.0, 200.0), eyes_px)[3:].mean(axis=0)
+    before, after = [], []
+    for k in range(40):
+        shown = image.copy()
+        if k >= 25:
+            at = np.round(8.0 * (mouth + (0.0, 0.1 * eyes_px))).astype(int).tolist()
+            size = round(6.0 * eyes_px), round(4.4 * eyes_px)
+            cv2.ellipse(shown, at, size, 20.0, 0.0, 360.0, (120, 150, 205), -1, cv2.LINE_AA, 3)
+        faces = found.find(noisy(shown, 3.0, rng))
+        percept = seen(perception, k + 1, faces=faces)
+        if k >= 15 and percept.faces:
+            (before if k < 25 else after).append(norm(percept.faces[0].p_world_m))
+    assert len(after) > 5
+    assert np.abs(np.array(after) / np.mean(before) - 1.0).max() < 0.05

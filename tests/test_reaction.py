@@ -16,7 +16,7 @@ from gazerig.gaze.top_down import TopDown, TopDownParams
 from gazerig.gaze.types import Floats, Percept
 
 FRAME_S, TICK_S, DELAY_S = 1 / 30, 1 / 200, 0.06
-REACHES = body(2, "hand", (0.8, 0.3, -0.1), (0.0, 1.0, 0.0))
+REACHES = body(2, "hand", (0.8, 0.3, -0.05), (0.0, 1.0, 0.0))
 NEARS = body(2, "hand", (0.8, 0.0, -0.1), (-1.0, 0.0, 0.1))
 
 
@@ -110,7 +110,7 @@ def test_what_has_stopped_before_its_time_is_not_looked_at() -> None:
     viewer.show([FACE], 0.5)
     assert {kind for _, kind, _ in viewer.show([FACE, REACHES], 0.1)} == {"face"}
     viewer.model._bottom_up.retune(BottomUpParams(smoothing_s=0.0, onset_salience=0.0))
-    resting = body(2, "hand", (0.8, 0.3, -0.1))
+    resting = body(2, "hand", (0.8, 0.3, -0.05))
     assert {kind for _, kind, _ in viewer.show([FACE, resting], 0.5)} == {"face"}
 
 
@@ -118,7 +118,7 @@ def test_what_wins_meanwhile_takes_over_the_time() -> None:
     viewer = Viewer(attention(spread=0.0))
     viewer.show([FACE], 0.5)
     viewer.show([FACE, REACHES], 0.1)
-    faster = body(3, "hand", (0.8, -0.3, -0.1), (0.0, 4.0, 0.0))
+    faster = body(3, "hand", (0.8, -0.3, -0.05), (0.0, 4.0, 0.0))
     looks = viewer.show([FACE, REACHES, faster], 0.3)
     first = next((t_s, id) for t_s, kind, id in looks if kind == "hand")
     assert first == (pytest.approx(0.075, abs=TICK_S), 3)

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gazerig.drivers.located_frame import Clothing
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.perception.perception import covariance
 from gazerig.robot.perception.tracker import LocalisedDetection, Track, Tracker, blended
@@ -275,3 +276,75 @@ def test_nothing_makes_it_give_what_is_no_number(
         for track in tracks:
             assert np.isfinite((track.p_world_m, track.v_world_m_s)).all()
             assert np.linalg.eigvalsh(cov_of(track)).min() > -1e-9
+
+
+def dressed(found: LocalisedDetection, *bins: int) -> LocalisedDetection:
+    """Return the same in clothes of one colour or of several in equal parts."""
+    colours = tuple(len(bins) ** -0.5 * (k in bins) for k in range(24))
+    return replace(found, clothing=Clothing(colours, 1.0))
+
+
+@pytest.mark.parametrize(("worn", "same"), [(3, True), (7, False)])
+def test_who_returns_elsewhere_in_the_same_clothes_is_known_again(worn: int, same: bool) -> None:
+    tracker = Tracker(TrackParams())
+    for k in range(15):
+        (gone,) = tracker.step([dressed(across(0.5, 2.0), 3)], CAMERA, k / 30)
+    tracker.step([], CAMERA, 6.0)
+    (back,) = tracker.step([dressed(across(-0.9, 2.0), worn)], CAMERA, 6.03)
+    assert (back.id == gone.id) is same
+
+
+def test_who_returns_after_the_time_of_memory_is_somebody_new() -> None:
+    tracker = Tracker(TrackParams(remember_face_s=5.0))
+    for k in range(15):
+        (gone,) = tracker.step([dressed(across(0.5, 2.0), 3)], CAMERA, k / 30)
+    tracker.step([], CAMERA, 6.0)
+    (back,) = tracker.step([dressed(across(0.5, 2.0), 3)], CAMERA, 6.03)
+    assert back.id != gone.id
+
+
+def test_two_whose_numbers_were_exchanged_while_hidden_get_them_back_by_their_clothes() -> None:
+    tracker = Tracker(TrackParams())
+    for k in range(30):
+        both = [dressed(across(-0.3, 2.0), 3), dressed(across(0.3, 2.0), 7)]
+        tracks = tracker.step(both, CAMERA, k / 30)
+    left, right = (track.id for track in sorted(tracks, key=_y))
+    for k in range(30, 60):  # they have changed sides behind something
+        tracker.step([], CAMERA, k / 30)
+    for k in range(60, 90):
+        both = [across(-0.3, 2.0), across(0.3, 2.0)]
+        if k > 65:
+            both = [dressed(both[0], 7), dressed(both[1], 3)]
+        tracks = tracker.step(both, CAMERA, k / 30)
+    assert [track.id for track in sorted(tracks, key=_y)] == [right, left]
+
+
+def test_people_always_in_sight_keep_their_numbers_whatever_they_put_on() -> None:
+    tracker = Tracker(TrackParams())
+    for k in range(120):
+        worn = (3, 7) if k < 40 else (7, 3)
+        both = [dressed(across(y, 2.0), w) for y, w in zip((-0.4, 0.4), worn, strict=True)]
+        tracks = tracker.step(both, CAMERA, k / 30)
+        if k == 0:
+            ids = [track.id for track in sorted(tracks, key=_y)]
+    assert [track.id for track in sorted(tracks, key=_y)] == ids
+
+
+def test_a_face_six_metres_farther_away_is_another_person() -> None:
+    tracker = Tracker(TrackParams())
+    for k in range(10):
+        (near,) = tracker.step([replace(across(0.0, 3.0), along_sd_m=0.2)], CAMERA, k / 30)
+    far = replace(across(0.0, 9.0), along_sd_m=1.2)
+    assert near.id not in {t.id for t in tracker.step([far], CAMERA, 0.36) if t.seen_s == t.at_s}
+
+
+def test_who_is_hidden_stays_as_high_and_goes_no_faster_than_people() -> None:
+    tracker = Tracker(TrackParams())
+    for k in range(12):
+        up = replace(across(0.0, 2.0), p_world_m=(2.0, 0.2 * k, 0.2 + 0.03 * k))
+        (one,) = tracker.step([up], CAMERA, k / 30)
+    assert np.linalg.norm(one.v_world_m_s) <= 4.0
+    before = one.p_world_m[2]
+    for k in range(12, 18):
+        tracker.step([], CAMERA, k / 30)
+    assert one.p_world_m[2] == pytest.approx(before, abs=0.05)

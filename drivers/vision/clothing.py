@@ -28,6 +28,8 @@ _HALF_WIDTH_M, _TOP_M, _BOTTOM_M = 0.11, 0.20, 0.50
 _HEAD_HALF_M, _HEAD_UP_M, _BODY_HALF_M = 0.1, 0.18, 0.22
 # Sizes in the image that differ less may be equal, and then neither is known to be nearer.
 _NEARER = 1.1
+# Of one head by its face and by its body, or in two frames, they differ by no larger factor.
+_AS_LARGE = 1.4
 # Pixels of a box that count, to a side; seldom more than this part of it may be out of sight.
 _SIDE = 12
 _LEAST_SHARE = 0.12
@@ -130,6 +132,9 @@ def clothes(
         seen_x, seen_y = (xs >= 0.0) & (xs < width), (ys >= 0.0) & (ys < height)
         seen = seen_y[:, None] & seen_x
         for other in covering:
+            beside = abs(other.x - head.x) > _HALF_WIDTH_M * head.px_m + _BODY_HALF_M * other.px_m
+            if beside or other.y - _HEAD_UP_M * other.px_m > bottom:
+                continue
             if other.px_m > head.px_m / _NEARER and not _is_same(other, head):
                 seen &= ~_covered(other, xs, ys)
         share = float(np.count_nonzero(seen)) / seen.size
@@ -150,7 +155,8 @@ def clothes(
 
 def _is_same(one: _Head, other: _Head) -> bool:
     """Return whether two heads are of one person."""
-    return hypot(one.x - other.x, one.y - other.y) < _HEAD_HALF_M * other.px_m
+    as_large = 1.0 / _AS_LARGE < one.px_m / other.px_m < _AS_LARGE
+    return as_large and hypot(one.x - other.x, one.y - other.y) < _HEAD_HALF_M * other.px_m
 
 
 def _covered(

@@ -11,12 +11,14 @@ from math import cos, hypot, radians, sqrt
 
 import numpy as np
 
+from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.located_frame import LocatedFrame
 from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections
-from gazerig.gaze.angles import add, dot, rotate, scale, sub
+from gazerig.gaze.angles import add, dot, rotate, rotate_back, scale, sub
 from gazerig.gaze.types import PARTS, Bodies, Face, Mat3, Percept, Vec3
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, LensParams, PoseHistory
+from gazerig.robot.model.intrinsics import project
 from gazerig.robot.perception.egomotion_residual import (
     EgomotionResidual,
     ResidualFigures,
@@ -41,6 +43,8 @@ from gazerig.robot.perception.tracker import UNNAMED, LocalisedDetection, Track,
 
 # The head's turn at a capture is taken over so long before and after it.
 _HALF_TURN_S = 0.015
+# Places are known to this part of a picture's width, beyond its edges too.
+_EDGE = 0.01
 # A camera that turned farther between two frames shows another part of the same room.
 _COS_SAME_VIEW = cos(radians(5.0))
 
@@ -129,7 +133,16 @@ class Perception:
             things = self._hands.named(things, known_faces(faces, known), p, t_s, palms)
             faces, things = without_own_motion(faces, things, known, p)
             things = [_at_head(thing) for thing in things]
-        self._tracks = tracks = self._tracker.step([*faces, *things], p, t_s)
+        tracked = self._tracker.step([*faces, *things], p, t_s)
+        size_px = detections.width_px, detections.height_px
+        self._tracks = tracks = tuple(
+            [
+                track
+                for track in tracked
+                if track.seen_s == t_s
+                or _in_picture(rotate_back(R, sub(track.p_world_m, p)), located.intrinsics, size_px)
+            ]
+        )
         self._p_camera = p
         self._note_residual(t_s, poses)
         self._percept = Percept(
@@ -258,6 +271,16 @@ class Perception:
             for at, own in self._parts
         ]
         return tuple(parts)
+
+
+def _in_picture(p_camera_m: Vec3, lens: Intrinsics, size_px: tuple[int, int]) -> bool:
+    """Return whether a place appears in a picture; who has left it is not seen, only remembered."""
+    if not p_camera_m[2] > 0.0:
+        return False
+    x, y = project([p_camera_m], lens)[0].tolist()
+    width, height = size_px
+    edge = _EDGE * width
+    return bool(-edge < x < width + edge and -edge < y < height + edge)
 
 
 def _at_head(thing: LocalisedDetection) -> LocalisedDetection:

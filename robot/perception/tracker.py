@@ -44,6 +44,8 @@ _FITS, _SURE, _MOST_OF_FRAME = -1.0, 9.0, 6.0
 # other; it must have been seen bare in so many frames, and is learned so fast. What a cover does to
 # the distance is up to this factor, and is learned so fast, at first faster.
 _COVERED, _BARE_AGAIN, _BARE, _SHAPE_GAIN, _MOST_OFF, _COVER_GAIN = 0.8, 0.9, 8, 0.03, 1.5, 0.03
+# Points that are guessed jump: a face is covered for so long after it was seen to be.
+_COVERED_S = 0.3
 # Inner product of colours that are much alike.
 _LIKE = 0.9
 # A doubt goes within so many frames in which nothing speaks for it.
@@ -128,8 +130,8 @@ class Track:
     lost_sight: whether it was out of sight and they have not been seen to be its own since
     box_m, lower_face: as of a detection, of the face as it usually is; bare: in how many frames
         they were seen
-    covered: for how many frames the lower half of the face has been covered; cover_share: by which
-        its distance is multiplied since
+    covered: for how many frames the lower half of the face has been covered; covered_s: capture
+        time of the last of them; cover_share: by which its distance is multiplied since
     """
 
     id: int
@@ -153,6 +155,7 @@ class Track:
     lower_face: float = 0.0
     bare: int = 0
     covered: int = 0
+    covered_s: float = -inf
     cover_share: float = 1.0
     doubts: dict[int, float] = field(default_factory=dict)
 
@@ -470,8 +473,11 @@ def _is_covered(track: Track, found: LocalisedDetection) -> bool:
     A network puts the points it does not see nearer to those it sees: the face seems to be farther
     away.
     """
-    least = (_BARE_AGAIN if track.covered else _COVERED) * track.lower_face
-    return not found.depth_measured and track.bare >= _BARE and 0.0 < found.lower_face < least
+    if found.depth_measured or track.bare < _BARE or not found.lower_face > 0.0:
+        return False
+    if found.lower_face < (_BARE_AGAIN if track.covered else _COVERED) * track.lower_face:
+        track.covered_s = track.at_s
+    return track.at_s - track.covered_s <= _COVERED_S
 
 
 def _held(track: Track, found: LocalisedDetection, place: Vec3, p_camera: Vec3) -> Vec3:

@@ -53,6 +53,8 @@ WANTED = {
     "two meet and turn back: IDF1": (0.95, 1.0),
     "three cross: IDF1": (0.95, 1.0),
     "six cross: IDF1": (0.95, 1.0),
+    "six walk to and fro, turning behind others: IDF1": (0.95, 1.0),
+    "six stroll, for seconds behind others: IDF1": (0.95, 1.0),
     "identities that go on after a cut, %": (0.0, 0.0),
     "cuts found, %": (100.0, 100.0),
     "cuts where there is none, of 1000 pictures": (0.0, 0.0),
