@@ -309,7 +309,8 @@ def test_a_hand_before_the_mouth_moves_nobody(who: str, eyes_px: float) -> None:
     perception, image = Perception(STILL, 69.0, Tracker(TrackParams())), background(WIDTH, HEIGHT)
     image = image.copy()
     mouth = paste(image, portrait(who), (320.0, 200.0), eyes_px)[3:].mean(axis=0)
-    before, after = [], []
+    before: list[float] = []
+    after: list[float] = []
     for k in range(40):
         shown = image.copy()
         if k >= 25:
