@@ -134,8 +134,7 @@ class Persons:
         away = max((ahead * ahead + aside * aside) ** 0.5, 1e-6)
         if self._turns(id, (velocity_m_s[1] * ahead - velocity_m_s[0] * aside) / away):
             owner = min(faces, key=lambda face: dist(faces[face], place))
-            raised = place[2] > faces[owner][2] - _RAISED_M
-            if raised and dist(faces[owner], place) < _ARM_M:
+            if _is_raised(place, faces[owner]) and dist(faces[owner], place) < _ARM_M:
                 self._waved_s[owner] = self._at_s
 
     def _update_part(self, id: int, place: Vec3, faces: Mapping[int, Vec3], p_eye: Vec3) -> None:
@@ -151,7 +150,7 @@ class Persons:
         owner = min(beside, key=lambda face: beside[face])
         if beside[owner] >= _ARM_M:
             return
-        if place[2] > faces[owner][2] - _RAISED_M:
+        if _is_raised(place, faces[owner]):
             self.raised.add(id)
         elif away > _HELD_OUT * dist(faces[owner], p_eye):
             self.parts[id] = owner
@@ -182,3 +181,8 @@ class Persons:
             self._hands = {
                 id: hand for id, hand in self._hands.items() if self._at_s - hand.seen_s < _WAVED_S
             }
+
+
+def _is_raised(place: Vec3, face: Vec3) -> bool:
+    """Return whether something is at the height of a face."""
+    return place[2] > face[2] - _RAISED_M

@@ -16,7 +16,7 @@ from gazerig.drivers.types import DetectedFace, DetectedPalm, DetectedPerson, Im
 from gazerig.drivers.vision.face.crops import cut_square
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.face.preprocess import as_bgr
-from gazerig.drivers.vision.people import Network, anchors
+from gazerig.drivers.vision.people import Network, anchors, confidences
 
 _SIDE_PX = 192
 # Cells of the anchors: pixels of a cell, and anchors in each.
@@ -80,7 +80,7 @@ class PalmDetector:
         part, where = cut_square(as_bgr(image), box, _SIDE_PX)
         rgb = cv2.cvtColor(part, cv2.COLOR_BGR2RGB).astype(np.float32)
         boxes, scores = self._network(rgb / np.float32(255.0))
-        sure = 1.0 / (1.0 + np.exp(-np.clip(scores, -50.0, 50.0).astype(np.float64)))
+        sure = confidences(scores)
         found: list[DetectedPalm] = []
         for row in np.argsort(-sure, kind="stable")[: int((sure >= _CONFIDENCE).sum())]:
             # Wrist, and roots of index, middle and little finger, from the anchor.

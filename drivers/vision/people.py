@@ -112,7 +112,7 @@ class PeopleDetector:
         part, where = cut_square(frame, box, _SIDE_PX)
         rgb = cv2.cvtColor(part, cv2.COLOR_BGR2RGB).astype(np.float32)
         boxes, scores = self._network(rgb / np.float32(127.5) - np.float32(1.0))
-        sure = 1.0 / (1.0 + np.exp(-np.clip(scores, -50.0, 50.0).astype(np.float64)))
+        sure = confidences(scores)
         rows = np.flatnonzero(sure >= self._params.people_confidence)
         # Face centre, hips and the top of the body's circle, from the anchor.
         points = boxes[rows][:, (0, 1, 4, 5, 6, 7)].reshape(-1, 3, 2) / _SIDE_PX
@@ -140,6 +140,14 @@ def _squares(width: int, height: int) -> list[_Square]:
         _Square(i * apart, float(height), edges[i] - both, edges[i + 1] + both)
         for i in range(count)
     ]
+
+
+def confidences(scores: Floats) -> NDArray[np.float64]:
+    """Return scores of a network as confidences of 0..1."""
+    sure: NDArray[np.float64] = 1.0 / (
+        1.0 + np.exp(-np.clip(scores, -50.0, 50.0).astype(np.float64))
+    )
+    return sure
 
 
 def anchors(side_px: int, cells: tuple[tuple[int, int], ...]) -> NDArray[np.float64]:

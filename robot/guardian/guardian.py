@@ -176,12 +176,10 @@ class Guardian:
 
     def _hangs(self, pid: int, now_s: float) -> bool:
         """Return whether it was suspended, or has looked at nothing for too long."""
-        looks, since_s = self._looks
-        if self._heartbeat.looks != looks:
+        if self._heartbeat.looks != self._looks[0]:
             self._looks = self._heartbeat.looks, now_s
-            return child_process.is_suspended(pid)
-        # A guardian that is still starting has not looked yet: since_s is infinite.
-        return now_s - since_s > HUNG_S or child_process.is_suspended(pid)
+        # A guardian that is still starting has not looked yet: its last look is at infinity.
+        return now_s - self._looks[1] > HUNG_S or child_process.is_suspended(pid)
 
     @staticmethod
     def _close_pipes(process: "subprocess.Popen[bytes]") -> None:

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
-from attack.ways_out import RIGS, START, Bench, bench, wait_until
+from attack.ways_out import RIGS, START, Bench, bench, children, wait_until
 
 LONGEST_S = 20.0
 
@@ -264,12 +264,6 @@ def held(interface: str, benches: list[Bench], begin: Begin) -> Iterator[Target]
 
 def _runs(pid: int, word: bytes) -> bool:
     return word in Path(f"/proc/{pid}/cmdline").read_bytes()
-
-
-def children(pid: int) -> list[int]:
-    """Return the children of all threads of a process."""
-    found = [p.read_text().split() for p in Path(f"/proc/{pid}/task").glob("*/children")]
-    return [int(one) for words in found for one in words]
 
 
 def _descendants(pid: int) -> list[int]:

@@ -274,7 +274,9 @@ def kill_page(run: Started) -> None:
 
 
 def children(pid: int) -> list[int]:
-    return [int(c) for c in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+    """Return the children of all threads of a process."""
+    found = [p.read_text().split() for p in Path(f"/proc/{pid}/task").glob("*/children")]
+    return [int(one) for words in found for one in words]
 
 
 def nothing(run: Started) -> None:
