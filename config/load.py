@@ -131,15 +131,20 @@ def read_yaml(path: Path, known: Collection[str] = ()) -> Document:
     return Document(path, text, root)
 
 
-def shipped(kind: str, name: str) -> Path:
+def shipped(kind: str, name: str, home: Path | None = None) -> Path:
     """Return the path of a file that comes with the package, e.g. ``shipped("rigs", "desk")``.
+
+    Args:
+        kind: of the files.
+        name: of the file, without its ending.
+        home: the folder of kinds, such as that of a feature; None: ``SHIPPED``.
 
     Raises:
         ConfigError: there is none of that name; lists those that exist.
     """
-    names = shipped_names(kind)
+    names = shipped_names(kind, home)
     if name in names:
-        return SHIPPED / kind / f"{name}.yaml"
+        return (home or SHIPPED) / kind / f"{name}.yaml"
     if kind in _GROUPS:
         return from_packages(kind, name)
     raise _unknown(kind, name, names)

@@ -18,6 +18,10 @@ import start_figures  # noqa: E402
 import trace_figure  # noqa: E402
 
 from gazerig.config.schema import load_rig, load_walk  # noqa: E402
+from gazerig.features.lab.sweep.axes import Axis, grid  # noqa: E402
+from gazerig.features.lab.sweep.outcome import Outcome  # noqa: E402
+from gazerig.features.lab.sweep.response_figure import response_png  # noqa: E402
+from gazerig.features.lab.sweep.worker import figures_at  # noqa: E402
 from gazerig.gaze.angles import rotation  # noqa: E402
 from gazerig.gaze.binocular import BinocularController  # noqa: E402
 from gazerig.gaze.head import HeadModel, HeadParams  # noqa: E402
@@ -30,10 +34,6 @@ from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.gaze_models import gaze_parts
 from gazerig.robot.app.options import RunOptions  # noqa: E402
 from gazerig.robot.control.loop import Tick, run  # noqa: E402
-from gazerig.robot.sweep.axes import Axis, grid  # noqa: E402
-from gazerig.robot.sweep.outcome import Outcome  # noqa: E402
-from gazerig.robot.sweep.response_figure import response_png  # noqa: E402
-from gazerig.robot.sweep.worker import figures_at  # noqa: E402
 from gazerig.sim_mock.scenes.steps_aside import STEP_AT_S, STEP_S  # noqa: E402
 from gazerig.sim_mock.true_gaze import (  # noqa: E402
     angles_of_place,

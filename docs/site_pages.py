@@ -16,7 +16,7 @@ from mkdocs.structure.nav import Navigation
 from mkdocs.structure.pages import Page
 
 ROOT = Path(__file__).resolve().parents[1]
-ROOMS = ("robot", "drivers", "gaze", "config", "sim_mock")
+ROOMS = ("robot", "features", "drivers", "gaze", "config", "sim_mock")
 
 FROM_ELSEWHERE = {
     "README.md": "index.md",

@@ -11,11 +11,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from gazerig.config.schema import load_rig
+from gazerig.features.lab.simulated_run import simulate
 from gazerig.gaze.angles import yaw_pitch
 from gazerig.robot.analysis.human_norms import evoked_blink, head_deg
 from gazerig.robot.analysis.summary import cyclopean
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.simulated_run import simulate
 from gazerig.robot.control.tick import Tick
 from gazerig.sim_mock.scenes.visitor import Visitor
 

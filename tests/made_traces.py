@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from gazerig.robot.analysis.blink_finder import BlinkEvent
-from gazerig.robot.analysis.event_detector import Commanded, SaccadeEvent
-from gazerig.robot.report.gaze_trace import GazeTrace, TraceRow
-from gazerig.robot.report.report import found
-from gazerig.robot.report.statistics import (
+from gazerig.features.lab.report.gaze_trace import GazeTrace, TraceRow
+from gazerig.features.lab.report.report import found
+from gazerig.features.lab.report.statistics import (
     MeasureResult,
 )
+from gazerig.robot.analysis.blink_finder import BlinkEvent
+from gazerig.robot.analysis.event_detector import Commanded, SaccadeEvent
 
 EMPTY = GazeTrace(np.zeros((0, len(TraceRow._fields))), (), (), ())
 

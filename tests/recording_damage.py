@@ -16,10 +16,10 @@ from mcap.records import Chunk
 from gazerig.config.schema import load_rig
 from gazerig.config.text import rig_text, walk_text
 from gazerig.drivers.errors import DriverError
+from gazerig.features.lab.cli.report import _recorded
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
-from gazerig.robot.cli.report import _recorded
 from gazerig.robot.control.loop import run
 from gazerig.robot.recording.gaze_angles import trace_of
 from gazerig.robot.recording.read import RunRecording, used

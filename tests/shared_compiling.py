@@ -17,7 +17,7 @@ import pytest
 from _pytest.assertion import rewrite
 
 ROOT = Path(__file__).resolve().parents[1]
-ROOMS = ("api", "config", "drivers", "gaze", "robot", "sim_mock")
+ROOMS = ("api", "config", "drivers", "features", "gaze", "robot", "sim_mock")
 
 
 def compile_in_two(config: pytest.Config) -> None:

@@ -15,13 +15,13 @@ from shown_page import free_port
 from websockets.sync.client import connect
 from websockets.typing import Origin
 
-from gazerig.config.study_file import LoadedStudy
-from gazerig.robot.dashboard.study.head_link import HeadLink
-from gazerig.robot.dashboard.study.server import StudyServer
-from gazerig.robot.study.journal import Journal
-from gazerig.robot.study.presenter import FilmPresenter, Presenter
-from gazerig.robot.study.session import StudySession
-from gazerig.robot.study.study_run import StudyRun
+from gazerig.features.study.journal import Journal
+from gazerig.features.study.pages.head_link import HeadLink
+from gazerig.features.study.pages.server import StudyServer
+from gazerig.features.study.presenter import FilmPresenter, Presenter
+from gazerig.features.study.run.study_file import LoadedStudy
+from gazerig.features.study.session import StudySession
+from gazerig.features.study.study_run import StudyRun
 
 PARTICIPANT, EXPERIMENTER = "participants-token", "experimenters-token"
 CODE = "P007"

@@ -25,9 +25,9 @@ from branch import Branch, gazerig
 from study_at_the_page import Tab, answers
 
 from gazerig.drivers.film_writer import film_writer
+from gazerig.features.study.journal import read
+from gazerig.features.study.records import Closed, ItemAnswered
 from gazerig.robot.model import clock
-from gazerig.robot.study.journal import read
-from gazerig.robot.study.records import Closed, ItemAnswered
 
 STUDY = """\
 title: Two films

@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from gazerig.robot.study.design import Condition, Hypothesis, StatisticalPlan, StudyDesign, Test
-from gazerig.robot.study.order import orders
-from gazerig.robot.study.questionnaire import Item, Questionnaire
-from gazerig.robot.study.records import (
+from gazerig.features.study.design import Condition, Hypothesis, StatisticalPlan, StudyDesign, Test
+from gazerig.features.study.order import orders
+from gazerig.features.study.questionnaire import Item, Questionnaire
+from gazerig.features.study.records import (
     Closed,
     Consented,
     ItemAnswered,
@@ -15,7 +15,7 @@ from gazerig.robot.study.records import (
     TrialBegan,
     TrialEnded,
 )
-from gazerig.robot.study.simulation import Population, SimulatedParticipant
+from gazerig.features.study.simulation import Population, SimulatedParticipant
 
 UTC = "2026-11-23T10:00:00Z"
 NO, YES = {"en": "not at all"}, {"en": "very much"}

@@ -4,10 +4,10 @@ from collections.abc import Callable
 from itertools import count
 from pathlib import Path
 
-from gazerig.config.study_file import LoadedStudy
-from gazerig.robot.study.journal import Journal
-from gazerig.robot.study.presenter import FilmPresenter, Presenter
-from gazerig.robot.study.screens import (
+from gazerig.features.study.journal import Journal
+from gazerig.features.study.presenter import FilmPresenter, Presenter
+from gazerig.features.study.run.study_file import LoadedStudy
+from gazerig.features.study.screens import (
     ConsentScreen,
     EndScreen,
     InstructionsScreen,
@@ -18,8 +18,8 @@ from gazerig.robot.study.screens import (
     RestScreen,
     Screen,
 )
-from gazerig.robot.study.session import StudySession
-from gazerig.robot.study.study_run import StudyRun
+from gazerig.features.study.session import StudySession
+from gazerig.features.study.study_run import StudyRun
 
 UTC = "2026-01-01T00:00:00+00:00"
 

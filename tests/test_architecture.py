@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-ROOMS = ("config", "drivers", "gaze", "robot", "sim_mock")
+ROOMS = ("config", "drivers", "features", "gaze", "robot", "sim_mock")
 
 # Vendor packages, and the only modules that may see each.
 OWNERS = {
@@ -26,19 +26,23 @@ OWNERS = {
     "zstandard": ("robot.recording.",),
     "msgspec": (
         "robot.control.tick_stream",
-        "robot.study.collected",
-        "robot.study.journal",
-        "robot.dashboard.study.participant_events",
+        "features.study.collected",
+        "features.study.journal",
+        "features.study.pages.participant_events",
     ),
     "orjson": ("robot.recording.",),
-    "matplotlib": ("robot.report.plotting",),
-    "pyarrow": ("robot.sweep.table",),
-    "jinja2": ("robot.report.", "robot.study.preregistration_text"),
-    "aiohttp": ("robot.dashboard.",),
+    "matplotlib": ("features.lab.report.plotting",),
+    "pyarrow": ("features.lab.sweep.table",),
+    "jinja2": (
+        "features.lab.report.",
+        "features.study.report.",
+        "features.study.preregistration_text",
+    ),
+    "aiohttp": ("robot.dashboard.", "features.study.pages."),
     "ruamel": ("config.entries", "config.save"),
     "pydantic": ("config.",),
     "pydantic_core": ("config.",),
-    "typer": ("robot.cli.",),
+    "typer": ("robot.cli.", "features.study.cli.", "features.lab.cli."),
     "viser": ("robot.dashboard.",),
     "PIL": (
         "robot.calibration.charuco_page",
@@ -135,6 +139,9 @@ def test_storeys(tmp_path: Path) -> None:
 
 WRONG = (
     ("gaze", "gazerig.robot.control.loop"),
+    ("robot/app", "gazerig.features.lab.simulated_run"),
+    ("robot/cli", "gazerig.features.study.design"),
+    ("features/lab", "gazerig.features.study.design"),
     ("drivers/camera", "gazerig.gaze.types"),
     ("drivers/servo_bus", "gazerig.drivers.dynamixel.family"),
     ("config", "gazerig.robot.control.loop"),

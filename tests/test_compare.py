@@ -10,19 +10,19 @@ from typer.testing import CliRunner
 
 from gazerig.config.schema import load_rig
 from gazerig.config.text import rig_text, walk_text
+from gazerig.features.lab.analysis.multiplicity import corrected
+from gazerig.features.lab.cli.report import app
+from gazerig.features.lab.report import report as build
+from gazerig.features.lab.report.compare import chance, compare, differences_of
+from gazerig.features.lab.report.run_header import RunHeader
+from gazerig.features.lab.report.statistics import MeasuredValue, mean, median
 from gazerig.robot.analysis.norm_bands import BY_KEY
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.cli.report import app
 from gazerig.robot.control.loop import run
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_info import RunInfo, versions
-from gazerig.robot.report import report as build
-from gazerig.robot.report.compare import chance, compare, differences_of
-from gazerig.robot.report.run_header import RunHeader
-from gazerig.robot.report.statistics import MeasuredValue, mean, median
-from gazerig.robot.study.statistics.multiplicity import corrected
 
 pytestmark = pytest.mark.usefixtures("ideal_servos", "branched_children")
 

@@ -12,9 +12,9 @@ from exported_run import RATE_HZ, Run, seen
 from present import present
 from scipy.spatial.transform import Rotation
 
+from gazerig.features.lab.analysis.eye_tracker_csv import FixationTable, read_recording
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import GazeState
-from gazerig.robot.analysis.eye_tracker_csv import FixationTable, read_recording
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Jog, Stop
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics

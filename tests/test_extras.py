@@ -94,7 +94,7 @@ def test_a_package_that_is_there_and_does_not_load_is_told_with_the_reason() -> 
 def test_every_extra_that_is_named_brings_its_package_and_the_tests_have_them_all() -> None:
     named = {
         (package, extra)
-        for path in ROOT.glob("[dgr]*/**/*.py")
+        for path in ROOT.glob("[dfgr]*/**/*.py")
         for package, extra in re.findall(
             r'extra_hint\("([\w-]+)", "(\w+)"', path.read_text("utf-8")
         )

@@ -8,6 +8,9 @@ import pytest
 
 from gazerig.config.load import ConfigError, load, shipped
 from gazerig.drivers.errors import SetupError
+from gazerig.features.lab.analysis.eye_tracker_csv import Samples, read_recording
+from gazerig.features.lab.analysis.fit_scanpath import fit
+from gazerig.features.lab.analysis.fixations import FixationParams, PartBoxes, fixations_of
 from gazerig.gaze.scanpath import (
     Scanpath,
     ScanpathParams,
@@ -17,9 +20,6 @@ from gazerig.gaze.scanpath import (
     row_sums_note,
 )
 from gazerig.gaze.types import PARTS
-from gazerig.robot.analysis.eye_tracker_csv import Samples, read_recording
-from gazerig.robot.analysis.fit_scanpath import fit
-from gazerig.robot.analysis.fixations import FixationParams, PartBoxes, fixations_of
 
 WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
 

@@ -10,8 +10,8 @@ from human.row_03_rests import visits
 
 from gazerig.config.parameters import changed
 from gazerig.config.schema import load_rig
+from gazerig.features.lab.simulated_run import simulate
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.simulated_run import simulate
 
 CLAIMS = list(claims())
 HALF_RATE = {"loop.rate_hz": 100.0}

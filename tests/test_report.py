@@ -15,31 +15,31 @@ from typer.testing import CliRunner
 
 from gazerig.config.schema import Rig, load_rig, load_walk
 from gazerig.drivers.errors import SetupError
-from gazerig.gaze.types import PARTS
-from gazerig.robot.analysis import human_norms as human
-from gazerig.robot.analysis import norm_bands as bands
-from gazerig.robot.analysis.event_detector import FixationEvent
-from gazerig.robot.app.assemble import assemble
-from gazerig.robot.app.options import RunOptions
-from gazerig.robot.cli.report import app, page_file
-from gazerig.robot.control.loop import run
-from gazerig.robot.report import face
-from gazerig.robot.report import report as build
-from gazerig.robot.report.compare import differences_of
-from gazerig.robot.report.compare_page import compare_page
-from gazerig.robot.report.gaze_trace import GazeTrace, GazeTraceBuilder, TraceRow
-from gazerig.robot.report.page import band_text, gauge, number, report_page
-from gazerig.robot.report.plotting import COLOURS, Shown, png
-from gazerig.robot.report.reference_walk import own, published
-from gazerig.robot.report.report import DRAWINGS, found, measured, report_of
-from gazerig.robot.report.run_header import RunHeader
-from gazerig.robot.report.statistics import (
+from gazerig.features.lab.cli.report import app, page_file
+from gazerig.features.lab.report import face
+from gazerig.features.lab.report import report as build
+from gazerig.features.lab.report.compare import differences_of
+from gazerig.features.lab.report.compare_page import compare_page
+from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder, TraceRow
+from gazerig.features.lab.report.page import band_text, gauge, number, report_page
+from gazerig.features.lab.report.plotting import COLOURS, Shown, png
+from gazerig.features.lab.report.reference_walk import own, published
+from gazerig.features.lab.report.report import DRAWINGS, found, measured, report_of
+from gazerig.features.lab.report.run_header import RunHeader
+from gazerig.features.lab.report.statistics import (
     MeasuredValue,
     judged,
     longest,
     mean,
     median,
 )
+from gazerig.gaze.types import PARTS
+from gazerig.robot.analysis import human_norms as human
+from gazerig.robot.analysis import norm_bands as bands
+from gazerig.robot.analysis.event_detector import FixationEvent
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.control.loop import run
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from gazerig.config.schema import load_rig
+from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
+from gazerig.features.lab.report.landing import planned_saccades
 from gazerig.gaze.lids import LidParams, Lids
 from gazerig.gaze.saccade import SaccadeModel as Jumps
 from gazerig.gaze.saccade import SaccadeParams
@@ -17,8 +19,6 @@ from gazerig.robot.analysis.saccade_finder import Jump, SaccadeFinder
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.control.loop import Tick, run
-from gazerig.robot.report.gaze_trace import GazeTrace, GazeTraceBuilder
-from gazerig.robot.report.landing import planned_saccades
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 

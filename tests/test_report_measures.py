@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from made_traces import run_of, verdicts
 
+from gazerig.features.lab.analysis.reaction_finder import ReactionFinder
+from gazerig.features.lab.report import blinks, eye_contact, landing, rests
+from gazerig.features.lab.report.gaze_trace import GazeTrace, TraceRow
+from gazerig.features.lab.report.lid_closure import blinks_of
 from gazerig.gaze.lids import LidParams, Lids
 from gazerig.gaze.types import Bodies, Percept
 from gazerig.robot.analysis.blink_finder import BlinkEvent
 from gazerig.robot.analysis.event_detector import Commanded, SaccadeEvent
-from gazerig.robot.analysis.reaction_finder import ReactionFinder
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.report import blinks, eye_contact, landing, rests
-from gazerig.robot.report.gaze_trace import GazeTrace, TraceRow
-from gazerig.robot.report.lid_closure import blinks_of
 
 
 def flown(

@@ -19,6 +19,11 @@ from six_joints import SIX
 from gazerig.config.schema import Rig, load_rig
 from gazerig.config.text import rig_text, walk_text
 from gazerig.drivers.errors import SetupError
+from gazerig.features.lab.report import report as build
+from gazerig.features.lab.report.compare import compare
+from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
+from gazerig.features.lab.report.joint_basis import JointBasis
+from gazerig.features.lab.report.run_header import RunHeader
 from gazerig.robot.analysis.lid_opening import UPPER, openings
 from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app.assemble import Substitutes, assemble
@@ -40,11 +45,6 @@ from gazerig.robot.recording.run_writer import RunWriter
 from gazerig.robot.recording.snapshot_index import SnapshotIndex
 from gazerig.robot.recording.tick_record import as_json, from_json
 from gazerig.robot.remote.request_handler import Pulse
-from gazerig.robot.report import report as build
-from gazerig.robot.report.compare import compare
-from gazerig.robot.report.gaze_trace import GazeTrace, GazeTraceBuilder
-from gazerig.robot.report.joint_basis import JointBasis
-from gazerig.robot.report.run_header import RunHeader
 
 pytestmark = pytest.mark.usefixtures("branched_children", "ideal_servos")
 

@@ -10,18 +10,18 @@ import pytest
 from study_records import QUESTIONS, UTC, design, pairs, records
 
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.cli.study_analyse import verdicts
-from gazerig.robot.report.study.page import banners
-from gazerig.robot.report.study.report import with_looks, write_report
-from gazerig.robot.report.study.tables import results_json
-from gazerig.robot.study.analysis import analysed
-from gazerig.robot.study.collected import collected
-from gazerig.robot.study.data_folder import StudyData, code_of
-from gazerig.robot.study.design import Condition, Exclusion, StudyDesign
-from gazerig.robot.study.journal import FILE, Journal
-from gazerig.robot.study.preregistration import canonical
-from gazerig.robot.study.records import Opened, Record, TrialBegan
-from gazerig.robot.study.simulation import Population
+from gazerig.features.study.analysis import analysed
+from gazerig.features.study.cli.analyse import verdicts
+from gazerig.features.study.collected import collected
+from gazerig.features.study.data_folder import StudyData, code_of
+from gazerig.features.study.design import Condition, Exclusion, StudyDesign
+from gazerig.features.study.journal import FILE, Journal
+from gazerig.features.study.preregistration import canonical
+from gazerig.features.study.records import Opened, Record, TrialBegan
+from gazerig.features.study.report.page import banners
+from gazerig.features.study.report.report import with_looks, write_report
+from gazerig.features.study.report.tables import results_json
+from gazerig.features.study.simulation import Population
 
 TWO = ("walk", "centre")
 SHOWN = {"walk": {"gaze.scanpath.model": "markov"}, "centre": {"gaze.scanpath.model": "simple"}}

@@ -12,10 +12,10 @@ from recorded_run import record
 from study_records import QUESTIONS, design, records
 
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.report.study.bids import StudyDataSet, write_study
-from gazerig.robot.study.analysis import StudyAnalysis, analysed
-from gazerig.robot.study.participation import participation
-from gazerig.robot.study.records import ItemAnswered, Record, TrialEnded
+from gazerig.features.study.analysis import StudyAnalysis, analysed
+from gazerig.features.study.participation import participation
+from gazerig.features.study.records import ItemAnswered, Record, TrialEnded
+from gazerig.features.study.report.bids import StudyDataSet, write_study
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from gazerig.config.study_file import LoadedStudy, load_study
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.app.study.participant import opened_journal
-from gazerig.robot.app.study.simulated_session import simulate_study
-from gazerig.robot.study.data_folder import StudyData, code_of
-from gazerig.robot.study.journal import FILE, Journal, read
-from gazerig.robot.study.records import Closed, ItemAnswered, Opened
-from gazerig.robot.study.simulation import Population
+from gazerig.features.study.data_folder import StudyData, code_of
+from gazerig.features.study.journal import FILE, Journal, read
+from gazerig.features.study.records import Closed, ItemAnswered, Opened
+from gazerig.features.study.run.participant import opened_journal
+from gazerig.features.study.run.simulated_session import simulate_study
+from gazerig.features.study.run.study_file import LoadedStudy, load_study
+from gazerig.features.study.simulation import Population
 
 
 @pytest.fixture(scope="module")

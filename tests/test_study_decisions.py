@@ -8,10 +8,9 @@ import pytest
 from scipy import stats
 from study_records import PAPER, QUESTIONS, UTC, design, pairs, records
 
-from gazerig.robot.report.study import apa
-from gazerig.robot.study.analysis import analysed, circular_triples
-from gazerig.robot.study.decisions import Decision, decisions
-from gazerig.robot.study.design import (
+from gazerig.features.study.analysis import analysed, circular_triples
+from gazerig.features.study.decisions import Decision, decisions
+from gazerig.features.study.design import (
     Exclusion,
     Hypothesis,
     StatisticalPlan,
@@ -19,10 +18,10 @@ from gazerig.robot.study.design import (
     Test,
     Trials,
 )
-from gazerig.robot.study.measures import measures
-from gazerig.robot.study.participation import Participation, participation
-from gazerig.robot.study.questionnaire import Questionnaire
-from gazerig.robot.study.records import (
+from gazerig.features.study.measures import measures
+from gazerig.features.study.participation import Participation, participation
+from gazerig.features.study.questionnaire import Questionnaire
+from gazerig.features.study.records import (
     Closed,
     Consented,
     ItemAnswered,
@@ -31,8 +30,9 @@ from gazerig.robot.study.records import (
     TrialBegan,
     TrialEnded,
 )
-from gazerig.robot.study.scores import item_answers, scores, wins
-from gazerig.robot.study.simulation import Population
+from gazerig.features.study.report import apa
+from gazerig.features.study.scores import item_answers, scores, wins
+from gazerig.features.study.simulation import Population
 
 TWO = ("walk", "centre")
 

@@ -12,12 +12,13 @@ from gazerig.config.parameters import changed
 from gazerig.config.schema import Rig
 from gazerig.config.shipped import shipped_names
 from gazerig.drivers.errors import SetupError
+from gazerig.features.lab.simulated_run import simulate
+from gazerig.features.study.cli.design import EXAMPLE, notes, state
+from gazerig.features.study.data_folder import StudyData
+from gazerig.features.study.run.study_check import checked_study
+from gazerig.features.study.shipped import HOME
 from gazerig.robot.app.assemble import with_options
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.simulated_run import simulate
-from gazerig.robot.app.study_file import checked_study
-from gazerig.robot.cli.study_design import EXAMPLE, notes, state
-from gazerig.robot.study.data_folder import StudyData
 
 Terminal = pytest.CaptureFixture[str]
 
@@ -125,7 +126,7 @@ def test_a_preregistration_states_all_that_a_reviewer_asks_for(elsewhere: Path) 
     assert "{{" not in text and "\n\n\n" not in text
 
 
-@pytest.mark.parametrize("name", shipped_names("studies"))
+@pytest.mark.parametrize("name", shipped_names("studies", HOME))
 def test_every_shipped_study_can_be_stated(name: str, elsewhere: Path, capfd: Terminal) -> None:
     assert typed("study", "design", name) == 0
     shown = capfd.readouterr()
@@ -172,7 +173,7 @@ def test_pairs_are_stated_as_pairs(elsewhere: Path, capfd: Terminal) -> None:
     assert "the first or the second" in stated and "by the normal approximation" in stated
 
 
-@pytest.mark.parametrize("name", shipped_names("studies"))
+@pytest.mark.parametrize("name", shipped_names("studies", HOME))
 def test_the_conditions_of_shipped_studies_move_the_head_differently(name: str) -> None:
     study = checked_study(name)
     shown = study.design.presentation

@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 from study_at_the_page import CODE, Pages, Tab, serving
 
-from gazerig.config.study_file import LoadedStudy, load_study
-from gazerig.robot.dashboard.study.head_link import HeadReport
-from gazerig.robot.study.presenter import FilmPresenter
-from gazerig.robot.study.records import Closed, TrialEnded
+from gazerig.features.study.pages.head_link import HeadReport
+from gazerig.features.study.presenter import FilmPresenter
+from gazerig.features.study.records import Closed, TrialEnded
+from gazerig.features.study.run.study_file import LoadedStudy, load_study
 
 
 class Head:

@@ -9,16 +9,16 @@ import pytest
 from scipy import stats
 from study_records import QUESTIONS, design, records
 
-from gazerig.robot.study.decisions import decisions
-from gazerig.robot.study.design import Condition, Hypothesis, StudyDesign, Trials
-from gazerig.robot.study.measures import measures
-from gazerig.robot.study.participation import Participation, participation
-from gazerig.robot.study.power import claim, power_of
-from gazerig.robot.study.preregistration_text import sentence
-from gazerig.robot.study.records import ItemAnswered
-from gazerig.robot.study.rules import asked_rules
-from gazerig.robot.study.scores import scores
-from gazerig.robot.study.simulation import Population, levels
+from gazerig.features.study.decisions import decisions
+from gazerig.features.study.design import Condition, Hypothesis, StudyDesign, Trials
+from gazerig.features.study.measures import measures
+from gazerig.features.study.participation import Participation, participation
+from gazerig.features.study.power import claim, power_of
+from gazerig.features.study.preregistration_text import sentence
+from gazerig.features.study.records import ItemAnswered
+from gazerig.features.study.rules import asked_rules
+from gazerig.features.study.scores import scores
+from gazerig.features.study.simulation import Population, levels
 
 GAZE = Hypothesis("paper.looked_at", "gaze=walk", "gaze=centre")
 LIDS = Hypothesis("paper.naturalness", "lids=blink", "lids=stare", also=("rank_sum",))

@@ -10,9 +10,10 @@ from recorded_run import record
 
 from gazerig.config.faults import ConfigError
 from gazerig.config.shipped import shipped_names
-from gazerig.config.study_file import load_questionnaire, load_study
+from gazerig.features.study.run.study_check import checked_study
+from gazerig.features.study.run.study_file import load_questionnaire, load_study
+from gazerig.features.study.shipped import HOME
 from gazerig.gaze.top_down import PLANNED
-from gazerig.robot.app.study_file import checked_study
 
 HEAD = "title: t\nquestionnaires: [nakamoto_tsuruno]\n"
 TWO = """\
@@ -45,7 +46,7 @@ def conditions(text: str, more: str = "") -> str:
     return f"{HEAD}conditions:\n{indent(dedent(text).strip(), '  ')}\n{more}"
 
 
-@pytest.mark.parametrize("name", shipped_names("studies"))
+@pytest.mark.parametrize("name", shipped_names("studies", HOME))
 def test_every_shipped_study_is_good_and_its_conditions_differ(name: str) -> None:
     study = checked_study(name)
     keys = list(study.design.conditions)
@@ -56,7 +57,7 @@ def test_every_shipped_study_is_good_and_its_conditions_differ(name: str) -> Non
     assert set(study.questionnaires) == {*study.design.questionnaires, *study.design.after}
 
 
-@pytest.mark.parametrize("name", shipped_names("studies"))
+@pytest.mark.parametrize("name", shipped_names("studies", HOME))
 def test_what_participants_read_before_names_no_condition(name: str) -> None:
     design = checked_study(name).design
     assert design.welcome and design.debriefing and design.hypotheses
@@ -70,7 +71,7 @@ def test_what_participants_read_before_names_no_condition(name: str) -> None:
 
 
 def test_the_shipped_studies_are_those_of_the_papers_and_of_the_program() -> None:
-    assert shipped_names("studies") == (
+    assert shipped_names("studies", HOME) == (
         *("boxing", "default_against_papers", "nakamoto_1", "nakamoto_2"),
     )
     assert load_study("nakamoto_1").changes("simple", "face_tracking") == {
@@ -95,7 +96,7 @@ def test_published_questionnaires_have_their_items_and_scales(
     )
 
 
-@pytest.mark.parametrize("name", shipped_names("questionnaires"))
+@pytest.mark.parametrize("name", shipped_names("questionnaires", HOME))
 def test_every_shipped_questionnaire_names_source_and_licence(name: str) -> None:
     asked = load_questionnaire(name)
     assert asked.source and asked.licence and asked.items

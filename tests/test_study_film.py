@@ -9,12 +9,12 @@ import pytest
 from rendering import renders as renders
 
 from gazerig.config.faults import ConfigError
-from gazerig.config.study_file import LoadedStudy, load_study
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.film_writer import film_seconds, film_writer
 from gazerig.drivers.types import ImageArray
-from gazerig.robot.app.study import film
-from gazerig.robot.app.study_file import checked_study
+from gazerig.features.study.run import film
+from gazerig.features.study.run.study_check import checked_study
+from gazerig.features.study.run.study_file import LoadedStudy, load_study
 
 
 @pytest.fixture(scope="module")

@@ -8,16 +8,16 @@ import pytest
 from shown_page import wait_for
 from slow_rigs import at_rate
 
-from gazerig.config.study_file import LoadedStudy, load_study
+from gazerig.features.study.presenter import HeadLost
+from gazerig.features.study.records import STEP_DEG, Record, TrialBegan, TrialEnded
+from gazerig.features.study.run.head_main import as_line, options_in
+from gazerig.features.study.run.head_presenter import HeadPresenter
+from gazerig.features.study.run.study_file import LoadedStudy, load_study
+from gazerig.features.study.run.trial_measures import SWITCH_S, measured
+from gazerig.features.study.session import ShownTrial
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.study.head_main import as_line, options_in
-from gazerig.robot.app.study.head_presenter import HeadPresenter
-from gazerig.robot.app.study.trial_measures import SWITCH_S, measured
 from gazerig.robot.model.clock import RealClock
 from gazerig.robot.recording.read import RunRecording
-from gazerig.robot.study.presenter import HeadLost
-from gazerig.robot.study.records import STEP_DEG, Record, TrialBegan, TrialEnded
-from gazerig.robot.study.session import ShownTrial
 
 pytestmark = pytest.mark.usefixtures("branched_children")
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.study.journal import FILE, Journal, NotKept, encoded, read
-from gazerig.robot.study.records import (
+from gazerig.features.study.journal import FILE, Journal, NotKept, encoded, read
+from gazerig.features.study.records import (
     Closed,
     Consented,
     ItemAnswered,

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
 from gazerig.config.faults import ConfigError
-from gazerig.config.shipped import SHIPPED
-from gazerig.robot.app.study_file import checked_study
+from gazerig.features.study.run.study_check import checked_study
+from gazerig.features.study.shipped import HOME
 
 WRONG: tuple[object, ...] = (
     *(
@@ -41,7 +41,7 @@ WRONG: tuple[object, ...] = (
     ),
 )
 """What may stand anywhere in a file by mistake."""
-DESIGN = YAML(typ="safe").load((SHIPPED / "studies" / "nakamoto_2.yaml").read_text("utf-8"))
+DESIGN = YAML(typ="safe").load((HOME / "studies" / "nakamoto_2.yaml").read_text("utf-8"))
 PLACES = (
     *(("title",), ("task",), ("welcome",), ("conditions",), ("conditions", "simple"), ("plan",)),
     *(("translations",), ("translations", "de"), ("translations", "ja", "welcome")),

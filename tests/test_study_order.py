@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gazerig.robot.study.design import Condition, StudyDesign, Trials
-from gazerig.robot.study.order import PAIR, orders, practice, rows, shown, williams
+from gazerig.features.study.design import Condition, StudyDesign, Trials
+from gazerig.features.study.order import PAIR, orders, practice, rows, shown, williams
 
 
 def design_of(n: int, **trials: object) -> StudyDesign:

@@ -14,17 +14,17 @@ import pytest
 from page_at_the_door import fetch
 from study_at_the_page import CODE, EXPERIMENTER, PARTICIPANT, Pages, Tab, answers, serving
 
-from gazerig.config.load import SHIPPED
-from gazerig.config.study_file import LoadedStudy, load_study
+from gazerig.features.study.design import Condition
+from gazerig.features.study.journal import NotKept
+from gazerig.features.study.pages import server
+from gazerig.features.study.pages.study_files import FOLDER, HEADERS
+from gazerig.features.study.records import Closed, Consented, ItemAnswered, TrialBegan, TrialEnded
+from gazerig.features.study.run.study_file import LoadedStudy, load_study
+from gazerig.features.study.shipped import HOME
 from gazerig.robot.dashboard.door import connection_limits
 from gazerig.robot.dashboard.door.addresses import page_url
-from gazerig.robot.dashboard.study import server
-from gazerig.robot.dashboard.study.study_files import FOLDER, HEADERS
-from gazerig.robot.study.design import Condition
-from gazerig.robot.study.journal import NotKept
-from gazerig.robot.study.records import Closed, Consented, ItemAnswered, TrialBegan, TrialEnded
 
-STUDIES = sorted(path.stem for path in (SHIPPED / "studies").glob("*.yaml"))
+STUDIES = sorted(path.stem for path in (HOME / "studies").glob("*.yaml"))
 
 
 @pytest.fixture(scope="module")

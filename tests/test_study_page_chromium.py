@@ -14,9 +14,9 @@ from page_layout import value, violations
 from shown_page import wait_for
 from study_at_the_page import CODE, Pages, Tab, serving
 
-from gazerig.config.study_file import LoadedStudy, load_study
-from gazerig.robot.study.journal import NotKept
-from gazerig.robot.study.records import AnswerValue, ItemAnswered, TrialBegan, TrialEnded
+from gazerig.features.study.journal import NotKept
+from gazerig.features.study.records import AnswerValue, ItemAnswered, TrialBegan, TrialEnded
+from gazerig.features.study.run.study_file import LoadedStudy, load_study
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from gazerig.config.study_file import load_study
-from gazerig.robot.study.design import DECIDING, Test
-from gazerig.robot.study.measures import measures
-from gazerig.robot.study.power import (
+from gazerig.features.study.design import DECIDING, Test
+from gazerig.features.study.measures import measures
+from gazerig.features.study.power import (
     MOST,
     PowerQuestion,
     by_formula,
@@ -19,8 +18,9 @@ from gazerig.robot.study.power import (
     power_of,
     sample_size,
 )
-from gazerig.robot.study.simulation import differences, effect_of, shift_of
-from gazerig.robot.study.statistics.ranks import exact_signed_rank, exact_swaps, sign
+from gazerig.features.study.run.study_file import load_study
+from gazerig.features.study.simulation import differences, effect_of, shift_of
+from gazerig.features.study.statistics.ranks import exact_signed_rank, exact_swaps, sign
 
 SIGNED = PowerQuestion("signed_rank", 0.6, 0.05)
 STUDIES = 500

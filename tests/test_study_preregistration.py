@@ -7,10 +7,11 @@ from pathlib import Path
 import pytest
 
 from gazerig.config.shipped import SHIPPED, shipped_names
-from gazerig.config.study_file import LoadedStudy, load_study
+from gazerig.features.study.run.study_file import LoadedStudy, load_study
+from gazerig.features.study.shipped import HOME
 
 PORT = re.compile(r"port: \S+")
-TEXT = (SHIPPED / "studies" / "nakamoto_1.yaml").read_text(encoding="utf-8")
+TEXT = (HOME / "studies" / "nakamoto_1.yaml").read_text(encoding="utf-8")
 
 
 def study_of(folder: Path, text: str) -> LoadedStudy:
@@ -79,7 +80,7 @@ def test_films_and_the_order_of_items_are_part_of_it(tmp_path: Path) -> None:
     assert len(found) == 2
 
 
-@pytest.mark.parametrize("name", shipped_names("studies"))
+@pytest.mark.parametrize("name", shipped_names("studies", HOME))
 def test_the_canonical_text_is_json_with_everything_written_out(name: str) -> None:
     study = load_study(name)
     stated = json.loads(study.canonical)

@@ -12,16 +12,16 @@ from math import nan
 import pytest
 from study_records import QUESTIONS, design, pairs, records
 
-from gazerig.robot.report.study import apa, figures
-from gazerig.robot.report.study.page import banners, study_page
-from gazerig.robot.report.study.r_script import r_script
-from gazerig.robot.report.study.tables import ANSWERS, answers_csv, results_json, trials_csv
-from gazerig.robot.study.analysis import StudyAnalysis, analysed, within_halves
-from gazerig.robot.study.design import Condition, Hypothesis, StudyDesign, Trials
-from gazerig.robot.study.participation import participation
-from gazerig.robot.study.records import STEP_DEG, ItemAnswered, Opened, TrialEnded
-from gazerig.robot.study.simulation import Population
-from gazerig.robot.study.statistics.results import EffectSize, StatisticalTest
+from gazerig.features.study.analysis import StudyAnalysis, analysed, within_halves
+from gazerig.features.study.design import Condition, Hypothesis, StudyDesign, Trials
+from gazerig.features.study.participation import participation
+from gazerig.features.study.records import STEP_DEG, ItemAnswered, Opened, TrialEnded
+from gazerig.features.study.report import apa, figures
+from gazerig.features.study.report.page import banners, study_page
+from gazerig.features.study.report.r_script import r_script
+from gazerig.features.study.report.tables import ANSWERS, answers_csv, results_json, trials_csv
+from gazerig.features.study.simulation import Population
+from gazerig.features.study.statistics.results import EffectSize, StatisticalTest
 
 SHA = "ab" * 32
 

@@ -9,13 +9,13 @@ import pytest
 from study_runs import UTC, run_of, screens, step
 
 from gazerig.config.shipped import shipped_names
-from gazerig.config.study_file import LoadedStudy, load_questionnaire, load_study
-from gazerig.robot.study.answers import LONGEST_TEXT, WrongAnswer
-from gazerig.robot.study.journal import read
-from gazerig.robot.study.order import PAIR
-from gazerig.robot.study.presenter import HeadLost, Presented
-from gazerig.robot.study.records import Closed, ItemAnswered, TrialBegan, TrialEnded
-from gazerig.robot.study.screens import (
+from gazerig.features.study.answers import LONGEST_TEXT, WrongAnswer
+from gazerig.features.study.journal import read
+from gazerig.features.study.order import PAIR
+from gazerig.features.study.presenter import HeadLost, Presented
+from gazerig.features.study.records import Closed, ItemAnswered, TrialBegan, TrialEnded
+from gazerig.features.study.run.study_file import LoadedStudy, load_questionnaire, load_study
+from gazerig.features.study.screens import (
     ConsentScreen,
     EndScreen,
     InstructionsScreen,
@@ -25,7 +25,8 @@ from gazerig.robot.study.screens import (
     ReadyScreen,
     RestScreen,
 )
-from gazerig.robot.study.session import INTERRUPTED, ShownTrial
+from gazerig.features.study.session import INTERRUPTED, ShownTrial
+from gazerig.features.study.shipped import HOME
 
 
 def rating(**trials: float) -> LoadedStudy:
@@ -44,7 +45,7 @@ def _with(study: LoadedStudy, **trials: float) -> LoadedStudy:
     return replace(study, design=design)
 
 
-@pytest.mark.parametrize("name", shipped_names("studies"))
+@pytest.mark.parametrize("name", shipped_names("studies", HOME))
 def test_all_of_a_study_is_shown_and_asked_in_its_order(name: str, tmp_path: Path) -> None:
     study = load_study(name)
     study = replace(

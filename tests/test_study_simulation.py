@@ -8,12 +8,12 @@ import pytest
 from scipy import stats
 from study_records import QUESTIONS, design, pairs, records
 
-from gazerig.robot.study.design import Hypothesis, Trials
-from gazerig.robot.study.measures import measures
-from gazerig.robot.study.participation import participation
-from gazerig.robot.study.power import PowerQuestion, power_of
-from gazerig.robot.study.scores import scores, wins
-from gazerig.robot.study.simulation import (
+from gazerig.features.study.design import Hypothesis, Trials
+from gazerig.features.study.measures import measures
+from gazerig.features.study.participation import participation
+from gazerig.features.study.power import PowerQuestion, power_of
+from gazerig.features.study.scores import scores, wins
+from gazerig.features.study.simulation import (
     BETWEEN_SD,
     ITEM_SD,
     TRIAL_SD,
@@ -26,7 +26,7 @@ from gazerig.robot.study.simulation import (
     rated,
     shift_of,
 )
-from gazerig.robot.study.statistics.ranks import exact_signed_rank
+from gazerig.features.study.statistics.ranks import exact_signed_rank
 
 
 @pytest.mark.parametrize("points", [2, 5, 7, 11])

@@ -12,10 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 from scipy import stats
 
-from gazerig.robot.study.statistics import effects, ranks
-from gazerig.robot.study.statistics.contingency import chi_square, counts_of
-from gazerig.robot.study.statistics.multiplicity import Correction, corrected
-from gazerig.robot.study.statistics.reliability import cronbachs_alpha
+from gazerig.features.lab.analysis.multiplicity import Correction, corrected
+from gazerig.features.study.statistics import effects, ranks
+from gazerig.features.study.statistics.contingency import chi_square, counts_of
+from gazerig.features.study.statistics.reliability import cronbachs_alpha
 
 GOLDEN = json.loads(golden.FILE.read_text())
 PINGOUIN = importlib.util.find_spec("pingouin") is not None

@@ -3,7 +3,7 @@
 import json
 import re
 
-from gazerig.robot.dashboard.study.study_files import FOLDER
+from gazerig.features.study.pages.study_files import FOLDER
 
 
 def test_every_text_is_there_in_every_language_with_the_same_places() -> None:

@@ -22,16 +22,16 @@ from gazerig.config.schema import load_rig
 from gazerig.config.text import rig_text
 from gazerig.drivers import child_process
 from gazerig.drivers.errors import SetupError
+from gazerig.features.lab.simulated_run import simulate
+from gazerig.features.lab.sweep.axes import Axis, Point, grid, latin_hypercube
+from gazerig.features.lab.sweep.outcome import OUTSIDE, Outcome, figures_of, grade
+from gazerig.features.lab.sweep.response import most_responsive
+from gazerig.features.lab.sweep.response_figure import response_png
+from gazerig.features.lab.sweep.run_store import RUNS, run_store
+from gazerig.features.lab.sweep.table import rows_of, write_tables
+from gazerig.features.lab.sweep.worker import Job, figures_at
+from gazerig.features.lab.sweep.worker_pool import SweepInterrupted, WorkerPool
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.simulated_run import simulate
-from gazerig.robot.sweep.axes import Axis, Point, grid, latin_hypercube
-from gazerig.robot.sweep.outcome import OUTSIDE, Outcome, figures_of, grade
-from gazerig.robot.sweep.response import most_responsive
-from gazerig.robot.sweep.response_figure import response_png
-from gazerig.robot.sweep.run_store import RUNS, run_store
-from gazerig.robot.sweep.table import rows_of, write_tables
-from gazerig.robot.sweep.worker import Job, figures_at
-from gazerig.robot.sweep.worker_pool import SweepInterrupted, WorkerPool
 
 pytestmark = pytest.mark.usefixtures("branched_children")
 

@@ -10,8 +10,8 @@ from gazerig.config.load import ConfigError
 from gazerig.config.parameters import changed
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
+from gazerig.features.lab.sweep.axes import Axis, axes_of, checked, grid, latin_hypercube
 from gazerig.robot.cli.tune import read_value
-from gazerig.robot.sweep.axes import Axis, axes_of, checked, grid, latin_hypercube
 
 RIG = load_rig("desk")
 COMFORT, BLINKS = "gaze.head.comfort_deg", "gaze.lids.blinks_per_min"

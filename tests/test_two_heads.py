@@ -13,6 +13,7 @@ pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install -e '.
 from command_line import invoked
 
 from gazerig.drivers.errors import SetupError
+from gazerig.features.lab.report.heads import mutual_gaze_report
 from gazerig.robot.analysis.kept_time import fell_behind
 from gazerig.robot.analysis.mutual_gaze import HeadPlace, mutual_gaze
 from gazerig.robot.app.options import RunOptions
@@ -22,7 +23,6 @@ from gazerig.robot.app.world.lockstep import Lockstep
 from gazerig.robot.control.interrupts import Interrupts
 from gazerig.robot.model.description.links import IDENTITY
 from gazerig.robot.recording.read import RunRecording
-from gazerig.robot.report.heads import mutual_gaze_report
 
 ASKED = RunOptions(mock=True, fast=True, world="two-heads", seconds=3.0, no_pictures=True)
 

@@ -19,16 +19,16 @@ from gazerig.drivers.camera.recording_writer import RecordingWriter
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.file_input import FileTooLarge, NotRegularFile, read_limited
 from gazerig.drivers.file_output import output_file, output_text, refuse_existing, write_file
-from gazerig.robot.analysis.eye_tracker_csv import read_recording
+from gazerig.features.lab.analysis.eye_tracker_csv import read_recording
+from gazerig.features.lab.report.files import files_of, write_all
+from gazerig.features.lab.report.gaze_trace import GazeTrace, TraceRow
+from gazerig.features.lab.report.page import Figure, report_page
+from gazerig.features.lab.report.plotting import COLOURS, Shown, png
+from gazerig.features.lab.report.report import DRAWINGS, found
+from gazerig.features.lab.report.run_header import RunHeader
 from gazerig.robot.analysis.heatmap import face_from
 from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.remote.file_watch import look
-from gazerig.robot.report.files import files_of, write_all
-from gazerig.robot.report.gaze_trace import GazeTrace, TraceRow
-from gazerig.robot.report.page import Figure, report_page
-from gazerig.robot.report.plotting import COLOURS, Shown, png
-from gazerig.robot.report.report import DRAWINGS, found
-from gazerig.robot.report.run_header import RunHeader
 
 SECRET = "root:$6$abcdefgh:19000:0:99999:7:::\ndaemon:*:19000:0:99999:7:::\n"
 

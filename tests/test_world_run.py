@@ -11,11 +11,11 @@ from rendering import why_not
 
 import gazerig
 from gazerig.config.schema import load_rig
+from gazerig.features.lab.simulated_run import simulate
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.app.session import compose, run
-from gazerig.robot.app.simulated_run import simulate
 from gazerig.robot.recording.read import RunRecording
 from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.world import gl_context

@@ -1,20 +1,29 @@
 """The commands of ``gazerig``: where each is defined, and its line in the list of all.
 
 The list is written here and not collected, as a short command must not wait for the modules of all
-others; tests/test_cli_start.py holds it against them.
+others; tests/test_cli_start.py holds it against them. Those of features and packages come from
+entry points.
 """
 
+from collections.abc import Mapping
+from functools import cache
 from typing import NamedTuple
+
+from gazerig.drivers.plugins import COMMAND, SHIPPED, PluginError, Registration, find, registered
 
 
 class CommandEntry(NamedTuple):
-    """One command in the list.
+    """One command in the list; what an entry point of the group ``gazerig.command`` names.
 
-    module: of this folder, which has it in its ``app``; summary: the first paragraph of its help
+    Attributes:
+        module: has the command in its ``app``, a ``typer.Typer``.
+        summary: the first paragraph of its help.
+        panel: of the help, under which it is listed.
     """
 
     module: str
     summary: str
+    panel: str = "Tools"
 
 
 PANELS: dict[str, dict[str, CommandEntry]] = {
@@ -37,27 +46,12 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
             "replay",
             "Show a recorded run on the page, with a time slider; or run it again with --rerun.",
         ),
-        "report": CommandEntry(
-            "report",
-            "Report how human a run's gaze was: gazerig report run.mcap, then open report.html.",
-        ),
-        "compare": CommandEntry(
-            "report", "Show two runs side by side, with the differences that exceed chance."
-        ),
-        "sweep": CommandEntry(
-            "sweep",
-            "Vary parameters over many simulated runs: a table, and a picture of what responds.",
-        ),
         "export": CommandEntry(
             "replay",
             "Write a recorded run as eye-tracking tools read it: degrees, + left and + up.",
         ),
     },
-    "Study": {
-        "study": CommandEntry(
-            "study", "Let people judge two to six gazes, blind: design, run and analyse a study."
-        ),
-    },
+    "Study": {},
     "Bring-up": {
         "scan": CommandEntry(
             "scan", "List serial ports, and who answers on one at every baud rate."
@@ -137,12 +131,41 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
             "gestures",
             "Make a gesture of key frames from an animation program, as YAML that rigs take.",
         ),
-        "fit-scanpath": CommandEntry(
-            "fit_scanpath",
-            "Fit a walk over the face to an eye-tracker recording, as YAML that run takes.",
-        ),
     },
 }
-"""Panel of the help -> its commands, all in the order in which they are shown."""
+"""Panel of the help -> the core's commands in it, by the name of their module in this folder."""
 
-COMMANDS = {name: entry for panel in PANELS.values() for name, entry in panel.items()}
+
+@cache
+def shipped_commands() -> Mapping[str, CommandEntry]:
+    """Return the core's commands and those of the features that are there, by name."""
+    found = {
+        name: CommandEntry(f"gazerig.robot.cli.{entry.module}", entry.summary, panel)
+        for panel, entries in PANELS.items()
+        for name, entry in entries.items()
+    }
+    return found | _loaded([find(COMMAND, name) for name in SHIPPED[COMMAND]])
+
+
+def package_commands() -> Mapping[str, CommandEntry]:
+    """Return the commands of installed packages, by name."""
+    return _loaded([one for one in registered(COMMAND) if not one.ours])
+
+
+def in_order(commands: Mapping[str, CommandEntry]) -> list[str]:
+    """Return names of commands panel by panel, as the help shows them."""
+    panels = [*PANELS, *(entry.panel for entry in commands.values())]
+    return sorted(commands, key=lambda name: panels.index(commands[name].panel))
+
+
+def _loaded(parts: list[Registration]) -> dict[str, CommandEntry]:
+    """Return the commands of the parts that can be loaded."""
+    found = {}
+    for one in parts:
+        try:
+            entry = one.load()
+        except PluginError:
+            continue  # reported when the command is used
+        if isinstance(entry, CommandEntry):
+            found[one.name] = entry
+    return found

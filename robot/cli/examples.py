@@ -1,6 +1,7 @@
 """Examples for every command's help, and the names a shell completes."""
 
 from collections.abc import Callable, Iterable
+from pathlib import Path
 
 import typer
 
@@ -222,9 +223,11 @@ def epilog(examples: Iterable[tuple[str, str]]) -> str:
     return "\n\n".join(f"gazerig {text}   ({what})" for text, what in examples)
 
 
-def complete_shipped(kind: str) -> Callable[[str], list[str]]:
+def complete_shipped(kind: str, home: Path | None = None) -> Callable[[str], list[str]]:
     """Return what completes the names of a kind of shipped file, e.g. "characters"."""
-    return lambda incomplete: [name for name in shipped_names(kind) if name.startswith(incomplete)]
+    return lambda incomplete: [
+        name for name in shipped_names(kind, home) if name.startswith(incomplete)
+    ]
 
 
 def complete_scene(incomplete: str) -> list[str]:

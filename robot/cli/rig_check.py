@@ -2,11 +2,12 @@
 
 import json
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any
 
 import typer
 
 from gazerig.drivers.file_output import write_file
+from gazerig.drivers.plugins import SCHEMA, SHIPPED, find
 from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say
 
 app = typer.Typer()
@@ -50,20 +51,23 @@ def collision_lines(rig: str) -> list[str]:
 def schema(
     out: Annotated[Path | None, typer.Argument(help="File to write; default: print.")] = None,
     of: Annotated[
-        Literal["rig", "study", "questionnaire"], typer.Option(help="Kind of the files.")
+        str,
+        typer.Option(
+            help=f"Kind of the files: {', '.join(SHIPPED[SCHEMA])}, or of a package.",
+            autocompletion=lambda incomplete: [
+                n for n in SHIPPED[SCHEMA] if n.startswith(incomplete)
+            ],
+        ),
     ] = "rig",
     force: ForceOption = False,
 ) -> None:
     """Export the JSON Schema of rig files, for editors; also of studies and questionnaires."""
     from gazerig.config.export import json_schema
-    from gazerig.config.schema import Rig
-    from gazerig.robot.study.design import StudyDesign
-    from gazerig.robot.study.questionnaire import Questionnaire
 
-    kinds = {"rig": Rig, "study": StudyDesign, "questionnaire": Questionnaire}
-    text = json.dumps(json_schema(kinds[of]), indent=2) + "\n"
-    if out is None:
-        print(text, end="")
-    else:
-        with clear_errors():
+    with clear_errors():
+        kind: Any = find(SCHEMA, of).load()
+        text = json.dumps(json_schema(kind), indent=2) + "\n"
+        if out is None:
+            print(text, end="")
+        else:
             write_file(out, text, force)

@@ -87,7 +87,7 @@ STUDY = """
 import sys, time
 from pathlib import Path
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.study.head_process import HeadProcess
+from gazerig.features.study.run.head_process import HeadProcess
 from gazerig.robot.model.clock import RealClock
 head = HeadProcess(
     RunOptions(rig=sys.argv[1], port=sys.argv[2], scene="visitor"), Path(sys.argv[3]), RealClock()

@@ -14,9 +14,9 @@ from statistics import fmean
 from typing import Any
 
 from gazerig.config.schema import load_rig
+from gazerig.features.lab.simulated_run import simulate
 from gazerig.robot.app.assemble import with_options
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.simulated_run import simulate
 
 ROUND_S = 44.1
 EYES: Mapping[str, Mapping[str, Any]] = {

@@ -21,8 +21,8 @@ path.insert(0, str(Path(__file__).parents[1]))
 import study_records
 from study_records import design, pairs, records
 
-from gazerig.robot.study.decisions import decisions
-from gazerig.robot.study.design import (
+from gazerig.features.study.decisions import decisions
+from gazerig.features.study.design import (
     Condition,
     Exclusion,
     Hypothesis,
@@ -31,11 +31,11 @@ from gazerig.robot.study.design import (
     Test,
     Trials,
 )
-from gazerig.robot.study.measures import measures
-from gazerig.robot.study.participation import participation
-from gazerig.robot.study.power import claim
-from gazerig.robot.study.simulation import Population
-from gazerig.robot.study.statistics import effects
+from gazerig.features.study.measures import measures
+from gazerig.features.study.participation import participation
+from gazerig.features.study.power import claim
+from gazerig.features.study.simulation import Population
+from gazerig.features.study.statistics import effects
 
 STUDIES = 2000
 QUESTIONS = {

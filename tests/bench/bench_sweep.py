@@ -15,10 +15,10 @@ from rich.table import Table
 
 from gazerig.config.schema import load_rig
 from gazerig.config.text import rig_text
+from gazerig.features.lab.sweep.axes import Point
+from gazerig.features.lab.sweep.worker import Job
+from gazerig.features.lab.sweep.worker_pool import WorkerPool
 from gazerig.robot.app.options import BUSES, RunOptions
-from gazerig.robot.sweep.axes import Point
-from gazerig.robot.sweep.worker import Job
-from gazerig.robot.sweep.worker_pool import WorkerPool
 
 LEVELS = (4.0, 6.0, 8.0, 10.0, 12.0, 14.0, 16.0, 18.0)
 

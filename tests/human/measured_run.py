@@ -15,15 +15,15 @@ import numpy as np
 
 from gazerig.config.parameters import changed
 from gazerig.config.schema import load_rig
+from gazerig.features.lab.report.gaze_trace import GazeTrace
+from gazerig.features.lab.simulated_run import simulate
 from gazerig.gaze.angles import add, scale, sub, yaw_pitch
 from gazerig.robot.app import run_scene
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_rig import with_options
-from gazerig.robot.app.simulated_run import simulate
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.commands import Value
 from gazerig.robot.recording.gaze_angles import GazeAngles, GazeAnglesBuilder, target_text
-from gazerig.robot.report.gaze_trace import GazeTrace
 from gazerig.sim_mock.scenes.scene import Scene
 
 BEGIN_S = 3.0

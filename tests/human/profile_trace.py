@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 from gazerig.config.parameters import changed, value_of
 from gazerig.config.schema import Rig, load_rig
+from gazerig.features.lab.simulated_run import simulate
 from gazerig.robot.app import run_scene
 from gazerig.robot.app.options import RunOptions
-from gazerig.robot.app.simulated_run import simulate
 from gazerig.sim_mock.scenes.scene import Event, ScenePerson, Thing
 
 PAGE = Path(__file__).parents[2] / "docs" / "profiles.md"

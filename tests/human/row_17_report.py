@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 
 from human.measured_run import MeasuredRun
 
-from gazerig.robot.report.report import found
+from gazerig.features.lab.report.report import found
 
 SCENES = ("visitor", "face-to-face")
 WANTED = {f"{scene}, outside, most of all seeds": (0.0, 2.0) for scene in SCENES}

@@ -161,9 +161,9 @@ MUTANTS = (
     Mutant("robot/analysis/planner_score.py", "phase_s = at_s % self._round_s", "phase_s = at_s",
            "attacks of later rounds are never into an open guard", ("behaviours", "action_planner_rerun")),
     # ---- looks
-    Mutant("robot/report/eye_contact.py", "cut = float(first == 0 or last >= len(t))", "cut = float(first == 0)",
+    Mutant("features/lab/report/eye_contact.py", "cut = float(first == 0 or last >= len(t))", "cut = float(first == 0)",
            "a look that the run's end cuts off is a whole bout", ("report_measures",)),
-    Mutant("robot/report/eye_contact.py", "cut = float(first == 0 or last >= len(t))", "cut = float(last >= len(t))",
+    Mutant("features/lab/report/eye_contact.py", "cut = float(first == 0 or last >= len(t))", "cut = float(last >= len(t))",
            "a look that the run's beginning cuts off is a whole bout", ("report_measures",)),
     Mutant("robot/analysis/mutual_gaze.py", "if b > 0 and e < len(t_s)]", "if e < len(t_s)]",
            "a mutual gaze that has begun before has a length", ("two_heads",)),

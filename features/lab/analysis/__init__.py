@@ -1,0 +1,1 @@
+"""Eye-tracker recordings, fits to them, reaction times, and corrections for multiple tests."""

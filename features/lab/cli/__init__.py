@@ -1,0 +1,1 @@
+"""The commands report, compare, sweep and fit-scanpath."""

@@ -1,0 +1,312 @@
+"""The commands ``gazerig report`` and ``gazerig compare``: how human the gaze of a run was."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gazerig.config.faults import ConfigError
+from gazerig.drivers.errors import SetupError
+from gazerig.robot.cli.progress_bar import Steps, progress_bar
+from gazerig.robot.cli.rig_command import DEFAULT_RIG, RigCommand
+from gazerig.robot.cli.terminal import ForceOption, clear_errors, say, signals
+
+if TYPE_CHECKING:
+    from gazerig.config.schema import Rig
+    from gazerig.features.lab.report.gaze_trace import GazeTrace
+    from gazerig.features.lab.report.heads import MutualGazeReport
+    from gazerig.features.lab.report.run_header import RunHeader
+    from gazerig.features.lab.report.statistics import MeasureResult
+    from gazerig.gaze.scanpath import Walk
+    from gazerig.robot.app.options import RunOptions
+    from gazerig.robot.recording.read import RunRecording
+
+app = typer.Typer(add_completion=False)
+
+_PAGES = {".html", ".htm"}
+
+
+@app.command(cls=RigCommand)
+def report(
+    file: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[FILE | RIG]",
+            help="A recording of gazerig run --record; with --scene the rig of that run "
+            f"(default: {DEFAULT_RIG}).",
+        ),
+    ] = None,
+    scene: Annotated[
+        str | None, typer.Option(help="Instead of a file: run this scene in simulated time.")
+    ] = None,
+    seconds: Annotated[float, typer.Option(min=5.0, help="Length of that run.")] = 180.0,
+    character: Annotated[str | None, typer.Option(help="A character laid over it.")] = None,
+    profile: Annotated[str | None, typer.Option(help="Its style of gaze.")] = None,
+    scanpath: Annotated[str | None, typer.Option(help="Face scanpath instead of its own.")] = None,
+    saccade: Annotated[str | None, typer.Option(help="Saccades instead of its own.")] = None,
+    conversation: Annotated[str | None, typer.Option(help="talk, listen or think.")] = None,
+    bus: Annotated[
+        str | None, typer.Option(help="With --scene: emulated servos (default) or ideal ones.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all rng.")] = 0,
+    out: Annotated[
+        Path | None, typer.Option(help="The page to write; .html is added where it is missing.")
+    ] = None,
+    other: Annotated[
+        Path | None,
+        typer.Option("--with", help="The recording of the run's other head: mutual gaze, too."),
+    ] = None,
+    force: ForceOption = False,
+) -> None:
+    """Report how human a run's gaze was: gazerig report run.mcap, then open report.html."""
+    with clear_errors():
+        file, rig = _source(file, scene, bus, other)
+        # Drawing and models are heavy; `--help` does without them.
+        from gazerig.features.lab.report.files import files_of, refuse_foreign
+        from gazerig.features.lab.report.page import banner
+        from gazerig.features.lab.report.report import FIGURE_KEYS, report_of
+
+        target = page_file(out or _beside(file, scene))
+        refuse_foreign(files_of(target, FIGURE_KEYS), force)
+        with progress_bar() as tell:
+            if file is not None:
+                about, run = _recorded(file, file.stem, tell)
+            else:
+                from gazerig.robot.app.options import RunOptions
+
+                options = RunOptions(
+                    True, True, seed, scene, scanpath=scanpath, saccade=saccade, bus=bus, rig=rig,
+                    character=character, profile=profile, conversation=conversation,
+                    seconds=seconds,
+                ).checked()  # fmt: skip
+                about, run = _simulated(options, tell)
+            gaze = None if file is None or other is None else _mutual_gaze(file, other)
+            made = report_of(run, about, target, tell, force, gaze)
+        if text := banner(run.joints):
+            say(text)
+        _tell_findings(made.findings)
+        say(f"{made.page}: the whole report; {len(made.figures)} figures beside it")
+
+
+def _source(
+    file: Path | None, scene: str | None, bus: str | None, other: Path | None
+) -> tuple[Path | None, str]:
+    """Return what to report of: a recording, or None for a scene; and the rig of that scene.
+
+    Raises:
+        SetupError: an option does not go with a recording, or not with a scene.
+    """
+    rig = DEFAULT_RIG
+    if scene is not None and file is not None and file.suffix != ".mcap":
+        rig, file = str(file), None
+    if (file is None) == (scene is None):
+        raise SetupError("report takes a recording, or --scene NAME: one of them")
+    if file is not None and bus is not None:
+        raise SetupError("--bus needs --scene: a recording was made on the bus it names")
+    if file is None and other is not None:
+        raise SetupError("--with takes the recording of another head: give both recordings")
+    return file, rig
+
+
+@app.command()
+def compare(
+    first: Annotated[Path, typer.Argument(metavar="A", help="A recording.")],
+    second: Annotated[Path, typer.Argument(metavar="B", help="Another recording.")],
+    out: Annotated[
+        Path, typer.Option(help="The page to write; .html is added where it is missing.")
+    ] = Path("compare.html"),
+    force: ForceOption = False,
+) -> None:
+    """Show two runs side by side, with the differences that exceed chance."""
+    with clear_errors():
+        from gazerig.features.lab.report.compare import LEVEL
+        from gazerig.features.lab.report.compare import compare as comparing
+        from gazerig.features.lab.report.files import files_of, refuse_foreign
+        from gazerig.features.lab.report.report import FIGURE_KEYS
+        from gazerig.robot.recording.read import RunRecording, used
+
+        target = page_file(out)
+        refuse_foreign(files_of(target, FIGURE_KEYS), force)
+        recordings = RunRecording(first), RunRecording(second)
+        names = _names(first, second)
+        abouts = _about(recordings[0], names[0]), _about(recordings[1], names[1])
+        with used(Path(f"{first} or {second}")), progress_bar() as tell:
+            ticks = recordings[0].ticks(), recordings[1].ticks()
+            made = comparing(ticks, abouts, target, tell, force)
+        if made.warning:
+            say(made.warning)
+        for difference in made.differences:
+            if difference.word == "more than chance":
+                a, b = difference.a, difference.b
+                unit = "" if a.band.unit in ("", "share") else f" {a.band.unit}"
+                how = " (the figure may be chance, its distribution is not)"
+                shape = how if difference.chance >= LEVEL else ""
+                say(f"{a.band.title}: {a.value:.3g} and {b.value:.3g}{unit}{shape}")
+        count = sum(d.word == "more than chance" for d in made.differences)
+        say(f"{made.page}: {count} of {len(made.differences)} measures differ by more than chance")
+
+
+def _recorded(file: Path, name: str, tell: Steps) -> "tuple[RunHeader, GazeTrace]":
+    """Read a recorded run."""
+    from gazerig.features.lab.report.report import read
+    from gazerig.robot.recording.read import RunRecording, used
+
+    recording = RunRecording(file)
+    about = _about(recording, name)
+    with used(file):
+        return about, read(recording.ticks(), about, tell)
+
+
+def _mutual_gaze(first: Path, second: Path) -> "MutualGazeReport":
+    """Read how two heads of one run looked at each other."""
+    from gazerig.features.lab.report.heads import mutual_gaze_report
+    from gazerig.robot.recording.read import RunRecording, used
+
+    a, b = RunRecording(first), RunRecording(second)
+    if a.info.scene != b.info.scene:
+        raise SetupError(
+            f"{first} is of the world {a.info.scene}, {second} of {b.info.scene}: --with takes the "
+            "recording of another head of the same run"
+        )
+    with used(Path(f"{first} or {second}")):
+        return mutual_gaze_report(
+            (a.ticks(), b.ticks()), (a.info.stands, b.info.stands), _names(first, second)
+        )
+
+
+def _simulated(options: "RunOptions", tell: Steps) -> "tuple[RunHeader, GazeTrace]":
+    """Run a scene in simulated time; Ctrl-C ends the run early."""
+    from gazerig.config.schema import load_walk
+    from gazerig.features.lab.simulated_run import simulate
+    from gazerig.robot.app.run_rig import run_rig
+    from gazerig.robot.control.tick import Tick
+
+    rig = run_rig(options)
+    seconds, start_s = options.seconds or 0.0, list[float]()
+    text = f"simulating {seconds:.0f} s"
+
+    def watch(tick: Tick) -> None:
+        start_s[:] = start_s or [tick.t_s]
+        tell(text, min(1.0, (tick.t_s - start_s[0]) / seconds))
+
+    with signals() as stopped:
+        run = simulate(rig, options, stopped, watch)
+    layers = ("rig", options.rig), ("character", options.character), ("profile", options.profile)
+    facts = (
+        *((name, value) for name, value in layers if value is not None),
+        ("scene", f"{options.scene}, simulated"),
+        ("seed", str(options.seed)),
+    )
+    walk = load_walk(rig.gaze.scanpath.transition_matrix)
+    name = " ".join(filter(None, (options.scene, options.character, options.profile)))
+    return _described(name, facts, rig, walk), run.trace
+
+
+def _about(recording: "RunRecording", name: str) -> "RunHeader":
+    """Describe a recorded run."""
+    from gazerig.features.lab.report.run_header import RunHeader
+
+    info = recording.info
+    known = (
+        ("recording", str(recording.path)),
+        ("rig", info.rig),
+        ("character", info.character or "none"),
+        ("profile", info.profile),
+        ("saw", f"scene {info.scene}" if info.scene else info.eyes),
+        ("servos", info.bus if info.mock else "real"),
+        ("time", "simulated" if info.fast else "real"),
+        ("seed", str(info.seed)),
+        ("started", info.started_utc),
+        ("versions", ", ".join(f"{name} {v}" for name, v in sorted(info.versions.items()))),
+    )
+    warnings = (recording.note,) if recording.note else ()
+    try:
+        rig, walk = _configured(info.config_yaml, info.walk_yaml)
+    except ConfigError as error:
+        first = str(error).splitlines()[0]
+        cannot = f"the recorded configuration is not valid today, so no notes on it: {first}"
+        return RunHeader(name, known, warnings=(*warnings, cannot), duration_s=recording.duration_s)
+    made = _described(name, known, rig, walk)
+    return replace(made, warnings=warnings, duration_s=recording.duration_s)
+
+
+def _configured(config_yaml: str, walk_yaml: str) -> "tuple[Rig, Walk]":
+    """Read the configuration that a recording holds.
+
+    Raises:
+        gazerig.config.load.ConfigError: it is not valid today.
+    """
+    from gazerig.config.load import load
+    from gazerig.config.schema import RULES, Rig, load_walk
+    from gazerig.gaze.scanpath import Walk
+
+    with TemporaryDirectory() as folder:
+        rig_file, walk_file = Path(folder) / "recorded.yaml", Path(folder) / "walk.yaml"
+        rig_file.write_text(config_yaml, encoding="utf-8")
+        rig = load(rig_file, Rig, checks=RULES)
+        if not walk_yaml:
+            return rig, load_walk(rig.gaze.scanpath.transition_matrix)
+        walk_file.write_text(walk_yaml, encoding="utf-8")
+        return rig, load(walk_file, Walk)
+
+
+def _described(
+    name: str,
+    facts: tuple[tuple[str, str], ...],
+    rig: "Rig",
+    walk: "Walk",
+) -> "RunHeader":
+    """Add to a run's description the style of its gaze."""
+    from gazerig.features.lab.report.reference_walk import own
+    from gazerig.features.lab.report.run_header import RunHeader
+
+    gaze = rig.gaze
+    styles = (
+        f"saccade {gaze.saccade.profile}",
+        f"scanpath {gaze.scanpath.model}",
+    )
+    shown = (
+        ("saccades", gaze.saccade.profile),
+        ("face scanpath", f"{gaze.scanpath.model}, walk {gaze.scanpath.transition_matrix}"),
+    )
+    return RunHeader(name, (*facts, *shown), frozenset(styles), own(gaze.scanpath, walk))
+
+
+def _tell_findings(findings: "Sequence[MeasureResult]") -> None:
+    """Print which measures are outside their bands, and how many are within."""
+    for finding in findings:
+        if finding.verdict == "outside":
+            band = finding.band
+            unit = "" if band.unit in ("", "share") else f" {band.unit}"
+            say(
+                f"outside: {band.title}: {finding.value:.3g}, people {band.low:g} to "
+                f"{band.high:g}{unit} ({finding.measured.events} events)"
+            )
+    counts = Counter(finding.verdict for finding in findings)
+    say(
+        f"{counts['pass']} pass, {counts['outside']} outside, "
+        f"{counts['too few events']} with too few events"
+    )
+
+
+def _names(first: Path, second: Path) -> tuple[str, str]:
+    """Return two short names that differ."""
+    if first.stem != second.stem:
+        return first.stem, second.stem
+    return f"{first.stem} (A)", f"{second.stem} (B)"
+
+
+def page_file(out: Path) -> Path:
+    """Return the file of a page, whose name ends so that a browser opens it as one."""
+    if out.suffix.lower() in _PAGES:
+        return out
+    # Not with_suffix: what follows the dot of "evening-0.5" is no ending.
+    return out.with_name(f"{out.name}.html")
+
+
+def _beside(file: Path | None, scene: str | None) -> Path:
+    return file.with_suffix(".html") if file is not None else Path(f"report-{scene}.html")

@@ -1,0 +1,237 @@
+"""The command ``gazerig sweep``: many simulated runs, and what parameters do to their figures."""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from gazerig.config.export import suggestion
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.file_output import write_file
+from gazerig.features.lab.cli import sweep_options as own
+from gazerig.robot.analysis.norm_bands import BY_KEY
+from gazerig.robot.app.options import DEFAULT_SCENE, RunOptions
+from gazerig.robot.cli import run_options as options
+from gazerig.robot.cli.progress_bar import progress_bar
+from gazerig.robot.cli.rig_command import RigCommand
+from gazerig.robot.cli.terminal import FAULT, INTERRUPTED, RigArgument, clear_errors, say, signals
+from gazerig.robot.cli.tune import read_value
+
+if TYPE_CHECKING:
+    from gazerig.features.lab.sweep.axes import Point
+    from gazerig.features.lab.sweep.fit import SweepFit
+    from gazerig.features.lab.sweep.outcome import Outcome
+    from gazerig.features.lab.sweep.sweep import Progress, Sweep, SweepSpec
+
+app = typer.Typer(add_completion=False)
+
+_COLUMNS = (
+    *("outside", "distance", "fixations", "saccades", "blinks"),
+    *("gaze_error_deg.median", "gaze_error_deg.p95"),
+)
+"""What can be drawn besides the report's measures."""
+_TRIED = 60
+"""Points of a search where nothing is said; the help of --samples says so."""
+
+
+@app.command(cls=RigCommand)
+def sweep(
+    rig: RigArgument = "desk",
+    setting: own.Settings = None,
+    scene: options.Scene = DEFAULT_SCENE,
+    seeds: own.Seeds = 4,
+    seed: own.FirstSeed = 0,
+    seconds: own.Seconds = None,
+    samples: own.Samples = None,
+    fit: own.Fit = False,
+    out: own.Out = None,
+    jobs: own.Jobs = None,
+    show: own.Show = None,
+    bus: own.Bus = "emulated",
+    profile: options.Profile = None,
+    character: options.Character = None,
+    rules: options.Rules = None,
+    behaviour: options.Behaviour = None,
+    conversation: options.Conversation = None,
+) -> None:
+    """Vary parameters over many simulated runs: a table, and a picture of what responds.
+
+    Every finished run is kept at once: the same command goes on after Ctrl-C.
+
+    --fit searches for the values with most measures inside people's bands.
+    """
+    with clear_errors(rig):
+        shown = [_column(name) for name in show or ()]
+        asked = RunOptions(
+            mock=True, fast=True, scene=scene, seconds=seconds, bus=bus, rig=rig, profile=profile,
+            character=character, rules=rules, behaviour=behaviour, conversation=conversation,
+        ).checked()  # fmt: skip
+        number = samples if samples is not None or not fit else _TRIED
+        spec, points = _checked(asked, setting or (), range(seed, seed + seeds), number, fit)
+        folder = out or Path(f"{'fit' if fit else 'sweep'}-{Path(rig).stem}-{scene}")
+        if fit:
+            outcomes = _fitted(spec, folder, jobs, shown)
+        else:
+            outcomes = _swept(spec, points, folder, jobs, shown)
+    if all(one.failed for one in outcomes):
+        raise typer.Exit(FAULT)
+
+
+def _checked(
+    asked: RunOptions, settings: Sequence[str], seeds: range, number: int | None, fit: bool
+) -> "tuple[SweepSpec, Sequence[Point]]":
+    """Return what is to be run, with its points unless a search is to find them.
+
+    Raises:
+        ConfigError, SetupError: something in it cannot be run.
+    """
+    # Models are heavy; `--help` does without them. What draws the picture is an extra, whose
+    # absence is told before hours of runs and not after them.
+    import gazerig.features.lab.sweep.response_figure  # noqa: F401
+    from gazerig.features.lab.simulated_run import refuse_unfit
+    from gazerig.features.lab.sweep.axes import axes_of, checked, grid, latin_hypercube, one_by_one
+    from gazerig.features.lab.sweep.sweep import SweepSpec
+    from gazerig.robot.app.run_rig import run_rig
+
+    rig = run_rig(asked)
+    refuse_unfit(rig, asked)
+    axes = axes_of(rig, settings, read_value)
+    if not axes:
+        example = "--set gaze.head.comfort_deg=4:16:7"
+        raise SetupError(f"nothing to vary: give --set KEY=VALUES, for example {example}")
+    if fit:
+        points = one_by_one(axes)
+    else:
+        points = grid(axes) if number is None else latin_hypercube(axes, number, seeds[0])
+    checked(rig, axes, points)
+    how = "fit" if fit else "samples"
+    search = {how: number, "seed": seeds[0]} if number is not None else {}
+    return SweepSpec(rig, asked, tuple(axes), tuple(seeds), search), points
+
+
+def _swept(
+    spec: "SweepSpec", points: "Sequence[Point]", folder: Path, jobs: int | None,
+    shown: Sequence[str],
+) -> "list[Outcome]":  # fmt: skip
+    """Run all points, and write table and picture."""
+    with _working(spec, folder, jobs) as (work, runs):
+        outcomes = work.run(points, runs)
+    _write(spec, folder, outcomes, shown)
+    _say_failures(outcomes)
+    return outcomes
+
+
+def _fitted(
+    spec: "SweepSpec", folder: Path, jobs: int | None, shown: Sequence[str]
+) -> "list[Outcome]":
+    """Search for the best point; write it as YAML, with the table and picture of all runs."""
+    from gazerig.config.parameters import value_of
+    from gazerig.features.lab.sweep.fit import fit
+    from gazerig.features.lab.sweep.snippet import SNIPPET, snippet_of
+
+    count, seed = int(str(spec.search["fit"])), int(str(spec.search["seed"]))
+    start = {axis.key: value_of(spec.rig, axis.key) for axis in spec.axes}
+    outcomes: list[Outcome] = []
+    with _working(spec, folder, jobs) as (work, runs):
+        total = (count + 1) * len(spec.seeds)
+
+        def run(points: "Sequence[Point]") -> "Sequence[Sequence[Outcome]]":
+            before = len(outcomes)
+            outcomes.extend(work.run(points, lambda done, _: runs(before + done, total)))
+            n = len(spec.seeds)
+            return [outcomes[i : i + n] for i in range(before, len(outcomes), n)]
+
+        found = fit(run, spec.axes, start, count, seed)
+    _write(spec, folder, outcomes, shown)
+    write_file(folder / SNIPPET, snippet_of(spec.options, found.best.point), force=True)
+    _say_failures(outcomes)
+    _say_fit(found, folder / SNIPPET, spec.options)
+    return outcomes
+
+
+def _say_fit(found: "SweepFit", snippet: Path, asked: RunOptions) -> None:
+    """Print the best point beside the rig's own values, and how to run it."""
+    own, best = found.start, found.best
+    say(
+        f"{len(found.counted)} measures count, {len(found.trials)} points tried; outside: "
+        f"{own.outside:.3g} with the rig's own values (graded {own.score:.3g}), "
+        f"{best.outside:.3g} with the best (graded {best.score:.3g})"
+    )
+    if best is own:
+        say("no point tried is better than the rig's own values")
+        return
+    for key, value in best.point.items():
+        say(f"{key}: {own.point[key]} -> {value}")
+    names = ("profile", "rules", "behaviour", "conversation")
+    given = "".join(f" --{name} {held}" for name in names if (held := getattr(asked, name)))
+    say(f"to run it: gazerig run {asked.rig} --character {snippet}{given}")
+
+
+def _write(
+    spec: "SweepSpec", folder: Path, outcomes: "Sequence[Outcome]", shown: Sequence[str]
+) -> None:
+    """Write table and picture, and say where."""
+    from gazerig.features.lab.sweep.response_figure import PICTURE, response_png
+    from gazerig.features.lab.sweep.table import write_tables
+
+    files = [*write_tables(folder, outcomes)]
+    if not all(one.failed for one in outcomes):
+        files.append(folder / PICTURE)
+        write_file(files[-1], response_png(spec.axes, outcomes, shown), force=True)
+    points = len(outcomes) // len(spec.seeds)
+    count = f"{points} points, {len(spec.seeds)} seeds each: {len(outcomes)} runs"
+    say(f"{files[0]}: {count}; beside it {', '.join(file.name for file in files[1:])}")
+
+
+@contextmanager
+def _working(
+    spec: "SweepSpec", folder: Path, jobs: int | None
+) -> "Iterator[tuple[Sweep, Progress]]":
+    """Return what runs points and what draws how far it is; Ctrl-C ends it and keeps its runs."""
+    from gazerig.features.lab.sweep.sweep import working
+    from gazerig.features.lab.sweep.worker_pool import SweepInterrupted
+
+    reached = [0, 0]
+    try:
+        with (
+            progress_bar(remaining=True) as tell,
+            signals() as stopped,
+            working(spec, folder, jobs, stopped) as work,
+        ):
+
+            def runs(done: int, total: int) -> None:
+                reached[:] = done, total
+                tell(f"{total} runs", done / max(1, total))
+
+            yield work, runs
+    except SweepInterrupted:
+        say(f"{reached[0]} of {reached[1]} runs are kept in {folder}: the same command goes on")
+        raise typer.Exit(INTERRUPTED) from None
+
+
+def _column(name: str) -> str:
+    """Return the column of a measure that can be drawn.
+
+    Raises:
+        SetupError: there is none of that name.
+    """
+    if name in BY_KEY or name in _COLUMNS[:2]:
+        return f"report.{name}"
+    if name in _COLUMNS:
+        return name
+    known = (*_COLUMNS, *BY_KEY)
+    near = suggestion(name, known) or ";"
+    raise SetupError(f"--show {name}: no such measure{near} there is {', '.join(known)}")
+
+
+def _say_failures(outcomes: "Sequence[Outcome]") -> None:
+    """Print which runs failed, each reason once."""
+    reasons = Counter(one.failed for one in outcomes if one.failed)
+    for failed, count in reasons.items():
+        first = next(one for one in outcomes if one.failed == failed)
+        where = ", ".join(f"{key}={value}" for key, value in first.point.items())
+        more = f" (and {count - 1} more)" if count > 1 else ""
+        say(f"failed: {where}, seed {first.seed}{more}: {failed}")

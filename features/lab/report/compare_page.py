@@ -1,0 +1,182 @@
+"""The page that puts two runs side by side, and the values it shows."""
+
+from collections.abc import Sequence
+from math import isfinite
+from typing import Literal, NamedTuple
+
+from gazerig.features.lab.report.gaze_trace import GazeTrace
+from gazerig.features.lab.report.page import (
+    Figure,
+    banner,
+    left_out,
+    line_of,
+    number,
+    rendered,
+    with_unit,
+)
+from gazerig.features.lab.report.run_header import RunHeader
+from gazerig.features.lab.report.statistics import MeasureResult
+from gazerig.robot.analysis.norm_bands import GROUPS
+from gazerig.robot.control.feedback_basis import Basis
+
+Word = Literal["more than chance", "may be chance", "too few events"]
+
+
+class MeasureDifference(NamedTuple):
+    """One measure of two runs.
+
+    difference: b - a; low95, high95: its interval, nan where there is none
+    chance: how often chance alone gives as much, corrected; chance_shape: the same for the
+        whole distribution, nan where a measure has none
+    """
+
+    a: MeasureResult
+    b: MeasureResult
+    difference: float
+    low95: float
+    high95: float
+    chance: float
+    chance_shape: float
+    word: Word
+
+
+class ComparedRow(NamedTuple):
+    """One row of the page's table, ready to print."""
+
+    title: str
+    people: str
+    a: str
+    b: str
+    a_css: str
+    b_css: str
+    a_verdict: str
+    b_verdict: str
+    events: str
+    difference: str
+    interval: str
+    chance: str
+    word: str
+    css: str
+
+
+_CLASSES = {"more than chance": "more", "may be chance": "same", "too few events": "few"}
+
+
+def _row(difference: MeasureDifference, abouts: tuple[RunHeader, RunHeader]) -> ComparedRow:
+    a, b = difference.a, difference.b
+    lines = (line_of(a, abouts[0].styles), line_of(b, abouts[1].styles))
+    known = isfinite(difference.difference)
+    chances = [f"p {_p(difference.chance)}"] if known else []
+    if isfinite(difference.chance_shape):
+        chances.append(f"distribution p {_p(difference.chance_shape)}")
+    return ComparedRow(
+        a.band.title,
+        lines[0].band,
+        lines[0].value,
+        lines[1].value,
+        lines[0].css,
+        lines[1].css,
+        a.verdict,
+        b.verdict,
+        f"{a.measured.events} and {b.measured.events}",
+        with_unit(difference.difference, a.band.unit) if known else "",
+        f"{number(difference.low95)} to {number(difference.high95)}" if known else "",
+        "; ".join(chances),
+        difference.word,
+        _CLASSES[difference.word],
+    )
+
+
+def _p(chance: float) -> str:
+    return "< .001" if chance < 0.001 else f"{chance:.3f}"
+
+
+class ComparedSection(NamedTuple):
+    """One section of the page."""
+
+    name: str
+    rows: tuple[ComparedRow, ...]
+    figures: tuple[Figure, ...]
+    left_out: tuple[str, ...]
+    basis: tuple[str, ...]
+
+
+def compare_page(
+    abouts: tuple[RunHeader, RunHeader],
+    runs: Sequence[GazeTrace],
+    differences: Sequence[MeasureDifference],
+    figures: Sequence[Figure],
+) -> str:
+    """Return the page as HTML that needs no other file."""
+    sections = tuple(
+        ComparedSection(
+            group,
+            tuple(_row(d, abouts) for d in differences if d.a.band.group == group),
+            tuple(p for p in figures if p.drawing.group == group),
+            _left_out(abouts, runs, group),
+            tuple(_basis(run.joints.basis(group)) for run in runs),
+        )
+        for group in GROUPS
+    )
+    return rendered(
+        "compare.html", abouts=abouts, sections=sections, facts=_facts(abouts, runs),
+        differing=[d.a.band.title for d in differences if d.word == "more than chance"],
+        counts={word: sum(d.word == word for d in differences) for word in _CLASSES},
+        banners=banners(abouts, runs),
+    )  # fmt: skip
+
+
+def banners(abouts: tuple[RunHeader, RunHeader], runs: Sequence[GazeTrace]) -> tuple[str, ...]:
+    """Return what a reader must know first: which runs were not measured, or differ in it."""
+    messages = [
+        f"{about.name}: {text}"
+        for about, run in zip(abouts, runs, strict=True)
+        if (text := banner(run.joints))
+    ]
+    return (*messages, *filter(None, (mixed(abouts, runs),)))
+
+
+def mixed(abouts: tuple[RunHeader, RunHeader], runs: Sequence[GazeTrace]) -> str:
+    """Warn of a measured run beside an estimated one, "" where both rest on the same."""
+    first, second = (run.joints.whole_basis for run in runs)
+    if first == second:
+        return ""
+    return (
+        f"{abouts[0].name} is {first} and {abouts[1].name} is {second}: what differs may be what "
+        "the servos tell, not what the gaze did"
+    )
+
+
+def _left_out(
+    abouts: tuple[RunHeader, RunHeader], runs: Sequence[GazeTrace], group: str
+) -> tuple[str, ...]:
+    """Return why a section says less than it could, and of which run."""
+    each = [dict.fromkeys(left_out(run.joints, group)) for run in runs]
+    both = [why for why in each[0] if why in each[1]]
+    return (
+        *both,
+        *(
+            f"{about.name}: {why}"
+            for about, reasons in zip(abouts, each, strict=True)
+            for why in reasons
+            if why not in both
+        ),
+    )
+
+
+def _basis(basis: Basis) -> str:
+    return "" if basis == "measured" else f" ({basis})"
+
+
+def _facts(
+    abouts: tuple[RunHeader, RunHeader], runs: Sequence[GazeTrace]
+) -> tuple[tuple[str, str, str], ...]:
+    """Return what is known of both runs, side by side."""
+    first, second = (dict(about.facts) for about in abouts)
+    names = dict.fromkeys((*first, *second))
+    counts = [
+        f"{run.seconds:.1f} s, {len(run.saccades)} saccades, {len(run.blinks)} blinks"
+        for run in runs
+    ]
+    facts = [(name, first.get(name, ""), second.get(name, "")) for name in names]
+    return (("length", counts[0], counts[1]), *facts)

@@ -1,0 +1,75 @@
+"""Looks at a face and away from it, and the time in which two look at each other."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.features.lab.report.gaze_trace import GazeTrace
+from gazerig.features.lab.report.statistics import MeasuredValue, longest, mean, median
+from gazerig.gaze.types import Floats
+from gazerig.robot.analysis.mutual_gaze import BRIDGED_S, HALF_HIGH_M, HALF_WIDE_M
+
+_FACING_DEG = 12.0
+
+
+def on_face(run: GazeTrace) -> NDArray[np.bool_]:
+    """Return (n,) whether the gaze is inside the oval of a face."""
+    y, z = run.column("face_y") / HALF_WIDE_M, run.column("face_z") / HALF_HIGH_M
+    inside: NDArray[np.bool_] = np.nan_to_num(y * y + z * z, nan=9.0) <= 1.0
+    return inside
+
+
+def bouts(run: GazeTrace, mask: NDArray[np.bool_]) -> Floats:
+    """Return (n, 3) begin, end, and whether it was cut off by the run, of each time it holds."""
+    t = run.column("t")
+    if not len(t):
+        return np.zeros((0, 3))
+    edges = np.flatnonzero(np.diff(mask.astype(int), prepend=0, append=0)).reshape(-1, 2)
+    out: list[list[float]] = []
+    for first, last in edges:
+        begin, end = float(t[first]), float(t[min(last, len(t) - 1)])
+        cut = float(first == 0 or last >= len(t))
+        if out and begin - out[-1][1] < BRIDGED_S:
+            out[-1][1:] = [end, max(cut, out[-1][2])]
+        else:
+            out.append([begin, end, cut])
+    rows = np.array(out).reshape(-1, 3)
+    kept: Floats = rows[rows[:, 1] - rows[:, 0] >= BRIDGED_S]
+    return kept
+
+
+def looks(run: GazeTrace) -> Floats:
+    """Return the times of looks at a face, cut ones included."""
+    return bouts(run, on_face(run))
+
+
+def mutual(run: GazeTrace) -> Floats:
+    """Return the times in which both faces are turned to each other."""
+    return bouts(run, on_face(run) & (run.column("face_off") < _FACING_DEG))
+
+
+def measures(run: GazeTrace) -> list[MeasuredValue]:
+    """Return what there is to say about looks at people."""
+    seen = looks(run)
+    whole = _lengths(seen[seen[:, 2] == 0.0])
+    both = mutual(run)
+    away = seen[1:, 0] - seen[:-1, 1]
+    pairs = np.column_stack([_lengths(seen)[:-1], away])
+    return [
+        MeasuredValue("bout_none", whole, median),
+        MeasuredValue("bout_talk", whole, mean),
+        MeasuredValue("share_talk", pairs, _share),
+        MeasuredValue("bout_listen", whole, mean),
+        MeasuredValue("share_listen", pairs, _share),
+        MeasuredValue("bout_think", away, mean),
+        MeasuredValue("longest_look", _lengths(seen), longest),
+        MeasuredValue("mutual", _lengths(both), mean),
+    ]
+
+
+def _lengths(rows: Floats) -> Floats:
+    out: Floats = rows[:, 1] - rows[:, 0]
+    return out
+
+
+def _share(rows: Floats) -> float:
+    return float(rows[:, 0].sum() / rows.sum())

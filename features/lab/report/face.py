@@ -1,0 +1,231 @@
+"""Where on the face the gaze rests, for how long, and where it goes next."""
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.features.lab.report.gaze_trace import GazeTrace
+from gazerig.features.lab.report.statistics import MeasuredValue, mean, median
+from gazerig.gaze.types import PARTS, Floats
+from gazerig.robot.analysis import human_norms as human
+from gazerig.robot.model.face_geometry import PARTS_FACE_M
+
+N = len(PARTS)
+_EYES = (PARTS.index("LE"), PARTS.index("RE"))
+_SETTLED_S = 0.04
+_PAUSE_S = 0.3
+"""Visits farther apart in time do not follow each other."""
+
+# Grid of the heat map: 4 mm, and half a degree seen from a metre away.
+_Y_M, _Z_M = np.arange(-0.1, 0.1001, 0.004), np.arange(-0.13, 0.1301, 0.004)
+_SPREAD_M = 0.0085
+GRID_M = (_Y_M, _Z_M)
+"""Centres of the cells of a density: sideways and up."""
+
+
+class Visit(NamedTuple):
+    """Time on one part, refixations of it included."""
+
+    part: int
+    start_s: float
+    end_s: float
+
+
+def visits(run: GazeTrace) -> list[Visit]:
+    """Return the visits to parts in their order."""
+    out: list[Visit] = []
+    for f in run.fixations:
+        if f.part is None or not f.on_face:
+            continue
+        part = PARTS.index(f.part)
+        if out and out[-1].part == part and f.start_s - out[-1].end_s < _PAUSE_S:
+            out[-1] = out[-1]._replace(end_s=f.end_s)
+        else:
+            out.append(Visit(part, f.start_s, f.end_s))
+    return out
+
+
+def shifts(run: GazeTrace) -> Floats:
+    """Return (n, 2) from and to of shifts between parts, as indices of PARTS."""
+    seen = visits(run)
+    rows = [
+        (a.part, b.part)
+        for a, b in zip(seen, seen[1:], strict=False)
+        if a.part != b.part and b.start_s - a.end_s < _PAUSE_S
+    ]
+    return np.array(rows, dtype=float).reshape(-1, 2)
+
+
+def counted(rows: Floats) -> Floats:
+    """Return (8, 8) counts of shifts, rows from."""
+    out = np.zeros((N, N))
+    np.add.at(out, (rows[:, 0].astype(int), rows[:, 1].astype(int)), 1.0)
+    return out
+
+
+def on_parts(run: GazeTrace) -> Floats:
+    """Return (n, 2) part and seconds of every fixation on one."""
+    rows = [(PARTS.index(f.part), f.duration_s) for f in run.fixations if f.part is not None]
+    return np.array(rows, dtype=float).reshape(-1, 2)
+
+
+def share(rows: Floats) -> Floats:
+    """Return the share of time on each part, (8,)."""
+    time = np.bincount(rows[:, 0].astype(int), weights=rows[:, 1], minlength=N)
+    out: Floats = time / time.sum()
+    return out
+
+
+@cache
+def human_share() -> Floats:
+    """Return the share of time that people spend on each part (Nakamoto & Tsuruno), (8,).
+
+    Asked for thousands of times by figures of samples drawn again, so computed once.
+    """
+    out = human.time_share(human.matrix(), human.DWELL_MEAN_S)
+    out.setflags(write=False)
+    return out
+
+
+def points(run: GazeTrace) -> Floats:
+    """Return (n, 3) y and z on the face in metres, and seconds, of fixations meant for a face.
+
+    They may well lie beside it.
+    """
+    y, z = run.column("face_y"), run.column("face_z")
+    rows = []
+    for f in run.fixations:
+        rested = run.between(f.start_s + _SETTLED_S, f.end_s)
+        if f.kind != "face" or not np.isfinite(y[rested]).any():
+            continue
+        rows.append((np.nanmedian(y[rested]), np.nanmedian(z[rested]), f.duration_s))
+    return np.array(rows).reshape(-1, 3)
+
+
+def density(rows: Floats) -> Floats:
+    """Spread (n, 3) y, z, seconds over the grid: (rows z, columns y)."""
+    z, y = _cells(rows[:, 1], _Z_M), _cells(rows[:, 0], _Y_M)
+    on_grid = (z >= 0) & (z < len(_Z_M)) & (y >= 0) & (y < len(_Y_M))
+    cells = z[on_grid] * len(_Y_M) + y[on_grid]
+    time = np.bincount(cells, rows[on_grid, 2], len(_Z_M) * len(_Y_M))
+    bell_z, bell_y = _bells()
+    out: Floats = bell_z @ time.reshape(len(_Z_M), len(_Y_M)) @ bell_y
+    return out
+
+
+@cache
+def expected_density() -> Floats:
+    """Return the density that people's share of time on the parts makes; computed once."""
+    places = np.array([PARTS_FACE_M[part][1:] for part in PARTS])
+    out = density(np.column_stack([places, human_share()]))
+    out.setflags(write=False)
+    return out
+
+
+def measures(run: GazeTrace) -> list[MeasuredValue]:
+    """Return what there is to say about the gaze on faces."""
+    parts, moves, seen = on_parts(run), shifts(run), visits(run)
+    on_eyes = np.isin(parts[:, 0], _EYES).astype(float)
+    never = human.matrix() == 0.0
+    forbidden = never[moves[:, 0].astype(int), moves[:, 1].astype(int)].astype(float)
+    lengths = np.array([visit.end_s - visit.start_s for visit in seen])
+    meant = [(float(f.part is not None), f.duration_s) for f in run.fixations if f.kind == "face"]
+    return [
+        MeasuredValue("on_parts", np.array(meant).reshape(-1, 2), _weighted),
+        MeasuredValue("part_share", parts, _share_apart),
+        MeasuredValue("eyes_share", np.column_stack([on_eyes, parts[:, 1]]), _weighted),
+        MeasuredValue("visit", lengths, mean),
+        MeasuredValue("never_taken", forbidden, mean),
+        MeasuredValue("transitions", moves, _rows_apart),
+        MeasuredValue("heat", points(run), _alike),
+        *_axes(run),
+    ]
+
+
+def _axes(run: GazeTrace) -> list[MeasuredValue]:
+    """Measure where both eyes point, one row a fixation on a face."""
+    rows = axes(run)
+    vergence = rows[:, 6]
+    good = (vergence >= -2.5) & (vergence <= 4.5)
+    within = np.maximum(rows[:, 4], rows[:, 5]) <= 0.5 * human.CONE_DEG
+    return [
+        MeasuredValue("left_mm", np.hypot(rows[:, 0], rows[:, 1]), median),
+        MeasuredValue("right_mm", np.hypot(rows[:, 2], rows[:, 3]), median),
+        MeasuredValue("in_cone", within.astype(float), mean),
+        MeasuredValue("vergence", vergence, median),
+        MeasuredValue("vergence_ok", good.astype(float), mean),
+    ]
+
+
+def axes(run: GazeTrace) -> Floats:
+    """Return (n, 7) medians of fixations on a face.
+
+    Columns: where the left, then the right pupil axis passes the point looked at (y, z, in mm
+    of the face's plane); angles off it, in deg; vergence beyond what is due, in deg.
+    """
+    names = ("left_y_mm", "left_z_mm", "right_y_mm", "right_z_mm", "off_left", "off_right")
+    due = run.column("vergence") - run.column("vergence_due")
+    table = np.column_stack([*(run.column(name) for name in names), due])
+    parts = [table[run.between(f.start_s + _SETTLED_S, f.end_s)] for f in run.fixations
+             if f.kind == "face"]  # fmt: skip
+    rows = [np.median(part, axis=0) for part in parts if len(part)]
+    found = np.array(rows).reshape(-1, 7)
+    whole: Floats = found[np.isfinite(found).all(axis=1)]
+    return whole
+
+
+def _share_apart(rows: Floats) -> float:
+    """Return half the sum of the differences to people's shares: 0 alike, 1 nothing in common."""
+    return float(0.5 * np.abs(share(rows) - human_share()).sum())
+
+
+def _rows_apart(rows: Floats) -> float:
+    """Return that difference of the rows of the transition matrix, weighted by their shifts."""
+    counts = counted(rows)
+    total = counts.sum(axis=1)
+    here = total > 0.0
+    ours = counts[here] / total[here, None]
+    apart = 0.5 * np.abs(ours - human.visit_matrix(human.matrix())[here]).sum(axis=1)
+    return float(np.average(apart, weights=total[here]))
+
+
+def _weighted(rows: Floats) -> float:
+    return float(np.average(rows[:, 0], weights=rows[:, 1]))
+
+
+def _alike(rows: Floats) -> float:
+    """Return the correlation of the heat map with that expected of people."""
+    ours = density(rows).ravel()
+    ours = ours - ours.mean()
+    size = float(np.sqrt(ours @ ours))
+    if size == 0.0:  # all of it beside the face
+        return 0.0
+    return float(ours @ _expected_unit()) / size
+
+
+@cache
+def _expected_unit() -> Floats:
+    """Return the heat map expected of people, less its mean, of length 1."""
+    expected = expected_density().ravel()
+    expected = expected - expected.mean()
+    out: Floats = expected / np.sqrt(expected @ expected)
+    return out
+
+
+def _cells(places: Floats, centres: Floats) -> NDArray[np.intp]:
+    """Return in which cell of an axis each place is; outside it, a number that no cell has."""
+    step = centres[1] - centres[0]
+    out: NDArray[np.intp] = np.floor((places - centres[0]) / step + 0.5).astype(np.intp)
+    return out
+
+
+@cache
+def _bells() -> tuple[Floats, Floats]:
+    return _bell(_Z_M), _bell(_Y_M)
+
+
+def _bell(centres: Floats) -> Floats:
+    out: Floats = np.exp(-0.5 * ((centres[:, None] - centres[None]) / _SPREAD_M) ** 2)
+    return out

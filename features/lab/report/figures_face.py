@@ -1,0 +1,233 @@
+"""Figures of the gaze on a face: parts, shifts, heat map, pupil axes, vergence."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gazerig.features.lab.report import face
+from gazerig.features.lab.report.plotting import (
+    HUMAN,
+    HUMAN_FILL,
+    INK,
+    Axes,
+    Circle,
+    Drawing,
+    Ellipse,
+    Figure,
+    Shown,
+    label,
+    legend,
+    nothing,
+)
+from gazerig.features.lab.report.reference_walk import published
+from gazerig.gaze.types import PART_NAMES, PARTS, Floats
+from gazerig.robot.analysis import human_norms as human
+from gazerig.robot.analysis.heatmap_face import HEIGHT_PX, WIDTH_PX, draw_face, on_canvas
+from gazerig.robot.analysis.norm_bands import FACE
+
+_NAMES = [PART_NAMES[part] for part in PARTS]
+_NONE = "no fixation on a face part"
+
+
+def _time_share(figure: Figure, runs: Sequence[Shown]) -> None:
+    shares, lengths = figure.subplots(1, 2)
+    places = np.arange(len(PARTS))
+    wide = 0.8 / (len(runs) + 1)
+    steps = human.matrix()
+    shares.bar(places, face.human_share(), wide, color=HUMAN, label="Nakamoto & Tsuruno")
+    lengths.bar(places, human.visit_s(steps, human.DWELL_MEAN_S), wide, color=HUMAN)
+    for n, shown in enumerate(runs, start=1):
+        at = places + n * wide
+        parts = face.on_parts(shown.run)
+        if len(parts):
+            shares.bar(at, face.share(parts), wide, color=shown.colour, label=shown.name)
+        if shown.model is not None:
+            due = shown.model.share(np.random.default_rng(7))
+            shares.plot(at, due, "_", color="black", ms=9,
+                        label="as the model asks" if n == 1 else None)  # fmt: skip
+        seen = face.visits(shown.run)
+        each = [[v.end_s - v.start_s for v in seen if v.part == p] for p in range(len(PARTS))]
+        means = [float(np.mean(e)) if e else 0.0 for e in each]
+        errors = [float(np.std(e) / np.sqrt(len(e))) if len(e) > 1 else 0.0 for e in each]
+        lengths.bar(at, means, wide, color=shown.colour, yerr=errors, ecolor=INK,
+                    error_kw={"lw": 0.8})  # fmt: skip
+    for axes in (shares, lengths):
+        axes.set_xticks(places + 0.5 * wide * len(runs), _NAMES, rotation=38, ha="right")
+        axes.grid(axis="x", visible=False)
+    label(shares, "", "share of the time on parts", "time on each part")
+    label(lengths, "", "mean visit in s (bar: standard error)", "length of a visit")
+    legend(shares, "upper left")
+
+
+def _dwell(figure: Figure, runs: Sequence[Shown]) -> None:
+    """Draw how visits to each part are distributed, beside the law of table 1."""
+    panels = figure.subplots(2, 4, sharex=True, sharey=True).ravel()
+    rng = np.random.default_rng(7)
+    grid = np.geomspace(0.03, 4.0, 120)
+    for part, axes in enumerate(panels):
+        law = published().visits(part, 2000, rng)
+        axes.plot(grid, _below(law, grid), color=HUMAN, lw=1.6, label="table 1")
+        for shown in runs:
+            if shown.model is not None:
+                asked = shown.model.visits(part, 2000, rng)
+                axes.plot(grid, _below(asked, grid), color=shown.colour, lw=1.0, ls=":",
+                          label=f"{shown.name}, its model")  # fmt: skip
+            lengths = np.array([v.end_s - v.start_s for v in face.visits(shown.run)
+                                if v.part == part])  # fmt: skip
+            if len(lengths):
+                axes.plot(grid, _below(lengths, grid), color=shown.colour, lw=1.4,
+                          label=shown.name)  # fmt: skip
+            if len(runs) == 1:
+                axes.text(0.96, 0.06, f"n {len(lengths)}", ha="right", fontsize=8.5,
+                          transform=axes.transAxes, color=HUMAN)  # fmt: skip
+        axes.set_xscale("log")
+        axes.set_xticks([0.05, 0.2, 1.0], ["50 ms", "0.2 s", "1 s"], fontsize=8)
+        axes.minorticks_off()
+        axes.set_title(_NAMES[part], loc="left", fontsize=9.5)
+    for axes in panels[::4]:
+        axes.set_ylabel("share not longer")
+    handles, names = panels[0].get_legend_handles_labels()
+    if handles:
+        figure.legend(handles, names, loc="outside upper right", ncols=len(names))
+
+
+def _below(values: Floats, grid: Floats) -> Floats:
+    out: Floats = np.searchsorted(np.sort(values), grid, side="right") / len(values)
+    return out
+
+
+def _transitions(figure: Figure, runs: Sequence[Shown]) -> None:
+    panels = figure.subplots(1, 1 + len(runs))
+    theirs = human.visit_matrix(human.matrix())
+    _matrix(panels[0], theirs, "Nakamoto & Tsuruno")
+    for axes, shown in zip(panels[1:], runs, strict=True):
+        moves = face.shifts(shown.run)
+        if not len(moves):
+            nothing(axes, "no shift between parts")
+            continue
+        counts = face.counted(moves)
+        total = counts.sum(axis=1, keepdims=True)
+        ours = np.divide(counts, total, out=np.zeros_like(counts), where=total > 0)
+        _matrix(axes, ours, f"{shown.name} ({len(moves)} shifts)", theirs)
+
+
+def _matrix(axes: Axes, values: Floats, title: str, theirs: Floats | None = None) -> None:
+    axes.imshow(values, cmap="Blues", vmin=0.0, vmax=0.75)
+    axes.set_xticks(range(len(PARTS)), PARTS)
+    axes.set_yticks(range(len(PARTS)), PARTS)
+    axes.grid(False)
+    for row, column in np.ndindex(values.shape):
+        value = values[row, column]
+        wrong = theirs is not None and value > 0.0 and theirs[row, column] == 0.0
+        if value > 0.005:
+            ink = "#c92a2a" if wrong else "white" if value > 0.42 else INK
+            axes.text(column, row, f"{100 * value:.0f}", ha="center", va="center", fontsize=7.5,
+                      color=ink)  # fmt: skip
+    label(axes, "to", "from", title)
+
+
+def _heat(figure: Figure, runs: Sequence[Shown]) -> None:
+    panels = figure.subplots(1, 1 + len(runs))
+    _map(panels[0], face.expected_density(), "expected of people")
+    for axes, shown in zip(panels[1:], runs, strict=True):
+        points = face.points(shown.run)
+        if len(points):
+            _map(axes, face.density(points), f"{shown.name} ({points[:, 2].sum():.0f} s)")
+        else:
+            nothing(axes, "no face was looked at")
+
+
+def _map(axes: Axes, density: Floats, title: str) -> None:
+    y, z = face.GRID_M
+    left, top = on_canvas(np.array([[y[0], z[-1]]]))[0]
+    right, bottom = on_canvas(np.array([[y[-1], z[0]]]))[0]
+    axes.imshow(draw_face()[..., ::-1])
+    shade = density / density.max()
+    axes.imshow(shade[::-1], extent=(left, right, bottom, top), cmap="plasma",
+                alpha=np.clip(1.6 * shade[::-1], 0.0, 0.85), interpolation="bilinear")  # fmt: skip
+    axes.set_xlim(40, WIDTH_PX - 40)
+    axes.set_ylim(HEIGHT_PX - 40, 60)
+    axes.axis("off")
+    axes.set_title(title, loc="left")
+
+
+def _pupils(figure: Figure, runs: Sequence[Shown]) -> None:
+    panels = figure.subplots(1, 2 * len(runs), sharex=True, sharey=True, squeeze=False)[0]
+    for n, shown in enumerate(runs):
+        rows = face.axes(shown.run)
+        distance = float(np.nanmedian(shown.run.column("target_m"))) if len(rows) else 1.0
+        for side, axes in enumerate(panels[2 * n : 2 * n + 2]):
+            name = ("left", "right")[side]
+            title = f"{name} eye" if len(runs) == 1 else f"{shown.name}: {name} eye"
+            label(axes, "mm to the person's left", "mm up" if not side else "", title)
+            for deg, text in ((1.0, "1 deg"), (0.5 * human.CONE_DEG, "cone of direct gaze")):
+                radius = 1e3 * distance * np.tan(np.radians(deg))
+                axes.add_patch(Circle((0, 0), radius, fill=False, ec=HUMAN, lw=1.0))
+                axes.text(0.0, radius, f"{text}", ha="center", va="bottom", fontsize=8,
+                          color=HUMAN)  # fmt: skip
+            _spot(axes, rows[:, 2 * side : 2 * side + 2], shown.colour)
+            half = 1e3 * distance * np.tan(np.radians(3.2))
+            axes.set_xlim(-half, half)
+            axes.set_ylim(-half, half)
+            axes.set_aspect("equal")
+
+
+def _spot(axes: Axes, points: Floats, colour: str) -> None:
+    """Draw where one axis passes, its mean, and the ellipse of two standard deviations."""
+    if len(points) < 3:
+        axes.text(0, 0, "too few", ha="center", color=HUMAN)
+        return
+    axes.scatter(points[:, 0], points[:, 1], s=7, alpha=0.35, lw=0, color=colour)
+    mean, cov = points.mean(axis=0), np.cov(points.T)
+    values, vectors = np.linalg.eigh(cov)
+    turn = np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1]))
+    wide, high = 4.0 * np.sqrt(np.maximum(values[::-1], 0.0))
+    axes.add_patch(Ellipse((mean[0], mean[1]), wide, high, angle=turn, fill=False, ec=INK, lw=1.2))
+    axes.plot(*mean, "+", color=INK, ms=9)
+    axes.text(0.03, 0.03, f"mean {mean[0]:+.1f}, {mean[1]:+.1f} mm", transform=axes.transAxes,
+              fontsize=8.5)  # fmt: skip
+
+
+def _vergence(figure: Figure, runs: Sequence[Shown]) -> None:
+    axes = figure.subplots()
+    axes.axvspan(-2.5, 4.5, color=HUMAN_FILL, lw=0, label="passes for a direct gaze")
+    axes.axvline(0.0, color=HUMAN, lw=1.0)
+    bins = np.arange(-3.0, 5.01, 0.1).tolist()
+    for shown in runs:
+        rows = face.axes(shown.run)
+        if not len(rows):
+            nothing(axes, _NONE)
+            continue
+        weights = np.full(len(rows), 1.0 / len(rows))
+        axes.hist(np.clip(rows[:, 6], -3.0, 5.0), bins, weights=weights, color=shown.colour,
+                  alpha=0.75, label=f"{shown.name} ({len(rows)})")  # fmt: skip
+    label(axes, "vergence beyond what the face's distance asks for, deg (+ nearer)",
+          "share of fixations")  # fmt: skip
+    legend(axes, "upper right")
+
+
+DRAWINGS = (
+    Drawing("part_share", FACE, "Time on the parts of a face",
+            "Share of the time on parts and mean visit, refixations merged; grey is Nakamoto & "
+            "Tsuruno, eq 1 with table 1 as dwell of each step.", _time_share, (8.4, 4.0)),
+    Drawing("dwell", FACE, "Visits to each part",
+            "Share of visits that are no longer than a time; grey is what table 1 of Nakamoto & "
+            "Tsuruno gives as log-normal dwells with the refixations of eq 1; dotted is what the "
+            "rig's own model asks for, its floor included.", _dwell,
+            (8.4, 4.4)),
+    Drawing("transitions", FACE, "Where the gaze goes next",
+            "Shifts between parts in percent of each row, staying left out; red are shifts that "
+            "eq 1 of Nakamoto & Tsuruno does not have. DN chin, FL and FR sides, LE and RE eyes, "
+            "M mouth, N nose, UP forehead; left and right are the person's own.", _transitions,
+            (8.4, 4.2)),
+    Drawing("heat", FACE, "Heat map",
+            "Time on the face, and what people's shares of time on the parts would make (the "
+            "figures 8 and 9 of Nakamoto & Tsuruno).", _heat, (8.4, 4.6)),
+    Drawing("pupil_axes", FACE, "Where each pupil axis passes at the face",
+            "One dot a fixation: the line of sight of each eye, {measured}, in the plane of the "
+            "face, from the point that was to be looked at. As the rig saw the face: an error of "
+            "its camera does not show here.", _pupils, (8.4, 4.2)),
+    Drawing("vergence", FACE, "Vergence at the face",
+            "Angle between the lines of sight, {measured}, less that of the point looked at.",
+            _vergence, (8.4, 3.0)),
+)  # fmt: skip

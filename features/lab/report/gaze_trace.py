@@ -1,0 +1,298 @@
+"""One pass over the ticks of a run: what every measure and figure of the report rests on."""
+
+from array import array
+from collections import defaultdict
+from dataclasses import dataclass, field
+from math import atan2, degrees, nan
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.features.lab.analysis.reaction_finder import MeasuredReaction, ReactionFinder
+from gazerig.features.lab.report.joint_basis import JointBasis, joints_of
+from gazerig.features.lab.report.lid_closure import blinks_of
+from gazerig.gaze.angles import add, angle_between, dot, norm, rotate_back, scale, sub, yaw_pitch
+from gazerig.gaze.field_of_view import head_in_space, line_of_sight
+from gazerig.gaze.types import Face, Floats, Vec3
+from gazerig.robot.analysis.blink_finder import BlinkEvent
+from gazerig.robot.analysis.event_detector import (
+    NEAR_FACE_M,
+    EventDetector,
+    FixationEvent,
+    SaccadeEvent,
+    beside_m,
+)
+from gazerig.robot.analysis.gaze_on_face import on_face
+from gazerig.robot.analysis.lid_opening import LOWER, UPPER, openings
+from gazerig.robot.analysis.summary import cyclopean
+from gazerig.robot.control.feedback_basis import estimated_joints
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.model.commands import Ask
+
+PLANE_M = -0.028
+"""The plane between the tip of the nose and eyes and mouth, along the face's own x axis."""
+
+MODES = ("none", "talk", "listen", "think")
+PHASES = ("fixate", "saccade", "pursue")
+"""What the eyes do, as ``phase`` counts it."""
+
+_IDLE = frozenset(("search", "glance", "rest"))
+_LONGEST_FORESEEN_S = 0.3
+
+
+class TraceRow(NamedTuple):
+    """One tick; degrees, seconds, metres where the name says no other; nan where unknown.
+
+    gaze_*: mean line of sight in space; head_*, eye_*: neck, and mean eye in the head
+    idle: whether the target is one of those with no one there
+    eye_limited: whether an eye is at the end of its range, short of where it should point
+    target_*: direction of the point in force from the head, now; target_*_rate: its speed
+    vergence, vergence_due: as it is, and as the point's place asks for
+    off_left, off_right: angle of each line of sight off the point
+    left_y_mm ... right_z_mm: where each pupil axis passes the point, in the face's plane
+    face_y, face_z: where the gaze meets the face, from the tip of the nose
+    face_off: how far the person's face is turned away from the robot
+    lid, lower_lid: the wider opening of the upper and of the lower lids, 0 shut .. 1 open
+    shift: the target's event count; mode: index in MODES
+    """
+
+    t: float
+    gaze_yaw: float
+    gaze_pitch: float
+    head_yaw: float
+    head_pitch: float
+    head_roll: float
+    eye_yaw: float
+    eye_pitch: float
+    target_yaw: float
+    target_pitch: float
+    target_yaw_rate: float
+    target_pitch_rate: float
+    target_m: float
+    vergence: float
+    vergence_due: float
+    off_left: float
+    off_right: float
+    left_y_mm: float
+    left_z_mm: float
+    right_y_mm: float
+    right_z_mm: float
+    face_y: float
+    face_z: float
+    face_off: float
+    on_face: float
+    lid: float
+    lower_lid: float
+    phase: float
+    is_face: float
+    idle: float
+    eye_limited: float
+    shift: float
+    mode: float
+
+
+@dataclass(frozen=True)
+class GazeTrace:
+    """A whole run: columns (one value a tick), and events in the order of their beginning.
+
+    asked_blinks: as the models commanded them; kinds: seconds per kind of target
+    joints: of the rig, and which of them are estimated
+    reactions: to what came into view
+    """
+
+    rows: Floats
+    saccades: tuple[SaccadeEvent, ...]
+    fixations: tuple[FixationEvent, ...]
+    blinks: tuple[BlinkEvent, ...]
+    asked_blinks: tuple[BlinkEvent, ...] = ()
+    kinds: dict[str, float] = field(default_factory=dict)
+    joints: JointBasis = JointBasis()
+    reactions: tuple[MeasuredReaction, ...] = ()
+
+    def column(self, name: str) -> Floats:
+        """Return a column of Row by its name."""
+        out: Floats = self.rows[:, TraceRow._fields.index(name)]
+        return out
+
+    @property
+    def seconds(self) -> float:
+        """Return the length of the run."""
+        t = self.column("t")
+        return float(t[-1] - t[0]) if len(t) else 0.0
+
+    @property
+    def rate_hz(self) -> float:
+        """Return the median tick rate, 0 of nothing."""
+        t = self.column("t")
+        return float(1.0 / np.median(np.diff(t))) if len(t) > 1 else 0.0
+
+    @property
+    def mode(self) -> str:
+        """Return the mode of conversation that was in force for longest."""
+        modes = self.column("mode")
+        return MODES[int(np.bincount(modes.astype(int)).argmax())] if len(modes) else "none"
+
+    def between(self, start_s: float, end_s: float) -> slice:
+        """Return the rows from ``start_s`` until before ``end_s``."""
+        first, last = np.searchsorted(self.column("t"), (start_s, end_s))
+        return slice(int(first), int(last))
+
+    def slow(self, before_s: float = 0.015, after_s: float = 0.04) -> NDArray[np.bool_]:
+        """Return (n,) whether each row is clear of saccades."""
+        clear = np.ones(len(self.rows), dtype=bool)
+        for saccade in self.saccades:
+            clear[self.between(saccade.onset_s - before_s, saccade.end_s + after_s)] = False
+        return clear
+
+
+class GazeTraceBuilder:
+    """Builds the gaze trace of a run from its ticks."""
+
+    def __init__(self) -> None:
+        self._events = EventDetector()
+        self._flat = array("d")
+        self._saccades: list[SaccadeEvent] = []
+        self._fixations: list[FixationEvent] = []
+        self._asked_lids = array("d")
+        self._new, self._reactions = ReactionFinder(), list[MeasuredReaction]()
+        self._kinds: defaultdict[str, float] = defaultdict(float)
+        self._mode = 0
+        self._last_s: float | None = None
+        self._names: tuple[str, ...] = ()
+        self._estimated: dict[str, None] = {}
+
+    def update(self, tick: Tick) -> None:
+        """Add a tick; time during which a user has stopped the robot does not count."""
+        for command in tick.commands:
+            if (
+                isinstance(command, Ask)
+                and command.menu == "conversation"
+                and command.choice in MODES
+            ):
+                self._mode = MODES.index(command.choice)
+        for event in self._events.update(tick):
+            if isinstance(event, SaccadeEvent):
+                self._saccades.append(event)
+            elif isinstance(event, FixationEvent):
+                self._fixations.append(event)
+        reaction = self._new.update(tick)
+        if reaction is not None:
+            self._reactions.append(reaction)
+        self._names = tick.guard_result.joints
+        self._estimated.update(dict.fromkeys(estimated_joints(tick)))
+        if self._last_s is not None:
+            self._kinds[tick.target.kind] += tick.t_s - self._last_s
+        self._last_s = tick.t_s
+        if not tick.stopped:
+            self._flat.extend(row_of(tick, self._mode))
+            gaze = tick.gaze
+            lids = openings(gaze.lid_left, gaze.lid_right, self._names, UPPER)
+            pitch = 0.5 * (gaze.eye_left_rad[1] + gaze.eye_right_rad[1])
+            self._asked_lids.extend((max(lids or (nan,)), degrees(pitch)))
+
+    def gathered(self) -> GazeTrace:
+        """Return all of it as it is now."""
+        rows = np.array(self._flat).reshape(-1, len(TraceRow._fields))
+        t_s, lid, pitch = (
+            rows[:, TraceRow._fields.index(name)] for name in ("t", "lid", "eye_pitch")
+        )
+        return GazeTrace(
+            rows,
+            tuple(self._saccades),
+            tuple(self._fixations),
+            blinks_of(t_s, lid, pitch),
+            blinks_of(t_s, *np.array(self._asked_lids).reshape(-1, 2).T),
+            dict(self._kinds),
+            joints_of(self._names, self._estimated),
+            tuple(self._reactions),
+        )
+
+
+def row_of(tick: Tick, mode: int) -> TraceRow:
+    """Return the columns of one tick."""
+    pose, target, names = tick.pose, tick.target, tick.guard_result.joints
+    head, left, right = pose.p_world_head_m, pose.p_world_eye_left_m, pose.p_world_eye_right_m
+    sight_left, sight_right = line_of_sight(pose, True), line_of_sight(pose, False)
+    way = cyclopean(tick)
+    moved = scale(target.v_world_m_s, min(max(0.0, tick.t_s - target.at_s), _LONGEST_FORESEEN_S))
+    point = add(target.p_world_m, moved)
+    rel = sub(point, head)
+    yaw, pitch = yaw_pitch(way)
+    at_yaw, at_pitch = yaw_pitch(rel)
+    yaw_rate, pitch_rate = _rates(rel, target.v_world_m_s)
+    x, y, _ = rotate_back(pose.R_world_head, rel)
+    half = 0.5 * norm(sub(left, right))
+    face, seen = _face(tick, way)
+    on_left = on_right = gaze_at = (nan, nan)
+    off_deg = nan
+    if face is not None:
+        since_s = min(max(0.0, tick.t_s - face[1]), _LONGEST_FORESEEN_S)
+        off_deg = _turned_deg(face[0], head)
+        gaze_at = _on_plane(face[0], since_s, head, way)
+        if target.kind == "face":
+            R = face[0].R_world_face
+            on_left = on_face(left, sight_left, point, R) or on_left
+            on_right = on_face(right, sight_right, point, R) or on_right
+    eye_left, eye_right = pose.eye_left_rad, pose.eye_right_rad
+    turned = head_in_space(pose)
+    return TraceRow(
+        tick.t_s, degrees(yaw), degrees(pitch),
+        degrees(turned[0]), degrees(turned[1]), degrees(turned[2]),
+        degrees(0.5 * (eye_left[0] + eye_right[0])), degrees(0.5 * (eye_left[1] + eye_right[1])),
+        degrees(at_yaw), degrees(at_pitch), degrees(yaw_rate), degrees(pitch_rate), norm(rel),
+        degrees(eye_right[0] - eye_left[0]), degrees(atan2(y + half, x) - atan2(y - half, x)),
+        degrees(angle_between(sight_left, sub(point, left))),
+        degrees(angle_between(sight_right, sub(point, right))),
+        1e3 * on_left[0], 1e3 * on_left[1], 1e3 * on_right[0], 1e3 * on_right[1],
+        gaze_at[0], gaze_at[1], off_deg, float(seen),
+        max(openings(pose.lid_left, pose.lid_right, names, UPPER) or (nan,)),
+        max(openings(pose.lower_left, pose.lower_right, names, LOWER) or (nan,)),
+        PHASES.index(tick.gaze.phase),
+        float(target.kind == "face"), float(target.kind in _IDLE),
+        float(any("eye" in limited.axis for limited in tick.gaze.limited)), target.shift, mode,
+    )  # fmt: skip
+
+
+def _rates(rel: Vec3, v: Vec3) -> tuple[float, float]:
+    """Return yaw and pitch rate of a point that moves, seen from a head that stands still."""
+    x, y, z = rel
+    level2 = x * x + y * y
+    if level2 < 1e-6:
+        return 0.0, 0.0
+    level = level2**0.5
+    yaw_rate = (x * v[1] - y * v[0]) / level2
+    outward = (x * v[0] + y * v[1]) / level
+    return yaw_rate, (level * v[2] - z * outward) / (level2 + z * z)
+
+
+def _face(tick: Tick, way: Vec3) -> tuple[tuple[Face, float] | None, bool]:
+    """Return the target's face, or else the one looked at, with its time; and whether it is."""
+    if tick.percept is None:
+        return None, False
+    captured_s, found = tick.percept.captured_s, None
+    for face in tick.percept.faces:
+        if face.id == tick.target.id or found is None:
+            found = face
+    if found is None:
+        return None, False
+    since_s = min(max(0.0, tick.t_s - captured_s), _LONGEST_FORESEEN_S)
+    centre = add(found.p_world_m, scale(found.v_world_m_s, since_s))
+    seen = beside_m(way, sub(centre, tick.pose.p_world_head_m)) <= NEAR_FACE_M
+    return (found, captured_s), seen
+
+
+def _turned_deg(face: Face, head: Vec3) -> float:
+    """Return how far a face is turned away from the robot's."""
+    R = face.R_world_face
+    return degrees(angle_between((R[0][0], R[1][0], R[2][0]), sub(head, face.p_world_m)))
+
+
+def _on_plane(face: Face, since_s: float, head: Vec3, way: Vec3) -> tuple[float, float]:
+    """Return where the gaze meets the face's plane, (y, z) from the nose, nan where it does not."""
+    R = face.R_world_face
+    out = scale((R[0][0], R[1][0], R[2][0]), PLANE_M)
+    centre = add(add(face.p_world_m, scale(face.v_world_m_s, since_s)), out)
+    if dot(way, sub(centre, head)) <= 0.0:
+        return nan, nan
+    return on_face(head, way, centre, R) or (nan, nan)

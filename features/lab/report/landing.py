@@ -1,0 +1,109 @@
+"""How saccades land: beyond or short of their targets, and what corrects them."""
+
+import numpy as np
+
+from gazerig.features.lab.report.gaze_trace import PHASES, GazeTrace
+from gazerig.features.lab.report.statistics import MeasuredValue, mean, median
+from gazerig.gaze.types import Floats
+
+OVERSHOOT_DEG = (5.0, 20.0)
+FAR_DEG = 10.0
+"""From here on people's saccades fall short."""
+
+_SETTLED_S = (0.06, 0.1)
+_LANDED_S = (0.02, 0.04)
+_STILL_DEG_S = 8.0
+_CORRECTION_S = (0.08, 0.35)
+
+
+def planned_saccades(run: GazeTrace) -> Floats:
+    """Return (n, 4) of each saccade that the models planned.
+
+    Columns: onset and end in s, how far the measured gaze went in deg, and 1 on a face.
+    """
+    t, flying = run.column("t"), run.column("phase") == PHASES.index("saccade")
+    edges = np.flatnonzero(np.diff(flying.astype(int), prepend=0, append=0)).reshape(-1, 2)
+    rows = []
+    for first, last in edges:
+        landed = run.between(t[min(last, len(t) - 1)] + _LANDED_S[0], t[last - 1] + 0.06)
+        if landed.stop > landed.start:
+            gone = np.median(_gaze(run, landed), axis=0) - _gaze(run, slice(first, first + 1))[0]
+            on_face = run.column("is_face")[first]
+            rows.append((t[first], t[last - 1], float(np.hypot(*gone)), on_face))
+    return np.array(rows).reshape(-1, 4)
+
+
+def overshoots(run: GazeTrace) -> Floats:
+    """Return (n,) how far each saccade of 5 to 20 deg went beyond its rest, as a share of it."""
+    rows = []
+    moves = np.hypot(run.column("target_yaw_rate"), run.column("target_pitch_rate"))
+    asked = [s for s in run.saccades if s.commanded is not None]
+    onsets = [*(s.onset_s for s in asked), np.inf]
+    for saccade, next_s in zip(asked, onsets[1:], strict=True):
+        rest = run.between(saccade.end_s + _SETTLED_S[0], saccade.end_s + _SETTLED_S[1])
+        flight = run.between(saccade.onset_s - 0.01, saccade.end_s + _SETTLED_S[1])
+        small = not OVERSHOOT_DEG[0] <= saccade.amplitude_deg <= OVERSHOOT_DEG[1]
+        if small or next_s < saccade.end_s + _SETTLED_S[1] or rest.stop <= rest.start:
+            continue
+        if float(np.median(moves[rest])) > _STILL_DEG_S:
+            continue
+        path = _gaze(run, flight)
+        whole = np.median(_gaze(run, rest), axis=0) - path[0]
+        size = float(np.hypot(*whole))
+        farthest = float(((path - path[0]) @ whole).max()) / size
+        rows.append(max(0.0, farthest / size - 1.0))
+    return np.array(rows)
+
+
+def landings(run: GazeTrace) -> Floats:
+    """Return (n, 2) of saccades to targets 10 deg away and more: share of the way, and corrected.
+
+    An eye that stops at the end of its range is brought on by the head, and no landing of its own.
+
+    corrected: 1 where another saccade to the same target follows within .35 s
+    """
+    t, shift = run.column("t"), run.column("shift")
+    at = np.column_stack([run.column("target_yaw"), run.column("target_pitch")])
+    jumps, limited = planned_saccades(run), run.column("eye_limited")
+    rows = []
+    for number, (onset_s, end_s, _, _) in enumerate(jumps):
+        first = run.between(onset_s, end_s).start
+        landed = run.between(end_s + _LANDED_S[0], end_s + _LANDED_S[1])
+        if landed.stop <= landed.start or shift[first] != shift[landed.start]:
+            continue
+        if limited[first : landed.stop].any():
+            continue
+        gaze, goal = _gaze(run, landed), at[landed].mean(axis=0)
+        start = _gaze(run, slice(first, first + 1))[0]
+        way = goal - start
+        far = float(np.hypot(*way))
+        if far < FAR_DEG:
+            continue
+        share = float((np.median(gaze, axis=0) - start) @ way) / far**2
+        rows.append((share, float(_corrected(jumps, number, t, shift))))
+    return np.array(rows).reshape(-1, 2)
+
+
+def _corrected(jumps: Floats, number: int, t: Floats, shift: Floats) -> bool:
+    """Return whether the next saccade follows soon and has the same target."""
+    if number + 1 >= len(jumps):
+        return False
+    after_s = jumps[number + 1, 0] - jumps[number, 1]
+    same = shift[np.searchsorted(t, jumps[number + 1, 0])] == shift[
+        np.searchsorted(t, jumps[number, 0])
+    ]  # fmt: skip
+    return bool(same and _CORRECTION_S[0] <= after_s <= _CORRECTION_S[1])
+
+
+def _gaze(run: GazeTrace, part: slice) -> Floats:
+    return np.column_stack([run.column("gaze_yaw")[part], run.column("gaze_pitch")[part]])
+
+
+def measures(run: GazeTrace) -> list[MeasuredValue]:
+    """Return what there is to say about landings."""
+    landed = landings(run)
+    return [
+        MeasuredValue("overshoot", overshoots(run), median),
+        MeasuredValue("landing", landed[:, 0], median),
+        MeasuredValue("corrected", landed[:, 1], mean),
+    ]

@@ -1,0 +1,214 @@
+"""The page of a report: words, numbers and figures put into the HTML templates."""
+
+from base64 import b64encode
+from collections import Counter
+from collections.abc import Sequence
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import jinja2
+
+from gazerig.features.lab.report.gaze_trace import GazeTrace
+from gazerig.features.lab.report.joint_basis import JointBasis
+from gazerig.features.lab.report.plotting import Drawing
+from gazerig.features.lab.report.run_header import RunHeader
+from gazerig.features.lab.report.statistics import MeasureResult
+from gazerig.robot.analysis.norm_bands import BANDS, GROUPS, NormBand
+from gazerig.robot.control.feedback_basis import ESTIMATED, Basis
+
+if TYPE_CHECKING:
+    from gazerig.features.lab.report.heads import MutualGazeReport
+
+_CLASSES = {
+    "pass": "pass", "uncertain": "uncertain", "outside": "outside", "too few events": "few",
+}  # fmt: skip
+
+
+class Figure(NamedTuple):
+    """A drawn figure, and its caption for the runs in it."""
+
+    drawing: Drawing
+    png: bytes
+    caption: str
+
+    @property
+    def data_uri(self) -> str:
+        """Return it as the page holds it."""
+        return f"data:image/png;base64,{b64encode(self.png).decode()}"
+
+
+class TextLine(NamedTuple):
+    """One row of a table of the page, ready to print.
+
+    css: class of its verdict; gauge: SVG of the value beside its band; notes: why it is so
+    """
+
+    title: str
+    value: str
+    interval: str
+    asked: str
+    band: str
+    events: str
+    verdict: str
+    css: str
+    source: str
+    notes: tuple[str, ...]
+    gauge: "Gauge | None"
+
+
+class Gauge(NamedTuple):
+    """Places on a scale of 0..100: the band, the value and its interval."""
+
+    band_from: float
+    band_wide: float
+    value: float
+    low: float
+    wide: float
+
+
+class PageSection(NamedTuple):
+    """One section of the page."""
+
+    name: str
+    lines: tuple[TextLine, ...]
+    figures: tuple[Figure, ...]
+    left_out: tuple[str, ...]
+    basis: Basis
+
+
+def report_page(
+    about: RunHeader,
+    run: GazeTrace,
+    findings: Sequence[MeasureResult],
+    figures: Sequence[Figure],
+    gaze: "MutualGazeReport | None" = None,
+) -> str:
+    """Return the page of one run as HTML that needs no other file."""
+    styles = about.styles | {f"conversation {run.mode}"} | run.joints.styles
+    sections = tuple(
+        PageSection(
+            group,
+            tuple(line_of(f, styles) for f in findings if f.band.group == group),
+            tuple(p for p in figures if p.drawing.group == group),
+            left_out(run.joints, group),
+            run.joints.basis(group),
+        )
+        for group in GROUPS
+    )
+    counts = Counter(finding.verdict for finding in findings)
+    facts = (*about.facts, *_facts(run))
+    return rendered(
+        "report.html", about=about, facts=facts, sections=sections, counts=counts,
+        outside=[f.band.title for f in findings if f.verdict == "outside"],
+        uncertain=[f.band.title for f in findings if f.verdict == "uncertain"],
+        basis=run.joints.whole_basis, banner=banner(run.joints),
+        gaze=gaze,
+    )  # fmt: skip
+
+
+def left_out(joints: JointBasis, group: str) -> tuple[str, ...]:
+    """Return why a section says less than it could of another rig."""
+    return joints.all_left_out(band.key for band in BANDS if band.group == group)
+
+
+def banner(joints: JointBasis) -> str:
+    """Return what a reader must know first where servos tell nothing, "" where all measure."""
+    if not joints.estimated:
+        return ""
+    if joints.whole_basis == "estimated":
+        return (
+            "Nothing here is measured: the servos of this rig tell nothing. Where this page speaks "
+            f"of what was found, it is {ESTIMATED}. Real eyes may lag, stick or swing, and the "
+            "verdicts would not know."
+        )
+    return (
+        f"Not all of this is measured: the servos of {', '.join(joints.estimated)} tell nothing. "
+        f"What rests on them is {ESTIMATED}; sections that do so say it."
+    )
+
+
+FOLDER = Path(__file__).parent
+"""Has the templates."""
+
+
+def rendered(template: str, folder: Path = FOLDER, **values: object) -> str:
+    """Fill a template of a folder; it may extend those of this folder."""
+    loader = jinja2.FileSystemLoader((folder, FOLDER))
+    environment = jinja2.Environment(
+        loader=loader, autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True,
+    )  # fmt: skip
+    return environment.get_template(template).render(**values)
+
+
+def line_of(finding: MeasureResult, styles: frozenset[str]) -> TextLine:
+    """Return a finding as text."""
+    band, value = finding.band, finding.value
+    known = isfinite(finding.low95)
+    interval = f"{number(finding.low95)} to {number(finding.high95)}" if known else ""
+    asked = finding.measured.asked
+    notes = tuple(text for style, text in band.notes if style in styles)
+    return TextLine(
+        band.title,
+        with_unit(value, band.unit) if isfinite(value) else "nothing found",
+        interval,
+        number(asked) if isfinite(asked) else "",
+        band_text(band),
+        f"{finding.measured.events} of {band.least}"
+        if finding.verdict == "too few events"
+        else f"{finding.measured.events}",
+        finding.verdict,
+        _CLASSES[finding.verdict],
+        band.source,
+        notes if finding.verdict in ("outside", "uncertain") else (),
+        gauge(finding) if known else None,
+    )
+
+
+def gauge(finding: MeasureResult) -> Gauge:
+    """Place band and value on one scale; a value far away stands at its end."""
+    band = finding.band
+    margin = 0.75 * (band.high - band.low)
+    start, span = band.low - margin, band.high - band.low + 2.0 * margin
+
+    def at(x: float) -> float:
+        return min(100.0, max(0.0, 100.0 * (x - start) / span))
+
+    low, high = at(finding.low95), at(finding.high95)
+    return Gauge(at(band.low), at(band.high) - at(band.low), at(finding.value), low, high - low)
+
+
+def band_text(band: NormBand) -> str:
+    """Return a band as text."""
+    return f"{number(band.low)} to {with_unit(band.high, band.unit)}"
+
+
+def with_unit(value: float, unit: str) -> str:
+    """Return a number with its unit; shares have none."""
+    return number(value) if unit in ("", "share") else f"{number(value)} {unit}"
+
+
+def number(value: float) -> str:
+    """Return a number with as many digits as are of use."""
+    size = abs(value)
+    if size >= 100.0:
+        return f"{value:.0f}"
+    if size >= 10.0:
+        return f"{value:.1f}".rstrip("0").rstrip(".")
+    text = f"{value:.2f}" if size >= 0.1 or value == 0.0 else f"{value:.3f}"
+    text = text.rstrip("0").rstrip(".")
+    return "0" if text in ("-0", "") else text
+
+
+def _facts(run: GazeTrace) -> tuple[tuple[str, str], ...]:
+    """Return what the ticks themselves say of the run."""
+    total = sum(run.kinds.values()) or 1.0
+    shares = sorted(run.kinds.items(), key=lambda item: -item[1])
+    return (
+        ("length", f"{run.seconds:.1f} s, {len(run.rows)} ticks at {run.rate_hz:.0f} Hz"),
+        ("events", f"{len(run.saccades)} saccades, {len(run.fixations)} fixations, "
+                   f"{len(run.blinks)} blinks"),
+        ("looked at", ", ".join(f"{kind} {100 * s / total:.0f} %" for kind, s in shares)),
+        ("conversation", run.mode),
+    )  # fmt: skip

@@ -1,0 +1,119 @@
+"""How figures look: one style, drawn without a screen, given as PNG.
+
+The one place where matplotlib is imported: it is an extra, and importing this module without it
+raises SetupError with the command that installs it.
+"""
+
+from collections.abc import Callable, Sequence
+from io import BytesIO
+from typing import Any, Literal, NamedTuple
+
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.extras import extra_hint
+from gazerig.features.lab.report.gaze_trace import GazeTrace
+from gazerig.features.lab.report.reference_walk import ReferenceWalk
+
+try:
+    import matplotlib as mpl
+    from matplotlib.axes import Axes as Axes
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure as Figure
+    from matplotlib.patches import Circle as Circle
+    from matplotlib.patches import Ellipse as Ellipse
+    from matplotlib.patches import Patch as Patch
+except ImportError as error:
+    raise SetupError(extra_hint("matplotlib", "report", error)) from error
+
+COLOURS = ("#1c6ea4", "#d9660a")
+HUMAN = "#7f8c8d"
+"""What people do is grey in every figure."""
+
+HUMAN_FILL = "#dfe4e6"
+INK = "#2c3136"
+
+_STYLE: Any = {
+    "text.parse_math": False,  # names of files are no formulas
+    "font.family": "DejaVu Sans", "font.size": 10, "text.color": INK, "axes.labelcolor": INK,
+    "axes.edgecolor": "#9aa3a9", "axes.titlesize": 11, "axes.titleweight": "bold",
+    "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True,
+    "axes.axisbelow": True, "grid.color": "#eceff1", "grid.linewidth": 0.8,
+    "xtick.color": INK, "ytick.color": INK, "legend.frameon": False, "legend.fontsize": 8.5,
+    "figure.facecolor": "white",
+}  # fmt: skip
+_DPI = 110
+_LAYOUT: Literal["constrained"] | None = "constrained"
+"""Finds room for all labels, which takes most of the time of drawing; tests do without."""
+
+_Corner = Literal["upper left", "upper right", "lower right", "center right"]
+
+
+class Shown(NamedTuple):
+    """A run as figures show it; model: the walk over faces that its rig asks for."""
+
+    name: str
+    run: GazeTrace
+    colour: str
+    model: ReferenceWalk | None = None
+
+
+class Drawing(NamedTuple):
+    """One figure: its key (the file's name), the section it stands in, title and caption.
+
+    caption: "{measured}" in it becomes what the runs' figures are: measured, or estimated
+    """
+
+    key: str
+    group: str
+    title: str
+    caption: str
+    draw: Callable[[Figure, Sequence[Shown]], None]
+    size_in: tuple[float, float] = (8.4, 3.8)
+
+
+def caption_of(drawing: Drawing, runs: Sequence[Shown]) -> str:
+    """Return the caption of a figure of these runs."""
+    return drawing.caption.replace("{measured}", basis_text(runs, drawing.group))
+
+
+def basis_text(runs: Sequence[Shown], group: str) -> str:
+    """Return what several runs rest on together, e.g. "measured or estimated"."""
+    return " or ".join(dict.fromkeys(shown.run.joints.basis(group) for shown in runs))
+
+
+def png(drawing: Drawing, runs: Sequence[Shown]) -> bytes:
+    """Draw a figure of one run, or of two for comparison."""
+    return png_of(lambda figure: drawing.draw(figure, runs), drawing.size_in)
+
+
+def png_of(draw: Callable[[Figure], None], size_in: tuple[float, float]) -> bytes:
+    """Return what a function draws into an empty figure in the style of all figures."""
+    with mpl.rc_context(_STYLE):
+        figure = Figure(figsize=size_in, dpi=_DPI, layout=_LAYOUT)
+        canvas = FigureCanvasAgg(figure)
+        draw(figure)
+        out = BytesIO()
+        # print_figure would draw everything twice, the first time only to lay it out.
+        canvas.print_png(out)  # type: ignore[no-untyped-call]
+    return out.getvalue()
+
+
+def nothing(axes: Axes, what: str) -> None:
+    """Write in place of a figure that there is nothing to draw."""
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.grid(False)
+    axes.text(0.5, 0.5, what, ha="center", va="center", transform=axes.transAxes, color=HUMAN)
+
+
+def legend(axes: Axes, where: _Corner, columns: int = 1) -> None:
+    """Name what has a label, where there is any."""
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc=where, ncols=columns, markerscale=1.4)
+
+
+def label(axes: Axes, x: str, y: str, title: str = "") -> None:
+    """Write what the axes show."""
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    if title:
+        axes.set_title(title, loc="left")

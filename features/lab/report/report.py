@@ -1,0 +1,165 @@
+"""From ticks to a report: gather, measure, judge, draw, write."""
+
+from collections.abc import Callable, Iterable, Sequence
+from math import isfinite
+from pathlib import Path
+from typing import NamedTuple
+
+from gazerig.drivers.errors import SetupError
+from gazerig.features.lab.report import (
+    blinks,
+    eye_contact,
+    eye_head,
+    face,
+    figures_face,
+    figures_head,
+    figures_lids,
+    figures_saccades,
+    landing,
+    pursuit,
+    reactions,
+    rests,
+    saccades,
+)
+from gazerig.features.lab.report.files import write_all
+from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
+from gazerig.features.lab.report.heads import MutualGazeReport
+from gazerig.features.lab.report.page import Figure, report_page
+from gazerig.features.lab.report.plotting import COLOURS, Drawing, Shown, caption_of, png
+from gazerig.features.lab.report.run_header import RunHeader
+from gazerig.features.lab.report.statistics import MeasuredValue, MeasureResult, judged
+from gazerig.robot.analysis.norm_bands import BY_KEY, applies
+from gazerig.robot.control.tick import Tick
+
+Progress = Callable[[str, float], None]
+"""Told what is being done and the share of it that is done, 0..1."""
+
+DRAWINGS: tuple[Drawing, ...] = (
+    *figures_saccades.DRAWINGS,
+    *figures_face.DRAWINGS,
+    *figures_head.DRAWINGS,
+    *figures_lids.DRAWINGS,
+)
+
+FIGURE_KEYS = tuple(drawing.key for drawing in DRAWINGS)
+
+_TOLD_EVERY, _LEAST_TICKS = 400, 20
+READING, DRAWING = "reading the run", "drawing figures"
+
+
+class Report(NamedTuple):
+    """What was found, and the files that say so: the page, its figures, and the figures as JSON."""
+
+    findings: tuple[MeasureResult, ...]
+    page: Path
+    figures: tuple[Path, ...]
+    data: Path
+
+
+def report(
+    ticks: Iterable[Tick], about: RunHeader, out: Path, progress: Progress, force: bool = False
+) -> Report:
+    """Write one HTML page, a PNG a figure, and the numbers as JSON; give what was found.
+
+    out: the page to write; the PNGs go into a folder beside it, NAME_figures
+    force: replace files that are there
+
+    Raises:
+        SetupError: a file cannot be written.
+    """
+    return report_of(read(ticks, about, progress), about, out, progress, force)
+
+
+def report_of(
+    run: GazeTrace,
+    about: RunHeader,
+    out: Path,
+    progress: Progress,
+    force: bool = False,
+    gaze: MutualGazeReport | None = None,
+) -> Report:
+    """Do the same with a run that is gathered already.
+
+    gaze: how this head and another one looked at each other, None where there was no other
+
+    Raises:
+        SetupError: a file cannot be written.
+    """
+    findings = found(run)
+    figures = drawn([Shown(about.name, run, COLOURS[0], about.model)], progress)
+    page = report_page(about, run, findings, figures, gaze)
+    numbers = [_numbers(f, run) for f in findings] + ([gaze.as_json] if gaze else [])
+    written = write_all(out, page, figures, numbers, force)
+    return Report(findings, out, *written)
+
+
+def read(ticks: Iterable[Tick], about: RunHeader, progress: Progress) -> GazeTrace:
+    """Gather a run in one pass.
+
+    Raises:
+        SetupError: there is nothing in it.
+    """
+    gathering, first_s = GazeTraceBuilder(), None
+    progress(READING, 0.0)
+    for count, tick in enumerate(ticks):
+        gathering.update(tick)
+        first_s = tick.t_s if first_s is None else first_s
+        if about.duration_s and count % _TOLD_EVERY == 0:
+            progress(READING, min(1.0, (tick.t_s - first_s) / about.duration_s))
+    progress(READING, 1.0)
+    run = gathering.gathered()
+    if len(run.rows) < _LEAST_TICKS:
+        raise SetupError(f"{about.name}: {len(run.rows)} ticks are nothing to report on")
+    return run
+
+
+def measured(run: GazeTrace) -> tuple[MeasuredValue, ...]:
+    """Measure all that applies to the rig's joints and in the run's mode of conversation."""
+    each = (
+        saccades.measures(run), landing.measures(run), rests.measures(run), face.measures(run),
+        eye_head.measures(run), pursuit.measures(run), blinks.measures(run),
+        eye_contact.measures(run), reactions.measures(run),
+    )  # fmt: skip
+    return tuple(
+        m
+        for group in each
+        for m in group
+        if applies(BY_KEY[m.key], run.mode) and not run.joints.left_out(m.key)
+    )
+
+
+def found(run: GazeTrace) -> tuple[MeasureResult, ...]:
+    """Measure and judge a run."""
+    return tuple(judged(m, BY_KEY[m.key]) for m in measured(run))
+
+
+def drawn(runs: Sequence[Shown], progress: Progress) -> tuple[Figure, ...]:
+    """Draw every figure of one run, or of two beside each other, of those that it can show."""
+    figures = []
+    for count, drawing in enumerate(DRAWINGS):
+        progress(DRAWING, count / len(DRAWINGS))
+        able = [shown for shown in runs if not shown.run.joints.left_out(drawing.key)]
+        if able:
+            figures.append(Figure(drawing, png(drawing, able), caption_of(drawing, able)))
+    progress(DRAWING, 1.0)
+    return tuple(figures)
+
+
+def _numbers(finding: MeasureResult, run: GazeTrace) -> dict[str, object]:
+    """Return a finding as plain JSON; what is not known is null.
+
+    basis: "measured", "partly estimated" or "estimated"
+    """
+    band = finding.band
+    return {
+        "key": band.key, "title": band.title, "unit": band.unit,
+        "value": _known(finding.value), "low95": _known(finding.low95),
+        "high95": _known(finding.high95), "asked": _known(finding.measured.asked),
+        "events": finding.measured.events, "least_events": band.least,
+        "band": [band.low, band.high], "verdict": finding.verdict, "source": band.source,
+        "basis": run.joints.basis(band.group),
+    }  # fmt: skip
+
+
+def _known(value: float) -> float | None:
+    return value if isfinite(value) else None

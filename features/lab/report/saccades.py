@@ -1,0 +1,113 @@
+"""Saccades of a run against the main sequence of human ones."""
+
+import numpy as np
+
+from gazerig.features.lab.report.gaze_trace import GazeTrace
+from gazerig.features.lab.report.statistics import (
+    MeasuredValue,
+    figure,
+    mean,
+    median,
+    one_over_mean,
+)
+from gazerig.gaze.types import Floats
+from gazerig.robot.analysis import human_norms as human
+
+LEAST_DEG = 1.0
+"""Below, threshold and encoder steps shape what is measured."""
+
+_SMALL_PEAK_DEG, _SMALL_DURATION_DEG = 8.0, 12.0
+_SOON_S, _PAUSE_S = 0.1, 2.0
+
+
+def table(run: GazeTrace) -> Floats:
+    """Return (n, 4) amplitude in deg, duration in ms, peak in deg/s, time of the peak 0..1.
+
+    Only saccades that had been asked for: a servo that swings back makes none.
+    """
+    rows = [
+        (s.amplitude_deg, 1e3 * s.duration_s, s.peak_deg_s, s.peak_at)
+        for s in run.saccades
+        if s.commanded is not None and s.amplitude_deg >= LEAST_DEG
+    ]
+    return np.array(rows).reshape(-1, 4)
+
+
+def asked_table(run: GazeTrace) -> Floats:
+    """Return (n, 3) amplitude in deg, duration in ms and peak in deg/s as commanded."""
+    asked = [s.commanded for s in run.saccades if s.commanded is not None]
+    rows = [(c.amplitude_deg, 1e3 * c.duration_s, c.peak_deg_s) for c in asked]
+    found = np.array(rows).reshape(-1, 3)
+    return found[found[:, 0] >= LEAST_DEG]
+
+
+def measures(run: GazeTrace) -> list[MeasuredValue]:
+    """Return what there is to say about saccades."""
+    seen, asked = table(run), asked_table(run)
+    every = [s for s in run.saccades if s.amplitude_deg >= LEAST_DEG]
+    unasked = np.array([s.commanded is None for s in every], dtype=float)
+    skew = seen[:, 3] - human.peak_at(seen[:, 0])
+    return [
+        *(_peak(key, seen, asked, *ends) for key, ends in _PEAKS),
+        *(_duration(key, seen, asked, *ends) for key, ends in _DURATIONS),
+        MeasuredValue("skew", skew, median),
+        MeasuredValue("below_15", (seen[:, 0] < 15.0).astype(float), mean),
+        MeasuredValue("rate", _intervals(run), one_over_mean),
+        MeasuredValue("too_soon", (_pauses(run) < _SOON_S).astype(float), mean),
+        MeasuredValue("unasked", unasked, mean),
+        MeasuredValue("rest_error", rest_errors(run), median),
+    ]
+
+
+_PEAKS = (("peak_small", (LEAST_DEG, _SMALL_PEAK_DEG)), ("peak_large", (_SMALL_PEAK_DEG, 999.0)))
+_DURATIONS = (
+    ("duration_small", (LEAST_DEG, _SMALL_DURATION_DEG)),
+    ("duration_large", (_SMALL_DURATION_DEG, 999.0)),
+)
+
+
+def _peak(key: str, seen: Floats, asked: Floats, low_deg: float, high_deg: float) -> MeasuredValue:
+    """Return whether each peak speed lies between the human curves."""
+
+    def inside(rows: Floats) -> Floats:
+        a = rows[(rows[:, 0] >= low_deg) & (rows[:, 0] < high_deg)]
+        fits = (a[:, 2] >= human.slowest_peak(a[:, 0])) & (a[:, 2] <= human.fastest_peak(a[:, 0]))
+        return fits.astype(float)
+
+    return MeasuredValue(key, inside(seen), mean, figure(mean, inside(asked)))
+
+
+def _duration(
+    key: str, seen: Floats, asked: Floats, low_deg: float, high_deg: float
+) -> MeasuredValue:
+    """Return whether each duration lies between the human lines."""
+
+    def inside(rows: Floats) -> Floats:
+        a = rows[(rows[:, 0] >= low_deg) & (rows[:, 0] < high_deg)]
+        fits = (a[:, 1] >= human.shortest_ms(a[:, 0])) & (a[:, 1] <= human.longest_ms(a[:, 0]))
+        return fits.astype(float)
+
+    return MeasuredValue(key, inside(seen), mean, figure(mean, inside(asked)))
+
+
+def _intervals(run: GazeTrace) -> Floats:
+    """Return seconds from each saccade asked for to the next."""
+    onsets = np.array([s.onset_s for s in run.saccades if s.commanded is not None])
+    return np.diff(onsets)
+
+
+def _pauses(run: GazeTrace) -> Floats:
+    """Return seconds from the end of each saccade to the next, of those that follow soon."""
+    asked = [s for s in run.saccades if s.commanded is not None]
+    ends = np.array([s.end_s for s in asked])
+    onsets = np.array([s.onset_s for s in asked])
+    pauses = onsets[1:] - ends[:-1]
+    soon: Floats = pauses[pauses < _PAUSE_S]
+    return soon
+
+
+def rest_errors(run: GazeTrace) -> Floats:
+    """Return per fixation the median angle of the lines of sight off the target, in deg."""
+    off = 0.5 * (run.column("off_left") + run.column("off_right"))
+    parts = [off[run.between(f.start_s + 0.04, f.end_s)] for f in run.fixations]
+    return np.array([np.median(part) for part in parts if len(part)])

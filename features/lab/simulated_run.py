@@ -1,0 +1,71 @@
+"""A run in simulated time, for its figures alone: nothing is shown, recorded or tuned."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from gazerig.config.schema import Rig
+from gazerig.drivers.errors import SetupError
+from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.session import ComposedRun, Session, run
+from gazerig.robot.control.tick import Tick
+
+
+class SimulatedRun(NamedTuple):
+    """The summary's figures of a run, and what the report's measures rest on."""
+
+    figures: dict[str, object]
+    trace: GazeTrace
+
+
+def simulate(
+    rig: Rig,
+    options: RunOptions,
+    stopped: Callable[[], str | None] = lambda: None,
+    watch: Callable[[Tick], object] = lambda tick: None,
+) -> SimulatedRun:
+    """Run a rig from torque on to torque off.
+
+    Args:
+        rig: the configuration; the rig, character and profile of the options only name it.
+        options: with emulated servos, simulated time and a scene.
+        stopped: returns why to end early, None to go on.
+        watch: gets every tick.
+
+    Raises:
+        gazerig.config.load.ConfigError: a file that the rig names is at fault.
+        SetupError: the options do not fit the rig, or the run ended by a fault.
+    """
+    gathering, failures = GazeTraceBuilder(), list[Exception]()
+
+    def update(tick: Tick) -> None:
+        try:
+            gathering.update(tick)
+            watch(tick)
+        except Exception as error:
+            failures.append(error)  # the run goes on without an observer that fails
+            raise
+
+    composed = ComposedRun(options, assemble(rig, options), None, None)
+    figures = run(composed, stopped, lambda line: None, watch=update)
+    if failures:
+        raise failures[0]
+    stopped_by = str(figures["stopped_by"])
+    if stopped_by.startswith("fault"):
+        raise SetupError(f"the simulated run ended by a {stopped_by}")
+    return SimulatedRun(figures, gathering.gathered())
+
+
+def refuse_unfit(rig: Rig, options: RunOptions) -> None:
+    """Refuse options with which no run of a rig could begin; nothing runs.
+
+    Raises:
+        gazerig.config.load.ConfigError: a file that the rig names is at fault.
+        SetupError: the options do not fit the rig.
+    """
+    made = assemble(rig, options)
+    try:
+        Session(ComposedRun(options, made, None, None), lambda: None, lambda line: None)
+    finally:
+        made.close()

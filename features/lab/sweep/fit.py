@@ -1,0 +1,126 @@
+"""The parameters that put most of the report's measures inside their bands.
+
+What is made small is the number of measures outside, each graded by its distance
+(``gazerig.features.lab.sweep.outcome.grade``), so that a step towards a band counts, too.
+"""
+
+import json
+from collections import Counter
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from gazerig.drivers.errors import SetupError
+from gazerig.features.lab.sweep.axes import Axis, Point
+from gazerig.features.lab.sweep.outcome import REPORT, VERDICT, Outcome, grade
+from gazerig.features.lab.sweep.search import search
+from gazerig.robot.analysis.norm_bands import BANDS, BY_KEY
+
+Runner = Callable[[Sequence[Point]], Sequence[Sequence[Outcome]]]
+"""Runs points; returns the outcomes of each, one for each seed."""
+_JUDGED = ("pass", "outside")
+
+
+class Trial(NamedTuple):
+    """One point that was tried.
+
+    Attributes:
+        point: its parameters.
+        score: graded measures outside, mean of the seeds.
+        outside: how many are outside or not judged any more, mean of the seeds.
+        failed: why a run failed, "" if none did.
+    """
+
+    point: Point
+    score: float
+    outside: float
+    failed: str = ""
+
+
+class SweepFit(NamedTuple):
+    """What a search found.
+
+    Attributes:
+        counted: keys of the measures that count, those that the rig's own values allow to judge.
+        start: the rig's own values.
+        best: the lowest score; of equal ones the first.
+        trials: all points in the order tried, the rig's own first.
+    """
+
+    counted: tuple[str, ...]
+    start: Trial
+    best: Trial
+    trials: tuple[Trial, ...]
+
+
+def fit(run: Runner, axes: Sequence[Axis], start: Point, count: int, seed: int) -> SweepFit:
+    """Search the axes for the best point.
+
+    The same arguments and outcomes make the same search: an interrupted one is repeated from runs
+    that are kept.
+
+    Args:
+        run: runs points.
+        axes: what may be varied.
+        start: the rig's own values.
+        count: points to try besides.
+        seed: of the search.
+
+    Raises:
+        SetupError: the rig's own values cannot be run, or no measure can be judged.
+    """
+    own = run([start])[0]
+    counted = counted_in(own)
+    tried = {_key(start): trial_of(start, own, counted)}
+
+    def scores(points: Sequence[Point]) -> list[float]:
+        fresh = list({_key(one): one for one in points if _key(one) not in tried}.values())
+        for point, outcomes in zip(fresh, run(fresh), strict=True):
+            tried[_key(point)] = trial_of(point, outcomes, counted)
+        return [tried[_key(point)].score for point in points]
+
+    search(scores, axes, start, count, seed)
+    trials = tuple(tried.values())
+    return SweepFit(counted, trials[0], min(trials, key=lambda trial: trial.score), trials)
+
+
+def counted_in(outcomes: Sequence[Outcome]) -> tuple[str, ...]:
+    """Return the measures that are judged in at least half of the runs.
+
+    Raises:
+        SetupError: a run failed, or there are none.
+    """
+    failed = next((one.failed for one in outcomes if one.failed), "")
+    if failed:
+        raise SetupError(f"the rig's own values cannot be run: {failed}")
+    judged = Counter(
+        band.key
+        for one in outcomes
+        for band in BANDS
+        if one.figures.get(f"{VERDICT}{band.key}") in _JUDGED
+    )
+    counted = tuple(band.key for band in BANDS if 2 * judged[band.key] >= len(outcomes))
+    if not counted:
+        raise SetupError("the runs are too short: no measure has enough events; give --seconds")
+    return counted
+
+
+def trial_of(point: Point, outcomes: Sequence[Outcome], counted: Sequence[str]) -> Trial:
+    """Return the score of a point's runs; one with a run that failed is the worst there can be."""
+    failed = next((one.failed for one in outcomes if one.failed), "")
+    if failed:
+        return Trial(point, len(counted) + 1.0, float(len(counted)), failed)
+    rows = [[_graded(one, key) for key in counted] for one in outcomes]
+    score = sum(map(sum, rows)) / len(rows)
+    return Trial(point, score, sum(x > 0.0 for row in rows for x in row) / len(rows))
+
+
+def _graded(outcome: Outcome, key: str) -> float:
+    """Return how far a measure is outside, 1 where too few events are left to judge it."""
+    verdict, value = outcome.figures.get(f"{VERDICT}{key}"), outcome.figures.get(f"{REPORT}{key}")
+    if verdict not in _JUDGED or not isinstance(value, int | float):
+        return 1.0
+    return grade(value, BY_KEY[key].low, BY_KEY[key].high) if verdict == "outside" else 0.0
+
+
+def _key(point: Point) -> str:
+    return json.dumps(point)

@@ -1,0 +1,96 @@
+"""What one run of a sweep leaves: the summary's figures and the report's, as flat columns."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from math import isfinite
+from typing import NamedTuple
+
+from gazerig.features.lab.report.report import measured
+from gazerig.features.lab.report.statistics import MeasureResult, compared
+from gazerig.features.lab.simulated_run import SimulatedRun
+from gazerig.features.lab.sweep.axes import Point
+from gazerig.robot.analysis.norm_bands import BANDS, BY_KEY
+
+Column = float | int | str | bool | None
+Figures = Mapping[str, Column]
+
+OUTSIDE, DISTANCE = "report.outside", "report.distance"
+"""Columns: measures outside their bands, and the same graded (see ``graded``)."""
+VERDICT = "verdict."
+REPORT = "report."
+_HALF = 0.25
+_NOT_REPRODUCED = ("wall_seconds", "reckoned")
+
+
+class Outcome(NamedTuple):
+    """One run.
+
+    Attributes:
+        point: its parameters.
+        seed: of its random generators.
+        figures: columns; empty if it failed.
+        failed: why it has no figures, "" if it has.
+        died: its process ended, perhaps for a reason that another time does not have.
+    """
+
+    point: Point
+    seed: int
+    figures: Figures
+    failed: str = ""
+    died: bool = False
+
+
+def figures_of(run: SimulatedRun) -> dict[str, Column]:
+    """Return the columns of a run, in the order of a table.
+
+    A measure KEY of the report stands in ``report.KEY``, its verdict in ``verdict.KEY``.
+    """
+    results = [compared(one, BY_KEY[one.key]) for one in measured(run.trace)]
+    words = [result.verdict for result in results]
+    columns: dict[str, Column] = {
+        OUTSIDE: words.count("outside"),
+        "report.pass": words.count("pass"),
+        "report.too_few_events": words.count("too few events"),
+        DISTANCE: sum(graded(result) for result in results),
+    }
+    for result in results:
+        columns[REPORT + result.band.key] = result.value if isfinite(result.value) else None
+        columns[VERDICT + result.band.key] = result.verdict
+    shown = {key: held for key, held in run.figures.items() if key not in _NOT_REPRODUCED}
+    return columns | dict(_flat(shown))
+
+
+def graded(result: MeasureResult) -> float:
+    """Return how far a measure is outside its band: 0 inside, 1 far away, 0.5 at a quarter."""
+    if result.verdict != "outside":
+        return 0.0
+    return grade(result.value, result.band.low, result.band.high)
+
+
+def grade(value: float, low: float, high: float) -> float:
+    """Return how far a value is outside a band, in widths of the band w: w / (w + 0.25)."""
+    widths = max(low - value, value - high, 0.0) / (high - low)
+    return widths / (widths + _HALF)
+
+
+def columns_of(outcomes: Sequence[Outcome]) -> list[str]:
+    """Return every column of figures that a run has, those of the report first."""
+    names = {name: None for one in outcomes for name in one.figures}
+    known = [OUTSIDE, "report.pass", "report.too_few_events", DISTANCE]
+    known += [f"{kind}{band.key}" for band in BANDS for kind in (REPORT, VERDICT)]
+    return [name for name in known if name in names] + [n for n in names if n not in set(known)]
+
+
+def _flat(held: Mapping[str, object], above: str = "") -> Iterator[tuple[str, Column]]:
+    """Return nested figures as columns with dotted names; of a list, its length."""
+    for name, value in held.items():
+        key = f"{above}{name}"
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{key}.")
+        elif isinstance(value, list | tuple):
+            yield key, len(value)
+        elif isinstance(value, float) and not isfinite(value):
+            yield key, None
+        elif value is None or isinstance(value, float | int | str | bool):
+            yield key, value
+        else:
+            yield key, str(value)

@@ -1,0 +1,90 @@
+"""A process of a sweep: imports once, then simulates one run after the other.
+
+Run as ``python -m gazerig.features.lab.sweep.worker`` by gazerig.features.lab.sweep.worker_pool.
+Standard input: a pickled ``Job``, then a line of JSON for each run, [number, point, seed]. Standard
+output: a line of JSON for each, [number, figures, why it failed]. It ends when its input
+does, and in the middle of a run when the program that started it is gone.
+"""
+
+import json
+import os
+import pickle
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from gazerig.config.parameters import changed
+from gazerig.config.schema import Rig
+from gazerig.config.text import rig_text
+from gazerig.errors import Error
+from gazerig.features.lab.simulated_run import simulate
+from gazerig.features.lab.sweep.axes import Point
+from gazerig.features.lab.sweep.outcome import Column, figures_of
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.run_rig import run_rig
+
+PARENT_GONE = "the program that asked for it is gone"
+_NICE = 5
+
+
+@dataclass(frozen=True)
+class Job:
+    """What all runs have in common.
+
+    Attributes:
+        options: but for the seed.
+        config: the rig's configuration as the program has read and checked it.
+    """
+
+    options: RunOptions
+    config: str
+
+
+def figures_at(
+    rig: Rig, options: RunOptions, point: Point, stopped: Callable[[], str | None]
+) -> dict[str, Column]:
+    """Run a rig with the values of a point; return the columns of its figures.
+
+    Raises:
+        ConfigError: a rule of the rig forbids the point.
+        SetupError: the run cannot be started, or ended by a fault.
+    """
+    return figures_of(simulate(changed(rig, point), options, stopped))
+
+
+def main() -> None:
+    """Serve until the input ends."""
+    os.nice(_NICE)
+    parent = os.getppid()
+    answers = os.fdopen(os.dup(sys.stdout.fileno()), "w", encoding="utf-8")
+    os.dup2(sys.stderr.fileno(), sys.stdout.fileno())  # what a package prints is no answer
+    job: Job = pickle.load(sys.stdin.buffer)
+    rig = run_rig(job.options)
+    changed_meanwhile = rig_text(rig) != job.config
+
+    def stopped() -> str | None:
+        return PARENT_GONE if os.getppid() != parent else None
+
+    for line in sys.stdin.buffer:
+        number, point, seed = json.loads(line)
+        figures, failed = dict[str, Column](), ""
+        try:
+            if changed_meanwhile:
+                raise Error(f"the files of {job.options.rig} changed while the sweep ran")
+            figures = figures_at(rig, replace(job.options, seed=seed), point, stopped)
+        except Exception as error:
+            failed = reason(error)
+        if stopped() is not None:
+            return
+        print(json.dumps([number, figures, failed]), file=answers, flush=True)
+
+
+def reason(error: Exception) -> str:
+    """Return why a run failed as one line."""
+    text = "; ".join(map(str.strip, str(error).splitlines()))
+    expected = isinstance(error, Error)
+    return text if expected and text else f"{type(error).__name__}: {text}"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,225 @@
+"""A study as a whole: who took part, what was measured in each condition, and what was decided."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import comb, nan, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from gazerig.features.study.data_folder import InterimLook
+from gazerig.features.study.decisions import Decision, decisions
+from gazerig.features.study.design import StudyDesign
+from gazerig.features.study.measures import Measure, measures
+from gazerig.features.study.participation import AnswerRow, Participation
+from gazerig.features.study.questionnaire import Questionnaire
+from gazerig.features.study.scores import Scores, item_answers, scores, wins
+from gazerig.features.study.statistics.contingency import Counts, counts_of
+from gazerig.features.study.statistics.reliability import cronbachs_alpha
+from gazerig.features.study.statistics.results import EffectSize
+from gazerig.gaze.types import Floats
+
+
+@dataclass(frozen=True)
+class ConditionSummary:
+    """A measure in one condition.
+
+    low95, high95: of the mean, within participants (Cousineau 2005, Morey 2008)
+    """
+
+    condition: str
+    n: int
+    mean: float
+    low95: float
+    high95: float
+    sd: float
+    median: float
+
+
+@dataclass(frozen=True)
+class MeasureSummary:
+    """A rating, the mean of a scale, or an objective measure.
+
+    counts: (conditions, points) how often each point was answered; None of other measures
+    alpha: Cronbach's, of a scale
+    """
+
+    measure: Measure
+    scores: Scores
+    conditions: tuple[ConditionSummary, ...]
+    counts: Counts | None
+    alpha: EffectSize | None
+
+
+@dataclass(frozen=True)
+class ChoiceSummary:
+    """Choices between pairs.
+
+    wins: (conditions, conditions) how often the row was chosen over the column
+    circles: triples of conditions that go in a circle by majority, and all triples
+    first: how often the first presentation was chosen, among how many
+    """
+
+    measure: Measure
+    wins: NDArray[np.int64]
+    circles: tuple[int, int]
+    first: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class StudyAnalysis:
+    """All that a report tells.
+
+    name: of the study's file; design_sha256: which all data carry
+    deleted: how many had their data deleted; looks: analyses before the planned sample was complete
+    """
+
+    name: str
+    design: StudyDesign
+    questionnaires: Mapping[str, Questionnaire]
+    design_sha256: str
+    people: tuple[Participation, ...]
+    decisions: tuple[Decision, ...]
+    measures: tuple[MeasureSummary, ...]
+    choices: tuple[ChoiceSummary, ...]
+    deleted: int = 0
+    looks: tuple[InterimLook, ...] = ()
+
+    @property
+    def counted(self) -> tuple[Participation, ...]:
+        """Return the participants who count."""
+        return tuple(one for one in self.people if not one.left_out)
+
+    @property
+    def remarks(self) -> tuple[AnswerRow, ...]:
+        """Return the free texts that are not empty."""
+        return tuple(
+            row
+            for one in self.counted
+            for row in one.counted
+            if isinstance(row.value, str) and row.value.strip() and self._is_text(row)
+        )
+
+    def label(self, name: str) -> str:
+        """Return what a condition, or a level of a factor, is called in the report."""
+        if name in self.design.conditions:
+            return self.design.conditions[name].label or name
+        return name.replace("=", " = ")
+
+    def _is_text(self, row: AnswerRow) -> bool:
+        return self.questionnaires[row.questionnaire].items[row.item].kind == "text"
+
+
+def analysed(
+    name: str,
+    design: StudyDesign,
+    questionnaires: Mapping[str, Questionnaire],
+    design_sha256: str,
+    people: Sequence[Participation],
+    deleted: int = 0,
+) -> StudyAnalysis:
+    """Analyse a study.
+
+    Args:
+        name: of the study's file.
+        design: with its hypotheses.
+        questionnaires: by the keys in the design.
+        design_sha256: hash of the design that all data carry.
+        people: with what is left out marked.
+        deleted: how many had their data deleted.
+    """
+    people = without_simulated(people)
+    known = [one for one in measures(design, questionnaires).values() if not one.once]
+    keys = tuple(design.conditions)
+    summaries = [
+        _summary(one, people, keys, questionnaires)
+        for one in known
+        if one.kind != "choice" and not (design.task == "pairwise" and one.kind != "objective")
+    ]
+    choices = [_choices(one, people, keys) for one in known if one.kind == "choice"]
+    return StudyAnalysis(
+        name, design, questionnaires, design_sha256, tuple(people),
+        decisions(design, questionnaires, people), tuple(summaries), tuple(choices), deleted,
+    )  # fmt: skip
+
+
+def without_simulated(people: Sequence[Participation]) -> tuple[Participation, ...]:
+    """Leave simulated participants out where anybody else took part."""
+    if all(one.simulated for one in people):
+        return tuple(people)
+    return tuple(
+        replace(one, left_out=one.left_out or "simulated") if one.simulated else one
+        for one in people
+    )
+
+
+def _summary(
+    measure: Measure,
+    people: Sequence[Participation],
+    conditions: tuple[str, ...],
+    questionnaires: Mapping[str, Questionnaire],
+) -> MeasureSummary:
+    found = scores(measure, people, conditions, questionnaires)
+    counts = None
+    if measure.kind == "item":
+        counts = np.array([counts_of(found.answers(c), measure.points) for c in conditions])
+    alpha = None
+    if measure.kind == "scale":
+        alpha = cronbachs_alpha(item_answers(measure, people, questionnaires))
+    return MeasureSummary(measure, found, _conditions(found), counts, alpha)
+
+
+def _conditions(found: Scores) -> tuple[ConditionSummary, ...]:
+    halves = within_halves(found.means)
+    out = []
+    for k, condition in enumerate(found.conditions):
+        column = found.means[:, k]
+        known = column[np.isfinite(column)]
+        mean = float(known.mean()) if len(known) else nan
+        sd = float(known.std(ddof=1)) if len(known) > 1 else nan
+        median = float(np.median(known)) if len(known) else nan
+        half = float(halves[k])
+        out.append(
+            ConditionSummary(condition, len(known), mean, mean - half, mean + half, sd, median)
+        )
+    return tuple(out)
+
+
+def within_halves(means: Floats) -> Floats:
+    """Return half the 95 % intervals of means within participants, (conditions,).
+
+    Each participant's own level is taken off (Cousineau 2005), which is made good for by the
+    factor k / (k - 1) of Morey (2008).
+
+    Args:
+        means: (participants, conditions); participants without all of them take no part.
+    """
+    whole = means[np.isfinite(means).all(axis=1)]
+    n, k = len(whole), means.shape[1]
+    if n < 2 or k < 2:
+        return np.full(k, nan)
+    relative = whole - whole.mean(axis=1, keepdims=True)
+    spread = relative.std(axis=0, ddof=1) * sqrt(k / (k - 1))
+    return np.asarray(float(stats.t.ppf(0.975, n - 1)) * spread / sqrt(n), np.float64)
+
+
+def _choices(
+    measure: Measure, people: Sequence[Participation], conditions: tuple[str, ...]
+) -> ChoiceSummary:
+    table = wins(measure, people, conditions)
+    made = [
+        row.value
+        for one in people
+        for row in one.counted
+        if row.questionnaire == measure.questionnaire and row.item in measure.items
+    ]
+    first = sum(value == "first" for value in made), len(made)
+    return ChoiceSummary(measure, table, circular_triples(table), first)
+
+
+def circular_triples(wins: NDArray[np.int64]) -> tuple[int, int]:
+    """Return how many triples of conditions go in a circle by majority, and how many there are."""
+    majority = (wins > wins.T).astype(np.int64)
+    circles = int(np.trace(np.linalg.matrix_power(majority, 3))) // 3
+    return circles, comb(len(wins), 3)

@@ -1,0 +1,165 @@
+"""The commands that run a study: its films, a participant's session, and deleting a participant."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from gazerig.drivers.errors import SetupError
+from gazerig.features.study.cli.design import DataOption, StudyArgument, data_folder, state
+from gazerig.robot.app.options import RunOptions, camera_of, host_port
+from gazerig.robot.cli import run_options as options
+from gazerig.robot.cli.browser import desktop_here, open_page
+from gazerig.robot.cli.progress_bar import progress_bar
+from gazerig.robot.cli.terminal import clear_errors, say, signals
+
+if TYPE_CHECKING:
+    from gazerig.features.study.data_folder import StudyData
+    from gazerig.features.study.run.study_file import LoadedStudy
+
+PAGE = "127.0.0.1:8090"
+"""Where the pages are served."""
+
+Participant = Annotated[
+    int | None,
+    typer.Option(metavar="N", min=1, max=999_999, help="Number of the participant; no names."),
+]
+
+
+def run(
+    study: StudyArgument = "study.yaml",
+    participant: Participant = None,
+    data: DataOption = None,
+    mock: options.Mock = False,
+    port: options.Port = None,
+    camera: options.Camera = None,
+    oak: options.Oak = False,
+    page: Annotated[
+        str,
+        typer.Option(
+            metavar="HOST:PORT",
+            help="Where the pages are served; for a phone or another computer 0.0.0.0:8090.",
+        ),
+    ] = PAGE,
+    no_browser: options.NoBrowser = False,
+    simulate: Annotated[
+        int, typer.Option(metavar="N", min=0, max=5000, help="Instead, N simulated participants.")
+    ] = 0,
+    effect: Annotated[
+        float,
+        typer.Option(min=-3.0, max=3.0, help="With --simulate: d_z of neighbouring conditions."),
+    ] = 0.6,
+    seed: Annotated[int, typer.Option(min=0, help="With --simulate: seed of the answers.")] = 0,
+) -> None:
+    """Run a participant's session in the browser; the same command goes on where it was cut off."""
+    with clear_errors(None, port, mock):
+        if (participant is None) == (not simulate):
+            raise SetupError("say --participant N, or --simulate N for simulated ones")
+        from gazerig.features.study.data_folder import StudyData
+        from gazerig.features.study.run.study_check import checked_study
+
+        found = checked_study(study)
+        folder = StudyData(data_folder(found, data))
+        if participant is None:
+            _simulate(found, folder, simulate, effect, seed)
+            print(f"next: gazerig study analyse {folder.folder}")
+            return
+        state(study, found, folder.folder)
+        from gazerig.features.study.run.participant import SessionPlan, run_session
+        from gazerig.robot.model.clock import RealClock
+
+        asked = RunOptions(
+            mock=mock,
+            port=port,
+            camera=camera_of(camera),
+            oak=oak,
+            seed=found.design.presentation.seed,
+        )
+        head = _head(found, asked)
+        films = {} if head is not None else _films(found, folder)
+        plan = SessionPlan(found, folder, participant, host_port(page), films, head)
+        browse = open_page if not no_browser and desktop_here() else None
+        with signals() as stopped:
+            print(run_session(plan, stopped, say, RealClock(), browse))
+
+
+def film(study: StudyArgument = "study.yaml", data: DataOption = None) -> None:
+    """Make the films of a study's conditions; those that are there already are kept."""
+    with clear_errors():
+        from gazerig.features.study.data_folder import StudyData
+        from gazerig.features.study.run.study_check import checked_study
+
+        found = checked_study(study)
+        for key, path in _films(found, StudyData(data_folder(found, data))).items():
+            print(f"{key}: {path}")
+
+
+def delete(
+    data: Annotated[Path, typer.Argument(metavar="DATA", help="Folder of the study's data.")],
+    participant: Annotated[
+        int, typer.Option(metavar="N", min=1, max=999_999, help="Number of the participant.")
+    ],
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask.")] = False,
+) -> None:
+    """Delete all data of a participant, and the reports made of them; this cannot be undone."""
+    with clear_errors():
+        from gazerig.features.study.data_folder import StudyData, code_of
+
+        code = code_of(participant)
+        question = f"Delete all data of {code} in {data}? This cannot be undone."
+        if not yes and not typer.confirm(question, err=True):
+            raise typer.Exit(1)
+        count = StudyData(data).delete(participant)
+        print(f"{code}: {count} files deleted; make the report again: gazerig study analyse {data}")
+
+
+def _simulate(
+    study: "LoadedStudy", data: "StudyData", count: int, effect: float, seed: int
+) -> None:
+    from gazerig.features.study.run.simulated_session import simulate_study
+    from gazerig.features.study.simulation import Population
+
+    with progress_bar() as steps:
+        simulate_study(
+            study, data, count, Population(effect=effect, seed=seed),
+            lambda share: steps("participants", share),
+        )  # fmt: skip
+    print(f"{data.folder}: {count} simulated participants, d_z = {effect:g}, seed {seed}")
+
+
+def _head(study: "LoadedStudy", asked: RunOptions) -> RunOptions | None:
+    """Return how the head is run, None where films are shown.
+
+    Raises:
+        SetupError: options of a head with films, or a scene before real servos.
+    """
+    shown = study.design.presentation
+    if shown.on == "film":
+        given = [
+            name
+            for name, said in {
+                "--mock": asked.mock, "--port": asked.port, "--camera": asked.camera, "--oak": asked.oak,
+            }.items()
+            if said
+        ]  # fmt: skip
+        if given:
+            raise SetupError(
+                f"{given[0]}: the study shows films, and no head runs (presentation.on: film)"
+            )
+        return None
+    looks = {} if asked.looks_through else {"scene": shown.scene, "world": shown.world}
+    return replace(asked, rig=shown.rig, no_page=True, **looks).checked()  # type: ignore[arg-type]
+
+
+def _films(study: "LoadedStudy", data: "StudyData") -> Mapping[str, Path]:
+    """Return the films of a study, made where they are not there yet."""
+    from gazerig.features.study.run.film import films
+
+    with progress_bar(remaining=True) as steps:
+
+        def progress(condition: str) -> Callable[[float], None]:
+            return lambda share: steps(f"film of {condition}", share)
+
+        return films(study, data.films, progress)

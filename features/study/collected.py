@@ -1,0 +1,132 @@
+"""The data of a study as they lie in its folder: the design, and every participant's journal."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.file_input import read_limited
+from gazerig.features.study import journal
+from gazerig.features.study.data_folder import StudyData
+from gazerig.features.study.design import Condition, StudyDesign
+from gazerig.features.study.participation import Participation, participation, require_fit
+from gazerig.features.study.questionnaire import Questionnaire
+from gazerig.features.study.records import Opened, Record
+
+_MOST_BYTES = 10_000_000
+
+
+@dataclass(frozen=True)
+class CollectedStudy:
+    """A study's data.
+
+    Attributes:
+        name: Of the study's file.
+        design: As it was at the first participant.
+        questionnaires: By the keys in the design.
+        design_sha256: Hash of the design, which all data carry.
+        people: With what is left out marked.
+        folders: Of the participants, in the order of ``people``.
+        deleted: Codes of participants whose data were deleted.
+    """
+
+    name: str
+    design: StudyDesign
+    questionnaires: Mapping[str, Questionnaire]
+    design_sha256: str
+    people: tuple[Participation, ...]
+    folders: tuple[Path, ...]
+    deleted: tuple[str, ...]
+
+
+def collected(folder: Path) -> CollectedStudy:
+    """Return all data of a study.
+
+    Raises:
+        SetupError: the folder holds no study or no participant, a file is
+            damaged, or data were taken with another design.
+    """
+    data = StudyData(folder)
+    sha256 = data.sha256()
+    path = folder / "design.json"
+    text = json.loads(read_limited(path, _MOST_BYTES))
+    design, questionnaires = stated(text["design"], path)
+    people, folders = [], []
+    for number in data.numbers():
+        each = data.participant(number)
+        records = journal.read(each)
+        _require_design(records, sha256, each, path)
+        if records:  # else nothing was kept of it
+            require_fit(records, design, questionnaires, each)
+            people.append(participation(records, design, questionnaires))
+            folders.append(each)
+    if not people:
+        raise SetupError(
+            f"{folder} has no participant yet: gazerig study run STUDY --participant 1, or "
+            "--simulate 24 to try it"
+        )
+    return CollectedStudy(
+        str(text["name"]), design, questionnaires, sha256, tuple(people), tuple(folders),
+        data.deleted(),
+    )  # fmt: skip
+
+
+def stated(text: Mapping[str, Any], path: Path) -> tuple[StudyDesign, dict[str, Questionnaire]]:
+    """Return design and questionnaires from a study's canonical text.
+
+    What the text has replaced by values, as the names of rigs and films, stays at its default: the
+    analysis needs none of it.
+
+    Args:
+        text: of gazerig.features.study.preregistration.canonical, decoded; it is not changed.
+        path: of the file that holds it, for messages.
+
+    Raises:
+        SetupError: it is no canonical text.
+    """
+    try:
+        design, asked = dict(text["design"]), text["questionnaires"]
+        known = {field.name for field in fields(Condition)}
+        design["conditions"] = {
+            key: {k: v for k, v in design["conditions"][key].items() if k in known}
+            for key in design.pop("order")
+        }
+        found = {
+            key: msgspec.convert(_in_order(asked[key]), Questionnaire)
+            for key in (*design["questionnaires"], *design["after"])
+        }
+        return msgspec.convert(design, StudyDesign), found
+    except (KeyError, TypeError, AttributeError, msgspec.MsgspecError) as error:
+        raise SetupError(
+            f"{path}: no design of a study ({error}): it was written by another version of gazerig, "
+            "or changed; analyse it with the version that ran the study"
+        ) from error
+
+
+def _in_order(asked: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a questionnaire with its items in the order in which they are asked."""
+    rest = {key: value for key, value in asked.items() if key != "order"}
+    return {**rest, "items": {key: asked["items"][key] for key in asked["order"]}}
+
+
+def _require_design(
+    records: tuple[Record, ...], sha256: str, participant: Path, path: Path
+) -> None:
+    """Refuse data that another design's session has taken.
+
+    Raises:
+        SetupError: they are such data.
+    """
+    for one in records:
+        if isinstance(one, Opened) and one.participant != participant.name:
+            raise SetupError(f"{participant} has the journal of {one.participant}: move it back")
+        if isinstance(one, Opened) and one.design_sha256 != sha256:
+            raise SetupError(
+                f"{participant} was recorded with another design ({one.design_sha256[:12]}) than "
+                f"{path} ({sha256[:12]}): data of two designs are two studies; move it to the "
+                "folder of its own"
+            )

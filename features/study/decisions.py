@@ -1,0 +1,205 @@
+"""The hypotheses of a study, decided by the tests that were planned for them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import isfinite, nan
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.features.lab.analysis.multiplicity import corrected
+from gazerig.features.study.design import Hypothesis, StudyDesign, Test
+from gazerig.features.study.measures import Measure, measures
+from gazerig.features.study.participation import Participation
+from gazerig.features.study.questionnaire import Questionnaire
+from gazerig.features.study.scores import Scores, choice_differences, scores, wins
+from gazerig.features.study.statistics.assumptions import (
+    AssumptionCheck,
+    difference_checks,
+    range_check,
+)
+from gazerig.features.study.statistics.contingency import chi_square, counts_of
+from gazerig.features.study.statistics.effects import cohens_dz
+from gazerig.features.study.statistics.ranks import friedman, rank_sum, sign, signed_rank
+from gazerig.features.study.statistics.results import EffectSize, StatisticalTest
+from gazerig.gaze.types import Floats
+
+Verdict = Literal["supported", "not supported", "against", "too few"]
+"""against: a difference beyond chance, but the test's effect has the other sign."""
+
+_LEAST_PEOPLE = 2
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What became of one hypothesis.
+
+    test: the one that was planned, None where nothing could be tested; also: further ones
+    corrected_p: of the planned test, over all hypotheses
+    n: participants with all conditions of both sides; standardised: d_z of their differences
+    medians, means: of the better and of the other condition; of choices the shares in all direct
+        choices, and no medians
+    too_few: why no result could have been significant, "" where one could
+    """
+
+    hypothesis: Hypothesis
+    measure: Measure
+    test: StatisticalTest | None
+    also: tuple[StatisticalTest, ...]
+    corrected_p: float
+    verdict: Verdict
+    n: int
+    medians: tuple[float, float]
+    means: tuple[float, float]
+    standardised: EffectSize | None
+    checks: tuple[AssumptionCheck, ...]
+    too_few: str = ""
+
+
+def decisions(
+    design: StudyDesign,
+    questionnaires: Mapping[str, Questionnaire],
+    people: Sequence[Participation],
+) -> tuple[Decision, ...]:
+    """Decide on every hypothesis of a design, with the correction that it planned.
+
+    Args:
+        design: with its hypotheses.
+        questionnaires: by the keys in the design.
+        people: with what is left out marked.
+    """
+    known = measures(design, questionnaires)
+    found = [
+        _tested(design, one, known[one.measure], questionnaires, people)
+        for one in design.hypotheses
+    ]
+    chances = {
+        str(k): one.test.deciding_p
+        for k, one in enumerate(found)
+        if one.test is not None and isfinite(one.test.deciding_p)
+    }
+    many = corrected(chances, design.plan.correction)
+    out = [replace(one, corrected_p=many.get(str(k), nan)) for k, one in enumerate(found)]
+    return tuple(replace(one, verdict=_verdict(one, design.plan.alpha)) for one in out)
+
+
+def _verdict(one: Decision, alpha: float) -> Verdict:
+    if one.test is None or one.too_few or not isfinite(one.corrected_p):
+        return "too few"
+    if one.corrected_p > alpha:
+        return "not supported"
+    # Means may have another sign than the ranks that the test compares.
+    return "supported" if one.test.effect.value > 0.0 else "against"
+
+
+def _tested(
+    design: StudyDesign,
+    one: Hypothesis,
+    measure: Measure,
+    questionnaires: Mapping[str, Questionnaire],
+    people: Sequence[Participation],
+) -> Decision:
+    conditions = tuple(design.conditions)
+    if measure.kind == "choice":
+        return _chosen(design, one, measure, people)
+    found = scores(measure, people, conditions, questionnaires)
+    sides = _Sides(found, design.side(one.better), design.side(one.than))
+    better, than = sides.means
+    n = len(better)
+    if n < _LEAST_PEOPLE:
+        why = f"{n} of {design.plan.participants} participants have both conditions"
+        nothing = (nan, nan)
+        return Decision(one, measure, None, (), nan, "too few", n, nothing, nothing, None, (), why)
+    tests = [_run(key, one, sides, measure) for key in (one.test, *one.also)]
+    return Decision(
+        one, measure, tests[0], tuple(tests[1:]), nan, "not supported", n,
+        (float(np.median(better)), float(np.median(than))), (float(better.mean()),
+        float(than.mean())), cohens_dz(better - than), _checks(measure, sides),
+        _too_few(tests[0], design.plan.alpha),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Sides:
+    """What a hypothesis compares: a condition, or all conditions of a factor's level, each."""
+
+    found: Scores
+    better: tuple[str, ...]
+    than: tuple[str, ...]
+
+    @property
+    def known(self) -> NDArray[np.bool_]:
+        """Return who has a mean of every condition on both sides, (participants,)."""
+        found: NDArray[np.bool_] = np.isfinite(self.found.column(*self.better, *self.than))
+        return found
+
+    @property
+    def means(self) -> tuple[Floats, Floats]:
+        """Return the means of the better side and of the other one, (known,) each."""
+        return self.found.column(*self.better)[self.known], self.found.column(*self.than)[
+            self.known
+        ]
+
+    @property
+    def better_first(self) -> NDArray[np.bool_]:
+        """Return who saw the better side first, (known,)."""
+        first, second = self.found.first_seen(*self.better), self.found.first_seen(*self.than)
+        found: NDArray[np.bool_] = (first < second)[self.known]
+        return found
+
+
+def _run(key: Test, one: Hypothesis, sides: _Sides, measure: Measure) -> StatisticalTest:
+    found, (better, than) = sides.found, sides.means
+    if key == "signed_rank":
+        return signed_rank(better - than, one.two_sided)
+    if key == "rank_sum":
+        return rank_sum(than, better, one.two_sided, paired=True)
+    if key == "friedman":
+        return friedman(found.means[np.isfinite(found.means).all(axis=1)])
+    if key == "chi_square":
+        rows = [counts_of(found.answers(*c), measure.points) for c in (sides.better, sides.than)]
+        return chi_square(rows, paired=True)
+    raise ValueError(f"{key} cannot decide on a rating")
+
+
+def _checks(measure: Measure, sides: _Sides) -> tuple[AssumptionCheck, ...]:
+    better, than = sides.means
+    checks = difference_checks(better - than, sides.better_first)
+    answers: list[Floats] = [sides.found.answers(*side) for side in (sides.than, sides.better)]
+    if measure.kind in ("item", "scale"):
+        checks.append(range_check(np.concatenate(answers), measure.points))
+    return tuple(checks)
+
+
+def _chosen(
+    design: StudyDesign, one: Hypothesis, measure: Measure, people: Sequence[Participation]
+) -> Decision:
+    """Decide on a choice between two."""
+    conditions = tuple(design.conditions)
+    table = wins(measure, people, conditions)
+    better, than = (
+        conditions.index(key) for name in (one.better, one.than) for key in design.side(name)
+    )
+    direct = int(table[better, than] + table[than, better])
+    leans = choice_differences(measure, people, conditions[better], conditions[than])
+    if not direct:
+        why = "nobody has chosen"
+        nothing = (nan, nan)
+        return Decision(one, measure, None, (), nan, "too few", 0, nothing, nothing, None, (), why)
+    test = sign(leans, one.two_sided)
+    share = float(table[better, than]) / direct
+    return Decision(
+        one, measure, test, (), nan, "not supported", len(leans), (nan, nan), (share, 1.0 - share),
+        None, (), _too_few(test, design.plan.alpha),
+    )  # fmt: skip
+
+
+def _too_few(test: StatisticalTest, alpha: float) -> str:
+    """Return why no result could have reached alpha, "" where one could."""
+    if test.least_p <= alpha:
+        return ""
+    return (
+        f"the most extreme answers that so few could give have p = {test.least_p:.3f}, "
+        f"which is above {alpha:g}"
+    )

@@ -1,0 +1,218 @@
+"""The journal of one participant: what happened, on disk before anybody goes on.
+
+A text file to which lines are added and never changed. A line is a JSON list of the records of one
+step, such as all answers of a page: after a crash it is there as a whole or not at all.
+"""
+
+import contextlib
+import fcntl
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, fields
+from math import nan
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import msgspec
+
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.file_output import make_folder
+from gazerig.features.study.records import (
+    Closed,
+    Consented,
+    ItemAnswered,
+    Measured,
+    Opened,
+    Record,
+    TrialBegan,
+    TrialEnded,
+)
+
+FILE = "journal.jsonl"
+_LOCK = "lock"
+_KINDS: Mapping[str, type[Record]] = {
+    kind.__name__: kind
+    for kind in (Opened, Consented, TrialBegan, TrialEnded, ItemAnswered, Measured, Closed)
+}
+
+
+class NotKept(SetupError):
+    """Records could not be written; the journal is as it was before."""
+
+
+class Journal:
+    """The journal of a participant, open for one session alone.
+
+    Attributes:
+        records: All that are on disk.
+        torn: Where the part of a line was put that a crash had left, None where there was none.
+
+    Args:
+        folder: of the participant; it is made.
+
+    Raises:
+        SetupError: another session has it open, or it cannot be read or written.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        make_folder(folder)
+        self._folder = folder
+        self._lock = _locked(folder)
+        try:
+            path = folder / FILE
+            data = path.read_bytes() if path.exists() else b""
+            whole = data.rfind(b"\n") + 1
+            self.records = decoded(data[:whole], path)
+            self.torn = self._set_aside(data[whole:]) if whole < len(data) else None
+            self._fd = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
+            os.ftruncate(self._fd, whole)
+            self._size = os.lseek(self._fd, whole, os.SEEK_SET)
+            os.fsync(self._fd)
+            _sync_folder(folder)
+        except OSError as error:
+            os.close(self._lock)
+            raise SetupError(f"{folder}: {error.strerror}") from error
+        except BaseException:
+            os.close(self._lock)
+            raise
+
+    def __enter__(self) -> "Journal":
+        """Return the journal itself."""
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Close it."""
+        self.close()
+
+    def write(self, records: Sequence[Record]) -> None:
+        """Add the records of one step; when this returns, they are on disk.
+
+        Raises:
+            NotKept: they are not, and nothing of them is; it may be tried again.
+        """
+        if not records:
+            return
+        line = encoded(records)
+        try:
+            written = 0
+            while written < len(line):
+                written += os.write(self._fd, line[written:])
+            os.fsync(self._fd)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._fd, self._size)
+                os.lseek(self._fd, self._size, os.SEEK_SET)
+            raise NotKept(f"{self._folder / FILE}: not kept: {error.strerror}") from error
+        self._size += len(line)
+        self.records = (*self.records, *records)
+
+    def close(self) -> None:
+        """Close it, and let another session have it."""
+        os.close(self._fd)
+        os.close(self._lock)
+
+    def _set_aside(self, torn: bytes) -> Path:
+        """Write the part of a line that a crash left to a file of its own; return its path."""
+        number = 1
+        while (path := self._folder / f"journal-torn-{number}.txt").exists():
+            number += 1
+        path.write_bytes(torn)
+        return path
+
+
+def read(folder: Path) -> tuple[Record, ...]:
+    """Return all records of a participant; what a crash left of a last line is no record.
+
+    Raises:
+        SetupError: there is no journal, or it is damaged.
+    """
+    path = folder / FILE
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise SetupError(f"{path}: {error.strerror}") from error
+    return decoded(data[: data.rfind(b"\n") + 1], path)
+
+
+def encoded(records: Sequence[Record]) -> bytes:
+    """Return the line of some records; what is not a number is null."""
+    said = [{"kind": type(one).__name__, **asdict(one)} for one in records]
+    return msgspec.json.encode(said) + b"\n"
+
+
+def decoded(data: bytes, path: Path) -> tuple[Record, ...]:
+    """Return the records of whole lines.
+
+    Raises:
+        SetupError: a line is none; with file, line and what is wrong.
+    """
+    records: list[Record] = []
+    for number, line in enumerate(data.splitlines(), start=1):
+        try:
+            records += [
+                _record(said) for said in msgspec.json.decode(line, type=list[dict[str, Any]])
+            ]
+        except (msgspec.MsgspecError, LookupError, TypeError, AttributeError, ValueError,
+                RecursionError) as error:  # fmt: skip
+            raise SetupError(
+                f"{path}:{number}: no records of a session ({error}): the file was changed or "
+                "damaged; put a copy of it in its place"
+            ) from error
+    return tuple(records)
+
+
+@contextlib.contextmanager
+def session_lock(folder: Path) -> Iterator[None]:
+    """Hold the lock of a participant's folder.
+
+    Raises:
+        SetupError: a session has it.
+    """
+    lock = _locked(folder)
+    try:
+        yield
+    finally:
+        os.close(lock)
+
+
+def _record(said: dict[str, Any]) -> Record:
+    kind = _KINDS[said.pop("kind")]
+    numbers = {field.name for field in fields(kind) if field.type is float}
+    for name in numbers & said.keys():
+        said[name] = nan if said[name] is None else said[name]
+    if kind is Measured:
+        said["values"] = {key: nan if one is None else one for key, one in said["values"].items()}
+    return msgspec.convert(said, kind)
+
+
+def _locked(folder: Path) -> int:
+    """Return the open lock of a folder; it is held until that is closed or the process ends.
+
+    Raises:
+        SetupError: another process holds it.
+    """
+    lock = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT, 0o600)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(lock)
+        raise SetupError(
+            f"{folder.name} has a session already, in another program: end that one, or take "
+            "another participant"
+        ) from None
+    return lock
+
+
+def _sync_folder(folder: Path) -> None:
+    """Have the names of new files on disk as well."""
+    fd = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(fd)
+    finally:
+        os.close(fd)

@@ -1,0 +1,138 @@
+"""The order in which each participant sees the conditions, balanced over the participants.
+
+Williams' squares (E. J. Williams, "Experimental designs balanced for the estimation of residual
+effects of treatments", Australian Journal of Scientific Research A 2, 1949, 149-168): with an even
+number n of conditions, n orders in which each condition stands in each place once and follows each
+other condition once; with an odd number, 2n orders in which it does so twice.
+"""
+
+from functools import cache
+from itertools import combinations
+
+import numpy as np
+
+from gazerig.features.study.design import StudyDesign
+
+PAIR = "|"
+"""Stands between the first and the second presentation of a pair."""
+_ORDERS, _PRACTICE = 0, 1
+"""Streams of random numbers of one seed."""
+
+
+def williams(n: int) -> tuple[tuple[int, ...], ...]:
+    """Return Williams' orders of ``n`` conditions 0..n-1: n of them if n is even, else 2n.
+
+    Raises:
+        ValueError: there is no condition.
+    """
+    if n < 1:
+        raise ValueError(f"{n} conditions; at least one is needed")
+    # 0, 1, n-1, 2, n-2, ...: neighbours differ by every number but 0, each once if n is even.
+    first = [0] + [(i + 1) // 2 if i % 2 else n - i // 2 for i in range(1, n)]
+    square = [tuple((one + row) % n for one in first) for row in range(n)]
+    mirrored = [row[::-1] for row in square] if n % 2 and n > 1 else []
+    return (*square, *mirrored)
+
+
+def rows(design: StudyDesign) -> int:
+    """Return how many participants see every order once; 1 where orders are random.
+
+    Numbers of participants that are multiples of it are balanced to the last cell.
+    """
+    return len(_table(design)) if design.trials.order == "williams" else 1
+
+
+def shown(design: StudyDesign) -> tuple[str, ...]:
+    """Return what one block of trials holds: the conditions, or the pairs of them as "a|b"."""
+    keys = tuple(design.conditions)
+    if design.task == "rating":
+        return keys
+    return tuple(f"{a}{PAIR}{b}" for a, b in combinations(keys, 2))
+
+
+def orders(design: StudyDesign, participant: int) -> tuple[str, ...]:
+    """Return the trials of a participant in order, each a condition key or a pair "a|b".
+
+    Each repetition is a block of its own, with another order of the same balanced set; the last
+    condition of a block is not the first of the next one if that can be helped.
+
+    Args:
+        design: a checked one.
+        participant: from 1; it chooses the row of the table, or the random order.
+
+    Raises:
+        ValueError: the number is below 1.
+    """
+    if participant < 1:
+        raise ValueError(f"participant {participant}: participants are counted from 1")
+    repetitions = design.trials.repetitions
+    if design.trials.order == "random":
+        return _random(design, participant, repetitions)
+    table = _table(design)
+    step = _step(table)
+    chosen = (table[(participant - 1 + k * step) % len(table)] for k in range(repetitions))
+    return tuple(one for row in chosen for one in row)
+
+
+def practice(design: StudyDesign, participant: int) -> tuple[str, ...]:
+    """Return the practice trials of a participant, drawn at random; none of them counts."""
+    rng = np.random.default_rng((design.trials.seed, participant, _PRACTICE))
+    drawn = rng.permutation(len(shown(design)))
+    return tuple(
+        _either_way(shown(design)[drawn[i % len(drawn)]], bool(rng.integers(2)))
+        for i in range(design.trials.practice)
+    )
+
+
+def _random(design: StudyDesign, participant: int, repetitions: int) -> tuple[str, ...]:
+    """Return blocks in random order; no trial is that before it if there are two."""
+    rng = np.random.default_rng((design.trials.seed, participant, _ORDERS))
+    there, out = shown(design), list[str]()
+    for _ in range(repetitions):
+        block = [there[i] for i in rng.permutation(len(there))]
+        if out and len(block) > 1 and _same(block[0], out[-1]):
+            at = int(rng.integers(1, len(block)))
+            block[0], block[at] = block[at], block[0]
+        out += [_either_way(one, bool(rng.integers(2))) for one in block]
+    return tuple(out)
+
+
+def _table(design: StudyDesign) -> tuple[tuple[str, ...], ...]:
+    """Return the orders that participants get in turn, as trials.
+
+    Which condition takes which part in the squares is drawn by the seed. Pairs are ordered as
+    conditions are; over the table each is seen both ways round equally often, in every place.
+    """
+    there = shown(design)
+    letters = np.random.default_rng((design.trials.seed, 0, _ORDERS)).permutation(len(there))
+    squares = [tuple(int(letters[one]) for one in row) for row in williams(len(there))]
+    if design.task == "rating":
+        return tuple(tuple(there[one] for one in row) for row in squares)
+    if len(squares) == len(there):  # of an even number, or one pair: the square again, turned
+        squares = 2 * squares
+    return tuple(
+        tuple(_either_way(there[one], bool((number // len(there) + one) % 2)) for one in row)
+        for number, row in enumerate(squares)
+    )
+
+
+@cache
+def _step(table: tuple[tuple[str, ...], ...]) -> int:
+    """Return how many rows further a participant's next block is taken from."""
+    n = len(table)
+    if len(table[0]) == 1:  # one pair: the other way round
+        return 1
+    for step in range(1, n):
+        if all(not _same(table[i][-1], table[(i + step) % n][0]) for i in range(n)):
+            return step
+    return 0
+
+
+def _same(one: str, other: str) -> bool:
+    """Whether two trials show the same, whichever way round."""
+    return set(one.split(PAIR)) == set(other.split(PAIR))
+
+
+def _either_way(trial: str, turned: bool) -> str:
+    """Return a pair the other way round if wanted; a condition stays itself."""
+    return PAIR.join(reversed(trial.split(PAIR))) if turned else trial

@@ -1,0 +1,183 @@
+"""What the experimenter sees and does: the session's state, live, and its buttons.
+
+Speaks as the live page does, so that the stop button (browser/stop.js) is the same.
+"""
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable
+
+import aiohttp
+from aiohttp import web
+
+from gazerig.features.study.answers import WrongAnswer
+from gazerig.features.study.design import StudyDesign
+from gazerig.features.study.journal import NotKept
+from gazerig.features.study.pages.head_link import HeadLink
+from gazerig.features.study.pages.study_files import HEADERS
+from gazerig.features.study.screens import (
+    ConsentScreen,
+    EndScreen,
+    InstructionsScreen,
+    PausedScreen,
+    PresentationScreen,
+    QuestionsScreen,
+    ReadyScreen,
+    RestScreen,
+    Screen,
+)
+from gazerig.features.study.study_run import StudyRun
+from gazerig.robot.dashboard.door.websocket_relay import TAKES_S, close_socket, until_one_ends
+from gazerig.robot.dashboard.requests.browser_requests import ASKED_BYTES, from_browser
+
+WHO = "the experimenter"
+_BEAT_S = 1.0
+_READ_S = 5.0
+_WORDS = 200
+_DOING: dict[type[Screen], str] = {
+    ConsentScreen: "reads the consent page",
+    InstructionsScreen: "reads the instructions",
+    ReadyScreen: "is asked to be ready",
+    PresentationScreen: "looks at the presentation",
+    QuestionsScreen: "answers questions",
+    RestScreen: "rests",
+    PausedScreen: "waits",
+    EndScreen: "has read to the end",
+}
+Watch = Callable[[web.Request, str, Callable[[], Awaitable[None]], float], Awaitable[None]]
+
+
+class ExperimenterLine:
+    """The experimenter's connections.
+
+    trouble: what the disk refused last, "" for nothing
+    """
+
+    def __init__(
+        self,
+        run: StudyRun,
+        design: StudyDesign,
+        head: HeadLink,
+        watch: Watch,
+        notify: Callable[[], None],
+        finish: Callable[[], None],
+    ) -> None:
+        """Serve nobody yet.
+
+        Args:
+            run: the session.
+            design: the study's, with what its conditions are called.
+            head: the one that is shown.
+            watch: calls something at news and after each beat, until the browser goes.
+            notify: tells all browsers that there is news.
+            finish: ends the program.
+        """
+        self._run, self._design, self._head = run, design, head
+        self._watch, self._notify, self._finish = watch, notify, finish
+        self._opened_s = 0.0
+        self.trouble = ""
+
+    def add_to(self, router: web.UrlDispatcher) -> None:
+        """Add the addresses that the page's scripts speak to."""
+        self._opened_s = asyncio.get_running_loop().time()
+        router.add_get("/rig/line", self._line)
+        router.add_post("/rig/ask", self._asked)
+
+    async def _line(self, request: web.Request) -> web.StreamResponse:
+        """Send the state whenever it changes and every second; receive stops."""
+        line = web.WebSocketResponse(max_msg_size=ASKED_BYTES, compress=False)
+        await line.prepare(request)
+
+        async def tell() -> None:
+            now_s = asyncio.get_running_loop().time() - self._opened_s
+            state = await asyncio.to_thread(self._state, now_s)
+            async with asyncio.timeout(TAKES_S):
+                await line.send_str(json.dumps({"state": state}))
+
+        await until_one_ends(self._watch(request, WHO, tell, _BEAT_S), self._receive(line))
+        await close_socket(line, request)
+        return line
+
+    def _state(self, elapsed_s: float) -> dict[str, object]:
+        """Return the state as the stop button and the page's script take it."""
+        head = self._head.report()
+        return {
+            "stopped": head.says if head.state == "stopped" else "",
+            "silent": head.state == "late",
+            "headless": head.state == "none",
+            "you": WHO,
+            "trouble": self.trouble,
+            "head": head.state,
+            "head_says": head.says,
+            "session": self._session(elapsed_s),
+        }
+
+    def _session(self, elapsed_s: float) -> dict[str, object]:
+        now = self._run.state()
+        shown = now.shown
+        condition = self._design.conditions[shown.condition] if shown else None
+        return {
+            "participant": now.participant,
+            "doing": _DOING[type(now.screen)],
+            "how": now.screen.how if isinstance(now.screen, EndScreen) else "",
+            "trial": None if now.trial is None else now.trial + 1,
+            "of": now.trials,
+            "condition": shown.condition if shown else "",
+            "label": condition.label if condition else "",
+            "attempt": shown.attempt if shown else 0,
+            "showing": now.presenting,
+            "showing_s": now.elapsed_s,
+            "answers": now.answers,
+            "elapsed_s": elapsed_s,
+            "fault": now.fault,
+            "paused": now.paused,
+        }
+
+    async def _receive(self, line: web.WebSocketResponse) -> None:
+        async for message in line:
+            if message.type is not aiohttp.WSMsgType.TEXT:
+                continue
+            status, text = await self._obey(from_browser(message.data, WHO))
+            async with asyncio.timeout(TAKES_S):
+                await line.send_str(json.dumps({"answer": status, "words": text}))
+
+    async def _asked(self, request: web.Request) -> web.Response:
+        async with asyncio.timeout(_READ_S):
+            body = await request.read()
+        status, text = await self._obey(from_browser(body, WHO))
+        return web.Response(status=status, text=f"{text}\n" if text else None, headers=HEADERS)
+
+    async def _obey(self, asked: dict[str, object] | None) -> tuple[int, str]:
+        """Do what is asked; return an HTTP status, and words of a refusal."""
+        if asked is None:
+            return 400, "not a JSON object that can be asked for"
+        what, why = asked.get("do"), f"{asked.get('why', '')!s}".strip()[:_WORDS]
+        try:
+            refused = await asyncio.to_thread(self._do, what, why)
+        except (WrongAnswer, NotKept) as error:
+            return 409, str(error)
+        except OSError as error:
+            return 503, str(error)
+        self._notify()
+        return (503, refused) if refused else (204, "")
+
+    def _do(self, what: object, why: str) -> str:
+        """Press a button; return words of a refusal, "" where it was done."""
+        match what:
+            case "stop":
+                return self._head.stop(f"{why} ({WHO})")
+            case "resume":
+                return self._head.resume()
+            case "pause" | "go on":
+                self._run.pause(what == "pause")
+            case "repeat":
+                self._run.repeat()
+            case "exclude":
+                if not why:
+                    return "say why the participant is excluded; the report names the reason"
+                self._run.exclude(why)
+            case "end":
+                self._finish()
+            case _:
+                return "there is no such button"
+        return ""

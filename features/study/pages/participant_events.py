@@ -1,0 +1,111 @@
+"""What a participant's browser may send: one thing done on one page."""
+
+from collections.abc import Mapping
+
+import msgspec
+
+from gazerig.features.study.records import AnswerValue
+from gazerig.features.study.study_run import StudyRun
+
+_MOST_ITEMS = 500
+
+
+class Malformed(ValueError):
+    """What came is nothing that can be done on a page."""
+
+
+class ParticipantEvent(msgspec.Struct, tag_field="do"):
+    """One thing done.
+
+    page: name of the page on which it was done; once: names this sending and its repetitions
+    """
+
+    page: str
+    once: str
+
+    def tell(self, run: StudyRun) -> None:
+        """Do it to the session; when this returns, it is on disk.
+
+        Raises:
+            NotKept: it could not be written.
+            WrongAnswer: the page has nothing of the kind.
+        """
+        raise NotImplementedError
+
+
+class _Consent(ParticipantEvent, tag="consent"):
+    given: bool
+    uses: list[str]
+
+    def tell(self, run: StudyRun) -> None:
+        """Record the decision."""
+        run.consent(self.page, self.given, "pictures" in self.uses, "gaze" in self.uses)
+
+
+class _Next(ParticipantEvent, tag="next"):
+    def tell(self, run: StudyRun) -> None:
+        """Leave the page."""
+        run.go_on(self.page)
+
+
+class _Begin(ParticipantEvent, tag="begin"):
+    def tell(self, run: StudyRun) -> None:
+        """Begin the presentation."""
+        run.begin(self.page)
+
+
+class _FilmSeen(ParticipantEvent, tag="seen"):
+    seconds: float
+
+    def tell(self, run: StudyRun) -> None:
+        """Record how much of the film was seen."""
+        run.film_ended(self.page, self.seconds)
+
+
+class _GivenAnswer(msgspec.Struct):
+    """An answer; key: number of the question on the page; ms: since the page appeared."""
+
+    key: str
+    value: int | str | None
+    ms: float
+
+
+class _Answers(ParticipantEvent, tag="answer"):
+    answers: list[_GivenAnswer]
+
+    def tell(self, run: StudyRun) -> None:
+        """Record the answers."""
+        values: Mapping[int, AnswerValue] = {_number(one): one.value for one in self.answers}
+        run.answer(self.page, values, {_number(one): one.ms for one in self.answers})
+
+
+class _Withdraw(ParticipantEvent, tag="withdraw"):
+    def tell(self, run: StudyRun) -> None:
+        """Leave the study."""
+        run.withdraw()
+
+
+_DECODER = msgspec.json.Decoder(_Consent | _Next | _Begin | _FilmSeen | _Answers | _Withdraw)
+
+
+def event_of(body: bytes) -> ParticipantEvent:
+    """Return what a browser sent.
+
+    Raises:
+        Malformed: it is not JSON, or nothing that can be done on a page.
+    """
+    try:
+        event: ParticipantEvent = _DECODER.decode(body)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise Malformed(f"nothing that can be done on a page: {error}") from None
+    if isinstance(event, _Answers):
+        numbers = [_number(one) for one in event.answers]
+        if len(numbers) > _MOST_ITEMS or len(set(numbers)) < len(numbers):
+            raise Malformed("too many answers, or two of one question")
+    return event
+
+
+def _number(answer: _GivenAnswer) -> int:
+    if not (answer.key.isascii() and answer.key.isdigit() and len(answer.key) <= 3):
+        raise Malformed(f"{answer.key!r:.20} is no question")
+    return int(answer.key)

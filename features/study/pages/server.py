@@ -1,0 +1,315 @@
+"""Serves the pages of a study: the participant's at "/", the experimenter's at "/experimenter".
+
+Each has a token of its own. What a participant does names the page it was done on and is done
+once, however often and from however many tabs it is sent; the answer is always the page that is
+shown now.
+A page is answered as kept only after the host has it on disk.
+"""
+
+import asyncio
+import threading
+from collections.abc import Awaitable, Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+
+from aiohttp import web
+from aiohttp.typedefs import Handler, Middleware
+
+from gazerig.features.study.answers import WrongAnswer
+from gazerig.features.study.design import StudyDesign
+from gazerig.features.study.journal import NotKept
+from gazerig.features.study.pages.experimenter_line import ExperimenterLine
+from gazerig.features.study.pages.head_link import HeadLink, NoHead
+from gazerig.features.study.pages.participant_events import (
+    Malformed,
+    ParticipantEvent,
+    event_of,
+)
+from gazerig.features.study.pages.participant_page import Json, page_json
+from gazerig.features.study.pages.study_files import HEADERS, StudyFiles
+from gazerig.features.study.study_run import StudyRun
+from gazerig.robot.dashboard.door.addresses import page_url
+from gazerig.robot.dashboard.door.admission import Admission
+from gazerig.robot.dashboard.door.browsers import TabLimits
+from gazerig.robot.dashboard.door.connection_limits import Connections
+from gazerig.robot.dashboard.door.websocket_relay import TAKES_S, until_one_ends
+
+SENT_BYTES = 256 * 1024
+"""Most that one page of answers may hold."""
+_MOST_TABS = 16
+_BEAT_S = 2.0
+_READ_S = 5.0
+_OPEN_TIMEOUT_S = 20.0
+_CLOSE_TIMEOUT_S = 3.0
+_PARTICIPANT, _EXPERIMENTER = "participant", "experimenter"
+_OTHERWISE = {
+    _PARTICIPANT: "please open the address that you were given by the experimenter",
+    _EXPERIMENTER: "open the experimenter's address that the terminal shows",
+}
+_FILMS_FAIL = (
+    "the participant's browser cannot play the films (WebM): open the participant's address in a "
+    "current Firefox, Chrome or Edge, on an iPhone or iPad with iOS 17.4 or later"
+)
+_EXPERIMENTERS_PATHS = ("/experimenter", "/rig/")
+
+
+class StudyServer:
+    """The pages of one session, served from a thread of its own."""
+
+    def __init__(
+        self,
+        run: StudyRun,
+        design: StudyDesign,
+        address: tuple[str, int],
+        tokens: tuple[str, str],
+        films: Mapping[str, Path],
+        finish: Callable[[], None],
+        head: HeadLink | None = None,
+    ) -> None:
+        """Prepare to listen.
+
+        Args:
+            run: the session.
+            design: the study's.
+            address: where to listen, e.g. ("127.0.0.1", 8090).
+            tokens: what the participant's browser must show, and what the experimenter's.
+            films: of each condition; empty with a head.
+            finish: called from any thread when the experimenter ends the program.
+            head: the one that is shown, None with films.
+        """
+        self._study_run, self._design, self._films = run, design, films
+        self._address = address
+        self._tokens = dict(zip((_PARTICIPANT, _EXPERIMENTER), tokens, strict=True))
+        self._admissions = {
+            who: Admission(*address, token, f"gazerig_study_{address[1]}_{who}", _OTHERWISE[who])
+            for who, token in self._tokens.items()
+        }
+        self._loop = asyncio.SelectorEventLoop()
+        self._over = asyncio.Event()
+        self._opened = threading.Event()
+        self._failed: OSError | None = None
+        self._news: set[asyncio.Event] = set()
+        self._tabs = TabLimits(_MOST_TABS)
+        self._once = ""
+        self._one_at_a_time = asyncio.Lock()
+        self._thread = threading.Thread(target=self._run, name="study pages", daemon=True)
+        self._experimenter = ExperimenterLine(
+            run, design, head or NoHead(), self._watch, self.notify, finish
+        )
+
+    @property
+    def participant_url(self) -> str:
+        """Return the address that lets the participant in."""
+        return self._url(_PARTICIPANT, "/")
+
+    @property
+    def experimenter_url(self) -> str:
+        """Return the address that lets the experimenter in."""
+        return self._url(_EXPERIMENTER, "/experimenter")
+
+    def open(self) -> None:
+        """Listen.
+
+        Raises:
+            OSError: the address cannot be listened on.
+        """
+        self._thread.start()
+        if not self._opened.wait(_OPEN_TIMEOUT_S):
+            raise OSError("the study's page did not open in time")
+        if self._failed is not None:
+            raise self._failed
+
+    def notify(self) -> None:
+        """Have the browsers look at what is shown now; from any thread."""
+        with suppress(RuntimeError):  # closed already
+            self._loop.call_soon_threadsafe(self._wake)
+
+    def close(self) -> None:
+        """Close all connections."""
+        if self._thread.is_alive():
+            with suppress(RuntimeError):
+                self._loop.call_soon_threadsafe(self._over.set)
+            self._thread.join(_CLOSE_TIMEOUT_S)
+
+    def _url(self, who: str, path: str) -> str:
+        return f"{page_url(*self._address)}{path}?token={self._tokens[who]}"
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        self._loop.run_until_complete(self._serve())
+        self._loop.close()
+
+    async def _serve(self) -> None:
+        runner = web.AppRunner(
+            self._app(), access_log=None, shutdown_timeout=0.5, lingering_time=0.0
+        )
+        await runner.setup()
+        assert runner.server is not None
+        self._connections = Connections(runner.server)
+        try:
+            listener = await self._loop.create_server(
+                self._connections.accept, *self._address, reuse_address=True
+            )
+        except OSError as error:
+            self._failed = error
+            return
+        finally:
+            self._opened.set()
+        await until_one_ends(self._over.wait(), self._connections.watch())
+        self._wake()
+        listener.close()
+        await runner.cleanup()
+
+    def _app(self) -> web.Application:
+        app = web.Application(middlewares=[self._doorkeeper()], client_max_size=SENT_BYTES)
+        app.router.add_get("/study/page", self._page)
+        app.router.add_get("/study/news", self._tell_news)
+        app.router.add_post("/study/done", self._done)
+        app.router.add_get("/study/film/{token}", self._film)
+        app.router.add_post("/study/film_failed", self._film_failed)
+        StudyFiles(self._design.language).add_to(app.router)
+        self._experimenter.add_to(app.router)
+        app.router.add_get("/{path:.*}", _nothing)
+        return app
+
+    def _doorkeeper(self) -> Middleware:
+        """Accept a request, redirect it to an address without token, or refuse it in one line."""
+
+        @web.middleware
+        async def admit(request: web.Request, handler: Handler) -> web.StreamResponse:
+            with self._connections.busy(request):
+                theirs = request.path.startswith(_EXPERIMENTERS_PATHS)
+                admission = self._admissions[_EXPERIMENTER if theirs else _PARTICIPANT]
+                why_not = admission.refusal(request)
+                if why_not is not None and _is_shared(request.path):
+                    why_not = self._admissions[_EXPERIMENTER].refusal(request)
+                if why_not is not None:
+                    return web.Response(status=403, text=f"{why_not}\n", headers=HEADERS)
+                if "token" in request.query:
+                    return admission.with_cookie(request, HEADERS)
+                return await handler(request)
+
+        return admit
+
+    def _shown(self) -> Json:
+        """Return the page that is shown now."""
+        name, screen = self._study_run.now()
+        return {
+            "page": name,
+            **page_json(screen, self._design, self._study_run.state().participant),
+        }
+
+    # --- the participant ----------------------------------------------------------------------
+
+    async def _page(self, request: web.Request) -> web.Response:
+        return web.json_response(await asyncio.to_thread(self._shown), headers=HEADERS)
+
+    async def _done(self, request: web.Request) -> web.Response:
+        """Do what was done on a page; answer with the page that follows."""
+        async with asyncio.timeout(_READ_S):
+            body = await request.read()
+        try:
+            event = event_of(body)
+        except Malformed as error:
+            return web.Response(status=400, text=f"{error}\n", headers=HEADERS)
+
+        try:
+            async with self._one_at_a_time:
+                status, page = await asyncio.to_thread(self._take, event)
+        except WrongAnswer as error:
+            return web.Response(status=400, text=f"{error}\n", headers=HEADERS)
+        except NotKept as error:
+            self._experimenter.trouble = str(error)
+            self._wake()
+            # What the disk says may hold names of files, which are not for participants.
+            return web.Response(status=507, text="not kept\n", headers=HEADERS)
+        if status == 200:
+            self._experimenter.trouble = ""
+        self._wake()
+        return web.json_response(page, status=status, headers=HEADERS)
+
+    def _take(self, event: ParticipantEvent) -> tuple[int, Json]:
+        """Return 200 where it was done, now or before, 409 where its page is over; and the page."""
+        if event.once != self._once:
+            if event.page != self._study_run.now()[0]:
+                return 409, self._shown()
+            event.tell(self._study_run)
+            self._once = event.once
+        return 200, self._shown()
+
+    async def _tell_news(self, request: web.Request) -> web.StreamResponse:
+        """Send the name of the present page whenever it changes, and every two seconds."""
+        stream = web.StreamResponse(headers={**HEADERS, "Content-Type": "text/event-stream"})
+        await stream.prepare(request)
+
+        async def tell() -> None:
+            name, _ = await asyncio.to_thread(self._study_run.now)
+            async with asyncio.timeout(TAKES_S):
+                await stream.write(f"data: {name}\n\n".encode())
+
+        await self._watch(request, _PARTICIPANT, tell, _BEAT_S)
+        return stream
+
+    async def _film(self, request: web.Request) -> web.StreamResponse:
+        """Send a film's bytes without name, date or tag of the file, which could be told apart."""
+        token = request.match_info["token"]
+        condition = await asyncio.to_thread(self._study_run.film_of, token)
+        path = None if condition is None else self._films.get(condition)
+        if path is None:
+            return await _nothing(request)
+        try:
+            body = await asyncio.to_thread(path.read_bytes)
+        except OSError as error:
+            self._experimenter.trouble = f"the film cannot be read: {error}"
+            self._wake()
+            return await _nothing(request)
+        self._connections.lasting(request)  # as long as a slow network takes
+        answer = web.Response(body=body, content_type="video/webm", headers=HEADERS)
+        answer.force_close()
+        await answer.prepare(request)
+        await answer.write_eof()
+        if request.method == "GET":
+            self._study_run.film_fetched(token)  # before anything that the browser sends next
+        return answer
+
+    async def _film_failed(self, request: web.Request) -> web.Response:
+        """Tell the experimenter, until the next thing is done, that the browser plays no films."""
+        self._experimenter.trouble = _FILMS_FAIL
+        self._wake()
+        return web.Response(status=204, headers=HEADERS)
+
+    # --- who listens ----------------------------------------------------------------------------
+
+    async def _watch(
+        self,
+        request: web.Request,
+        who: str,
+        tell: Callable[[], Awaitable[None]],
+        beat_s: float,
+    ) -> None:
+        """Send to a browser now, at news and after each beat, until it goes."""
+        self._connections.lasting(request)
+        news = asyncio.Event()
+        self._news.add(news)
+        try:
+            with self._tabs.take(who) as leave, suppress(ConnectionError, TimeoutError):
+                while not (self._over.is_set() or leave.is_set()):
+                    news.clear()
+                    await tell()
+                    with suppress(TimeoutError):
+                        await asyncio.wait_for(news.wait(), beat_s)
+        finally:
+            self._news.discard(news)
+
+    def _wake(self) -> None:
+        for news in self._news:
+            news.set()
+
+
+def _is_shared(path: str) -> bool:
+    """Whether both pages need what is there."""
+    return path.startswith("/study/") and path.endswith((".css", ".js", ".svg", ".json"))
+
+
+async def _nothing(request: web.Request) -> web.Response:
+    return web.Response(status=404, text="there is nothing at this address\n", headers=HEADERS)

@@ -1,0 +1,275 @@
+"""From records to rows: what each participant answered, and what the design's rules leave out."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import inf, isnan, nan
+from pathlib import Path
+
+from gazerig.drivers.errors import SetupError
+from gazerig.features.study.answers import WrongAnswer, checked
+from gazerig.features.study.design import Exclusion, StudyDesign
+from gazerig.features.study.journal import FILE
+from gazerig.features.study.order import PAIR
+from gazerig.features.study.questionnaire import Questionnaire
+from gazerig.features.study.records import (
+    AnswerValue,
+    Closed,
+    Consented,
+    ItemAnswered,
+    Measured,
+    Opened,
+    Record,
+    TrialBegan,
+    TrialEnded,
+)
+
+LEAST_SAME = 8
+"""Ratings from which on one answer to all of them tells something: fewer may well be honest."""
+
+
+@dataclass(frozen=True)
+class AnswerRow:
+    """One answer, as the tidy table has it.
+
+    trial: None for what is asked once at the end, below 0 in practice
+    left_out: why the analysis does without it, "" where it counts
+    """
+
+    participant: str
+    trial: int | None
+    condition: str
+    questionnaire: str
+    item: str
+    value: AnswerValue
+    ms: float
+    utc: str
+    left_out: str = ""
+
+
+@dataclass(frozen=True)
+class TrialRow:
+    """One trial in its last attempt: outcome and what it was measured by.
+
+    side: 1 for the second presentation of a pair
+    from_s, to_s: when it began and ended in the recording's time, nan without one
+    """
+
+    trial: int
+    side: int
+    condition: str
+    attempts: int
+    outcome: str
+    seconds: float
+    utc: str
+    recording: str
+    reason: str
+    measured: Mapping[str, float]
+    from_s: float = nan
+    to_s: float = nan
+
+
+@dataclass(frozen=True)
+class Participation:
+    """All that is known of one participant.
+
+    how: "finished", "withdrawn", "excluded", or "unfinished"
+    left_out: why the analysis does without the participant, "" where it does not
+    """
+
+    participant: str
+    design_sha256: str
+    order: tuple[str, ...]
+    program: str
+    opened_utc: str
+    simulated: bool
+    how: str
+    answers: tuple[AnswerRow, ...]
+    trials: tuple[TrialRow, ...]
+    left_out: str = ""
+
+    @property
+    def counted(self) -> tuple[AnswerRow, ...]:
+        """Return the answers that count, none of a participant who is left out."""
+        return () if self.left_out else tuple(row for row in self.answers if not row.left_out)
+
+    @property
+    def counted_trials(self) -> tuple[TrialRow, ...]:
+        """Return the complete trials that count, none of a participant who is left out."""
+        counted = (t for t in self.trials if t.trial >= 0 and t.outcome == "complete")
+        return () if self.left_out else tuple(counted)
+
+
+def participation(
+    records: Sequence[Record], design: StudyDesign, questionnaires: Mapping[str, Questionnaire]
+) -> Participation:
+    """Return what records say of one participant, with what the design's rules leave out.
+
+    Args:
+        records: of one journal in order, the first of them Opened.
+        design: whose exclusion rules hold.
+        questionnaires: by the keys in the design.
+
+    Raises:
+        ValueError: the journal does not begin with Opened.
+    """
+    if not records or not isinstance(records[0], Opened):
+        raise ValueError("a journal begins with what opened it")
+    opened = records[0]
+    trials = _trials(records)
+    rows = [_judged(row, trials) for row in _rows(opened.participant, records)]
+    rows = _without_hasty(rows, design.exclusion)
+    closed = [r for r in records if isinstance(r, Closed)]
+    how = closed[-1].how if closed else "unfinished"
+    whole = Participation(
+        opened.participant, opened.design_sha256, opened.order, opened.program, opened.utc,
+        opened.simulated, how, tuple(rows), trials,
+    )  # fmt: skip
+    why = _whole_reason(whole, records, design, questionnaires)
+    return replace(whole, left_out=why)
+
+
+def require_fit(
+    records: Sequence[Record],
+    design: StudyDesign,
+    questionnaires: Mapping[str, Questionnaire],
+    folder: Path,
+) -> None:
+    """Refuse records that no session of this design can have written.
+
+    Args:
+        records: of one journal in order.
+        design: of the study.
+        questionnaires: by the keys in the design.
+        folder: of the participant, for the message.
+
+    Raises:
+        SetupError: the journal was changed or damaged; it is as it was.
+    """
+    began: set[tuple[int, int, int]] = set()
+    for number, one in enumerate(records, start=1):
+        why = _misfit(number, one, design, questionnaires)
+        if isinstance(one, TrialBegan):
+            began.add((one.trial, one.attempt, one.side))
+        if isinstance(one, TrialEnded) and (one.trial, one.attempt, one.side) not in began:
+            why = "the presentation did not begin"
+        if why:
+            raise SetupError(
+                f"{folder / FILE}: record {number}, {type(one).__name__}: {why}: the file was "
+                "changed or damaged; put a copy of it in its place"
+            )
+
+
+def _misfit(
+    number: int, one: Record, design: StudyDesign, questionnaires: Mapping[str, Questionnaire]
+) -> str:
+    """Return why a record is none of this design's sessions, "" if it may be one."""
+    if number == 1 and not isinstance(one, Opened):
+        return "a journal begins with Opened"
+    shown: list[str] = []
+    if isinstance(one, TrialBegan):
+        shown = [one.condition]
+    if isinstance(one, ItemAnswered):
+        asked = questionnaires.get(one.questionnaire)
+        if asked is None or one.item not in asked.items:
+            return f"{one.questionnaire}.{one.item} is not asked"
+        item = asked.items[one.item]
+        try:
+            checked(0, item, one.value, may_skip=True)
+        except WrongAnswer as error:
+            return str(error)
+        shown = one.condition.split(PAIR) if one.trial is not None else []
+        if len(shown) not in ((2,) if item.kind == "choice" else (0, 1, 2)):
+            return f"{one.condition!r} is no pair"
+    unknown = [key for key in shown if key not in design.conditions]
+    return f"there is no condition {unknown[0]!r}" if unknown else ""
+
+
+def _rows(participant: str, records: Iterable[Record]) -> list[AnswerRow]:
+    """Return the answers; of an item that was answered again, the last."""
+    found: dict[tuple[int | None, str, str], AnswerRow] = {}
+    for one in records:
+        if isinstance(one, ItemAnswered):
+            found[one.trial, one.questionnaire, one.item] = AnswerRow(
+                participant, one.trial, one.condition, one.questionnaire, one.item, one.value,
+                one.ms, one.utc,
+            )  # fmt: skip
+    return list(found.values())
+
+
+def _trials(records: Iterable[Record]) -> tuple[TrialRow, ...]:
+    found: dict[tuple[int, int], TrialRow] = {}
+    for one in records:
+        if isinstance(one, TrialBegan):
+            attempts = found[one.trial, one.side].attempts if (one.trial, one.side) in found else 0
+            found[one.trial, one.side] = TrialRow(
+                one.trial, one.side, one.condition, attempts + 1, "interrupted", nan,
+                one.utc, "", "did not end", {},
+            )  # fmt: skip
+        elif isinstance(one, TrialEnded) and (one.trial, one.side) in found:
+            found[one.trial, one.side] = replace(
+                found[one.trial, one.side], outcome=one.outcome, seconds=one.seconds,
+                recording=one.recording, reason=one.reason, from_s=one.from_s, to_s=one.to_s,
+            )  # fmt: skip
+        elif isinstance(one, Measured) and (one.trial, one.side) in found:
+            before = found[one.trial, one.side]
+            found[one.trial, one.side] = replace(before, measured=dict(one.values))
+    return tuple(found.values())
+
+
+def _judged(row: AnswerRow, trials: Sequence[TrialRow]) -> AnswerRow:
+    """Leave out practice, presentations that were not completed, and what was not answered."""
+    if row.trial is not None and row.trial < 0:
+        return replace(row, left_out="practice")
+    ends = [t.outcome for t in trials if t.trial == row.trial]
+    if broken := next((outcome for outcome in ends if outcome != "complete"), ""):
+        return replace(row, left_out=f"presentation {broken.replace('_', ' ')}")
+    return replace(row, left_out="not answered") if row.value is None else row
+
+
+def _without_hasty(rows: Iterable[AnswerRow], rules: Exclusion) -> list[AnswerRow]:
+    """Leave out pages that were answered faster than anybody reads."""
+    rows = list(rows)
+    slowest: dict[tuple[int | None, str], float] = {}
+    for row in rows:
+        page = row.trial, row.questionnaire
+        # A browser that measured nothing was not too fast.
+        slowest[page] = max(slowest.get(page, 0.0), inf if isnan(row.ms) else row.ms)
+    return [
+        replace(row, left_out=row.left_out or "answered too fast")
+        if slowest[row.trial, row.questionnaire] < rules.fastest_answer_ms
+        else row
+        for row in rows
+    ]
+
+
+def _whole_reason(
+    one: Participation,
+    records: Iterable[Record],
+    design: StudyDesign,
+    questionnaires: Mapping[str, Questionnaire],
+) -> str:
+    """Return why a participant is left out as a whole, "" where none is."""
+    consents = [r.given for r in records if isinstance(r, Consented)]
+    if not consents or not consents[-1]:
+        return "did not consent"
+    if one.how in ("withdrawn", "excluded"):
+        last = [r.reason for r in records if isinstance(r, Closed)][-1]
+        words = "withdrew" if one.how == "withdrawn" else "excluded by the experimenter"
+        return f"{words}: {last}" if last else words
+    if one.how == "unfinished" and design.exclusion.incomplete == "exclude":
+        return "did not finish"
+    if design.exclusion.same_answers and _all_the_same(one, questionnaires):
+        return "gave one answer to every item of all trials"
+    return ""
+
+
+def _all_the_same(one: Participation, questionnaires: Mapping[str, Questionnaire]) -> bool:
+    ratings = [
+        row.value
+        for row in one.answers
+        if row.trial is not None
+        and row.trial >= 0
+        and row.value is not None
+        and questionnaires[row.questionnaire].items[row.item].kind == "rating"
+    ]
+    return len(ratings) >= LEAST_SAME and len(set(ratings)) == 1

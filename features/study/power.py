@@ -1,0 +1,288 @@
+"""How many participants a study needs: power of its tests under the model of answers.
+
+A closed formula for the signed-rank test (the paired t test's over the asymptotic relative
+efficiency 3/pi; Lehmann, Nonparametrics, 1975, ch. 4) supposes continuous answers. Five points have
+ties, which cost power, so a claim is counted: studies are drawn from the model of answers that
+simulated participants have (gazerig.features.study.simulation) and tested, 5 000 for each number
+of participants, by a fixed seed. The formula is where the search begins, and is shown beside it.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from math import ceil, pi, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from gazerig.features.study.design import Hypothesis, StudyDesign, Test
+from gazerig.features.study.measures import Measure
+from gazerig.features.study.order import rows
+from gazerig.features.study.simulation import (
+    BETWEEN_SD,
+    ITEM_SD,
+    TRIAL_SD,
+    preference,
+    shift_of,
+    thresholds,
+)  # fmt: skip
+from gazerig.gaze.types import Floats
+
+MOST = 2000
+"""Participants beyond which no number is looked for."""
+_STUDIES = 5_000
+_SEED = 20_020_405
+_EXACT = 40
+"""Differences up to which the exact chance decides, as it does in the analysis."""
+_NODES, _WEIGHTS = np.polynomial.hermite_e.hermegauss(61)
+_WEIGHTS = _WEIGHTS / _WEIGHTS.sum()
+
+Counts = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class PowerQuestion:
+    """What a test has to find.
+
+    Attributes:
+        test: That decides.
+        effect: d_z of a participant's differences, as they are analysed.
+        alpha: Of this one test.
+        two_sided: Differences of either sign count.
+        points: Steps of the rating; 0 for what is continuous, as means of scales nearly are.
+        choices: Direct choices between both that a participant makes, where choices are made.
+    """
+
+    test: Test
+    effect: float
+    alpha: float
+    two_sided: bool = True
+    points: int = 5
+    choices: int = 1
+
+
+class PowerClaim(NamedTuple):
+    """What a hypothesis can expect.
+
+    power: with the participants that are planned; formula: participants by the closed formula
+    needed: for the wanted power, a multiple of the orders; None above ``MOST``
+    """
+
+    question: PowerQuestion
+    participants: int
+    power: float
+    formula: int
+    needed: int | None
+
+
+def claim(design: StudyDesign, hypothesis: Hypothesis, measure: Measure) -> PowerClaim:
+    """Return the power of a hypothesis' own test, and how many participants it takes.
+
+    Where hypotheses are corrected for being many, each gets its share of the false alarms, to which
+    Holm's procedure adds power only.
+
+    Args:
+        design: a checked one.
+        hypothesis: one of its own.
+        measure: what the hypothesis is about.
+    """
+    asked = _question(design, hypothesis, measure)
+    n, wanted = design.plan.participants, design.plan.power
+    return PowerClaim(
+        asked, n, power_of(asked, n), by_formula(asked, wanted),
+        sample_size(asked, wanted, rows(design)),
+    )  # fmt: skip
+
+
+def _question(design: StudyDesign, one: Hypothesis, measure: Measure) -> PowerQuestion:
+    many = len(design.hypotheses) if design.plan.correction != "none" else 1
+    repetitions = design.trials.repetitions
+    sides = (*design.side(one.better), *design.side(one.than))
+    whole = measure.kind == "item" and repetitions == 1 and len(sides) == 2
+    return PowerQuestion(
+        one.test, design.plan.effect, design.plan.alpha / many, one.two_sided,
+        measure.points if whole else 0, repetitions,
+    )  # fmt: skip
+
+
+def by_formula(asked: PowerQuestion, power: float) -> int:
+    """Return participants by the normal approximation, ties left out of account.
+
+    n = ((z_alpha + z_power) / d)^2, of rank tests over 3/pi; of choices that of the sign test.
+    """
+    sides = 2 if asked.two_sided else 1
+    z_null, z_power = float(stats.norm.isf(asked.alpha / sides)), float(stats.norm.ppf(power))
+    if asked.test == "sign":
+        above, below = _leans(asked)
+        mean, lean = above - below, above + below
+        return ceil(((z_null * sqrt(lean) + z_power * sqrt(lean - mean**2)) / mean) ** 2)
+    return ceil(((z_null + z_power) / asked.effect) ** 2 * pi / 3.0)
+
+
+def sample_size(asked: PowerQuestion, power: float, multiple: int = 1) -> int | None:
+    """Return the fewest participants with a power, None if they were more than ``MOST``.
+
+    Args:
+        asked: what is to be found.
+        power: wanted chance to find it.
+        multiple: the number must be one of this.
+    """
+    low, high = 0, ceil(by_formula(asked, power) / multiple)
+    if high * multiple > MOST:  # ties only make it more
+        return None
+    while power_of(asked, high * multiple) < power:
+        low, high = high, ceil(1.3 * high) + 1
+        if low * multiple >= MOST:
+            return None
+    while high - low > 1:
+        middle = (low + high) // 2
+        if power_of(asked, middle * multiple) < power:
+            low = middle
+        else:
+            high = middle
+    return high * multiple
+
+
+@lru_cache(maxsize=4096)
+def power_of(asked: PowerQuestion, n: int) -> float:
+    """Return the chance that a deciding test of ``n`` participants is significant."""
+    if n < 1:
+        return 0.0
+    if asked.test == "sign":
+        return _sign(asked, n)
+    rng = np.random.default_rng((_SEED, n))
+    if asked.test == "rank_sum":
+        return _rank_sum(asked, n, rng)
+    return _signed_rank(asked, n, rng)
+
+
+@lru_cache(maxsize=64)
+def joint(effect: float, points: int) -> Floats:
+    """Return the chances of both ratings of a participant, (points, points).
+
+    Rows are the rating of the condition expected above, columns of the other one.
+    """
+    shift, noise = shift_of(effect, points), sqrt(TRIAL_SD**2 + ITEM_SD**2)
+    ends = np.array([-np.inf, *thresholds(points), np.inf])
+    own = BETWEEN_SD * _NODES[:, None]
+    above, below = (
+        np.diff(stats.norm.cdf((ends - own - side * shift) / noise), axis=1) for side in (0.5, -0.5)
+    )
+    found: Floats = np.einsum("k,ki,kj->ij", _WEIGHTS, above, below)
+    return found
+
+
+def _drawn(asked: PowerQuestion, n: int, rng: np.random.Generator) -> Counts:
+    """Return how many participants gave each pair of ratings, (studies, points, points)."""
+    cells = joint(asked.effect, asked.points)
+    found: Counts = rng.multinomial(n, (cells / cells.sum()).ravel(), _STUDIES)
+    return found.reshape(_STUDIES, asked.points, asked.points)
+
+
+def _signed_rank(asked: PowerQuestion, n: int, rng: np.random.Generator) -> float:
+    """Return the power of Wilcoxon's signed-rank test, zeros left out."""
+    if asked.points:
+        drawn = _drawn(asked, n, rng)
+        reach = range(1, asked.points)
+        up = np.stack([np.trace(drawn, -k, 1, 2) for k in reach], axis=1)
+        down = np.stack([np.trace(drawn, k, 1, 2) for k in reach], axis=1)
+    else:  # no two are alike: a participant is a column, in the order of the differences
+        d = rng.normal(asked.effect, 1.0, (_STUDIES, n))
+        sign = np.take_along_axis(d, np.argsort(np.abs(d), axis=1), axis=1) > 0.0
+        up, down = sign.astype(np.int64), (~sign).astype(np.int64)
+    return float(_found(up, down, asked).mean())
+
+
+def _found(up: Counts, down: Counts, asked: PowerQuestion) -> NDArray[np.bool_]:
+    """Return in which studies the signed-rank test is significant.
+
+    Args:
+        up: (studies, sizes) differences above zero, by ascending size.
+        down: (studies, sizes) those below.
+        asked: for its alpha and its sides.
+    """
+    size = up + down
+    doubled = 2 * np.cumsum(size, axis=1) - size + 1  # twice the midrank of each size
+    above, below = (np.sum(doubled * one, axis=1) for one in (up, down))
+    alpha = asked.alpha / (2.0 if asked.two_sided else 1.0)
+    kept = size.sum(axis=1)
+    # W+ less its mean is half of (above - below) in doubled ranks; its variance sums their squares.
+    spread = np.sqrt(np.sum(size * doubled.astype(float) ** 2, axis=1))
+    z = (np.abs(above - below) - 2.0) / np.maximum(spread, 1e-12)
+    found: NDArray[np.bool_] = stats.norm.sf(z) <= alpha
+    few = np.flatnonzero(kept <= _EXACT)
+    if len(few):
+        patterns, which = np.unique(size[few], axis=0, return_inverse=True)
+        least = np.array([_critical(tuple(row), alpha) for row in patterns.tolist()])
+        found[few] = np.maximum(above, below)[few] >= least[which.ravel()]
+    return found if asked.two_sided else found & (above > below)
+
+
+@lru_cache(maxsize=200_000)
+def _critical(size: tuple[int, ...], alpha: float) -> int:
+    """Return the least doubled sum of ranks on one side whose exact chance is at most alpha.
+
+    size: differences by ascending size; the signs of all are equally likely both ways
+    """
+    chances, before = np.ones(1), 0
+    for many in size:
+        if not many:
+            continue
+        step = 2 * before + many + 1
+        spaced = np.zeros(many * step + 1)
+        spaced[::step] = _coins(many)
+        chances, before = np.convolve(chances, spaced), before + many
+    tail = np.cumsum(chances[::-1])[::-1]
+    return int(np.searchsorted(-tail, -alpha * (1.0 + 1e-9)))
+
+
+@lru_cache(maxsize=_EXACT + 1)
+def _coins(n: int) -> Floats:
+    """Return the chances of 0..n heads of n coins."""
+    found: Floats = stats.binom.pmf(np.arange(n + 1), n, 0.5)
+    return found
+
+
+def _rank_sum(asked: PowerQuestion, n: int, rng: np.random.Generator) -> float:
+    """Return the power of the rank-sum test of the same participants' answers, by their swaps."""
+    if asked.points:
+        drawn = _drawn(asked, n, rng)
+        size = drawn.sum(axis=2) + drawn.sum(axis=1)
+        midrank = np.cumsum(size, axis=1) - 0.5 * (size - 1)
+        scores = midrank[:, :, None] - midrank[:, None, :]
+        total, spread = (np.sum(drawn * one, axis=(1, 2)) for one in (scores, scores**2))
+    else:
+        own = BETWEEN_SD**2 / (BETWEEN_SD**2 + TRIAL_SD**2 + ITEM_SD**2)
+        shift = asked.effect * sqrt(2.0 * (1.0 - own))
+        person = sqrt(own) * rng.normal(size=(_STUDIES, n))
+        both = [person + sqrt(1.0 - own) * rng.normal(size=(_STUDIES, n)) for _ in range(2)]
+        ranks = stats.rankdata(np.concatenate([both[0] + shift, both[1]], axis=1), axis=1)
+        scores = ranks[:, :n] - ranks[:, n:]
+        total, spread = (np.sum(one, axis=1) for one in (scores, scores**2))
+    z = (np.abs(total) - 0.5) / np.sqrt(np.maximum(spread, 1e-12))
+    alpha = asked.alpha / (2.0 if asked.two_sided else 1.0)
+    found = stats.norm.sf(z) <= alpha
+    return float(np.mean(found if asked.two_sided else found & (total > 0.0)))
+
+
+def _leans(asked: PowerQuestion) -> tuple[float, float]:
+    """Return the chances that a participant chooses the better one more often, and less often."""
+    chances = stats.binom.pmf(np.arange(asked.choices + 1), asked.choices, preference(asked.effect))
+    half = 0.5 * asked.choices
+    at = np.arange(asked.choices + 1)
+    return float(chances[at > half].sum()), float(chances[at < half].sum())
+
+
+def _sign(asked: PowerQuestion, n: int) -> float:
+    """Return the power of the exact sign test of participants' choices."""
+    alpha = asked.alpha / (2.0 if asked.two_sided else 1.0)
+    above, below = _leans(asked)
+    kept = np.arange(n + 1)
+    share = above / (above + below)
+    # More than this number above has a chance of at most alpha where both sides are alike.
+    most = stats.binom.isf(alpha, kept, 0.5)
+    found = stats.binom.sf(most, kept, share)
+    if asked.two_sided:
+        found = found + stats.binom.cdf(kept - most - 1, kept, share)
+    return float(stats.binom.pmf(kept, n, above + below) @ found)

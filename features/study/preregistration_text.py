@@ -1,0 +1,301 @@
+"""A study's pre-registration as Markdown: what is expected, shown, asked, tested and left out."""
+
+from collections.abc import Iterator, Mapping
+from math import ceil
+from pathlib import Path
+
+import jinja2
+
+from gazerig.features.study.design import Hypothesis, StudyDesign, Test
+from gazerig.features.study.measures import GAZE_MEASURES, measures
+from gazerig.features.study.order import PAIR, orders, rows, shown
+from gazerig.features.study.participation import LEAST_SAME
+from gazerig.features.study.power import MOST, PowerClaim, claim, power_of
+from gazerig.features.study.questionnaire import Item, Questionnaire, Texts
+
+TESTS: Mapping[Test, str] = {
+    "signed_rank": "Wilcoxon's signed-rank test of participants' differences, zeros left out",
+    "rank_sum": "Wilcoxon's rank-sum statistic, by all swaps of participants' two answers",
+    "sign": "the exact sign test of participants, by which of both each chose more often",
+    "chi_square": "Pearson's chi-square test of the counts of each point",
+    "friedman": "Friedman's test over all conditions",
+}
+"""What each test is, in words."""
+_QUESTION_S, _SHOWN_ROWS = 6.0, 12
+
+
+def text(
+    design: StudyDesign,
+    questionnaires: Mapping[str, Questionnaire],
+    changes: Mapping[str, Mapping[str, object]],
+    sha256: str,
+    program: str,
+) -> str:
+    """Return the pre-registration of a study.
+
+    Args:
+        design: a checked one.
+        questionnaires: by the keys in the design.
+        changes: of each condition what differs from the study's rig, by dotted key.
+        sha256: of the canonical text.
+        program: version.
+    """
+    claims = claims_of(design, questionnaires)
+    hypotheses = [
+        {
+            "sentence": sentence(one, design),
+            "analysis": _analysis(one),
+            "size": size_words(design, found),
+        }
+        for one, found in zip(design.hypotheses, claims, strict=True)
+    ]
+    trials = design.trials
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(Path(__file__).parent), undefined=jinja2.StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True, autoescape=False,
+    )  # fmt: skip
+    made = environment.get_template("preregistration.md.jinja").render(
+        design=design, program=program, sha256=sha256, hypotheses=hypotheses,
+        conditions=list(_conditions(design, changes)), shown=_presentation(design),
+        trials=_trials(design), repeated=_times(trials.repetitions),
+        course=" ".join(filter(None, (_order(design), _practice(design), _rests(design)))),
+        minutes=minutes(design, questionnaires),
+        rows=list(_rows(design)), questionnaires=list(_asked(design, questionnaires)),
+        objective=[(n, GAZE_MEASURES.get(n, "as in gazerig report")) for n in design.objective],
+        correction=_correction(design), curve=_curve(design, claims),
+        exclusions=list(_exclusions(design)), privacy=list(_privacy(design)),
+        debriefing="At the end:\n" if design.texts.debriefing else "",
+    )  # fmt: skip
+    return made.rstrip("\n") + "\n"
+
+
+def claims_of(
+    design: StudyDesign, questionnaires: Mapping[str, Questionnaire]
+) -> tuple[PowerClaim, ...]:
+    """Return the power of each hypothesis."""
+    known = measures(design, questionnaires)
+    return tuple(claim(design, one, known[one.measure]) for one in design.hypotheses)
+
+
+def sentence(one: Hypothesis, design: StudyDesign) -> str:
+    """Return a hypothesis in words."""
+    sides = "either sign counts" if one.two_sided else "the other sign does not count"
+    better, than = design.side(one.better), design.side(one.than)
+    if len(better) > 1:
+        means = (", ".join(f"`{key}`" for key in side) for side in (better, than))
+        sides = f"each participant's mean of {' against that of '.join(means)}; {sides}"
+    return f"`{one.measure}` is higher for `{one.better}` than for `{one.than}` ({sides})."
+
+
+def size_words(design: StudyDesign, found: PowerClaim) -> str:
+    """Return how many participants a hypothesis takes, and what the planned ones give."""
+    asked, wanted = found.question, design.plan.power
+    needed = f"{found.needed}" if found.needed is not None else f"more than {MOST}"
+    few = found.needed is None or found.participants < found.needed
+    ties = (
+        f"by the formula without ties {found.formula}" if asked.test != "sign"
+        else f"by the normal approximation {found.formula}"
+    )  # fmt: skip
+    return (
+        f"{TESTS[asked.test]}, alpha {asked.alpha:.4g}: power {wanted:g} takes {needed} participants "
+        f"({ties}); the {found.participants} planned have power {found.power:.2f}"
+        + (": too few." if few else ".")
+    )
+
+
+def minutes(design: StudyDesign, questionnaires: Mapping[str, Questionnaire]) -> int:
+    """Return about how long a session takes."""
+    trials = len(shown(design)) * design.trials.repetitions + design.trials.practice
+    sides = 2 if design.task == "pairwise" else 1
+    items = sum(len(questionnaires[key].items) for key in design.questionnaires)
+    once = sum(len(questionnaires[key].items) for key in design.after)
+    rests = (trials - 1) // design.trials.rest_every if design.trials.rest_every else 0
+    seconds = trials * (sides * design.trials.seconds + items * _QUESTION_S)
+    return ceil((seconds + once * _QUESTION_S + rests * design.trials.rest_s + 120.0) / 60.0)
+
+
+def _analysis(one: Hypothesis) -> str:
+    also = "; ".join(TESTS[test] for test in one.also)
+    beside = f" Exploratory, deciding nothing: {also}." if also else ""
+    return f"`{one.measure}`, `{one.better}` against `{one.than}`: {TESTS[one.test]}.{beside}"
+
+
+def _conditions(
+    design: StudyDesign, changes: Mapping[str, Mapping[str, object]]
+) -> Iterator[dict[str, str]]:
+    for key, one in design.conditions.items():
+        said = [
+            f"{name} {_file(getattr(one, name))}"
+            for name in (
+                "rig",
+                "profile",
+                "character",
+                "scanpath",
+                "behaviour",
+                "recording",
+                "film",
+            )
+            if getattr(one, name) is not None
+        ]
+        said += [f"{name} = {value}" for name, value in one.params.items()]
+        said += [f"{name}: {level}" for name, level in one.factors.items()]
+        many = len(changes.get(key, ()))
+        values = f"{many} value{'s' if many != 1 else ''} in all" if many else "nothing"
+        yield {"key": key, "label": _cell(one.label), "differs": _cell("; ".join([*said, values]))}
+
+
+def _file(name: str) -> str:
+    return Path(name).name
+
+
+def _presentation(design: StudyDesign) -> str:
+    shown_by = design.presentation
+    before = shown_by.world or shown_by.scene
+    who = f"an emulated head before {_file(before)!r}" if before else "the head before its camera"
+    if shown_by.on == "head":
+        return f"They sit before the head itself; seed {shown_by.seed} for all conditions."
+    return (
+        f"They see films in a browser, of {who}; seed {shown_by.seed} for all conditions, whose "
+        "people and things therefore do the same."
+    )
+
+
+def _trials(design: StudyDesign) -> str:
+    if design.task == "rating":
+        return f"each of the {len(design.conditions)} conditions"
+    if len(shown(design)) == 1:
+        return "the pair of conditions, one after the other"
+    return f"each of the {len(shown(design))} pairs of conditions, one after the other"
+
+
+def _times(repetitions: int) -> str:
+    return f", {repetitions} times" if repetitions > 1 else ""
+
+
+def _order(design: StudyDesign) -> str:
+    if design.trials.order == "random":
+        return f"The order is random for each participant (seed {design.trials.seed})."
+    return (
+        f"Orders are Williams' squares (seed {design.trials.seed}): after every {rows(design)} "
+        "participants each has stood in each place, and after each other one, equally often."
+    )
+
+
+def _practice(design: StudyDesign) -> str:
+    count = design.trials.practice
+    return f"Before it, {count} practice trial{'s' if count > 1 else ''}." if count else ""
+
+
+def _rests(design: StudyDesign) -> str:
+    trials = design.trials
+    if not trials.rest_every or len(orders(design, 1)) <= trials.rest_every:
+        return ""
+    return f"After every {trials.rest_every} trials a rest of at least {trials.rest_s:g} s."
+
+
+def _rows(design: StudyDesign) -> Iterator[tuple[str, str]]:
+    """Return the orders of the first participants, as far as they do not repeat."""
+    every = rows(design) if design.trials.order == "williams" else design.plan.participants
+    for number in range(1, min(every, _SHOWN_ROWS) + 1):
+        yield str(number), ", ".join(one.replace(PAIR, " then ") for one in orders(design, number))
+    if every > _SHOWN_ROWS:
+        yield "...", f"{every - _SHOWN_ROWS} more, from the seed"
+    if design.trials.order == "williams" and every < design.plan.participants:
+        yield "...", f"participant {every + 1} as participant 1, and so on"
+
+
+def _asked(
+    design: StudyDesign, questionnaires: Mapping[str, Questionnaire]
+) -> Iterator[dict[str, object]]:
+    said = design.language
+    for key in (*design.questionnaires, *design.after):
+        one = questionnaires[key]
+        items = [
+            {"key": name, "text": _cell(_in(item.text, said)), "answers": _cell(_answers(item, said)),
+             "scale": item.scale + (" (reversed)" if item.reverse else "")}
+            for name, item in one.items.items()
+        ]  # fmt: skip
+        asked = "after each trial" if key in design.questionnaires else "once at the end"
+        shuffled = " Items are shuffled for each participant and trial." if one.shuffled else ""
+        licence = one.licence.rstrip(".") + "."
+        yield {
+            "key": key, "title": one.title, "asked": asked, "source": one.source.rstrip(".") + ".",
+            "licence": licence, "shuffled": shuffled, "asked_items": items,
+            "instruction": _in(one.instruction, said),
+        }  # fmt: skip
+
+
+def _in(texts: Texts, language: str) -> str:
+    return texts.get(language) or texts.get("en", "")
+
+
+def _answers(item: Item, language: str) -> str:
+    if item.kind == "text":
+        return "free text, may be left empty"
+    if item.kind == "choice":
+        return "the first or the second"
+    low, high = _in(item.low, language), _in(item.high, language)
+    return f"1 ({low}) to {item.points} ({high})"
+
+
+def _cell(words: str) -> str:
+    """Return text that a table's cell can hold."""
+    return words.replace("|", "\\|")
+
+
+def _correction(design: StudyDesign) -> str:
+    many, by = len(design.hypotheses), design.plan.correction
+    if many < 2:
+        return ""
+    return {
+        "holm": f", over the {many} hypotheses by Holm's procedure",
+        "bonferroni": f", divided by the {many} hypotheses (Bonferroni)",
+        "none": f" for each of the {many} hypotheses, not corrected for being many",
+    }[by]
+
+
+def _curve(design: StudyDesign, claims: tuple[PowerClaim, ...]) -> list[tuple[int, list[str]]]:
+    """Return the power of all hypotheses for some numbers of participants."""
+    every = rows(design)
+    found = [one.needed for one in claims if one.needed is not None]
+    around = max(found, default=design.plan.participants)
+    wanted = {design.plan.participants, *found}
+    wanted |= {max(1, round(share * around / every)) * every for share in (0.5, 0.75, 1.25)}
+    return [(n, [f"{power_of(one.question, n):.2f}" for one in claims]) for n in sorted(wanted)]
+
+
+def _exclusions(design: StudyDesign) -> Iterator[str]:
+    rule = design.exclusion
+    if rule.lost_head == "repeat":
+        yield f"A trial in which the head was lost is repeated, at most {rule.repeats} times, then left out."
+    else:
+        yield "A trial in which the head was lost is left out."
+    if rule.fastest_answer_ms:
+        yield f"A page of answers given in less than {rule.fastest_answer_ms:g} ms is left out."
+    if rule.same_answers:
+        yield (
+            f"Who gives one answer to every item of all trials, at least {LEAST_SAME} ratings, is left "
+            "out."
+        )
+    if rule.incomplete == "exclude":
+        yield "Who did not finish is left out."
+    else:
+        yield "Who did not finish is kept, with the trials that were answered."
+    if design.may_skip:
+        yield (
+            "Questions may be left unanswered. A scale counts if at least half of its items are "
+            "answered; a participant counts in a comparison with answers on both sides."
+        )
+
+
+def _privacy(design: StudyDesign) -> Iterator[str]:
+    rule = design.privacy
+    yield "No name is asked; participants have codes."
+    yield (
+        "Pictures of participants are kept, and the consent page says so." if rule.pictures
+        else "No picture of a participant is kept."
+    )  # fmt: skip
+    if rule.gaze and design.presentation.on == "head":
+        yield "Where participants looked is kept, as angles."
+    yield f"Data are deleted or made anonymous after {rule.deleted_after_days} days."
+    yield f"Participants write to: {rule.contact or '(nobody is named: privacy.contact is empty)'}"

@@ -1,0 +1,200 @@
+"""Films of conditions: the head as the person sees it whom it looks at, rendered without a display.
+
+The run is simulated with the condition's rig, or read from a recording; the head is the robot
+description of the rig (gazerig.robot.model.description), the camera stands where the scene's first
+person has their nose, still.
+"""
+
+import os
+import secrets
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gazerig.config.schema import Rig
+from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.file_output import make_folder
+from gazerig.drivers.film_writer import film_writer
+from gazerig.drivers.types import ImageArray
+from gazerig.features.lab.simulated_run import simulate
+from gazerig.features.study.run.study_file import LoadedStudy
+from gazerig.gaze.types import Floats, Vec3
+from gazerig.robot.app.assemble import assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.rig_description import description_of
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.model.description.files import description_files
+from gazerig.robot.model.types import in_order
+from gazerig.robot.recording.read import RunRecording, used
+
+SIZE_PX, RATE_HZ = 720, 25.0
+SETTLES_S = 3.0
+"""A simulated run begins so long before its film: the head has found the person then."""
+VIEWER_M: Vec3 = (1.0, 0.0, 0.25)
+"""From where a head is seen that looks at nobody."""
+_HEAD_M, _HEAD_SHARE = 0.24, 0.8
+"""Height of a head, and the share of the picture's height that it takes."""
+_BELOW_EYES_M = 0.02
+"""The picture's middle is so far below the eyes."""
+_SAMPLES, _SHADOW_PX = 4, 0  # shadows speckle a skin this near
+
+Progress = Callable[[float], None]
+"""Told the share that is done, 0..1."""
+
+
+class HeadPictures:
+    """Pictures of a rig's head from one place.
+
+    Args:
+        rig: whose head.
+        p_viewer_m: from where it is seen, world frame of the rig.
+
+    Raises:
+        SetupError: MuJoCo is not installed, or nothing here can render.
+    """
+
+    def __init__(self, rig: Rig, p_viewer_m: Vec3) -> None:
+        from gazerig.sim_mock.world.gl_context import import_mujoco
+
+        mujoco: Any = import_mujoco()
+        from gazerig.sim_mock.world.renderer import Renderer, RendererParams
+
+        self._description = description_of(rig)
+        files = description_files(self._description, ["mjcf"])
+        scene = files.pop("scene.xml").decode()
+        self._mujoco = mujoco
+        self._model = mujoco.MjModel.from_xml_string(scene, files)
+        self._data = mujoco.MjData(self._model)
+        params = RendererParams(_SHADOW_PX, _SAMPLES)
+        self._renderer = Renderer(self._model, SIZE_PX, SIZE_PX, params)
+        shape = rig.geometry
+        up_mm = shape.pitch_axis_height_mm + shape.eyes_above_mm
+        middle = np.array([0.001 * shape.eyes_ahead_mm, 0.0, 0.001 * up_mm - _BELOW_EYES_M])
+        self._p_m = np.array(p_viewer_m)
+        self._R, away_m = _looking(self._p_m, middle)
+        focal_px = _HEAD_SHARE * SIZE_PX * away_m / _HEAD_M
+        self._lens = Intrinsics(focal_px, focal_px, 0.5 * (SIZE_PX - 1), 0.5 * (SIZE_PX - 1))
+
+    def draw(self, names: tuple[str, ...], position_rad: tuple[float, ...]) -> ImageArray:
+        """Return a BGR picture with the joints at these angles."""
+        for name, angle in self._description.angles(names, position_rad).items():
+            self._data.qpos[self._model.joint(name).qposadr[0]] = angle
+        self._mujoco.mj_forward(self._model, self._data)
+        return self._renderer.render(self._data, self._lens, self._R, self._p_m).image
+
+    def close(self) -> None:
+        """Free what it renders with."""
+        self._renderer.close()
+
+
+def _looking(p_m: Floats, at_m: Floats) -> tuple[Floats, float]:
+    """Return the rotation of a camera that looks at a point, optical axes, and its distance."""
+    ahead = at_m - p_m
+    away_m = float(np.linalg.norm(ahead))
+    ahead = ahead / away_m
+    right = np.cross(ahead, (0.0, 0.0, 1.0))
+    right = right / np.linalg.norm(right)
+    return np.column_stack((right, np.cross(ahead, right), ahead)), away_m
+
+
+def films(study: LoadedStudy, folder: Path, progress: Callable[[str], Progress]) -> dict[str, Path]:
+    """Return the film of each condition; those that are not there yet are made.
+
+    Files have names that say nothing; ``index.txt`` in the folder says which is which.
+
+    Args:
+        study: a checked one.
+        folder: where films are kept.
+        progress: returns what is told how far the film of a condition is.
+
+    Raises:
+        SetupError: a film cannot be rendered or written.
+    """
+    make_folder(folder)
+    index = folder / "index.txt"
+    found = dict(line.split() for line in _lines(index))
+    for key, condition in study.design.conditions.items():
+        if condition.film is not None:
+            continue
+        name = found.get(key, "")
+        if not name or not (folder / name).exists():
+            name = f"{secrets.token_hex(8)}.webm"
+            render(study, key, folder / name, progress(key))
+            found[key] = name
+            index.write_text("".join(f"{a} {b}\n" for a, b in found.items()), encoding="utf-8")
+    own = {key: one.film for key, one in study.design.conditions.items()}
+    return {key: Path(film) if film else folder / found[key] for key, film in own.items()}
+
+
+def _lines(path: Path) -> list[str]:
+    return path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+
+
+def render(study: LoadedStudy, key: str, path: Path, progress: Progress) -> None:
+    """Write the film of a condition; a file that is there is written over.
+
+    Raises:
+        SetupError: it cannot be rendered or written, or the run that it shows cannot be had.
+    """
+    seconds = study.design.trials.seconds
+    rig = study.rigs[key]
+    names = in_order(rig.joints)
+    pictures = HeadPictures(rig, _viewer_m(study, rig))
+    made = path.with_name(f".{path.name}")
+    try:
+        with film_writer(made, (SIZE_PX, SIZE_PX), RATE_HZ) as write:
+            begin_s, shown, next_s = None, 0, 0.0
+            for tick in _ticks(study, key):
+                begin_s = tick.t_s if begin_s is None else begin_s
+                at_s = tick.t_s - begin_s
+                if at_s < next_s - 1e-9 or next_s >= seconds - 1e-9:
+                    continue
+                write(pictures.draw(names, tick.joints.position_rad))
+                shown += 1
+                next_s = shown / RATE_HZ
+                progress(min(1.0, next_s / seconds))
+        if next_s < seconds - 1.0 / RATE_HZ:
+            raise SetupError(
+                f"{study.design.conditions[key].recording} lasts {next_s:.1f} s, and a "
+                f"presentation {seconds:g} s: take trials.seconds: {int(next_s)}"
+            )
+        os.replace(made, path)
+    finally:
+        made.unlink(missing_ok=True)
+        pictures.close()
+
+
+def _ticks(study: LoadedStudy, key: str) -> Iterator[Tick]:
+    """Return the ticks that a film shows."""
+    recording = study.design.conditions[key].recording
+    if recording is not None:
+        with used(Path(recording)):
+            yield from RunRecording(recording).ticks()
+        return
+    seen = list[Tick]()
+    seconds = SETTLES_S + study.design.trials.seconds
+    simulate(study.rigs[key], _options(study, seconds), watch=seen.append)
+    first_s = seen[0].t_s + SETTLES_S
+    yield from (tick for tick in seen if tick.t_s >= first_s)
+
+
+def _options(study: LoadedStudy, seconds: float) -> RunOptions:
+    """Return the options of the simulated run that a film shows."""
+    shown = study.design.presentation
+    return RunOptions(
+        mock=True, fast=True, seed=shown.seed, scene=shown.scene, world=shown.world,
+        no_pictures=shown.world is not None, seconds=seconds, no_page=True,
+    ).checked()  # fmt: skip
+
+
+def _viewer_m(study: LoadedStudy, rig: Rig) -> Vec3:
+    """Return where the person has their nose whom the head looks at."""
+    made = assemble(rig, _options(study, 1.0))
+    try:
+        people = () if made.scene is None else made.scene.people(0.0)
+    finally:
+        made.close()
+    return people[0].p_world_face_m if people else VIEWER_M

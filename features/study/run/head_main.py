@@ -1,0 +1,68 @@
+"""The head of a study, in a process of its own: python -m gazerig.features.study.run.head_main.
+
+Standard input: the options of the run as one line of JSON. It ends, parked and with its torque off,
+when its input does, so also when the study's program dies.
+"""
+
+import json
+import os
+import signal
+import sys
+import threading
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from gazerig.errors import Error
+from gazerig.robot.app import session
+from gazerig.robot.app.options import RunOptions
+
+_PATHS = ("record", "video", "replay", "heatmap", "heatmap_face")
+_ENDING = (signal.SIGTERM, signal.SIGHUP)
+
+
+def as_line(options: RunOptions) -> bytes:
+    """Return options as the line that ``main`` reads."""
+    plain = {field.name: getattr(options, field.name) for field in fields(options)}
+    said = {name: str(one) if isinstance(one, Path) else one for name, one in plain.items()}
+    return json.dumps(said).encode() + b"\n"
+
+
+def options_in(line: bytes) -> RunOptions:
+    """Return the options of a line."""
+    said: dict[str, Any] = json.loads(line)
+    for name in _PATHS:
+        said[name] = None if said[name] is None else Path(said[name])
+    return RunOptions(**said)
+
+
+def main() -> int:
+    """Run the head until the input ends; return the exit code."""
+    ended: list[str] = []
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the study's program
+    for number in _ENDING:
+        signal.signal(number, lambda *_: ended.append("a signal"))
+    options = options_in(sys.stdin.buffer.readline())
+
+    def wait() -> None:
+        while os.read(0, 4096):  # not by the buffer, whose lock the program's end waits for
+            pass
+        ended.append("the end of the study's session")
+
+    threading.Thread(target=wait, daemon=True).start()
+    try:
+        composed = session.compose(options)
+        figures = session.run(composed, lambda: ended[0] if ended else None, _say, summarised=False)
+    except Error as error:
+        _say(str(error))
+        return 1
+    return 1 if str(figures["stopped_by"]).startswith("fault") else 0
+
+
+def _say(line: str) -> None:
+    sys.stderr.write(f"{line}\n")
+    sys.stderr.flush()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,112 @@
+"""The process of a study's head, and the connection to it."""
+
+import contextlib
+import subprocess
+from pathlib import Path
+from subprocess import PIPE
+
+from gazerig.drivers import child_process
+from gazerig.drivers.errors import DriverError
+from gazerig.features.study.presenter import HeadLost
+from gazerig.features.study.run.head_main import as_line
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.control.head_state import HeadState
+from gazerig.robot.model.clock import Clock
+from gazerig.robot.remote.client import NoRobotError, RobotClient
+
+_MODULE = "gazerig.features.study.run.head_main"
+_STARTS_S, _LOOKS_S = 90.0, 0.05
+_PARKS_S = 20.0
+
+
+class HeadProcess:
+    """A head that runs.
+
+    Attributes:
+        client: the connection to it.
+
+    Args:
+        options: what to run.
+        log: where it writes what happens.
+        clock: the host's.
+
+    Raises:
+        HeadLost: it does not come to run; says why.
+    """
+
+    def __init__(self, options: RunOptions, log: Path, clock: Clock) -> None:
+        self._log, self._clock = log, clock
+        with log.open("ab") as file:
+            self._process = child_process.start(_MODULE, stdin=PIPE, stderr=file.fileno())
+        assert self._process.stdin is not None
+        try:
+            self._process.stdin.write(as_line(options))
+            self._process.stdin.flush()
+            self.client = self._connected()
+        except (OSError, HeadLost) as error:
+            self.end()
+            raise HeadLost(str(error) or self.last_words()) from error
+        except BaseException:
+            self.end()
+            raise
+
+    @property
+    def alive(self) -> bool:
+        """Return whether the process runs."""
+        return self._process.poll() is None
+
+    def state(self) -> HeadState:
+        """Return the head at its newest tick.
+
+        Raises:
+            HeadLost: it has none, or is gone.
+        """
+        try:
+            state, _ = self.client.state()
+        except DriverError as error:
+            raise HeadLost(self.last_words() if not self.alive else str(error)) from error
+        if state is None:
+            raise HeadLost("the head has not begun to move")
+        return state
+
+    def last_words(self) -> str:
+        """Return the last line that it wrote."""
+        with contextlib.suppress(OSError):
+            lines = self._log.read_text(encoding="utf-8", errors="replace").split("\n")
+            said = [line.strip() for line in lines if line.strip()]
+            if said:
+                return said[-1]
+        return "the head's program has ended"
+
+    def end(self) -> None:
+        """Have it park and switch off, and wait for that; one that hangs is killed."""
+        if hasattr(self, "client"):
+            with contextlib.suppress(DriverError, OSError):
+                self.client.close()
+        assert self._process.stdin is not None
+        with contextlib.suppress(OSError):
+            self._process.stdin.close()
+        try:
+            self._process.wait(_PARKS_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def _connected(self) -> RobotClient:
+        """Wait until the head moves; return the connection to it."""
+        end_s = self._clock.now_s() + _STARTS_S
+        client: RobotClient | None = None
+        while self._clock.now_s() < end_s:
+            if not self.alive:
+                raise HeadLost(self.last_words())
+            try:
+                client = client or RobotClient.connect(self._process.pid, "the study")
+                if client.state()[0] is not None:
+                    return client
+            except NoRobotError:
+                pass
+            except DriverError:
+                client = None
+            self._clock.sleep_until(self._clock.now_s() + _LOOKS_S)
+        late = f"the head did not begin to move within {_STARTS_S:g} s"
+        raise HeadLost(f"{late}: {self.last_words()}")

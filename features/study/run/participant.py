@@ -1,0 +1,221 @@
+"""One participant's session from start to end: data folder, journal, pages, films or the head."""
+
+import hashlib
+import hmac
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+import gazerig
+from gazerig.drivers.errors import SetupError
+from gazerig.features.study.data_folder import StudyData, code_of
+from gazerig.features.study.journal import Journal, NotKept
+from gazerig.features.study.pages.server import StudyServer
+from gazerig.features.study.participation import require_fit
+from gazerig.features.study.presenter import FilmPresenter
+from gazerig.features.study.records import Opened
+from gazerig.features.study.run.head_presenter import HeadPresenter
+from gazerig.features.study.run.study_file import LoadedStudy
+from gazerig.features.study.session import StudySession
+from gazerig.features.study.study_run import StudyRun
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.model.clock import Clock
+
+_POLL_S = 0.05
+_TOKEN_DIGITS = 32
+
+
+@dataclass(frozen=True)
+class SessionPlan:
+    """What a session is run with.
+
+    Attributes:
+        study: A checked one.
+        data: Its folder.
+        number: Of the participant, from 1.
+        address: Where the pages are served, host and port.
+        films: Of each condition; empty with a head.
+        head: How the head is run, None with films.
+    """
+
+    study: LoadedStudy
+    data: StudyData
+    number: int
+    address: tuple[str, int]
+    films: Mapping[str, Path]
+    head: RunOptions | None
+
+
+def utc_now() -> str:
+    """Return date and time of day."""
+    return datetime.now(UTC).isoformat(timespec="milliseconds")
+
+
+def opened_journal(study: LoadedStudy, data: StudyData, number: int, sha256: str) -> Journal:
+    """Return the journal of a participant who has not finished yet, of this design.
+
+    Raises:
+        SetupError: the participant's data were deleted, are of another design or damaged, or a
+            session is under way.
+    """
+    code = code_of(number)
+    if code in data.deleted():
+        raise SetupError(f"the data of {code} were deleted on request: take another participant")
+    folder = data.participant(number)
+    journal = Journal(folder)
+    try:
+        for one in journal.records:
+            if isinstance(one, Opened) and one.design_sha256 != sha256:
+                raise SetupError(
+                    f"{folder} was begun with another design ({one.design_sha256[:12]}; this one "
+                    f"is {sha256[:12]}): begin a new study with --data NEW_FOLDER"
+                )
+        require_fit(journal.records, study.design, study.questionnaires, folder)
+    except SetupError:
+        journal.close()
+        raise
+    return journal
+
+
+def run_session(
+    plan: SessionPlan,
+    stopped: Callable[[], str | None],
+    say: Callable[[str], None],
+    clock: Clock,
+    browse: Callable[[str], object] | None = None,
+) -> str:
+    """Run a participant's session until it is over, or is to stop; return how it ended, in words.
+
+    Args:
+        plan: what to run.
+        stopped: returns why to end now, None to go on; the session can be resumed.
+        say: writes a line for the experimenter.
+        clock: the host's.
+        browse: opens the participant's page in a browser here, None: only its address is said.
+
+    Raises:
+        SetupError: the participant has finished already, or the session cannot begin.
+    """
+    study, data = plan.study, plan.data
+    sha256 = data.claim(study.name, study.canonical)
+    folder = data.participant(plan.number)
+    with opened_journal(study, data, plan.number, sha256) as journal:
+        session = StudySession(
+            study.design, study.questionnaires, plan.number, data.secret(), journal.records
+        )
+        code = code_of(plan.number)
+        if session.closed:
+            raise SetupError(f"{code} has ended the session already: take another participant")
+        journal.write((session.opened(code, sha256, gazerig.__version__, utc_now()),))
+        head = _head(plan, session, folder, clock)
+        run = StudyRun(code, session, journal, head or FilmPresenter(), clock.now_s, utc_now)
+        finished: list[str] = []
+        tokens = _tokens(data.secret(), plan.number)
+        server = StudyServer(
+            run, study.design, plan.address, tokens, plan.films,
+            lambda: finished.append("ended by the experimenter"), head,
+        )  # fmt: skip
+        try:
+            over = _ending(head, study, journal, folder, say)
+            _open(server, plan)
+            say(f"participant: {server.participant_url}")
+            say(f"experimenter: {server.experimenter_url}")
+            if browse is not None:
+                browse(server.participant_url)
+            why = _until_told(
+                run, server, lambda: finished[0] if finished else stopped(), over, say, clock
+            )
+        finally:
+            server.close()
+            if head is not None:
+                head.close()
+        over()
+    return "the session is over" if session.closed else f"{why}; the same command goes on with it"
+
+
+def _head(
+    plan: SessionPlan, session: StudySession, folder: Path, clock: Clock
+) -> HeadPresenter | None:
+    """Return what shows the conditions on the head, None with films."""
+    if plan.head is None:
+        return None
+    return HeadPresenter(plan.study, plan.head, folder, session.agreed, clock)
+
+
+def _ending(
+    head: HeadPresenter | None,
+    study: LoadedStudy,
+    journal: Journal,
+    folder: Path,
+    say: Callable[[str], None],
+) -> Callable[[], None]:
+    """Return what parks the head and measures what it showed; with films it does nothing.
+
+    Raises:
+        SetupError: what measures needs a package that is not installed.
+    """
+    if head is None:
+        return lambda: None
+    from gazerig.features.study.run.trial_measures import measured  # .7 s of a processor
+
+    def over() -> None:
+        head.close_head()
+        journal.write(measured(study, journal.records, folder, say))
+
+    return over
+
+
+def _tokens(secret: bytes, number: int) -> tuple[str, str]:
+    """Return what lets the participant and the experimenter in.
+
+    They are the same when a session is resumed: pages that stood open go on by themselves.
+    """
+
+    def token(who: str) -> str:
+        text = f"the page of the {who} of session {number}"
+        return hmac.new(secret, text.encode(), hashlib.sha256).hexdigest()[:_TOKEN_DIGITS]
+
+    return token("participant"), token("experimenter")
+
+
+def _open(server: StudyServer, plan: SessionPlan) -> None:
+    try:
+        server.open()
+    except OSError as error:
+        host, port = plan.address
+        raise SetupError(
+            f"the pages cannot be served at {host}:{port} ({error.strerror or error}): name another "
+            "address with --page HOST:PORT"
+        ) from error
+
+
+def _until_told(
+    run: StudyRun,
+    server: StudyServer,
+    told: Callable[[], str | None],
+    over: Callable[[], None],
+    say: Callable[[str], None],
+    clock: Clock,
+) -> str:
+    """Have time pass for the session until the program is told to end; return why.
+
+    over: called once when the session has been closed; its last page stays
+    """
+    shown, said, closed = run.now()[0], "", False
+    while (why := told()) is None:
+        try:
+            run.poll()
+        except NotKept as error:
+            if str(error) != said:
+                said = str(error)
+                say(said)
+        if (page := run.now()[0]) != shown:
+            shown = page
+            server.notify()
+        if not closed and run.state().closed:
+            closed = True
+            over()
+            say("the session is over; Ctrl-C, or the experimenter's page, ends the program")
+        clock.sleep_until(clock.now_s() + _POLL_S)
+    return why

@@ -1,0 +1,348 @@
+"""Studies and questionnaires by name or path: read, and checked with the rigs that they show."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from hashlib import sha256
+from os.path import isfile
+from pathlib import Path
+from typing import cast
+
+from gazerig.config.load import Check, ConfigError, load, read_yaml, shipped
+from gazerig.config.parameters import NEXT_START, changed, differences, live, values
+from gazerig.config.schema import Rig, load_rig
+from gazerig.features.study.design import Condition, StudyDesign
+from gazerig.features.study.preregistration import canonical, design_sha256
+from gazerig.features.study.questionnaire import Questionnaire
+from gazerig.features.study.rules import asked_rules, design_rules, questionnaire_rules
+from gazerig.features.study.shipped import HOME
+from gazerig.gaze.top_down import PLANNED
+from gazerig.robot.model.commands import Value
+
+_ENDS = {"recording": ".mcap", "film": ".webm"}
+_GAZE = ("gaze", "ranges", "expressions", "expression_blend_s", "levels")
+"""Sections of a rig that decide what is seen of it, whichever servos and camera it has."""
+_MACHINE = frozenset({"bus", "buses", "webcam", "oak", "camera", "camera_recovery"})
+"""Sections that may change between two participants, as a port or a calibration does."""
+_WHILE_READ = frozenset({"name", "profile"})
+"""Keys of a rig that only say how it is called and which file was laid over it."""
+
+
+@dataclass(frozen=True)
+class LoadedStudy:
+    """A checked study.
+
+    Attributes:
+        design: Its paths as seen from the working folder, its questionnaires by their keys.
+        questionnaires: By the keys in the design.
+        rig: The study's own rig, as it is without any condition.
+        rigs: The rig of each condition, with profile, character and parameters laid over it.
+        path: The file.
+        text: What it holds.
+    """
+
+    design: StudyDesign
+    questionnaires: Mapping[str, Questionnaire]
+    rig: Rig
+    rigs: Mapping[str, Rig]
+    path: Path
+    text: str
+
+    @property
+    def name(self) -> str:
+        """Return the name of the study's file, after which what it writes is called."""
+        return self.path.stem
+
+    def changes(self, before: str | None, after: str) -> dict[str, Value]:
+        """Return what turns a running head from one condition into another, by dotted key.
+
+        Args:
+            before: the condition that is shown; None: the head runs with the study's own rig.
+            after: a condition of the same rig.
+        """
+        there = self.rig if before is None else self.rigs[before]
+        return _differing(there, self.rigs[after])
+
+    def changes_of_own_rig(self, condition: str) -> dict[str, Value]:
+        """Return what a condition lays over its own rig, profile and character, by dotted key."""
+        one = self.design.conditions[condition]
+        there = load_rig(one.rig or self.design.presentation.rig, one.character, one.profile)
+        return _differing(there, self.rigs[condition])
+
+    @cached_property
+    def canonical(self) -> bytes:
+        """Return what the data's hash is of: all that is shown and asked, defaults and all."""
+        shown = {key: self._shown(key) for key in self.design.conditions}
+        return canonical(self.design, self.questionnaires, shown)
+
+    @property
+    def sha256(self) -> str:
+        """Return the hash that the data carry."""
+        return design_sha256(self.canonical)
+
+    def _shown(self, condition: str) -> dict[str, object]:
+        """Return what a participant can see of a condition, by dotted key, and its files' hashes.
+
+        Raises:
+            OSError: a recording or a film is not there any more.
+        """
+        rig, one = self.rigs[condition], self.design.conditions[condition]
+        seen: dict[str, object] = {
+            key: value for key, value in values(rig).items() if _section(key) in _GAZE
+        }
+        for key, value in _differing(self.rig, rig).items():
+            if _section(key) not in _MACHINE:
+                seen[key] = value
+        for name in _ENDS:
+            file = getattr(one, name)
+            if file is not None:
+                seen[f"{name}_sha256"] = sha256(Path(file).read_bytes()).hexdigest()
+        return seen
+
+
+def load_study(name_or_path: str, *further: Check[StudyDesign]) -> LoadedStudy:
+    """Return a study by shipped name or path, with its questionnaires and the conditions' rigs.
+
+    Args:
+        name_or_path: of the study; files that it names are relative to its own folder.
+        further: rules of what this room does not know, such as scenes; the design that they get
+            has its paths as seen from the working folder.
+
+    Raises:
+        gazerig.config.load.ConfigError: with every fault, each with the study's line.
+    """
+    path = _find("studies", name_or_path)
+    folder = path.parent
+    checks: list[Check[StudyDesign]] = [design_rules, partial(_asked_faults, folder)]
+    checks += [partial(_rig_faults, folder)]
+    checks += [partial(_located, folder, check) for check in further]
+    design = _from_its_folder(load(path, StudyDesign, checks=checks), folder)
+    files = (*design.questionnaires, *design.after)
+    design = replace(
+        design,
+        questionnaires=tuple(Path(file).stem for file in design.questionnaires),
+        after=tuple(Path(file).stem for file in design.after),
+    )
+    return LoadedStudy(
+        design,
+        {Path(file).stem: load_questionnaire(file) for file in files},
+        load_rig(design.presentation.rig),
+        {key: condition_rig(design, one) for key, one in design.conditions.items()},
+        path,
+        read_yaml(path).text,
+    )
+
+
+def _located(
+    folder: Path, check: Check[StudyDesign], raw: StudyDesign
+) -> Iterable[tuple[str, str]]:
+    return check(_from_its_folder(raw, folder))
+
+
+def load_questionnaire(name_or_path: str) -> Questionnaire:
+    """Return a questionnaire by shipped name or path.
+
+    Raises:
+        gazerig.config.load.ConfigError: with every fault.
+    """
+    path = _find("questionnaires", name_or_path)
+    return load(path, Questionnaire, checks=(questionnaire_rules,))
+
+
+def condition_rig(design: StudyDesign, condition: Condition) -> Rig:
+    """Return the rig that a condition shows, with all that it lays over it.
+
+    Raises:
+        gazerig.config.load.ConfigError: with every fault.
+    """
+    rig = load_rig(condition.rig or design.presentation.rig, condition.character, condition.profile)
+    return changed(rig, dict(_changes(condition))) if any(_changes(condition)) else rig
+
+
+def _changes(condition: Condition) -> Iterator[tuple[str, Value]]:
+    """Return what a condition says of its rig beside files, by dotted key."""
+    yield from cast(Mapping[str, Value], condition.params).items()
+    if condition.scanpath is not None:
+        yield _SCANPATH, condition.scanpath
+    if condition.behaviour is not None and condition.behaviour != PLANNED:
+        yield _BEHAVIOUR, condition.behaviour
+
+
+_SCANPATH, _BEHAVIOUR = "gaze.scanpath.model", "gaze.top_down.behaviour"
+
+
+def _section(key: str) -> str:
+    return key.partition(".")[0]
+
+
+def _differing(before: Rig, after: Rig) -> dict[str, Value]:
+    """Return what turns one rig into another, without what its files are called."""
+    found = differences(before, after)
+    return {key: value for key, value in found.items() if key not in _WHILE_READ}
+
+
+def _find(kind: str, name_or_path: str) -> Path:
+    """Return the path of a file given by path (a slash or a YAML ending) or by shipped name."""
+    return (
+        Path(name_or_path).expanduser()
+        if _is_path(name_or_path)
+        else shipped(kind, name_or_path, HOME)
+    )
+
+
+def _is_path(name_or_path: str) -> bool:
+    return "/" in name_or_path or name_or_path.endswith((".yaml", ".yml"))
+
+
+def _from_its_folder(design: StudyDesign, folder: Path) -> StudyDesign:
+    """Return a design with the paths of files as seen from the working folder."""
+
+    def found(name: str | None) -> str | None:
+        return name if name is None or not _is_path(name) else _beside(folder, name)
+
+    conditions = {
+        key: replace(
+            one,
+            rig=found(one.rig),
+            profile=found(one.profile),
+            character=found(one.character),
+            recording=one.recording and _beside(folder, one.recording),
+            film=one.film and _beside(folder, one.film),
+        )
+        for key, one in design.conditions.items()
+    }
+    shown = design.presentation
+    return replace(
+        design,
+        conditions=conditions,
+        questionnaires=tuple(found(one) or "" for one in design.questionnaires),
+        after=tuple(found(one) or "" for one in design.after),
+        presentation=replace(shown, rig=found(shown.rig) or "", world=found(shown.world)),
+    )
+
+
+def _beside(folder: Path, name: str) -> str:
+    return str(folder / Path(name).expanduser())
+
+
+def _asked_faults(folder: Path, raw: StudyDesign) -> Iterator[tuple[str, str]]:
+    """Find questionnaires that cannot be read, and what does not fit those that can."""
+    design = _from_its_folder(raw, folder)
+    found: dict[str, Questionnaire] = {}
+    for list_name in ("questionnaires", "after"):
+        files = getattr(design, list_name)
+        for i, file in enumerate(files):
+            try:
+                found[Path(file).stem] = load_questionnaire(file)
+            except ConfigError as error:
+                yield from _here(f"{list_name}.{i}", error)
+    keys = replace(
+        design,
+        questionnaires=tuple(Path(file).stem for file in design.questionnaires),
+        after=tuple(Path(file).stem for file in design.after),
+    )
+    yield from asked_rules(keys, found)
+
+
+def _rig_faults(folder: Path, raw: StudyDesign) -> Iterator[tuple[str, str]]:
+    """Find conditions that cannot be shown, not on a running head, or not told apart."""
+    design = _from_its_folder(raw, folder)
+    try:
+        own: Rig | None = load_rig(design.presentation.rig)
+    except ConfigError as error:
+        yield from _here("presentation.rig", error)
+        own = None
+    rigs: dict[str, Rig] = {}
+    for key, one in design.conditions.items():
+        if own is None and one.rig is None:
+            continue
+        try:
+            rigs[key] = condition_rig(design, one)
+        except ConfigError as error:
+            yield from _condition_faults(f"conditions.{key}", one, error)
+            continue
+        yield from _file_faults(f"conditions.{key}", one)
+        if own is not None:
+            yield from _start_faults(design, key, own, rigs[key])
+    yield from _alike(design, rigs)
+
+
+def _condition_faults(at: str, one: Condition, error: ConfigError) -> Iterator[tuple[str, str]]:
+    """Return the faults of a condition's files and parameters, each at the key that caused it."""
+    kinds = {"config/rigs": "rig", "config/profiles": "profile", "config/characters": "character"}
+    for fault in error.faults:
+        if fault.file in kinds:
+            yield f"{at}.{kinds[fault.file]}", fault.rule
+        elif fault.file:  # in a file that it names
+            named = (name for name in kinds.values() if getattr(one, name) == fault.file)
+            yield f"{at}.{next(named, 'rig')}".removesuffix(".rig"), str(fault)
+        elif fault.key == _BEHAVIOUR or (one.behaviour and "behaviour" in fault.rule):
+            yield f"{at}.behaviour", fault.rule
+        else:
+            given = (key for key in one.params if f"{fault.key}.".startswith(f"{key}."))
+            key = next(given, None)
+            place = f"{at}.params.{key}" if key is not None else at
+            more = "" if key == fault.key else f"{fault.key}: "
+            yield place, f"{more}{fault.rule}"
+
+
+def _file_faults(at: str, one: Condition) -> Iterator[tuple[str, str]]:
+    """Find recordings and films that are not there."""
+    for name, ending in _ENDS.items():
+        file = getattr(one, name)
+        if file is None:
+            continue
+        if not file.endswith(ending):
+            yield f"{at}.{name}", f"{file} does not end in {ending}; name such a file"
+        elif not isfile(file):
+            yield f"{at}.{name}", f"there is no file {file}; check the name"
+
+
+def _start_faults(design: StudyDesign, key: str, own: Rig, rig: Rig) -> Iterator[tuple[str, str]]:
+    """Find what cannot change while a head runs that is to go from condition to condition."""
+    one = design.conditions[key]
+    if one.rig is not None or design.presentation.on == "film":
+        return
+    for name in _differing(own, rig):
+        when = live(name)
+        if not when.startswith(NEXT_START):
+            continue
+        given = next((k for k in one.params if f"{name}.".startswith(f"{k}.")), None)
+        named = "character" if one.character is not None else "profile"
+        place = f"params.{given}" if given is not None else named
+        reason = when.removeprefix(NEXT_START).lstrip(": ")
+        yield (
+            f"conditions.{key}.{place}",
+            f"{name} cannot change while the head runs ({reason}): give the condition a rig of its "
+            "own, or show films (presentation.on: film)",
+        )
+
+
+def _alike(design: StudyDesign, rigs: Mapping[str, Rig]) -> Iterator[tuple[str, str]]:
+    """Find conditions of which each shows what another one shows."""
+    keys = [key for key in design.conditions if key in rigs]
+    for i, key in enumerate(keys):
+        for other in keys[:i]:
+            if _same(design, rigs, key, other):
+                rule = (
+                    f"cannot be told apart from {other!r}: both show the same; change a value of "
+                    "one of them, or leave it out"
+                )
+                yield f"conditions.{key}", rule
+                break
+
+
+def _same(design: StudyDesign, rigs: Mapping[str, Rig], key: str, other: str) -> bool:
+    """Whether two conditions show the same."""
+    one, two = design.conditions[key], design.conditions[other]
+    files = [(c.recording, c.film) for c in (one, two)]
+    if any(file is not None for pair in files for file in pair):
+        return files[0] == files[1]
+    planned = [c.behaviour == PLANNED for c in (one, two)]
+    return planned[0] == planned[1] and not _differing(rigs[key], rigs[other])
+
+
+def _here(key: str, error: ConfigError) -> Iterator[tuple[str, str]]:
+    """Return the faults of a file that a key names; of a name that is not shipped, the rule."""
+    for fault in error.faults:
+        yield key, fault.rule if fault.file.startswith("config/") else str(fault)

@@ -1,0 +1,151 @@
+"""What is measured of presentations on the head, from the recordings of its runs.
+
+The participant is the nearest person. Whether they look at the head is what the detectors find of
+their face and eyes (``Face.looks_at_head``); where that is too uncertain the time does not count.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from math import degrees, isfinite, nan
+from pathlib import Path
+
+import numpy as np
+
+from gazerig.drivers.errors import SetupError
+from gazerig.features.lab.report import report
+from gazerig.features.lab.report.gaze_trace import GazeTraceBuilder
+from gazerig.features.lab.report.statistics import judged
+from gazerig.features.study.measures import GAZE_MEASURES
+from gazerig.features.study.records import (
+    STEP_DEG,
+    Measured,
+    Record,
+    TrialBegan,
+    TrialEnded,
+)
+from gazerig.features.study.run.study_file import LoadedStudy
+from gazerig.gaze.angles import add, norm, scale, sub
+from gazerig.gaze.types import Face
+from gazerig.robot.analysis.gaze_on_face import on_face
+from gazerig.robot.analysis.mutual_gaze import HALF_HIGH_M, HALF_WIDE_M
+from gazerig.robot.analysis.norm_bands import BY_KEY
+from gazerig.robot.analysis.summary import cyclopean
+from gazerig.robot.control.tick import Tick
+from gazerig.robot.recording.read import RunRecording, used
+
+SWITCH_S = 0.5
+"""Steps of the joints count as those of a switch so long before and after it."""
+
+
+def measured(
+    study: LoadedStudy, records: Sequence[Record], folder: Path, say: Callable[[str], None]
+) -> tuple[Measured, ...]:
+    """Return what is measured of the presentations that have not been yet.
+
+    Args:
+        study: whose objective measures they are.
+        records: of the participant.
+        folder: of the participant, with the recordings.
+        say: told of a recording that cannot be read; its presentations have no measures.
+    """
+    began = {
+        (one.trial, one.attempt, one.side): one for one in records if isinstance(one, TrialBegan)
+    }
+    done = {(one.trial, one.attempt, one.side) for one in records if isinstance(one, Measured)}
+    wanted = [
+        one
+        for one in records
+        if isinstance(one, TrialEnded) and one.recording and isfinite(one.from_s)
+        and (one.trial, one.attempt, one.side) not in done
+    ]  # fmt: skip
+    found = []
+    for name in dict.fromkeys(one.recording for one in wanted):
+        ends = [one for one in wanted if one.recording == name]
+        try:
+            with used(folder / name):
+                runs = _cut(RunRecording(folder / name).ticks(), ends)
+        except SetupError as error:
+            say(str(error))
+            continue
+        for end, ticks in zip(ends, runs, strict=True):
+            condition = began[end.trial, end.attempt, end.side].condition
+            values = _values(study.design.objective, ticks, end.from_s)
+            found.append(Measured(end.trial, condition, values, end.side, end.attempt))
+    return tuple(found)
+
+
+def _cut(ticks: Iterator[Tick], ends: Sequence[TrialEnded]) -> list[list[Tick]]:
+    """Return the ticks of each presentation, and those shortly before it, in one pass."""
+    cut: list[list[Tick]] = [[] for _ in ends]
+    for tick in ticks:
+        for one, mine in zip(ends, cut, strict=True):
+            if one.from_s - SWITCH_S <= tick.t_s <= one.to_s:
+                mine.append(tick)
+    return cut
+
+
+def _values(names: Sequence[str], ticks: Sequence[Tick], from_s: float) -> dict[str, float]:
+    """Return the measures of one presentation by name."""
+    shown = [tick for tick in ticks if tick.t_s >= from_s]
+    values = {STEP_DEG: largest_step_deg(ticks, from_s)}
+    if any(name in GAZE_MEASURES for name in names):
+        gaze = participants_gaze(shown, from_s)
+        values |= {name: gaze[name] for name in names if name in gaze}
+    if others := [name for name in names if name not in GAZE_MEASURES]:
+        building = GazeTraceBuilder()
+        for tick in shown:
+            building.update(tick)
+        of_run = {one.key: one for one in report.measured(building.gathered())} if shown else {}
+        for name in others:
+            one = of_run.get(name)
+            values[name] = nan if one is None else judged(one, BY_KEY[name]).value
+    return values
+
+
+def largest_step_deg(ticks: Sequence[Tick], from_s: float) -> float:
+    """Return the largest step of a joint's goal from tick to tick about a switch, degrees."""
+    near = [tick for tick in ticks if abs(tick.t_s - from_s) <= SWITCH_S]
+    if len(near) < 2:
+        return nan
+    goals = np.array([tick.guard_result.command_rad for tick in near])
+    return degrees(float(np.abs(np.diff(goals, axis=0)).max()))
+
+
+def participants_gaze(ticks: Sequence[Tick], from_s: float) -> dict[str, float]:
+    """Return the measures of GAZE_MEASURES; shares of the time in which a face is seen.
+
+    nan where the face was never seen, or its gaze never known.
+    """
+    known = looks = both = 0
+    first_s = nan
+    for tick in ticks:
+        face = _participant(tick)
+        if face is None or face.looks_at_head is None:
+            continue
+        known += 1
+        if face.looks_at_head:
+            looks += 1
+            both += _looked_at(tick, face)
+            first_s = first_s if isfinite(first_s) else tick.t_s - from_s
+    share = 1.0 / known if known else nan
+    return {
+        "mutual_gaze_share": both * share,
+        "participant_gaze_share": looks * share,
+        "first_look_s": first_s,
+    }
+
+
+def _participant(tick: Tick) -> Face | None:
+    """Return the nearest face, None where there is none."""
+    faces = tick.percept.faces if tick.percept is not None else ()
+    head = tick.pose.p_world_head_m
+    return min(faces, key=lambda face: norm(sub(face.p_world_m, head)), default=None)
+
+
+def _looked_at(tick: Tick, face: Face) -> bool:
+    """Whether the head's measured gaze is inside the oval of a face."""
+    elapsed_s = max(0.0, tick.t_s - (tick.percept.captured_s if tick.percept is not None else 0.0))
+    p_m = add(face.p_world_m, scale(face.v_world_m_s, elapsed_s))
+    point = on_face(tick.pose.p_world_head_m, cyclopean(tick), p_m, face.R_world_face)
+    return (
+        point is not None and (point[0] / HALF_WIDE_M) ** 2 + (point[1] / HALF_HIGH_M) ** 2 <= 1.0
+    )

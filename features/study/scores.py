@@ -1,0 +1,172 @@
+"""A measure as numbers: one a participant and condition, and the single answers behind them."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import nan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.features.study.measures import Measure
+from gazerig.features.study.order import PAIR
+from gazerig.features.study.participation import AnswerRow, Participation
+from gazerig.features.study.questionnaire import Questionnaire
+from gazerig.gaze.types import Floats
+
+
+@dataclass(frozen=True)
+class Scores:
+    """A measure of all who count.
+
+    participants: codes, in the order of the rows; conditions: keys, in that of the columns
+    means: (participants, conditions) over items and repetitions, nan where nothing is known
+    places: (participants, conditions) where each condition was first seen, from 0
+    single: (answers, 3) row of the participant, column of the condition, and the answer itself
+    """
+
+    measure: Measure
+    participants: tuple[str, ...]
+    conditions: tuple[str, ...]
+    means: Floats
+    places: Floats
+    single: Floats
+
+    def columns(self, conditions: Sequence[str]) -> list[int]:
+        """Return where conditions stand."""
+        return [self.conditions.index(condition) for condition in conditions]
+
+    def column(self, *conditions: str) -> Floats:
+        """Return the means of one condition, or over several, (participants,); nan with a gap."""
+        found: Floats = self.means[:, self.columns(conditions)].mean(axis=1)
+        return found
+
+    def answers(self, *conditions: str) -> Floats:
+        """Return every single answer on these conditions."""
+        found: Floats = self.single[np.isin(self.single[:, 1], self.columns(conditions)), 2]
+        return found
+
+    def first_seen(self, *conditions: str) -> Floats:
+        """Return at which place the first of these conditions was seen, (participants,)."""
+        found: Floats = self.places[:, self.columns(conditions)].min(axis=1)
+        return found
+
+
+def scores(
+    measure: Measure,
+    people: Sequence[Participation],
+    conditions: Sequence[str],
+    questionnaires: Mapping[str, Questionnaire],
+) -> Scores:
+    """Return a measure of all participants of whom it is known.
+
+    Args:
+        measure: a rating, a scale's mean or an objective measure.
+        people: with what is left out marked.
+        conditions: keys of the design.
+        questionnaires: by the keys in the design.
+    """
+    conditions = tuple(conditions)
+    columns = {key: k for k, key in enumerate(conditions)}
+    kept: list[Participation] = []
+    means, places, single = [], [], []
+    for one in people:
+        values = [
+            (columns[condition], value)
+            for condition, value in _values(measure, one, questionnaires)
+            if condition in columns
+        ]
+        if not values:
+            continue
+        single += [(len(kept), column, value) for column, value in values]
+        kept.append(one)
+        means.append([_mean([v for at, v in values if at == k]) for k in range(len(conditions))])
+        places.append([_place(one.order, key) for key in conditions])
+    shape = (len(kept), len(conditions))
+    return Scores(
+        measure, tuple(one.participant for one in kept), conditions,
+        np.array(means, float).reshape(shape), np.array(places, float).reshape(shape),
+        np.array(single, float).reshape(-1, 3),
+    )  # fmt: skip
+
+
+def _values(
+    measure: Measure, one: Participation, questionnaires: Mapping[str, Questionnaire]
+) -> list[tuple[str, float]]:
+    """Return (condition, value) of each trial; of a scale the mean of its items, turned round.
+
+    A scale of which fewer than half of the items are answered has no value.
+    """
+    if measure.kind == "objective":
+        return [
+            (t.condition, t.measured[measure.name])
+            for t in one.counted_trials
+            if np.isfinite(t.measured.get(measure.name, nan))
+        ]
+    by_trial: dict[tuple[int | None, str], list[float]] = {}
+    for row in one.counted:
+        if row.questionnaire == measure.questionnaire and row.item in measure.items:
+            value = turned(row, questionnaires)
+            by_trial.setdefault((row.trial, row.condition), []).append(value)
+    return [
+        (condition, _mean(values))
+        for (_, condition), values in by_trial.items()
+        if 2 * len(values) >= len(measure.items)
+    ]
+
+
+def turned(row: AnswerRow, questionnaires: Mapping[str, Questionnaire]) -> float:
+    """Return a rating with reversed items turned round, so that more is more of the scale."""
+    item = questionnaires[row.questionnaire].items[row.item]
+    assert row.value is not None  # such rows are left out
+    return item.points + 1.0 - float(row.value) if item.reverse else float(row.value)
+
+
+def item_answers(
+    measure: Measure, people: Sequence[Participation], questionnaires: Mapping[str, Questionnaire]
+) -> Floats:
+    """Return the answers to a scale's items, (presentations, items), of whole pages alone."""
+    pages: dict[tuple[str, int | None], dict[str, float]] = {}
+    for one in people:
+        for row in one.counted:
+            if row.questionnaire == measure.questionnaire and row.item in measure.items:
+                page = pages.setdefault((one.participant, row.trial), {})
+                page[row.item] = turned(row, questionnaires)
+    whole = [[page[i] for i in measure.items] for page in pages.values()
+             if len(page) == len(measure.items)]  # fmt: skip
+    return np.array(whole, float).reshape(-1, len(measure.items))
+
+
+def wins(
+    measure: Measure, people: Sequence[Participation], conditions: Sequence[str]
+) -> NDArray[np.int64]:
+    """Return how often the row was chosen over the column, (conditions, conditions)."""
+    columns = {key: k for k, key in enumerate(conditions)}
+    out = np.zeros((len(columns), len(columns)), np.int64)
+    for one in people:
+        for row in one.counted:
+            if row.questionnaire == measure.questionnaire and row.item in measure.items:
+                first, second = row.condition.split(PAIR)
+                chosen, other = (first, second) if row.value == "first" else (second, first)
+                if chosen in columns and other in columns:
+                    out[columns[chosen], columns[other]] += 1
+    return out
+
+
+def choice_differences(
+    measure: Measure, people: Sequence[Participation], better: str, than: str
+) -> Floats:
+    """Return how much more often each participant chose one condition than the other, (n,).
+
+    Participants who did not choose between these two are left out.
+    """
+    each = (wins(measure, [one], (better, than)) for one in people)
+    found = [int(table[0, 1]) - int(table[1, 0]) for table in each if table.any()]
+    return np.array(found, float)
+
+
+def _place(order: Sequence[str], condition: str) -> float:
+    return next((float(k) for k, key in enumerate(order) if key == condition), nan)
+
+
+def _mean(values: Sequence[float]) -> float:
+    return float(np.mean(values)) if values else nan

@@ -1,0 +1,366 @@
+"""One participant's session: which screen is shown, and what is recorded of it.
+
+Methods propose records; they take effect with ``add``, once they are on disk.
+"""
+
+import hashlib
+import hmac
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite, nan
+
+import numpy as np
+
+from gazerig.features.study.answers import WrongAnswer, checked
+from gazerig.features.study.design import StudyDesign
+from gazerig.features.study.order import PAIR
+from gazerig.features.study.progress import Step, StudyPlace, StudyProgress
+from gazerig.features.study.questionnaire import Item, Questionnaire
+from gazerig.features.study.records import (
+    AnswerValue,
+    Closed,
+    Consented,
+    ItemAnswered,
+    Opened,
+    Outcome,
+    Record,
+    TrialBegan,
+    TrialEnded,
+)
+from gazerig.features.study.screens import (
+    ConsentScreen,
+    Ending,
+    EndScreen,
+    InstructionsScreen,
+    PausedScreen,
+    PresentationScreen,
+    Question,
+    QuestionsScreen,
+    ReadyScreen,
+    RestScreen,
+    Screen,
+)
+
+INTERRUPTED = "the program ended"
+_ITEMS = 2
+"""Stream of random numbers of the trials' seed; orders have others."""
+
+
+@dataclass(frozen=True)
+class ShownTrial:
+    """The presentation that comes or is under way; for the experimenter and the head alone."""
+
+    trial: int
+    attempt: int
+    side: int
+    condition: str
+
+
+@dataclass(frozen=True)
+class AskedItems:
+    """A page of questions by its keys; see records.ItemAnswered.
+
+    items: in the order in which they are shown
+    """
+
+    trial: int | None
+    condition: str
+    questionnaire: str
+    items: tuple[str, ...]
+
+
+class StudySession:
+    """A participant's session.
+
+    Attributes:
+        paused: The experimenter has something to do first: no presentation begins.
+
+    Args:
+        design: a checked one.
+        questionnaires: by the keys in the design.
+        participant: from 1; it chooses the order.
+        secret: makes names of pages and films that nobody can guess.
+        records: what is known of the participant already.
+    """
+
+    def __init__(
+        self,
+        design: StudyDesign,
+        questionnaires: Mapping[str, Questionnaire],
+        participant: int,
+        secret: bytes,
+        records: Sequence[Record] = (),
+    ) -> None:
+        self.design, self.participant = design, participant
+        self.paused = False
+        self._questionnaires, self._secret = questionnaires, secret
+        self._progress = StudyProgress(design, participant)
+        self.add(records)
+
+    @property
+    def order(self) -> tuple[str, ...]:
+        """Return the trials that count: condition keys, or pairs "a|b"."""
+        return self._progress.order
+
+    @property
+    def screen(self) -> Screen:
+        """Return what the participant sees now."""
+        place, design = self._progress.place, self.design
+        if self.paused and place.step == "ready":
+            return PausedScreen()
+        match place.step:
+            case "consent":
+                return self._consent_screen()
+            case "instructions":
+                trials = design.trials
+                return InstructionsScreen(len(self.order), trials.practice, trials.seconds)
+            case "rest":
+                return RestScreen(design.trials.rest_s)
+            case "ready":
+                return ReadyScreen(*self._number(place), place.side, place.attempt > 0)
+            case "presentation":
+                film = self._token("film", place) if design.presentation.on == "film" else ""
+                return PresentationScreen(
+                    *self._number(place), place.side, design.trials.seconds, film
+                )
+            case "questions":
+                return self._questions(place)
+        return EndScreen(self._ending)
+
+    @property
+    def page(self) -> str:
+        """Return the name of the present screen; the same screen has it again after a crash."""
+        return self._token(
+            "paused" if self.screen == PausedScreen() else "page", self._progress.place
+        )
+
+    @property
+    def shown(self) -> ShownTrial | None:
+        """Return the presentation that comes or is under way, None between them."""
+        place = self._progress.place
+        if place.step not in ("ready", "presentation") or place.trial is None:
+            return None
+        condition = self._progress.trials[place.trial].split(PAIR)[place.side]
+        return ShownTrial(place.trial, place.attempt, place.side, condition)
+
+    @property
+    def asked(self) -> "AskedItems | None":
+        """Return what is asked now, None where nothing is; for the program alone."""
+        place = self._progress.place
+        if place.step != "questions":
+            return None
+        keys = tuple(key for key, _ in self._items(place))
+        condition = "" if place.trial is None else self._progress.trials[place.trial]
+        return AskedItems(place.trial, condition, place.questionnaire, keys)
+
+    @property
+    def trial(self) -> int | None:
+        """Return the trial that the participant is in, practice trials below 0; None outside."""
+        return self._progress.place.trial
+
+    @property
+    def closed(self) -> bool:
+        """Return whether the session has ended for good."""
+        return self._progress.closed is not None
+
+    def agreed(self) -> tuple[bool, bool]:
+        """Return whether the participant's gaze may be kept, and pictures of the camera."""
+        said = self._progress.consented
+        return (False, False) if said is None else (said.gaze, said.pictures)
+
+    def film_of(self, token: str) -> str | None:
+        """Return the condition whose film is shown now under this name, None for another name."""
+        place, shown = self._progress.place, self.shown
+        if shown is None or place.step != "presentation":
+            return None
+        known = hmac.compare_digest(token.encode(), self._token("film", place).encode())
+        return shown.condition if known else None
+
+    def opened(
+        self, code: str, design_sha256: str, program: str, utc: str, simulated: bool = False
+    ) -> Opened:
+        """Return the record with which a session begins or is resumed."""
+        return Opened(code, design_sha256, self.order, program, utc, simulated)
+
+    def resumed(self, utc: str) -> tuple[Record, ...]:
+        """Return what is recorded of a presentation that was cut off as the program ended."""
+        if self._progress.began is None:
+            return ()
+        return self._cut("interrupted", nan, utc, INTERRUPTED)
+
+    def consent(self, given: bool, pictures: bool, gaze: bool, utc: str) -> tuple[Record, ...]:
+        """Return the records of a decision on the consent page.
+
+        Raises:
+            WrongAnswer: another screen is shown.
+        """
+        self._require("consent")
+        asked = self._consent_screen()
+        uses = given and pictures and asked.pictures, given and gaze and asked.gaze
+        said = Consented(given, *uses, utc)
+        return (said,) if given else (said, Closed("withdrawn", "no consent", utc))
+
+    def _consent_screen(self) -> ConsentScreen:
+        camera, kept = self.design.presentation.on == "head", self.design.privacy
+        return ConsentScreen(camera and kept.pictures, camera and kept.gaze)
+
+    def go_on(self) -> None:
+        """Leave the instructions or a rest, of which nothing is recorded.
+
+        Raises:
+            WrongAnswer: another screen is shown.
+        """
+        self._require("instructions", "rest")
+        self._progress.pass_by(self._progress.place)
+
+    def begin(self, utc: str) -> tuple[Record, ...]:
+        """Return the record of the presentation that begins now.
+
+        Raises:
+            WrongAnswer: none is to begin.
+        """
+        self._require("ready")
+        shown = self.shown
+        if shown is None or self.paused:
+            raise WrongAnswer("the experimenter has paused the study")
+        return (TrialBegan(shown.trial, shown.attempt, shown.condition, utc, shown.side),)
+
+    def end(
+        self,
+        outcome: Outcome,
+        seconds: float,
+        utc: str,
+        reason: str = "",
+        recording: str = "",
+        span_s: tuple[float, float] = (nan, nan),
+    ) -> tuple[Record, ...]:
+        """Return the record of the presentation that ends now.
+
+        Args:
+            outcome: how.
+            seconds: how long it was shown.
+            utc: when.
+            reason: why it was not completed.
+            recording: file beside the journal that holds it.
+            span_s: its beginning and end in the recording's time.
+
+        Raises:
+            WrongAnswer: none is under way.
+        """
+        self._require("presentation")
+        return self._cut(outcome, seconds, utc, reason, recording, span_s)
+
+    def answer(
+        self,
+        values: Mapping[int, AnswerValue],
+        ms: Mapping[int, float],
+        utc: str,
+        longest_ms: float,
+    ) -> tuple[Record, ...]:
+        """Return the records of a page of answers, by the questions' numbers.
+
+        Args:
+            values: answers.
+            ms: response times as the browser reports them.
+            utc: when.
+            longest_ms: for how long the page was shown by the host's clock, nan: not known.
+
+        Raises:
+            WrongAnswer: no questions are shown, one is not answered, or not as it can be.
+        """
+        self._require("questions")
+        asked, items = self.asked, self._items(self._progress.place)
+        assert asked is not None  # on a page of questions
+        if unknown := set(values) - set(range(len(items))):
+            raise WrongAnswer(f"there is no question {min(unknown)}")
+        at = (asked.trial, asked.condition, asked.questionnaire)
+        records = []
+        for number, (key, item) in enumerate(items):
+            value = checked(number, item, values.get(number), self.design.may_skip)
+            late = ms.get(number, nan)
+            known = isfinite(late) and late >= 0.0 and isfinite(longest_ms)
+            late = min(late, longest_ms) if known else nan
+            records.append(ItemAnswered(*at, key, value, late, utc))
+        return tuple(records)
+
+    def finish(self, utc: str) -> tuple[Record, ...]:
+        """Return the record of the end, once nothing is left to show or ask."""
+        if self.closed or self._progress.place.step != "end":
+            return ()
+        return (Closed("finished", "", utc),)
+
+    def withdraw(self, utc: str) -> tuple[Record, ...]:
+        """Return the records of a participant who leaves the study."""
+        if self.closed:
+            return ()
+        return (*self._cut("withdrawn", nan, utc), Closed("withdrawn", "", utc))
+
+    def exclude(self, reason: str, utc: str) -> tuple[Record, ...]:
+        """Return the records of a participant whom the experimenter excludes."""
+        if self.closed:
+            return ()
+        return (*self._cut("interrupted", nan, utc, reason), Closed("excluded", reason, utc))
+
+    def add(self, records: Iterable[Record]) -> None:
+        """Apply records that are on disk."""
+        self._progress.add(records)
+
+    def _cut(
+        self,
+        outcome: Outcome,
+        seconds: float,
+        utc: str,
+        reason: str = "",
+        recording: str = "",
+        span_s: tuple[float, float] = (nan, nan),
+    ) -> tuple[Record, ...]:
+        """Return the record of the end of the presentation under way, none without one."""
+        began = self._progress.began
+        if began is None:
+            return ()
+        at = (began.trial, began.attempt)
+        return (TrialEnded(*at, outcome, seconds, utc, began.side, recording, reason, *span_s),)
+
+    @property
+    def _ending(self) -> Ending:
+        closed, consented = self._progress.closed, self._progress.consented
+        if closed is None:
+            return "finished"
+        return "declined" if consented is not None and not consented.given else closed.how
+
+    def _number(self, place: StudyPlace) -> tuple[int, int, bool, bool]:
+        """Return the trial's number, of how many, whether it is practice, and of pairs."""
+        pair = self.design.task == "pairwise"
+        if place.trial is None:
+            return 0, 0, False, pair
+        if place.trial < 0:
+            warm_up = self.design.trials.practice
+            return place.trial + warm_up + 1, warm_up, True, pair
+        return place.trial + 1, len(self.order), False, pair
+
+    def _items(self, place: StudyPlace) -> list[tuple[str, Item]]:
+        """Return the items of a page in the order in which this participant gets them."""
+        asked = self._questionnaires[place.questionnaire]
+        items = list(asked.items.items())
+        if not asked.shuffled:
+            return items
+        every = (*self.design.questionnaires, *self.design.after)
+        trials = self.design.trials
+        # A seed is not negative; the numbers of practice trials are.
+        row = 0 if place.trial is None else place.trial + trials.practice + 1
+        key = (trials.seed, self.participant, _ITEMS, every.index(place.questionnaire), row)
+        return [items[i] for i in np.random.default_rng(key).permutation(len(items))]
+
+    def _questions(self, place: StudyPlace) -> QuestionsScreen:
+        instruction = self._questionnaires[place.questionnaire].instruction
+        questions = tuple(Question(i, item) for i, (_, item) in enumerate(self._items(place)))
+        return QuestionsScreen(*self._number(place), place.trial is None, instruction, questions)
+
+    def _token(self, kind: str, place: StudyPlace) -> str:
+        text = f"{kind} {self.participant} {place}"
+        return hmac.new(self._secret, text.encode(), hashlib.sha256).hexdigest()[:20]
+
+    def _require(self, *steps: Step) -> None:
+        step = self._progress.place.step
+        if step not in steps:
+            raise WrongAnswer(f"this page is over; the participant is at: {step}")

@@ -1,0 +1,266 @@
+"""Simulated participants: answers with a known effect, to try a study before anybody comes.
+
+A rating is a latent normal value cut by thresholds: the participant's own level, what the trial
+left (shared by the items of a scale), the item's noise, and the shift of the condition. The shift
+is solved so that the differences of participants between neighbouring conditions have the wanted
+d_z as they will be analysed: whole points, means of scales and of repetitions. A choice follows
+Bradley & Terry (1952), with the chance that such a difference is above zero.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from math import sqrt
+from typing import Annotated
+from zlib import crc32
+
+import numpy as np
+from scipy import optimize, special
+
+from gazerig.features.study.design import StudyDesign
+from gazerig.features.study.order import PAIR
+from gazerig.features.study.questionnaire import Item, Questionnaire
+from gazerig.features.study.records import AnswerValue
+from gazerig.gaze.types import Floats
+from gazerig.params import Bounds
+
+BETWEEN_SD, TRIAL_SD, ITEM_SD = 0.8, 0.7, 0.7
+"""Spreads of participants, of their trials, and of items within a trial; those of d_z's noise are
+the last two, as a participant's level is in both conditions."""
+
+_TOTAL_SD = sqrt(BETWEEN_SD**2 + TRIAL_SD**2 + ITEM_SD**2)
+_NODES, _RAW_WEIGHTS = np.polynomial.hermite_e.hermegauss(31)
+_WEIGHTS: Floats = np.asarray(_RAW_WEIGHTS / _RAW_WEIGHTS.sum(), np.float64)
+_LARGEST_SHIFT = 12.0
+_MEDIAN_MS, _HASTY_MS = 2600.0, 180.0
+_OBJECTIVE_MIDDLE, _OBJECTIVE_SD = 0.5, 0.1
+
+
+# fmt: off
+@dataclass(frozen=True)
+class Population:
+    """Whom simulated participants are drawn from."""
+
+    effect: Annotated[float, Bounds(-3, 3), "d_z of the differences between neighbouring conditions"] = 0.6
+    careless: Annotated[float, Bounds(0, 1), "share who give one answer to everything"] = 0.0
+    hasty: Annotated[float, Bounds(0, 1), "share who answer faster than anybody reads"] = 0.0
+    seed: Annotated[int, Bounds(0, 2**31 - 1), "seed of all participants"] = 0
+    preference_sd: Annotated[float, Bounds(0, 10), "spread of each one's preferences for conditions, latent"] = 0.0
+    contrast_sd: Annotated[float, Bounds(0, 10), "spread of each one's preference for the first condition, latent"] = 0.0
+# fmt: on
+
+
+def levels(design: StudyDesign) -> dict[str, int]:
+    """Return how far up each condition stands by the hypotheses, the lowest at 0.
+
+    Without hypotheses the first condition stands above the others.
+    """
+    pairs = [pair for one in design.hypotheses for pair in design.matched(one)]
+    first, *others = design.conditions
+    pairs = pairs or [(first, other) for other in others]
+    found = dict.fromkeys(design.conditions, 0)
+    for _ in design.conditions:  # as many rounds as the longest chain; circles end with them
+        for better, than in pairs:
+            found[better] = max(found[better], min(found[than] + 1, len(found) - 1))
+    return found
+
+
+def compared_trials(design: StudyDesign) -> int:
+    """Return over how many trials of a participant the mean goes of which a hypothesis decides.
+
+    Those of all conditions of a factor's level, or of one condition, each as often as it is shown;
+    where hypotheses differ in that, the fewest.
+    """
+    sides = [len(design.side(one.better)) for one in design.hypotheses]
+    return min(sides, default=1) * design.trials.repetitions
+
+
+@cache
+def thresholds(points: int) -> tuple[float, ...]:
+    """Return the latent values between the points, used equally often where nothing shifts."""
+    shares = np.arange(1, points) / points
+    return tuple((_TOTAL_SD * special.ndtri(shares)).tolist())
+
+
+@cache
+def shift_of(effect: float, points: int, items: int = 1, repetitions: int = 1) -> float:
+    """Return the latent shift that gives differences of this d_z.
+
+    Args:
+        effect: d_z of mean ratings of the shifted condition less those of the other.
+        points: steps of the rating.
+        items: of the scale whose mean is analysed.
+        repetitions: trials of each condition.
+    """
+    wanted = abs(effect)
+
+    def missing(shift: float) -> float:
+        return effect_of(shift, points, items, repetitions) - wanted
+
+    found = float(optimize.brentq(missing, 0.0, _LARGEST_SHIFT, xtol=1e-9)) if wanted else 0.0
+    return found if effect >= 0.0 else -found
+
+
+def effect_of(shift: float, points: int, items: int = 1, repetitions: int = 1) -> float:
+    """Return d_z of the differences that a shift of half up and half down gives.
+
+    By Gauss-Hermite quadrature over the participant's level and what the trial left.
+    """
+    own = BETWEEN_SD * _NODES[:, None]
+    trial = TRIAL_SD * _NODES[None, :]
+    mean_at: list[Floats] = []
+    variance = np.zeros(len(_NODES))
+    for side in (0.5, -0.5):
+        mean, square = _moments(own + trial + side * shift, points)
+        seen = mean @ _WEIGHTS
+        between = (mean**2) @ _WEIGHTS - seen**2
+        within = (square - mean**2) @ _WEIGHTS / items
+        variance += (between + within) / repetitions
+        mean_at.append(seen)
+    difference = mean_at[0] - mean_at[1]
+    middle = float(difference @ _WEIGHTS)
+    spread = float(variance @ _WEIGHTS + (difference - middle) ** 2 @ _WEIGHTS)
+    return middle / sqrt(spread)
+
+
+def _moments(latent: Floats, points: int) -> tuple[Floats, Floats]:
+    """Return mean and mean square of the rating at latent values without the item's noise."""
+    # The rating is 1 and one more for each threshold that is passed.
+    above = special.ndtr((latent[..., None] - np.array(thresholds(points))) / ITEM_SD)
+    mean: Floats = 1.0 + above.sum(axis=-1)
+    square: Floats = 1.0 + (above * (2.0 * np.arange(2, points + 1) - 1.0)).sum(axis=-1)
+    return mean, square
+
+
+def preference(effect: float) -> float:
+    """Return the chance that the condition above is chosen: that of a difference above zero."""
+    return float(special.ndtr(effect))
+
+
+def rated(latent: Floats, points: int) -> Floats:
+    """Return the ratings 1..points of latent values."""
+    return np.asarray(1.0 + np.digitize(latent, thresholds(points)), np.float64)
+
+
+def differences(
+    effect: float, shape: tuple[int, int], rng: np.random.Generator, points: int = 5
+) -> Floats:
+    """Return differences of one item's ratings between two conditions, (studies, participants)."""
+    shift, own = shift_of(effect, points), rng.normal(0.0, BETWEEN_SD, shape)
+    noise = sqrt(TRIAL_SD**2 + ITEM_SD**2)
+    above = rated(own + 0.5 * shift + rng.normal(0.0, noise, shape), points)
+    return above - rated(own - 0.5 * shift + rng.normal(0.0, noise, shape), points)
+
+
+class SimulatedParticipant:
+    """One who answers; the same number and population give the same answers in any order."""
+
+    def __init__(
+        self,
+        design: StudyDesign,
+        questionnaires: Mapping[str, Questionnaire],
+        number: int,
+        population: Population,
+    ) -> None:
+        """Draw what the participant is like.
+
+        Args:
+            design: of the study.
+            questionnaires: by the keys in the design.
+            number: from 1.
+            population: whom the participant is drawn from.
+        """
+        self._design, self._questionnaires = design, questionnaires
+        self._number, self._population = number, population
+        self._levels = levels(design)
+        self._middle = 0.5 * max(self._levels.values())
+        self._shown = compared_trials(design)
+        careless, hasty = self._rng("manner").random(2)
+        self.careless = bool(careless < population.careless)
+        self.hasty = bool(hasty < population.hasty)
+
+    def answer(
+        self, trial: int | None, condition: str, questionnaire: str, item: str
+    ) -> tuple[AnswerValue, float]:
+        """Return the answer to an item, and the milliseconds that it took.
+
+        Args:
+            trial: row of the order, practice below 0; None for what is asked once at the end.
+            condition: key, "a|b" for a pair, "" for what is asked once at the end.
+            questionnaire: key in the design.
+            item: key in the questionnaire.
+        """
+        asked = self._questionnaires[questionnaire].items[item]
+        rng = self._rng(f"{trial} {questionnaire}.{item}")
+        ms = (_HASTY_MS if self.hasty else _MEDIAN_MS) * float(np.exp(rng.normal(0.0, 0.35)))
+        if asked.kind == "text":
+            return "", ms
+        if asked.kind == "choice":
+            return self._choice(condition, questionnaire, rng), ms
+        return self._rating(trial, condition, questionnaire, item, asked, rng), ms
+
+    def measured(self, trial: int, condition: str) -> dict[str, float]:
+        """Return the objective measures of a trial, of which each has the population's effect."""
+        shift = sqrt(2.0 / self._shown) * self._population.effect
+        values = {}
+        for name in self._design.objective:
+            own = self._rng(name).normal()
+            noise = self._rng(f"{trial} {name}").normal()
+            latent = own + noise + shift * self._height(condition)
+            values[name] = _OBJECTIVE_MIDDLE + _OBJECTIVE_SD * latent
+        return values
+
+    def _preference(self, condition: str, construct: str) -> float:
+        """Return how much more than others this participant likes a condition, latent units."""
+        if condition not in self._levels:
+            return 0.0
+        one, found = self._population, 0.0
+        if one.preference_sd:
+            found += one.preference_sd * self._rng(f"{condition} {construct}").normal()
+        if one.contrast_sd:
+            half = 0.5 if condition == next(iter(self._levels)) else -0.5
+            found += half * one.contrast_sd * self._rng(f"contrast {construct}").normal()
+        return found
+
+    def _choice(self, pair: str, questionnaire: str, rng: np.random.Generator) -> str:
+        if self.careless:
+            return "first"
+        first, second = pair.split(PAIR)
+        apart = self._levels[first] - self._levels[second]
+        own = self._preference(first, questionnaire) - self._preference(second, questionnaire)
+        chance = special.expit(apart * special.logit(preference(self._population.effect)) + own)
+        return "first" if rng.random() < chance else "second"
+
+    def _rating(
+        self,
+        trial: int | None,
+        condition: str,
+        questionnaire: str,
+        key: str,
+        item: Item,
+        rng: np.random.Generator,
+    ) -> int:
+        if self.careless:
+            return (item.points + 1) // 2
+        construct = f"{questionnaire}.{item.scale or key}"
+        asked = self._questionnaires[questionnaire].items.values()
+        items = sum(one.scale == item.scale for one in asked) if item.scale else 1
+        repetitions = 1 if trial is None else self._shown
+        shift = shift_of(self._population.effect, item.points, items, repetitions)
+        latent = (
+            BETWEEN_SD * self._rng(construct).normal()
+            + TRIAL_SD * self._rng(f"{trial} {construct}").normal()
+            + ITEM_SD * rng.normal()
+            + shift * self._height(condition)
+            + self._preference(condition, construct)
+        )
+        rating = int(rated(np.array([latent]), item.points)[0])
+        return item.points + 1 - rating if item.reverse else rating
+
+    def _height(self, condition: str) -> float:
+        """Return how many shifts a condition lies above the middle; pairs lie there."""
+        return self._levels[condition] - self._middle if condition in self._levels else 0.0
+
+    def _rng(self, of: str) -> np.random.Generator:
+        """Return the random numbers of one thing, whatever was drawn before."""
+        return np.random.default_rng((self._population.seed, self._number, crc32(of.encode())))

@@ -1,0 +1,121 @@
+"""Counts of answers: Pearson's chi-square of two or more rows, with an exact chance beside it."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from math import nan
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special, stats
+
+from gazerig.features.study.statistics.effects import cramers_v
+from gazerig.features.study.statistics.results import StatisticalTest, no_effect
+from gazerig.gaze.types import Floats
+
+Counts = NDArray[np.int64]
+_MOST_TABLES = 200_000
+_DRAWS = 9999
+_SEED = 20020403
+_LEAST_EXPECTED = 5.0
+
+
+def counts_of(ratings: Floats, points: int) -> Counts:
+    """Return how often each of 1..points was answered, (points,)."""
+    return np.bincount(np.asarray(ratings, np.int64), minlength=points + 1)[1 : points + 1]
+
+
+def chi_square(
+    rows: Sequence[Sequence[int] | Counts] | Counts, paired: bool = False
+) -> StatisticalTest:
+    """Test whether rows of counts come from one distribution: Pearson's chi-square.
+
+    No correction for continuity. Columns that nobody chose are dropped, which the notes say, as
+    they say where expected counts are below five: there the exact chance is to be believed, which
+    is that of all tables with the same margins, or of 9999 of them drawn by a fixed seed.
+
+    Args:
+        rows: (conditions, points) how often each was answered.
+        paired: the same participants answered in all rows, which the test does not use.
+
+    Raises:
+        ValueError: a row is empty, or there are not two.
+    """
+    table = np.asarray(rows, np.int64)
+    if len(table) < 2 or (table.sum(axis=1) == 0).any():
+        raise ValueError("a chi-square test needs two rows with answers")
+    kept = table[:, table.sum(axis=0) > 0]
+    notes = ["the same participants answered in all rows: the test treats them as others"] * paired
+    if dropped := table.shape[1] - kept.shape[1]:
+        which = ", ".join(str(k + 1) for k in np.flatnonzero(table.sum(axis=0) == 0))
+        notes.append(f"{dropped} of {table.shape[1]} columns are empty and dropped ({which})")
+    n, least = int(kept.sum()), _least(table.sum(axis=1))
+    if kept.shape[1] < 2:
+        nothing, same = no_effect("Cramér's V", "V"), (*notes, "all answers are the same")
+        return StatisticalTest("chi_square", "χ²", 0.0, nan, 1.0, 1.0, least, n, nothing, same)
+    found = stats.chi2_contingency(kept, correction=False)
+    if small := int((found.expected_freq < _LEAST_EXPECTED).sum()):
+        notes.append(
+            f"{small} of {kept.size} expected counts are below 5: believe the exact chance"
+        )
+    return StatisticalTest(
+        "chi_square", "χ²", float(found.statistic), float(found.dof), float(found.pvalue),
+        exact_chance(kept), least, n, cramers_v(float(found.statistic), n, kept.shape), tuple(notes),
+    )  # fmt: skip
+
+
+def _least(rows: Counts) -> float:
+    """Return the exact chance of rows that share no column, two columns in all."""
+    n, first = int(rows.sum()), int(rows[0])
+    # Of rows of one length the table turned round is as extreme.
+    return min(1.0, (2.0 if 2 * first == n else 1.0) / float(special.binom(n, first)))
+
+
+def exact_chance(table: Counts) -> float:
+    """Return the chance of tables at least as extreme with these margins.
+
+    Extreme is what has a large chi-square. Tables of two rows are all enumerated while they are
+    at most 200,000; of others 9999 are drawn.
+    """
+    columns = table.sum(axis=0)
+    if len(table) == 2 and np.prod(np.minimum(columns, table.sum(axis=1).min()) + 1.0) < (
+        _MOST_TABLES
+    ):
+        first, chances = _tables(columns, int(table[0].sum()))
+        distances = _distance(first, columns, int(table[0].sum()))
+        seen = float(_distance(table[:1], columns, int(table[0].sum()))[0])
+        extreme = distances >= seen * (1.0 - 1e-12) - 1e-12
+        return min(1.0, float(chances[extreme].sum()))
+    drawn = stats.random_table(table.sum(axis=1), columns, seed=np.random.default_rng(_SEED))
+    tables = drawn.rvs(size=_DRAWS)
+    expected = np.outer(table.sum(axis=1), columns) / table.sum()
+    seen = float((((table - expected) ** 2) / expected).sum())
+    distances = (((tables - expected) ** 2) / expected).sum(axis=(1, 2))
+    as_far = int(np.count_nonzero(distances >= seen * (1.0 - 1e-12)))
+    return (as_far + 1.0) / (_DRAWS + 1.0)
+
+
+def _tables(columns: Counts, row: int) -> tuple[Counts, Floats]:
+    """Return all first rows with these margins, (tables, columns), and their chances."""
+    partial = np.zeros((1, 0), np.int64)
+    left = np.concatenate([np.cumsum(columns[::-1])[::-1], [0]])
+    for column, (_, after) in zip(columns, pairwise(left), strict=True):
+        each = np.arange(column + 1)
+        partial = np.concatenate(
+            [np.repeat(partial, len(each), axis=0), np.tile(each, len(partial))[:, None]], axis=1
+        )
+        so_far = partial.sum(axis=1)
+        partial = partial[(so_far <= row) & (so_far + after >= row)]
+    log = (
+        special.gammaln(columns + 1.0)
+        - special.gammaln(partial + 1.0)
+        - special.gammaln(columns - partial + 1.0)
+    ).sum(axis=1)
+    chances = np.exp(log - log.max())
+    return partial, chances / chances.sum()
+
+
+def _distance(first: Counts, columns: Counts, row: int) -> Floats:
+    """Return chi-square up to a factor, of first rows (tables, columns) of two."""
+    expected = columns * (row / columns.sum())
+    distances: Floats = (((first - expected) ** 2) / columns).sum(axis=1)
+    return distances

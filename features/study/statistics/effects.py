@@ -1,0 +1,175 @@
+"""Effect sizes with their 95 % intervals.
+
+Intervals are those of the bias-corrected and accelerated bootstrap (Efron 1987) over participants;
+where it has none, as all participants answered alike, the interval is nan.
+"""
+
+import warnings
+from collections.abc import Callable, Sequence
+from math import isfinite, nan, sqrt
+
+import numpy as np
+from scipy import optimize, stats
+
+from gazerig.features.study.statistics.results import EffectSize
+from gazerig.gaze.types import Floats
+
+RESAMPLES = 2000
+SEED = 20020401
+_BCA = "BCa bootstrap"
+_MOST_NONCENTRAL = 1e5
+
+Along = Callable[..., Floats]
+"""Samples (..., n), each along its last axis -> figures (...)."""
+
+
+def rank_biserial(differences: Floats, resamples: int = RESAMPLES) -> EffectSize:
+    """Return the matched-pairs rank-biserial correlation (Kerby 2014).
+
+    Args:
+        differences: (n,) one a participant, zeros count for neither side.
+        resamples: of the bootstrap.
+    """
+    interval = bootstrapped([differences], matched_correlation, resamples)
+    value = float(matched_correlation(differences))
+    return EffectSize("matched rank-biserial correlation", "r", value, *interval, _BCA)
+
+
+def matched_correlation(differences: Floats, axis: int = -1) -> Floats:
+    """Return (W+ - W-) / (W+ + W-) of differences along an axis, nan where all are zero."""
+    d = np.moveaxis(np.asarray(differences, float), axis, -1)
+    zeros = np.count_nonzero(d == 0.0, axis=-1, keepdims=True)
+    # Zeros have the lowest ranks, so those of the others are too high by their number.
+    ranks = np.where(d == 0.0, 0.0, stats.rankdata(np.abs(d), axis=-1) - zeros)
+    total = ranks.sum(axis=-1)
+    signed = (np.sign(d) * ranks).sum(axis=-1)
+    share: Floats = np.divide(signed, total, out=np.full_like(total, nan), where=total > 0.0)
+    return share
+
+
+def cliffs_delta(a: Floats, b: Floats, paired: bool, resamples: int = RESAMPLES) -> EffectSize:
+    """Return Cliff's delta (1993): how much more often b exceeds a than a exceeds b.
+
+    Args:
+        a: (n,) answers.
+        b: (m,) others.
+        paired: the same participants in the same order gave both; they are resampled together.
+        resamples: of the bootstrap.
+    """
+    interval = bootstrapped([a, b], dominance, resamples, paired)
+    return EffectSize("Cliff's delta", "δ", float(dominance(a, b)), *interval, _BCA)
+
+
+def dominance(a: Floats, b: Floats, axis: int = -1) -> Floats:
+    """Return P(b > a) - P(b < a) of samples along an axis."""
+    a, b = np.moveaxis(np.asarray(a, float), axis, -1), np.moveaxis(np.asarray(b, float), axis, -1)
+    n, m = a.shape[-1], b.shape[-1]
+    ranks = stats.rankdata(np.concatenate([a, b], axis=-1), axis=-1)
+    over = ranks[..., n:].sum(axis=-1) - 0.5 * m * (m + 1)
+    difference: Floats = 2.0 * over / (n * m) - 1.0
+    return difference
+
+
+def cohens_dz(differences: Floats, resamples: int = RESAMPLES) -> EffectSize:
+    """Return Cohen's d_z: the mean of the differences over their standard deviation.
+
+    Args:
+        differences: (n,) one a participant.
+        resamples: of the bootstrap.
+    """
+    interval = bootstrapped([differences], standardised_mean, resamples)
+    value = float(standardised_mean(differences)) if len(differences) > 1 else nan
+    return EffectSize("Cohen's d_z", "d_z", value, *interval, _BCA, bounded=False)
+
+
+def standardised_mean(differences: Floats, axis: int = -1) -> Floats:
+    """Return mean over standard deviation along an axis, nan where all are equal."""
+    mean = np.asarray(np.mean(differences, axis=axis))
+    spread = np.asarray(np.std(differences, axis=axis, ddof=1))
+    ratio: Floats = np.divide(mean, spread, out=np.full_like(mean, nan), where=spread > 1e-12)
+    return ratio
+
+
+def kendalls_w(rows: Floats, resamples: int = RESAMPLES) -> EffectSize:
+    """Return Kendall's coefficient of concordance, corrected for ties.
+
+    Args:
+        rows: (participants, conditions).
+        resamples: of the bootstrap.
+    """
+    columns = list(rows.T)
+
+    def along(*samples: Floats, axis: int = -1) -> Floats:
+        return concordance(np.moveaxis(np.stack(samples), 0, -1))
+
+    interval = bootstrapped(columns, along, resamples, paired=True)
+    return EffectSize("Kendall's W", "W", float(concordance(rows)), *interval, _BCA)
+
+
+def concordance(rows: Floats) -> Floats:
+    """Return Kendall's W of (..., participants, conditions), nan where all rows are ties."""
+    n, k = rows.shape[-2:]
+    ranks = stats.rankdata(rows, axis=-1)
+    apart = ((ranks.sum(axis=-2) - 0.5 * n * (k + 1)) ** 2).sum(axis=-1)
+    # The spread within rows is k (k^2 - 1) / 12 less what ties take from it.
+    most = n * ((ranks - 0.5 * (k + 1)) ** 2).sum(axis=(-1, -2))
+    share: Floats = np.divide(apart, most, out=np.full_like(apart, nan), where=most > 0.0)
+    return share
+
+
+def cramers_v(chi2: float, n: int, shape: tuple[int, int]) -> EffectSize:
+    """Return Cramer's V of a table.
+
+    The interval is that of the noncentral chi-square distribution turned round (Smithson 2003).
+
+    Args:
+        chi2: Pearson's statistic.
+        n: answers.
+        shape: rows and columns.
+    """
+    df, width = (shape[0] - 1) * (shape[1] - 1), n * (min(shape) - 1)
+    if df < 1 or width < 1 or not isfinite(chi2):
+        return EffectSize("Cramér's V", "V", nan, nan, nan, "none")
+    value = sqrt(chi2 / width)
+    low, high = (_noncentrality(chi2, df, share) for share in (0.975, 0.025))
+    bounds = (0.0 if low == 0.0 else sqrt((low + df) / width), sqrt((high + df) / width))
+    method = "noncentral chi-square"
+    return EffectSize(
+        "Cramér's V", "V", value, min(value, bounds[0]), max(value, min(1.0, bounds[1])), method
+    )
+
+
+def _noncentrality(chi2: float, df: int, share: float) -> float:
+    """Return the noncentrality under which ``share`` lies below chi2, 0 where none is so small."""
+
+    def beyond(centre: float) -> float:
+        return float(stats.ncx2.cdf(chi2, df, centre) if centre else stats.chi2.cdf(chi2, df))
+
+    if beyond(0.0) <= share:
+        return 0.0
+    most = 2.0 * chi2 + 100.0
+    return float(optimize.brentq(lambda c: beyond(c) - share, 0.0, min(most, _MOST_NONCENTRAL)))
+
+
+def bootstrapped(
+    samples: Sequence[Floats], figure: Along, resamples: int = RESAMPLES, paired: bool = False
+) -> tuple[float, float]:
+    """Return the 95 % BCa interval of a figure, (nan, nan) where there is none.
+
+    Args:
+        samples: each (n,); with ``paired`` all of the same participants.
+        figure: vectorised along an axis.
+        resamples: how often participants are drawn again.
+        paired: the samples are drawn together.
+    """
+    if min(len(s) for s in samples) < 3 or all(np.ptp(s) == 0.0 for s in samples):
+        return nan, nan
+    with warnings.catch_warnings(), np.errstate(all="ignore"):
+        # SciPy warns where the bootstrap distribution is degenerate; the interval is then nan.
+        warnings.simplefilter("ignore")
+        found = stats.bootstrap(
+            samples, figure, n_resamples=resamples, paired=paired, vectorized=True, axis=-1,
+            method="BCa", rng=np.random.default_rng(SEED),
+        ).confidence_interval  # fmt: skip
+    low, high = float(found.low), float(found.high)
+    return (low, high) if isfinite(low) and isfinite(high) else (nan, nan)

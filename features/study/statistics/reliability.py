@@ -1,0 +1,37 @@
+"""Whether the items of a scale measure one thing: Cronbach's alpha."""
+
+from math import nan
+
+import numpy as np
+
+from gazerig.features.study.statistics.effects import bootstrapped
+from gazerig.features.study.statistics.results import EffectSize
+from gazerig.gaze.types import Floats
+
+
+def cronbachs_alpha(answers: Floats) -> EffectSize:
+    """Return Cronbach's alpha (1951) of a scale, with its interval over participants.
+
+    Args:
+        answers: (participants, items), reversed items already turned round.
+    """
+    rows = np.asarray(answers, float)
+    name = "Cronbach's alpha"
+    if rows.ndim != 2 or rows.shape[0] < 2 or rows.shape[1] < 2:
+        return EffectSize(name, "α", nan, nan, nan, "none")
+
+    def along(*items: Floats, axis: int = -1) -> Floats:
+        return _alpha(np.stack(items))
+
+    interval = bootstrapped(list(rows.T), along, paired=True)
+    return EffectSize(name, "α", float(_alpha(rows.T)), *interval, "BCa bootstrap")
+
+
+def _alpha(items: Floats) -> Floats:
+    """Return alpha of (items, ..., participants), nan where all sums are equal."""
+    k = len(items)
+    parts = np.var(items, axis=-1, ddof=1).sum(axis=0)
+    whole = np.asarray(np.var(items.sum(axis=0), axis=-1, ddof=1))
+    share = np.divide(parts, whole, out=np.full_like(whole, nan), where=whole > 1e-12)
+    alpha: Floats = k / (k - 1.0) * (1.0 - share)
+    return alpha

@@ -1,0 +1,277 @@
+"""One participant's session as it is run: screens out, answers in, everything on disk first.
+
+Everything may be called from any thread. What a browser asks for names the page it was asked on;
+what comes twice, or late from a page that is over, changes nothing.
+"""
+
+import threading
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite, nan
+
+from gazerig.features.study.answers import WrongAnswer
+from gazerig.features.study.journal import Journal
+from gazerig.features.study.presenter import HeadLost, Presenter
+from gazerig.features.study.records import AnswerValue, Outcome, Record
+from gazerig.features.study.screens import PresentationScreen, ReadyScreen, Screen
+from gazerig.features.study.session import ShownTrial, StudySession
+
+WHOLE_SHARE = 0.9
+"""A film of which less was seen has not been shown."""
+
+
+@dataclass(frozen=True)
+class StudyRunState:
+    """What the experimenter sees.
+
+    Attributes:
+        participant: Code.
+        screen: What the participant sees.
+        trial: Number of the trial, from 0; below 0 in practice, None outside trials.
+        trials: How many count.
+        shown: The presentation that comes or is under way.
+        presenting: It is under way.
+        elapsed_s: Since it began, 0 without one.
+        answers: How many are on disk.
+        fault: Why nothing can be shown, "" while all is well.
+        paused: By the experimenter.
+        closed: The session has ended for good.
+    """
+
+    participant: str
+    screen: Screen
+    trial: int | None
+    trials: int
+    shown: ShownTrial | None
+    presenting: bool
+    elapsed_s: float
+    answers: int
+    fault: str
+    paused: bool
+    closed: bool
+
+
+class StudyRun:
+    """Runs one participant's session.
+
+    Args:
+        code: of the participant.
+        session: with the journal's records.
+        journal: open, with the record of the opening.
+        presenter: shows the conditions.
+        now_s: returns the time on a clock that never jumps.
+        utc: returns date and time of day.
+    """
+
+    def __init__(
+        self,
+        code: str,
+        session: StudySession,
+        journal: Journal,
+        presenter: Presenter,
+        now_s: Callable[[], float],
+        utc: Callable[[], str],
+    ) -> None:
+        self._code, self._session, self._journal = code, session, journal
+        self._presenter, self._now_s, self._utc = presenter, now_s, utc
+        self._lock = threading.RLock()
+        self._began_s = 0.0
+        self._fetched_s = nan
+        self._fault = ""
+        self._keep(session.resumed(utc()))
+        # How long a page was shown by a program that has ended is not known.
+        self._asked_s = nan
+
+    def now(self) -> tuple[str, Screen]:
+        """Return the name of the page that the participant is on, and its screen."""
+        with self._lock:
+            return self._session.page, self._session.screen
+
+    def state(self) -> StudyRunState:
+        """Return what the experimenter sees."""
+        with self._lock:
+            session, screen = self._session, self._session.screen
+            presenting = isinstance(screen, PresentationScreen)
+            return StudyRunState(
+                self._code, screen, session.trial, len(session.order), session.shown, presenting,
+                self._now_s() - self._began_s if presenting else 0.0,
+                sum(type(one).__name__ == "ItemAnswered" for one in self._journal.records),
+                self._fault, session.paused, session.closed,
+            )  # fmt: skip
+
+    def consent(self, page: str, given: bool, pictures: bool, gaze: bool) -> None:
+        """Record the decision on the consent page.
+
+        Raises:
+            NotKept: it could not be written.
+        """
+        with self._lock:
+            if page == self._session.page:
+                self._keep(self._session.consent(given, pictures, gaze, self._utc()))
+
+    def go_on(self, page: str) -> None:
+        """Leave the instructions or a rest.
+
+        Raises:
+            WrongAnswer: the page is no such one.
+        """
+        with self._lock:
+            if page == self._session.page:
+                self._session.go_on()
+
+    def begin(self, page: str) -> None:
+        """Begin the presentation.
+
+        A head that cannot show it pauses the session, until the experimenter goes on.
+
+        Raises:
+            NotKept: that it begins could not be written; it does not.
+            WrongAnswer: the page is no such one.
+        """
+        with self._lock:
+            if page != self._session.page or not isinstance(self._session.screen, ReadyScreen):
+                return
+            shown = self._session.shown
+            assert shown is not None  # of a screen before a presentation
+            try:
+                self._presenter.begin(shown)
+            except HeadLost as lost:
+                self._fault, self._session.paused = str(lost), True
+                return
+            self._keep(self._session.begin(self._utc()))
+            self._began_s, self._fetched_s = self._now_s(), nan
+
+    def film_fetched(self, token: str) -> None:
+        """Note that the participant's browser has the whole film of this name."""
+        with self._lock:
+            if not isfinite(self._fetched_s) and self._session.film_of(token) is not None:
+                self._fetched_s = self._now_s()
+
+    def film_ended(self, page: str, seconds: float) -> None:
+        """Record that the browser has shown the film; one cut short begins again.
+
+        Args:
+            page: on which it was shown.
+            seconds: how much of it was played, as the browser reports. The time since the browser
+                has the film bounds it; a film that was not fetched was not played.
+
+        Raises:
+            NotKept: it could not be written.
+        """
+        with self._lock:
+            screen = self._session.screen
+            if page != self._session.page or not isinstance(screen, PresentationScreen):
+                return
+            if not screen.film:
+                return  # the head's own time decides
+            fetched = isfinite(self._fetched_s)
+            longest_s = self._now_s() - self._fetched_s if fetched else 0.0
+            seconds = min(max(seconds, 0.0), longest_s) if isfinite(seconds) else 0.0
+            whole = seconds >= WHOLE_SHARE * screen.seconds
+            reason = "the film was not shown whole" if fetched else "the film was not fetched"
+            self._end("complete" if whole else "interrupted", "" if whole else reason, seconds)
+
+    def poll(self) -> None:
+        """End the presentation when its time is over or the head was lost; call it often.
+
+        Raises:
+            NotKept: the end could not be written; the next call tries again.
+        """
+        with self._lock:
+            fault = self._presenter.fault()
+            self._fault = fault or ("" if not self._session.paused else self._fault)
+            screen = self._session.screen
+            if not isinstance(screen, PresentationScreen) or self._session.closed:
+                return
+            if fault:
+                self._end("head_lost", fault)
+                self._session.paused = True
+            elif not screen.film and self._now_s() - self._began_s >= screen.seconds:
+                self._end("complete", "")
+
+    def answer(self, page: str, values: Mapping[int, AnswerValue], ms: Mapping[int, float]) -> None:
+        """Record a page of answers; when this returns, they are on disk.
+
+        Args:
+            page: on which they were given.
+            values: by the questions' numbers.
+            ms: response times as the browser reports them; none is longer than the page was shown.
+
+        Raises:
+            NotKept: they could not be written, and the page is still to be answered.
+            WrongAnswer: one is missing, or not as it can be.
+        """
+        with self._lock:
+            if page == self._session.page:
+                longest_ms = 1000.0 * (self._now_s() - self._asked_s)
+                self._keep(self._session.answer(values, ms, self._utc(), longest_ms))
+
+    def withdraw(self) -> None:
+        """Record that the participant leaves.
+
+        Raises:
+            NotKept: it could not be written.
+        """
+        with self._lock:
+            self._leave(self._session.withdraw(self._utc()))
+
+    def film_of(self, token: str) -> str | None:
+        """Return the condition of the film that is shown now, None for any other name."""
+        with self._lock:
+            return self._session.film_of(token)
+
+    def pause(self, paused: bool) -> None:
+        """Have no presentation begin, or go on, with a head that was lost if it can be had."""
+        with self._lock:
+            if not paused and self._presenter.fault():
+                self._presenter.restart()
+                self._fault = self._presenter.fault()
+                if self._fault:
+                    return
+            self._session.paused = paused
+            if not paused:
+                self._fault = ""
+
+    def repeat(self) -> None:
+        """Have the presentation under way begin again.
+
+        Raises:
+            NotKept: it could not be written.
+            WrongAnswer: none is under way.
+        """
+        with self._lock:
+            if not isinstance(self._session.screen, PresentationScreen):
+                raise WrongAnswer("no presentation is under way")
+            self._end("interrupted", "the experimenter had it repeated")
+
+    def exclude(self, reason: str) -> None:
+        """Exclude the participant.
+
+        Raises:
+            NotKept: it could not be written.
+        """
+        with self._lock:
+            self._leave(self._session.exclude(reason, self._utc()))
+
+    def _end(self, outcome: Outcome, reason: str, seconds: float = nan) -> None:
+        """End the presentation under way; seconds: how long it was shown, nan: since it began."""
+        if not isfinite(seconds):
+            seconds = self._now_s() - self._began_s
+        what = self._presenter.end()
+        ended = (outcome, seconds, self._utc(), reason, what.recording, what.span_s)
+        self._keep(self._session.end(*ended))
+
+    def _leave(self, records: Sequence[Record]) -> None:
+        presenting = isinstance(self._session.screen, PresentationScreen)
+        self._keep(records)
+        if presenting:
+            self._presenter.end()
+
+    def _keep(self, records: Sequence[Record]) -> None:
+        """Have records on disk, then take effect; at the end of all, that as well."""
+        self._journal.write(records)
+        self._session.add(records)
+        self._asked_s = self._now_s()
+        end = self._session.finish(self._utc())
+        self._journal.write(end)
+        self._session.add(end)
