@@ -19,13 +19,13 @@ run: $(VENV)/.installed
 test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest --workers auto
 
-check: $(VENV)/.installed-dev links
+check: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/mypy --config-file tests/mypy.ini
 	$(BIN)/mypy --config-file pyproject.toml examples/*.py
-	PYTHONPATH=.links $(BIN)/lint-imports --no-logo
+	$(BIN)/lint-imports --no-logo
 
 # How much of the source the tests reach, line by line and branch by branch; too little fails it.
 coverage: $(VENV)/.installed-dev
@@ -56,22 +56,22 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python tests/bench/bench_sweep.py
 	$(BIN)/python tests/bench/bench_world.py --quick
 
-# A folder with the packages under their import names, for what does not see through an install.
+# .links/gazerig holds links to the sources, as the package is imported: after adding a file to api/ or a
+# top folder.
 links:
-	@mkdir -p .links/gazerig
 	@ln -sf $(addprefix ../../,$(wildcard api/*.py api/py.typed)) .links/gazerig/
 	@ln -sfn ../../api/testing .links/gazerig/testing
 	@for room in config drivers features gaze robot sim_mock; do ln -sfn ../../$$room .links/gazerig/$$room; done
 
 # The documentation as a site, in site/; a link to nothing or a faulty docstring fails it.
-docs: $(VENV)/.installed-docs links
+docs: $(VENV)/.installed-docs
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build
 
 figures: $(VENV)/.installed-dev
 	$(BIN)/python docs/make_figures.py
 
 clean:
-	rm -rf $(VENV) .links build dist site *.egg-info
+	rm -rf $(VENV) build dist site .links/*.egg-info
 
 # One line that is written over again as an installer goes on; errors stay. Without a terminal, nothing
 # is rewritten.

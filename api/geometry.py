@@ -8,7 +8,7 @@ from math import degrees
 from gazerig.config.schema import Rig, load_rig
 from gazerig.errors import Refused
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.oculomotor import Oculomotor
+from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.types import Angles3, Target, Vec3
 from gazerig.robot.app.gaze_models import gaze_parts
 from gazerig.robot.app.rig_limits import limits

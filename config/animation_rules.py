@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from gazerig.config.rig import Rig
-from gazerig.gaze.minimum_jerk_blend import PEAK_ACCELERATION, PEAK_SPEED
+from gazerig.gaze.minimum_jerk import PEAK_ACCELERATION, PEAK_SPEED
 from gazerig.robot.model.kinematics import LIDS, NECK
 from gazerig.robot.model.types import GAZE_JOINTS
 

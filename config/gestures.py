@@ -19,7 +19,7 @@ from gazerig.config.load import (
     shipped_names,
 )
 from gazerig.config.rig import Rig
-from gazerig.gaze.gesture import Gesture, faults_of, loop_fault
+from gazerig.gaze.gesture.gesture import Gesture, faults_of, loop_fault
 from gazerig.robot.model.gesture_fit import GestureFit, GestureRefused, motions
 from gazerig.robot.model.kinematics import LIDS
 from gazerig.robot.model.types import GAZE_JOINTS, JOINT_NAME

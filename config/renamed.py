@@ -12,7 +12,7 @@ from typing import Any
 from gazerig.config.entries import Entry
 from gazerig.config.faults import ConfigFault
 from gazerig.config.rig import Rig
-from gazerig.gaze.top_down import TopDownParams
+from gazerig.gaze.attention.top_down import TopDownParams
 
 RIG: Mapping[str, str] = {
     "camera_care": "camera_recovery",

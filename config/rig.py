@@ -16,21 +16,21 @@ from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.servo_models import BUS_KINDS, BusKind
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.motion.params import MotionParams
-from gazerig.gaze.attention import AttentionParams
-from gazerig.gaze.aversion import AversionParams
-from gazerig.gaze.bottom_up import BottomUpParams
-from gazerig.gaze.breathing import BreathingParams
+from gazerig.gaze.attention.attention import AttentionParams
+from gazerig.gaze.attention.aversion import AversionParams
+from gazerig.gaze.attention.bottom_up import BottomUpParams
+from gazerig.gaze.attention.idle import IdleParams
+from gazerig.gaze.attention.top_down import TopDownParams
 from gazerig.gaze.field_of_view import FieldOfViewParams
-from gazerig.gaze.gesture import GestureParams
-from gazerig.gaze.head import HeadParams
-from gazerig.gaze.idle import IdleParams
-from gazerig.gaze.level import LevelParams
-from gazerig.gaze.lids import LidParams
-from gazerig.gaze.oculomotor import OculomotorParams
-from gazerig.gaze.pursuit_params import PursuitParams
-from gazerig.gaze.saccade import SaccadeParams
-from gazerig.gaze.scanpath import ScanpathParams
-from gazerig.gaze.top_down import TopDownParams
+from gazerig.gaze.gesture.breathing import BreathingParams
+from gazerig.gaze.gesture.gesture import GestureParams
+from gazerig.gaze.gesture.level import LevelParams
+from gazerig.gaze.lids.lids import LidParams
+from gazerig.gaze.oculomotor.head import HeadParams
+from gazerig.gaze.oculomotor.oculomotor import OculomotorParams
+from gazerig.gaze.oculomotor.pursuit_params import PursuitParams
+from gazerig.gaze.oculomotor.saccade import SaccadeParams
+from gazerig.gaze.scanpath.scanpath import ScanpathParams
 from gazerig.params import Bounds, Choices, Unit
 from gazerig.robot.model.coupling_params import CouplingParams
 from gazerig.robot.model.frames import CameraParams

@@ -8,8 +8,8 @@ from gazerig.config.load import Check, load, read_yaml, shipped
 from gazerig.config.rig import LidJoints as LidJoints
 from gazerig.config.rig import Rig as Rig
 from gazerig.config.rig_rules import RULES as RULES
-from gazerig.gaze.scanpath import Walk
-from gazerig.gaze.top_down import TopDownParams
+from gazerig.gaze.attention.top_down import TopDownParams
+from gazerig.gaze.scanpath.scanpath import Walk
 
 
 def load_rig(

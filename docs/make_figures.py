@@ -23,12 +23,12 @@ from gazerig.features.lab.sweep.outcome import Outcome  # noqa: E402
 from gazerig.features.lab.sweep.response_figure import response_png  # noqa: E402
 from gazerig.features.lab.sweep.worker import figures_at  # noqa: E402
 from gazerig.gaze.angles import rotation  # noqa: E402
-from gazerig.gaze.binocular import BinocularController  # noqa: E402
-from gazerig.gaze.head import HeadModel, HeadParams  # noqa: E402
-from gazerig.gaze.lids import LidParams, Lids  # noqa: E402
-from gazerig.gaze.pursuit_params import PursuitParams  # noqa: E402
-from gazerig.gaze.saccade import SaccadeModel, SaccadeParams  # noqa: E402
-from gazerig.gaze.scanpath import ScanpathParams, markov_walk, normalised  # noqa: E402
+from gazerig.gaze.lids.lids import LidParams, Lids  # noqa: E402
+from gazerig.gaze.oculomotor.binocular import BinocularController  # noqa: E402
+from gazerig.gaze.oculomotor.head import HeadModel, HeadParams  # noqa: E402
+from gazerig.gaze.oculomotor.pursuit_params import PursuitParams  # noqa: E402
+from gazerig.gaze.oculomotor.saccade import SaccadeModel, SaccadeParams  # noqa: E402
+from gazerig.gaze.scanpath.scanpath import ScanpathParams, markov_walk, normalised  # noqa: E402
 from gazerig.gaze.types import PART_NAMES  # noqa: E402
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.gaze_models import gaze_parts

@@ -52,7 +52,7 @@ SHIPPED: Mapping[str, Mapping[str, str]] = {
         "mtcnn": "gazerig.drivers.vision.face.detector:MTCNN",
         "yunet": "gazerig.drivers.vision.face.detector:YUNET",
     },
-    ATTENTION: {"attention": "gazerig.gaze.attention:Attention"},
+    ATTENTION: {"attention": "gazerig.gaze.attention.attention:Attention"},
     GESTURES: {"gazerig": "gazerig.config.load:GESTURES_FOLDER"},
     RIGS: {"gazerig": "gazerig.config.load:RIGS_FOLDER"},
     COMMAND: {

@@ -180,7 +180,8 @@ class Target(NamedTuple):
     shift:    counts up whenever another object or part is chosen: the saccade's event flag
     why:      the reason in words
     centre_world_m: where the head turns to, e.g. the face's centre; None: the point itself
-    plan:     what the action planner (gazerig.gaze.action_planner) has chosen and why; "" without
+    plan:     what the action planner (gazerig.gaze.attention.action_planner) has chosen and why; ""
+              without
     saliences: of the winner and of the next three, highest first
     """
 

@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from gazerig.gaze.angles import rotation
-from gazerig.gaze.attention import Attention, AttentionParams
-from gazerig.gaze.bottom_up import BottomUp, BottomUpParams
+from gazerig.gaze.attention.attention import Attention, AttentionParams
+from gazerig.gaze.attention.bottom_up import BottomUp, BottomUpParams
+from gazerig.gaze.attention.idle import Idle, IdleParams
+from gazerig.gaze.attention.top_down import TopDown, TopDownParams
 from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
-from gazerig.gaze.idle import Idle, IdleParams
-from gazerig.gaze.top_down import TopDown, TopDownParams
 from gazerig.gaze.types import Bodies, GazeState, Percept
 
 IDENTITY = rotation((0.0, 0.0, 0.0))

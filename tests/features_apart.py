@@ -38,10 +38,9 @@ def lay_out(folder: Path, removed: tuple[str, ...] = ()) -> Path:
     """Write the package into a folder, by links and without some features; return the folder."""
     top = folder / "gazerig"
     (top / "features").mkdir(parents=True)
-    for path in (ROOT / "api").iterdir():
-        (top / path.name).symlink_to(path)
-    for room in ("config", "drivers", "gaze", "robot", "sim_mock"):
-        (top / room).symlink_to(ROOT / room)
+    for link in (ROOT / ".links" / "gazerig").iterdir():
+        if link.name != "features":
+            (top / link.name).symlink_to(link.resolve())
     for path in (ROOT / "features").iterdir():
         if path.name not in removed:
             (top / "features" / path.name).symlink_to(path)

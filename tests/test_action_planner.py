@@ -8,10 +8,10 @@ import pytest
 from attention_scene import attention, body, looking, percept
 
 from gazerig.config.schema import load_rules
-from gazerig.gaze.action_planner import ActionPlanner, ActionPlannerParams, Plan
-from gazerig.gaze.attention import Attention
-from gazerig.gaze.opponent import SeenHand, approaches, places
-from gazerig.gaze.top_down import PLANNED, TopDown, TopDownParams
+from gazerig.gaze.attention.action_planner import ActionPlanner, ActionPlannerParams, Plan
+from gazerig.gaze.attention.attention import Attention
+from gazerig.gaze.attention.opponent import SeenHand, approaches, places
+from gazerig.gaze.attention.top_down import PLANNED, TopDown, TopDownParams
 from gazerig.gaze.types import Face, Percept, Target, Vec3
 
 Row = tuple[int, str, tuple[float, ...], tuple[float, ...]]

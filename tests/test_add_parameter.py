@@ -16,7 +16,7 @@ from gazerig.config.export import json_schema
 from gazerig.config.parameters import changed, parameters
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import Rig, load_rig
-from gazerig.gaze.saccade import SaccadeModel
+from gazerig.gaze.oculomotor.saccade import SaccadeModel
 
 rig, key = load_rig("desk"), "gaze.saccade.rise_share"
 (knob,) = [one for one in parameters(rig, rig) if one.key == key]

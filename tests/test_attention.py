@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from attention_scene import FACE, UNBOUNDED, attention, body, looking, percept, waving
 
-from gazerig.gaze.attention import Attention, AttentionParams
-from gazerig.gaze.bottom_up import BottomUp, BottomUpParams, motion_terms
+from gazerig.gaze.attention.attention import Attention, AttentionParams
+from gazerig.gaze.attention.bottom_up import BottomUp, BottomUpParams, motion_terms
+from gazerig.gaze.attention.idle import Idle, IdleParams
+from gazerig.gaze.attention.top_down import Rule, TopDown, TopDownParams
 from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams, occluded
-from gazerig.gaze.idle import Idle, IdleParams
-from gazerig.gaze.top_down import Rule, TopDown, TopDownParams
 from gazerig.gaze.types import Bodies, Percept
 
 
@@ -386,7 +386,7 @@ def test_a_few_bodies_are_chosen_from_as_many_are(
         state = looking(20.0 * sin(t_s))._replace(p_world_head_m=(0.0, 0.1 * sin(t_s), 0.0))
         found = []
         for one, limit in ((few, 24), (many, -1)):
-            monkeypatch.setattr("gazerig.gaze.attention._FEW", limit)
+            monkeypatch.setattr("gazerig.gaze.attention.attention._FEW", limit)
             found.append(one.choose(Percept(t_s, seen), state, t_s))
         a, b = found
         assert (a.kind, a.id, a.shift, a.why) == (b.kind, b.id, b.shift, b.why)

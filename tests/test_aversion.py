@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 
 from gazerig.gaze.angles import angle_between, sub, unit
-from gazerig.gaze.aversion import DIRECTIONS_PERCENT, Aversion, AversionMode, AversionParams
+from gazerig.gaze.attention.aversion import (
+    DIRECTIONS_PERCENT,
+    Aversion,
+    AversionMode,
+    AversionParams,
+)
 from gazerig.gaze.types import Target, Vec3
 
 DT = 0.02

@@ -11,11 +11,11 @@ from gazerig.config.load import load, read_yaml, shipped, shipped_names
 from gazerig.config.rig import GazeConfig
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import rotation
-from gazerig.gaze.attention import Attention
-from gazerig.gaze.bottom_up import BottomUp
+from gazerig.gaze.attention.attention import Attention
+from gazerig.gaze.attention.bottom_up import BottomUp
+from gazerig.gaze.attention.idle import Idle
+from gazerig.gaze.attention.top_down import Rule, TopDown, TopDownParams
 from gazerig.gaze.field_of_view import FieldOfView
-from gazerig.gaze.idle import Idle
-from gazerig.gaze.top_down import Rule, TopDown, TopDownParams
 from gazerig.gaze.types import Bodies, GazeState, Percept
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")

@@ -11,12 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.config.schema import load_rig
-from gazerig.gaze.aversion import Aversion, AversionParams
-from gazerig.gaze.expression import Expressions
-from gazerig.gaze.gesture import GestureParams
-from gazerig.gaze.gesture_player import GesturePlayer
-from gazerig.gaze.lids import LidParams, Lids
-from gazerig.gaze.top_down import TopDown, TopDownParams
+from gazerig.gaze.attention.aversion import Aversion, AversionParams
+from gazerig.gaze.attention.top_down import TopDown, TopDownParams
+from gazerig.gaze.gesture.expression import Expressions
+from gazerig.gaze.gesture.gesture import GestureParams
+from gazerig.gaze.gesture.gesture_player import GesturePlayer
+from gazerig.gaze.lids.lids import LidParams, Lids
 from gazerig.robot.app.session import leave
 from gazerig.robot.control.command_choices import Menus
 from gazerig.robot.control.gesture_choices import GestureChoices

@@ -34,7 +34,7 @@ from gazerig.features.study.design import (
 )
 from gazerig.features.study.questionnaire import Item, Questionnaire
 from gazerig.features.study.shipped import HOME
-from gazerig.gaze.gesture import LID_GROUPS, Gesture, KeyFrame
+from gazerig.gaze.gesture.gesture import LID_GROUPS, Gesture, KeyFrame
 from gazerig.robot.cli.examples import EXAMPLES
 from gazerig.robot.model.joint import JointParams
 from gazerig.sim_mock.scenes.registry import scenes

@@ -8,10 +8,10 @@ from random import Random
 import pytest
 from expressive_rig import expressive_rig, faults, started
 
-from gazerig.gaze.expression import Expressions
-from gazerig.gaze.level import HOLD_S, LevelParams, LevelRange, Levels
-from gazerig.gaze.minimum_jerk_blend import PEAK_SPEED, MinimumJerkBlend
-from gazerig.gaze.pose_offset import NO_OFFSET, PoseOffset
+from gazerig.gaze.gesture.expression import Expressions
+from gazerig.gaze.gesture.level import HOLD_S, LevelParams, LevelRange, Levels
+from gazerig.gaze.gesture.pose_offset import NO_OFFSET, PoseOffset
+from gazerig.gaze.minimum_jerk import PEAK_SPEED, MinimumJerkBlend
 from gazerig.robot.app.animation_tables import pose_offset
 from gazerig.robot.app.assemble import Assembly
 from gazerig.robot.control.tick import Tick

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from attention_scene import FACE, attention, body, looking, percept
 
-from gazerig.gaze.attention import Attention
-from gazerig.gaze.face_memory import FaceMemory
+from gazerig.gaze.attention.attention import Attention
+from gazerig.gaze.attention.face_memory import FaceMemory
 from gazerig.gaze.types import Target
 
 OTHER = body(2, "face", (1.0, 0.6, 0.0))

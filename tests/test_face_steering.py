@@ -8,8 +8,8 @@ import pytest
 
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import angle_between, rotation, sub
+from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.top_down import TopDown
 from gazerig.gaze.types import Bodies, Face, Percept, Target
 from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions

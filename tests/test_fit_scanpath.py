@@ -11,7 +11,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.analysis.eye_tracker_csv import Samples, read_recording
 from gazerig.features.lab.analysis.fit_scanpath import fit
 from gazerig.features.lab.analysis.fixations import FixationParams, PartBoxes, fixations_of
-from gazerig.gaze.scanpath import (
+from gazerig.gaze.scanpath.scanpath import (
     Scanpath,
     ScanpathParams,
     Walk,

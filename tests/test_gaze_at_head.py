@@ -207,7 +207,7 @@ def test_the_page_says_it_above_the_face() -> None:
 def test_of_two_faces_the_one_that_looks_at_the_head_gets_more(
     monkeypatch: pytest.MonkeyPatch, few: int, ratio: float, looked_at: list[tuple[int, ...]]
 ) -> None:
-    monkeypatch.setattr("gazerig.gaze.attention._FEW", few)
+    monkeypatch.setattr("gazerig.gaze.attention.attention._FEW", few)
     left, right = (1.0, 0.2, 0.0), (1.0, -0.2, 0.0)
     for (one, other), first in zip([(False, True), (True, False)], looked_at, strict=True):
         model = attention(looks_elsewhere_ratio=ratio)

@@ -9,11 +9,11 @@ import pytest
 from gaze_trace_rig import AT_ONCE, EXACT, HUMAN, Rig, still
 
 from gazerig.gaze.angles import angle_between, direction, norm, scale, sub, unit
-from gazerig.gaze.oculomotor import OculomotorParams
-from gazerig.gaze.refixation import RefixationParams, Refixations
-from gazerig.gaze.saccade import SaccadeModel, SaccadeParams
-from gazerig.gaze.saccade_endpoint import EndpointParams, endpoint
-from gazerig.gaze.saccade_trajectory import RedirectedTrajectory, SaccadeTrajectory
+from gazerig.gaze.oculomotor.oculomotor import OculomotorParams
+from gazerig.gaze.oculomotor.refixation import RefixationParams, Refixations
+from gazerig.gaze.oculomotor.saccade import SaccadeModel, SaccadeParams
+from gazerig.gaze.oculomotor.saccade_endpoint import EndpointParams, endpoint
+from gazerig.gaze.oculomotor.saccade_trajectory import RedirectedTrajectory, SaccadeTrajectory
 from gazerig.gaze.types import Target, Vec3
 
 EYE = (0.0, 0.0, 0.0)

@@ -16,7 +16,7 @@ from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.drivers.servo_bus.registers import Registers
-from gazerig.gaze.minimum_jerk_curve import MinimumJerkCurve
+from gazerig.gaze.gesture.minimum_jerk_curve import MinimumJerkCurve
 from gazerig.robot.app.gesture_file import TOLERANCE_DEG, gesture_text, write_gesture
 from gazerig.robot.bringup.hand_recording import record, switch_off
 from gazerig.robot.bringup.key_frame_table import read_table

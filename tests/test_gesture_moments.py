@@ -7,10 +7,10 @@ import pytest
 
 from gazerig.config.gestures import shipped_gestures
 from gazerig.config.schema import load_rig
-from gazerig.gaze.gesture import GestureParams
-from gazerig.gaze.gesture_player import GesturePlayer
-from gazerig.gaze.lids import LidOpenings
-from gazerig.gaze.pose_offset import PoseOffset
+from gazerig.gaze.gesture.gesture import GestureParams
+from gazerig.gaze.gesture.gesture_player import GesturePlayer
+from gazerig.gaze.gesture.pose_offset import PoseOffset
+from gazerig.gaze.lids.lids import LidOpenings
 from gazerig.gaze.types import Floats
 from gazerig.robot.app.gaze_models import kinematics_of
 from gazerig.robot.app.rig_limits import lid_ends, lid_spans, limits

@@ -8,8 +8,8 @@ from ticked_rig import TickedRig, connected, gazerig
 from gazerig.config.load import ConfigError
 from gazerig.config.parameters import changed
 from gazerig.config.schema import RULES, load_rig
-from gazerig.gaze.gesture_trigger import GestureTrigger
-from gazerig.gaze.top_down import Rule
+from gazerig.gaze.attention.top_down import Rule
+from gazerig.gaze.gesture.gesture_trigger import GestureTrigger
 from gazerig.gaze.types import Target
 from gazerig.robot.app import session
 from gazerig.robot.app.options import RunOptions

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from gazerig.config.gestures import gestures_of, load_gesture, shipped_gestures
 from gazerig.config.load import ConfigError, shipped, shipped_names
 from gazerig.config.schema import load_rig
-from gazerig.gaze import minimum_jerk_curve
-from gazerig.gaze.gesture import POSE_TRACKS, Gesture, KeyFrame, keys_of
-from gazerig.gaze.minimum_jerk_curve import MinimumJerkCurve
+from gazerig.gaze.gesture import minimum_jerk_curve
+from gazerig.gaze.gesture.gesture import POSE_TRACKS, Gesture, KeyFrame, keys_of
+from gazerig.gaze.gesture.minimum_jerk_curve import MinimumJerkCurve
 from gazerig.gaze.types import Floats
 from gazerig.robot.app.rig_limits import lid_spans, limits
 from gazerig.robot.model.gesture_fit import FittedGesture, GestureFit, GestureRefused, motions

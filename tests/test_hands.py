@@ -9,12 +9,12 @@ from attention_scene import looking
 from seeing.drawn_scene import frames, off_deg
 
 from gazerig.config.schema import load_rules
-from gazerig.gaze.attention import Attention, AttentionParams
-from gazerig.gaze.bottom_up import BottomUp, BottomUpParams
+from gazerig.gaze.attention.attention import Attention, AttentionParams
+from gazerig.gaze.attention.bottom_up import BottomUp, BottomUpParams
+from gazerig.gaze.attention.idle import Idle, IdleParams
+from gazerig.gaze.attention.persons import Persons
+from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
-from gazerig.gaze.idle import Idle, IdleParams
-from gazerig.gaze.persons import Persons
-from gazerig.gaze.top_down import TopDown
 from gazerig.gaze.types import Vec3
 from gazerig.robot.perception.hands import HAND, Hands, Known
 from gazerig.robot.perception.tracker import LocalisedDetection

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gazerig.gaze.angles import norm, sub, yaw_pitch
-from gazerig.gaze.idle import Idle, IdleParams
+from gazerig.gaze.attention.idle import Idle, IdleParams
 from gazerig.gaze.types import Target, Vec3
 
 DT = 0.01

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gazerig.gaze.lids import LidOpenings, LidParams, Lids, Side
+from gazerig.gaze.lids.lids import LidOpenings, LidParams, Lids, Side
 from gazerig.gaze.types import GazeCommand
 from gazerig.robot.model.kinematics import GeometryParams, Kinematics
 

@@ -7,8 +7,8 @@ import numpy as np
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from gazerig.gaze.blink_profile import closure
-from gazerig.gaze.lids import LidParams, Lids
+from gazerig.gaze.lids.blink_profile import closure
+from gazerig.gaze.lids.lids import LidParams, Lids
 from gazerig.params import declarations
 
 DT = 0.005

@@ -23,10 +23,10 @@ from gazerig.gaze.angles import (
     unit,
     yaw_pitch,
 )
-from gazerig.gaze.breathing import Breathing, BreathingParams
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.head import HeadParams
-from gazerig.gaze.saccade import SaccadeParams
+from gazerig.gaze.gesture.breathing import Breathing, BreathingParams
+from gazerig.gaze.oculomotor.head import HeadParams
+from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.types import Angles2, GazeState, Target, Vec3
 from gazerig.robot.model.types import JointState
 

@@ -15,8 +15,8 @@ from gazerig.gaze.angles import (
     scale,
     sub,
 )
-from gazerig.gaze.head import HeadParams
-from gazerig.gaze.saccade import SaccadeParams
+from gazerig.gaze.oculomotor.head import HeadParams
+from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.types import Target
 from gazerig.robot.model.kinematics import GeometryParams
 from gazerig.robot.model.types import JointState

@@ -8,7 +8,7 @@ import pytest
 from gazerig.config.schema import load_rig
 from gazerig.drivers.types import Detections, MovingBlob
 from gazerig.gaze.angles import norm, rotate_back, sub
-from gazerig.gaze.persons import Persons
+from gazerig.gaze.attention.persons import Persons
 from gazerig.gaze.types import Bodies, Percept, Vec3
 from gazerig.robot.app.gaze_models import kinematics_of
 from gazerig.robot.model.capsule import Capsule

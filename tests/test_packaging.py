@@ -14,57 +14,42 @@ import gazerig
 
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-PACKAGES: list[str] = PROJECT["tool"]["setuptools"]["packages"]
-FOLDERS: dict[str, str] = PROJECT["tool"]["setuptools"]["package-dir"]
-DATA: dict[str, list[str]] = PROJECT["tool"]["setuptools"]["package-data"]
+LINKS = ROOT / ".links" / "gazerig"
+PATTERNS: list[str] = PROJECT["tool"]["setuptools"]["package-data"]["*"]
+TOPS = sorted(path.parent for path in ROOT.glob("*/__init__.py") if path.parent.name != "api")
 
 
-def source_folders() -> dict[str, Path]:
-    """Return every folder with Python sources under its import name."""
-    return {
-        ".".join((package, *folder.relative_to(ROOT / root).parts)): folder
-        for package, root in FOLDERS.items()
-        for folder in sorted({path.parent for path in (ROOT / root).rglob("*.py")})
-    }
+def packages() -> list[Path]:
+    """Return every folder that is installed."""
+    return sorted({path.parent for top in (ROOT / "api", *TOPS) for path in top.rglob("*.py")})
 
 
-def test_every_folder_of_sources_is_a_package_and_every_package_is_there() -> None:
-    assert sorted(PACKAGES) == sorted(source_folders())
-    assert len(PACKAGES) > 30
+def test_the_package_links_to_every_source() -> None:
+    wanted = {path for path in (ROOT / "api").iterdir() if path.name != "__pycache__"} | set(TOPS)
+    found = [path for path in LINKS.iterdir() if path.name != "__pycache__"]
+    assert {path.resolve() for path in found} == wanted, "make links"
+    assert all(path.is_symlink() and path.name == path.resolve().name for path in found)
+    assert len(TOPS) >= 5
 
 
-def test_every_top_folder_of_sources_is_mapped() -> None:
-    beside = {path.parent.name for path in ROOT.glob("*/__init__.py")}
-    assert beside == set(FOLDERS.values())
+def test_every_folder_of_sources_is_a_package() -> None:
+    for folder in packages():
+        assert (folder / "__init__.py").is_file(), folder
 
 
 def test_every_file_that_is_not_python_is_named_as_data() -> None:
-    for package, folder in source_folders().items():
+    named = {path for folder in packages() for pattern in PATTERNS for path in folder.glob(pattern)}
+    for folder in packages():
         for path in folder.iterdir():
             if path.is_file() and path.suffix not in (".py", ".pyc"):
-                assert covered(package, path), f"{path.relative_to(ROOT)} would not be installed"
-    data = [path for root in FOLDERS.values() for path in (ROOT / root).rglob("*.yaml")]
-    assert len(data) > 10
-    for path in data:
-        feature = path.is_relative_to(ROOT / "features")
-        assert covered("gazerig.features.study" if feature else "gazerig.config", path), path
+                assert path in named, f"{path.relative_to(ROOT)} would not be installed"
+    data = [path for top in TOPS for path in top.rglob("*.yaml")]
+    assert len(data) > 10 and named.issuperset(data)
 
 
-def covered(package: str, path: Path) -> bool:
-    """Return whether a pattern of the package or of one above it names the file."""
-    while True:
-        folder = source_folders()[package]
-        if any(path in folder.glob(pattern) for pattern in DATA.get(package, [])):
-            return True
-        if package in FOLDERS:
-            return False
-        package = package.rpartition(".")[0]
-
-
-@pytest.mark.parametrize("package", DATA)
-def test_every_pattern_of_data_names_a_file(package: str) -> None:
-    for pattern in DATA[package]:
-        assert list(source_folders()[package].glob(pattern)), f"{package}: {pattern}"
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_every_pattern_of_data_names_a_file(pattern: str) -> None:
+    assert any(list(folder.glob(pattern)) for folder in packages())
 
 
 def test_the_version_is_the_projects() -> None:
@@ -115,8 +100,8 @@ def test_a_commit_is_checked_as_the_host_checks_it() -> None:
 
 def test_the_container_holds_all_sources_and_starts_a_command_that_is_one() -> None:
     file = (ROOT / "docs/Containerfile").read_text(encoding="utf-8")
-    copied = re.findall(r"^COPY (\w+) /src/(\w+)$", file, re.MULTILINE)
-    assert {source for source, _ in copied} == set(FOLDERS.values())
+    copied = re.findall(r"^COPY ([\w.]+) /src/([\w.]+)$", file, re.MULTILINE)
+    assert {source for source, _ in copied} == {".links", "api", *(top.name for top in TOPS)}
     assert all(source == target for source, target in copied)
     [beside] = re.findall(r"^COPY (.+) /src/$", file, re.MULTILINE)
     assert {

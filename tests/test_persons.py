@@ -10,13 +10,13 @@ from attention_scene import looking
 from gazerig.config.faults import ConfigError
 from gazerig.config.schema import load_rules
 from gazerig.gaze.angles import rotation
-from gazerig.gaze.attention import Attention, AttentionParams
-from gazerig.gaze.bottom_up import BottomUp, BottomUpParams
+from gazerig.gaze.attention.attention import Attention, AttentionParams
+from gazerig.gaze.attention.bottom_up import BottomUp, BottomUpParams
+from gazerig.gaze.attention.idle import Idle, IdleParams
+from gazerig.gaze.attention.persons import Persons
+from gazerig.gaze.attention.top_down import Rule, TopDown, TopDownParams
 from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
-from gazerig.gaze.gesture_trigger import GestureTrigger
-from gazerig.gaze.idle import Idle, IdleParams
-from gazerig.gaze.persons import Persons
-from gazerig.gaze.top_down import Rule, TopDown, TopDownParams
+from gazerig.gaze.gesture.gesture_trigger import GestureTrigger
 from gazerig.gaze.types import Bodies, Face, Percept, Target, Vec3
 from gazerig.sim_mock.scenes.group import HEAD_M
 from gazerig.sim_mock.scenes.scene import Scene

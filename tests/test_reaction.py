@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from attention_scene import FACE, body, looking, percept
 
-from gazerig.gaze.attention import Attention, AttentionParams
-from gazerig.gaze.bottom_up import BottomUp, BottomUpParams
+from gazerig.gaze.attention.attention import Attention, AttentionParams
+from gazerig.gaze.attention.bottom_up import BottomUp, BottomUpParams
+from gazerig.gaze.attention.idle import Idle, IdleParams
+from gazerig.gaze.attention.reaction import ReactionParams
+from gazerig.gaze.attention.top_down import TopDown, TopDownParams
 from gazerig.gaze.field_of_view import FieldOfView, FieldOfViewParams
-from gazerig.gaze.idle import Idle, IdleParams
-from gazerig.gaze.reaction import ReactionParams
-from gazerig.gaze.top_down import TopDown, TopDownParams
 from gazerig.gaze.types import Floats, Percept
 
 FRAME_S, TICK_S, DELAY_S = 1 / 30, 1 / 200, 0.06

@@ -18,7 +18,7 @@ from gazerig.config.parameters import changed, value_of
 from gazerig.config.rig import Rig
 from gazerig.config.save import save_rig
 from gazerig.config.schema import load_rig, load_rules
-from gazerig.gaze.action_planner import ActionPlannerParams
+from gazerig.gaze.attention.action_planner import ActionPlannerParams
 from gazerig.robot.app.resimulate import rerun
 from gazerig.robot.recording.read import RunRecording
 

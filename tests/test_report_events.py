@@ -9,9 +9,9 @@ import pytest
 from gazerig.config.schema import load_rig
 from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
 from gazerig.features.lab.report.landing import planned_saccades
-from gazerig.gaze.lids import LidParams, Lids
-from gazerig.gaze.saccade import SaccadeModel as Jumps
-from gazerig.gaze.saccade import SaccadeParams
+from gazerig.gaze.lids.lids import LidParams, Lids
+from gazerig.gaze.oculomotor.saccade import SaccadeModel as Jumps
+from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.types import Vec3
 from gazerig.robot.analysis.blink_finder import BlinkEvent, BlinkFinder
 from gazerig.robot.analysis.event_detector import EventDetector, FixationEvent, SaccadeEvent

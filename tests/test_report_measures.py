@@ -12,7 +12,7 @@ from gazerig.features.lab.analysis.reaction_finder import ReactionFinder
 from gazerig.features.lab.report import blinks, eye_contact, landing, rests
 from gazerig.features.lab.report.gaze_trace import GazeTrace, TraceRow
 from gazerig.features.lab.report.lid_closure import blinks_of
-from gazerig.gaze.lids import LidParams, Lids
+from gazerig.gaze.lids.lids import LidParams, Lids
 from gazerig.gaze.types import Bodies, Percept
 from gazerig.robot.analysis.blink_finder import BlinkEvent
 from gazerig.robot.analysis.event_detector import Commanded, SaccadeEvent

@@ -34,7 +34,7 @@ from gazerig.config.schema import Rig, load_rig
 from gazerig.config.text import rig_text
 from gazerig.drivers.types import Detections
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.scanpath import Walk
+from gazerig.gaze.scanpath.scanpath import Walk
 from gazerig.gaze.types import Bodies, Face, Percept
 from gazerig.robot.control.loop import Tick
 from gazerig.robot.control.tick_stream import TickBatch, TickStream

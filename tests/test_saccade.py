@@ -6,7 +6,8 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from gazerig.gaze.saccade import MinJerkProfile, SaccadeModel, SaccadeParams, min_jerk
+from gazerig.gaze.minimum_jerk import min_jerk
+from gazerig.gaze.oculomotor.saccade import MinJerkProfile, SaccadeModel, SaccadeParams
 from gazerig.robot.analysis import human_norms
 
 SACCADE = SaccadeModel(SaccadeParams(profile="min_jerk"))

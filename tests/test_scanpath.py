@@ -9,8 +9,8 @@ import pytest
 from present import present
 
 from gazerig.config.load import load, shipped
-from gazerig.gaze.scanpath import Scanpath, ScanpathParams, Walk, markov_walk, normalised
-from gazerig.gaze.scanpath_models import MarkovWalk
+from gazerig.gaze.scanpath.models import MarkovWalk
+from gazerig.gaze.scanpath.scanpath import Scanpath, ScanpathParams, Walk, markov_walk, normalised
 from gazerig.gaze.types import PARTS, Bodies, Face, Percept, Target
 
 WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)

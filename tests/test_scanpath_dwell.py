@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from gazerig.config.load import load, shipped
-from gazerig.gaze.scanpath import Walk
-from gazerig.gaze.scanpath_dwell import dwell_distribution
+from gazerig.gaze.scanpath.dwell import dwell_distribution
+from gazerig.gaze.scanpath.scanpath import Walk
 
 WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)
 TABLE_1 = list(zip(WALK.order, WALK.dwell_mean_s, WALK.dwell_sd_s, strict=True))

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from gazerig.config.load import load, shipped
-from gazerig.gaze.scanpath import ScanpathParams, Walk, markov_walk, normalised
-from gazerig.gaze.scanpath_fit import FitParams, PartFixation, fit_walk
+from gazerig.gaze.scanpath.fit import FitParams, PartFixation, fit_walk
+from gazerig.gaze.scanpath.scanpath import ScanpathParams, Walk, markov_walk, normalised
 from gazerig.gaze.types import PARTS
 
 WALK = load(shipped("scanpaths", "nakamoto_tsuruno"), Walk)

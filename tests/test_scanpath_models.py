@@ -10,7 +10,7 @@ import pytest
 from gazerig.config.load import load, shipped
 from gazerig.gaze.angles import add, angle_between, norm, rotation, scale, sub, yaw_pitch
 from gazerig.gaze.angles import rotate_back as seen_from
-from gazerig.gaze.scanpath import (
+from gazerig.gaze.scanpath.scanpath import (
     Scanpath,
     ScanpathParams,
     Walk,

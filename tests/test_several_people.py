@@ -3,7 +3,7 @@
 import pytest
 from seeing import row_08_several_people as row
 
-from gazerig.gaze.shared_attention import SharedAttention
+from gazerig.gaze.attention.shared_attention import SharedAttention
 
 
 @pytest.mark.usefixtures("ideal_servos")

@@ -4,8 +4,8 @@ from math import radians
 
 import pytest
 
-from gazerig.gaze.pursuit import Slip
-from gazerig.gaze.saccade_trigger import SaccadeTrigger, SaccadeTriggerParams
+from gazerig.gaze.oculomotor.pursuit import Slip
+from gazerig.gaze.oculomotor.saccade_trigger import SaccadeTrigger, SaccadeTriggerParams
 
 
 def slip(error_deg: float, slip_deg_s: float = 0.0) -> Slip:

@@ -13,7 +13,7 @@ from gazerig.config.shipped import shipped_names
 from gazerig.features.study.run.study_check import checked_study
 from gazerig.features.study.run.study_file import load_questionnaire, load_study
 from gazerig.features.study.shipped import HOME
-from gazerig.gaze.top_down import PLANNED
+from gazerig.gaze.attention.top_down import PLANNED
 
 HEAD = "title: t\nquestionnaires: [nakamoto_tsuruno]\n"
 TWO = """\

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from gazerig.gaze.angles import norm, sub
-from gazerig.gaze.target_prediction import TargetPrediction
+from gazerig.gaze.oculomotor.target_prediction import TargetPrediction
 from gazerig.gaze.types import Target, Vec3
 from gazerig.sim_mock.scenes.scene import min_jerk
 

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from math import radians
 
 from gazerig.config.schema import Rig
-from gazerig.gaze.animation import AnimationTables
-from gazerig.gaze.level import LevelParams, LevelRange
-from gazerig.gaze.pose_offset import NO_OFFSET, PoseOffset
+from gazerig.gaze.gesture.animation import AnimationTables
+from gazerig.gaze.gesture.level import LevelParams, LevelRange
+from gazerig.gaze.gesture.pose_offset import NO_OFFSET, PoseOffset
 from gazerig.robot.app.rig_limits import lid_ends
 from gazerig.robot.model.kinematics import LIDS, NECK
 from gazerig.robot.model.types import further

@@ -11,11 +11,11 @@ from gazerig.config.schema import Rig, load_walk
 from gazerig.config.shipped import shipped_names
 from gazerig.drivers.camera.depth_roi import depth_at
 from gazerig.drivers.types import Camera
-from gazerig.gaze.animation import Animation
-from gazerig.gaze.attention import Attention
-from gazerig.gaze.aversion import Aversion
-from gazerig.gaze.lids import Lids
-from gazerig.gaze.scanpath import Scanpath, Walk, row_sums_note
+from gazerig.gaze.attention.attention import Attention
+from gazerig.gaze.attention.aversion import Aversion
+from gazerig.gaze.gesture.animation import Animation
+from gazerig.gaze.lids.lids import Lids
+from gazerig.gaze.scanpath.scanpath import Scanpath, Walk, row_sums_note
 from gazerig.robot.app.animation_tables import animation_tables
 from gazerig.robot.app.borrowed_camera import BorrowedCamera
 from gazerig.robot.app.camera_factory import (

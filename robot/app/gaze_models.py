@@ -15,16 +15,16 @@ from gazerig.drivers.plugins import (
     load,
     made,
 )
-from gazerig.gaze.bottom_up import BottomUp
-from gazerig.gaze.breathing import Breathing
+from gazerig.gaze.attention.bottom_up import BottomUp
+from gazerig.gaze.attention.idle import Idle
+from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.field_of_view import FieldOfView
-from gazerig.gaze.head import HeadModel
-from gazerig.gaze.idle import Idle
-from gazerig.gaze.lids import Lids
-from gazerig.gaze.oculomotor import Oculomotor
-from gazerig.gaze.pursuit import Pursuit
-from gazerig.gaze.saccade import SaccadeModel
-from gazerig.gaze.top_down import TopDown
+from gazerig.gaze.gesture.breathing import Breathing
+from gazerig.gaze.lids.lids import Lids
+from gazerig.gaze.oculomotor.head import HeadModel
+from gazerig.gaze.oculomotor.oculomotor import Oculomotor
+from gazerig.gaze.oculomotor.pursuit import Pursuit
+from gazerig.gaze.oculomotor.saccade import SaccadeModel
 from gazerig.robot.app.rig_limits import eye_limits, head_limits, lid_ends
 from gazerig.robot.control.chooser import LONGEST_S, GuardedChooser, TargetChooser
 from gazerig.robot.model.kinematics import Kinematics

@@ -13,20 +13,20 @@ from gazerig.config.faults import ConfigError
 from gazerig.config.parameters import NEXT_START, changed, differences, live
 from gazerig.config.schema import Rig, load_walk
 from gazerig.drivers.types import Camera
-from gazerig.gaze.animation import Animation
-from gazerig.gaze.attention import Attention
-from gazerig.gaze.aversion import Aversion
-from gazerig.gaze.bottom_up import BottomUp
-from gazerig.gaze.breathing import Breathing
+from gazerig.gaze.attention.attention import Attention
+from gazerig.gaze.attention.aversion import Aversion
+from gazerig.gaze.attention.bottom_up import BottomUp
+from gazerig.gaze.attention.idle import Idle
+from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.field_of_view import FieldOfView
-from gazerig.gaze.head import HeadModel
-from gazerig.gaze.idle import Idle
-from gazerig.gaze.lids import Lids
-from gazerig.gaze.oculomotor import Oculomotor
-from gazerig.gaze.pursuit import Pursuit
-from gazerig.gaze.saccade import SaccadeModel
-from gazerig.gaze.scanpath import Scanpath, Walk
-from gazerig.gaze.top_down import TopDown
+from gazerig.gaze.gesture.animation import Animation
+from gazerig.gaze.gesture.breathing import Breathing
+from gazerig.gaze.lids.lids import Lids
+from gazerig.gaze.oculomotor.head import HeadModel
+from gazerig.gaze.oculomotor.oculomotor import Oculomotor
+from gazerig.gaze.oculomotor.pursuit import Pursuit
+from gazerig.gaze.oculomotor.saccade import SaccadeModel
+from gazerig.gaze.scanpath.scanpath import Scanpath, Walk
 from gazerig.robot.app.animation_tables import animation_tables
 from gazerig.robot.app.camera_factory import retune_camera
 from gazerig.robot.app.rig_limits import (

@@ -5,8 +5,8 @@ from typing import TypeVar
 
 from gazerig.config.schema import Rig, load_rig, load_rules
 from gazerig.drivers.errors import SetupError
-from gazerig.gaze.saccade import SaccadeParams
-from gazerig.gaze.scanpath import ScanpathParams
+from gazerig.gaze.oculomotor.saccade import SaccadeParams
+from gazerig.gaze.scanpath.scanpath import ScanpathParams
 from gazerig.params import choices_of
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_description import mesh_faults

@@ -6,7 +6,7 @@ through the keys would be farther from it than a tolerance.
 
 import numpy as np
 
-from gazerig.gaze.minimum_jerk_curve import MinimumJerkCurve
+from gazerig.gaze.gesture.minimum_jerk_curve import MinimumJerkCurve
 from gazerig.gaze.types import Floats
 
 GRID_S = 0.02

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.angles import angle_between, norm, sub
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.oculomotor import Oculomotor
+from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.types import GazeState, Target, Vec3
 from gazerig.robot.bringup.manual_control import ManualControl
 from gazerig.robot.bringup.move_result import MoveResult, Step

@@ -22,7 +22,7 @@ from math import degrees, isfinite, radians, sqrt
 from typing import Annotated
 
 from gazerig.drivers.errors import SetupError
-from gazerig.gaze.quintic import Quintic
+from gazerig.gaze.minimum_jerk import Quintic
 from gazerig.params import Bounds
 from gazerig.robot.bringup.move_result import GuardReasons, MoveResult, Step, outcome, standing
 from gazerig.robot.control.body import Body

@@ -8,7 +8,7 @@ model, guard, servos.
 from math import degrees, inf
 
 from gazerig.gaze.angles import norm, sub
-from gazerig.gaze.top_down import TopDown
+from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.types import Face, GazeState, Percept, Target, Vec3
 from gazerig.robot.calibration.face_calibration import FaceCalibration, Key, point_world_m, pressed
 from gazerig.robot.control.tick import Tick

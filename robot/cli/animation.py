@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from gazerig.drivers.errors import SetupError
-from gazerig.gaze.gesture import MAX_COUNT, MAX_SPEED, MIN_SPEED
+from gazerig.gaze.gesture.gesture import MAX_COUNT, MAX_SPEED, MIN_SPEED
 from gazerig.robot.cli.lead import PidOption
 from gazerig.robot.cli.terminal import clear_errors, say
 from gazerig.robot.model.clock import RealClock

@@ -9,7 +9,7 @@ from math import dist, isfinite
 from typing import Any, Protocol
 
 from gazerig.drivers.bounded_call import BoundedCall
-from gazerig.gaze.top_down import TopDown
+from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.types import GazeState, Percept, Target, Vec3
 
 LONGEST_S = 0.001

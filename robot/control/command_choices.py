@@ -3,11 +3,11 @@
 from collections.abc import Callable, Mapping, Sequence
 from math import degrees, radians
 
-from gazerig.gaze.animation import Animation
-from gazerig.gaze.aversion import MODES, Aversion
-from gazerig.gaze.expression import Expressions
-from gazerig.gaze.lids import Lids
-from gazerig.gaze.top_down import TopDown
+from gazerig.gaze.attention.aversion import MODES, Aversion
+from gazerig.gaze.attention.top_down import TopDown
+from gazerig.gaze.gesture.animation import Animation
+from gazerig.gaze.gesture.expression import Expressions
+from gazerig.gaze.lids.lids import Lids
 from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.model.commands import NO_GESTURE, Ask, Command, Express, Jog, Play, SetLevel
 from gazerig.robot.model.joint_limit import JointLimit

@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 
-from gazerig.gaze.animation import Animation
-from gazerig.gaze.gesture_trigger import GestureTrigger
-from gazerig.gaze.oculomotor import Oculomotor
+from gazerig.gaze.gesture.animation import Animation
+from gazerig.gaze.gesture.gesture_trigger import GestureTrigger
+from gazerig.gaze.oculomotor.oculomotor import Oculomotor
 from gazerig.gaze.types import Target
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import TargetChooser

@@ -5,8 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.gaze.gesture import Gesture, GestureParams
-from gazerig.gaze.gesture_player import GesturePlayer
+from gazerig.gaze.gesture.gesture import Gesture, GestureParams
+from gazerig.gaze.gesture.gesture_player import GesturePlayer
 from gazerig.robot.model.commands import Play
 from gazerig.robot.model.gesture_fit import (
     FittedGesture,

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 from gazerig.drivers.errors import DriverError
 from gazerig.drivers.types import Camera
-from gazerig.gaze.animation import Animation
-from gazerig.gaze.aversion import Aversion
-from gazerig.gaze.lids import Lids
-from gazerig.gaze.oculomotor import Oculomotor
-from gazerig.gaze.scanpath import Scanpath
+from gazerig.gaze.attention.aversion import Aversion
+from gazerig.gaze.gesture.animation import Animation
+from gazerig.gaze.lids.lids import Lids
+from gazerig.gaze.oculomotor.oculomotor import Oculomotor
+from gazerig.gaze.scanpath.scanpath import Scanpath
 from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.chooser import TargetChooser

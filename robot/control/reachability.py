@@ -5,7 +5,7 @@ from math import pi, radians
 
 from gazerig.gaze.angles import add, norm, scale, sub, unit
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.oculomotor import Oculomotor, ReachableGaze
+from gazerig.gaze.oculomotor.oculomotor import Oculomotor, ReachableGaze
 from gazerig.gaze.types import Angles2, Angles3, GazeCommand, Target
 from gazerig.robot.model.commands import Jog
 from gazerig.robot.model.gaze_error import gaze_error

@@ -2,7 +2,7 @@
 
 from math import pi
 
-from gazerig.gaze.gesture import MAX_COUNT, MAX_SPEED, MIN_SPEED
+from gazerig.gaze.gesture.gesture import MAX_COUNT, MAX_SPEED, MIN_SPEED
 from gazerig.robot.model.commands import (
     Ask,
     Command,

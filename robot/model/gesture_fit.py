@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gazerig.gaze.gesture import (
+from gazerig.gaze.gesture.gesture import (
     EYE_TRACKS,
     HEAD_TRACKS,
     LID_TRACKS,
@@ -15,8 +15,8 @@ from gazerig.gaze.gesture import (
     KeyFrame,
     keys_of,
 )
-from gazerig.gaze.gesture_motion import GestureMotion, MotionSamples
-from gazerig.gaze.gesture_player import OffsetState, PlayedGesture
+from gazerig.gaze.gesture.gesture_motion import GestureMotion, MotionSamples
+from gazerig.gaze.gesture.gesture_player import OffsetState, PlayedGesture
 from gazerig.gaze.types import Floats
 from gazerig.robot.model.joint_limit import JointLimit
 from gazerig.robot.model.types import further

@@ -7,8 +7,8 @@ hand is waved: the hand; (e) a hand reaches in from outside the field of view: i
 enters, and the head turns. Besides, two feints that draw the gaze off the face for an instant
 (section 4: boxers return to the face at once).
 
-What the robot does about it is for its action planner (gazerig.gaze.action_planner), which sees
-what the camera shows.
+What the robot does about it is for its action planner (gazerig.gaze.attention.action_planner),
+which sees what the camera shows.
 
 The robot's eyes are taken to be at ``HEAD_M`` and to look straight ahead along the
 world's x; both hold for the desk rig within what the neck turns to follow the opponent.

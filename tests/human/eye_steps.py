@@ -8,7 +8,7 @@ import numpy as np
 from true_shafts import Bench
 
 from gazerig.config.schema import load_rig
-from gazerig.gaze.saccade import SaccadeModel
+from gazerig.gaze.oculomotor.saccade import SaccadeModel
 
 EYES = {
     "desk": "left_eye_pan", "feetech": "left_eye_pan", "expressive": "eyes_pan", "maker": "eyes_pan",

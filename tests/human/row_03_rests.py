@@ -12,7 +12,7 @@ import numpy as np
 from human.measured_run import MeasuredRun, Runner
 
 from gazerig.config.schema import load_rig, load_walk
-from gazerig.gaze.scanpath import steps_and_dwells
+from gazerig.gaze.scanpath.scanpath import steps_and_dwells
 
 SCENE = "face-to-face"
 TICK_S = 0.005

@@ -2,9 +2,9 @@
 
 Zhang & Wakamatsu's structure with everything that a robot with one camera cannot show: an eye
 that is covered and goes with the seeing one, by copy or by the crossed path alone; feedback of
-the delayed error without the efference copy; the dark. gazerig.gaze.binocular, which the profile
-mitake runs, is held to the same numbers. Head frame; yaw + left, or pitch + up with one value for
-both eyes; radians inside, degrees and milliseconds in the parameters.
+the delayed error without the efference copy; the dark. gazerig.gaze.oculomotor.binocular, which
+the profile mitake runs, is held to the same numbers. Head frame; yaw + left, or pitch + up with one
+value for both eyes; radians inside, degrees and milliseconds in the parameters.
 """
 
 from collections import deque

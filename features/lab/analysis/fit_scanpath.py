@@ -16,8 +16,7 @@ from gazerig.features.lab.analysis.fixations import (
     labelled,
     usual_side,
 )
-from gazerig.gaze.scanpath import Walk
-from gazerig.gaze.scanpath_fit import (
+from gazerig.gaze.scanpath.fit import (
     SMOOTHINGS,
     FitParams,
     Interval,
@@ -25,6 +24,7 @@ from gazerig.gaze.scanpath_fit import (
     WalkFit,
     fit_walk,
 )
+from gazerig.gaze.scanpath.scanpath import Walk
 from gazerig.gaze.types import PART_NAMES, PARTS
 
 

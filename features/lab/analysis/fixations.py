@@ -11,7 +11,7 @@ import numpy as np
 
 from gazerig.drivers.errors import SetupError
 from gazerig.features.lab.analysis.eye_tracker_csv import FixationTable, Samples
-from gazerig.gaze.scanpath_fit import PartFixation
+from gazerig.gaze.scanpath.fit import PartFixation
 from gazerig.gaze.types import PARTS, Floats
 from gazerig.params import Bounds
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from gazerig.features.lab.report.heads import MutualGazeReport
     from gazerig.features.lab.report.run_header import RunHeader
     from gazerig.features.lab.report.statistics import MeasureResult
-    from gazerig.gaze.scanpath import Walk
+    from gazerig.gaze.scanpath.scanpath import Walk
     from gazerig.robot.app.options import RunOptions
     from gazerig.robot.recording.read import RunRecording
 
@@ -242,7 +242,7 @@ def _configured(config_yaml: str, walk_yaml: str) -> "tuple[Rig, Walk]":
     """
     from gazerig.config.load import load
     from gazerig.config.schema import RULES, Rig, load_walk
-    from gazerig.gaze.scanpath import Walk
+    from gazerig.gaze.scanpath.scanpath import Walk
 
     with TemporaryDirectory() as folder:
         rig_file, walk_file = Path(folder) / "recorded.yaml", Path(folder) / "walk.yaml"

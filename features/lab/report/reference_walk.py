@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gazerig.gaze.scanpath import ScanpathParams, Walk, steps_and_dwells
-from gazerig.gaze.scanpath_dwell import Draw, dwell_distribution
+from gazerig.gaze.scanpath.dwell import Draw, dwell_distribution
+from gazerig.gaze.scanpath.scanpath import ScanpathParams, Walk, steps_and_dwells
 from gazerig.gaze.types import PARTS, Floats
 from gazerig.robot.analysis import human_norms as human
 

@@ -16,7 +16,7 @@ from gazerig.features.study.preregistration import canonical, design_sha256
 from gazerig.features.study.questionnaire import Questionnaire
 from gazerig.features.study.rules import asked_rules, design_rules, questionnaire_rules
 from gazerig.features.study.shipped import HOME
-from gazerig.gaze.top_down import PLANNED
+from gazerig.gaze.attention.top_down import PLANNED
 from gazerig.robot.model.commands import Value
 
 _ENDS = {"recording": ".mcap", "film": ".webm"}

@@ -13,7 +13,7 @@ from rich.table import Table
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.gaze.top_down import TopDown
+from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.types import Vec3
 from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
 from gazerig.robot.app.options import RunOptions

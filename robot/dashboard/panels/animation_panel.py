@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from gazerig.gaze.expression import NEUTRAL
+from gazerig.gaze.gesture.expression import NEUTRAL
 from gazerig.robot.dashboard.requests.outbox import Outbox
 from gazerig.robot.dashboard.widgets.container import Container
 from gazerig.robot.dashboard.widgets.widget import Buttons, Slider

@@ -37,8 +37,8 @@ LEAST_M = 0.01
 _MIDDLE: Vec3 = (-0.85, 0.0, 0.10)
 """Of the head's solid."""
 
-# With these openings at rest (gaze/lid_params.py) an eye looks awake with its lids' edges so far
-# above and below the middle of the pupil.
+# With these openings at rest (gaze/lids/lid_params.py) an eye looks awake with its lids' edges so
+# far above and below the middle of the pupil.
 _UPPER_REST, _LOWER_REST = 0.75, 0.8
 _UPPER_AWAKE_RAD, _LOWER_AWAKE_RAD = radians(24.0), radians(-26.0)
 _LOWEST_MEETING_RAD = radians(-26.0)

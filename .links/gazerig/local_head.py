@@ -1,0 +1,1 @@
+../../api/local_head.py

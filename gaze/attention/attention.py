@@ -1,0 +1,361 @@
+"""The winner of bottom-up and top-down attention (Mitake et al. 3.3.4), and the reason why.
+
+The larger amount of attention wins. Two nearly equal amounts would flicker, so the
+present winner is kept unless another is clearly stronger, and for a shortest time. And
+a winner for ever would be a stare, so amounts are multiplied by the factor that habituation
+leaves (gazerig.gaze.attention.habituation). Of the bodies that a rule points at the one with the
+highest factor keeps the rule's whole constant, which the paper's comparison needs: so one
+person alone is not left for habituation, and several people share the gaze.
+"""
+
+from dataclasses import dataclass, field
+from math import inf
+from operator import mul
+from typing import Annotated
+
+import numpy as np
+
+from gazerig.gaze.angles import add, scale, sub
+from gazerig.gaze.attention.bottom_up import BottomUp
+from gazerig.gaze.attention.comparison import NO_BODY, TargetComparison
+from gazerig.gaze.attention.face_memory import FaceMemory
+from gazerig.gaze.attention.habituation import Habituation, HabituationParams
+from gazerig.gaze.attention.idle import Idle
+from gazerig.gaze.attention.persons import Persons
+from gazerig.gaze.attention.reaction import Reaction, ReactionParams
+from gazerig.gaze.attention.top_down import RuleTarget, TopDown
+from gazerig.gaze.field_of_view import FieldOfView, line_of_sight
+from gazerig.gaze.types import Bodies, GazeState, Percept, Target, Vec3, vec
+from gazerig.params import Bounds
+
+_STILL: Vec3 = (0.0, 0.0, 0.0)
+_NO_ONE: frozenset[int] = frozenset()
+_FEW = 24
+"""So many bodies are computed one by one, which costs less than arrays do."""
+_SPEED_OVER_S = 0.2  # a speed of the head from positions farther apart says nothing
+_DECIDED_S = 0.2
+"""A camera may show the target of a new behaviour so long after the change."""
+
+
+@dataclass(frozen=True)
+class AttentionParams:
+    """Hysteresis of the choice, reaction time, and the greatest age of a frame."""
+
+    # fmt: off
+    hysteresis_ratio: Annotated[float, Bounds(1, 10),
+        "another body becomes the target if its salience exceeds the present target's by this factor"] = 1.2
+    least_salience: Annotated[float, Bounds(0, 10),
+        "a thing less salient than this is no target of its own: glanced at like anything in view, as if nobody were there"] = 0.05
+    min_dwell_ms: Annotated[float, Bounds(0, 10000), "shortest time on one target"] = 300.0
+    stale_ms: Annotated[float, Bounds(20, 10000), "a frame older than this is not used"] = 400.0
+    looks_elsewhere_ratio: Annotated[float, Bounds(0, 1),
+        "share of its salience that a face keeps while the person does not look at the head; 1: all"] = 0.85
+    own_motion_ratio: Annotated[float, Bounds(0, 1),
+        "share of their motion that a person's own hands and clothes keep beside the face, unless they are raised to it or held "
+        "out; the rest counts for the face; 1: all"] = 0.3
+    face_memory_s: Annotated[float, Bounds(0, 600),
+        "a face that leaves the view while something else is looked at is remembered where it was for this time; 0: not at all"] = 15.0
+    habituation: Annotated[HabituationParams, "habituation and inhibition of return"] = field(default_factory=HabituationParams)
+    reaction: Annotated[ReactionParams, "reaction time"] = field(default_factory=ReactionParams)
+    # fmt: on
+
+
+class Attention:
+    """Choice of the target, once for each new frame.
+
+    Args:
+        params: hysteresis, habituation and reaction time.
+        field_of_view: which bodies an eye can see.
+        bottom_up: salience by motion.
+        top_down: the rules.
+        idle: where to look with nothing in sight.
+        rng: draws reaction times; None: every change of target is at once.
+    """
+
+    def __init__(
+        self,
+        params: AttentionParams,
+        field_of_view: FieldOfView,
+        bottom_up: BottomUp,
+        top_down: TopDown,
+        idle: Idle,
+        rng: np.random.Generator | None = None,
+    ) -> None:
+        self._params = params
+        self._field_of_view = field_of_view
+        self._bottom_up = bottom_up
+        self.top_down = top_down
+        self._idle = idle
+        self._habituation = Habituation(params.habituation)
+        self._reaction = Reaction(params.reaction, rng)
+        self._memory = FaceMemory()
+        self._persons = Persons()
+        self.reset(0.0)
+
+    def retune(self, params: AttentionParams) -> None:
+        """Change the hysteresis; the target in force and all habituation stay."""
+        self._params = params
+        self._habituation.retune(params.habituation)
+        self._reaction.retune(params.reaction)
+
+    def reset(self, t_s: float) -> None:
+        """Forget everything seen."""
+        for model in (self._bottom_up, self.top_down, self._idle, self._habituation):
+            model.reset(t_s)
+        self._reaction.reset(t_s)
+        self._memory.reset()
+        self._persons.reset()
+        self._gestures: dict[int, float] = {}
+        self._seen_s = -inf
+        self._scene = 0
+        self._target: Target | None = None
+        self._shift = 0
+        self._since_s = -inf
+        self._identity: tuple[str, int] | None = None
+        self._place = _STILL
+        self._favoured_id = -1
+        self._behaviour = self.top_down.behaviour
+        self._changed_s = -inf
+        self._eye: tuple[Vec3, float] | None = None
+
+    def choose(self, percept: Percept | None, state: GazeState, t_s: float) -> Target:
+        """Return the target in force at ``t_s``."""
+        stale_s = self._params.stale_ms / 1e3
+        fresh = percept is not None and t_s - percept.captured_s <= stale_s
+        new = percept is not None and percept.captured_s != self._seen_s
+        target = self._target
+        if fresh and not new and target is not None and not self._reaction.waits:
+            return target  # as decided on the frame
+        if percept is not None and fresh and new:
+            self._seen_s = percept.captured_s
+            self._target = self._decide(percept, state, t_s)
+        if fresh:
+            self._target = self._reaction.take(t_s) or self._target
+        else:
+            self._target = None
+            self._reaction.drop()
+        if self._target is None:
+            return self._settle(self._idle.step(t_s), t_s)
+        if self._target.id >= 0:
+            self._idle.remember(self._target)
+        self._target = self._settle(self._target, t_s)
+        return self._target
+
+    def _settle(self, target: Target, t_s: float) -> Target:
+        """Count a gaze shift whenever another object is looked at."""
+        place, self._place = self._place, target.p_world_m
+        identity = (target.kind, target.id)
+        if identity == self._identity and target.shift == self._shift:
+            return target
+        if identity != self._identity:
+            if self._identity is not None:
+                self._habituation.leave(place, t_s)
+                self._reaction.record_left(*self._identity, t_s)
+            self._identity = identity
+            self._shift += 1
+            self._since_s = t_s
+        return target._replace(shift=self._shift)
+
+    def _decide(self, percept: Percept, state: GazeState, t_s: float) -> Target | None:
+        """Return the present target as it is now, None where there is nothing to look at.
+
+        What wins over it waits for its reaction time; a present target that is gone stays where it
+        was until then.
+        """
+        if percept.scene != self._scene:  # a cut: nobody is where they were
+            self._scene = percept.scene
+            self._memory.reset()
+            self._persons.reset()
+            self._idle.forget_places()
+        attended = self._identity[1] if self._identity is not None else -1
+        lasts_s = self._params.face_memory_s
+        bodies = self._memory.step(percept.bodies, attended, percept.captured_s, lasts_s)
+        if "face" in percept.bodies.kinds:  # a remembered face never wins against a visible one
+            bodies = percept.bodies
+        self._persons.update(percept, state.p_world_head_m)
+        if self.top_down.plans:
+            self.top_down.plan(percept, state.p_world_head_m, t_s)
+        trait = self.top_down.rule.person
+        self.top_down.named_ids = self._persons.named(trait) if trait is not None else _NO_ONE
+        compare = self._compare_few if len(bodies) <= _FEW else self._compare
+        ratio = self._params.looks_elsewhere_ratio
+        elsewhere = [face.id for face in percept.faces if face.looks_at_head is False]
+        worth = [ratio if id in elsewhere else 1.0 for id in bodies.ids]
+        made = compare(bodies, worth, state, t_s)
+        self._note_gestures(made)
+        if self._unnoticed(made):
+            self._reaction.drop()
+            seen = [row for row in range(len(made.bodies)) if made.total[row] > -inf]
+            places = [vec(made.bodies.p_world_m[row]) for row in seen]
+            self._idle.see([made.bodies.ids[row] for row in seen], places, t_s)
+            return None
+        changed = self._behaviour != self.top_down.behaviour
+        if changed:
+            self._behaviour, self._changed_s = self.top_down.behaviour, t_s
+        present = self._present_row(made)
+        row = self._winner(made, present)
+        named = made.rule_target is not None and row in made.rule_target.rows
+        if named:
+            self._favoured_id = made.bodies.ids[row]
+        winner = made.target(row, percept.captured_s)
+        # A change of mind waits neither for a reaction nor for the end of a fixation.
+        if row == present or changed or (named and t_s - self._changed_s <= _DECIDED_S):
+            self._reaction.drop()
+            return winner
+        dwelt_s = -inf if present is None else self._since_s + self._params.min_dwell_ms / 1e3
+        self._reaction.wait(winner, dwelt_s)
+        if present is not None:
+            return made.target(present, percept.captured_s)
+        return self._target and self._target._replace(plan=made.plan)
+
+    def _unnoticed(self, made: TargetComparison) -> bool:
+        """Return whether there is nothing, or only things that are explored as anything else is."""
+        best, most = made.best, made.total[made.best]
+        if most == -inf or most >= self._params.least_salience:
+            return bool(most == -inf)
+        return best < len(made.bodies) and made.bodies.kinds[best] != "face"
+
+    def _compare_few(
+        self, bodies: Bodies, worth: list[float], state: GazeState, t_s: float
+    ) -> TargetComparison:
+        """Return what ``_compare`` does, for few bodies."""
+        n, eye, rows = len(bodies), state.p_world_head_m, bodies.rows()
+        seen = self._field_of_view.visible_rows(bodies, rows, state)
+        v_eye = self._eye_velocity(eye, t_s)
+        motion = self._bottom_up.step_rows(
+            rows, eye, t_s, v_eye, self._gaze(state), seen, *self._motion_limits(bodies)
+        )
+        rule_target = self.top_down.step_rows(rows, seen, eye)
+        attended = self._identity[1] if self._identity is not None else -1
+        left = self._habituation.step_rows(rows, eye, attended, t_s)
+        habituation = [*map(mul, left, worth), 1.0]
+        rule = [0.0] * (n + 1)
+        amount = [*[terms.total for terms in motion], 0.0]
+        point = rule_target is not None and rule_target.point_world_m is not None
+        if rule_target is not None:
+            wanted = [n] if point else rule_target.rows
+            for row in wanted:
+                rule[row] = rule_target.salience
+                amount[row] = max(amount[row], rule_target.salience)
+            if not point:
+                shares = self._shares(rule_target, bodies.ids, worth, attended, t_s)
+                for row, one in zip(wanted, shares, strict=True):
+                    habituation[row] = one
+        total = [
+            one * factor if there else -inf
+            for one, factor, there in zip(amount, habituation, (*seen, point), strict=True)
+        ]
+        best = total.index(max(total))
+        plan = self.top_down.plan_text
+        return TargetComparison(
+            bodies, motion.__getitem__, rule_target, rule, habituation, total, best, plan
+        )
+
+    def _compare(
+        self, bodies: Bodies, worth: list[float], state: GazeState, t_s: float
+    ) -> TargetComparison:
+        """Return everything that the decision rests on.
+
+        worth: share of its salience that each body keeps besides
+        """
+        n, eye = len(bodies), state.p_world_head_m
+        seen = self._field_of_view.visible(bodies, state)
+        v_eye = self._eye_velocity(eye, t_s)
+        motion = self._bottom_up.step(
+            bodies, eye, t_s, v_eye, self._gaze(state), seen, *self._motion_limits(bodies)
+        )
+        rule_target = self.top_down.step(bodies, seen, eye)
+        attended = self._identity[1] if self._identity is not None else -1
+        habituation, rule = np.ones(n + 1), np.zeros(n + 1)
+        left = self._habituation.step(bodies.ids, bodies.p_world_m, eye, attended, t_s)
+        habituation[:n] = left * worth
+        amount = np.append(motion.total, 0.0)
+        if rule_target is not None:
+            rows = rule_target.rows if rule_target.point_world_m is None else np.array([n])
+            rule[rows] = rule_target.salience
+            amount[rows] = np.maximum(amount[rows], rule_target.salience)
+        if rule_target is not None and rule_target.point_world_m is None:
+            habituation[rows] = self._shares(rule_target, bodies.ids, worth, attended, t_s)
+        total = amount * habituation
+        total[:n][~seen] = -inf
+        if rule_target is None or rule_target.point_world_m is None:
+            total[n] = -inf
+        best = int(total.argmax())
+        plan = self.top_down.plan_text
+        return TargetComparison(
+            bodies, motion.row, rule_target, rule, habituation, total, best, plan
+        )
+
+    def _motion_limits(self, bodies: Bodies) -> tuple[list[float], list[float]]:
+        """Return of each body what its motion cannot exceed, and the share of it that counts."""
+        parts, ratio = self._persons.parts, self._params.own_motion_ratio
+        usual, of_hands = self._bottom_up.limit(), self._bottom_up.limit(hand=True)
+        most, worth = [], []
+        for id, kind in zip(bodies.ids, bodies.kinds, strict=True):
+            most.append(of_hands if kind == "hand" and id in self._persons.raised else usual)
+            worth.append(ratio if id in parts else 1.0)
+        return most, worth
+
+    def _note_gestures(self, made: TargetComparison) -> None:
+        """Note how much each person's own body moves; it counts in the next decision."""
+        ratio, self._gestures = self._params.own_motion_ratio, {}
+        if ratio == 0.0 or ratio == 1.0:
+            return
+        for row, id in enumerate(made.bodies.ids):
+            owner = self._persons.parts.get(id)
+            if owner is not None:
+                motion = made.motion(row)
+                moved = (motion.total - motion.onset) * (1.0 / ratio - 1.0)
+                self._gestures[owner] = max(self._gestures.get(owner, 0.0), moved)
+
+    def _shares(
+        self,
+        rule_target: RuleTarget,
+        ids: tuple[int, ...],
+        worth: list[float],
+        attended: int,
+        t_s: float,
+    ) -> list[float]:
+        """Return the factor 0..1 of each body that a rule points at, 1 for the strongest."""
+        named = [ids[row] for row in rule_target.rows]
+        moved = self._gestures
+        mine = [worth[row] * (1.0 + moved.get(ids[row], 0.0)) for row in rule_target.rows]
+        weights = [float(near) * one for near, one in zip(rule_target.nearness, mine, strict=True)]
+        shares = [
+            factor * one * (rule_target.stay if id == self._favoured_id else 1.0)
+            for id, factor, one in zip(
+                named, self._habituation.share(named, weights, attended, t_s), mine, strict=True
+            )
+        ]
+        most = max(*shares, 1e-9)
+        return [one / most for one in shares]
+
+    def _gaze(self, state: GazeState) -> Vec3:
+        """Return where both eyes look, of any length, where the salience goes by it."""
+        if not self._bottom_up.needs_gaze:
+            return _STILL
+        return add(line_of_sight(state, left=True), line_of_sight(state, left=False))
+
+    def _eye_velocity(self, p_eye_m: Vec3, t_s: float) -> Vec3:
+        """Return how fast the head has carried the eyes since the decision before, m/s."""
+        before, self._eye = self._eye, (p_eye_m, t_s)
+        if before is None or not 0.0 < t_s - before[1] <= _SPEED_OVER_S:
+            return _STILL
+        return scale(sub(p_eye_m, before[0]), 1.0 / (t_s - before[1]))
+
+    def _winner(self, made: TargetComparison, present: int | None) -> int:
+        """Return the row of the strongest, the present one being favoured."""
+        if present is None:
+            return made.best
+        stays = made.total[made.best] < made.total[present] * self._params.hysteresis_ratio
+        return present if stays else made.best
+
+    def _present_row(self, made: TargetComparison) -> int | None:
+        """Return the row of what is looked at now, None where it is no longer there."""
+        if self._identity is not None and self._identity[1] == NO_BODY:
+            there = made.total[-1] > -inf and made.point_kind == self._identity[0]
+            return len(made.bodies) if there else None
+        if self._identity is None or self._identity[1] not in made.bodies.ids:
+            return None
+        row = made.bodies.ids.index(self._identity[1])
+        return row if made.total[row] > -inf else None

@@ -1,0 +1,92 @@
+"""Faces that have left the view are remembered where they were.
+
+A camera sees less than people do, and it turns away with the head: of several people some are
+always out of its view. What is remembered of them competes for the gaze like what is seen, so that
+the gaze comes back to them. A remembered face that is looked at and not found is forgotten, and so
+is one that is lost while it is looked at: that one is searched for (gazerig.gaze.attention.idle).
+"""
+
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+
+from gazerig.gaze.types import Bodies, Vec3
+
+_FOUND_WITHIN_S = 0.7
+"""From the change of target: the flight of eyes and head, and the delay of the camera."""
+
+
+@dataclass(slots=True)
+class _Remembered:
+    """A face: where and when it was seen last, and since when it has been looked for."""
+
+    p_world_m: Vec3
+    radius_m: float
+    seen_s: float
+    sought_s: float = inf
+
+
+class FaceMemory:
+    """The faces that were seen a while ago."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all faces."""
+        self._faces: dict[int, _Remembered] = {}
+        self._captured_s = -inf
+
+    def step(self, bodies: Bodies, attended_id: int, captured_s: float, lasts_s: float) -> Bodies:
+        """Return the bodies of a new frame with the remembered faces behind them.
+
+        Args:
+            bodies: seen in the frame.
+            attended_id: what is looked at; -1 for nothing.
+            captured_s: of the frame.
+            lasts_s: how long a face is remembered.
+        """
+        before, self._captured_s = self._captured_s, captured_s
+        seen = frozenset(bodies.ids)
+        gone = []
+        for id, face in self._faces.items():
+            if id in seen:
+                continue
+            if id != attended_id:
+                face.sought_s = inf
+            else:
+                face.sought_s = min(face.sought_s, captured_s)
+            lost = id == attended_id and face.seen_s == before
+            not_found = captured_s - face.sought_s > _FOUND_WITHIN_S
+            if lost or not_found or captured_s - face.seen_s > lasts_s:
+                gone.append(id)
+        for id in gone:
+            del self._faces[id]
+        if lasts_s > 0.0:
+            self._record(bodies, captured_s)
+        return self._joined(bodies, seen)
+
+    def _record(self, bodies: Bodies, captured_s: float) -> None:
+        """Record the faces in view."""
+        for row, kind in enumerate(bodies.kinds):
+            if kind == "face":
+                x, y, z = bodies.p_world_m[row].tolist()
+                radius_m = float(bodies.radius_m[row])
+                self._faces[bodies.ids[row]] = _Remembered((x, y, z), radius_m, captured_s)
+
+    def _joined(self, bodies: Bodies, seen: frozenset[int]) -> Bodies:
+        """Return bodies and the faces that are remembered and not seen."""
+        rest = {id: face for id, face in self._faces.items() if id not in seen}
+        if not rest:
+            return bodies
+        still = np.zeros((len(rest), 3))
+        faces = rest.values()
+        return Bodies(
+            (*bodies.ids, *rest),
+            (*bodies.kinds, *("face",) * len(rest)),
+            np.concatenate((bodies.p_world_m, [face.p_world_m for face in faces])),
+            np.concatenate((bodies.v_world_m_s, still)),
+            np.concatenate((bodies.w_world_rad_s, still)),
+            np.concatenate((bodies.radius_m, [face.radius_m for face in faces])),
+        )

@@ -1,0 +1,188 @@
+"""Habituation to what is attended, and inhibition of return.
+
+Habituation, as in Pan et al. 2020 ("Realistic and interactive robot gaze"): a factor h of
+what is attended falls, that of everything else recovers, and what is compared is h times
+the salience. Without it the gaze stares. It belongs to an identity and outlives its
+absence: a person who comes back at once is not new. Several bodies that one rule points at share
+the gaze instead (gazerig.gaze.attention.shared_attention).
+
+Inhibition of return: for a moment the gaze avoids the place it has just left, as in
+Ruesch et al. 2008 (a Gaussian about that place that decays).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import acos, exp, radians
+from typing import Annotated, NamedTuple
+
+import numpy as np
+
+from gazerig.gaze.angles import dot, sub, unit
+from gazerig.gaze.attention.shared_attention import SharedAttention
+from gazerig.gaze.types import BodyRows, Floats, Vec3
+from gazerig.params import Bounds
+
+
+@dataclass(frozen=True)
+class HabituationParams:
+    """Rates of habituation and recovery, and extent of the inhibition of return."""
+
+    # fmt: off
+    decay_rate_1_s: Annotated[float, Bounds(0, 10),
+        "rate at which the salience factor of the present target decreases from 1; 0: never"] = 0.2
+    recovery_rate_1_s: Annotated[float, Bounds(0.01, 10), "rate at which the salience factors of everything else recover to 1"] = 1.0
+    rule_floor: Annotated[float, Bounds(0, 1),
+        "lowest salience factor of one of several targets of a rule; lower: the gaze changes sooner between people"] = 0.0
+    inhibition_of_return_strength: Annotated[float, Bounds(0, 1),
+        "how strongly the point that the gaze has just left is avoided; 0: not at all"] = 0.5
+    inhibition_of_return_sigma_deg: Annotated[float, Bounds(0.1, 45), "standard deviation of that inhibition around the point"] = 4.0
+    inhibition_of_return_s: Annotated[float, Bounds(0.05, 60), "time constant with which that inhibition decays"] = 1.5
+    # fmt: on
+
+
+class _Left(NamedTuple):
+    """A point that the gaze has left, and when."""
+
+    p_world_m: Vec3
+    at_s: float
+
+
+class Habituation:
+    """State of habituation of every identity, and the points left."""
+
+    def __init__(self, params: HabituationParams) -> None:
+        self._params = params
+        self._shared = SharedAttention()
+        self.reset(0.0)
+
+    def retune(self, params: HabituationParams) -> None:
+        """Change the rates; the state stays."""
+        self._params = params
+
+    def reset(self, t_s: float) -> None:
+        """Forget all habituation and the points left."""
+        # Only factors below 1 are kept: of those attended in the last 1/recovery_rate_1_s
+        # seconds, a handful however many bodies there are.
+        self._habituation: dict[int, float] = {}
+        self._left: list[_Left] = []
+        self._shared.reset(t_s)
+        self._at_s = t_s
+
+    def leave(self, p_world_m: Vec3, t_s: float) -> None:
+        """Record that the gaze has left a point."""
+        if self._params.inhibition_of_return_strength > 0.0:
+            self._left.append(_Left(p_world_m, t_s))
+
+    def step(
+        self,
+        ids: tuple[int, ...],
+        p_world_m: Floats,
+        p_world_eye_m: Vec3,
+        attended_id: int,
+        t_s: float,
+    ) -> Floats:
+        """Return (n,) the factor 0..1 of each body's salience.
+
+        ids, p_world_m: the bodies in view and their centres, (n, 3)
+        attended_id: what has been looked at since the step before; -1 for nothing
+        """
+        self._go_on(attended_id, t_s)
+        habituation = np.ones(len(ids))
+        for id, left in self._habituation.items():
+            if id in ids:
+                habituation[ids.index(id)] = left
+        if self._left:
+            self._avoid(habituation, ids, p_world_m, p_world_eye_m, attended_id, t_s)
+        return habituation
+
+    def step_rows(
+        self, rows: BodyRows, p_world_eye_m: Vec3, attended_id: int, t_s: float
+    ) -> list[float]:
+        """Return what ``step`` does, for few bodies."""
+        self._go_on(attended_id, t_s)
+        if not self._left:
+            return [self._habituation.get(id, 1.0) for id in rows.ids]
+        return [
+            self._habituation.get(id, 1.0)
+            * (1.0 if id == attended_id else self._return_factor(p, p_world_eye_m, t_s))
+            for id, p in zip(rows.ids, rows.p_world_m, strict=True)
+        ]
+
+    def share(
+        self, ids: Sequence[int], weights: Sequence[float], attended_id: int, t_s: float
+    ) -> list[float]:
+        """Return the factor 0..1 of each of several bodies that a rule points at.
+
+        One alone keeps 1: what a rule names is not left for habituation.
+
+        Args:
+            ids: the bodies that share the gaze.
+            weights: of each; they are looked at for times as their weights.
+            attended_id: what has been looked at since the step before; -1 for nothing.
+            t_s: now.
+        """
+        floor, rate = self._params.rule_floor, self._params.decay_rate_1_s
+        if rate == 0.0 or floor == 1.0:
+            return [1.0] * len(ids)
+        leads = self._shared.step(ids, weights, attended_id, t_s)
+        return [floor + (1.0 - floor) * exp(-rate * lead) for lead in leads]
+
+    def _go_on(self, attended_id: int, t_s: float) -> None:
+        """Bring all factors and the points left to the present."""
+        self._habituate(attended_id, max(0.0, t_s - self._at_s))
+        self._at_s = t_s
+        if self._left:
+            lasts_s = 4.0 * self._params.inhibition_of_return_s
+            self._left = [one for one in self._left if t_s - one.at_s < lasts_s]
+
+    def _habituate(self, attended_id: int, dt_s: float) -> None:
+        """Lower the factor of what is attended and raise those of the rest."""
+        risen = self._params.recovery_rate_1_s * dt_s
+        attended = self._habituation.pop(attended_id, 1.0)
+        self._habituation = {
+            id: left + risen for id, left in self._habituation.items() if left + risen < 1.0
+        }
+        attended = max(0.0, attended - self._params.decay_rate_1_s * dt_s)
+        if attended_id >= 0 and attended < 1.0:
+            self._habituation[attended_id] = attended
+
+    def _return_factor(self, p_world_m: list[float], p_eye: Vec3, t_s: float) -> float:
+        """Return the factor of one body near points left, as ``_avoid`` does of all."""
+        par = self._params
+        x, y, z = p_world_m
+        way = unit(sub((x, y, z), p_eye))
+        factor = 1.0
+        for left in self._left:
+            cosine = dot(way, unit(sub(left.p_world_m, p_eye)))
+            sigmas = acos(max(-1.0, min(1.0, cosine))) / radians(par.inhibition_of_return_sigma_deg)
+            age = (t_s - left.at_s) / par.inhibition_of_return_s
+            factor *= 1.0 - par.inhibition_of_return_strength * exp(-0.5 * sigmas * sigmas - age)
+        return factor
+
+    def _avoid(
+        self,
+        habituation: Floats,
+        ids: tuple[int, ...],
+        p_world_m: Floats,
+        p_eye: Vec3,
+        attended_id: int,
+        t_s: float,
+    ) -> None:
+        """Inhibit the return to points left: lower the factors of bodies near them, in place."""
+        par = self._params
+        places = np.array([one.p_world_m for one in self._left]) - np.asarray(p_eye)
+        ages = t_s - np.array([one.at_s for one in self._left])
+        cosines = _directions(p_world_m - np.asarray(p_eye)) @ _directions(places).T
+        angles = np.arccos(np.clip(cosines, -1.0, 1.0))
+        sigmas = angles / radians(par.inhibition_of_return_sigma_deg)
+        near = np.exp(-0.5 * sigmas * sigmas - ages / par.inhibition_of_return_s)
+        factor = (1.0 - par.inhibition_of_return_strength * near).prod(axis=1)
+        if attended_id in ids:
+            factor[ids.index(attended_id)] = 1.0
+        habituation *= factor
+
+
+def _directions(rel_m: Floats) -> Floats:
+    """Return the directions of (n, 3) vectors."""
+    out: Floats = rel_m / np.maximum(np.sqrt((rel_m * rel_m).sum(axis=1, keepdims=True)), 1e-9)
+    return out

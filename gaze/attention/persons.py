@@ -1,0 +1,188 @@
+"""Persons by what they do: the nearest, those who wave or look at the head, the one who came last.
+
+Rules can name people so (gazerig.gaze.attention.top_down), however the tracker numbers them.
+
+A hand waves when its velocity across the view has changed sides twice within a little more than a
+second, faster than a hand that only gestures, at the height of the face; the person who waves is
+the one with the face nearest to it.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import dist, inf
+
+from gazerig.gaze.angles import add, scale, sub
+from gazerig.gaze.types import Percept, Vec3
+
+NEAREST, WAVING, LOOKING, NEWEST = "nearest", "waving", "looking", "newest"
+TRAITS = (NEAREST, WAVING, LOOKING, NEWEST)
+
+_WAVES_M_S = 0.25
+_TURNS, _TURNS_WITHIN_S = 2, 1.2
+_WAVED_S = 1.5
+"""Time for which a person counts as waving after the hand has turned the last time."""
+_ARM_M = 0.9
+_HELD_OUT = 0.65
+"""A hand nearer than this share of the face's distance is held out; signs and gestures are not."""
+_RAISED_M = 0.08
+"""A hand is raised at the height of the face, at most so far below its centre; signs are lower."""
+_OWN = "own"
+"""The robot's own body waves to nobody."""
+_TOGETHER_S = 0.5
+"""Who comes within this time of another has come together with them."""
+_CLEARLY_NEARER = 1.1
+_GONE_S = 120.0
+
+
+@dataclass(slots=True)
+class _Hand:
+    """Motion of something that is no face: the side it moves to, and when it last changed sides."""
+
+    side: float = 0.0
+    turned_s: list[float] = field(default_factory=list)
+    seen_s: float = -inf
+
+
+class Persons:
+    """What the people in view do.
+
+    Attributes:
+        parts: of what moves within a person's reach, the id of that person's face; without what is
+            held out towards the head or raised to the face.
+        raised: ids of what moves within a person's reach at the height of the face.
+    """
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all people."""
+        self._came_s: dict[int, float] = {}
+        self._seen_s: dict[int, float] = {}
+        self._waved_s: dict[int, float] = {}
+        self._hands: dict[int, _Hand] = {}
+        self.parts: dict[int, int] = {}
+        self.raised: set[int] = set()
+        self._looking: frozenset[int] = frozenset()
+        self._nearest = -1
+        self._at_s = -inf
+
+    def update(self, percept: Percept, p_world_eye_m: Vec3) -> None:
+        """Update with a new frame.
+
+        Args:
+            percept: what it showed.
+            p_world_eye_m: from where.
+        """
+        bodies, self._at_s = percept.bodies, percept.captured_s
+        rows = bodies.p_world_m.tolist()
+        faces = {
+            id: (x, y, z)
+            for id, kind, (x, y, z) in zip(bodies.ids, bodies.kinds, rows, strict=True)
+            if kind == "face"
+        }
+        for id in faces:
+            self._came_s.setdefault(id, self._at_s)
+            self._seen_s[id] = self._at_s
+        self._looking = frozenset(face.id for face in percept.faces if face.looks_at_head)
+        self._update_nearest(faces, p_world_eye_m)
+        self.parts, self.raised = {}, set()
+        for row, id in enumerate(bodies.ids):
+            if faces and id not in faces and bodies.kinds[row] != _OWN:
+                x, y, z = rows[row]
+                vx, vy, _ = bodies.v_world_m_s[row].tolist()
+                self._update_hand(id, (x, y, z), (vx, vy), faces, p_world_eye_m)
+                self._update_part(id, (x, y, z), faces, p_world_eye_m)
+        self._drop_old()
+
+    def named(self, trait: str) -> frozenset[int]:
+        """Return the ids of the people with a trait, none where nobody has it.
+
+        Args:
+            trait: one of TRAITS.
+        """
+        if trait == LOOKING:
+            return self._looking
+        if trait == WAVING:
+            return self._within(self._waved_s, _WAVED_S)
+        if trait == NEAREST:
+            return frozenset((self._nearest,)) if self._nearest >= 0 else frozenset()
+        latest_s = max(self._came_s.values(), default=-inf)
+        return frozenset(id for id, at_s in self._came_s.items() if latest_s - at_s < _TOGETHER_S)
+
+    def _update_nearest(self, faces: Mapping[int, Vec3], p_eye: Vec3) -> None:
+        """Update who is nearest; somebody else must be clearly nearer."""
+        away = {id: dist(p, p_eye) for id, p in faces.items()}
+        if not away:
+            self._nearest = -1
+            return
+        id = min(away, key=lambda one: away[one])
+        if away.get(self._nearest, inf) > _CLEARLY_NEARER * away[id]:
+            self._nearest = id
+
+    def _update_hand(
+        self,
+        id: int,
+        place: Vec3,
+        velocity_m_s: tuple[float, float],
+        faces: Mapping[int, Vec3],
+        p_eye: Vec3,
+    ) -> None:
+        """Update a hand, and who waves with it: the person with the nearest face."""
+        # Sideways as seen from the eye: level, and across the direction to the hand.
+        ahead, aside = place[0] - p_eye[0], place[1] - p_eye[1]
+        away = max((ahead * ahead + aside * aside) ** 0.5, 1e-6)
+        if self._turns(id, (velocity_m_s[1] * ahead - velocity_m_s[0] * aside) / away):
+            owner = min(faces, key=lambda face: dist(faces[face], place))
+            if _is_raised(place, faces[owner]) and dist(faces[owner], place) < _ARM_M:
+                self._waved_s[owner] = self._at_s
+
+    def _update_part(self, id: int, place: Vec3, faces: Mapping[int, Vec3], p_eye: Vec3) -> None:
+        """Update whose body something is part of: who is nearest to its line of sight.
+
+        The distance of what moves is often only assumed, so it is compared as far away as the face.
+        """
+        away, towards = dist(place, p_eye), sub(place, p_eye)
+        beside = {
+            face: dist(add(p_eye, scale(towards, dist(p, p_eye) / max(away, 1e-3))), p)
+            for face, p in faces.items()
+        }
+        owner = min(beside, key=lambda face: beside[face])
+        if beside[owner] >= _ARM_M:
+            return
+        if _is_raised(place, faces[owner]):
+            self.raised.add(id)
+        elif away > _HELD_OUT * dist(faces[owner], p_eye):
+            self.parts[id] = owner
+
+    def _turns(self, id: int, across_m_s: float) -> bool:
+        """Return whether a hand has just changed sides in a wave."""
+        hand = self._hands.setdefault(id, _Hand())
+        hand.seen_s = self._at_s
+        if abs(across_m_s) < _WAVES_M_S or across_m_s * hand.side > 0.0:
+            return False
+        turned, hand.side = hand.side != 0.0, across_m_s
+        if not turned:
+            return False
+        hand.turned_s = [at for at in hand.turned_s if self._at_s - at <= _TURNS_WITHIN_S]
+        hand.turned_s.append(self._at_s)
+        return len(hand.turned_s) >= _TURNS
+
+    def _within(self, at_s: Mapping[int, float], lasts_s: float) -> frozenset[int]:
+        return frozenset(id for id, one_s in at_s.items() if self._at_s - one_s <= lasts_s)
+
+    def _drop_old(self) -> None:
+        """Drop people and hands that have not been seen for long."""
+        gone = [id for id, seen_s in self._seen_s.items() if self._at_s - seen_s > _GONE_S]
+        for id in gone:
+            del self._seen_s[id], self._came_s[id]
+            self._waved_s.pop(id, None)
+        if len(self._hands) > len(self._seen_s):
+            self._hands = {
+                id: hand for id, hand in self._hands.items() if self._at_s - hand.seen_s < _WAVED_S
+            }
+
+
+def _is_raised(place: Vec3, face: Vec3) -> bool:
+    """Return whether something is at the height of a face."""
+    return place[2] > face[2] - _RAISED_M

@@ -1,0 +1,348 @@
+"""Top-down attention: the target of the behaviour in force (Mitake et al. 3.3.3).
+
+The paper's rules are attack -> attack target, guard -> guard target, wait -> the
+opponent's face, each with a constant amount of attention whose value it does not give.
+Here a rule may point at a kind of body, at persons by what they do
+(gazerig.gaze.attention.persons), at one body by its id, or at a place. Where several bodies are of
+the wanted kind, each is wanted, the nearer the more. Where no person does what a rule names, it
+points at all faces.
+
+With an action planner (gazerig.gaze.attention.action_planner) the behaviour follows from what is
+seen, unless the user has chosen one, until they give it back (``PLANNED``).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import compress
+from math import dist
+from typing import Annotated, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gazerig.gaze.attention.action_planner import (
+    ACTIONS,
+    Action,
+    ActionPlanner,
+    ActionPlannerParams,
+)
+from gazerig.gaze.attention.persons import TRAITS
+from gazerig.gaze.types import Bodies, BodyRows, Floats, Percept, Vec3
+from gazerig.params import Bounds
+
+_BY_ID = "id:"
+_PERSON = "person:"
+_POINT = "point"
+_NO_ONE: frozenset[int] = frozenset()
+_STILL: Vec3 = (0.0, 0.0, 0.0)
+
+PLANNED = "planned"
+"""Choice of the menu of behaviours that leaves them to the action planner."""
+
+GUARD_TARGET, ATTACK_TARGET = "guard_target", "attack_target"
+"""What comes and the place to be hit: what a rule looks at that leaves it to the action planner."""
+
+
+@dataclass(frozen=True)
+class Rule:
+    """One behaviour's rule."""
+
+    # fmt: off
+    look_at: Annotated[str,
+        'kind of body to look at, e.g. "face" or "hand"; "person:nearest", "person:waving", "person:looking" (at the head) or '
+        '"person:newest" (who came last); "id:7" for the body with that id; "point" for the position point_world_m']
+    salience: Annotated[float, Bounds(0, 10), "salience of the rule's target (A_attack, A_guard, A_face)"]
+    point_world_m: Annotated[tuple[float, float, float] | None, Bounds(-100, 100),
+        "position to look at: ahead, left and above of the neck base"] = None
+    gesture: Annotated[str, "gesture that is played once when the gaze comes to what the rule names; empty: none"] = ""
+    gesture_at: Annotated[str, 
+        "kind of body at which it is played wherever the rule looks, e.g. hand; empty: what look_at names"] = ""
+    gesture_refractory_s: Annotated[float, Bounds(0, 3600), "shortest time between two of its gestures"] = 10.0
+    # fmt: on
+
+    def __post_init__(self) -> None:
+        """Check that the fields fit each other.
+
+        Raises:
+            ValueError: an id that is no number; a person by a word that is no trait; a point
+                without a place, or a place without one.
+        """
+        self._check_person()
+        if self.look_at.startswith(_BY_ID) and not self.look_at[len(_BY_ID) :].isdecimal():
+            raise ValueError(f'look_at {self.look_at!r} names no id; write e.g. "id:7"')
+        if (self.look_at == _POINT) != (self.point_world_m is not None):
+            raise ValueError("look_at: point and point_world_m go together; give both or neither")
+
+    def _check_person(self) -> None:
+        """Check that a rule names persons by what they may do.
+
+        Raises:
+            ValueError: it does not; the message lists what can be written.
+        """
+        prefix, colon, word = self.look_at.partition(":")
+        traits = ", ".join(f'"{_PERSON}{trait}"' for trait in TRAITS)
+        if self.look_at in TRAITS:
+            raise ValueError(f'look_at {self.look_at!r}: write "{_PERSON}{self.look_at}"')
+        if colon and f"{prefix}:" not in (_BY_ID, _PERSON):
+            raise ValueError(
+                f'look_at {self.look_at!r}: before ":" stands "id" or "person"; write e.g. "id:7" '
+                f"or one of {traits}"
+            )
+        if f"{prefix}:" == _PERSON and word not in TRAITS:
+            raise ValueError(f"look_at {self.look_at!r} names no person; write one of {traits}")
+
+    @property
+    def person(self) -> str | None:
+        """Return what the persons do whom it names, None where it names none."""
+        named = self.look_at.startswith(_PERSON)
+        return self.look_at[len(_PERSON) :] if named else None
+
+    @property
+    def kind(self) -> str:
+        """Return the kind of body it names."""
+        return "face" if self.person is not None else self.look_at
+
+    @property
+    def body_id(self) -> int | None:
+        """Return the id of the one body it names, None where it names none."""
+        return int(self.look_at[len(_BY_ID) :]) if self.look_at.startswith(_BY_ID) else None
+
+
+def _shipped_rules() -> dict[str, Rule]:
+    return {
+        "wait": Rule("face", 0.5),
+        "guard": Rule(GUARD_TARGET, 0.8),
+        "attack": Rule(ATTACK_TARGET, 0.9),
+    }
+
+
+@dataclass(frozen=True)
+class TopDownParams:
+    """The rule set and the behaviour in force at the start."""
+
+    # fmt: off
+    behaviour: Annotated[str, "name of the behaviour that is active at the start"] = "wait"
+    rules: Annotated[Mapping[str, Rule], "behaviour -> what to look at and with what salience"] = field(default_factory=_shipped_rules)
+    stay_with_person: Annotated[float, Bounds(1, 10),
+        "the person looked at last is treated as this many times nearer than they are; larger: the gaze changes less often"] = 1.25
+    nearness: Annotated[float, Bounds(0, 4),
+        "exponent with which salience decreases with distance if several bodies match a rule; 0: distance has no effect"] = 0.5
+    planner: Annotated[ActionPlannerParams, "action planner of a boxing match"] = field(default_factory=ActionPlannerParams)
+    # fmt: on
+
+    def __post_init__(self) -> None:
+        """Check the start behaviour and those of the planner.
+
+        Raises:
+            ValueError: one is not among the rules.
+        """
+        wanted = (self.behaviour, *ACTIONS) if self.planner.enabled else (self.behaviour,)
+        for behaviour in wanted:
+            if behaviour not in self.rules:
+                known = ", ".join(sorted(self.rules))
+                raise ValueError(f"behaviour {behaviour!r} has no rule; rules: {known}")
+        if PLANNED in self.rules:
+            raise ValueError(f"no rule can be called {PLANNED!r}: that leaves it to the planner")
+
+
+class RuleTarget(NamedTuple):
+    """What the rule in force points at.
+
+    rows:     (k,) rows of the bodies wanted; none for a place
+    nearness: (k,) weight of each, 1 for the nearest
+    stay:     factor by which the body that was looked at last is preferred
+    point_world_m: the place wanted, None for bodies
+    salience, behaviour: the rule's constant and name
+    point_kind, point_world_m_s: what the place is called, and how fast it moves
+    """
+
+    rows: NDArray[np.intp] | list[int]
+    nearness: Floats | list[float]
+    stay: float
+    point_world_m: Vec3 | None
+    salience: float
+    behaviour: str
+    point_kind: str = _POINT
+    point_world_m_s: Vec3 = _STILL
+
+
+class TopDown:
+    """The rules, and the behaviour in force.
+
+    behaviour: in force
+    named_ids: the people who do what the rule in force names, where it names persons; set by who
+        knows them before each step
+    """
+
+    def __init__(self, params: TopDownParams) -> None:
+        self._params = params
+        self._planner = ActionPlanner(params.planner)
+        self.behaviour = params.behaviour
+        self.reset(0.0)
+
+    def retune(self, params: TopDownParams) -> None:
+        """Change the rules; the behaviour in force stays unless its rule is gone.
+
+        Another behaviour of the start is in force at once: what was asked for is its rule. That of
+        the start also follows a planner that is switched off.
+        """
+        before, self._params = self._params, params
+        self._planner.retune(params.planner)
+        ends = before.planner.enabled and not params.planner.enabled and not self._by_user
+        if ends or params.behaviour != before.behaviour or self.behaviour not in params.rules:
+            self.behaviour = params.behaviour
+
+    @property
+    def rule(self) -> Rule:
+        """Return the rule in force."""
+        return self._params.rules[self.behaviour]
+
+    @property
+    def behaviours(self) -> tuple[str, ...]:
+        """Return what can be chosen: the behaviours in the order of the rules, and the planner."""
+        rules = tuple(self._params.rules)
+        return (*rules, PLANNED) if self._params.planner.enabled else rules
+
+    @property
+    def chosen(self) -> str:
+        """Return which of ``behaviours`` is chosen."""
+        return PLANNED if self.plans and not self._by_user else self.behaviour
+
+    @property
+    def plans(self) -> bool:
+        """Return whether there is an action planner."""
+        return self._params.planner.enabled
+
+    @property
+    def plan_text(self) -> str:
+        """Return what the action planner means to do and why, "" without a planner."""
+        now = self._planner.plan
+        return now.text if self.plans and now.action == self.behaviour else ""
+
+    def plan(self, percept: Percept, p_eye: Vec3, t_s: float) -> None:
+        """Let the action planner choose the behaviour; once for each new percept.
+
+        Where the user has chosen one, it only finds what that is for.
+        """
+        asked: Action | None = None
+        if self._by_user:
+            asked = next((one for one in ACTIONS if one == self.behaviour), None)
+            if asked is None:  # a behaviour beside the match
+                return
+        self.behaviour = self._planner.step(percept, p_eye, t_s, asked).action
+
+    def reset(self, t_s: float) -> None:
+        """Return to the behaviour of the start, which the planner may change."""
+        self.behaviour = self._params.behaviour
+        self._by_user = False
+        self._planner.reset()
+        self.named_ids = _NO_ONE
+        self._named: tuple[str, tuple[str, ...]] = ("", ())
+        self._rows_named = np.zeros(0, dtype=np.intp)
+
+    def behave(self, behaviour: str) -> None:
+        """Set the behaviour in force, or leave it to the planner again.
+
+        Raises:
+            ValueError: there is no rule for it; the message lists what there is.
+        """
+        if behaviour not in self.behaviours:
+            known = ", ".join(sorted(self.behaviours))
+            raise ValueError(f"no rule for behaviour {behaviour!r}; rules: {known}")
+        self._by_user = behaviour != PLANNED
+        if self._by_user:
+            self.behaviour = behaviour
+
+    def step(
+        self,
+        bodies: Bodies,
+        seen: NDArray[np.bool_],
+        p_world_eye_m: Vec3,
+    ) -> RuleTarget | None:
+        """Return what the rule points at among the bodies in view, None where nothing.
+
+        seen: (n,) which bodies are in view
+        """
+        rule = self._params.rules[self.behaviour]
+        if self.plans and (planned := self._planned(rule, bodies.ids, seen.tolist())):
+            return planned
+        rows = self._rows(bodies, rule)
+        rows = rows[seen[rows]]
+        if self.named_ids:
+            named = np.isin(np.array(bodies.ids, dtype=np.int64)[rows], list(self.named_ids))
+            some = rows[named]
+            rows = some if len(some) else rows
+        if len(rows) == 0 and rule.point_world_m is None:
+            return None
+        near = self._nearness(bodies, rows, p_world_eye_m)
+        return RuleTarget(rows, near, self._stay, rule.point_world_m, rule.salience, self.behaviour)
+
+    def step_rows(
+        self,
+        bodies: BodyRows,
+        seen: list[bool],
+        p_world_eye_m: Vec3,
+    ) -> RuleTarget | None:
+        """Return what ``step`` does, for few bodies."""
+        rule = self._params.rules[self.behaviour]
+        if self.plans and (planned := self._planned(rule, bodies.ids, seen)):
+            return planned
+        if rule.point_world_m is not None:
+            point = rule.point_world_m
+            return RuleTarget([], [], self._stay, point, rule.salience, self.behaviour)
+        named: Sequence[object] = bodies.kinds if rule.body_id is None else bodies.ids
+        wanted = rule.kind if rule.body_id is None else rule.body_id
+        rows = [i for i, one in enumerate(named) if one == wanted and seen[i]]
+        if not rows:
+            return None
+        if self.named_ids:
+            rows = [i for i in rows if bodies.ids[i] in self.named_ids] or rows
+        near = [1.0]
+        if len(rows) > 1:
+            away = [max(dist(bodies.p_world_m[i], p_world_eye_m), 1e-3) for i in rows]
+            nearest, power = min(away), self._params.nearness
+            near = [(nearest / one) ** power for one in away]
+        return RuleTarget(rows, near, self._stay, None, rule.salience, self.behaviour)
+
+    def _planned(self, rule: Rule, ids: Sequence[int], seen: list[bool]) -> RuleTarget | None:
+        """Return what the plan looks at, where the rule leaves it to the planner."""
+        plan = self._planner.plan
+        if rule.look_at == GUARD_TARGET and plan.body_id in ids:
+            row = ids.index(plan.body_id)
+            if seen[row]:
+                return RuleTarget([row], [1.0], self._stay, None, rule.salience, self.behaviour)
+        if rule.look_at == ATTACK_TARGET and plan.p_world_m is not None:
+            return RuleTarget(
+                [], [], self._stay, plan.p_world_m, rule.salience, self.behaviour, ATTACK_TARGET,
+                plan.v_world_m_s,
+            )  # fmt: skip
+        return None
+
+    @property
+    def _stay(self) -> float:
+        """Return the factor by which the present person is preferred: as if nearer."""
+        return float(self._params.stay_with_person**self._params.nearness)
+
+    def _nearness(self, bodies: Bodies, rows: NDArray[np.intp], p_eye: Vec3) -> Floats:
+        """Return the factor of each wanted row: (nearest distance / its distance)^nearness."""
+        if len(rows) <= 1:
+            return np.ones(len(rows))
+        rel = bodies.p_world_m[rows] - np.asarray(p_eye)
+        distance = np.maximum(np.sqrt((rel * rel).sum(axis=1)), 1e-3)
+        factor: Floats = (distance.min() / distance) ** self._params.nearness
+        return factor
+
+    def _rows(self, bodies: Bodies, rule: Rule) -> NDArray[np.intp]:
+        """Return the rows of the bodies that a rule names."""
+        if rule.point_world_m is not None:
+            return np.zeros(0, dtype=np.intp)
+        if rule.body_id is not None:
+            rows = [bodies.ids.index(rule.body_id)] if rule.body_id in bodies.ids else []
+            return np.array(rows, dtype=np.intp)
+        # The same kinds in the same order come again and again; comparing tuples of the
+        # same strings is many times faster than looking through them.
+        if (rule.kind, bodies.kinds) != self._named:
+            same = [kind == rule.kind for kind in bodies.kinds]
+            self._named = rule.kind, bodies.kinds
+            self._rows_named = np.array(list(compress(range(len(same)), same)), dtype=np.intp)
+        return self._rows_named

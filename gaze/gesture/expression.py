@@ -1,0 +1,83 @@
+"""Facial expressions: named poses that are laid over gaze and blended over time."""
+
+from collections.abc import Mapping
+
+from gazerig.gaze.gesture.pose_offset import NO_OFFSET, PoseOffset
+from gazerig.gaze.minimum_jerk import MinimumJerkBlend
+
+NEUTRAL = "neutral"
+"""The expression at the start. It is always there; without an entry all its offsets are 0."""
+
+
+class Expressions:
+    """The expression in force, and the way to it.
+
+    name, strength: in force; strength 1 is the expression as written, 0 none of it
+    moves: ``step`` may return another offset than the last time
+
+    Args:
+        offsets: the expressions by name.
+        blend_s: time from one expression to another.
+        joints: number of joints that gaze does not move.
+    """
+
+    def __init__(self, offsets: Mapping[str, PoseOffset], blend_s: float, joints: int) -> None:
+        self._rest = NO_OFFSET._replace(joints_rad=(0.0,) * joints)
+        self._offsets = self._with_neutral(offsets)
+        self._blend = MinimumJerkBlend(self._rest.flat(), blend_s)
+        self.reset()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the expressions there are, neutral first; none where the rig has no table."""
+        others = [name for name in self._offsets if name != NEUTRAL]
+        return (NEUTRAL, *others) if len(self._offsets) > 1 else ()
+
+    def reset(self) -> None:
+        """Be neutral at once."""
+        self.name, self.strength = NEUTRAL, 1.0
+        self._blend.reset(self._goal())
+        self._flat = self._goal()
+        self._offset = PoseOffset.from_flat(self._flat)
+        self.moves = True
+
+    def retune(self, offsets: Mapping[str, PoseOffset], blend_s: float) -> None:
+        """Change the table; the face moves to what its expression is now, without a jump."""
+        self._offsets = self._with_neutral(offsets)
+        self._blend.duration_s = blend_s
+        if self.name not in self._offsets:
+            self.name, self.strength = NEUTRAL, 1.0
+        self._blend.move_to(self._goal())
+        self.moves = True
+
+    def express(self, name: str, strength: float = 1.0) -> None:
+        """Move to an expression, from the next step on.
+
+        Raises:
+            ValueError: there is no such expression; the message lists those there are.
+        """
+        self.require(name)
+        self.name, self.strength = name, strength
+        self._blend.move_to(self._goal())
+        self.moves = True
+
+    def require(self, name: str) -> None:
+        """Raise ValueError if there is no such expression; the message lists those there are."""
+        if name not in self._offsets:
+            there = ", ".join(self.names) or "none: add a table expressions to the rig"
+            raise ValueError(f"no expression {name!r}; there is {there}")
+
+    def step(self, t_s: float) -> PoseOffset:
+        """Return the offset at a time; at rest it is the same object."""
+        flat = self._blend.step(t_s)
+        if flat is not self._flat:
+            self._flat, self._offset = flat, PoseOffset.from_flat(flat)
+        self.moves = not self._blend.rests
+        return self._offset
+
+    def _with_neutral(self, offsets: Mapping[str, PoseOffset]) -> dict[str, PoseOffset]:
+        return {NEUTRAL: self._rest, **offsets}
+
+    def _goal(self) -> tuple[float, ...]:
+        rest, full = self._rest.flat(), self._offsets[self.name].flat()
+        return tuple([r + self.strength * (f - r) for r, f in zip(rest, full, strict=True)])

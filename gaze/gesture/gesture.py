@@ -1,0 +1,201 @@
+"""Gestures as data: key frames of what is laid over gaze, such as a nod.
+
+A frame says where head, eyes, lids and further joints are at a time, relative to where gaze has
+them. What a frame does not name goes on to the next frame that does. Between the frames
+everything moves with least jerk (``gazerig.gaze.gesture.minimum_jerk_curve``), from rest and back
+to rest.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from math import radians
+from typing import Annotated, Literal, NamedTuple
+
+from gazerig.params import Bounds
+
+MIN_SPEED, MAX_SPEED = 0.1, 4.0
+"""Factors on the speed of a gesture as written."""
+MAX_COUNT = 20
+"""A gesture is not repeated more often by one command."""
+MAX_FRAMES = 2000
+"""Of a gesture as written: 33 a second for a minute."""
+HEAD_TRACKS = ("head_yaw", "head_pitch", "head_roll")
+EYE_TRACKS = ("eyes_yaw", "eyes_pitch")
+LID_TRACKS = ("left_upper_lid", "right_upper_lid", "left_lower_lid", "right_lower_lid")
+POSE_TRACKS = (*HEAD_TRACKS, *EYE_TRACKS, *LID_TRACKS)
+"""The tracks of all rigs, in the order of PoseOffset.flat(); further joints follow them."""
+LID_GROUPS: Mapping[str, tuple[str, ...]] = {
+    "all": LID_TRACKS,
+    "upper": LID_TRACKS[:2],
+    "lower": LID_TRACKS[2:],
+    "left": LID_TRACKS[::2],
+    "right": LID_TRACKS[1::2],
+    **{name: (name,) for name in LID_TRACKS},
+}
+"""What a frame may say of lids, the general before the particular."""
+
+
+@dataclass(frozen=True)
+class KeyFrame:
+    """Where everything is at one time of a gesture; what is left out is not moved by it."""
+
+    # fmt: off
+    time_s: Annotated[float, Bounds(0.02, 60), "time since the beginning"]
+    head_yaw_deg: Annotated[float | None, Bounds(-90, 90), "head turned to the left of where gaze has it"] = None
+    head_pitch_deg: Annotated[float | None, Bounds(-90, 90), "head turned up from where gaze has it"] = None
+    head_roll_deg: Annotated[float | None, Bounds(-90, 90), "head tilted towards the right shoulder"] = None
+    eyes_yaw_deg: Annotated[float | None, Bounds(-90, 90),
+        "line of sight to the left of its target; in joint space, eyes to the left in the head"] = None
+    eyes_pitch_deg: Annotated[float | None, Bounds(-90, 90),
+        "line of sight above its target; in joint space, eyes up in the head"] = None
+    lids: Annotated[Mapping[str, float], Bounds(0, 3),
+        "factor on the opening of lids: all, upper, lower, left, right or a lid's joint; 0 shut, 1 as gaze has them"] = field(
+        default_factory=dict
+    )
+    joints_deg: Annotated[Mapping[str, float], Bounds(-180, 180), "further joints by name, added to where they are"] = field(
+        default_factory=dict
+    )
+    # fmt: on
+
+    def __post_init__(self) -> None:
+        """Check that the frame says something.
+
+        Raises:
+            ValueError: it names nothing, or lids there cannot be.
+        """
+        unknown = [name for name in self.lids if name not in LID_GROUPS]
+        if unknown:
+            raise ValueError(f"no lids {unknown[0]!r}; there is {', '.join(LID_GROUPS)}")
+        if not self.values():
+            raise ValueError("names nothing that moves; give e.g. head_pitch_deg")
+
+    def values(self) -> dict[str, float]:
+        """Return the value of each track that the frame names: radians, and factors of lids."""
+        angles = {
+            name: getattr(self, f"{name}_deg") for name in (*HEAD_TRACKS, *EYE_TRACKS)
+        } | dict(self.joints_deg)
+        found = {name: radians(angle) for name, angle in angles.items() if angle is not None}
+        for group, tracks in LID_GROUPS.items():
+            if group in self.lids:
+                found.update(dict.fromkeys(tracks, self.lids[group]))
+        return found
+
+
+@dataclass(frozen=True)
+class Gesture:
+    """One gesture."""
+
+    # fmt: off
+    description: Annotated[str, "what it expresses"]
+    frames: Annotated[tuple[KeyFrame, ...], "key frames in the order of their times; all returns to rest after the last one"]
+    space: Annotated[Literal["gaze", "joint"],
+        "gaze: the eyes stay on their target while the head moves; joint: they go along with the head"] = "gaze"
+    fit: Annotated[Literal["slow", "refuse"],
+        "where a rig cannot do it as written: slow: slower, and smaller where a range ends; refuse: not at all"] = "refuse"
+    count: Annotated[int, Bounds(1, MAX_COUNT), "how often it is done"] = 1
+    loop_s: Annotated[tuple[float, float] | None, Bounds(0, 60),
+        "times of the two frames between which it repeats; null: all of it repeats"] = None
+    return_s: Annotated[float, Bounds(0.05, 10), "time in which what the last frame leaves aside returns to rest"] = 0.4
+    optional: Annotated[tuple[str, ...], "joints that a rig may lack; a rig that lacks any other joint is refused the gesture"] = ()
+    frames_without_neck: Annotated[tuple[KeyFrame, ...],
+        "frames for rigs that lack a joint of the neck that the frames move and that is not optional"] = ()
+    # fmt: on
+
+    def __post_init__(self) -> None:
+        """Check that there is something to play.
+
+        Raises:
+            ValueError: there are no frames, or too many.
+        """
+        if not self.frames:
+            raise ValueError("a gesture needs at least one frame")
+        most = max(len(self.frames), len(self.frames_without_neck))
+        if most > MAX_FRAMES:
+            raise ValueError(f"{most} frames: a gesture has at most {MAX_FRAMES}; leave some out")
+
+
+@dataclass(frozen=True)
+class GestureParams:
+    """How gestures fit in with everything else that moves the joints."""
+
+    # fmt: off
+    limit_share: Annotated[float, Bounds(0.1, 1),
+        "share of the joints' speed and acceleration limits that a gesture may use; the rest is left to gaze"] = 0.8
+    blend_out_ms: Annotated[float, Bounds(100, 5000),
+        "shortest time in which a gesture that is interrupted returns to rest"] = 250.0
+    # fmt: on
+
+
+class TrackKeys(NamedTuple):
+    """The keys of one track: times, and values relative to rest (0, of lids 1)."""
+
+    times_s: tuple[float, ...]
+    values: tuple[float, ...]
+
+
+def rest_of(track: str) -> float:
+    """Return the value at which a track moves nothing."""
+    return 1.0 if track in LID_TRACKS else 0.0
+
+
+def faults_of(frames: tuple[KeyFrame, ...]) -> list[tuple[int, str]]:
+    """Return what is wrong between frames: index of the frame, and the rule."""
+    return [
+        (i + 1, f"must be later than the frame before, which is at {one.time_s:g} s")
+        for i, (one, other) in enumerate(pairwise(frames))
+        if other.time_s <= one.time_s
+    ]
+
+
+def loop_fault(gesture: Gesture) -> str:
+    """Return what is wrong with the times of a loop, "" where nothing is."""
+    if gesture.loop_s is None:
+        return ""
+    begin_s, end_s = gesture.loop_s
+    for frames in filter(None, (gesture.frames, gesture.frames_without_neck)):
+        times = [frame.time_s for frame in frames]
+        absent = [t for t in (begin_s, end_s) if t not in times and t != 0.0]
+        if absent:
+            listed = ", ".join(f"{t:g}" for t in times)
+            return f"{absent[0]:g} s is the time of no frame; frames are at {listed} s"
+    if begin_s >= end_s:
+        return f"the first time must be before the second: {begin_s:g}, {end_s:g}"
+    return ""
+
+
+def keys_of(gesture: Gesture, frames: tuple[KeyFrame, ...], count: int) -> dict[str, TrackKeys]:
+    """Return the keys of every track with its loop repeated, ending at rest.
+
+    Args:
+        gesture: says what repeats.
+        frames: those of its frames that are played.
+        count: how often.
+    """
+    tracks: dict[str, list[tuple[float, float]]] = {}
+    for time_s, values in _repeated(frames, gesture.loop_s, count):
+        for name, value in values.items():
+            tracks.setdefault(name, []).append((time_s, value))
+    return {name: _ended(name, keys, gesture.return_s) for name, keys in tracks.items()}
+
+
+def _repeated(
+    frames: tuple[KeyFrame, ...], loop_s: tuple[float, float] | None, count: int
+) -> list[tuple[float, dict[str, float]]]:
+    """Return the times and the values of all frames, those of the loop as often as it is done."""
+    begin_s, end_s = loop_s or (0.0, frames[-1].time_s)
+    keys = [(frame.time_s, frame.values()) for frame in frames]
+    before = [key for key in keys if key[0] <= begin_s]
+    again = [key for key in keys if begin_s < key[0] <= end_s]
+    period_s = end_s - begin_s
+    rounds = [(i * period_s + t_s, values) for i in range(count) for t_s, values in again]
+    later_s = (count - 1) * period_s
+    return [*before, *rounds, *((later_s + t_s, values) for t_s, values in keys if t_s > end_s)]
+
+
+def _ended(name: str, keys: list[tuple[float, float]], return_s: float) -> TrackKeys:
+    rest = rest_of(name)
+    if keys[-1][1] != rest:
+        keys = [*keys, (keys[-1][0] + return_s, rest)]
+    times, values = zip(*keys, strict=True)
+    return TrackKeys(times, values)

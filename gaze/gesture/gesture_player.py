@@ -1,0 +1,120 @@
+"""Plays gestures one at a time; whatever begins, ends or interrupts one, nothing jumps.
+
+A gesture begins from rest and returns to rest. When another takes its place, or it is ended
+early, what it has moved returns to rest on a fifth-order polynomial that begins with the
+present offset, speed and acceleration, and the next gesture is added to that.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from gazerig.gaze.gesture.gesture import POSE_TRACKS, rest_of
+from gazerig.gaze.gesture.gesture_motion import GestureMotion
+from gazerig.gaze.gesture.pose_offset import PoseOffset
+from gazerig.gaze.minimum_jerk import Quintic
+from gazerig.gaze.types import Floats
+
+
+class PlayedGesture(NamedTuple):
+    """A gesture as it is played.
+
+    speed: factor on the speed at which it was written; sizes: factor of every channel
+    """
+
+    name: str
+    motion: GestureMotion
+    speed: float
+    sizes: tuple[float, ...]
+
+    @property
+    def duration_s(self) -> float:
+        """Return the time from its beginning until all is at rest again."""
+        return self.motion.duration_s / self.speed
+
+
+class OffsetState(NamedTuple):
+    """Where the offset is and how it moves: (channels,) each, relative to rest."""
+
+    value: Floats
+    speed: Floats
+    acceleration: Floats
+
+
+class GesturePlayer:
+    """The gesture under way.
+
+    moves: ``step`` may return another offset than the last time
+
+    Args:
+        joints: number of joints that gaze does not move.
+    """
+
+    def __init__(self, joints: int) -> None:
+        self._rest_flat = (*map(rest_of, POSE_TRACKS), *(0.0,) * joints)
+        self._rest = PoseOffset.from_flat(self._rest_flat)
+        self.reset()
+
+    def reset(self) -> None:
+        """Be at rest at once, for a head whose joints are led or switched off."""
+        self._played: PlayedGesture | None = None
+        self._begins_s = 0.0
+        self._fades: list[tuple[int, Quintic]] = []
+        self._fades_from_s = self._faded_s = 0.0
+        self.moves = True
+
+    @property
+    def playing(self) -> str:
+        """Return the name of the gesture under way, "" where there is none."""
+        return self._played.name if self._played is not None else ""
+
+    def play(self, played: PlayedGesture | None, t_s: float, fade_s: float, wait_s: float) -> None:
+        """Begin a gesture, or none; one under way returns to rest meanwhile.
+
+        Args:
+            played: the next; None: there is none.
+            t_s: now.
+            fade_s: time in which what is under way returns to rest.
+            wait_s: time until the next begins.
+        """
+        states = zip(*self.state(t_s), strict=True)
+        self._fades = [
+            (i, Quintic((float(p), float(v), float(a)), 0.0, fade_s))
+            for i, (p, v, a) in enumerate(states)
+            if p or v or a
+        ]
+        self._fades_from_s, self._faded_s = t_s, t_s + fade_s
+        self._played, self._begins_s = played, t_s + wait_s
+        self.moves = True
+
+    def state(self, t_s: float) -> OffsetState:
+        """Return the offset at a time, with its speed and acceleration."""
+        total = [np.zeros(len(self._rest_flat)) for _ in range(3)]
+        for i, fade in self._fades:
+            for column, number in zip(total, fade.at(t_s - self._fades_from_s), strict=True):
+                column[i] += number
+        if self._played is not None:
+            _, motion, speed, sizes = self._played
+            found = motion.state_at(max(0.0, t_s - self._begins_s) * speed)
+            size = np.array(sizes)
+            rates = size, size * speed, size * speed * speed
+            for column, now, rate in zip(total, found, rates, strict=True):
+                column += np.array(now) * rate
+        return OffsetState(*total)
+
+    def step(self, t_s: float) -> PoseOffset:
+        """Return the offset at a time; at rest it is always the same object."""
+        if self._fades and t_s >= self._faded_s:
+            self._fades = []
+        if self._played is not None and t_s >= self._begins_s + self._played.duration_s:
+            self._played = None
+        if self._played is None and not self._fades:
+            self.moves = False
+            return self._rest
+        flat = list(self._rest_flat)
+        for i, fade in self._fades:
+            flat[i] += fade.position(t_s - self._fades_from_s)
+        if self._played is not None:
+            _, motion, speed, sizes = self._played
+            motion.add_to(flat, max(0.0, t_s - self._begins_s) * speed, sizes)
+        return PoseOffset.from_flat(tuple(flat))

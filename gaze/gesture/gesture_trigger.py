@@ -1,0 +1,61 @@
+"""When the rule in force makes the head gesture: once, as the gaze comes to what it names."""
+
+from math import inf
+
+from gazerig.gaze.attention.top_down import Rule
+from gazerig.gaze.types import Target
+
+
+class GestureTrigger:
+    """Finds the onsets at which rules play their gestures."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget what was looked at and when a gesture was played."""
+        self._named_by: str | None = None
+        self._played_s: dict[str, float] = {}
+
+    def step(
+        self,
+        behaviour: str,
+        rule: Rule,
+        target: Target,
+        t_s: float,
+        named_ids: frozenset[int] = frozenset(),
+    ) -> str:
+        """Return the gesture to play now, "" for none.
+
+        Args:
+            behaviour: in force.
+            rule: of this behaviour.
+            target: what the gaze goes to.
+            t_s: now.
+            named_ids: the people who do what the rule names, where it names persons.
+        """
+        if not rule.gesture:
+            return ""
+        before = self._named_by
+        named = _is_named(rule, target, named_ids)
+        self._named_by = behaviour if named else None
+        if not named or before == behaviour:
+            return ""
+        ready_s = self._played_s.get(behaviour, -inf) + rule.gesture_refractory_s
+        if t_s < ready_s:
+            return ""
+        self._played_s[behaviour] = t_s
+        return rule.gesture
+
+
+def _is_named(rule: Rule, target: Target, named_ids: frozenset[int]) -> bool:
+    """Return whether a target is what makes the rule's gesture."""
+    if rule.gesture_at:
+        return target.kind == rule.gesture_at
+    if rule.person is not None:
+        return target.id in named_ids
+    if rule.body_id is not None:
+        return target.id == rule.body_id
+    if rule.point_world_m is not None:
+        return target.p_world_m == rule.point_world_m
+    return target.kind == rule.look_at

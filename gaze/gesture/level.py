@@ -1,0 +1,148 @@
+"""Levels: values 0..1 that a program sets many times a second, such as a jaw by loudness."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import inf
+from typing import Annotated, NamedTuple
+
+from gazerig.gaze.gesture.pose_offset import NO_OFFSET, PoseOffset
+from gazerig.gaze.minimum_jerk import MinimumJerkBlend
+from gazerig.params import Bounds
+
+HOLD_S = 0.5
+"""A level that was not set for so long falls back to 0: the program that set it may be dead."""
+
+
+@dataclass(frozen=True)
+class LevelParams:
+    """What one level moves."""
+
+    # fmt: off
+    joint: Annotated[str, "joint that the level moves: any but those of the eyes"]
+    low_deg: Annotated[float, Bounds(-180, 180), "angle added to the joint at level 0"]
+    high_deg: Annotated[float, Bounds(-180, 180), "angle added to the joint at level 1"]
+    smoothing_ms: Annotated[float, Bounds(10, 500), "time within which the joint follows a step of the level"] = 80.0
+    # fmt: on
+
+
+class LevelRange(NamedTuple):
+    """What a level adds to the pose at 0 and at 1; it follows a step within ``smoothing_s``."""
+
+    low: PoseOffset
+    high: PoseOffset
+    smoothing_s: float
+
+    def at(self, value: float) -> tuple[float, ...]:
+        """Return what a value comes to, flat."""
+        low, high = self.low.flat(), self.high.flat()
+        return tuple([a + value * (b - a) for a, b in zip(low, high, strict=True)])
+
+
+class _Level:
+    """One level on its way."""
+
+    def __init__(self, span: LevelRange, start: tuple[float, ...]) -> None:
+        self.value = 0.0
+        self.until_s = inf
+        self.span = span
+        self.blend = MinimumJerkBlend(start, span.smoothing_s)
+        self.set(0.0, inf)
+
+    def set(self, value: float, until_s: float) -> None:
+        self.value, self.until_s = value, until_s
+        self.blend.move_to(self.span.at(value))
+
+    def retune(self, span: LevelRange) -> None:
+        self.span, self.blend.duration_s = span, span.smoothing_s
+        self.blend.move_to(span.at(self.value))
+
+
+class Levels:
+    """All levels of a rig.
+
+    lapses_s: before this time no level lapses
+    moves: ``step`` may return another offset than the last time
+
+    Args:
+        ranges: what each level moves.
+        joints: number of joints that gaze does not move.
+    """
+
+    def __init__(self, ranges: Mapping[str, LevelRange], joints: int) -> None:
+        self._rest = NO_OFFSET._replace(joints_rad=(0.0,) * joints)
+        self._ranges = dict(ranges)
+        self.reset()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the levels there are."""
+        return tuple(self._levels)
+
+    def reset(self) -> None:
+        """Put all levels to 0 at once."""
+        self._levels = {name: _Level(span, span.at(0.0)) for name, span in self._ranges.items()}
+        self._gone: list[_Level] = []
+        self._flats: tuple[tuple[float, ...], ...] = ()
+        self._offset = self._rest
+        self.moves = True
+        self.lapses_s = inf
+
+    def retune(self, ranges: Mapping[str, LevelRange]) -> None:
+        """Change what the levels move; joints move there without a jump."""
+        rest = LevelRange(self._rest, self._rest, 0.0)
+        for name in self._levels.keys() - ranges.keys():
+            level = self._levels.pop(name)
+            level.retune(rest._replace(smoothing_s=level.span.smoothing_s))
+            self._gone.append(level)
+        for name, span in ranges.items():
+            if name not in self._levels:
+                self._levels[name] = _Level(span, self._rest.flat())
+            elif span != self._levels[name].span:
+                self._levels[name].retune(span)
+        self._ranges = dict(ranges)
+        self.moves = True
+
+    def set(self, name: str, value: float, t_s: float) -> None:
+        """Set a level to a value 0..1, from the next step on.
+
+        Raises:
+            ValueError: there is no such level; the message lists those there are.
+        """
+        self.require(name)
+        self._levels[name].set(value, t_s + HOLD_S)
+        self.moves = True
+        self.lapses_s = min(self.lapses_s, t_s + HOLD_S)
+
+    def require(self, name: str) -> None:
+        """Raise ValueError if there is no such level; the message lists those there are."""
+        if name not in self._levels:
+            there = ", ".join(self._levels) or "none: add a table levels to the rig"
+            raise ValueError(f"no level {name!r}; there is {there}")
+
+    def lapsed(self, t_s: float) -> tuple[str, ...]:
+        """Let levels fall to 0 that were not set for ``HOLD_S``; return those that were above."""
+        fallen = []
+        for name, level in self._levels.items():
+            if t_s >= level.until_s:
+                if level.value > 0.0:
+                    fallen.append(name)
+                level.set(0.0, inf)
+                self.moves = True
+        self.lapses_s = min([level.until_s for level in self._levels.values()], default=inf)
+        return tuple(fallen)
+
+    def step(self, t_s: float) -> PoseOffset:
+        """Return what all levels add at a time; at rest it is the same object."""
+        if not self.moves:
+            return self._offset
+        if self._gone:
+            self._gone = [one for one in self._gone if one.blend.step(t_s) != self._rest.flat()]
+        levels = (*self._levels.values(), *self._gone)
+        flats = tuple([level.blend.step(t_s) for level in levels])
+        if flats != self._flats:
+            offset = self._rest
+            for flat in flats:
+                offset = offset.plus(PoseOffset.from_flat(flat))
+            self._flats, self._offset = flats, offset
+        self.moves = not all([level.blend.rests for level in levels])
+        return self._offset

@@ -1,0 +1,1 @@
+"""Lids: blinks and their statistics, and lids that follow the eyes."""

@@ -1,0 +1,294 @@
+"""Binocular controller: pursuit, vergence and vestibulo-ocular reflex of both eyes.
+
+Zhang & Wakamatsu's controller, which Mitake et al. 3.3.5 use and the profile mitake runs; its
+gains are not public, its structure is. The sum of both eyes is controlled by a conjugate channel,
+their difference by a vergence channel with dynamics of its own. A frame tells where in space the
+target was when it was taken (efference copy), which is smoothed and compared with the gaze of
+now, so that no delay remains in the loop:
+
+    w = d(S_f)/dt,  u_c = Gp sat(w) + Kc sat(S_f - G),  u_d = Kd (V_demand - V)
+
+S_f: smoothed direction of the target, G: direction of the gaze, V: vergence. The reflex turns
+the eyes against the head, by the inverse of its rotation and not by opposite angles, which err
+by degrees. Directions are unit vectors in the world, so that a channel needs no axes.
+
+tests/reference has the same controller in angles of one axis, with two covered eyes and with
+feedback of the delayed error alone; both are held to the same numbers.
+"""
+
+from collections import deque
+from collections.abc import Callable
+from math import exp, radians, sqrt, tan
+from typing import NamedTuple, Protocol
+
+from gazerig.gaze.angles import (
+    add,
+    direction,
+    no_nearer,
+    norm,
+    rotate,
+    rotate_back,
+    scale,
+    sub,
+    unit,
+    yaw_pitch,
+)
+from gazerig.gaze.oculomotor.pursuit_params import PursuitParams
+from gazerig.gaze.types import Angles2, Mat3, Target, Vec3
+
+Eyes = tuple[Angles2, Angles2]
+"""(yaw, pitch) of the left and right eye in the head, rad."""
+
+_STRAIGHT: Vec3 = (1.0, 0.0, 0.0)
+_NONE: Vec3 = (0.0, 0.0, 0.0)
+_FARTHEST_M = 100.0
+_LOST_S = 0.04
+"""A moving target without a frame for so long is lost from sight, until the next one."""
+
+
+class Version(NamedTuple):
+    """Both eyes as one direction in the head and the angle between them.
+
+    ahead: unit vector in the head; vergence_rad: right yaw less left yaw, positive where they meet
+    """
+
+    ahead: Vec3
+    vergence_rad: float
+
+
+class EyeGeometry(NamedTuple):
+    """The head at the time when commands of now take effect, and what its eyes can do.
+
+    eyes_on: returns the eye angles that fixate a point from a pose of the head
+    nearest_m: nearest distance on which the eyes converge
+    in_range: returns eye angles clipped to their ranges
+    """
+
+    R_world_head: Mat3
+    p_head: Vec3
+    eyes_on: Callable[[Vec3, Mat3, Vec3], Eyes]
+    nearest_m: float
+    in_range: Callable[[Eyes], Eyes]
+
+    def eyes_to(self, point: Vec3) -> Eyes:
+        """Return the eye angles that fixate a point."""
+        point = no_nearer(point, self.p_head, self.nearest_m)
+        return self.eyes_on(point, self.R_world_head, self.p_head)
+
+
+class SaccadeState(Protocol):
+    """What the saccades want meanwhile (gazerig.gaze.oculomotor.saccade_trigger)."""
+
+    @property
+    def waits(self) -> bool:
+        """Return whether a new target has come and its saccade is still to start."""
+        ...
+
+    @property
+    def corrects(self) -> bool:
+        """Return whether an error waits for a corrective saccade."""
+        ...
+
+
+def version_of(eyes: Eyes) -> Version:
+    """Return the mean direction and the vergence of two eyes."""
+    (left_yaw, left_pitch), (right_yaw, right_pitch) = eyes
+    mean = 0.5 * (left_yaw + right_yaw), 0.5 * (left_pitch + right_pitch)
+    return Version(direction(mean), right_yaw - left_yaw)
+
+
+class DelayedSight:
+    """Where a target was a fixed delay ago, from frames that come now and then and are late."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget all frames."""
+        self._frames: deque[tuple[float, Vec3, Vec3]] = deque()
+        self._shift = -1
+
+    def place(self, target: Target, t_s: float) -> Vec3 | None:
+        """Return where the target was at a time in the past; None: lost from sight by then.
+
+        A new target is known at once: that it was chosen shows that it has been seen.
+        """
+        frames = self._frames
+        if target.shift != self._shift:
+            self._shift = target.shift
+            frames.clear()
+        if not frames or target.at_s > frames[-1][0]:
+            frames.append((target.at_s, target.p_world_m, target.v_world_m_s))
+        while len(frames) > 1 and frames[1][0] <= t_s + 1e-9:
+            frames.popleft()
+        at_s, p, v = frames[0]
+        if v == _NONE:
+            return p
+        return None if t_s - at_s > _LOST_S else add(p, scale(v, t_s - at_s))
+
+
+class BinocularController:
+    """Controls both eyes between saccades.
+
+    sight: where the target was a delay ago
+    version: where the eyes are commanded to; started: whether that has been set since the reset
+    """
+
+    def __init__(self, params: PursuitParams) -> None:
+        self.sight = DelayedSight()
+        self.retune(params)
+        self.reset()
+
+    def retune(self, params: PursuitParams) -> None:
+        """Change gains and delays; the eyes and what they have seen stay."""
+        self._params = params
+        self.delay_s = params.delay_ms / 1e3
+        self._smooth_s, self._fade_s = params.smooth_ms / 1e3, params.lost_fade_ms / 1e3
+        self._reflex_delay_s = params.reflex_delay_ms / 1e3
+        self._vergence_delay_s = params.vergence_delay_ms / 1e3
+        self._max_rad_s = radians(params.max_speed_deg_s)
+        self._reject_rad_s = radians(params.reject_deg_s)
+        self._max_error_rad = radians(params.max_error_deg)
+        self._widest_rad = radians(params.max_vergence_deg)
+
+    def reset(self) -> None:
+        """Forget target and head; the eyes begin where ``hold`` sets them, or straight ahead."""
+        self.version = Version(_STRAIGHT, 0.0)
+        self.started = False
+        self.sight.reset()
+        self._seen: Vec3 | None = None
+        self._known = False
+        self._smoothed, self._velocity = _NONE, _NONE
+        self._heads: deque[tuple[float, Mat3]] = deque()
+        self._demands: deque[tuple[float, float]] = deque()
+
+    def fixate(
+        self,
+        target: Target,
+        gaze: Vec3,
+        prescribed: Eyes | None,
+        saccades: SaccadeState,
+        view: EyeGeometry,
+        t_s: float,
+        dt_s: float,
+    ) -> tuple[Eyes, Vec3]:
+        """Return the eye angles for the next period, and the point that they fixate.
+
+        gaze: the point fixated so far, or that a saccade prescribes
+        prescribed: eye angles of a saccade; None: no saccade is under way
+        """
+        place = self.sight.place(target, t_s - self.delay_s)
+        seen = None if place is None else view.eyes_to(place)
+        if prescribed is not None or dt_s <= 0.0 or not self.started:
+            eyes = view.eyes_to(gaze) if prescribed is None else prescribed
+            self.hold(eyes, seen, view.R_world_head, t_s)
+            return eyes, gaze
+        if saccades.waits:
+            seen = None
+        eyes = self.step(seen, view.R_world_head, t_s, dt_s, not saccades.corrects)
+        p_head, ahead = view.p_head, rotate(view.R_world_head, self.version.ahead)
+        one_m = view.eyes_to(add(p_head, ahead))
+        distance = self.distance_m(one_m, norm(sub(target.p_world_m, p_head)))
+        return eyes, add(p_head, scale(ahead, max(distance, view.nearest_m)))
+
+    def hold(self, eyes: Eyes, target: Eyes | None, R_world_head: Mat3, t_s: float) -> None:
+        """Adopt the angles that a saccade prescribes; the target's velocity is kept.
+
+        target: eye angles that fixate the target as seen, from the present pose of the head
+        """
+        self.version, self.started = version_of(eyes), True
+        self._turned(R_world_head, t_s)
+        if target is not None:
+            self._shift(rotate(R_world_head, version_of(target).ahead))
+            self._demand(version_of(target).vergence_rad, t_s)
+
+    def step(
+        self, target: Eyes | None, R_world_head: Mat3, t_s: float, dt_s: float, closing: bool = True
+    ) -> Eyes:
+        """Return the angles of both eyes in the head for the next period.
+
+        target: eye angles that fixate the target as seen, from the present pose of the head;
+            None: not seen
+        closing: whether the error of direction is closed; False leaves it to a saccade
+        """
+        par, (ahead, vergence) = self._params, self.version
+        turned = self._turned(R_world_head, t_s)
+        if turned is not None:
+            held = rotate_back(turned[1], rotate(turned[0], ahead))
+            ahead = unit(add(ahead, scale(sub(held, ahead), par.reflex_gain)))
+        gaze = rotate(R_world_head, ahead)
+        if target is None:
+            self._known = False
+            self._velocity = scale(self._velocity, exp(-dt_s / self._fade_s))
+            rate = scale(_clipped(self._velocity, self._max_rad_s), par.velocity_gain)
+        else:
+            seen, demand_rad = version_of(target)
+            self._follow(rotate(R_world_head, seen), dt_s)
+            rate = scale(_clipped(self._velocity, self._max_rad_s), par.velocity_gain)
+            if closing:
+                error = _clipped(sub(self._smoothed, gaze), self._max_error_rad)
+                rate = add(rate, scale(error, par.gain_1_s))
+            past_rad = self._demand(demand_rad, t_s)
+            if past_rad is not None:
+                off = past_rad - vergence
+                gain = par.vergence_gain_1_s if off >= 0.0 else par.divergence_gain_1_s
+                vergence += gain * off * dt_s
+        vergence = min(max(vergence, 0.0), self._widest_rad)
+        ahead = rotate_back(R_world_head, unit(add(gaze, scale(rate, dt_s))))
+        self.version = Version(ahead, vergence)
+        yaw, pitch = yaw_pitch(ahead)
+        return (yaw - 0.5 * vergence, pitch), (yaw + 0.5 * vergence, pitch)
+
+    def distance_m(self, one_m: Eyes, otherwise_m: float) -> float:
+        """Return the distance at which both lines of sight meet.
+
+        one_m: eye angles that fixate a point in the same direction 1 m away
+        otherwise_m: for eyes that cannot converge
+        """
+        half_m = tan(0.5 * version_of(one_m).vergence_rad)
+        if half_m <= 0.0:
+            return otherwise_m
+        vergence = self.version.vergence_rad
+        return min(half_m / tan(0.5 * vergence), _FARTHEST_M) if vergence > 0.0 else _FARTHEST_M
+
+    def _turned(self, R_world_head: Mat3, t_s: float) -> tuple[Mat3, Mat3] | None:
+        """Return the head's rotations between which the reflex acts in this period."""
+        heads = self._heads
+        before = heads[0][1] if heads else None
+        heads.append((t_s, R_world_head))
+        while len(heads) > 1 and heads[1][0] <= t_s - self._reflex_delay_s + 1e-9:
+            heads.popleft()
+        return (before, heads[0][1]) if before is not None else None
+
+    def _demand(self, vergence_rad: float, t_s: float) -> float | None:
+        """Return the vergence that the target asked for a delay ago, None before there was one."""
+        demands = self._demands
+        demands.append((t_s, vergence_rad))
+        due_s = t_s - self._vergence_delay_s + 1e-9
+        while len(demands) > 1 and demands[1][0] <= due_s:
+            demands.popleft()
+        return demands[0][1] if demands[0][0] <= due_s else None
+
+    def _shift(self, seen: Vec3) -> None:
+        """Adopt a jump of the target, which is no velocity."""
+        moved = _NONE if self._seen is None else sub(seen, self._seen)
+        self._smoothed = seen if self._seen is None else add(self._smoothed, moved)
+        self._seen, self._known = seen, True
+
+    def _follow(self, seen: Vec3, dt_s: float) -> None:
+        """Low-pass the direction of the target and differentiate it."""
+        before = self._seen
+        most = self._reject_rad_s * dt_s
+        if before is None or not self._known or norm(sub(seen, before)) > most:
+            self._shift(seen)
+        self._seen = seen
+        kept = exp(-dt_s / self._smooth_s)
+        smoothed = add(scale(self._smoothed, kept), scale(seen, 1.0 - kept))
+        self._velocity = scale(sub(smoothed, self._smoothed), 1.0 / dt_s)
+        self._smoothed = smoothed
+
+
+def _clipped(v: Vec3, most: float) -> Vec3:
+    """Return a vector no longer than ``most``."""
+    size = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+    return v if size <= most else scale(v, most / size)

@@ -1,0 +1,241 @@
+"""The gaze point: saccades bring it to a target, pursuit keeps it there.
+
+Points are in the world, in metres.
+"""
+
+from dataclasses import dataclass
+from math import sqrt
+from typing import Annotated
+
+import numpy as np
+
+from gazerig.gaze.angles import (
+    add,
+    angle_between,
+    direction,
+    no_nearer,
+    norm,
+    scale,
+    sub,
+    yaw_pitch,
+)
+from gazerig.gaze.oculomotor.pursuit import Pursuit, sight
+from gazerig.gaze.oculomotor.refixation import RefixationParams, Refixations
+from gazerig.gaze.oculomotor.saccade import SaccadeModel
+from gazerig.gaze.oculomotor.saccade_endpoint import EndpointParams, endpoint
+from gazerig.gaze.oculomotor.saccade_trajectory import (
+    RedirectedTrajectory,
+    SaccadeTrajectory,
+    Trajectory,
+)
+from gazerig.gaze.oculomotor.saccade_trigger import SaccadeTrigger, SaccadeTriggerParams
+from gazerig.gaze.oculomotor.target_prediction import TargetPrediction
+from gazerig.gaze.types import Angles2, Vec3
+from gazerig.params import Bounds
+
+MOVING_M_S = 0.05
+"""A target slower than this is fixated, not pursued."""
+_MIDDLE = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class GazePointParams(SaccadeTriggerParams, EndpointParams, RefixationParams):
+    """Saccade trigger and endpoints, re-fixations, and the nearest point."""
+
+    # fmt: off
+    nearest_m: Annotated[float, Bounds(0.05, 2), "nearest distance on which the eyes converge (0.2 m is 17.6 deg of vergence)"] = 0.2
+    # fmt: on
+
+
+class GazePoint:
+    """Where both eyes are meant to point, moved from tick to tick.
+
+    point_m: in the world
+    saccades, fixations: counts since the reset
+
+    Args:
+        params: thresholds and times.
+        saccade: the model of saccades.
+        pursuit: the model of pursuit.
+        prediction: of the target, which ``move`` is called with.
+        rng: random generator of endpoints and re-fixations; None: without re-fixations.
+
+    Raises:
+        ValueError: endpoints are to scatter and there is no rng.
+    """
+
+    def __init__(
+        self,
+        params: GazePointParams,
+        saccade: SaccadeModel,
+        pursuit: Pursuit,
+        prediction: TargetPrediction,
+        rng: np.random.Generator | None,
+    ) -> None:
+        self._rng = rng
+        self._saccade, self._pursuit, self._prediction = saccade, pursuit, prediction
+        self._trigger = SaccadeTrigger(params, False)
+        self._refixations = Refixations(params, rng)
+        self.retune(params)
+        self._exact = False
+        self.reset(0.0, (1.0, 0.0, 0.0))
+
+    def retune(self, params: GazePointParams) -> None:
+        """Change thresholds and times; a saccade under way goes on to its end.
+
+        Raises:
+            ValueError: endpoints are to scatter and there is no rng.
+        """
+        if params.scatters and self._rng is None:
+            raise ValueError(
+                "endpoint_scatter_along and endpoint_scatter_across need a random generator: give rng"
+            )
+        self._params = params
+        self._trigger.retune(params, params.errs)
+        self._refixations.retune(params)
+
+    def reset(self, t_s: float, point_m: Vec3) -> None:
+        """Rest on a point."""
+        self._trigger.reset(t_s)
+        self._refixations.reset()
+        self.point_m = point_m
+        self._trajectory: Trajectory | None = None
+        self.saccades = self.fixations = 0
+
+    @property
+    def jumps(self) -> bool:
+        """Return whether a saccade is in flight."""
+        return self._trajectory is not None
+
+    @property
+    def settled(self) -> bool:
+        """Return whether the gaze has arrived: no saccade to a new target is due or in flight."""
+        return self._trajectory is None and not self._trigger.waits
+
+    @property
+    def waits(self) -> bool:
+        """Return whether a new target has come and its saccade is still to start."""
+        return self._trigger.waits
+
+    @property
+    def corrects(self) -> bool:
+        """Return whether what the last saccade left waits for a correction."""
+        return self._trigger.corrects
+
+    @property
+    def nearest_m(self) -> float:
+        """Return the nearest distance on which the eyes converge."""
+        return self._params.nearest_m
+
+    @property
+    def shift(self) -> int | None:
+        """Return the target's count of gaze shifts that was recorded last."""
+        return self._trigger.shift
+
+    @property
+    def onset_s(self) -> float:
+        """Return when the last saccade started, or the next one is to."""
+        return self._trigger.onset_s
+
+    def record_shift(self, shift: int, wait_s: float, t_s: float, exact: bool = False) -> None:
+        """Record a new target.
+
+        Args:
+            shift: its count of gaze shifts.
+            wait_s: what the eyes wait because the head goes first.
+            t_s: now.
+            exact: land on it without undershoot and scatter, and rest there without re-fixations.
+        """
+        self._exact = exact
+        lands_s = self._trajectory.ends_s if self._trajectory else None
+        self._trigger.record_shift(shift, wait_s, lands_s, t_s)
+        self._refixations.reset()
+
+    def postpone(self, wait_s: float) -> None:
+        """Let the saccade to a new target wait for longer."""
+        self._trigger.postpone(wait_s)
+
+    def move(
+        self, point: Vec3, velocity: Vec3, p_head: Vec3, t_s: float, dt_s: float
+    ) -> float | None:
+        """Move the gaze point along a saccade, or after the target.
+
+        Args:
+            point: the target now, not nearer than ``nearest_m``.
+            velocity: of the target, m/s.
+            p_head: midway between the eyes.
+            t_s: now.
+            dt_s: since the tick before.
+
+        Returns:
+            The amplitude of the saccade that starts now, radians; None where none does.
+        """
+        shift_rad = None
+        trigger, trajectory = self._trigger, self._trajectory
+        if self._refixations.offset_rad != _MIDDLE:
+            point = _beside(point, p_head, self._refixations.offset_rad)
+        if trajectory is None:
+            gaze, there = sight(self.point_m, p_head), sight(point, p_head)
+            x, y, z = there[0] - gaze[0], there[1] - gaze[1], there[2] - gaze[2]
+            if not trigger.rests(sqrt(x * x + y * y + z * z)):
+                self._refixations.interrupt()
+                slip = self._pursuit.slip(self.point_m, point, velocity, p_head)
+                if trigger.due(slip, t_s):
+                    shift_rad = self._jump(point, velocity, p_head, t_s)
+            elif not self._exact and self._refixations.due(t_s, norm(velocity) <= MOVING_M_S):
+                trigger.refixate(t_s)
+            if shift_rad is None:
+                if dt_s > 0.0 and self._pursuit.controller is None:
+                    closing = not (trigger.corrects or trigger.waits)
+                    self.point_m = self._pursuit.follow(
+                        gaze, there, point, velocity, p_head, dt_s, closing
+                    )
+                return None
+        elif trigger.redirects(t_s):
+            self._redirect(trajectory, point, velocity, p_head, t_s)
+        trajectory = self._trajectory
+        assert trajectory is not None
+        self.point_m = trajectory.at(p_head, t_s)
+        if trajectory.landed(t_s):
+            self._trajectory = None
+            trigger.record_landing(t_s, self._correction_delay_s())
+            self.fixations += 1
+        return shift_rad
+
+    def _jump(self, point: Vec3, velocity: Vec3, p_head: Vec3, t_s: float) -> float:
+        """Start a saccade; return its amplitude in radians."""
+        error = angle_between(sub(self.point_m, p_head), sub(point, p_head))
+        after_s = t_s + self._saccade.duration_s(error)
+        moved, until = self._prediction.displacement(t_s), self._prediction.displacement(after_s)
+        end = add(point, sub(until, moved))
+        end = self.clear(end, p_head)
+        if self._params.errs and not self._exact:
+            end = endpoint(end, self.point_m, p_head, self._params, self._rng)
+        self._trajectory = SaccadeTrajectory(self._saccade, self.point_m, end, p_head, t_s)
+        self.saccades += 1
+        return error
+
+    def _redirect(
+        self, before: Trajectory, point: Vec3, velocity: Vec3, p_head: Vec3, t_s: float
+    ) -> None:
+        """Bend the saccade in flight to where the target is now."""
+        end = self.clear(add(point, scale(velocity, before.ends_s - t_s)), p_head)
+        self._trajectory = RedirectedTrajectory(before, self._saccade, end, p_head, t_s)
+
+    def _correction_delay_s(self) -> float:
+        """Draw after how long an error of this landing would be corrected."""
+        par, spread = self._params, 0.0
+        if self._rng is not None and par.scatters and par.correct_spread_ms > 0.0:
+            spread = par.correct_spread_ms * float(self._rng.uniform(-1.0, 1.0))
+        return (par.correct_after_ms + spread) / 1e3
+
+    def clear(self, point: Vec3, p_head: Vec3) -> Vec3:
+        """Return a point moved away to ``nearest_m`` where it is nearer."""
+        return no_nearer(point, p_head, self._params.nearest_m)
+
+
+def _beside(point: Vec3, eye: Vec3, offset: Angles2) -> Vec3:
+    """Return a point beside another one, as far away, by angles to the left and up."""
+    way = sub(point, eye)
+    yaw, pitch = yaw_pitch(way)
+    return add(eye, scale(direction((yaw + offset[0], pitch + offset[1])), norm(way)))

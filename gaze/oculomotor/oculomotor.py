@@ -1,0 +1,348 @@
+"""Oculomotor control: a target in, head, eye and lid angles out, tick by tick.
+
+Gaze is planned in space and the eyes take what the head does not: E = gaze - head. So
+whatever the head does during or after a gaze shift, planned or pushed, is compensated
+exactly (the vestibulo-ocular reflex), and vergence comes from each eye's own geometry.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple, Protocol
+
+import numpy as np
+
+from gazerig.gaze.angles import (
+    add,
+    angle_between,
+    norm,
+    sub,
+    unit,
+)
+from gazerig.gaze.field_of_view import line_of_sight
+from gazerig.gaze.gesture.animation import NO_OFFSET, PoseOffset
+from gazerig.gaze.lids.lids import Lids
+from gazerig.gaze.oculomotor.binocular import EyeGeometry
+from gazerig.gaze.oculomotor.gaze_point import MOVING_M_S, GazePoint, GazePointParams
+from gazerig.gaze.oculomotor.head import HeadModel
+from gazerig.gaze.oculomotor.pursuit import Pursuit
+from gazerig.gaze.oculomotor.saccade import SaccadeModel
+from gazerig.gaze.oculomotor.target_prediction import PredictionModel, TargetPrediction
+from gazerig.gaze.types import (
+    ORDERED,
+    Angles2,
+    Angles3,
+    GazeCommand,
+    GazeState,
+    HeadGeometry,
+    Limited,
+    Mat3,
+    Phase,
+    Target,
+    Vec3,
+)
+from gazerig.params import Bounds
+
+_AT_END = "at the end of its range"
+
+
+@dataclass(frozen=True)
+class OculomotorParams(GazePointParams):
+    """The gaze point's parameters, and the prediction of target and head."""
+
+    # fmt: off
+    prediction_horizon_ms: Annotated[float, Bounds(0, 2000),
+        "longest time over which a target's position is extrapolated with its velocity"] = 120.0
+    fade_ms: Annotated[float, Bounds(1, 5000), "time constant with which that velocity decays after that time"] = 300.0
+    target_prediction: Annotated[PredictionModel,
+        "where a target is expected: where its frame showed it, moved on with its velocity, or along its curve and its swing, "
+        "which is recognised after one to two cycles"] = "periodic"
+    eye_lag_ms: Annotated[float, Bounds(0, 200), "delay from command to motion of an eye; the head's motion during it is predicted"] = 15.0
+    # fmt: on
+
+
+class Sway(Protocol):
+    """A motion added to the head's angles: breathing."""
+
+    def reset(self, t_s: float) -> None:
+        """Start from rest."""
+        ...
+
+    def step(self, t_s: float) -> Angles3:
+        """Return (yaw, pitch, roll) to add to the head's angles."""
+        ...
+
+
+_Seen = tuple[Vec3, Vec3, Vec3, Vec3]
+"""The target at this tick: its point and velocity, the point that the head turns to, and the way
+from between the eyes to the first."""
+
+
+class ReachableGaze(NamedTuple):
+    """Where head and eyes come to rest for a point, and the eye angles that it would need.
+
+    facing_rad, head_rad: (yaw, pitch, roll) that face it, and where the head stops
+    asked_eyes_rad, eyes_rad: left and right (yaw, pitch) from there, and as far as they go
+    too_near: the point is nearer than the eyes converge on
+    base_rad: (yaw, pitch) of a lower neck meanwhile
+    """
+
+    facing_rad: Angles3
+    head_rad: Angles3
+    asked_eyes_rad: tuple[Angles2, Angles2]
+    eyes_rad: tuple[Angles2, Angles2]
+    too_near: bool
+    base_rad: Angles2 = (0.0, 0.0)
+
+
+class Oculomotor:
+    """Composes saccades, following, head and lids.
+
+    Args:
+        params: thresholds and times.
+        geometry: of head and eyes.
+        eye_limits: for left and right eye, ((yaw low, high), (pitch low, high)), rad.
+        saccade: the model of saccades.
+        pursuit: the model of pursuit.
+        head: the model of head movements.
+        lids: the model of lids and blinks.
+        breathing: sways the head; None: it does not.
+        rng: random generator of endpoints and re-fixations; None: without re-fixations.
+
+    Raises:
+        ValueError: endpoints are to scatter and there is no rng.
+    """
+
+    def __init__(
+        self,
+        params: OculomotorParams,
+        geometry: HeadGeometry,
+        eye_limits: tuple[tuple[Angles2, Angles2], tuple[Angles2, Angles2]],
+        saccade: SaccadeModel,
+        pursuit: Pursuit,
+        head: HeadModel,
+        lids: Lids,
+        breathing: Sway | None = None,
+        rng: np.random.Generator | None = None,
+    ) -> None:
+        self._prediction = TargetPrediction("none", 0.0, 1.0)
+        self._gaze = GazePoint(params, saccade, pursuit, self._prediction, rng)
+        self.retune(params, eye_limits)
+        self._geometry = geometry
+        self._pursuit = pursuit
+        self._head = head
+        self._lids = lids
+        self._breathing = breathing
+        self._started = False
+        self._base_rad: Angles2 = (0.0, 0.0)
+
+    def retune(
+        self,
+        params: OculomotorParams,
+        eye_limits: tuple[tuple[Angles2, Angles2], tuple[Angles2, Angles2]],
+    ) -> None:
+        """Change thresholds, durations and ranges; a saccade under way goes on to its end.
+
+        Raises:
+            ValueError: endpoints are to scatter and there is no rng.
+        """
+        self._gaze.retune(params)
+        self._eye_limits, self._lag_s = eye_limits, params.eye_lag_ms / 1e3
+        self._prediction.retune(
+            params.target_prediction,
+            params.prediction_horizon_ms / 1e3,
+            params.fade_ms / 1e3,
+            self._lag_s,
+        )
+
+    def reset(self, t_s: float, state: GazeState) -> None:
+        """Start from the present angles of head and eyes."""
+        self._head.reset(t_s, state.head_rad)
+        self._lids.reset(t_s)
+        if self._breathing is not None:
+            self._breathing.reset(t_s)
+        self._prediction.reset()
+        self._pursuit.reset()
+        self._gaze.reset(t_s, _meeting_point(state))
+        self._started = True
+
+    def step(
+        self,
+        target: Target,
+        state: GazeState,
+        t_s: float,
+        dt_s: float,
+        offset: PoseOffset = NO_OFFSET,
+    ) -> GazeCommand:
+        """Return the command for this tick.
+
+        state: head and eyes as measured now
+        dt_s: time since the step before
+        offset: what gestures and expressions add
+        """
+        if not self._started:
+            self.reset(t_s, state)
+        R_world_head, p_head = self._foreseen_head(state)
+        point, velocity, centre_point, toward = self._now(target, p_head, t_s)
+        self._base_rad = base = state.base_rad
+        facing = centre = self._geometry.facing(point, base)
+        if centre_point is not point:
+            centre = self._geometry.facing(centre_point, base)
+        ahead = R_world_head[0][0], R_world_head[1][0], R_world_head[2][0]
+        aside_rad = angle_between(ahead, toward)
+        place, eyes_on = self._gaze, self._geometry.eyes_on
+        if target.shift != place.shift:
+            off_rad = angle_between(sub(place.point_m, p_head), toward)
+            self._record_shift(target, aside_rad, off_rad, t_s)
+        jumps = place.jumps
+        shift_rad = place.move(point, velocity, p_head, t_s, dt_s)
+        head = self._head.step(target, centre, facing, aside_rad, t_s - place.onset_s, t_s)
+        wanted = eyes_on(place.point_m, R_world_head, p_head)
+        if (controller := self._pursuit.controller) is not None:
+            jumps = jumps or shift_rad is not None
+            view = EyeGeometry(R_world_head, p_head, eyes_on, place.nearest_m, self._in_range)
+            wanted, place.point_m = controller.fixate(
+                target, place.point_m, wanted if jumps else None, place, view, t_s, dt_s
+            )
+        if offset.eyes_rad != NO_OFFSET.eyes_rad:
+            wanted = _turned(wanted[0], offset.eyes_rad), _turned(wanted[1], offset.eyes_rad)
+        left, right = eyes = self._in_range(wanted)
+        limited = () if eyes == wanted else self._limited(wanted, head, facing)
+        lids = self._lids.step(t_s, 0.5 * (left[1] + right[1]), shift_rad)
+        if offset.lids != NO_OFFSET.lids:
+            lids = lids.scaled(offset.lids)
+        head = self._swayed(head, offset.head_rad, t_s)
+        phase: Phase = (
+            "saccade" if place.jumps
+            else "pursue" if norm(velocity) > MOVING_M_S
+            else "fixate"
+        )  # fmt: skip
+        # Without the call of a function written in Python that the class itself would cost.
+        return tuple.__new__(
+            GazeCommand,
+            (
+                head, left, right, lids.left, lids.right, phase, lids.blink, place.point_m,
+                place.saccades, place.fixations, self._lids.blinks, lids.lower_left,
+                lids.lower_right, limited,
+            ),
+        )  # fmt: skip
+
+    def reach(self, target: Target) -> ReachableGaze:
+        """Return where head and eyes come to rest for a point that stands still."""
+        facing = self._geometry.facing(target.p_world_m, self._base_rad)
+        head = self._head.destination_rad(target, facing)
+        R_world_head, p_head = self._geometry.head_pose(head, self._base_rad)
+        exact = self._geometry.eyes_on(target.p_world_m, R_world_head, p_head)
+        point = self._gaze.clear(target.p_world_m, p_head)
+        left, right = self._in_range(self._geometry.eyes_on(point, R_world_head, p_head))
+        return ReachableGaze(
+            (*facing, 0.0), head, exact, (left, right), point != target.p_world_m, self._base_rad
+        )
+
+    @property
+    def settled(self) -> bool:
+        """Return whether the gaze has arrived: no saccade to a new target is due or in flight."""
+        return self._gaze.settled
+
+    @property
+    def ranges_rad(self) -> tuple[tuple[Angles2, Angles2], ...]:
+        """Return ((yaw low, high), (pitch low, high)) of left eye, right eye and head."""
+        return (*self._eye_limits, self._head.range_rad)
+
+    def _record_shift(self, target: Target, aside_rad: float, off_rad: float, t_s: float) -> None:
+        """Record a new target; the lids draw the blink that comes with its saccade, or its bend.
+
+        aside_rad, off_rad: how far the target is off the head's facing, and off the gaze
+        """
+        gaze = self._gaze
+        waits = gaze.waits
+        wait_s = self._head.leads_s(target, aside_rad)
+        gaze.record_shift(target.shift, wait_s, t_s, target.kind == ORDERED)
+        if waits:
+            return
+        if not gaze.jumps:
+            wait_s = self._lids.announce(off_rad, gaze.onset_s, t_s)
+            if wait_s > 0.0:
+                gaze.postpone(wait_s)
+        elif gaze.onset_s <= t_s:
+            self._lids.announce(off_rad, t_s, t_s)
+
+    def _in_range(self, eyes: tuple[Angles2, Angles2]) -> tuple[Angles2, Angles2]:
+        """Return the angles of both eyes clipped to their ranges; the same where nothing is."""
+        (left_yaw, left_pitch), (right_yaw, right_pitch) = eyes
+        left, right = self._eye_limits
+        (yaw_low, yaw_high), (pitch_low, pitch_high) = left
+        if yaw_low <= left_yaw <= yaw_high and pitch_low <= left_pitch <= pitch_high:
+            (yaw_low, yaw_high), (pitch_low, pitch_high) = right
+            if yaw_low <= right_yaw <= yaw_high and pitch_low <= right_pitch <= pitch_high:
+                return eyes
+        return _clip(eyes[0], left), _clip(eyes[1], right)
+
+    def _limited(
+        self, wanted: tuple[Angles2, Angles2], head: Angles3, facing: Angles2
+    ) -> tuple[Limited, ...]:
+        """Return the angles that the ranges of eyes and neck cut off."""
+        eyes = self._in_range(wanted)
+        rows = (("left eye", wanted[0], eyes[0]), ("right eye", wanted[1], eyes[1]))
+        found = [
+            Limited(f"{name} {axis}", asked[i], done[i], _AT_END)
+            for name, asked, done in rows
+            for i, axis in enumerate(("yaw", "pitch"))
+            if asked[i] != done[i]
+        ]
+        for i, axis in enumerate(("yaw", "pitch")):
+            low, high = self._head.range_rad[i]
+            if not low < head[i] < high and not low <= facing[i] <= high:
+                found.append(Limited(f"head {axis}", facing[i], head[i], _AT_END))
+        return tuple(found)
+
+    def _swayed(self, head: Angles3, offset: Angles3, t_s: float) -> Angles3:
+        """Return the head's angles with breathing and an offset, clipped to the neck's range."""
+        if self._breathing is not None:
+            yaw, pitch, roll = self._breathing.step(t_s)
+            head = head[0] + yaw, head[1] + pitch, head[2] + roll
+        elif offset == NO_OFFSET.head_rad:
+            return head
+        return self._head.in_range((head[0] + offset[0], head[1] + offset[1], head[2] + offset[2]))
+
+    def _foreseen_head(self, state: GazeState) -> tuple[Mat3, Vec3]:
+        """Return the head's pose at the time when an eye command of now takes effect."""
+        lag = self._lag_s
+        (yaw, pitch, roll), (yaw_rate, pitch_rate, roll_rate) = state[:2]
+        base, turning = state.base_rad, state.base_rate_rad_s
+        if turning != (0.0, 0.0):
+            base = base[0] + turning[0] * lag, base[1] + turning[1] * lag
+        return self._geometry.head_pose(
+            (yaw + yaw_rate * lag, pitch + pitch_rate * lag, roll + roll_rate * lag), base
+        )
+
+    def _now(self, target: Target, p_head: Vec3, t_s: float) -> _Seen:
+        """Return the target where it is predicted to be now."""
+        prediction = self._prediction
+        prediction.see(target, p_head, self._pursuit.fastest_swing_rad_s)
+        moved, velocity = prediction.motion(t_s)
+        p, centre = target.p_world_m, target.centre_world_m
+        point = self._gaze.clear(add(p, moved), p_head)
+        middle = prediction.to_middle
+        if middle is not None:
+            head_point = self._gaze.clear(add(p if centre is None else centre, middle), p_head)
+        elif centre is None:
+            head_point = point
+        else:
+            head_point = self._gaze.clear(add(centre, moved), p_head)
+        return point, velocity, head_point, sub(point, p_head)
+
+
+def _clip(eye: Angles2, limits: tuple[Angles2, Angles2]) -> Angles2:
+    """Return eye angles clipped to their range."""
+    (yaw_low, yaw_high), (pitch_low, pitch_high) = limits
+    return (min(max(eye[0], yaw_low), yaw_high), min(max(eye[1], pitch_low), pitch_high))
+
+
+def _turned(eye: Angles2, offset: Angles2) -> Angles2:
+    """Return an eye's angles with an offset."""
+    return eye[0] + offset[0], eye[1] + offset[1]
+
+
+def _meeting_point(state: GazeState) -> Vec3:
+    """Return a point 1 m along the mean of the measured lines of sight."""
+    way = unit(add(line_of_sight(state, left=True), line_of_sight(state, left=False)))
+    return add(state.p_world_head_m, way)

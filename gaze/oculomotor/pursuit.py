@@ -1,0 +1,200 @@
+"""Smooth following of a moving target between saccades, in gaze space.
+
+Two controls, conjugate and vergence, as in the binocular controller (gaze.binocular, which
+takes the place of this one with ``model: binocular``), on a target that is predicted to where
+it is now (gaze.target_prediction): no delay of seeing is left, a jump of the place never
+enters the speed, and a head that turns or moves changes nothing, near targets included.
+
+The direction takes over the share Gp of the target's angular speed and closes the error
+at the rate Kc, both together no faster than human pursuit; the nearness closes its own
+at Kd, or at the slower Kdiv where it recedes. Larger errors of direction are saccades.
+"""
+
+from math import exp, radians, sqrt
+from typing import NamedTuple, Protocol
+
+from gazerig.gaze.angles import scale, sub
+from gazerig.gaze.oculomotor.binocular import BinocularController, EyeGeometry, Eyes, SaccadeState
+from gazerig.gaze.oculomotor.opposite_angles import OppositeAngles
+from gazerig.gaze.oculomotor.pursuit_params import PursuitParams
+from gazerig.gaze.types import Target, Vec3
+
+Sight = tuple[float, float, float, float]
+"""A point as seen from the eyes: its direction x, y, z, and its nearness, 1 / distance in 1/m."""
+
+_FARTHEST_1_M = 0.01
+"""Nearness below which the lines of sight are as good as parallel (100 m)."""
+_NEAREST_1_M = 20.0
+"""Nearness of a point at the eyes themselves (0.05 m); nothing nearer has a direction."""
+_PEAK_SHARE = 1.2
+"""Peak speed of a swing that is followed, over the fastest pursuit: what is cut off at its middle
+is made up for at its ends."""
+_NEAREST_M = 1.0 / _NEAREST_1_M
+
+
+class Slip(NamedTuple):
+    """Position error and retinal slip of the target, as seen from the eyes.
+
+    error_rad: from the gaze to the target, as a vector across the line of sight
+    slip_rad_s: speed of the target less that of the following, closing aside
+    """
+
+    error_rad: Vec3
+    slip_rad_s: Vec3
+
+
+class EyeController(Protocol):
+    """What moves both eyes between saccades in place of pursuit by the gaze point."""
+
+    def reset(self) -> None:
+        """Forget target, eyes and head."""
+        ...
+
+    def fixate(
+        self,
+        target: Target,
+        gaze: Vec3,
+        prescribed: Eyes | None,
+        saccades: SaccadeState,
+        view: EyeGeometry,
+        t_s: float,
+        dt_s: float,
+    ) -> tuple[Eyes, Vec3]:
+        """Return the eye angles for the next period, and the point that they fixate."""
+        ...
+
+
+class Pursuit:
+    """Smooth pursuit of a target point by the gaze point.
+
+    controller: what moves the eyes in its place; None: nothing does
+    """
+
+    def __init__(self, params: PursuitParams) -> None:
+        self.binocular = BinocularController(params)
+        self._opposite = OppositeAngles()
+        self._params = params
+        self.retune(params)
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin with eyes that have seen nothing."""
+        self.binocular.reset()
+        self._opposite.reset()
+
+    def retune(self, params: PursuitParams) -> None:
+        """Change gains and limits."""
+        if params.model != self._params.model:
+            self.reset()
+        self._params = params
+        self.binocular.retune(params)
+        self.controller: EyeController | None = None
+        if params.model != "gaze_space":
+            self.controller = self.binocular if params.model == "binocular" else self._opposite
+        self._max_rad_s = radians(params.max_speed_deg_s)
+        self._reject_rad_s = radians(params.reject_deg_s)
+        self._max_error_rad = radians(params.max_error_deg)
+        self.fastest_swing_rad_s = _PEAK_SHARE * self._max_rad_s
+
+    def slip(self, gaze: Vec3, target: Vec3, v_target: Vec3, eye: Vec3) -> Slip:
+        """Return error and retinal slip; all points in the world, metres."""
+        (x, y, z, _), (to_x, to_y, to_z, near) = sight(gaze, eye), sight(target, eye)
+        across = _across((to_x, to_y, to_z), scale(v_target, near))
+        return Slip((to_x - x, to_y - y, to_z - z), sub(across, self._taken(across)))
+
+    def step(
+        self, gaze: Vec3, target: Vec3, v_target: Vec3, eye: Vec3, dt_s: float, closing: bool = True
+    ) -> Vec3:
+        """Return the gaze point ``dt_s`` later; all points in the world, metres.
+
+        target, v_target: where the target is now and its velocity
+        eye: centre between the eyes, from which directions and nearness are seen
+        closing: whether the error of direction is closed; False leaves it to a saccade
+        """
+        if dt_s <= 0.0:
+            return gaze
+        return self.follow(
+            sight(gaze, eye), sight(target, eye), target, v_target, eye, dt_s, closing
+        )
+
+    def follow(
+        self,
+        gaze: Sight,
+        now: Sight,
+        target: Vec3,
+        v_target: Vec3,
+        eye: Vec3,
+        dt_s: float,
+        closing: bool,
+    ) -> Vec3:
+        """Return what ``step`` does, for whom has seen both points already.
+
+        gaze, now: gaze point and target as seen from ``eye``
+        dt_s: above 0
+        """
+        par = self._params
+        (x, y, z, near), (to_x, to_y, to_z, near_now) = gaze, now
+        vx, vy, vz = v_target
+        # The target one step ago, and by how much its direction has changed since.
+        was_x, was_y, was_z, near_before = sight(
+            (target[0] - vx * dt_s, target[1] - vy * dt_s, target[2] - vz * dt_s), eye
+        )
+        rate = 1.0 / dt_s
+        move_x, move_y, move_z = self._taken(
+            ((to_x - was_x) * rate, (to_y - was_y) * rate, (to_z - was_z) * rate)
+        )
+        move_x, move_y, move_z = move_x * dt_s, move_y * dt_s, move_z * dt_s
+        if closing:
+            off_x, off_y, off_z = was_x - x, was_y - y, was_z - z
+            size, most = sqrt(off_x * off_x + off_y * off_y + off_z * off_z), self._max_error_rad
+            if size > most:
+                off_x, off_y, off_z = scale((off_x, off_y, off_z), most / size)
+            share = 1.0 - exp(-par.gain_1_s * dt_s)
+            move_x += off_x * share
+            move_y += off_y * share
+            move_z += off_z * share
+            size = sqrt(move_x * move_x + move_y * move_y + move_z * move_z)
+            most = self._max_rad_s * dt_s
+            if size > most:
+                move_x, move_y, move_z = scale((move_x, move_y, move_z), most / size)
+        gain = par.vergence_gain_1_s if near_before > near else par.divergence_gain_1_s
+        near += near_now - near_before + (near_before - near) * (1.0 - exp(-gain * dt_s))
+        if not _FARTHEST_1_M <= near <= _NEAREST_1_M:
+            near = min(max(near, _FARTHEST_1_M), _NEAREST_1_M)
+        x, y, z = x + move_x, y + move_y, z + move_z
+        length, distance = sqrt(x * x + y * y + z * z), 1.0 / near
+        if length == 0.0:  # turned back within one step
+            x = length = 1.0
+        return (
+            eye[0] + x / length * distance,
+            eye[1] + y / length * distance,
+            eye[2] + z / length * distance,
+        )
+
+    def _taken(self, speed_rad_s: Vec3) -> Vec3:
+        """Return the angular velocity that is taken over from a target's."""
+        x, y, z = speed_rad_s
+        size, gain = sqrt(x * x + y * y + z * z), self._params.velocity_gain
+        if size > self._reject_rad_s:
+            return (0.0, 0.0, 0.0)
+        if size > self._max_rad_s:
+            share = self._max_rad_s / size
+            x, y, z = x * share, y * share, z * share
+        return (x * gain, y * gain, z * gain)
+
+
+def sight(point: Vec3, eye: Vec3) -> Sight:
+    """Return the direction of a point and its nearness; straight ahead for the eye itself."""
+    x, y, z = point[0] - eye[0], point[1] - eye[1], point[2] - eye[2]
+    length = sqrt(x * x + y * y + z * z)
+    if length > _NEAREST_M:
+        return x / length, y / length, z / length, 1.0 / length
+    if length == 0.0:
+        return 1.0, 0.0, 0.0, 1.0 / _NEAREST_M
+    return x / length, y / length, z / length, 1.0 / _NEAREST_M
+
+
+def _across(way: Vec3, v: Vec3) -> Vec3:
+    """Return the part of a vector that is perpendicular to a direction."""
+    along = way[0] * v[0] + way[1] * v[1] + way[2] * v[2]
+    return sub(v, scale(way, along))

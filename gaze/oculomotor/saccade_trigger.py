@@ -1,0 +1,166 @@
+"""Saccade trigger: when an error is closed by a saccade and when by smooth pursuit.
+
+A new object or part of it (the target's event flag) brings a saccade after the latency.
+Without that, an error beyond ``saccade_deg`` does, unless the eye is about to cross the
+target by itself: with the error PE and the retinal slip RV the crossing is T = -PE / RV
+away, and between 40 and 180 ms it is left to smooth following (de Brouwer et al. 2002).
+Where landings err, what one leaves beyond ``correct_deg`` is corrected by another saccade
+some 150 ms later; an exact landing errs only where the target was misjudged, and that is
+closed smoothly. No error brings a saccade sooner after the last than the refractory time,
+nothing at all sooner than ``min_interval_ms`` after its landing. A new target that comes
+early in a saccade redirects it; one that comes later waits for that interval.
+"""
+
+from dataclasses import dataclass
+from math import inf, radians
+from typing import Annotated
+
+from gazerig.gaze.angles import dot, norm
+from gazerig.gaze.oculomotor.pursuit import Slip
+from gazerig.params import Bounds
+
+
+@dataclass(frozen=True)
+class SaccadeTriggerParams:
+    """Thresholds and times of the saccade trigger."""
+
+    # fmt: off
+    saccade_deg: Annotated[float, Bounds(0.1, 30), "position error above which a saccade is made instead of smooth pursuit"] = 2.0
+    smallest_shift_deg: Annotated[float, Bounds(0, 10), "a new target closer to the gaze than this gets no saccade"] = 0.3
+    refractory_ms: Annotated[float, Bounds(0, 2000),
+        "shortest time after a saccade before a position error alone triggers the next"] = 150.0
+    latency_ms: Annotated[float, Bounds(0, 1000), "latency from a new target to the saccade; people 200"] = 0.0
+    crossing_least_ms: Annotated[float, Bounds(0, 1000),
+        "no catch-up saccade if pursuit will bring the eye onto the target between this time ..."] = 40.0
+    crossing_most_ms: Annotated[float, Bounds(0, 1000), "... and this time from now"] = 180.0
+    correct_deg: Annotated[float, Bounds(0.1, 30), "landing error above which a corrective saccade follows, if saccades err"] = 1.2
+    correct_after_ms: Annotated[float, Bounds(0, 1000), "mean delay from landing to the corrective saccade; people 100 to 200"] = 155.0
+    correct_spread_ms: Annotated[float, Bounds(0, 500), "that delay is drawn from so much less to so much more"] = 45.0
+    min_interval_ms: Annotated[float, Bounds(0, 1000), "shortest time from the landing of a saccade to the next one"] = 100.0
+    redirect_before_ms: Annotated[float, Bounds(0, 1000),
+        "a new target bends the saccade in flight if it comes at least this long before its end; 1000: never"] = 70.0
+    # fmt: on
+
+
+class SaccadeTrigger:
+    """State of the events that call for a saccade, and the decision when one is due.
+
+    shift: the target's count of gaze shifts recorded last, None before the first
+    onset_s: when the last saccade started, or the next one is to
+    """
+
+    def __init__(self, params: SaccadeTriggerParams, errs: bool) -> None:
+        self.retune(params, errs)
+        self.reset(0.0)
+
+    def retune(self, params: SaccadeTriggerParams, errs: bool) -> None:
+        """Change thresholds and times; an event that waits for its saccade still does.
+
+        errs: whether saccades land elsewhere than on their targets
+        """
+        self._errs = errs
+        self._smallest_rad = radians(params.smallest_shift_deg)
+        self._saccade_rad = radians(params.saccade_deg)
+        self._correct_rad = radians(params.correct_deg)
+        self._latency_s = params.latency_ms / 1e3
+        self._refractory_s = params.refractory_ms / 1e3
+        self._interval_s, self._redirect_s = (
+            params.min_interval_ms / 1e3,
+            params.redirect_before_ms / 1e3,
+        )
+        self._smooth_s = (params.crossing_least_ms / 1e3, params.crossing_most_ms / 1e3)
+
+    def reset(self, t_s: float) -> None:
+        """Start with no event and no refractory time."""
+        self.shift: int | None = None
+        self._due_s: float | None = None
+        self._landed_s = -inf
+        self._correct_s = 0.0
+        self._erred: bool | None = False
+        self.onset_s = t_s
+
+    def record_shift(self, shift: int, wait_s: float, lands_s: float | None, t_s: float) -> None:
+        """Record the target's count of gaze shifts.
+
+        wait_s: what the eyes wait beyond the latency, because the head goes first
+        lands_s: when the saccade in flight lands, None where there is none
+        """
+        if shift == self.shift:
+            return
+        self.shift = shift
+        self._erred = False
+        if self._due_s is None:
+            # The latency counts from the first event that is not answered yet; a later
+            # one changes where the saccade goes.
+            due_s, after_s = t_s + self._latency_s + wait_s, self._landed_s
+            if lands_s is not None:
+                after_s = -inf if due_s <= lands_s - self._redirect_s else lands_s
+            self._due_s = self.onset_s = max(due_s, after_s + self._interval_s)
+
+    def postpone(self, wait_s: float) -> None:
+        """Let the saccade that is to come wait for longer."""
+        if self._due_s is not None:
+            self._due_s = self.onset_s = self._due_s + wait_s
+
+    def redirects(self, t_s: float) -> bool:
+        """Return whether a new target bends the saccade in flight now, at most once for each."""
+        if self._due_s is None or t_s < self._due_s - 1e-9:
+            return False
+        self._due_s = None
+        return True
+
+    def refixate(self, t_s: float) -> None:
+        """Ask for a small saccade to another point of the same target."""
+        if self._due_s is None:
+            self._due_s = t_s
+
+    def record_landing(self, t_s: float, correct_after_s: float = 0.0) -> None:
+        """Record the end of a saccade, and after how long its error would be corrected."""
+        self._landed_s, self._correct_s = t_s, max(correct_after_s, self._interval_s)
+        self._erred = None if self._errs else False
+
+    def rests(self, error_rad: float) -> bool:
+        """Return whether nothing waits and an error calls for nothing: ``due`` would be False."""
+        return self._due_s is None and self._erred is False and error_rad <= self._saccade_rad
+
+    def due(self, slip: Slip, t_s: float) -> bool:
+        """Return whether a saccade starts now; to be asked only between saccades."""
+        error = norm(slip.error_rad)
+        if self._erred is None:
+            self._erred = error > self._correct_rad
+        if self._due_s is not None:
+            if t_s < self._due_s - 1e-9:
+                return False
+            self._due_s = None
+            if error > self._smallest_rad:
+                return self._go(t_s)
+        rested_s = t_s - self._landed_s
+        if self._erred:
+            if error <= self._correct_rad:
+                self._erred = False
+            elif rested_s >= self._correct_s - 1e-9:
+                return self._go(t_s)
+        if error <= self._saccade_rad or rested_s < self._refractory_s:
+            return False
+        return self._go(t_s) if not self._crosses(slip, error) else False
+
+    @property
+    def waits(self) -> bool:
+        """Return whether a new target has come and its saccade is still to start."""
+        return self._due_s is not None
+
+    @property
+    def corrects(self) -> bool:
+        """Return whether what the last saccade left waits for a correction."""
+        return bool(self._erred)
+
+    def _go(self, t_s: float) -> bool:
+        self.onset_s = t_s
+        self._erred = False
+        return True
+
+    def _crosses(self, slip: Slip, error_rad: float) -> bool:
+        """Return whether the target meets the line of sight soon by its own motion."""
+        closing = -dot(slip.error_rad, slip.slip_rad_s) / error_rad
+        least, most = self._smooth_s
+        return closing > 0.0 and least < error_rad / closing < most

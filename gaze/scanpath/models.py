@@ -1,0 +1,247 @@
+"""Four ways to look at a face: the measured walk and the three it is compared with.
+
+MarkovWalk     the measured walk over eight parts (Nakamoto & Tsuruno 3.2)
+SimpleCycle    face centre, right eye, left eye, again (4.4.2)
+FaceTracking   the face centre, always (4.4.3)
+RandomAngles   eyes to random angles at random intervals (4.4.4)
+
+Time and random generator are arguments of all; ``enter`` is called when a face is looked at that
+was not before, then ``step`` every tick.
+"""
+
+from collections.abc import Sequence
+from math import radians
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from gazerig.gaze.angles import add, direction, norm, rotate, rotation, scale, sub, yaw_pitch
+from gazerig.gaze.scanpath.dwell import Draw
+from gazerig.gaze.types import PARTS, Angles2, Face, Floats, Vec3
+
+
+class ScanpathStep(NamedTuple):
+    """One fixation on a face: the point, its part if it is one, whether it is new."""
+
+    p_world_m: Vec3
+    part: str | None
+    moved: bool
+
+
+class ScanpathModel(Protocol):
+    """The interface of the scanpath models."""
+
+    def enter(self, nearest: str | None = None) -> None:
+        """Start on a face; ``nearest``: its part nearest to the gaze, None where not known."""
+        ...
+
+    @property
+    def dwell(self) -> tuple[str | None, float | None]:
+        """Return the part looked at, None where it is none, and when that look ends, if known."""
+        ...
+
+    def go_on(self, before: "ScanpathModel") -> bool:
+        """Continue the fixation of another model; return whether this model can."""
+        ...
+
+    def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> ScanpathStep:
+        """Return what to look at; ``settled``: the gaze has arrived at the last look."""
+        ...
+
+
+class MarkovWalk:
+    """First-order Markov chain over the parts, with a dwell time drawn at each arrival.
+
+    A part that is drawn again is a refixation: the gaze stays for another dwell.
+    """
+
+    def __init__(
+        self,
+        parts: Sequence[str],
+        matrix: Floats,
+        dwells: Sequence[Draw],
+        start: int,
+        rng: np.random.Generator,
+        enters_nearest: bool = False,
+    ) -> None:
+        self._parts = tuple(parts)
+        self._columns = tuple(PARTS.index(part) for part in parts)
+        self._cumulative: list[list[float]] = np.cumsum(matrix, axis=1).tolist()
+        self._dwells = tuple(dwells)
+        self._start = start
+        self._enters_nearest = enters_nearest
+        self._rng = rng
+        self.enter()
+
+    def enter(self, nearest: str | None = None) -> None:
+        """Start at the start part, or at the nearest one where that is asked for and known."""
+        known = nearest is not None and self._enters_nearest
+        self._part = self._parts.index(str(nearest)) if known else self._start
+        self._face: Face | None = None
+        self._until_s: float | None = None
+
+    @property
+    def dwell(self) -> tuple[str | None, float | None]:
+        """Return the part looked at and when its dwell ends, None before the gaze is there."""
+        return self._parts[self._part], self._until_s
+
+    def go_on(self, before: ScanpathModel) -> bool:
+        """Continue the part fixated and its dwell; return whether it is one of this model's."""
+        part, until_s = before.dwell
+        if part not in self._parts:
+            return False
+        self._part, self._until_s, self._face = self._parts.index(part), until_s, None
+        return True
+
+    def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> ScanpathStep:
+        """Return the step: the dwell starts on arrival; after it another part is drawn."""
+        before, until_s = self._part, self._until_s
+        if until_s is None:
+            if settled:
+                self._until_s = t_s + self.dwell_s(before)
+        elif t_s >= until_s:
+            self._walk(until_s, t_s)
+        moved = self._part != before
+        if moved or face is not self._face:
+            point = face.parts_world_m[self._columns[self._part]]
+            self._step = ScanpathStep(point, self._parts[self._part], moved)
+            self._face = None if moved else face
+        return self._step
+
+    def next_part(self, part: int) -> int:
+        """Draw the part that follows ``part``, both as indices in the order given."""
+        draw = self._rng.random()
+        row = self._cumulative[part]
+        for following, edge in enumerate(row):
+            if draw < edge:
+                return following
+        return row.index(row[-1])  # rounding left the sum a hair below 1
+
+    def dwell_s(self, part: int) -> float:
+        """Draw a dwell time of a part."""
+        return self._dwells[part](self._rng)
+
+    def _walk(self, until_s: float, t_s: float) -> None:
+        while t_s >= until_s:
+            following = self.next_part(self._part)
+            if following != self._part:
+                self._part = following
+                self._until_s = None
+                return
+            until_s += self.dwell_s(self._part)
+        self._until_s = until_s
+
+
+class SimpleCycle:
+    """A fixed round of parts, each held for its own time after arrival."""
+
+    def __init__(self, parts: Sequence[str], dwell_s: Sequence[float]) -> None:
+        self._parts = tuple(parts)
+        self._columns = tuple(PARTS.index(part) for part in parts)
+        self._dwell_s = tuple(dwell_s)
+        self.enter()
+
+    def enter(self, nearest: str | None = None) -> None:
+        """Start at the first part."""
+        self._at = 0
+        self._until_s: float | None = None
+
+    @property
+    def dwell(self) -> tuple[str | None, float | None]:
+        """Return the part looked at and when its time is over, None before the gaze is there."""
+        return self._parts[self._at], self._until_s
+
+    def go_on(self, before: ScanpathModel) -> bool:
+        """Continue the part fixated and its dwell; return whether it is one of this model's."""
+        part, until_s = before.dwell
+        if part not in self._parts:
+            return False
+        self._at, self._until_s = self._parts.index(part), until_s
+        return True
+
+    def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> ScanpathStep:
+        """Return the step: the duration starts on arrival."""
+        moved = False
+        if self._until_s is None:
+            if settled:
+                self._until_s = t_s + self._dwell_s[self._at]
+        elif t_s >= self._until_s:
+            self._at = (self._at + 1) % len(self._parts)
+            self._until_s = None
+            moved = True
+        return ScanpathStep(
+            face.parts_world_m[self._columns[self._at]], self._parts[self._at], moved
+        )
+
+
+class FaceTracking:
+    """The face centre, always; the paper takes the tip of the nose for it (4.4.2)."""
+
+    def enter(self, nearest: str | None = None) -> None:
+        """Do nothing: this model has no state."""
+
+    @property
+    def dwell(self) -> tuple[str | None, float | None]:
+        """Return the nose, for ever."""
+        return "N", None
+
+    def go_on(self, before: ScanpathModel) -> bool:
+        """Return whether the nose was looked at before."""
+        return before.dwell[0] == "N"
+
+    def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> ScanpathStep:
+        """Return the centre."""
+        return ScanpathStep(face.p_world_m, "N", False)
+
+
+class RandomAngles:
+    """Eyes to random angles at random intervals, whatever the face shows.
+
+    Angles are even within +-angle_deg in yaw and in pitch, and turn about the direction
+    from the head to the face, which is where the head turns to. Intervals run from jump to
+    jump; the paper prints them as 0-3.0 ms, shorter than one of its frames: seconds are meant.
+    """
+
+    def __init__(self, angle_deg: float, longest_s: float, rng: np.random.Generator) -> None:
+        self._angle_rad = radians(angle_deg)
+        self._longest_s = longest_s
+        self._rng = rng
+        self.enter()
+
+    def enter(self, nearest: str | None = None) -> None:
+        """Start with angles drawn at once."""
+        self._offset_rad: Angles2 = self._angles()
+        self._until_s: float | None = None
+
+    @property
+    def dwell(self) -> tuple[str | None, float | None]:
+        """Return no part, and when the interval is over."""
+        return None, self._until_s
+
+    def go_on(self, before: ScanpathModel) -> bool:
+        """Continue angles and interval of another such model, clipped to this one's limits."""
+        if not isinstance(before, RandomAngles):
+            return False
+        most, (yaw, pitch) = self._angle_rad, before._offset_rad
+        self._offset_rad = (min(max(yaw, -most), most), min(max(pitch, -most), most))
+        self._until_s = before._until_s
+        return True
+
+    def step(self, face: Face, p_world_head_m: Vec3, t_s: float, settled: bool) -> ScanpathStep:
+        """Return the step: new angles are drawn when the interval is over."""
+        if self._until_s is None:
+            self._until_s = t_s + self._interval_s()
+        moved = t_s >= self._until_s
+        while t_s >= self._until_s:
+            self._offset_rad = self._angles()
+            self._until_s += self._interval_s()
+        to_face = sub(face.p_world_m, p_world_head_m)
+        way = rotate(rotation((*yaw_pitch(to_face), 0.0)), direction(self._offset_rad))
+        return ScanpathStep(add(p_world_head_m, scale(way, norm(to_face))), None, moved)
+
+    def _angles(self) -> Angles2:
+        yaw, pitch = self._rng.uniform(-self._angle_rad, self._angle_rad, 2).tolist()
+        return yaw, pitch
+
+    def _interval_s(self) -> float:
+        return self._longest_s * (1.0 - self._rng.random())  # never 0

@@ -1,0 +1,324 @@
+"""Scanpath on a face: a Markov walk over eight parts, or one of three simpler models.
+
+The measured walk is that of Nakamoto & Tsuruno 3.2. Its printed matrix has one decimal, so
+the rows sum to 0.8-1.1 and are normalised; rows are "from", columns "to". Only the point of
+a face target is replaced here; the head is told to turn to the face's centre and not to each
+part (3.5).
+"""
+
+from dataclasses import dataclass
+from math import inf
+from typing import Annotated, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gazerig.gaze.angles import add, angle_between, sub
+from gazerig.gaze.scanpath.dwell import LAWS, Draw
+from gazerig.gaze.scanpath.models import (
+    FaceTracking,
+    MarkovWalk,
+    RandomAngles,
+    ScanpathModel,
+    ScanpathStep,
+    SimpleCycle,
+)
+from gazerig.gaze.scanpath.rest import rests_s, shifted, stationary, visits_s
+from gazerig.gaze.types import PART_NAMES, PARTS, Face, Floats, Percept, Target, Vec3
+from gazerig.params import Bounds, Choices
+
+_OTHER_SIDE = {"LE": "RE", "RE": "LE", "FL": "FR", "FR": "FL"}
+# A measured and rounded row may miss 1 by this and still count as a row that sums to 1.
+_ROUNDING = 0.005
+
+
+@dataclass(frozen=True)
+class Walk:
+    """Statistics of a measured scanpath: transition matrix as printed, and dwell times."""
+
+    # fmt: off
+    order: Annotated[tuple[str, ...], "face parts in the order of rows and columns"]
+    matrix: Annotated[tuple[tuple[float, ...], ...], Bounds(0, 1), "transition probabilities, rows from, columns to, as printed"]
+    dwell_mean_s: Annotated[tuple[float, ...], Bounds(0.001, 60), "mean dwell per part"]
+    dwell_sd_s: Annotated[tuple[float, ...], Bounds(0, 60), "its standard deviation"]
+    start: Annotated[str, Choices(*PARTS), "first part"] = "FR"
+    # fmt: on
+
+    def __post_init__(self) -> None:
+        """Check the shapes.
+
+        Raises:
+            ValueError: parts, rows, columns and dwell times do not fit together.
+        """
+        if sorted(self.order) != sorted(PARTS):
+            raise ValueError(f"order must hold each of {', '.join(PARTS)} once")
+        n = len(PARTS)
+        if len(self.matrix) != n or any(len(row) != n for row in self.matrix):
+            raise ValueError(f"matrix must be {n} rows of {n} numbers")
+        if any(sum(row) <= 0.0 for row in self.matrix):
+            raise ValueError("every row of matrix needs at least one positive number")
+        if len(self.dwell_mean_s) != n or len(self.dwell_sd_s) != n:
+            raise ValueError(f"dwell_mean_s and dwell_sd_s must hold {n} numbers each")
+
+    @property
+    def row_sums(self) -> tuple[float, ...]:
+        """Return the sum of every row as it stands, before it is normalised."""
+        return tuple(sum(row) for row in self.matrix)
+
+
+def row_sums_note(walk: Walk) -> str | None:
+    """Return one line on the rows that do not sum to 1 and are normalised; None where all do."""
+    sums = zip(walk.order, walk.row_sums, strict=True)
+    off = [f"{part} {total:.3g}" for part, total in sums if abs(total - 1.0) > _ROUNDING]
+    if not off:
+        return None
+    return f"the walk's rows do not all sum to 1 ({', '.join(off)}); they are normalised"
+
+
+@dataclass(frozen=True)
+class ScanpathParams:
+    """Choice and parameters of the scanpath model."""
+
+    # fmt: off
+    model: Annotated[Literal["markov", "simple", "face_tracking", "random"],
+        "model of the scan path: the measured Markov walk, or one of the three baselines it is compared with"] = "markov"
+    transition_matrix: Annotated[str, "name of a shipped transition matrix or path of a YAML file"] = "nakamoto_tsuruno"
+    start: Annotated[str, Choices("nearest", "as_walk", *PARTS),
+        "face part that is looked at first, named as in the matrix; nearest: the one nearest to where the gaze comes from; "
+        "as_walk: as the matrix file says"] = "nearest"
+    viewers_left: Annotated[bool,
+        "left and right in the matrix and in simple_order are as the viewer sees them, not as the face's owner does"] = False
+    diagonal: Annotated[Literal["one_rest", "refixation", "whole_visit"],
+        "meaning of the matrix's diagonal, the same part again: another dwell (refixation), included in the dwell of the visit "
+        "(whole_visit), or another dwell that makes one rest with the last, spread by rest_spread (one_rest)"] = "one_rest"
+    dwell_distribution: Annotated[str, Choices(*LAWS), "distribution of the dwell times"] = "lognormal"
+    min_dwell_ms: Annotated[float, Bounds(0, 2000),
+        "shortest dwell, from landing to departure; what lasts longer is distributed above it, with the same mean"] = 140.0
+    rest_spread: Annotated[float, Bounds(0.05, 3),
+        "with diagonal one_rest: standard deviation over mean of what a rest lasts beyond min_dwell_ms"] = 0.6
+    shift_ms: Annotated[float, Bounds(0, 500),
+        "with diagonal one_rest: duration of a shift between parts, which the times of the table include"] = 44.0
+    rate_scale: Annotated[float, Bounds(0.1, 10), "dwell times are divided by this: with 2 the gaze wanders twice as fast"] = 1.0
+    simple_order: Annotated[tuple[str, ...], Choices(*PARTS), "order of the parts in the simple model"] = ("N", "RE", "LE")
+    simple_dwell_ms: Annotated[tuple[float, ...], Bounds(1, 60000), "dwell on each part of simple_order"] = (459.42, 408.21, 408.21)
+    random_angle_deg: Annotated[float, Bounds(0, 60), "largest yaw and pitch of the random model about the direction to the face"] = 20.0
+    random_longest_ms: Annotated[float, Bounds(10, 60000), "longest interval between jumps of the random model"] = 3000.0
+    # fmt: on
+
+    def __post_init__(self) -> None:
+        """Check the simple model's round.
+
+        Raises:
+            ValueError: it is empty, or its parts and times differ in number.
+        """
+        if not self.simple_order or len(self.simple_order) != len(self.simple_dwell_ms):
+            raise ValueError(
+                "simple_order and simple_dwell_ms must hold as many items, one or more"
+            )
+
+
+def normalised(matrix: ArrayLike) -> Floats:
+    """Return an (n, n) matrix with every row summing to 1."""
+    rows = np.asarray(matrix, dtype=float)
+    out: Floats = rows / rows.sum(axis=1, keepdims=True)
+    return out
+
+
+def without_refixations(matrix: ArrayLike) -> Floats:
+    """Return the chain of visits: the same walk with its self-transitions merged.
+
+    matrix: (n, n); a part that is never left for another keeps its row
+    """
+    rows = np.asarray(matrix, dtype=float)
+    away = rows * (1.0 - np.eye(len(rows)))
+    return normalised(np.where(away.sum(axis=1, keepdims=True) > 0.0, away, rows))
+
+
+class _Replaced(NamedTuple):
+    """A target as it was passed on, and what it was made of."""
+
+    target: Target
+    face: Face | None
+    point: Vec3 | None
+    shift: int
+    result: Target
+
+    def of(self, target: Target, face: Face | None, point: Vec3 | None, shift: int) -> bool:
+        """Return whether the same would be made of these."""
+        return (
+            point is self.point
+            and face is self.face
+            and shift == self.shift
+            and target == self.target
+        )
+
+
+def _replaced(target: Target, face: Face | None, look: ScanpathStep | None, shift: int) -> Target:
+    """Return a target with the point of its face, and counting the shifts on the face."""
+    if face is None or look is None:
+        return target._replace(shift=target.shift + shift) if shift else target
+    what = PART_NAMES[look.part] if look.part is not None else "random angles about"
+    # A lost face is waited for where it was heading, its parts with it.
+    moved = sub(target.p_world_m, face.p_world_m)
+    return target._replace(
+        p_world_m=add(look.p_world_m, moved),
+        part=look.part,
+        shift=target.shift + shift,
+        why=f"{what} of {target.why}" if look.part is not None else f"{what} {target.why}",
+        centre_world_m=target.p_world_m,
+    )
+
+
+class Scanpath:
+    """Replaces a face as target by the point of the face that is to be fixated."""
+
+    def __init__(self, params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> None:
+        self._rng = rng
+        self.looks = _looks(params, walk, rng)
+        self._last: _Replaced | None = None
+        self.reset(0.0)
+
+    def retune(self, params: ScanpathParams, walk: Walk) -> None:
+        """Change the model, walk or rate; the part looked at and its dwell go on.
+
+        A model that does not know that part begins with its own first look.
+        """
+        before, self.looks = self.looks, _looks(params, walk, self._rng)
+        self._last = None
+        if not self.looks.go_on(before):
+            self._shift += 1
+
+    def reset(self, t_s: float) -> None:
+        """Forget the face; the next one is entered again."""
+        self._face: Face | None = None
+        self._searched: Percept | None = None
+        self._last = None
+        self._shift = 0
+        self._rests_until_s = -inf
+        self.looks.enter()
+
+    def wander(
+        self,
+        target: Target,
+        percept: Percept | None,
+        t_s: float,
+        settled: bool,
+        p_world_head_m: Vec3 = (0.0, 0.0, 0.2),
+        gaze_world_m: Vec3 | None = None,
+    ) -> Target:
+        """Replace a face target by the point of it that is due; pass anything else on.
+
+        settled: whether the gaze has arrived at the last target given
+        gaze_world_m: where both eyes point now; None where that is unknown
+        """
+        if target.kind != "face":
+            self._face = face = None
+        else:
+            face, entered = self._find(target.id, percept)
+            if face is not None and entered:
+                self.looks.enter(_nearest(face, p_world_head_m, gaze_world_m))
+                settled = False  # at what was looked at before
+        look = None
+        if face is not None:
+            look = self.looks.step(face, p_world_head_m, t_s, settled)
+            self._shift += look.moved
+        self._rests_until_s = self._until_s(look, settled)
+        point = look.p_world_m if look is not None else None
+        last = self._last
+        if last is not None and last.of(target, face, point, self._shift):
+            return last.result
+        result = _replaced(target, face, look, self._shift)
+        self._last = _Replaced(target, face, point, self._shift, result)
+        return result
+
+    @property
+    def rests_until_s(self) -> float:
+        """Return until when the gaze rests on a part of a face.
+
+        inf while it is on its way there, -inf where no end is drawn or no face looked at.
+        """
+        return self._rests_until_s
+
+    def _until_s(self, look: ScanpathStep | None, settled: bool) -> float:
+        if look is None:
+            return -inf
+        _, until_s = self.looks.dwell
+        if until_s is not None:
+            return until_s
+        return -inf if settled and not look.moved else inf
+
+    def _find(self, face_id: int, percept: Percept | None) -> tuple[Face | None, bool]:
+        """Return the face, the last known while it is out of sight, and whether it is new.
+
+        None for a person who is in sight and has turned the face away.
+        """
+        known = self._face
+        if known is not None and known.id != face_id:
+            known = None
+        if known is not None and percept is self._searched:
+            return known, False
+        self._searched = percept
+        seen = () if percept is None else percept.faces
+        turned_away = percept is not None and face_id in percept.bodies.ids
+        missed = None if turned_away else known
+        self._face = next((face for face in seen if face.id == face_id), missed)
+        return self._face, known is None and self._face is not None
+
+
+def _nearest(face: Face, p_world_head_m: Vec3, gaze_world_m: Vec3 | None) -> str | None:
+    """Return the part of a face nearest to where the eyes point, None where that is unknown."""
+    if gaze_world_m is None:
+        return None
+    gaze = sub(gaze_world_m, p_world_head_m)
+    away = [angle_between(gaze, sub(part, p_world_head_m)) for part in face.parts_world_m]
+    return PARTS[away.index(min(away))]
+
+
+def _looks(params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> ScanpathModel:
+    """Return the model that the parameters name."""
+    match params.model:
+        case "simple":
+            dwells_s = [ms / 1e3 / params.rate_scale for ms in params.simple_dwell_ms]
+            return SimpleCycle(_owners(params, params.simple_order), dwells_s)
+        case "face_tracking":
+            return FaceTracking()
+        case "random":
+            longest_s = params.random_longest_ms / 1e3 / params.rate_scale
+            return RandomAngles(params.random_angle_deg, longest_s, rng)
+    return markov_walk(params, walk, rng)
+
+
+def markov_walk(params: ScanpathParams, walk: Walk, rng: np.random.Generator) -> MarkovWalk:
+    """Return the walk with the chosen reading of its diagonal, sides and start."""
+    matrix, dwells = steps_and_dwells(params, walk)
+    start = walk.start if params.start in ("nearest", "as_walk") else params.start
+    return MarkovWalk(
+        _owners(params, walk.order), matrix, dwells, walk.order.index(start), rng,
+        enters_nearest=params.start == "nearest",
+    )  # fmt: skip
+
+
+def steps_and_dwells(params: ScanpathParams, walk: Walk) -> tuple[Floats, list[Draw]]:
+    """Return the matrix of the steps that are drawn and the dwell law of each part.
+
+    Parts are in the walk's order; the matrix is normalised, rows from.
+    """
+    steps = normalised(walk.matrix)
+    if params.diagonal != "refixation":
+        steps = without_refixations(walk.matrix)
+    law, floor_s = params.dwell_distribution, params.min_dwell_ms / 1e3
+    mean_s = np.array(walk.dwell_mean_s) / params.rate_scale
+    sd_s = np.array(walk.dwell_sd_s) / params.rate_scale
+    if params.diagonal == "one_rest":
+        visit_s = visits_s(normalised(walk.matrix), mean_s)
+        mean_s = rests_s(stationary(steps), visit_s, params.shift_ms / 1e3, floor_s)
+        sd_s = params.rest_spread * (mean_s - floor_s)
+    pairs = zip(mean_s.tolist(), sd_s.tolist(), strict=True)
+    return steps, [shifted(law, mean, sd, floor_s) for mean, sd in pairs]
+
+
+def _owners(params: ScanpathParams, parts: tuple[str, ...]) -> tuple[str, ...]:
+    """Name the parts by the owner's left and right."""
+    if not params.viewers_left:
+        return parts
+    return tuple(_OTHER_SIDE.get(part, part) for part in parts)
