@@ -196,7 +196,7 @@ def branched_camera() -> Iterator[None]:
 def unlaid_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Draw figures small and without finding room for their labels, in a third of the time.
 
-    tests/test_report.py draws all of them as users see them.
+    tests/lab/test_report.py draws all of them as users see them.
     """
     from gazerig.features.lab.report import plotting
 

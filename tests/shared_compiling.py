@@ -38,7 +38,7 @@ def compile_missing(worker: str, config: pytest.Config) -> None:
         worker: name of this one; it gives the order.
         config: of pytest.
     """
-    tests = ROOT.glob("tests/test_*.py")
+    tests = ROOT.glob("tests/**/test_*.py")
     for file in order_of(worker, tests):
         cached = rewrite.get_cache_dir(file) / (file.stem + rewrite.PYC_TAIL)
         if not cached.exists() and rewrite.try_makedirs(cached.parent):

@@ -213,7 +213,7 @@ def test_files_named_exist(paper: Path) -> None:
 def defined() -> set[str]:
     """Return every name that the sources define, with and without its class, and every test."""
     names: set[str] = set()
-    for path in (ROOT / "tests").glob("*.py"):
+    for path in (*ROOT.glob("tests/*.py"), *ROOT.glob("tests/*/test_*.py")):
         names.add(path.stem)
         names |= set(re.findall(r"^def (\w+)", path.read_text(encoding="utf-8"), re.MULTILINE))
     for folder in FOLDERS:

@@ -24,22 +24,23 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 from mutants import ALL, Mutant  # noqa: E402
 
-COPIED = ("api", "config", "docs", "drivers", "examples", "gaze", "robot", "sim_mock", "tests")
+COPIED = (".links", "api", "config", "docs", "drivers", "examples", "features", "gaze", "robot", "sim_mock", "tests")
 
 
 def copied(to: Path) -> None:
     """Make a copy of sources and tests that runs by itself."""
     for folder in COPIED:
-        shutil.copytree(ROOT / folder, to / folder, ignore=shutil.ignore_patterns("__pycache__"))
+        passed_over = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(ROOT / folder, to / folder, symlinks=True, ignore=passed_over)
     for file in ("Makefile", "pyproject.toml", "README.md", "CHANGELOG.md"):
         shutil.copy(ROOT / file, to / file)
-    subprocess.run(["make", "-s", "links"], cwd=to, check=True)
 
 
 def node(name: str) -> str:
     """Return what pytest calls a test file, or a function in it."""
     file, *function = name.split("::")
-    return "::".join([f"tests/test_{file}.py", *function])
+    (path,) = ROOT.glob(f"tests/**/test_{file}.py")
+    return "::".join([str(path.relative_to(ROOT)), *function])
 
 
 def passes(copy: Path, tests: Iterable[str]) -> bool:
