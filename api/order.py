@@ -6,7 +6,8 @@ from types import TracebackType
 from typing import Literal, Protocol, Self
 
 from gazerig.robot.control.tick_feed import Progress
-from gazerig.robot.model.lead import ARRIVED_RAD, GestureState
+from gazerig.robot.model.lead import ARRIVED_RAD
+from gazerig.robot.model.leader import GestureState
 from gazerig.robot.model.reply import CommandReply
 
 Outcome = Literal["arrived", "refused", "out of reach", "taken over", "timed out"]

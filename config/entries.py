@@ -17,7 +17,7 @@ from ruamel.yaml.reader import ReaderError
 from gazerig.config.bounds import Step
 from gazerig.config.export import abbreviated, suggestion
 from gazerig.config.faults import ConfigFault
-from gazerig.drivers.file_input import FileTooLarge, NotRegularFile, read_limited
+from gazerig.drivers.files.file_input import FileTooLarge, NotRegularFile, read_limited
 
 Scalar = str | int | float | bool | None
 

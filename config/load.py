@@ -21,7 +21,8 @@ from gazerig.config.plugin_sections import extended
 from gazerig.config.renamed import renamed
 from gazerig.config.shipped import SHIPPED
 from gazerig.config.shipped import shipped_names as shipped_names
-from gazerig.drivers.plugins import GESTURES, RIGS, PluginError, yaml_files
+from gazerig.drivers.errors import PluginError
+from gazerig.drivers.plugins import GESTURES, RIGS, yaml_files
 
 T = TypeVar("T")
 _GROUPS = {"rigs": RIGS, "gestures": GESTURES}

@@ -12,6 +12,8 @@ from functools import cache
 from typing import Annotated, Any, NamedTuple, TypeVar, cast
 
 from gazerig.config.rig import BusConfig, GazeConfig, Rig
+from gazerig.drivers.bus.servo_models import add_models
+from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import (
     ATTENTION,
     BUS,
@@ -21,13 +23,11 @@ from gazerig.drivers.plugins import (
     BusPlugin,
     CameraPlugin,
     DetectorPlugin,
-    PluginError,
     find,
     is_ours,
     load,
     registered,
 )
-from gazerig.drivers.servo_models import add_models
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.params import Choices
 
@@ -169,7 +169,7 @@ def _section(group: str, name: str) -> tuple[str, Any, Any]:
     if isinstance(part, BusPlugin):
         if "baud" not in {field.name for field in dataclasses.fields(part.params)}:
             raise PluginError(f"{label}: its params need a field baud")
-        add_models(name, part, label)
+        add_models(name, part.models, part.moves, label)
     says = f"settings of {label}"
     return name, Annotated[part.params, says], _default(part.params)
 

@@ -7,13 +7,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
+from gazerig.drivers.bus.servo_models import BUS_KINDS, BusKind
 from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.params import CameraRecoveryParams, WebcamParams
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.pca9685.params import Pca9685Params
-from gazerig.drivers.servo_models import BUS_KINDS, BusKind
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.gaze.attention.attention import AttentionParams
@@ -32,13 +32,13 @@ from gazerig.gaze.oculomotor.pursuit_params import PursuitParams
 from gazerig.gaze.oculomotor.saccade import SaccadeParams
 from gazerig.gaze.scanpath.scanpath import ScanpathParams
 from gazerig.params import Bounds, Choices, Unit
+from gazerig.robot.description.mesh_params import MeshParams
 from gazerig.robot.model.coupling_params import CouplingParams
 from gazerig.robot.model.frames import CameraParams
 from gazerig.robot.model.guard_params import GuardParams
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS, GeometryParams
 from gazerig.robot.model.loop_params import LoopParams
-from gazerig.robot.model.mesh_params import MeshParams
 from gazerig.robot.model.track_params import TrackParams
 from gazerig.robot.model.types import in_order
 

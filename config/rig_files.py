@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from gazerig.config.load import ConfigError, ConfigFault, shipped_names
 from gazerig.config.save import SaveResult, copy_shipped, rig_file, save
 from gazerig.config.schema import Rig, layers_of, load_rig
-from gazerig.drivers.file_input import kind_of, read_limited
+from gazerig.drivers.files.file_input import kind_of, read_limited
 
 _LARGEST = 1_000_000  # bytes, as gazerig.config.entries reads
 

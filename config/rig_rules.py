@@ -6,8 +6,8 @@ from difflib import get_close_matches
 from gazerig.config.animation_rules import expressions, levels
 from gazerig.config.gestures import gesture_rules
 from gazerig.config.rig import Rig
+from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.hobby_board.params import HobbyBoardParams
-from gazerig.drivers.servo_models import SERVOS
 from gazerig.drivers.types import ServoConfig
 from gazerig.gaze.types import PARTS
 from gazerig.robot.model.coupling_params import CoupledPair, pair_setups, unreachable

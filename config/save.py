@@ -21,7 +21,7 @@ from gazerig.config.renamed import renamed_changes
 from gazerig.config.save_text import EditRefused, Value, edited, with_new_names, written
 from gazerig.config.schema import Rig, load_rig
 from gazerig.config.shipped import SHIPPED
-from gazerig.drivers.file_input import read_limited
+from gazerig.drivers.files.file_input import read_limited
 
 Check = Callable[[str], Any]
 """Loads a file by its path and returns its value; raises gazerig.config.load.ConfigError."""

@@ -14,7 +14,7 @@ from typing import Any, ParamSpec, TypeVar
 
 from gazerig.config.load import ConfigError, ConfigFault
 from gazerig.config.renamed import report_once
-from gazerig.drivers import child_process
+from gazerig.drivers.process import child_process
 
 P = ParamSpec("P")
 T = TypeVar("T")

@@ -27,6 +27,10 @@ class ModelFileError(SetupError):
     """A detector's model file is missing or not what it should be."""
 
 
+class PluginError(SetupError):
+    """A part of a package cannot be used; the message names part, package and version."""
+
+
 class BusLost(DriverError):
     """The port went away while in use: nothing may move until it is back and re-read."""
 

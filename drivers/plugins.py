@@ -15,11 +15,11 @@ from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from gazerig.drivers.errors import SetupError
+from gazerig.drivers.errors import PluginError, SetupError
 
 if TYPE_CHECKING:
+    from gazerig.drivers.bus.servo_models import ServoModelInfo
     from gazerig.drivers.serial.port import BusPort
-    from gazerig.drivers.servo_models import ServoModelInfo
 
 BUS, CAMERA, DETECTOR = "gazerig.bus", "gazerig.camera", "gazerig.detector"
 ATTENTION, GESTURES, RIGS = "gazerig.attention", "gazerig.gestures", "gazerig.rigs"
@@ -38,10 +38,10 @@ GROUPS: Mapping[str, str] = {
 
 SHIPPED: Mapping[str, Mapping[str, str]] = {
     BUS: {
-        "dynamixel": "gazerig.drivers.bus_plugins:DYNAMIXEL",
-        "feetech": "gazerig.drivers.bus_plugins:FEETECH",
-        "maestro": "gazerig.drivers.bus_plugins:MAESTRO",
-        "pca9685": "gazerig.drivers.bus_plugins:PCA9685",
+        "dynamixel": "gazerig.drivers.bus.bus_plugins:DYNAMIXEL",
+        "feetech": "gazerig.drivers.bus.bus_plugins:FEETECH",
+        "maestro": "gazerig.drivers.bus.bus_plugins:MAESTRO",
+        "pca9685": "gazerig.drivers.bus.bus_plugins:PCA9685",
     },
     CAMERA: {
         "webcam": "gazerig.drivers.camera.camera_plugins:WEBCAM",
@@ -75,10 +75,6 @@ a ``gazerig.robot.cli.command_list.CommandEntry``, a schema a dataclass that a Y
 """
 
 OUR_PACKAGE = "gazerig"
-
-
-class PluginError(SetupError):
-    """A part of a package cannot be used; the message names part, package and version."""
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ from typing import Final, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from gazerig.drivers.camera.located_frame import Clothing, LocatedFrame
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.located_frame import Clothing, LocatedFrame
 
 ImageArray = NDArray[np.uint8]
 """(height, width, 3) BGR."""

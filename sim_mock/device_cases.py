@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from gazerig.drivers.servo_models import BusKind
+from gazerig.drivers.bus.servo_models import BusKind
 from gazerig.sim_mock.dynamixel.chain import DynamixelChain
 from gazerig.sim_mock.feetech.chain import FeetechChain
 from gazerig.sim_mock.maestro import settings as maestro_settings

@@ -3,8 +3,8 @@
 import re
 from collections.abc import Iterable
 
+from gazerig.drivers.bus.servo_models import SERVOS, BusKind
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.servo_models import SERVOS, BusKind
 from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 

@@ -6,12 +6,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, ClassVar, NamedTuple
 
+from gazerig.drivers.bus.servo_models import HOBBY_KINDS, BusKind
 from gazerig.drivers.dynamixel.control_table import BAUD_RATES as DYNAMIXEL_BAUDS
+from gazerig.drivers.errors import PluginError
 from gazerig.drivers.feetech.memory_table import BAUD_RATES as FEETECH_BAUDS
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.pca9685.params import BRIDGE_BAUD
-from gazerig.drivers.plugins import BUS, BusPlugin, EmulatedJoint, PluginError, find, load
-from gazerig.drivers.servo_models import HOBBY_KINDS, BusKind
+from gazerig.drivers.plugins import BUS, BusPlugin, EmulatedJoint, find, load
 from gazerig.params import choices_of
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.hobby_servo import HobbyMaker, HobbyServo, HobbySpec

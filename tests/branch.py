@@ -29,8 +29,8 @@ from typing import Any, NoReturn
 import child_processes
 import pytest
 
-from gazerig.drivers import child_process
 from gazerig.drivers.camera import process as camera_process
+from gazerig.drivers.process import child_process
 
 _GIVEN = inspect.signature(subprocess.Popen._execute_child)  # type: ignore[attr-defined]
 _SIGNALS = (

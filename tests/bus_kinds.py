@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from gazerig.drivers.bus.servo_families import FAMILY_OF
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.hobby_board.channel import Channel
@@ -17,7 +18,6 @@ from gazerig.drivers.pca9685.bus import Pca9685Bus, Pca9685Params
 from gazerig.drivers.serial.port import BlockingPort, BusPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.servo_bus.params import BusParams
-from gazerig.drivers.servo_families import FAMILY_OF
 from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.sim_mock.device import Device
 from gazerig.sim_mock.devices import (

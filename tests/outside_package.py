@@ -7,7 +7,8 @@ from pathlib import Path
 from textwrap import dedent
 
 from gazerig.config import plugin_sections as sections
-from gazerig.drivers import plugins, servo_models
+from gazerig.drivers import plugins
+from gazerig.drivers.bus import servo_models
 
 OURS = frozenset(servo_models.SERVOS)
 

@@ -47,7 +47,7 @@ OWNERS = {
     "PIL": (
         "robot.calibration.charuco_page",
         "robot.dashboard.view.glb",
-        "robot.model.description.gltf",
+        "robot.description.gltf",
     ),
     "cv2": (
         "drivers.",
@@ -57,7 +57,7 @@ OWNERS = {
         "robot.perception.face_pose",
         "robot.calibration.hand_eye",
         "robot.analysis.heatmap",
-        "robot.model.description.mesh_files",
+        "robot.description.mesh_files",
         "robot.model.intrinsics",
         "robot.dashboard.",
         "robot.perception.kalman",

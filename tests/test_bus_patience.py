@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.dynamixel.control_table import MODELS, indirect_blocks
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.dynamixel.params import DynamixelParams
@@ -18,7 +19,6 @@ from gazerig.drivers.servo_bus.adaptive_timeout import (
 )
 from gazerig.drivers.servo_bus.faults import AGAIN_AND_AGAIN, ServoHealth
 from gazerig.drivers.servo_bus.read_windows import CALM_S
-from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoConfig
 
 

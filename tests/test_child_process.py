@@ -5,7 +5,7 @@ import subprocess
 
 import pytest
 
-from gazerig.drivers import child_process
+from gazerig.drivers.process import child_process
 
 
 def test_a_module_runs_in_a_session_of_its_own_with_what_it_is_given() -> None:

@@ -12,9 +12,9 @@ from described_rigs import SHIPPED, shipped
 
 from gazerig.config.schema import Rig
 from gazerig.robot.app.rig_description import collision_hints, shape_of
-from gazerig.robot.model.description.build import describe
-from gazerig.robot.model.description.clearance import collisions
-from gazerig.robot.model.description.mjcf import mjcf
+from gazerig.robot.description.build import describe
+from gazerig.robot.description.clearance import collisions
+from gazerig.robot.description.mjcf import mjcf
 from gazerig.robot.model.forbidden_range import CollisionParams
 
 Ranges = Mapping[str, tuple[float, float]]

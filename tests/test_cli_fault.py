@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 import pytest
 from ticked_rig import TickedRig, connected, gazerig
 
-from gazerig.drivers.servo_models import SERVOS
+from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.robot.control.command_handler import REAL
 from gazerig.robot.remote.request_handler import RequestHandler
 from gazerig.sim_mock.device_spec import line_of

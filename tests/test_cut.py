@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gazerig.robot.model.cut import cut
-from gazerig.robot.model.description import head_mesh
-from gazerig.robot.model.head_shape import JAW_BOUNDS, JAW_HALF
-from gazerig.robot.model.mesh import ellipsoid
-from gazerig.robot.model.paint import Painted, merged, painted
+from gazerig.robot.description import head_mesh
+from gazerig.robot.description.cut import cut
+from gazerig.robot.description.head_shape import JAW_BOUNDS, JAW_HALF
+from gazerig.robot.description.mesh import ellipsoid
+from gazerig.robot.description.paint import Painted, merged, painted
 
 BALL = painted(ellipsoid((0.3, 0.5, 0.4)), (200, 100, 50))
 

@@ -18,11 +18,11 @@ from command_line import invoked
 from described_rigs import SHIPPED, shipped
 
 from gazerig.robot.app.rig_description import description_of
+from gazerig.robot.description.files import description_files
+from gazerig.robot.description.gltf import gltf
+from gazerig.robot.description.servo_limits import joint_torques_nm
+from gazerig.robot.description.urdf import urdf
 from gazerig.robot.model.coupling_params import CouplingParams
-from gazerig.robot.model.description.files import description_files
-from gazerig.robot.model.description.gltf import gltf
-from gazerig.robot.model.description.servo_limits import joint_torques_nm
-from gazerig.robot.model.description.urdf import urdf
 
 VALIDATOR = os.environ.get("GLTF_VALIDATOR", "")
 """Folder in which ``npm install gltf-validator`` was run."""

@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 
 from gazerig.config.schema import Rig
 from gazerig.robot.app.rig_description import description_of
-from gazerig.robot.model.description import head_mesh
-from gazerig.robot.model.description.links import Description
-from gazerig.robot.model.description.mass import (
+from gazerig.robot.description import head_mesh
+from gazerig.robot.description.head_shape import JAW_HALF
+from gazerig.robot.description.links import Description
+from gazerig.robot.description.mass import (
     HEAD_LOAD_KG_M2,
     SHELL_M,
     about,
@@ -24,10 +25,9 @@ from gazerig.robot.model.description.mass import (
     skull,
     turned,
 )
-from gazerig.robot.model.description.mjcf import mjcf
-from gazerig.robot.model.description.urdf import urdf
-from gazerig.robot.model.head_shape import JAW_HALF
-from gazerig.robot.model.paint import merged
+from gazerig.robot.description.mjcf import mjcf
+from gazerig.robot.description.paint import merged
+from gazerig.robot.description.urdf import urdf
 
 
 def _own(description: Description, angles: Mapping[str, float]) -> Poses:

@@ -19,11 +19,11 @@ from gazerig.config.load import ConfigError, shipped_names
 from gazerig.config.parameters import NEXT_TICK, changed, parameters, value_of
 from gazerig.config.renamed import RIG as RENAMED
 from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.plugins import BusPlugin
 from gazerig.drivers.servo_bus.family import Family
-from gazerig.drivers.servo_models import SERVOS
 from gazerig.features.study.design import (
     Exclusion,
     Presentation,

@@ -18,9 +18,9 @@ import numpy as np
 import pytest
 from shown_page import free_port
 
-from gazerig.drivers import message_link
 from gazerig.drivers.errors import PortError
-from gazerig.drivers.message_link import MessageLink
+from gazerig.drivers.process import message_link
+from gazerig.drivers.process.message_link import MessageLink
 from gazerig.drivers.serial import port as serial_port
 from gazerig.drivers.types import Detections
 from gazerig.robot.dashboard.door import viser_server

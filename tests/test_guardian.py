@@ -15,8 +15,8 @@ from present import present
 from sts_rig import Rig as StsRig
 
 from gazerig.config.schema import load_rig
-from gazerig.drivers import child_process
 from gazerig.drivers.errors import ServoFault, SetupError
+from gazerig.drivers.process import child_process
 from gazerig.robot.app.bus_wiring import ports_of, release_plans
 from gazerig.robot.calibration.smart_servo_access import SingleServo
 from gazerig.robot.guardian.guarded_bus import RETRY_S, GuardedBus

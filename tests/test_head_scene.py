@@ -24,18 +24,18 @@ from gazerig.robot.dashboard.view.lid_edges import lid_edges
 from gazerig.robot.dashboard.view.scene_node import turned_up
 from gazerig.robot.dashboard.view.snapshot_shape import wide_awake
 from gazerig.robot.dashboard.view.views import BOTH, FACE, SHOULDER, View, view
-from gazerig.robot.model.description import head_mesh
-from gazerig.robot.model.description.parts import LOWER_LID, UPPER_LID
-from gazerig.robot.model.head_shape import (
+from gazerig.robot.description import head_mesh
+from gazerig.robot.description.head_shape import (
     EYE_RADIUS,
     eye_rim,
     field,
     measures_of,
     surface,
 )
-from gazerig.robot.model.mesh import Mesh, grid
-from gazerig.robot.model.paint import Painted, merged
-from gazerig.robot.model.person_shape import hand, head, torso
+from gazerig.robot.description.mesh import Mesh, grid
+from gazerig.robot.description.paint import Painted, merged
+from gazerig.robot.description.parts import LOWER_LID, UPPER_LID
+from gazerig.robot.description.person_shape import hand, head, torso
 from gazerig.robot.model.types import JointState, Snapshot
 
 RIGS = sorted(path.stem for path in shipped("rigs", "desk").parent.glob("*.yaml"))

@@ -8,7 +8,13 @@ from line_noise import Noisy
 
 from gazerig.drivers.errors import PortError
 from gazerig.drivers.event_log import SELDOM_S, EventLog, RateLimitedLog
-from gazerig.drivers.host_lateness import AFTERMATH_S, BUSY, LATE_COMPUTER, WITHIN_S, HostLateness
+from gazerig.drivers.process.host_lateness import (
+    AFTERMATH_S,
+    BUSY,
+    LATE_COMPUTER,
+    WITHIN_S,
+    HostLateness,
+)
 from gazerig.drivers.serial.port import BlockingPort
 
 KINDS = ("dynamixel", "feetech")

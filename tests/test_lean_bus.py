@@ -10,7 +10,7 @@ from collections import Counter
 import pytest
 from stand_in import StandIn
 
-from gazerig.drivers.bus_plugins import DYNAMIXEL, FEETECH, MAESTRO, PCA9685
+from gazerig.drivers.bus.bus_plugins import DYNAMIXEL, FEETECH, MAESTRO, PCA9685
 from gazerig.robot.control.body import Body, setups
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.types import GAZE_JOINTS

@@ -28,7 +28,8 @@ from gazerig.robot.model.commands import (
     LookAtPixel,
     Stop,
 )
-from gazerig.robot.model.lead import ARRIVED_RAD, NOBODY_LEADS
+from gazerig.robot.model.lead import ARRIVED_RAD
+from gazerig.robot.model.leader import NOBODY_LEADS
 from gazerig.robot.model.reply import CommandReply
 from gazerig.robot.recording.read import RunRecording
 

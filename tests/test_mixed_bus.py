@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
+from gazerig.drivers.bus.multi_bus import AGAIN_S, IN_A_ROW, BusShare, MultiBus
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
-from gazerig.drivers.multi_bus import AGAIN_S, IN_A_ROW, BusShare, MultiBus
 from gazerig.drivers.types import BusHealth, ServoConfig
 from gazerig.testing.rows import Row, feedback_of, rows
 

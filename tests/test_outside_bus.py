@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
-from gazerig.drivers.plugins import PluginError
+from gazerig.drivers.errors import PluginError
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.bus_wiring import has_watchdog, release_plan
 from gazerig.robot.app.emulation import emulated_lines

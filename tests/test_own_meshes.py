@@ -13,10 +13,10 @@ from gazerig.config.allowed_folder import AllowedFolder
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.app.mesh_reader import read_mesh
 from gazerig.robot.app.rig_description import description_of, shape_of
-from gazerig.robot.model.description.mjcf import mjcf
-from gazerig.robot.model.mesh_params import MeshParams
+from gazerig.robot.description.mesh_params import MeshParams
+from gazerig.robot.description.mesh_reader import read_mesh
+from gazerig.robot.description.mjcf import mjcf
 
 RIG = """name: mine
 profile: robot

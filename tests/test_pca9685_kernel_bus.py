@@ -12,8 +12,8 @@ from gazerig.drivers.errors import BusLost, PortError
 from gazerig.drivers.i2c import port as i2c_port
 from gazerig.drivers.i2c.port import I2cPort, explain
 from gazerig.drivers.pca9685.bus import Pca9685Bus
-from gazerig.drivers.port_by_path import port_of
 from gazerig.drivers.serial.port import BlockingPort
+from gazerig.drivers.serial.port_by_path import port_of
 from gazerig.drivers.serial.port_owner import refuse_owner
 from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions

@@ -9,7 +9,7 @@ from shown_page import SNAPSHOT
 from test_page import face_at
 
 from gazerig.robot.dashboard.view.people import PeopleView
-from gazerig.robot.model import person_shape
+from gazerig.robot.description import person_shape
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.model.types import SeenBody, Snapshot
 

@@ -4,8 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gazerig.drivers.feetech.family import FEETECH
-from gazerig.drivers.plausibility import (
+from gazerig.drivers.bus.plausibility import (
     AGREEING,
     DISTURBED_S,
     LATE_S,
@@ -13,6 +12,7 @@ from gazerig.drivers.plausibility import (
     PAIR_STEPS,
     Plausibility,
 )
+from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.read_windows import Sample
 from gazerig.drivers.servo_bus.sync_read import ServoReply

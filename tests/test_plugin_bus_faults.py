@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from gazerig.drivers.checked_bus import CheckedBus
+from gazerig.drivers.bus.checked_bus import CheckedBus
 from gazerig.drivers.errors import BusLost
 from gazerig.drivers.types import Feedback, ServoConfig
 

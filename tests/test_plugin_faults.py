@@ -12,12 +12,12 @@ from outside_package import install, on_path
 
 from gazerig.config.parameters import changed
 from gazerig.config.schema import load_rig
-from gazerig.drivers.bounded_call import BoundedCall, CallResult
 from gazerig.drivers.camera.camera_plugins import CheckedSource
 from gazerig.drivers.camera.guarded_camera import GuardedCamera
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.errors import CameraError
-from gazerig.drivers.plugins import ATTENTION, PluginError
+from gazerig.drivers.errors import CameraError, PluginError
+from gazerig.drivers.plugins import ATTENTION
+from gazerig.drivers.process.bounded_call import BoundedCall, CallResult
 from gazerig.drivers.types import DetectedFace, Detections
 from gazerig.drivers.vision.face.detector import CheckedDetector
 from gazerig.gaze.types import Target

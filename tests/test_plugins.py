@@ -16,6 +16,7 @@ from gazerig.config.load import ConfigError
 from gazerig.config.parameters import changed, parameters
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers import plugins
+from gazerig.drivers.errors import PluginError
 from gazerig.drivers.plugins import (
     ATTENTION,
     BUS,
@@ -30,7 +31,6 @@ from gazerig.drivers.plugins import (
     AttentionPlugin,
     CameraPlugin,
     Plugin,
-    PluginError,
 )
 from gazerig.robot.app.camera_factory import real_camera
 from gazerig.robot.app.options import RunOptions, camera_of

@@ -8,8 +8,8 @@ from mixed_rig import mixed_text
 
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.bus.multi_bus import MultiBus
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.multi_bus import MultiBus
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, ports_of, rig_setups
 from gazerig.robot.app.options import RunOptions
 

@@ -41,7 +41,7 @@ from gazerig.robot.control.tick_stream import TickBatch, TickStream
 from gazerig.robot.dashboard.feed.camera_overlay import encode
 from gazerig.robot.model import stop_latch
 from gazerig.robot.model.commands import Ask, Jog, LookAt, Resume, Stop, Tune
-from gazerig.robot.model.lead import GestureState, LeadState
+from gazerig.robot.model.leader import GestureState, LeadState
 from gazerig.robot.recording import run_format as fmt
 from gazerig.robot.recording import tick_record as moments
 from gazerig.robot.recording.frame_picker import FramePicker

@@ -9,12 +9,12 @@ from served_rigs import hide_real_ports, served
 
 from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig
+from gazerig.drivers.bus.servo_families import FAMILY_OF
+from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.feetech.scs import FEETECH_SCS, SCS_REGISTERS
 from gazerig.drivers.servo_bus.discovery import corrupt, scan_ids
 from gazerig.drivers.servo_bus.registers import Registers
-from gazerig.drivers.servo_families import FAMILY_OF
-from gazerig.drivers.servo_models import SERVOS
 from gazerig.robot.guardian.release_plan import ReleasePlan, decode, encode, releaser
 from gazerig.sim_mock.feetech.chain import build_feetech
 from gazerig.sim_mock.in_process_port import InProcessPort

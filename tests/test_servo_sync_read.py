@@ -18,8 +18,7 @@ from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.feetech.protocol import checksum
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.poll_list import AGAIN_FIRST_S, AGAIN_LAST_S, PollList, silent_servos
-from gazerig.drivers.servo_bus.sync_packets import SyncRead
-from gazerig.drivers.servo_bus.sync_read import ServoReply
+from gazerig.drivers.servo_bus.sync_read import ServoReply, SyncRead
 from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.dynamixel.packets import status

@@ -9,11 +9,10 @@ from hypothesis import strategies as st
 
 from gazerig.gaze.types import Floats
 from gazerig.robot.dashboard.view.glow import glow
-from gazerig.robot.model import person_shape
-from gazerig.robot.model.description import head_mesh
-from gazerig.robot.model.description.texture import TexturedMesh, textured
-from gazerig.robot.model.mesh import Mesh, cap, smooth_normals
-from gazerig.robot.model.paint import Painted, merged, mirrored, mix, moved, painted, plain
+from gazerig.robot.description import head_mesh, person_shape
+from gazerig.robot.description.mesh import Mesh, cap, smooth_normals
+from gazerig.robot.description.paint import Painted, merged, mirrored, mix, moved, painted, plain
+from gazerig.robot.description.texture import TexturedMesh, textured
 
 SHAPES: dict[str, Callable[[], Painted]] = {
     "eye": head_mesh.eye,

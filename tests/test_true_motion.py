@@ -17,7 +17,7 @@ from mixed_rig import mixed_text
 from true_shafts import Bench, Judge, restless
 
 from gazerig.config.schema import Rig, load_rig
-from gazerig.drivers.servo_models import HOBBY_KINDS
+from gazerig.drivers.bus.servo_models import HOBBY_KINDS
 from gazerig.robot.app.rig_limits import limits
 
 NAMES = ("desk", "feetech", "maker", "pca9685", "mixed")

@@ -21,7 +21,7 @@ from gazerig.robot.app.world.first_world import what_it_needs
 from gazerig.robot.app.world.head_group import Following, compose_group, has_other_heads
 from gazerig.robot.app.world.lockstep import Lockstep
 from gazerig.robot.control.interrupts import Interrupts
-from gazerig.robot.model.description.links import IDENTITY
+from gazerig.robot.description.links import IDENTITY
 from gazerig.robot.recording.read import RunRecording
 
 ASKED = RunOptions(mock=True, fast=True, world="two-heads", seconds=3.0, no_pictures=True)

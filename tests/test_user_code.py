@@ -16,14 +16,13 @@ import pytest
 from slow_rigs import at_rate
 
 import gazerig
-from gazerig.drivers import bounded_call
-from gazerig.drivers.bounded_call import LASTING, BoundedCall, LastingReport, lasting_text
+from gazerig.drivers.bus.checked_bus import CheckedBus
 from gazerig.drivers.camera import thread
 from gazerig.drivers.camera.guarded_camera import GuardedCamera
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.checked_bus import CheckedBus
-from gazerig.drivers.errors import BusLost
-from gazerig.drivers.plugins import PluginError
+from gazerig.drivers.errors import BusLost, PluginError
+from gazerig.drivers.process import bounded_call
+from gazerig.drivers.process.bounded_call import LASTING, BoundedCall, LastingReport, lasting_text
 from gazerig.drivers.types import Detections, ServoConfig
 from gazerig.robot.app import run_bus
 from gazerig.robot.control import line_queue
@@ -398,8 +397,8 @@ def test_a_call_that_waits_outside_python_is_told_as_long_as_it_lasts() -> None:
 def test_a_bus_that_blocks_ends_the_run_and_can_be_closed(
     misbehaves: Callable[[str], Misbehaviour], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gazerig.drivers.checked_bus._USUAL_S", 0.05)
-    monkeypatch.setattr("gazerig.drivers.checked_bus._BLOCKED_S", 0.05)
+    monkeypatch.setattr("gazerig.drivers.bus.checked_bus._USUAL_S", 0.05)
+    monkeypatch.setattr("gazerig.drivers.bus.checked_bus._BLOCKED_S", 0.05)
     released: list[int] = []
     inner: Any = Parts(read=misbehaves("blocks"), disable_torque=lambda: released.append(1))
     bus = CheckedBus(inner, "bus 'b' of b 1", (ServoConfig(1, "m", 0, 1000, 500.0, "neck"),))

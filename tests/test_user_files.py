@@ -17,8 +17,8 @@ from gazerig.config.load import ConfigError
 from gazerig.config.schema import load_rig, load_rules, load_walk
 from gazerig.drivers.camera.recording_writer import RecordingWriter
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_input import FileTooLarge, NotRegularFile, read_limited
-from gazerig.drivers.file_output import output_file, output_text, refuse_existing, write_file
+from gazerig.drivers.files.file_input import FileTooLarge, NotRegularFile, read_limited
+from gazerig.drivers.files.file_output import output_file, output_text, refuse_existing, write_file
 from gazerig.features.lab.analysis.eye_tracker_csv import read_recording
 from gazerig.features.lab.report.files import files_of, write_all
 from gazerig.features.lab.report.gaze_trace import GazeTrace, TraceRow

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from world_scripts import WORLDS, shipped_world
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.model.person_shape import WORLD_LOOKS
+from gazerig.robot.description.person_shape import WORLD_LOOKS
 from gazerig.sim_mock.world.body_shape import body_segments
 from gazerig.sim_mock.world.faces import looks
 from gazerig.sim_mock.world.figure import SEGMENTS, Figures

@@ -14,7 +14,7 @@ from rendering import renders as renders
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.gaze.angles import compose, rotate, rotation, sub
 from gazerig.gaze.types import Floats, Mat3, Vec3
-from gazerig.robot.model.description.links import IDENTITY, ORIGIN
+from gazerig.robot.description.links import IDENTITY, ORIGIN
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.scene_view import PinholeView, Rendered
 from gazerig.sim_mock.cameras.optics import (

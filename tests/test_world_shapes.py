@@ -18,9 +18,9 @@ from gazerig.config.schema import load_rig
 from gazerig.robot.app.world.rig import rig_in_world
 from gazerig.robot.app.world.run_world import world_scene
 from gazerig.robot.dashboard.view.world_view import part_glb, room_glbs
-from gazerig.robot.model.description.texture import TexturedMesh
-from gazerig.robot.model.paint import Painted
-from gazerig.robot.model.world_shapes import WorldPart
+from gazerig.robot.description.paint import Painted
+from gazerig.robot.description.texture import TexturedMesh
+from gazerig.robot.description.world_shapes import WorldPart
 from gazerig.sim_mock.world.figure_model import PlacedPeople
 from gazerig.sim_mock.world.rig_in_world import RigInWorld
 from gazerig.sim_mock.world.shapes import SpecShapes, shapes_of

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import gazerig.robot.app.assemble as assembling
 import gazerig.robot.app.run_bus as run_bus
 from gazerig.config.schema import Rig
-from gazerig.drivers.servo_models import HOBBY_KINDS
+from gazerig.drivers.bus.servo_models import HOBBY_KINDS
 from gazerig.robot.app.assemble import Assembly, assemble
 from gazerig.robot.app.bus_wiring import rig_bus
 from gazerig.robot.app.emulation import emulated_lines, place_of

@@ -6,12 +6,12 @@ from math import sin
 import numpy as np
 
 from gazerig.gaze.types import Vec3
-from gazerig.robot.model.description.texture import textured
-from gazerig.robot.model.mesh import Mesh, grid
-from gazerig.robot.model.paint import Painted, painted
-from gazerig.robot.model.person_shape import head, torso
+from gazerig.robot.description.mesh import Mesh, grid
+from gazerig.robot.description.paint import Painted, painted
+from gazerig.robot.description.person_shape import head, torso
+from gazerig.robot.description.texture import textured
+from gazerig.robot.description.world_shapes import WorldPart
 from gazerig.robot.model.quaternion import Quaternion
-from gazerig.robot.model.world_shapes import WorldPart
 
 LEAVES_S = 60.0
 

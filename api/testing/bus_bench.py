@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from gazerig.drivers.multi_bus import BusShare, MultiBus
+from gazerig.drivers.bus.multi_bus import BusShare, MultiBus
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.sim_mock.device import Device

@@ -2,8 +2,8 @@
 
 import pytest
 
+from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
-from gazerig.drivers.servo_models import servo_label
 from gazerig.testing.bus_suite import BusBenches
 from gazerig.testing.rows import rows, well
 

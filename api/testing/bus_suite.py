@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from gazerig.drivers.servo_models import servo_label
+from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.types import ServoBus
 from gazerig.testing.bus_bench import PLACES, BusBench, BusUnderTest, InProcess, holding, in_process
 from gazerig.testing.rows import present, rows, well

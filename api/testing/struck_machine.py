@@ -10,7 +10,7 @@ from math import pi, radians, sin
 from typing import NamedTuple
 
 from gazerig.config.schema import Rig
-from gazerig.drivers.servo_models import HOBBY_KINDS, servo_label
+from gazerig.drivers.bus.servo_models import HOBBY_KINDS, servo_label
 from gazerig.robot.app.bus_wiring import rig_bus, rig_setups
 from gazerig.robot.app.emulation import emulated_lines, place_of
 from gazerig.robot.app.rig_limits import limits, park_rad

@@ -7,17 +7,8 @@ from typing import Any, cast
 from gazerig.drivers.camera.oak.params import OakParams
 from gazerig.drivers.camera.params import WebcamParams
 from gazerig.drivers.camera.source import FrameSource, Shot, bgr
-from gazerig.drivers.errors import CameraError, SetupError
-from gazerig.drivers.plugins import (
-    CAMERA,
-    CameraPlugin,
-    Evidence,
-    PluginError,
-    failure,
-    find,
-    load,
-    made,
-)
+from gazerig.drivers.errors import CameraError, PluginError, SetupError
+from gazerig.drivers.plugins import CAMERA, CameraPlugin, Evidence, failure, find, load, made
 from gazerig.drivers.types import CameraTurn
 
 

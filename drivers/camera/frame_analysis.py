@@ -4,10 +4,10 @@ from collections.abc import Callable
 from math import degrees
 from time import perf_counter
 
+from gazerig.drivers.camera.located_frame import LocatedFrame
 from gazerig.drivers.camera.off_frame import OffFrameReport
 from gazerig.drivers.camera.params import ASSUMED_FIELD_DEG
 from gazerig.drivers.camera.source import Shot
-from gazerig.drivers.located_frame import LocatedFrame
 from gazerig.drivers.types import DetectedFace, Detections, FaceDetector, MovingBlob
 
 Motion = Callable[[Shot], tuple[MovingBlob, ...]]

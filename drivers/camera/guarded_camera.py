@@ -5,11 +5,11 @@ from collections.abc import Sequence
 from math import isfinite
 from typing import Any
 
-from gazerig.drivers.bounded_call import BoundedCall
 from gazerig.drivers.camera.off_frame import OffFrameReport
-from gazerig.drivers.errors import SetupError
+from gazerig.drivers.errors import PluginError, SetupError
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.plugins import PluginError, failure
+from gazerig.drivers.plugins import failure
+from gazerig.drivers.process.bounded_call import BoundedCall
 from gazerig.drivers.types import Camera, DetectedFace, Detections, MovingBlob
 
 LONGEST_S = 0.001

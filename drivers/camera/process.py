@@ -27,8 +27,8 @@ from gazerig.drivers.camera.params import CameraRecoveryParams
 from gazerig.drivers.camera.shared_detections import SharedDetections
 from gazerig.drivers.camera.shared_frames import SlotReader
 from gazerig.drivers.camera.worker import LONGEST_END_S, CameraParts, Ended, Found, Retune, run
-from gazerig.drivers.child_process import hidden_script
 from gazerig.drivers.errors import CameraError, SetupError
+from gazerig.drivers.process.child_process import hidden_script
 from gazerig.drivers.types import SCENES_OF_A_PROCESS, Detections, FaceDetector
 
 _LONGEST_START_S = 60.0

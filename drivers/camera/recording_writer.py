@@ -14,7 +14,7 @@ from mcap.writer import CompressionType, IndexType, Writer
 from gazerig.drivers.camera.recording_format import PROFILE, SCHEMAS, encoded, nanoseconds
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
-from gazerig.drivers.file_output import refuse_existing
+from gazerig.drivers.files.file_output import refuse_existing
 
 # What the system has may be lost with the power; so often it is put on the disk.
 _SYNC_NS = 1_000_000_000

@@ -8,13 +8,13 @@ import threading
 from collections import deque
 from collections.abc import Callable
 
-from gazerig.drivers.bounded_call import BoundedCall
 from gazerig.drivers.camera.capture_loop import CaptureLoop, failed
 from gazerig.drivers.camera.frame_analysis import Locate, Motion
 from gazerig.drivers.camera.params import CameraRecoveryParams
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.camera.worker import Retune
 from gazerig.drivers.errors import CameraError, SetupError
+from gazerig.drivers.process.bounded_call import BoundedCall
 from gazerig.drivers.types import Detections, FaceDetector
 
 # OpenCV gives up waiting for a camera after 10 s; a film stops at once.

@@ -8,11 +8,11 @@ the pulses are on their way, and ``lead`` is called again and again.
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple, Protocol
 
+from gazerig.drivers.bus.port_bus import Exchange
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.params import HobbyBoardParams
-from gazerig.drivers.host_lateness import HostLateness
-from gazerig.drivers.port_bus import Exchange
+from gazerig.drivers.process.host_lateness import HostLateness
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.types import ServoConfig
 

@@ -14,9 +14,11 @@ What such a board cannot do, and so this bus cannot promise:
 from collections.abc import Sequence
 from math import inf, nan
 
+from gazerig.drivers.bus.goal_limits import clipped
+from gazerig.drivers.bus.port_bus import CUT, PortBus
+from gazerig.drivers.bus.released import ReleaseResult
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.goal_limits import clipped
 from gazerig.drivers.hobby_board.board import Board, BoardLine
 from gazerig.drivers.hobby_board.channel import Channel
 from gazerig.drivers.hobby_board.models import channel_label
@@ -24,8 +26,6 @@ from gazerig.drivers.hobby_board.release import TRIES, switch_off
 from gazerig.drivers.hobby_board.silence import SilenceMonitor
 from gazerig.drivers.hobby_board.start import enable_channels
 from gazerig.drivers.hobby_board.supervisor import BoardSupervisor
-from gazerig.drivers.port_bus import CUT, PortBus
-from gazerig.drivers.released import ReleaseResult
 from gazerig.drivers.serial.reconnect import ReconnectingPort
 from gazerig.drivers.types import Feedback, ServoConfig
 

@@ -3,9 +3,9 @@
 from collections import deque
 from math import inf
 
+from gazerig.drivers.bus.limit_recovery import entry_speed_steps_s
 from gazerig.drivers.hobby_board.models import HOBBY
 from gazerig.drivers.hobby_board.ramp import Ramp
-from gazerig.drivers.slow_entry import entry_speed_steps_s
 from gazerig.drivers.types import ServoConfig
 
 RECENT_S = 0.1

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from typing import Protocol
 
+from gazerig.drivers.bus.released import ReleaseResult
 from gazerig.drivers.errors import PortError
-from gazerig.drivers.released import ReleaseResult
 from gazerig.drivers.serial.port import BusPort
 
 TRIES = 3

@@ -3,7 +3,7 @@
 from math import inf
 
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.host_lateness import BLAME_S, SILENCE_S, STOOD_STILL, HostLateness
+from gazerig.drivers.process.host_lateness import BLAME_S, SILENCE_S, STOOD_STILL, HostLateness
 
 AGAIN_FIRST_S, AGAIN_LAST_S = 0.0625, 0.5
 """Time between questions to a board that stays silent: doubled from the first to the last."""

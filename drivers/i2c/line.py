@@ -6,8 +6,8 @@ I2C has no check bytes: an answer that is acted upon is read twice.
 from collections import Counter
 from collections.abc import Sequence
 
-from gazerig.drivers.host_lateness import HostLateness
 from gazerig.drivers.i2c.bridge import ASK_STATUS, OUTCOMES
+from gazerig.drivers.process.host_lateness import HostLateness
 from gazerig.drivers.serial.port import BITS_PER_BYTE, BusPort
 
 WAIT_PIECE_S = 0.1

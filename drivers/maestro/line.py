@@ -7,9 +7,9 @@ other. After a missing answer the line is drained before the next request.
 from collections import Counter
 from collections.abc import Sequence
 
-from gazerig.drivers.host_lateness import HostLateness
 from gazerig.drivers.maestro.commands import MOST, PROTOCOL_ERROR, WORD, MaestroCodec, decode_words
 from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.process.host_lateness import HostLateness
 from gazerig.drivers.serial.port import BITS_PER_BYTE, QUIET_S, BusPort
 
 AT_ONCE = 6

@@ -4,12 +4,12 @@ import struct
 from collections.abc import Callable, Collection, Mapping, Sequence
 from math import ceil
 
+from gazerig.drivers.bus.goal_limits import clipped
+from gazerig.drivers.bus.plausibility import DISTURBED_S
+from gazerig.drivers.bus.port_bus import CUT, PortBus
+from gazerig.drivers.bus.released import ReleaseResult
 from gazerig.drivers.errors import BusLost, PortError, ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog, servo_label
-from gazerig.drivers.goal_limits import clipped
-from gazerig.drivers.plausibility import DISTURBED_S
-from gazerig.drivers.port_bus import CUT, PortBus
-from gazerig.drivers.released import ReleaseResult
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.reconnect import ReconnectingPort
 from gazerig.drivers.servo_bus.discovery import find

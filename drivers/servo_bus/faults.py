@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping, Sequence
 
 from gazerig.drivers.event_log import EventLog, RateLimitedLog, servo_label
-from gazerig.drivers.host_lateness import BLAME_S, SILENCE_S, STOOD_STILL, HostLateness
+from gazerig.drivers.process.host_lateness import BLAME_S, SILENCE_S, STOOD_STILL, HostLateness
 from gazerig.drivers.types import ServoConfig
 
 MOST_RESTARTS, WITHIN_S = 3, 10.0

@@ -2,7 +2,7 @@
 
 Where the check over an answer is weak (a sum of one byte), bytes spoilt in two places pass it now
 and then. So a position that no joint can have reached since the last one is withheld
-(``gazerig.drivers.plausibility``), and on a disturbed line every answer needs a second one that
+(``gazerig.drivers.bus.plausibility``), and on a disturbed line every answer needs a second one that
 agrees with it.
 """
 
@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from operator import mul
 from typing import TypeVar
 
-from gazerig.drivers.plausibility import Plausibility
+from gazerig.drivers.bus.plausibility import Plausibility
 from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.sync_packets import Expected, GroupRead
 from gazerig.drivers.servo_bus.sync_read import ServoReply

@@ -6,6 +6,7 @@ becomes the present position, and only then comes the torque.
 
 from collections.abc import Collection, Mapping, Sequence
 
+from gazerig.drivers.bus.limit_recovery import entry_speed_steps_s
 from gazerig.drivers.errors import ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.servo_bus.faults import ServoHealth
@@ -13,7 +14,6 @@ from gazerig.drivers.servo_bus.provisioning import Provisioning
 from gazerig.drivers.servo_bus.torque import find_faults, insist, positions, switch_off, switch_on
 from gazerig.drivers.servo_bus.transaction import Transactions
 from gazerig.drivers.servo_bus.turn import nearest_turn
-from gazerig.drivers.slow_entry import entry_speed_steps_s
 from gazerig.drivers.types import ServoConfig
 
 FAR_SIDE = "stands beyond its encoder's zero: turn it into its range by hand"

@@ -4,7 +4,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Mapping
 from math import inf
 
-from gazerig.drivers.host_lateness import LATE_COMPUTER
+from gazerig.drivers.bus.limit_recovery import SlowEntry
+from gazerig.drivers.process.host_lateness import LATE_COMPUTER
 from gazerig.drivers.servo_bus.faults import ServoHealth
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
 from gazerig.drivers.servo_bus.read_plan import ReadPlan
@@ -12,7 +13,6 @@ from gazerig.drivers.servo_bus.read_windows import Sample
 from gazerig.drivers.servo_bus.recovery import Recovery
 from gazerig.drivers.servo_bus.torque import rearm_tripped
 from gazerig.drivers.servo_bus.transaction import TRIES, Transactions
-from gazerig.drivers.slow_entry import SlowEntry
 from gazerig.drivers.types import ServoConfig
 
 AGAIN_S = 0.25

@@ -9,7 +9,6 @@ import struct
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, Protocol
 
-from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.read_windows import KNOWN, Columns, ReadWindow, Sample
 
 Values = tuple[Any, ...]
@@ -124,72 +123,3 @@ class WholeAnswer:
                 known.append(bytes(size) if value is None else struct.pack(order + code, value))
         self._mask = int.from_bytes(b"".join(mask), "little")
         self._known = int.from_bytes(b"".join(known), "little")
-
-
-class SyncRead:
-    """A sync read, one status a servo; of one servo a plain read where there is no other.
-
-    See ``GroupRead``.
-    """
-
-    def __init__(self, family: Family, ids: Sequence[int], window: ReadWindow) -> None:
-        codec = self._codec = family.codec
-        self.ids, self.window = tuple(ids), window
-        self._size = window.length + codec.STATUS_OVERHEAD
-        self.request = family.request(ids, window.address, window.length)
-        heads = [codec.status_head(i, window.length) + b"\x00" for i in ids]
-        before, after = codec.CHECKED
-        part = f"{before}x{self._size - before - after}s{after}x"
-        answer = WholeAnswer(b"", heads, window, codec.CHECK, part * len(ids), codec.all_intact)
-        self.whole, self.columns = answer.values, answer.columns
-        self.reply_length, self.covers_torque = answer.length, "torque" in window.fields
-
-    def missing(self, raw: bytes) -> int:
-        """Count the bytes still to come."""
-        codec, count, length = self._codec, len(self.ids), self.window.length
-        missing = codec.bytes_missing(raw, count, length)
-        if missing:
-            return missing
-        # Repeated statuses, echoes, and others' than asked for, are not those waited for.
-        found = codec.statuses(raw)
-        fits = {s.id for s in found if len(s.params) == length or s.error & codec.REFUSAL}
-        there = len(fits.intersection(self.ids))
-        return codec.bytes_missing(raw, len(found) + count - there, length)
-
-    def pieces(self, raw: bytes) -> PartialReply:
-        """Return what can be proved right.
-
-        Servos answer in the order asked. Where an answer is missing, one in the place of another
-        servo's proves nothing: that servo may have lost its id, and the right answer its header.
-        """
-        samples: dict[int, Sample] = {}
-        damaged, twofold, in_place = set[int](), set[int](), set[int]()
-        begin = len(self.request) if raw.startswith(self.request) else 0  # an echo
-        stray = len(raw)
-        for status in self._codec.statuses(raw):
-            stray -= status.intact * (len(status.params) + self._codec.STATUS_OVERHEAD)
-            if status.id not in self.ids:
-                continue
-            place = begin + self.ids.index(status.id) * self._size
-            if status.intact and abs(status.at - place) < self._size // 2:
-                in_place.add(status.id)
-            if not status.intact:
-                damaged.add(status.id)
-            elif len(status.params) == self.window.length:
-                sample = self.window.sample(status.error, status.params)
-                # Twice the same is an echo; two that differ cannot both be this servo's.
-                if samples.setdefault(status.id, sample) != sample:
-                    twofold.add(status.id)
-            elif not status.params and status.error & self._codec.REFUSAL:
-                samples[status.id] = Sample(status.error)
-            else:
-                # An answer, but not what was asked for: late, or the servo is out of its mind.
-                damaged.add(status.id)
-        missing = len(samples) < len(self.ids)
-        unproved = samples.keys() - in_place if missing else set[int]()
-        for servo_id in twofold | unproved:
-            del samples[servo_id]
-        damaged = (damaged | twofold) - samples.keys()
-        return PartialReply(
-            samples, frozenset(damaged), frozenset(unproved - damaged), missing and stray > 0
-        )

@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TypeVar
 
+from gazerig.drivers.bus.released import ReleaseResult
 from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
-from gazerig.drivers.released import ReleaseResult
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.family import Family
 from gazerig.drivers.servo_bus.transaction import Transactions

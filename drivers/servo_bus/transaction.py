@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import inf
 
-from gazerig.drivers.host_lateness import HostLateness
+from gazerig.drivers.process.host_lateness import HostLateness
 from gazerig.drivers.serial.port import BABBLE_S, BITS_PER_BYTE, QUIET_S, BusPort
 from gazerig.drivers.servo_bus.adaptive_timeout import AdaptiveTimeout
 from gazerig.drivers.servo_bus.family import Family

@@ -10,7 +10,7 @@ from urllib.error import URLError
 from urllib.request import Request, urlopen
 
 from gazerig.drivers.errors import ModelFileError
-from gazerig.drivers.file_output import make_folder, write_file
+from gazerig.drivers.files.file_output import make_folder, write_file
 from gazerig.drivers.vision.model_files import ModelFile, models_folder
 
 _CHUNK_BYTES = 1 << 16

@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_input import read_limited
+from gazerig.drivers.files.file_input import read_limited
 from gazerig.features.study import journal
 from gazerig.features.study.data_folder import StudyData
 from gazerig.features.study.design import Condition, StudyDesign

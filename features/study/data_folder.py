@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_input import read_limited
-from gazerig.drivers.file_output import make_folder, write_file
+from gazerig.drivers.files.file_input import read_limited
+from gazerig.drivers.files.file_output import make_folder, write_file
 from gazerig.features.study.journal import FILE, session_lock
 from gazerig.features.study.preregistration import design_sha256
 

@@ -17,7 +17,7 @@ from typing import Any
 import msgspec
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_output import make_folder
+from gazerig.drivers.files.file_output import make_folder
 from gazerig.features.study.records import (
     Closed,
     Consented,

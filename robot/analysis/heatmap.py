@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_input import read_limited
-from gazerig.drivers.file_output import write_file
+from gazerig.drivers.files.file_input import read_limited
+from gazerig.drivers.files.file_output import write_file
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.gaze.types import PARTS, Floats

@@ -15,8 +15,8 @@ from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.robot.analysis.gaze_on_face import on_face
 from gazerig.robot.analysis.summary import cyclopean
 from gazerig.robot.control.tick import Tick
+from gazerig.robot.description.head_shape import measures_of
 from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
-from gazerig.robot.model.head_shape import measures_of
 
 BRIDGED_S = 0.15
 HALF_WIDE_M, HALF_HIGH_M = 0.085, 0.125

@@ -49,6 +49,7 @@ from gazerig.robot.control.gesture_choices import GestureChoices
 from gazerig.robot.control.heads_together import NamedRobot
 from gazerig.robot.control.loop import Robot
 from gazerig.robot.dashboard.feed.snapshot import ShownRig
+from gazerig.robot.description.world_shapes import WorldShapes
 from gazerig.robot.model.clock import Clock, RealClock, SimulatedClock
 from gazerig.robot.model.coupling_params import pairs_of
 from gazerig.robot.model.frames import (
@@ -59,7 +60,6 @@ from gazerig.robot.model.frames import (
 from gazerig.robot.model.kinematics import Kinematics
 from gazerig.robot.model.loop_params import LoopParams
 from gazerig.robot.model.types import JointAngles, further
-from gazerig.robot.model.world_shapes import WorldShapes
 from gazerig.robot.perception.gyro_fusion import GyroFusion
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.pixel_to_world import PixelToWorld

@@ -4,13 +4,13 @@ from collections.abc import Mapping, Sequence
 
 from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig
-from gazerig.drivers.checked_bus import CheckedBus
-from gazerig.drivers.errors import SetupError
-from gazerig.drivers.multi_bus import BusShare, MultiBus
-from gazerig.drivers.plugins import BUS, BusPlugin, PluginError, failure, find, is_ours, load
-from gazerig.drivers.port_by_path import port_of
+from gazerig.drivers.bus.checked_bus import CheckedBus
+from gazerig.drivers.bus.multi_bus import BusShare, MultiBus
+from gazerig.drivers.bus.servo_models import SERVOS
+from gazerig.drivers.errors import PluginError, SetupError
+from gazerig.drivers.plugins import BUS, BusPlugin, failure, find, is_ours, load
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_models import SERVOS
+from gazerig.drivers.serial.port_by_path import port_of
 from gazerig.drivers.types import ServoBus, ServoConfig
 from gazerig.robot.app.rig_limits import park_rad
 from gazerig.robot.control.body import setups

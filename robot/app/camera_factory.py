@@ -23,8 +23,8 @@ from gazerig.drivers.camera.process import CameraProcess
 from gazerig.drivers.camera.source import FrameSource
 from gazerig.drivers.camera.thread import CameraThread
 from gazerig.drivers.camera.worker import CameraParts
-from gazerig.drivers.errors import SetupError
-from gazerig.drivers.plugins import CAMERA, CameraPlugin, PluginError, find, is_ours, load
+from gazerig.drivers.errors import PluginError, SetupError
+from gazerig.drivers.plugins import CAMERA, CameraPlugin, find, is_ours, load
 from gazerig.drivers.types import Camera, FaceDetector
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.gaze.types import Mat3, Vec3

@@ -5,11 +5,11 @@ from math import pi, radians
 
 from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig
+from gazerig.drivers.bus.servo_models import HOBBY_KINDS
 from gazerig.drivers.plugins import EmulatedJoint
-from gazerig.drivers.servo_models import HOBBY_KINDS
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, rig_setups
+from gazerig.robot.description.mass import HEAD_LOAD_KG_M2
 from gazerig.robot.model.coupling_params import pair_setups, pairs_of
-from gazerig.robot.model.description.mass import HEAD_LOAD_KG_M2
 from gazerig.robot.model.joint import JointParams
 from gazerig.sim_mock.devices import (
     DynamixelLine,

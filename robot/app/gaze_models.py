@@ -6,15 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.config.schema import Rig
-from gazerig.drivers.plugins import (
-    ATTENTION,
-    AttentionPlugin,
-    PluginError,
-    find,
-    is_ours,
-    load,
-    made,
-)
+from gazerig.drivers.errors import PluginError
+from gazerig.drivers.plugins import ATTENTION, AttentionPlugin, find, is_ours, load, made
 from gazerig.gaze.attention.bottom_up import BottomUp
 from gazerig.gaze.attention.idle import Idle
 from gazerig.gaze.attention.top_down import TopDown

@@ -9,7 +9,7 @@ from gazerig.config.gestures import gesture_name, load_gesture
 from gazerig.config.save_text import written
 from gazerig.config.schema import Rig
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_output import write_file
+from gazerig.drivers.files.file_output import write_file
 from gazerig.gaze.gesture.gesture import HEAD_TRACKS, Gesture
 from gazerig.gaze.types import Floats
 from gazerig.robot.app.rig_limits import lid_spans, limits

@@ -5,12 +5,12 @@ from dataclasses import replace
 
 from gazerig.config.schema import Rig
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.app.mesh_reader import MeshUnusable, read_mesh
 from gazerig.robot.app.rig_limits import lid_ends
-from gazerig.robot.model.description.build import RigShape, describe
-from gazerig.robot.model.description.clearance import collisions
-from gazerig.robot.model.description.links import Description
-from gazerig.robot.model.description.own_meshes import OwnMesh, unknown_links
+from gazerig.robot.description.build import RigShape, describe
+from gazerig.robot.description.clearance import collisions
+from gazerig.robot.description.links import Description
+from gazerig.robot.description.mesh_reader import MeshUnusable, read_mesh
+from gazerig.robot.description.own_meshes import OwnMesh, unknown_links
 from gazerig.robot.model.forbidden_range import CollisionParams
 
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from gazerig.config.schema import Rig
 from gazerig.config.text import gestures_text, rig_text, walk_text
-from gazerig.drivers.bounded_call import LastingReport
 from gazerig.drivers.errors import SetupError
+from gazerig.drivers.process.bounded_call import LastingReport
 from gazerig.robot.analysis.gaze_on_face import GazeOnFace
 from gazerig.robot.analysis.summary import Summary
 from gazerig.robot.app.assemble import (

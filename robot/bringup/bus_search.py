@@ -19,13 +19,13 @@ is not found out: with such a one on the line name the kind that is meant.
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from gazerig.drivers.bus.servo_families import FAMILY_OF
+from gazerig.drivers.bus.servo_models import BUS_KINDS, BusKind
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.maestro.probe import USB_CHANNELS, DetectedMaestro, probe
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.port_owner import POLOLU
 from gazerig.drivers.servo_bus.discovery import FoundServo, scan
-from gazerig.drivers.servo_families import FAMILY_OF
-from gazerig.drivers.servo_models import BUS_KINDS, BusKind
 from gazerig.robot.bringup.servo_families import KINDS
 
 BOARD_RATES = (115_200, 9_600, 57_600, 38_400, 19_200)

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple
 
+from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.hobby_board.board import Board
@@ -17,7 +18,6 @@ from gazerig.drivers.hobby_board.release import switch_off
 from gazerig.drivers.hobby_board.start import every_pulse
 from gazerig.drivers.maestro.commands import name_errors
 from gazerig.drivers.maestro.line import MaestroLink
-from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoConfig
 
 SLOW_STEPS_S = 20.0 / 360.0 * 16_000.0

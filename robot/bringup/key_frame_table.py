@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_input import read_limited
+from gazerig.drivers.files.file_input import read_limited
 from gazerig.gaze.types import Floats
 
 _TIMES = ("time", "time_s", "t", "seconds", "frame")

@@ -2,9 +2,9 @@
 
 from collections.abc import Container, Iterator, Sequence
 
+from gazerig.drivers.bus.servo_models import BusKind
 from gazerig.drivers.hobby_board.models import US_STEPS
 from gazerig.drivers.servo_bus.discovery import FoundServo
-from gazerig.drivers.servo_models import BusKind
 from gazerig.robot.bringup.bus_search import SearchRound, found_of
 
 

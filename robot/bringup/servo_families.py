@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.dynamixel import control_table as dynamixel
 from gazerig.drivers.dynamixel.family import DYNAMIXEL as DYNAMIXEL_FAMILY
 from gazerig.drivers.errors import SetupError
@@ -9,7 +10,6 @@ from gazerig.drivers.feetech import homing
 from gazerig.drivers.feetech import memory_table as feetech
 from gazerig.drivers.feetech.family import FEETECH as FEETECH_FAMILY
 from gazerig.drivers.feetech.scs import FEETECH_SCS
-from gazerig.drivers.servo_models import SERVOS
 from gazerig.robot.bringup.servo_family import Driving, ServoKind, Setting
 
 GENTLE_ACCELERATION = 10

@@ -7,9 +7,9 @@ once. A board of hobby servos, whose channels do not answer, is no such kind.
 from collections.abc import Callable
 from typing import NamedTuple
 
+from gazerig.drivers.bus.servo_models import BusKind
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.family import Family
-from gazerig.drivers.servo_models import BusKind
 
 Tell = Callable[[str], None]
 """Takes a few words on what is being done now."""

@@ -11,6 +11,7 @@ under the new id and at the new rate. Sources: ROBOTIS e-Manual; Feetech memory 
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
+from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import (
@@ -22,7 +23,6 @@ from gazerig.drivers.servo_bus.discovery import (
     scan_ids,
 )
 from gazerig.drivers.servo_bus.registers import Registers
-from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.servo_family import ServoKind, Tell
 

@@ -7,7 +7,7 @@ import numpy as np
 from PIL import Image
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_output import output_file
+from gazerig.drivers.files.file_output import output_file
 from gazerig.drivers.types import ImageArray
 from gazerig.robot.model.charuco_board import CharucoBoard
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple
 
-from gazerig.drivers.servo_models import STEPS_PER_TURN
+from gazerig.drivers.bus.servo_models import STEPS_PER_TURN
 from gazerig.params import Bounds
 
 STEPS_PER_DEG = STEPS_PER_TURN / 360.0

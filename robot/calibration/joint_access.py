@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
+from gazerig.drivers.bus.servo_models import STEPS_PER_TURN
 from gazerig.drivers.errors import DriverError, ServoFault
-from gazerig.drivers.servo_models import STEPS_PER_TURN
 from gazerig.robot.calibration.endstop_search import (
     STEPS_PER_DEG,
     EndStop,

@@ -3,7 +3,7 @@
 A servo counts 4096 steps a turn; where 4095 meets 0 is its seam. After a restart it knows
 only the place within the turn, so a joint whose travel holds the seam would wake up a whole
 turn from where it is: such a joint cannot be used and must be built in again.
-Steps as in gazerig.drivers.servo_models, angles in degrees at the joint.
+Steps as in gazerig.drivers.bus.servo_models, angles in degrees at the joint.
 """
 
 from collections.abc import Mapping
@@ -11,8 +11,8 @@ from dataclasses import replace
 from math import floor
 from typing import NamedTuple
 
+from gazerig.drivers.bus.servo_models import STEPS_PER_TURN
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.servo_models import STEPS_PER_TURN
 from gazerig.robot.bringup.servo_families import kind_of
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS

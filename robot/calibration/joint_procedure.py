@@ -6,7 +6,7 @@ Nothing is printed or written here: questions go to ``Operator``, the result is 
 from collections.abc import Callable
 from typing import Literal, Protocol
 
-from gazerig.drivers.servo_models import STEPS_PER_TURN
+from gazerig.drivers.bus.servo_models import STEPS_PER_TURN
 from gazerig.robot.calibration.endstop_search import EndStop, StopSearchParams
 from gazerig.robot.calibration.joint_access import SingleJoint
 from gazerig.robot.calibration.joint_calibration import (

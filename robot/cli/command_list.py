@@ -9,7 +9,8 @@ from collections.abc import Mapping
 from functools import cache
 from typing import NamedTuple
 
-from gazerig.drivers.plugins import COMMAND, SHIPPED, PluginError, Registration, find, registered
+from gazerig.drivers.errors import PluginError
+from gazerig.drivers.plugins import COMMAND, SHIPPED, Registration, find, registered
 
 
 class CommandEntry(NamedTuple):

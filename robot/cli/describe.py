@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_output import make_folder, refuse_existing, write_file
+from gazerig.drivers.files.file_output import make_folder, refuse_existing, write_file
 from gazerig.robot.cli.rig_check import collision_lines
 from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say
 
@@ -33,7 +33,7 @@ def describe(
     with clear_errors(rig):
         from gazerig.config.schema import load_rig
         from gazerig.robot.app.rig_description import description_of, mesh_faults
-        from gazerig.robot.model.description.files import FORMATS, description_files, file_name
+        from gazerig.robot.description.files import FORMATS, description_files, file_name
 
         description = description_of(load_rig(rig, further=[mesh_faults]))
         asked = dict(zip(FORMATS, (mjcf, urdf, glb), strict=True))

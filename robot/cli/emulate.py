@@ -10,8 +10,8 @@ from typing import NamedTuple
 import typer
 
 from gazerig.config.schema import load_rig
+from gazerig.drivers.bus.servo_models import BusKind
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.servo_models import BusKind
 from gazerig.robot.app.emulation import emulated_lines
 from gazerig.robot.cli import emulate_options as options
 from gazerig.robot.cli.rig_command import RigCommand

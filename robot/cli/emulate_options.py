@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from gazerig.drivers.servo_models import BusKind
+from gazerig.drivers.bus.servo_models import BusKind
 from gazerig.robot.cli.terminal import complete_rig
 from gazerig.sim_mock.device_cases import CASES
 from gazerig.sim_mock.device_spec import DEFAULT_FIRMWARE, EXAMPLE

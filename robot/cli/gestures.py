@@ -10,7 +10,7 @@ import typer
 from gazerig.config.gestures import gesture_name
 from gazerig.config.schema import Rig, load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_output import refuse_existing
+from gazerig.drivers.files.file_output import refuse_existing
 from gazerig.robot.bringup.hand_recording import LONGEST_S, HandRecording, record, switch_off
 from gazerig.robot.bringup.monitor import Monitor
 from gazerig.robot.bringup.servo_families import kind_of

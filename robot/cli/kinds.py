@@ -9,15 +9,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from gazerig.drivers.plugins import (
-    GROUPS,
-    Plugin,
-    PluginError,
-    Registration,
-    folder_of,
-    registered,
-    taken_names,
-)
+from gazerig.drivers.errors import PluginError
+from gazerig.drivers.plugins import GROUPS, Plugin, Registration, folder_of, registered, taken_names
 from gazerig.robot.cli.terminal import clear_errors
 
 app = typer.Typer()

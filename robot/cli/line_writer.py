@@ -11,7 +11,7 @@ import select
 import stat
 from time import perf_counter
 
-from gazerig.drivers.bounded_call import BoundedCall
+from gazerig.drivers.process.bounded_call import BoundedCall
 
 _MOST = 500
 """So many lines wait; more are dropped."""

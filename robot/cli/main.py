@@ -62,7 +62,7 @@ def rig_files() -> list[Path]:
 
 
 def _looks_like_a_rig(path: Path) -> bool:
-    from gazerig.drivers.file_input import read_limited
+    from gazerig.drivers.files.file_input import read_limited
 
     try:
         return b"joints:" in read_limited(path, 1_000_000)

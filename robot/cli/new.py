@@ -20,7 +20,7 @@ from gazerig.config.new_rig import (
     usual_port,
 )
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_output import refuse_existing, write_file
+from gazerig.drivers.files.file_output import refuse_existing, write_file
 from gazerig.robot.cli.terminal import ForceOption, clear_errors, say
 
 app = typer.Typer()

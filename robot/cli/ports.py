@@ -9,9 +9,9 @@ import typer
 from gazerig.config.schema import Rig
 from gazerig.drivers.errors import PortError, SetupError
 from gazerig.drivers.plugins import BUS, find, is_ours
-from gazerig.drivers.port_by_path import port_of
 from gazerig.drivers.serial.list_ports import serial_ports
 from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.serial.port_by_path import port_of
 from gazerig.drivers.serial.port_owner import refuse_owner
 from gazerig.drivers.types import ServoConfig
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, ports_of, rig_setups

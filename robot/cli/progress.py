@@ -8,9 +8,9 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from gazerig.drivers.port_by_path import port_of
 from gazerig.drivers.serial.list_ports import Host, SerialPort, serial_ports
 from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.serial.port_by_path import port_of
 from gazerig.drivers.serial.port_owner import usb_of
 from gazerig.robot.cli.terminal import status
 

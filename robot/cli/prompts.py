@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_input import read_limited
+from gazerig.drivers.files.file_input import read_limited
 from gazerig.robot.calibration.joint_access import CalibrationStopped
 from gazerig.robot.cli.terminal import say, status
 

@@ -14,7 +14,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_output import refuse_existing
+from gazerig.drivers.files.file_output import refuse_existing
 from gazerig.robot.app.options import host_port
 from gazerig.robot.cli.rig_command import RigCommand
 from gazerig.robot.cli.terminal import (
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from gazerig.robot.app.resimulate import Resimulation
     from gazerig.robot.control.loop import Tick
     from gazerig.robot.dashboard.feed.snapshot import ShownRig
-    from gazerig.robot.model.world_shapes import WorldShapes
+    from gazerig.robot.description.world_shapes import WorldShapes
     from gazerig.robot.recording.read import RunRecording
 
 app = typer.Typer(add_completion=False)

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 import typer
 
-from gazerig.drivers.file_output import write_file
+from gazerig.drivers.files.file_output import write_file
 from gazerig.drivers.plugins import SCHEMA, SHIPPED, find
 from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from gazerig.drivers.file_output import refuse_existing, write_file
+from gazerig.drivers.files.file_output import refuse_existing, write_file
 from gazerig.robot.app.options import RunOptions, camera_of
 from gazerig.robot.cli import run_options as options
 from gazerig.robot.cli.browser import desktop_here, open_page

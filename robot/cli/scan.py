@@ -12,15 +12,15 @@ from rich.progress import Progress
 from rich.table import Table
 
 from gazerig.config.schema import load_rig
+from gazerig.drivers.bus.servo_families import FAMILY_OF
+from gazerig.drivers.bus.servo_models import BusKind
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.pca9685.probe import probe
-from gazerig.drivers.port_by_path import port_of
 from gazerig.drivers.serial.list_ports import SerialPort
 from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.serial.port_by_path import port_of
 from gazerig.drivers.serial.port_owner import POLOLU, is_i2c
-from gazerig.drivers.servo_families import FAMILY_OF
-from gazerig.drivers.servo_models import BusKind
 from gazerig.robot.bringup.bus_search import RATES, SearchRound, found_of, known_kinds, plan, search
 from gazerig.robot.bringup.doctor.port import name_ports
 from gazerig.robot.bringup.scan_report import board_plain, board_text, remarks, servo_plain

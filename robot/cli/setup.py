@@ -8,9 +8,9 @@ import typer
 
 from gazerig.config.rig import BusConfig
 from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import DriverError, SetupError
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoConfig
 from gazerig.robot.app.bus_wiring import bus_names
 from gazerig.robot.app.emulation import CHAINS

@@ -5,10 +5,10 @@ from math import radians
 
 import typer
 
+from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import DriverError, ServoFault
 from gazerig.drivers.hobby_board.board import Board
 from gazerig.drivers.hobby_board.models import US_STEPS
-from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.channel_test import FINE_STEPS, ChannelPosition, walk
 from gazerig.robot.cli.terminal import say, signals

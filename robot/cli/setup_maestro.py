@@ -11,15 +11,15 @@ from pathlib import Path
 
 import typer
 
+from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import ServoMissing
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.file_output import write_file
+from gazerig.drivers.files.file_output import write_file
 from gazerig.drivers.maestro.board import MaestroBoard
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.maestro.probe import USB_CHANNELS
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.port_owner import POLOLU
-from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.channel_test import FINE_STEPS, ChannelPosition
 from gazerig.robot.bringup.maestro_settings import clipped, instructions, settings_file

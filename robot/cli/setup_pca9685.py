@@ -11,12 +11,12 @@ import typer
 
 from gazerig.config.faults import ConfigError
 from gazerig.config.save import save_rig
+from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.hobby_board.models import US_STEPS
 from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.pca9685.registers import CHANNELS
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.channel_test import ChannelPosition, given
 from gazerig.robot.bringup.oscillator import free_channel, free_pulse, oscillator_hz

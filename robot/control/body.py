@@ -4,8 +4,8 @@ import contextlib
 from collections.abc import Mapping, Sequence
 from operator import add, mul, sub
 
+from gazerig.drivers.bus.limit_recovery import ENTRY_DEG_S
 from gazerig.drivers.errors import BusLost, DriverError
-from gazerig.drivers.slow_entry import ENTRY_DEG_S
 from gazerig.drivers.types import Feedback, ServoBus, ServoConfig
 from gazerig.robot.control.coupled_servos import CoupledServos
 from gazerig.robot.model.coupling_params import CoupledPair, pair_setups

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from math import dist, isfinite
 from typing import Any, Protocol
 
-from gazerig.drivers.bounded_call import BoundedCall
+from gazerig.drivers.process.bounded_call import BoundedCall
 from gazerig.gaze.attention.top_down import TopDown
 from gazerig.gaze.types import GazeState, Percept, Target, Vec3
 

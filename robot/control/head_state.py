@@ -14,8 +14,7 @@ from gazerig.gaze.field_of_view import line_of_sight
 from gazerig.gaze.types import PART_NAMES, PARTS, Angles2, Angles3, Face, Vec3
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import doing, leader, target_name
-from gazerig.robot.model.lead import NO_GESTURE, NOBODY_LEADS, GestureState, LeadState
-from gazerig.robot.model.leader import Leader
+from gazerig.robot.model.leader import NO_GESTURE, NOBODY_LEADS, GestureState, Leader, LeadState
 
 
 @dataclass(frozen=True, slots=True)

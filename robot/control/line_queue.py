@@ -7,8 +7,8 @@ from functools import partial
 from types import TracebackType
 from typing import Self
 
-from gazerig.drivers.bounded_call import LASTING, BoundedCall
 from gazerig.drivers.plugins import failure
+from gazerig.drivers.process.bounded_call import LASTING, BoundedCall
 
 _MOST = 500
 """So many lines wait; more are dropped."""

@@ -5,7 +5,7 @@ from typing import NamedTuple
 from gazerig.drivers.types import Detections
 from gazerig.gaze.types import GazeCommand, GazeState, Percept, Target
 from gazerig.robot.model.commands import Command
-from gazerig.robot.model.lead import NO_GESTURE, NOBODY_LEADS, GestureState, LeadState
+from gazerig.robot.model.leader import NO_GESTURE, NOBODY_LEADS, GestureState, LeadState
 from gazerig.robot.model.types import GuardResult, JointAngles, JointState
 
 

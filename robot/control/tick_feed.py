@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from gazerig.robot.control.head_state import HeadEvent
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.lead import NO_GESTURE, NOBODY_LEADS, GestureState, LeadState
+from gazerig.robot.model.leader import NO_GESTURE, NOBODY_LEADS, GestureState, LeadState
 
 _MOST_EVENTS = 1000
 

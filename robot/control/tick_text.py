@@ -3,7 +3,7 @@
 from math import degrees
 from typing import NamedTuple
 
-from gazerig.drivers.host_lateness import LATE_COMPUTER
+from gazerig.drivers.process.host_lateness import LATE_COMPUTER
 from gazerig.drivers.types import BusHealth
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import ORDERED, PART_NAMES, Target

@@ -5,8 +5,8 @@ import select
 import subprocess
 from math import inf
 
-from gazerig.drivers import child_process
 from gazerig.drivers.errors import SetupError
+from gazerig.drivers.process import child_process
 from gazerig.robot.guardian import process
 from gazerig.robot.guardian.heartbeat import (
     IDLE,

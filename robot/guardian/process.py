@@ -20,7 +20,7 @@ import signal
 import sys
 
 from gazerig.drivers.errors import DriverError
-from gazerig.drivers.port_by_path import port_of
+from gazerig.drivers.serial.port_by_path import port_of
 from gazerig.robot.guardian.hang_detector import HangDetector
 from gazerig.robot.guardian.heartbeat import IDLE, RELEASED, RELEASING, Heartbeat
 from gazerig.robot.guardian.release_plan import ReleasePlan, decode, describe, releaser

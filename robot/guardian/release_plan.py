@@ -6,9 +6,9 @@ import pickle
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from gazerig.drivers.bus.servo_models import HOBBY_KINDS, BusKind
 from gazerig.drivers.maestro.params import Form, MaestroParams
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_models import HOBBY_KINDS, BusKind
 
 
 class ReleasePlan(NamedTuple):
@@ -72,8 +72,8 @@ def releaser(plan: ReleasePlan) -> Releaser:
 
 
 def _smart(plan: ReleasePlan) -> Releaser:
+    from gazerig.drivers.bus.servo_families import FAMILIES
     from gazerig.drivers.servo_bus.torque import disable_torque
-    from gazerig.drivers.servo_families import FAMILIES
 
     family = FAMILIES[plan.family or plan.kind]
     return lambda port: disable_torque(port, family, plan.baud, plan.ids)

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from math import ceil, floor, pi, radians
 from typing import Annotated, Literal
 
-from gazerig.drivers.servo_models import SERVOS, ServoModelInfo
-from gazerig.drivers.slow_entry import ENTRY_DEG_S
+from gazerig.drivers.bus.limit_recovery import ENTRY_DEG_S
+from gazerig.drivers.bus.servo_models import SERVOS, ServoModelInfo
 from gazerig.drivers.types import ServoConfig
 from gazerig.params import Bounds, Unit
 from gazerig.robot.model.joint_limit import JointLimit

@@ -5,7 +5,7 @@ are those of the ticks and heartbeats are commands, so a recorded run lapses as 
 """
 
 from math import degrees, radians
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from gazerig.gaze.angles import add, scale
 from gazerig.gaze.types import ORDERED, Face, GazeState, Percept, Target, Vec3
@@ -21,58 +21,13 @@ from gazerig.robot.model.commands import (
     Renew,
 )
 from gazerig.robot.model.gaze_error import gaze_error
+from gazerig.robot.model.leader import NOBODY_LEADS, LeadState
 from gazerig.robot.model.types import JointAngles
 
 ARRIVED_RAD = radians(1.0)
 """A gaze or joint that is measured nearer than this to what was asked for is there."""
 GONE_S = 2.0
 """Who looks at a person leads no longer when the person was not seen for so long."""
-
-
-class LeadState(NamedTuple):
-    """The newest lead, as it is after a tick.
-
-    number: counts the leads since the start; 0 before the first
-    active: it is in force
-    arrived: the gaze has been measured on the point, or the joints at their angles, since
-    error_rad: between gaze and point, or of the worst joint, as measured; 0 while not active
-    ended: why it is not in force any more, "" while it is
-    by: what leads while it is in force: a person or program that chose what to look at, somebody's
-        pointer, or joints that are held
-    who: asked for it, as given; what: e.g. "look at 1 0 0.3"; joints: those that are held
-    since_s: since when the same client leads in this way without a break
-    """
-
-    number: int = 0
-    active: bool = False
-    arrived: bool = False
-    error_rad: float = 0.0
-    ended: str = ""
-    by: Literal["person", "pointer", "joint"] = "person"
-    who: str = ""
-    what: str = ""
-    joints: tuple[str, ...] = ()
-    since_s: float = 0.0
-
-
-class GestureState(NamedTuple):
-    """The newest gesture, as it is after a tick.
-
-    number: counts the gestures since the start; 0 before the first
-    name: of the one under way, "" where there is none
-    ended: why it is over, "" where it has come to its own end or is under way
-    who: asked for it, "" where that is not known; since_s: when it began
-    """
-
-    number: int = 0
-    name: str = ""
-    ended: str = ""
-    who: str = ""
-    since_s: float = 0.0
-
-
-NOBODY_LEADS = LeadState()
-NO_GESTURE = GestureState()
 
 
 class Lead:

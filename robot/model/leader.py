@@ -3,10 +3,7 @@
 The page, the status line, other programs and Python all say it with these words.
 """
 
-from typing import TYPE_CHECKING, Literal, NamedTuple
-
-if TYPE_CHECKING:
-    from gazerig.robot.model.lead import GestureState, LeadState
+from typing import Literal, NamedTuple
 
 LeaderKind = Literal[
     "gaze", "person", "pointer", "joint", "gesture", "stopped", "parking", "recording"
@@ -17,6 +14,52 @@ looks at somebody's mouse pointer; joint: joints are held; recording: a recorded
 _WORTH_TELLING_S = 1.0
 """How long somebody has led is said from here on."""
 _MINUTE_S = 60.0
+
+
+class LeadState(NamedTuple):
+    """The newest lead, as it is after a tick.
+
+    number: counts the leads since the start; 0 before the first
+    active: it is in force
+    arrived: the gaze has been measured on the point, or the joints at their angles, since
+    error_rad: between gaze and point, or of the worst joint, as measured; 0 while not active
+    ended: why it is not in force any more, "" while it is
+    by: what leads while it is in force: a person or program that chose what to look at, somebody's
+        pointer, or joints that are held
+    who: asked for it, as given; what: e.g. "look at 1 0 0.3"; joints: those that are held
+    since_s: since when the same client leads in this way without a break
+    """
+
+    number: int = 0
+    active: bool = False
+    arrived: bool = False
+    error_rad: float = 0.0
+    ended: str = ""
+    by: Literal["person", "pointer", "joint"] = "person"
+    who: str = ""
+    what: str = ""
+    joints: tuple[str, ...] = ()
+    since_s: float = 0.0
+
+
+class GestureState(NamedTuple):
+    """The newest gesture, as it is after a tick.
+
+    number: counts the gestures since the start; 0 before the first
+    name: of the one under way, "" where there is none
+    ended: why it is over, "" where it has come to its own end or is under way
+    who: asked for it, "" where that is not known; since_s: when it began
+    """
+
+    number: int = 0
+    name: str = ""
+    ended: str = ""
+    who: str = ""
+    since_s: float = 0.0
+
+
+NOBODY_LEADS = LeadState()
+NO_GESTURE = GestureState()
 
 
 class Leader(NamedTuple):
@@ -40,7 +83,7 @@ class Leader(NamedTuple):
         return self.kind not in ("gaze", "gesture")
 
 
-def leader_of(stopped: str, parking: bool, lead: "LeadState", gesture: "GestureState") -> Leader:
+def leader_of(stopped: str, parking: bool, lead: LeadState, gesture: GestureState) -> Leader:
     """Return who leads.
 
     Args:

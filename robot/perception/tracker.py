@@ -11,7 +11,7 @@ from math import inf, sqrt
 
 import numpy as np
 
-from gazerig.drivers.located_frame import Clothing, FaceSigns
+from gazerig.drivers.camera.located_frame import Clothing, FaceSigns
 from gazerig.gaze.angles import add, cross, norm, scale, sub, unit
 from gazerig.gaze.types import Floats, Mat3, Vec3
 from gazerig.robot.model.track_params import TrackParams

@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_input import read_limited
-from gazerig.drivers.file_output import make_folder, output_file, write_file
+from gazerig.drivers.files.file_input import read_limited
+from gazerig.drivers.files.file_output import make_folder, output_file, write_file
 from gazerig.gaze.types import PART_NAMES, Floats
 from gazerig.robot.control.feedback_basis import ESTIMATED, PARTLY, Basis
 from gazerig.robot.recording.gaze_angles import GazeAngles

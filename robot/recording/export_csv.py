@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gazerig.drivers.file_output import output_text, refuse_existing, write_file
+from gazerig.drivers.files.file_output import output_text, refuse_existing, write_file
 from gazerig.robot.control.feedback_basis import ESTIMATED
 from gazerig.robot.recording.gaze_angles import MOVEMENTS, GazeAngles
 from gazerig.robot.recording.gaze_labels import LabelledInterval, Labels

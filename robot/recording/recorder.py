@@ -14,8 +14,8 @@ from math import inf
 from pathlib import Path
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_output import refuse_existing
-from gazerig.drivers.passed_image import copied
+from gazerig.drivers.files.file_output import refuse_existing
+from gazerig.drivers.process.passed_image import copied
 from gazerig.drivers.types import BusHealth, Detections
 from gazerig.robot.control.body import Body
 from gazerig.robot.control.tick import Tick

@@ -23,7 +23,7 @@ from gazerig.gaze.types import (
 )
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.model.command_json import from_recording as command_from_json
-from gazerig.robot.model.lead import NO_GESTURE, NOBODY_LEADS, GestureState, LeadState
+from gazerig.robot.model.leader import NO_GESTURE, NOBODY_LEADS, GestureState, LeadState
 from gazerig.robot.model.types import GAZE_JOINTS, GuardResult, JointAngles, JointState
 
 Json = dict[str, Any]

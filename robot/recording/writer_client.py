@@ -12,8 +12,8 @@ import subprocess
 from collections import deque
 from typing import Any, NamedTuple
 
-from gazerig.drivers import child_process
-from gazerig.drivers.passed_image import send
+from gazerig.drivers.process import child_process
+from gazerig.drivers.process.passed_image import send
 from gazerig.robot.recording import writer_process as writer
 from gazerig.robot.recording.run_writer import WrittenFile
 

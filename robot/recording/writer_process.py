@@ -16,7 +16,7 @@ import sys
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from gazerig.drivers.passed_image import PassedImage, receive, taken
+from gazerig.drivers.process.passed_image import PassedImage, receive, taken
 from gazerig.drivers.types import BusHealth
 from gazerig.robot.control.tick_stream import decode_plain
 from gazerig.robot.model.clock import Clock, RealClock

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-from gazerig.drivers.file_input import read_limited
+from gazerig.drivers.files.file_input import read_limited
 
 EVERY_S = 0.5
 _LARGEST = 10_000_000  # bytes; no rig is as large, so more counts as missing

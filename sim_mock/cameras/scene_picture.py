@@ -14,9 +14,9 @@ import numpy as np
 from gazerig.drivers.types import ImageArray
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Floats, Vec3
-from gazerig.robot.model.mesh import turned
-from gazerig.robot.model.paint import Painted, painted
-from gazerig.robot.model.person_shape import LOOKS, hand, head_parts, torso
+from gazerig.robot.description.mesh import turned
+from gazerig.robot.description.paint import Painted, painted
+from gazerig.robot.description.person_shape import LOOKS, hand, head_parts, torso
 from gazerig.robot.model.scene_view import PinholeView
 from gazerig.sim_mock.cameras.canvas import Canvas
 from gazerig.sim_mock.cameras.draw_arm import elbow_m, shoulder_m

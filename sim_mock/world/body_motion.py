@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.model.person_shape import EYE_FACE_M, MOUTH_FACE_M
+from gazerig.robot.description.person_shape import EYE_FACE_M, MOUTH_FACE_M
 from gazerig.sim_mock.world import faces, handed_over, motions
 from gazerig.sim_mock.world.gait import Base, base_motion
 from gazerig.sim_mock.world.measures import Measures

@@ -10,10 +10,19 @@ from math import cos, pi, radians, sin
 import numpy as np
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.model.mesh import Mesh, grid
-from gazerig.robot.model.paint import Colour, Painted, merged, mirrored, mix, painted, spot, step
-from gazerig.robot.model.person_shape import PersonLook, hand_of
-from gazerig.robot.model.solid import Solid, capsule, ellipsoid, union
+from gazerig.robot.description.mesh import Mesh, grid
+from gazerig.robot.description.paint import (
+    Colour,
+    Painted,
+    merged,
+    mirrored,
+    mix,
+    painted,
+    spot,
+    step,
+)
+from gazerig.robot.description.person_shape import PersonLook, hand_of
+from gazerig.robot.description.solid import Solid, capsule, ellipsoid, union
 from gazerig.sim_mock.world.measures import ADULT_M, Measures
 
 _AROUND = 18

@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 
 from gazerig.gaze.types import Vec3
-from gazerig.robot.model.description.texture import textured
-from gazerig.robot.model.paint import Painted, moved
-from gazerig.robot.model.person_shape import WORLD_LOOKS, HeadSegments, head_segments
+from gazerig.robot.description.paint import Painted, moved
+from gazerig.robot.description.person_shape import WORLD_LOOKS, HeadSegments, head_segments
+from gazerig.robot.description.texture import textured
 from gazerig.sim_mock.world.body_shape import ball, body_segments, cup
 from gazerig.sim_mock.world.figure import SEGMENTS, Figures
 from gazerig.sim_mock.world.measures import Measures

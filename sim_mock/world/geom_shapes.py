@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.model.description.texture import TexturedMesh
-from gazerig.robot.model.mesh import Mesh, ellipsoid, smooth_normals, turned
-from gazerig.robot.model.paint import Painted, merged
-from gazerig.robot.model.world_shapes import WorldPart
+from gazerig.robot.description.mesh import Mesh, ellipsoid, smooth_normals, turned
+from gazerig.robot.description.paint import Painted, merged
+from gazerig.robot.description.texture import TexturedMesh
+from gazerig.robot.description.world_shapes import WorldPart
 
 _SHOWN_GROUPS = 3
 """Groups of geoms below this are shown, as MuJoCo's own viewer does."""

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_input import open_regular, read_limited
+from gazerig.drivers.files.file_input import open_regular, read_limited
 
 MOST_XML_BYTES = 20_000_000
 MOST_ASSET_BYTES = 200_000_000

@@ -9,7 +9,7 @@ import mujoco
 
 from gazerig.drivers.errors import SetupError
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.model.description.links import IDENTITY, ORIGIN
+from gazerig.robot.description.links import IDENTITY, ORIGIN
 from gazerig.sim_mock.world.figure import Figures
 from gazerig.sim_mock.world.figure_model import add_people
 from gazerig.sim_mock.world.mjcf_limits import refuse_excessive

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from gazerig.gaze.types import Vec3
+from gazerig.robot.description.world_shapes import WorldPart
 from gazerig.robot.model.quaternion import Quaternion
-from gazerig.robot.model.world_shapes import WorldPart
 from gazerig.sim_mock.world.rig_in_world import RigInWorld
 from gazerig.sim_mock.world.state_file import StateReader
 

@@ -6,7 +6,7 @@ import mujoco
 
 from gazerig.gaze.angles import add, compose, rotate
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.model.description.links import IDENTITY, ORIGIN
+from gazerig.robot.description.links import IDENTITY, ORIGIN
 from gazerig.robot.model.scene_view import PinholeView, Rendered
 from gazerig.sim_mock.world.renderer import Renderer, RendererParams
 

@@ -8,8 +8,8 @@ import mujoco
 import numpy as np
 
 from gazerig.gaze.types import Vec3
-from gazerig.robot.model.description.parts import FLOOR_M
-from gazerig.robot.model.paint import Colour
+from gazerig.robot.description.paint import Colour
+from gazerig.robot.description.parts import FLOOR_M
 from gazerig.sim_mock.world.room import LIVING_ROOM, SEAT_M, SOFA_M, Place
 from gazerig.sim_mock.world.room_paint import texture
 from gazerig.sim_mock.world.script import WorldScript

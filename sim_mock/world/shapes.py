@@ -8,8 +8,8 @@ from math import radians
 from typing import NamedTuple
 
 from gazerig.gaze.types import Vec3
+from gazerig.robot.description.world_shapes import WorldFinish, WorldPart
 from gazerig.robot.model.quaternion import Quaternion
-from gazerig.robot.model.world_shapes import WorldFinish, WorldPart
 from gazerig.sim_mock.world.figure import Figures
 from gazerig.sim_mock.world.other_heads import OtherHeads
 from gazerig.sim_mock.world.rig_in_world import RigInWorld

@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.gaze.types import Vec3
-from gazerig.robot.model.description.texture import TexturedMesh
-from gazerig.robot.model.paint import Painted
+from gazerig.robot.description.paint import Painted
+from gazerig.robot.description.texture import TexturedMesh
+from gazerig.robot.description.world_shapes import WorldPart, WorldShapes
 from gazerig.robot.model.quaternion import Quaternion, quaternion
-from gazerig.robot.model.world_shapes import WorldPart, WorldShapes
 from gazerig.sim_mock.world.heads_scene import RigFrame
 from gazerig.sim_mock.world.rotations import rotation_matrix
 

@@ -21,7 +21,7 @@ from gazerig.features.lab.report import report as build
 from gazerig.features.lab.report.compare import differences_of
 from gazerig.features.lab.report.compare_page import compare_page
 from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder, TraceRow
-from gazerig.features.lab.report.page import band_text, gauge, number, report_page
+from gazerig.features.lab.report.page import band_text, gauge, report_page
 from gazerig.features.lab.report.plotting import COLOURS, Shown, png
 from gazerig.features.lab.report.reference_walk import own, published
 from gazerig.features.lab.report.report import DRAWINGS, found, measured, report_of
@@ -32,6 +32,7 @@ from gazerig.features.lab.report.statistics import (
     longest,
     mean,
     median,
+    number,
 )
 from gazerig.gaze.types import PARTS
 from gazerig.robot.analysis import human_norms as human

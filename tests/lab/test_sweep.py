@@ -20,8 +20,8 @@ from command_line import Invoked, invoked
 from gazerig.config.load import shipped
 from gazerig.config.schema import load_rig
 from gazerig.config.text import rig_text
-from gazerig.drivers import child_process
 from gazerig.drivers.errors import SetupError
+from gazerig.drivers.process import child_process
 from gazerig.features.lab.simulated_run import simulate
 from gazerig.features.lab.sweep.axes import Axis, Point, grid, latin_hypercube
 from gazerig.features.lab.sweep.outcome import OUTSIDE, Outcome, figures_of, grade

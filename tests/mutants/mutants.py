@@ -146,7 +146,7 @@ MUTANTS = (
            "three FF in a row begin a packet of the wrong servo", ("feetech_packets",)),
     Mutant("drivers/hobby_board/channel.py", "recent.append((now_s, self.goal_steps))",
            "recent.append((now_s, goal_steps))", "a board that is behind is taken for damaged", ("maestro_line",)),
-    Mutant("drivers/multi_bus.py", "if goal != goal:", "if False:",
+    Mutant("drivers/bus/multi_bus.py", "if goal != goal:", "if False:",
            "NaN goes to the buses before the one that refuses it", ("mixed_bus", "bus_kinds", "bus_kinds_lost")),
     # ---- action planner
     Mutant("gaze/attention/action_planner.py", "late_s = max(0.0, t_s - percept.captured_s)", "late_s = 0.0",
@@ -199,12 +199,12 @@ MUTANTS = (
     Mutant("sim_mock/world/world_scene.py", "and z > -0.35 * x)", ")",
            "a hand below the picture counts as seen", ("world_acts", "world_scripts", "world_people")),
     # ---- description
-    Mutant("robot/model/description/build.py", "edge = meet - up * shut", "edge = meet",
+    Mutant("robot/description/build.py", "edge = meet - up * shut", "edge = meet",
            "lids do not meet where the rig says that they are shut", ("description",)),
-    Mutant("robot/model/description/build.py",
+    Mutant("robot/description/build.py",
            "place + share * (place - off)", "place", "the head is not balanced with its eyes and jaw", ("description",)),
-    Mutant("robot/model/description/clearance.py", "(free, middle) if deep else (middle, met)", "(free, met)",
+    Mutant("robot/description/clearance.py", "(free, middle) if deep else (middle, met)", "(free, met)",
            "parts are said to meet at the joint's limit", ("clearance",)),
-    Mutant("robot/model/cut.py", "stumps[alone != side]", "stumps[alone == side]",
+    Mutant("robot/description/cut.py", "stumps[alone != side]", "stumps[alone == side]",
            "a cut gives the wider part of a triangle to the wrong side", ("cut",)),
 )  # fmt: skip

@@ -24,7 +24,7 @@ import numpy as np
 from branch import Branch, gazerig
 from study_at_the_page import Tab, answers
 
-from gazerig.drivers.film_writer import film_writer
+from gazerig.drivers.files.film_writer import film_writer
 from gazerig.features.study.journal import read
 from gazerig.features.study.records import Closed, ItemAnswered
 from gazerig.robot.model import clock

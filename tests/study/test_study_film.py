@@ -10,7 +10,7 @@ from rendering import renders as renders
 
 from gazerig.config.faults import ConfigError
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.film_writer import film_seconds, film_writer
+from gazerig.drivers.files.film_writer import film_seconds, film_writer
 from gazerig.drivers.types import ImageArray
 from gazerig.features.study.run import film
 from gazerig.features.study.run.study_check import checked_study

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from math import ceil, inf, nan
 from typing import Annotated
 
+from gazerig.drivers.bus.plausibility import Plausibility
+from gazerig.drivers.bus.port_bus import CUT, PortBus
+from gazerig.drivers.bus.released import ReleaseResult
+from gazerig.drivers.bus.servo_models import ServoModelInfo
 from gazerig.drivers.errors import BusLost, PortError, ServoMissing
 from gazerig.drivers.event_log import EventLog, servo_label
-from gazerig.drivers.plausibility import Plausibility
-from gazerig.drivers.port_bus import CUT, PortBus
-from gazerig.drivers.released import ReleaseResult
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.reconnect import ReconnectingPort
-from gazerig.drivers.servo_models import ServoModelInfo
 from gazerig.drivers.types import Feedback, ServoConfig
 from gazerig.params import Bounds, Choices
 from gazerig_lx16a import protocol as p

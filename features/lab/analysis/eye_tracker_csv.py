@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_input import read_limited
+from gazerig.drivers.files.file_input import read_limited
 from gazerig.gaze.types import PART_NAMES, PARTS, Floats
 
 _NAMES = {

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_output import refuse_existing, write_file
+from gazerig.drivers.files.file_output import refuse_existing, write_file
 from gazerig.features.lab.analysis.eye_tracker_csv import Samples, read_recording
 from gazerig.features.lab.analysis.fixations import (
     FixationParams,

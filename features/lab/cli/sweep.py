@@ -10,7 +10,7 @@ import typer
 
 from gazerig.config.export import suggestion
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_output import write_file
+from gazerig.drivers.files.file_output import write_file
 from gazerig.features.lab.cli import sweep_options as own
 from gazerig.robot.analysis.norm_bands import BY_KEY
 from gazerig.robot.app.options import DEFAULT_SCENE, RunOptions

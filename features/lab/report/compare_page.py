@@ -5,17 +5,9 @@ from math import isfinite
 from typing import Literal, NamedTuple
 
 from gazerig.features.lab.report.gaze_trace import GazeTrace
-from gazerig.features.lab.report.page import (
-    Figure,
-    banner,
-    left_out,
-    line_of,
-    number,
-    rendered,
-    with_unit,
-)
+from gazerig.features.lab.report.page import Figure, banner, left_out, line_of, rendered, with_unit
 from gazerig.features.lab.report.run_header import RunHeader
-from gazerig.features.lab.report.statistics import MeasureResult
+from gazerig.features.lab.report.statistics import MeasureResult, number
 from gazerig.robot.analysis.norm_bands import GROUPS
 from gazerig.robot.control.feedback_basis import Basis
 

@@ -5,7 +5,7 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_output import make_folder, refuse_existing, write_file
+from gazerig.drivers.files.file_output import make_folder, refuse_existing, write_file
 from gazerig.features.lab.report.page import Figure
 
 

@@ -6,8 +6,8 @@ from heapq import merge
 from typing import NamedTuple
 
 from gazerig.drivers.errors import SetupError
-from gazerig.features.lab.report.page import number
 from gazerig.features.lab.report.plotting import COLOURS, Figure, label, png_of
+from gazerig.features.lab.report.statistics import number
 from gazerig.robot.analysis.mutual_gaze import (
     HeadPlace,
     Mask,

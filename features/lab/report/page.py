@@ -5,20 +5,18 @@ from collections import Counter
 from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import jinja2
 
 from gazerig.features.lab.report.gaze_trace import GazeTrace
+from gazerig.features.lab.report.heads import MutualGazeReport
 from gazerig.features.lab.report.joint_basis import JointBasis
 from gazerig.features.lab.report.plotting import Drawing
 from gazerig.features.lab.report.run_header import RunHeader
-from gazerig.features.lab.report.statistics import MeasureResult
+from gazerig.features.lab.report.statistics import MeasureResult, number
 from gazerig.robot.analysis.norm_bands import BANDS, GROUPS, NormBand
 from gazerig.robot.control.feedback_basis import ESTIMATED, Basis
-
-if TYPE_CHECKING:
-    from gazerig.features.lab.report.heads import MutualGazeReport
 
 _CLASSES = {
     "pass": "pass", "uncertain": "uncertain", "outside": "outside", "too few events": "few",
@@ -82,7 +80,7 @@ def report_page(
     run: GazeTrace,
     findings: Sequence[MeasureResult],
     figures: Sequence[Figure],
-    gaze: "MutualGazeReport | None" = None,
+    gaze: MutualGazeReport | None = None,
 ) -> str:
     """Return the page of one run as HTML that needs no other file."""
     styles = about.styles | {f"conversation {run.mode}"} | run.joints.styles
@@ -187,18 +185,6 @@ def band_text(band: NormBand) -> str:
 def with_unit(value: float, unit: str) -> str:
     """Return a number with its unit; shares have none."""
     return number(value) if unit in ("", "share") else f"{number(value)} {unit}"
-
-
-def number(value: float) -> str:
-    """Return a number with as many digits as are of use."""
-    size = abs(value)
-    if size >= 100.0:
-        return f"{value:.0f}"
-    if size >= 10.0:
-        return f"{value:.1f}".rstrip("0").rstrip(".")
-    text = f"{value:.2f}" if size >= 0.1 or value == 0.0 else f"{value:.3f}"
-    text = text.rstrip("0").rstrip(".")
-    return "0" if text in ("-0", "") else text
 
 
 def _facts(run: GazeTrace) -> tuple[tuple[str, str], ...]:

@@ -187,3 +187,15 @@ _ALONG: Mapping[Statistic, Callable[[Floats], Floats]] = {
     longest: lambda rows: np.max(rows, axis=1),
 }
 """The statistics of many samples at once, (samples, n) -> (samples,)."""
+
+
+def number(value: float) -> str:
+    """Return a number with as many digits as are of use."""
+    size = abs(value)
+    if size >= 100.0:
+        return f"{value:.0f}"
+    if size >= 10.0:
+        return f"{value:.1f}".rstrip("0").rstrip(".")
+    text = f"{value:.2f}" if size >= 0.1 or value == 0.0 else f"{value:.3f}"
+    text = text.rstrip("0").rstrip(".")
+    return "0" if text in ("-0", "") else text

@@ -13,7 +13,7 @@ from typing import BinaryIO
 
 from gazerig.config.export import abbreviated
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_output import make_folder, write_file
+from gazerig.drivers.files.file_output import make_folder, write_file
 from gazerig.features.lab.sweep.axes import Point
 from gazerig.features.lab.sweep.outcome import Outcome
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from gazerig.drivers.file_output import output_file, write_file
+from gazerig.drivers.files.file_output import output_file, write_file
 from gazerig.features.lab.sweep.outcome import Outcome, columns_of
 
 SEED, FAILED = "seed", "failed"

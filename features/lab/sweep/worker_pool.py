@@ -15,8 +15,8 @@ from collections.abc import Callable, Iterator, Sequence
 from subprocess import PIPE
 from typing import BinaryIO, NamedTuple, Self
 
-from gazerig.drivers import child_process
 from gazerig.drivers.errors import SetupError
+from gazerig.drivers.process import child_process
 from gazerig.features.lab.sweep.axes import Point
 from gazerig.features.lab.sweep.outcome import Figures, Outcome
 from gazerig.features.lab.sweep.worker import Job

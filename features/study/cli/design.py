@@ -7,7 +7,7 @@ import typer
 
 from gazerig.config.shipped import shipped_names
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_output import make_folder, write_file
+from gazerig.drivers.files.file_output import make_folder, write_file
 from gazerig.features.study.shipped import HOME
 from gazerig.robot.cli.examples import complete_shipped
 from gazerig.robot.cli.terminal import ForceOption, clear_errors, say

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_output import make_folder, write_file
+from gazerig.drivers.files.file_output import make_folder, write_file
 from gazerig.features.study.analysis import StudyAnalysis
 from gazerig.features.study.participation import AnswerRow, Participation
 from gazerig.features.study.report.page import Progress

@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 from markupsafe import Markup
 
-from gazerig.features.lab.report.page import number, rendered
+from gazerig.features.lab.report.page import rendered
+from gazerig.features.lab.report.statistics import number
 from gazerig.features.study.analysis import ChoiceSummary, MeasureSummary, StudyAnalysis
 from gazerig.features.study.decisions import Decision
 from gazerig.features.study.records import STEP_DEG

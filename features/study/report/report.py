@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_output import make_folder, write_file
+from gazerig.drivers.files.file_output import make_folder, write_file
 from gazerig.features.study.analysis import StudyAnalysis, analysed
 from gazerig.features.study.collected import collected
 from gazerig.features.study.data_folder import InterimLook, StudyData

@@ -1,7 +1,7 @@
 """Films of conditions: the head as the person sees it whom it looks at, rendered without a display.
 
 The run is simulated with the condition's rig, or read from a recording; the head is the robot
-description of the rig (gazerig.robot.model.description), the camera stands where the scene's first
+description of the rig (gazerig.robot.description), the camera stands where the scene's first
 person has their nose, still.
 """
 
@@ -16,8 +16,8 @@ import numpy as np
 from gazerig.config.schema import Rig
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_output import make_folder
-from gazerig.drivers.film_writer import film_writer
+from gazerig.drivers.files.file_output import make_folder
+from gazerig.drivers.files.film_writer import film_writer
 from gazerig.drivers.types import ImageArray
 from gazerig.features.lab.simulated_run import simulate
 from gazerig.features.study.run.study_file import LoadedStudy
@@ -26,7 +26,7 @@ from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_description import description_of
 from gazerig.robot.control.tick import Tick
-from gazerig.robot.model.description.files import description_files
+from gazerig.robot.description.files import description_files
 from gazerig.robot.model.types import in_order
 from gazerig.robot.recording.read import RunRecording, used
 

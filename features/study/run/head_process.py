@@ -5,8 +5,8 @@ import subprocess
 from pathlib import Path
 from subprocess import PIPE
 
-from gazerig.drivers import child_process
 from gazerig.drivers.errors import DriverError
+from gazerig.drivers.process import child_process
 from gazerig.features.study.presenter import HeadLost
 from gazerig.features.study.run.head_main import as_line
 from gazerig.robot.app.options import RunOptions

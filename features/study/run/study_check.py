@@ -7,7 +7,7 @@ from gazerig.config.export import suggestion
 from gazerig.config.load import ConfigError, shipped_names
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.film_writer import film_seconds
+from gazerig.drivers.files.film_writer import film_seconds
 from gazerig.features.study.design import StudyDesign
 from gazerig.features.study.rules import objective_rules
 from gazerig.features.study.run.study_file import LoadedStudy, load_study

@@ -11,7 +11,7 @@ from gazerig.drivers.extras import extra_hint
 from gazerig.robot.analysis.mutual_gaze import HeadPlace
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.world.run_world import mjcf_of, world_script
-from gazerig.robot.model.world_shapes import WorldShapes
+from gazerig.robot.description.world_shapes import WorldShapes
 from gazerig.robot.recording.world_info import WorldInfo
 from gazerig.sim_mock.world.figure import Figures
 from gazerig.sim_mock.world.heads_scene import RigFrame

@@ -49,7 +49,7 @@ def _body(rig: Rig, looks: bool) -> tuple[str, Mapping[str, bytes]]:
     """Return the body of a rig as MJCF, and the files that this names."""
     # Meshes and what writes their textures: 30 MB that a control loop does without.
     from gazerig.robot.app.rig_description import description_of
-    from gazerig.robot.model.description.mjcf import mjcf
+    from gazerig.robot.description.mjcf import mjcf
 
     xml, assets = mjcf(description_of(rig, looks=looks), looks=looks)
     return xml, assets

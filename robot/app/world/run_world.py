@@ -18,8 +18,8 @@ from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.rig_description import mesh_faults
 from gazerig.robot.app.run_scene import refuse_unruled
 from gazerig.robot.app.world.rig import rig_in_world
+from gazerig.robot.description.world_shapes import WorldShapes
 from gazerig.robot.model.clock import Clock
-from gazerig.robot.model.world_shapes import WorldShapes
 from gazerig.sim_mock.scenes.scene import Scene
 from gazerig.sim_mock.world.camera_params import WorldCameraParams
 from gazerig.sim_mock.world.other_heads import HeadInState, OtherHeads

@@ -19,8 +19,8 @@ from gazerig.robot.app.gaze_models import kinematics_of
 from gazerig.robot.app.world.lockstep import Lockstep
 from gazerig.robot.app.world.poses import RigInState, SimulatedPoses, WorldPoses
 from gazerig.robot.app.world.run_world import RunWorld, ServedRig
+from gazerig.robot.description.head_shape import HeadMeasures
 from gazerig.robot.model.clock import Clock, RealClock
-from gazerig.robot.model.head_shape import HeadMeasures
 from gazerig.sim_mock.pty.client import PtyBuses, has_terminals
 from gazerig.sim_mock.scenes.scene import Scene
 from gazerig.sim_mock.world.heads_scene import HeadFace, RigFrame

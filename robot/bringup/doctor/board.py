@@ -6,8 +6,8 @@ A make says what it was asked and what it calls things; the rules are here.
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.hobby_board.models import US_STEPS
-from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.doctor.diagnostics import Diagnostic
 

@@ -8,6 +8,7 @@ program. Source: Pololu Maestro User's Guide (0J40), sections 4.b, 4.e, 5.a and 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import PortError
 from gazerig.drivers.hobby_board.models import US_STEPS
 from gazerig.drivers.maestro.commands import MICRO, MOST_INPUT
@@ -15,7 +16,6 @@ from gazerig.drivers.maestro.line import MaestroLink
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.maestro.probe import USB_CHANNELS, DetectedMaestro, probe
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.doctor.board import WHERE, BoardRules, examine
 from gazerig.robot.bringup.doctor.diagnostics import BOARD, Diagnostic, Fix, Level

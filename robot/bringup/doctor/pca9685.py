@@ -6,12 +6,12 @@ PCA9685 data sheet, rev. 4.
 
 from collections.abc import Sequence
 
+from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import PortError, ServoMissing
 from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.pca9685.board import Pca9685Board
 from gazerig.drivers.pca9685.params import Pca9685Params
 from gazerig.drivers.serial.port import BusPort
-from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.doctor.board import WHERE, BoardRules, examine
 from gazerig.robot.bringup.doctor.diagnostics import Diagnostic

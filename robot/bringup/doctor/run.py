@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from gazerig.drivers.bus.servo_models import servo_label
 from gazerig.drivers.errors import DriverError, PortError, SetupError
 from gazerig.drivers.serial.list_ports import (
     RECOMMENDED_LATENCY_MS,
@@ -19,7 +20,6 @@ from gazerig.drivers.serial.list_ports import (
 )
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.discovery import FoundServo, any_reply, corrupt, ping, scan_ids
-from gazerig.drivers.servo_models import servo_label
 from gazerig.drivers.types import ServoConfig
 from gazerig.robot.bringup.doctor.checks import visit
 from gazerig.robot.bringup.doctor.diagnostics import Diagnostic, Fix, worst

@@ -9,7 +9,7 @@ from gazerig.config.schema import Rig
 from gazerig.drivers.errors import ServoFault, ServoMissing, SetupError
 from gazerig.drivers.maestro.params import MaestroParams
 from gazerig.drivers.pca9685.params import Pca9685Params
-from gazerig.drivers.port_by_path import port_of
+from gazerig.drivers.serial.port_by_path import port_of
 from gazerig.robot.app.bus_wiring import bus_names, joints_on, release_plan
 from gazerig.robot.bringup.servo_families import KINDS, kind_of
 from gazerig.robot.calibration.endstop_search import StopSearchParams

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.drivers.camera.pinhole import Intrinsics
-from gazerig.drivers.passed_image import PassedImage, taken
+from gazerig.drivers.process.passed_image import PassedImage, taken
 from gazerig.drivers.types import (
     BusHealth,
     DetectedFace,
@@ -30,12 +30,12 @@ from gazerig.robot.control.tick_text import health_text, perception_text
 from gazerig.robot.dashboard.feed.gaze_trail import GazeTrail
 from gazerig.robot.dashboard.feed.overlay_choices import OverlayChoices
 from gazerig.robot.dashboard.feed.snapshot import ShownRig, SnapshotBuilder, SnapshotTexts
-from gazerig.robot.model.description.build import RigShape
+from gazerig.robot.description.build import RigShape
+from gazerig.robot.description.world_shapes import WorldShapes
 from gazerig.robot.model.frames import PoseHistory
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, project
 from gazerig.robot.model.scene_view import PinholeView, SceneView
 from gazerig.robot.model.types import Level, OtherHead, Snapshot
-from gazerig.robot.model.world_shapes import WorldShapes
 from gazerig.robot.perception.egomotion_residual import ResidualFigures
 
 TICKS, RIG, STATE, DETECTED, PIXELS = b"t", b"g", b"a", b"d", b"i"

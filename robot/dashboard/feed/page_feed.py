@@ -3,8 +3,8 @@
 import json
 from typing import NamedTuple
 
-from gazerig.drivers.message_link import DONT_WAIT, MessageLink
-from gazerig.drivers.passed_image import receive
+from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink
+from gazerig.drivers.process.passed_image import receive
 from gazerig.drivers.types import ImageArray
 from gazerig.robot.dashboard.feed.live_feed import LiveFeed, WorldNow
 from gazerig.robot.dashboard.feed.page_process import (
@@ -18,7 +18,7 @@ from gazerig.robot.dashboard.feed.page_process import (
     unpack,
 )
 from gazerig.robot.dashboard.requests.inbox import MESSAGE_BYTES
-from gazerig.robot.model.description.build import RigShape
+from gazerig.robot.description.build import RigShape
 from gazerig.robot.model.types import Snapshot
 
 

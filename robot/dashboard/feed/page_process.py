@@ -23,9 +23,9 @@ from operator import attrgetter
 from typing import BinaryIO
 from urllib.parse import urlsplit
 
-from gazerig.drivers import child_process, message_link
-from gazerig.drivers.message_link import MessageLink
-from gazerig.drivers.passed_image import CAN_PASS, send
+from gazerig.drivers.process import child_process, message_link
+from gazerig.drivers.process.message_link import MessageLink
+from gazerig.drivers.process.passed_image import CAN_PASS, send
 from gazerig.robot.dashboard.requests.inbox import (
     MESSAGE_BYTES,
     PICTURE,

@@ -8,7 +8,7 @@ import os
 from collections.abc import Callable, Iterable
 from math import inf
 
-from gazerig.drivers.passed_image import CAN_PASS, copied
+from gazerig.drivers.process.passed_image import CAN_PASS, copied
 from gazerig.drivers.types import Detections
 from gazerig.robot.control.tick_stream import TickBatch
 from gazerig.robot.dashboard.feed.live_feed import (

@@ -13,7 +13,7 @@ from gazerig.robot.analysis.event_detector import Event, EventDetector, Fixation
 from gazerig.robot.control.loop_timing import LoopTiming, busy_text
 from gazerig.robot.control.tick import Tick
 from gazerig.robot.control.tick_text import doing, lead_text, leader
-from gazerig.robot.model.description.build import RigShape
+from gazerig.robot.description.build import RigShape
 from gazerig.robot.model.frames import CameraMount
 from gazerig.robot.model.guard_params import HealthParams
 from gazerig.robot.model.joint_limit import JointLimit

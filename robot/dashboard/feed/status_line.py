@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from math import inf
 
-from gazerig.drivers.bounded_call import lasting_text
+from gazerig.drivers.process.bounded_call import lasting_text
 from gazerig.drivers.types import BusHealth
 from gazerig.robot.control.loop_timing import busy_text
 from gazerig.robot.control.tick import Tick

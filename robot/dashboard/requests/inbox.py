@@ -12,7 +12,7 @@ import socket
 import threading
 from collections.abc import Callable
 
-from gazerig.drivers.message_link import MessageLink, wait_readable
+from gazerig.drivers.process.message_link import MessageLink, wait_readable
 from gazerig.robot.model.commands import COMMANDS
 
 REQUEST = b"t"

@@ -4,7 +4,7 @@ import json
 import threading
 from collections.abc import Callable, Mapping
 
-from gazerig.drivers.message_link import DONT_WAIT, MessageLink
+from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink
 from gazerig.robot.dashboard.requests.inbox import MESSAGE_BYTES, PICTURE, request_message
 from gazerig.robot.dashboard.requests.token_bucket import TokenBucket
 from gazerig.robot.model.clock import Clock, RealClock

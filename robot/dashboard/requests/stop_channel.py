@@ -10,7 +10,7 @@ import socket
 import threading
 from collections.abc import Callable, Mapping
 
-from gazerig.drivers.message_link import DONT_WAIT, MessageLink
+from gazerig.drivers.process.message_link import DONT_WAIT, MessageLink
 
 MESSAGE_BYTES = 4096
 _CLOSE_TIMEOUT_S = 2.0

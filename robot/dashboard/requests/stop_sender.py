@@ -4,7 +4,7 @@ import asyncio
 import contextlib
 import json
 
-from gazerig.drivers.message_link import MessageLink
+from gazerig.drivers.process.message_link import MessageLink
 from gazerig.robot.dashboard.requests.stop_channel import MESSAGE_BYTES, WORDS
 
 _ANSWERED_WITHIN_S = 1.0

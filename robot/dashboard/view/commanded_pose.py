@@ -9,10 +9,10 @@ import viser
 from gazerig.gaze.angles import rotate_back, sub
 from gazerig.robot.dashboard.view.lid_edges import LidEdges
 from gazerig.robot.dashboard.view.scene_node import along, put, turned_up
-from gazerig.robot.model.description.build import SIDES
-from gazerig.robot.model.head_shape import EYE_RADIUS, measures_of, surface
-from gazerig.robot.model.mesh import Mesh, grid, lid, ring
-from gazerig.robot.model.paint import Colour
+from gazerig.robot.description.build import SIDES
+from gazerig.robot.description.head_shape import EYE_RADIUS, measures_of, surface
+from gazerig.robot.description.mesh import Mesh, grid, lid, ring
+from gazerig.robot.description.paint import Colour
 from gazerig.robot.model.quaternion import quaternion
 from gazerig.robot.model.types import CommandedPose, Snapshot
 

@@ -12,9 +12,9 @@ from PIL import Image
 
 from gazerig.gaze.types import Floats, Vec3
 from gazerig.robot.dashboard.view.glb_file import glb_file
-from gazerig.robot.model.description.texture import TexturedMesh
-from gazerig.robot.model.mesh import smooth_normals
-from gazerig.robot.model.paint import Colour, Painted
+from gazerig.robot.description.mesh import smooth_normals
+from gazerig.robot.description.paint import Colour, Painted
+from gazerig.robot.description.texture import TexturedMesh
 
 
 class Light(NamedTuple):

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.model.mesh import Mesh
+from gazerig.robot.description.mesh import Mesh
 
 _UNSIGNED_BYTE: Final = 5121
 _UNSIGNED_INT: Final = 5125

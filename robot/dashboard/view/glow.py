@@ -4,8 +4,8 @@ from math import pi
 
 import numpy as np
 
-from gazerig.robot.model.mesh import turned
-from gazerig.robot.model.paint import Painted, plain
+from gazerig.robot.description.mesh import turned
+from gazerig.robot.description.paint import Painted, plain
 
 
 def glow(inner: tuple[int, int, int, int], rings: int = 20) -> Painted:

@@ -14,13 +14,13 @@ from gazerig.robot.dashboard.view.glow import glow
 from gazerig.robot.dashboard.view.lid_edges import LidEdges, lid_edges
 from gazerig.robot.dashboard.view.scene_node import put
 from gazerig.robot.dashboard.view.snapshot_shape import shape_of, wide_awake
-from gazerig.robot.model.description import links
-from gazerig.robot.model.description.build import SIDES, RigShape, describe
-from gazerig.robot.model.description.links import Description, Link, Visual, turn_about
-from gazerig.robot.model.description.parts import FLOOR_M
-from gazerig.robot.model.head_shape import HeadMeasures, measures_of
+from gazerig.robot.description import links
+from gazerig.robot.description.build import SIDES, RigShape, describe
+from gazerig.robot.description.head_shape import HeadMeasures, measures_of
+from gazerig.robot.description.links import Description, Link, Visual, turn_about
+from gazerig.robot.description.paint import Colour
+from gazerig.robot.description.parts import FLOOR_M
 from gazerig.robot.model.kinematics import LIDS
-from gazerig.robot.model.paint import Colour
 from gazerig.robot.model.quaternion import quaternion
 from gazerig.robot.model.types import Snapshot
 

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from gazerig.robot.model.description.build import SIDES, RigShape
-from gazerig.robot.model.description.parts import meeting_rad
+from gazerig.robot.description.build import SIDES, RigShape
+from gazerig.robot.description.parts import meeting_rad
 from gazerig.robot.model.kinematics import LIDS
 
 

@@ -2,9 +2,9 @@
 
 from math import radians
 
-from gazerig.robot.model.description.build import RigShape
+from gazerig.robot.description.build import RigShape
+from gazerig.robot.description.head_shape import HeadMeasures
 from gazerig.robot.model.frames import CameraParams
-from gazerig.robot.model.head_shape import HeadMeasures
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS, GeometryParams
 from gazerig.robot.model.types import Snapshot

@@ -7,7 +7,7 @@ import viser
 
 from gazerig.gaze.types import Floats, Vec3
 from gazerig.robot.dashboard.view.scene_node import along, put
-from gazerig.robot.model.paint import Colour
+from gazerig.robot.description.paint import Colour
 from gazerig.robot.model.quaternion import quaternion
 from gazerig.robot.model.types import Snapshot
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from gazerig.gaze.angles import add, sub
 from gazerig.gaze.types import Vec3
 from gazerig.robot.dashboard.view.head_view import shown_measures
-from gazerig.robot.model.head_shape import CHIN, TOP, HeadMeasures
+from gazerig.robot.description.head_shape import CHIN, TOP, HeadMeasures
 from gazerig.robot.model.types import Snapshot
 
 FACE, BOTH, SHOULDER, ABOVE = "face", "both", "over its shoulder", "from above"

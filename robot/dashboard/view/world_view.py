@@ -7,9 +7,9 @@ import viser
 
 from gazerig.robot.dashboard.view.glb import CLOTH, FLAT, PLASTIC, SKIN, Finish, glb, textured_glb
 from gazerig.robot.dashboard.view.scene_node import put
-from gazerig.robot.model.mesh import smooth_normals
-from gazerig.robot.model.paint import Painted, merged
-from gazerig.robot.model.world_shapes import WorldFinish, WorldPart, WorldShapes
+from gazerig.robot.description.mesh import smooth_normals
+from gazerig.robot.description.paint import Painted, merged
+from gazerig.robot.description.world_shapes import WorldFinish, WorldPart, WorldShapes
 
 _FINISHES: Mapping[WorldFinish, Finish] = {
     "skin": SKIN,

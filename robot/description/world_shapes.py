@@ -4,8 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple, Protocol
 
 from gazerig.gaze.types import Vec3
-from gazerig.robot.model.description.texture import TexturedMesh
-from gazerig.robot.model.paint import Painted
+from gazerig.robot.description.paint import Painted
+from gazerig.robot.description.texture import TexturedMesh
 from gazerig.robot.model.quaternion import Quaternion
 
 WorldFinish = Literal["skin", "plastic", "cloth", "flat"]

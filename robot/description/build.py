@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Vec3
-from gazerig.robot.model.coupling_params import CouplingParams
-from gazerig.robot.model.description import mass, parts
-from gazerig.robot.model.description.links import (
+from gazerig.robot.description import mass, parts
+from gazerig.robot.description.head_shape import HeadMeasures
+from gazerig.robot.description.links import (
     CameraFrame,
     Description,
     Follows,
@@ -23,10 +23,10 @@ from gazerig.robot.model.description.links import (
     Link,
     LinkJoint,
 )
-from gazerig.robot.model.description.own_meshes import OwnMesh, with_own_meshes
-from gazerig.robot.model.description.servo_limits import joint_torques_nm
+from gazerig.robot.description.own_meshes import OwnMesh, with_own_meshes
+from gazerig.robot.description.servo_limits import joint_torques_nm
+from gazerig.robot.model.coupling_params import CouplingParams
 from gazerig.robot.model.frames import OPTICAL, CameraParams
-from gazerig.robot.model.head_shape import HeadMeasures
 from gazerig.robot.model.joint import JointParams
 from gazerig.robot.model.kinematics import LIDS, LOWER_NECK, NECK, GeometryParams, LidEnds
 from gazerig.robot.model.types import further

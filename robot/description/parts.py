@@ -1,7 +1,7 @@
 """The links of a head with their shapes, looks and masses, in metres.
 
-Everything scales with the distance between the eyes (robot/model/head_shape.py); a user's own
-mesh takes the place of a link's looks (robot/model/description/own_meshes.py).
+Everything scales with the distance between the eyes (robot/description/head_shape.py); a user's own
+mesh takes the place of a link's looks (robot/description/own_meshes.py).
 """
 
 from collections.abc import Sequence
@@ -11,17 +11,17 @@ import numpy as np
 
 from gazerig.gaze.angles import rotation
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.model.description import head_mesh, mass
-from gazerig.robot.model.description.links import (
+from gazerig.robot.description import head_mesh, mass
+from gazerig.robot.description.head_shape import CHIN, HeadMeasures
+from gazerig.robot.description.links import (
     CollisionShape,
     Inertia,
     Link,
     LinkJoint,
     Visual,
 )
-from gazerig.robot.model.head_shape import CHIN, HeadMeasures
-from gazerig.robot.model.mesh import Mesh, ellipsoid
-from gazerig.robot.model.paint import Painted, merged, mirrored, moved, painted
+from gazerig.robot.description.mesh import Mesh, ellipsoid
+from gazerig.robot.description.paint import Painted, merged, mirrored, moved, painted
 
 FLOOR_M = -0.09
 """Height of the table the rig stands on, below the neck base."""

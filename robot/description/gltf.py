@@ -17,7 +17,7 @@ from trimesh.visual.material import PBRMaterial
 
 from gazerig.gaze.angles import compose
 from gazerig.gaze.types import Floats, Mat3, Vec3
-from gazerig.robot.model.description.links import (
+from gazerig.robot.description.links import (
     IDENTITY,
     ORIGIN,
     Description,
@@ -25,7 +25,7 @@ from gazerig.robot.model.description.links import (
     Visual,
     turn_about,
 )
-from gazerig.robot.model.description.texture import textured
+from gazerig.robot.description.texture import textured
 
 _ROUGHNESS: dict[Finish, float] = {
     "skin": 0.7, "plastic": 0.45, "cloth": 0.95, "eye": 0.12, "dark": 1.0,

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from typing import Any
 
+from gazerig.drivers.bus.servo_families import FAMILY_OF
+from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.dynamixel.params import DynamixelParams
 from gazerig.drivers.feetech.params import FeetechParams
 from gazerig.drivers.maestro.bus import MaestroBus
@@ -13,8 +15,6 @@ from gazerig.drivers.plugins import BusPlugin, Evidence
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.servo_bus.bus import SmartServoBus
 from gazerig.drivers.servo_bus.params import BusParams
-from gazerig.drivers.servo_families import FAMILY_OF
-from gazerig.drivers.servo_models import SERVOS
 from gazerig.drivers.types import ServoBus, ServoConfig
 
 

@@ -5,10 +5,10 @@ from itertools import chain
 from math import isfinite
 from typing import Any, TypeVar
 
-from gazerig.drivers.bounded_call import BoundedCall, CallResult
-from gazerig.drivers.errors import BusLost, DriverError
+from gazerig.drivers.errors import BusLost, DriverError, PluginError
 from gazerig.drivers.event_log import EventLog, RateLimitedLog, servo_label
-from gazerig.drivers.plugins import PluginError, failure
+from gazerig.drivers.plugins import failure
+from gazerig.drivers.process.bounded_call import BoundedCall, CallResult
 from gazerig.drivers.types import BusHealth, Feedback, ServoBus, ServoConfig
 
 T = TypeVar("T")

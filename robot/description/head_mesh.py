@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.model.cut import cut
-from gazerig.robot.model.face_features import brow as bow
-from gazerig.robot.model.face_features import lips
-from gazerig.robot.model.head_shape import HEAD, JAW_BOUNDS, JAW_HALF, MOUTH, eye_rim, surface
-from gazerig.robot.model.mesh import Mesh, ellipsoid, grid, smooth_normals, turned
-from gazerig.robot.model.paint import (
+from gazerig.robot.description.cut import cut
+from gazerig.robot.description.face_features import brow as bow
+from gazerig.robot.description.face_features import lips
+from gazerig.robot.description.head_shape import HEAD, JAW_BOUNDS, JAW_HALF, MOUTH, eye_rim, surface
+from gazerig.robot.description.mesh import Mesh, ellipsoid, grid, smooth_normals, turned
+from gazerig.robot.description.paint import (
     Colour,
     Painted,
     merged,

@@ -10,7 +10,7 @@ from math import atan, degrees, tan
 from typing import NamedTuple
 
 from gazerig.gaze.angles import compose
-from gazerig.robot.model.description.links import (
+from gazerig.robot.description.links import (
     IDENTITY,
     CollisionShape,
     Description,
@@ -20,8 +20,8 @@ from gazerig.robot.model.description.links import (
     Visual,
     turn_about,
 )
-from gazerig.robot.model.description.mesh_files import mesh_files
-from gazerig.robot.model.description.numbers import numbers
+from gazerig.robot.description.mesh_files import mesh_files
+from gazerig.robot.description.numbers import numbers
 from gazerig.robot.model.quaternion import quaternion
 
 _LAYERS = {"body": "1", "lid": "2"}

@@ -1,24 +1,24 @@
 """Every servo model that a joint can have: on which kind of bus, and in which steps it counts."""
 
+from collections.abc import Mapping, Sequence
 from math import inf
 from typing import TYPE_CHECKING, NamedTuple
 
 from gazerig.drivers.dynamixel.control_table import MODELS as DYNAMIXEL
 from gazerig.drivers.dynamixel.control_table import STEPS_PER_TURN as STEPS_PER_TURN
 from gazerig.drivers.dynamixel.control_table import DynamixelModel
+from gazerig.drivers.errors import PluginError
 from gazerig.drivers.event_log import servo_label as label_with
 from gazerig.drivers.feetech.memory_table import MODELS as FEETECH
 from gazerig.drivers.feetech.memory_table import SCS_MODELS, SCS_STEPS, FeetechModel
 from gazerig.drivers.hobby_board.models import HOBBY, US_STEPS
-from gazerig.drivers.plugins import BUS, SHIPPED, PluginError
 
 if TYPE_CHECKING:
-    from gazerig.drivers.plugins import BusPlugin
     from gazerig.drivers.types import ServoConfig
 
 BusKind = str
 """Name of a kind of bus: one of ``BUS_KINDS``, or one that a package brings."""
-BUS_KINDS: tuple[BusKind, ...] = tuple(SHIPPED[BUS])
+BUS_KINDS: tuple[BusKind, ...] = ("dynamixel", "feetech", "maestro", "pca9685")
 HOBBY_KINDS: tuple[BusKind, ...] = ("maestro", "pca9685")
 """Our boards that send pulses to hobby servos: any of them moves any."""
 
@@ -101,22 +101,30 @@ _ALSO_MOVED: dict[BusKind, tuple[BusKind, ...]] = {}
 """Kind of a package -> kinds of which it moves the servos too."""
 
 
-def add_models(kind: BusKind, part: "BusPlugin", label: str) -> None:
-    """Make the servo models of a package's bus known; ``label`` names it in messages.
+def add_models(
+    kind: BusKind, models: Mapping[str, ServoModelInfo], moves: Sequence[str], label: str
+) -> None:
+    """Make the servo models of a package's bus known.
+
+    Args:
+        kind: of the bus.
+        models: by name.
+        moves: names of models of others that it moves too.
+        label: of the package in messages.
 
     Raises:
         PluginError: a model has a name that is taken, or is no model.
     """
-    for name, model in part.models.items():
+    for name, model in models.items():
         if not isinstance(model, ServoModelInfo):
             raise PluginError(f"{label}: its servo model {name!r} is no ServoModelInfo")
         if SERVOS.get(name, model._replace(bus=kind)) != model._replace(bus=kind):
             raise PluginError(f"{label}: there is another servo model {name!r} already")
-    for name in part.moves:
+    for name in moves:
         if name not in SERVOS:
             raise PluginError(f"{label}: there is no servo model {name!r} that it could move too")
-    SERVOS.update({name: m._replace(bus=kind) for name, m in part.models.items()})
-    _ALSO_MOVED[kind] = tuple(SERVOS[name].bus for name in part.moves)
+    SERVOS.update({name: m._replace(bus=kind) for name, m in models.items()})
+    _ALSO_MOVED[kind] = tuple(SERVOS[name].bus for name in moves)
 
 
 def servo_label(setup: "ServoConfig") -> str:

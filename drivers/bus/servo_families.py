@@ -1,10 +1,10 @@
 """Every family of smart servos, by its name and by the models in it."""
 
+from gazerig.drivers.bus.servo_models import SERVOS
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.feetech.scs import FEETECH_SCS
 from gazerig.drivers.servo_bus.family import Family
-from gazerig.drivers.servo_models import SERVOS
 
 FAMILIES: dict[str, Family] = {one.name: one for one in (DYNAMIXEL, FEETECH, FEETECH_SCS)}
 """By name."""

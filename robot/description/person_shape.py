@@ -12,11 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.gaze.types import Floats, Vec3
-from gazerig.robot.model.face_features import Mouth, brow, lips
-from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
-from gazerig.robot.model.mesh import Mesh, cap, grid
-from gazerig.robot.model.mesh import ellipsoid as ellipsoid_mesh
-from gazerig.robot.model.paint import (
+from gazerig.robot.description.face_features import Mouth, brow, lips
+from gazerig.robot.description.mesh import Mesh, cap, grid
+from gazerig.robot.description.mesh import ellipsoid as ellipsoid_mesh
+from gazerig.robot.description.paint import (
     Colour,
     Painted,
     merged,
@@ -27,7 +26,8 @@ from gazerig.robot.model.paint import (
     spot,
     step,
 )
-from gazerig.robot.model.solid import Field, Solid, Surface, capsule, carve, ellipsoid, union
+from gazerig.robot.description.solid import Field, Solid, Surface, capsule, carve, ellipsoid, union
+from gazerig.robot.model.face_geometry import PUPIL_DISTANCE_M
 
 
 class PersonLook(NamedTuple):

@@ -7,9 +7,9 @@ import cv2
 import numpy as np
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.model.description.texture import TexturedMesh, textured
-from gazerig.robot.model.mesh import Mesh
-from gazerig.robot.model.paint import Painted
+from gazerig.robot.description.mesh import Mesh
+from gazerig.robot.description.paint import Painted
+from gazerig.robot.description.texture import TexturedMesh, textured
 
 
 def mesh_files(name: str, painted: Painted) -> dict[str, bytes]:

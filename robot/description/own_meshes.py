@@ -6,9 +6,9 @@ from difflib import get_close_matches
 from math import radians
 
 from gazerig.gaze.angles import rotation
-from gazerig.robot.model.description.links import Description, Visual
-from gazerig.robot.model.mesh_params import MeshParams
-from gazerig.robot.model.paint import Painted
+from gazerig.robot.description.links import Description, Visual
+from gazerig.robot.description.mesh_params import MeshParams
+from gazerig.robot.description.paint import Painted
 
 
 @dataclass(frozen=True, eq=False)

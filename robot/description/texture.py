@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.model.mesh import quads, smooth_normals
-from gazerig.robot.model.paint import Painted
+from gazerig.robot.description.mesh import quads, smooth_normals
+from gazerig.robot.description.paint import Painted
 
 _PATCH = 4
 """Texels along the side of the square that two triangles share."""

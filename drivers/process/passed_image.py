@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.message_link import MessageLink
+from gazerig.drivers.process.message_link import MessageLink
 
 _FD_BYTES = 4  # a C int
 CAN_PASS = hasattr(os, "memfd_create") and hasattr(socket, "SCM_RIGHTS")

@@ -4,10 +4,10 @@ import re
 from collections.abc import Collection
 from typing import Literal
 
-from gazerig.robot.model.description.links import Description
-from gazerig.robot.model.description.mjcf import mjcf
-from gazerig.robot.model.description.parts import FLOOR_M
-from gazerig.robot.model.description.urdf import urdf
+from gazerig.robot.description.links import Description
+from gazerig.robot.description.mjcf import mjcf
+from gazerig.robot.description.parts import FLOOR_M
+from gazerig.robot.description.urdf import urdf
 
 Format = Literal["mjcf", "urdf", "glb"]
 FORMATS: tuple[Format, ...] = ("mjcf", "urdf", "glb")
@@ -63,7 +63,7 @@ def description_files(
         found[f"{name}.urdf"] = text.encode()
         found |= {f"{MESHES}/{file}": data for file, data in assets.items()}
     if "glb" in formats:
-        from gazerig.robot.model.description.gltf import gltf  # takes .5 s of a processor
+        from gazerig.robot.description.gltf import gltf  # takes .5 s of a processor
 
         found[f"{name}.glb"] = gltf(named)
     return found

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.gaze.types import Floats, Vec3
-from gazerig.robot.model.face_features import Mouth
-from gazerig.robot.model.mesh import grid, smooth_normals
-from gazerig.robot.model.solid import (
+from gazerig.robot.description.face_features import Mouth
+from gazerig.robot.description.mesh import grid, smooth_normals
+from gazerig.robot.description.solid import (
     Field,
     Solid,
     Surface,

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from gazerig.robot.model.mesh import Mesh
-from gazerig.robot.model.mesh_params import MeshParams
-from gazerig.robot.model.paint import Painted
+from gazerig.robot.description.mesh import Mesh
+from gazerig.robot.description.mesh_params import MeshParams
+from gazerig.robot.description.paint import Painted
 
 FORMATS = (".stl", ".obj", ".ply", ".off", ".glb", ".gltf")
 _Y_UP = (".glb", ".gltf")

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import BinaryIO, TextIO
 
 from gazerig.drivers.errors import SetupError
-from gazerig.drivers.file_input import kind_of
+from gazerig.drivers.files.file_input import kind_of
 
 _OWN_OUTPUT = ("/dev/fd/", "/proc/self/fd/")
 

@@ -4,8 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.model.mesh import Mesh
-from gazerig.robot.model.paint import Painted
+from gazerig.robot.description.mesh import Mesh
+from gazerig.robot.description.paint import Painted
 
 
 def cut(one: Painted, outside: Floats) -> tuple[Painted, Painted]:

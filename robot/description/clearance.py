@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.gaze.types import Floats
-from gazerig.robot.model.description.build import RigShape, describe
-from gazerig.robot.model.description.links import CollisionShape, Description, Pose
+from gazerig.robot.description.build import RigShape, describe
+from gazerig.robot.description.links import CollisionShape, Description, Pose
 
 _STEPS, _HALVINGS = 7, 7
 """Angles of a joint that are tried, its limits among them."""

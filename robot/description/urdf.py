@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from gazerig.gaze.angles import add, rotate
 from gazerig.gaze.types import Mat3, Vec3
-from gazerig.robot.model.description.links import (
+from gazerig.robot.description.links import (
     IDENTITY,
     ORIGIN,
     CollisionShape,
@@ -19,9 +19,9 @@ from gazerig.robot.model.description.links import (
     Link,
     LinkJoint,
 )
-from gazerig.robot.model.description.mesh_files import mesh_files, plain_obj
-from gazerig.robot.model.description.numbers import numbers, roll_pitch_yaw
-from gazerig.robot.model.mesh import ellipsoid
+from gazerig.robot.description.mesh import ellipsoid
+from gazerig.robot.description.mesh_files import mesh_files, plain_obj
+from gazerig.robot.description.numbers import numbers, roll_pitch_yaw
 
 _BALL = "ball_of_radius_1.obj"
 

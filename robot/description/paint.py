@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gazerig.gaze.types import Floats, Vec3
-from gazerig.robot.model.mesh import Mesh, smooth_normals
+from gazerig.robot.description.mesh import Mesh, smooth_normals
 
 Colour = tuple[int, int, int]
 

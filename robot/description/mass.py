@@ -8,7 +8,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from gazerig.gaze.types import Floats, Mat3, Vec3
-from gazerig.robot.model.description.links import Inertia
+from gazerig.robot.description.links import Inertia
 
 _PRINTED_KG_M3 = 1050.0
 """Density of printed PLA or PETG with the usual share of air."""

@@ -5,9 +5,9 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import ClassVar, Protocol
 
+from gazerig.drivers.bus.released import ReleaseResult
 from gazerig.drivers.errors import BusLost
 from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.released import ReleaseResult
 from gazerig.drivers.serial.port import BusPort
 from gazerig.drivers.serial.reconnect import ReconnectingPort
 from gazerig.drivers.types import BusHealth, ServoConfig

@@ -1,0 +1,1 @@
+"""What every kind of servo bus shares: models, ports, checks of goals and readings."""
