@@ -370,3 +370,14 @@ def test_a_hand_before_the_mouth_moves_nobody_and_points_that_jump_are_no_hand()
     off, covered = _seen_with_a_hand(0.02, 150)
     assert off < 0.05 and covered == 30
     assert _seen_with_a_hand(0.15, 180)[1] == 0
+
+
+def test_a_thing_that_turns_out_to_be_a_hand_keeps_its_identity() -> None:
+    tracker = Tracker(TrackParams())
+    moving = replace(face(2.0, 0.9, "thing"), mark=7)
+    (thing,) = tracker.step([moving], CAMERA, 0.0)
+    hand = replace(moving, kind="hand", p_world_m=(0.6, 0.27, 0.2))
+    other = replace(face(1.0, -0.5, "hand"), mark=8)
+    found = {track.detection.mark: track for track in tracker.step([hand, other], CAMERA, 0.03)}
+    assert found[7].id == thing.id != found[8].id
+    assert found[7].p_world_m == pytest.approx(hand.p_world_m)

@@ -235,12 +235,17 @@ class Tracker:
         if self._worn is not None:
             self._settle(self._worn, dict(pairs), detections)
         taken = {j for _, j in pairs}
-        for j, detection in enumerate(detections):
-            if j not in taken:
-                self._tracks.append(self._begin(detection, p_world_camera_m, t_s))
         renamed = {
             found.mark for found in detections if found.mark is not None and found.kind != UNNAMED
         }
+        # What is known at last to be a hand is no newcomer: it keeps the number that it had.
+        ids = {t.detection.mark: t.id for t in self._tracks if _became_another(t, renamed)}
+        for j, detection in enumerate(detections):
+            if j not in taken:
+                track = self._begin(detection, p_world_camera_m, t_s)
+                if detection.kind != UNNAMED:
+                    track.id = ids.pop(detection.mark, track.id)
+                self._tracks.append(track)
         self._tracks = [
             t
             for t in self._tracks
