@@ -79,6 +79,23 @@ class TestPca9685(_OfKind):
     kind, cases, left = "pca9685", CASES["pca9685"], frozenset(LEFT["pca9685"])
 
 
+def test_a_servo_that_cannot_be_set_up_again_is_named_and_keeps_no_other_waiting():
+    rig, machine = copied(of_kind("dynamixel"))
+    bus, i, j = pair_of(rig, "dynamixel")
+    # A second servo has its id, which only shows where both stand apart without torque.
+    again = ("collide {i}", "unplug", "brown-out {i}", "brown-out {j}")
+    outcome = machine.strike(bus, i, j, Case(again, ("plug",)))
+    assert outcome.end == "left, named", outcome
+    assert [k for k, heard in enumerate(machine.heard) if not heard] == [i]
+
+
+def test_a_limp_joint_may_fall_out_of_its_range_under_a_load():
+    rig, machine = copied(of_kind("dynamixel"))
+    bus, i, j = pair_of(rig, "dynamixel")
+    case = Case(("load {i} 0.05", "unplug", "brown-out {i}"), ("load {i} 0", "plug"))
+    assert machine.strike(bus, i, j, case).end == "came back"
+
+
 # --- several kinds in one head
 
 ALONE = (

@@ -123,6 +123,10 @@ def test_the_largest_disc_within_a_patch_tells_how_thick_it_is() -> None:
     holed = things(((100, 50, 90, 24), (2, 0)))
     holed.mask[60:62, 120:122] = False
     assert inscribed_px(gathered(holed, MotionParams())[0], SHAPE) == pytest.approx(12.0, abs=1.0)
+    plain = things(((0, 50, 90, 24), (2, 0)))
+    plain.mask[54:70, :3] = plain.mask[56:68, :70] = False
+    (sleeve,) = gathered(plain, MotionParams())
+    assert inscribed_px(sleeve, SHAPE) == pytest.approx(12.0, abs=1.0), "only its edges show"
     (cut,) = gathered(things(((0, 50, 90, 24), (2, 0))), MotionParams())
     assert inscribed_px(cut, SHAPE) == pytest.approx(12.0, abs=1.0)
     (corner,) = gathered(things(((0, 0, 40, 30), (2, 0))), MotionParams())

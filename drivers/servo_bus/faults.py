@@ -16,6 +16,11 @@ GARBLES = "answers, but its bytes arrive damaged: a second servo with its id, or
 BUSY_S = 2.0
 """Where answers come late a servo may be silent for so long before it is named."""
 
+NOT_SET_UP = "cannot be set up again: a second servo with its id, or a bad cable"
+
+FAILED_IN_A_ROW = 2
+"""A servo that fails so often alone is named: one lost answer is no news."""
+
 OWED_S = 0.1
 """So long after the first answer, those that were owed have come."""
 
@@ -37,6 +42,7 @@ class ServoHealth:
         self.faults: dict[int, str] = {}
         self.latches: set[int] = set()
         self._restarts: dict[int, list[float]] = {}
+        self._failed: dict[int, int] = {}
         self._silent_since: dict[int, float] = {}
         self._reported: set[int] = set()
         self._all_silent = False
@@ -78,6 +84,16 @@ class ServoHealth:
         """Record that a servo had restarted and works again."""
         self._restarts.setdefault(servo_id, []).append(now_s)
         self._log.add(f"{servo_label(self._setups[servo_id])} restarted: set up again")
+
+    def not_set_up(self, servo_id: int) -> None:
+        """Record that a servo could not be set up again, alone."""
+        self._failed[servo_id] = failed = self._failed.get(servo_id, 0) + 1
+        if failed == FAILED_IN_A_ROW:
+            self._log.add(f"{servo_label(self._setups[servo_id])} {NOT_SET_UP}")
+
+    def set_up(self, servo_id: int) -> None:
+        """Record that a servo has been set up again."""
+        self._failed.pop(servo_id, None)
 
     def record_silent(
         self,

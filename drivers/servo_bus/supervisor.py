@@ -65,6 +65,7 @@ class Supervisor(ABC):
         self._rearmed: set[int] = set()
         self._recover_at_s = self._check_at_s = -inf
         self._checked = 0
+        self._failures = 0
 
     @property
     def at_ease(self) -> bool:
@@ -125,17 +126,30 @@ class Supervisor(ABC):
     # --- servos to be set up again
 
     def _recover(self, group: Collection[int], now_s: float) -> None:
-        """Set up again who may have restarted and answers; tried again later where that fails."""
+        """Set up again who may have restarted and answers; tried again later where that fails.
+
+        After a failure each is set up alone, in turn: one that fails keeps no other waiting.
+        """
         ids = tuple(i for i in self._ids if i in self._suspects and i in group)
         if not ids:
             return
+        if self._failures:
+            ids = (ids[self._failures % len(ids)],)
         self._recover_at_s = now_s + AGAIN_S
         found = self._recovery.recover(ids, self.engaged, now_s)
         if found is None:
+            if self._failures:
+                self._health.not_set_up(ids[0])
+            self._failures += 1
             return
         self._suspects.difference_update(ids)
+        if not self._suspects:
+            self._failures = 0
+        elif self._failures:
+            self._recover_at_s = now_s
         at_s = self._line.port.now_s()
         for servo_id in ids:
+            self._health.set_up(servo_id)
             self._name_fault(servo_id)
         for servo_id, position in found.items():
             self._line.errors["rearmed"] += 1

@@ -40,10 +40,12 @@ _COLOURS_GAIN, _UNFIT_GAIN, _PROVED, _OWN = 0.15, 0.005, 3, 60
 _GAP_S, _LOST_S = 0.12, 0.25
 _CONFIRMED, _MOST_CONFIRMED, _MISFITS = 3.0, 6.0, 2.0
 _FITS, _SURE, _MOST_OF_FRAME = -1.0, 9.0, 6.0
-# Below this part of its usual measure the lower half of a face is covered, until it is above the
-# other; it must have been seen bare in so many frames, and is learned so fast. What a cover does to
-# the distance is up to this factor, and is learned so fast, at first faster.
-_COVERED, _BARE_AGAIN, _BARE, _SHAPE_GAIN, _MOST_OFF, _COVER_GAIN = 0.8, 0.9, 8, 0.03, 1.5, 0.03
+# Below this part of its usual measure the lower half of a face is covered, if that is so many
+# standard deviations of a frame below too; one frame alone is about so uncertain, as a part.
+_COVERED, _COVERED_SDS, _SHAPE_SD = 0.8, 4.0, 0.1
+# It must have been seen bare in so many frames, and is learned so fast. What a cover does to the
+# distance is up to this factor, and is learned so fast, at first faster.
+_BARE, _SHAPE_GAIN, _MOST_OFF, _COVER_GAIN = 8, 0.03, 1.5, 0.03
 # Points that are guessed jump: a face is covered for so long after it was seen to be.
 _COVERED_S = 0.3
 # Inner product of colours that are much alike.
@@ -129,7 +131,7 @@ class Track:
     confirmed: in how many frames they were its own since it was out of sight
     lost_sight: whether it was out of sight and they have not been seen to be its own since
     box_m, lower_face: as of a detection, of the face as it usually is; bare: in how many frames
-        they were seen
+        they were seen; lower_var: its variance from frame to frame, as a part of it
     covered: for how many frames the lower half of the face has been covered; covered_s: capture
         time of the last of them; cover_share: by which its distance is multiplied since
     """
@@ -153,6 +155,7 @@ class Track:
     lost_sight: bool = False
     box_m: float = 0.0
     lower_face: float = 0.0
+    lower_var: float = _SHAPE_SD * _SHAPE_SD
     bare: int = 0
     covered: int = 0
     covered_s: float = -inf
@@ -232,12 +235,17 @@ class Tracker:
         if self._worn is not None:
             self._settle(self._worn, dict(pairs), detections)
         taken = {j for _, j in pairs}
-        for j, detection in enumerate(detections):
-            if j not in taken:
-                self._tracks.append(self._begin(detection, p_world_camera_m, t_s))
         renamed = {
             found.mark for found in detections if found.mark is not None and found.kind != UNNAMED
         }
+        # What is known at last to be a hand is no newcomer: it keeps the number that it had.
+        ids = {t.detection.mark: t.id for t in self._tracks if _became_another(t, renamed)}
+        for j, detection in enumerate(detections):
+            if j not in taken:
+                track = self._begin(detection, p_world_camera_m, t_s)
+                if detection.kind != UNNAMED:
+                    track.id = ids.pop(detection.mark, track.id)
+                self._tracks.append(track)
         self._tracks = [
             t
             for t in self._tracks
@@ -475,7 +483,9 @@ def _is_covered(track: Track, found: LocalisedDetection) -> bool:
     """
     if found.depth_measured or track.bare < _BARE or not found.lower_face > 0.0:
         return False
-    if found.lower_face < (_BARE_AGAIN if track.covered else _COVERED) * track.lower_face:
+    # The points of a far face jump more than those of a near one.
+    least = min(_COVERED, 1.0 - _COVERED_SDS * sqrt(track.lower_var))
+    if found.lower_face < (0.5 + 0.5 * least if track.covered else least) * track.lower_face:
         track.covered_s = track.at_s
     return track.at_s - track.covered_s <= _COVERED_S
 
@@ -501,7 +511,11 @@ def _learn_shape(track: Track, found: LocalisedDetection) -> None:
     track.bare += 1
     gain = max(1.0 / track.bare, _SHAPE_GAIN)
     track.box_m += gain * (found.box_m - track.box_m)
-    track.lower_face += gain * (found.lower_face - track.lower_face)
+    off = found.lower_face - track.lower_face
+    track.lower_face += gain * off
+    gain = max(1.0 / (track.bare + _BARE), _SHAPE_GAIN)
+    if track.bare > 1:
+        track.lower_var += gain * ((off / track.lower_face) ** 2 - track.lower_var)
 
 
 def _learn_colours(track: Track, clothing: Clothing | None) -> None:

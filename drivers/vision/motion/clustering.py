@@ -30,6 +30,8 @@ _SMOOTH_PX = 3
 # the image from which on less is enough: what is near is large, and its edges are soft.
 _LEAST_CHANGE, _SMALL_SHARE = 0.13, 0.008
 _SAMPLE = 400
+# A patch so near to the image's edge, where flow is not known, goes on beyond it.
+_CUT_PX = 3
 _HOLES = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (3, 3))
 
 
@@ -166,15 +168,24 @@ def inscribed_px(group: Group, shape: tuple[int, ...]) -> float:
     """
     x, y, width, height = group.box
     mask = np.zeros((height + 2, width + 2), np.uint8)
-    mask[group.y - y + 1, group.x - x + 1] = 1
-    # Where the flow of a plain skin is not sure there are holes.
-    mask[1:-1, 1:-1] = cv2.morphologyEx(mask[1:-1, 1:-1], cv2.MORPH_CLOSE, _HOLES)
-    if y <= 0:
-        mask[0] = mask[1]
-    if y + height >= shape[0]:
-        mask[-1] = mask[-2]
-    if x <= 0:
-        mask[:, 0] = mask[:, 1]
-    if x + width >= shape[1]:
-        mask[:, -1] = mask[:, -2]
+    inner = mask[1:-1, 1:-1]
+    inner[group.y - y, group.x - x] = 1
+    inner[:] = cv2.morphologyEx(inner, cv2.MORPH_CLOSE, _HOLES)
+    if x <= _CUT_PX:
+        _go_on(mask[:, 0], mask[:, 1])
+    if x + width >= shape[1] - _CUT_PX:
+        _go_on(mask[:, -1], mask[:, -2])
+    if y <= _CUT_PX:
+        _go_on(mask[0], mask[1])
+    if y + height >= shape[0] - _CUT_PX:
+        _go_on(mask[-1], mask[-2])
+    # In a plain skin no flow shows: what moves all around moves, too.
+    outlines, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    cv2.drawContours(mask, outlines, -1, 1, cv2.FILLED)
     return float(cv2.distanceTransform(mask, cv2.DIST_L2, cv2.DIST_MASK_3).max())
+
+
+def _go_on(beyond: NDArray[np.uint8], edge: NDArray[np.uint8]) -> None:
+    """Let a patch that the image's edge cuts go on beyond it in one piece."""
+    at = np.flatnonzero(edge)
+    beyond[at[0] : at[-1] + 1] = 1
