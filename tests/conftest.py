@@ -198,7 +198,7 @@ def unlaid_figures(monkeypatch: pytest.MonkeyPatch) -> None:
 
     tests/lab/test_report.py draws all of them as users see them.
     """
-    from gazerig.features.lab.report import plotting
+    plotting = pytest.importorskip("gazerig.features.lab.report.plotting")
 
     monkeypatch.setattr(plotting, "_LAYOUT", None)
     monkeypatch.setattr(plotting, "_DPI", 30)
@@ -207,7 +207,7 @@ def unlaid_figures(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def few_drawings(unlaid_figures: None, monkeypatch: pytest.MonkeyPatch) -> int:
     """Draw the first three figures alone: all of them take longest, and are drawn elsewhere."""
-    from gazerig.features.lab.report import report
+    report = pytest.importorskip("gazerig.features.lab.report.report")
 
     monkeypatch.setattr(report, "DRAWINGS", report.DRAWINGS[:3])
     return 3

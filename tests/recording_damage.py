@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import pytest
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
@@ -16,7 +17,6 @@ from mcap.records import Chunk
 from gazerig.config.schema import load_rig
 from gazerig.config.text import rig_text, walk_text
 from gazerig.drivers.errors import DriverError
-from gazerig.features.lab.cli.report import _recorded
 from gazerig.robot.app.assemble import Substitutes, assemble
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
@@ -183,6 +183,7 @@ def _again(file: Path) -> object:
 
 
 def _reported(file: Path) -> object:
+    _recorded = pytest.importorskip("gazerig.features.lab.cli.report")._recorded
     return len(_recorded(file, "x", lambda words, share: None)[1].rows)
 
 

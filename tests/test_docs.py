@@ -24,16 +24,6 @@ from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.plugins import BusPlugin
 from gazerig.drivers.servo_bus.family import Family
-from gazerig.features.study.design import (
-    Exclusion,
-    Presentation,
-    Privacy,
-    StatisticalPlan,
-    StudyDesign,
-    Trials,
-)
-from gazerig.features.study.questionnaire import Item, Questionnaire
-from gazerig.features.study.shipped import HOME
 from gazerig.gaze.gesture.gesture import LID_GROUPS, Gesture, KeyFrame
 from gazerig.robot.cli.examples import EXAMPLES
 from gazerig.robot.model.joint import JointParams
@@ -48,6 +38,12 @@ from gazerig.sim_mock.world.script import (
     ThingScript,
     WorldScript,
 )
+
+# The documents describe every feature: without one of them, they cannot be compared with it.
+design = pytest.importorskip("gazerig.features.study.design")
+questionnaire = pytest.importorskip("gazerig.features.study.questionnaire")
+HOME = pytest.importorskip("gazerig.features.study.shipped").HOME
+pytest.importorskip("gazerig.features.lab")
 
 FOLDERS = ("api", "config", "drivers", "features", "gaze", "robot", "sim_mock")
 RIGS = {name: load_rig(name) for name in shipped_names("rigs")}
@@ -151,7 +147,7 @@ def test_yaml_shown_has_keys_that_there_are() -> None:
             _fits(Shape("params", params=WorldScript), data, "world")
             continue
         if "conditions" in data or "items" in data:
-            form = StudyDesign if "conditions" in data else Questionnaire
+            form = design.StudyDesign if "conditions" in data else questionnaire.Questionnaire
             _fits(Shape("params", params=form), data, form.__name__)
             continue
         for key, value in data.items():
@@ -306,14 +302,8 @@ def test_every_span_names_something_that_is_there(paper: Path) -> None:
     words |= {field.name for script in scripts for field in fields(script)}
     words |= {*get_args(Do), *shipped_names("worlds"), HEAD}
     forms = (
-        StudyDesign,
-        Presentation,
-        Trials,
-        StatisticalPlan,
-        Exclusion,
-        Privacy,
-        Questionnaire,
-        Item,
+        *(design.StudyDesign, design.Presentation, design.Trials, design.StatisticalPlan),
+        *(design.Exclusion, design.Privacy, questionnaire.Questionnaire, questionnaire.Item),
     )
     words |= {field.name for form in forms for field in fields(form)}
     words |= {*shipped_names("studies", HOME), *shipped_names("questionnaires", HOME)}

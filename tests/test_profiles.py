@@ -10,7 +10,6 @@ from human.row_03_rests import visits
 
 from gazerig.config.parameters import changed
 from gazerig.config.schema import load_rig
-from gazerig.features.lab.simulated_run import simulate
 from gazerig.robot.app.options import RunOptions
 
 CLAIMS = list(claims())
@@ -101,6 +100,7 @@ def test_a_conversation_changes_the_rate_of_blinks_of_a_running_head(
     options = RunOptions(
         True, True, 0, "face-to-face", seconds=8.0, bus="ideal", conversation=conversation
     )
+    simulate = pytest.importorskip("gazerig.features.lab.simulated_run").simulate
     figures = simulate(changed(load_rig("desk"), rates), options).figures
     blinks = figures["blinks"]
     assert isinstance(blinks, int)

@@ -4,33 +4,23 @@ import csv
 import gzip
 import json
 from collections.abc import Iterator
-from html import unescape
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS
 from mcap.reader import make_reader
-from mixed_rig import mixed_text
+from recorded_rigs import Run, recorded
 from recorded_run import handed_over
 from six_joints import SIX
 
-from gazerig.config.schema import Rig, load_rig
-from gazerig.config.text import rig_text, walk_text
+from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import SetupError
-from gazerig.features.lab.report import report as build
-from gazerig.features.lab.report.compare import compare
-from gazerig.features.lab.report.gaze_trace import GazeTrace, GazeTraceBuilder
-from gazerig.features.lab.report.joint_basis import JointBasis
-from gazerig.features.lab.report.run_header import RunHeader
 from gazerig.robot.analysis.lid_opening import UPPER, openings
 from gazerig.robot.analysis.summary import Summary
-from gazerig.robot.app.assemble import Substitutes, assemble
-from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.resimulate import rerun
-from gazerig.robot.app.session import leave
-from gazerig.robot.control.loop import Tick, run
+from gazerig.robot.control.loop import Tick
 from gazerig.robot.dashboard.feed.page_process import unpack
 from gazerig.robot.recording.export_bids import DatasetDescription as Subject
 from gazerig.robot.recording.export_bids import write_bids
@@ -38,9 +28,8 @@ from gazerig.robot.recording.export_csv import columns, write_csv
 from gazerig.robot.recording.gaze_angles import trace_of
 from gazerig.robot.recording.gaze_labels import labels_of, stretches_of
 from gazerig.robot.recording.read import RunRecording
-from gazerig.robot.recording.recorder import Recorder
 from gazerig.robot.recording.run_format import HEALTH, PERCEPT, TICK, Message
-from gazerig.robot.recording.run_info import RunEnd, RunInfo, as_text
+from gazerig.robot.recording.run_info import RunEnd, as_text
 from gazerig.robot.recording.run_writer import RunWriter
 from gazerig.robot.recording.snapshot_index import SnapshotIndex
 from gazerig.robot.recording.tick_record import as_json, from_json
@@ -54,36 +43,6 @@ NO_MORE = {
     "gaze": ("lower_left", "lower_right"), "verdict": ("joints",),
 }  # fmt: skip
 """Fields of a tick that recordings once did not have."""
-
-
-class Run(NamedTuple):
-    recording: RunRecording
-    ticks: list[Tick]
-
-
-def recorded(path: Path, rig: Rig, seconds: float) -> Run:
-    """Record a simulated run; give its ticks too."""
-    options = RunOptions(mock=True, fast=True, seed=5, scene="visitor", bus="emulated")
-    info = RunInfo(
-        "a rig", rig.profile, rig_text(rig), 5, rig.loop.rate_hz, STARTED,
-        walk_yaml=walk_text(rig.gaze.scanpath.transition_matrix), scene="visitor", mock=True, fast=True,
-    )  # fmt: skip
-    recorder = Recorder(path, info, patient=True)
-    recorder.open()
-    made = assemble(rig, options, Substitutes(body=recorder.recorded))
-    seen: list[Tick] = []
-
-    def watch(tick: Tick) -> None:
-        recorder.record(tick)
-        seen.append(tick)
-
-    made.robot.start(made.clock)
-    stop = recorder.timed(lambda s: "seconds" if s >= seconds - 1e-9 else None)
-    count = run(made.robot, made.clock, lambda: made.loop, stop, watch)
-    leave(made, count, lambda line: None)
-    recorder.close(count.stopped_by, made.sent_digest())
-    made.close()
-    return Run(RunRecording(path), seen)
 
 
 @pytest.fixture(scope="module")
@@ -188,13 +147,6 @@ def test_another_rig_follows_and_is_not_fed_with_joints_of_others(maker: Run, de
 # --- what is said of the run
 
 
-def gathered(ticks: list[Tick]) -> GazeTrace:
-    gathering = GazeTraceBuilder()
-    for tick in ticks:
-        gathering.update(tick)
-    return gathering.gathered()
-
-
 def test_figures_and_status_say_what_is_estimated(maker: Run, desk: Run) -> None:
     for ticks, estimated in ((maker.ticks, list(SIX)), (desk.ticks, [])):
         summary, pulse = Summary(), Pulse(_Still())
@@ -216,119 +168,10 @@ class _Still:
         raise AssertionError("nobody waits here")
 
 
-def quiet(words: str, share: float) -> None:
-    """Ignore progress."""
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("unlaid_figures")
-def test_a_report_of_estimated_joints_says_so_everywhere(maker: Run, tmp_path: Path) -> None:
-    out = tmp_path / "six.html"
-    made = build.report(maker.ticks, RunHeader("six"), out, quiet)
-    rows = {row["key"]: row for row in json.loads(made.data.read_text())}
-    assert {row["basis"] for row in rows.values()} == {"estimated"}
-    page = unescape(out.read_text(encoding="utf-8"))
-    assert "Nothing here is measured: the servos of this rig tell nothing" in page
-    assert "not measured" in page.partition("Saccades <span")[2][:120]
-    assert "measured from the servos" not in page
-    assert "{measured}" not in page and "line of sight of each eye, estimated" in page
-    for key in ("head_slope", "head_share", "head_after", "head_peak", "vor", "vergence",
-                "vergence_ok", "unasked"):  # fmt: skip
-        assert key not in rows, key
-    for key in ("head_part", "vor", "vergence"):
-        assert not (tmp_path / "six_figures" / f"{key}.png").exists(), key
-    assert (tmp_path / "six_figures" / "blink_shape.png").exists()
-    assert "This rig has no neck" in page and "they stay parallel" in page
-
-
-def test_a_report_of_measured_joints_claims_it(desk: Run) -> None:
-    run = gathered(desk.ticks)
-    assert run.joints == JointBasis(GAZE_JOINTS, ())
-    assert run.joints.whole_basis == "measured"
-    assert not any(run.joints.left_out(drawing.key) for drawing in build.DRAWINGS)
-    assert np.isnan(run.column("lower_lid")).all() and np.isfinite(run.column("lid")).all()
-
-
-@pytest.mark.usefixtures("unlaid_figures")
-def test_a_measured_run_beside_a_estimated_one_is_warned_of(
-    maker: Run, desk: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    drawings = [d for d in build.DRAWINGS if d.key in ("overview", "vor", "blink_shape")]
-    monkeypatch.setattr(build, "DRAWINGS", tuple(drawings))
-    abouts = RunHeader("desk"), RunHeader("maker")
-    made = compare((desk.ticks, maker.ticks), abouts, tmp_path / "both.html", quiet)
-    assert made.warning.startswith("desk is measured and maker is estimated")
-    page = unescape(made.page.read_text(encoding="utf-8"))
-    assert made.warning in page and "maker: Nothing here is measured" in page
-    assert "maker: This rig has no neck" in page
-    assert len(made.figures) == 3  # the desk rig has a neck to draw
-    rows = json.loads(made.data.read_text())
-    assert {tuple(row["basis"]) for row in rows} == {("measured", "estimated")}
-    assert not {"vor", "vergence"} & {row["key"] for row in rows}
-    alike = compare((desk.ticks, desk.ticks), abouts, tmp_path / "same.html", quiet)
-    assert alike.warning == "" and "not measured" not in alike.page.read_text("utf-8")
-
-
-@pytest.mark.parametrize(
-    ("names", "key", "words"),
-    [
-        (SIX, "vor", "no neck"),
-        (SIX, "vergence", "stay parallel"),
-        (("left_eye_pan", "neck_yaw"), "vor", ""),
-        (("left_eye_pan", "neck_yaw"), "head_slope", ""),
-        (("left_eye_pan", "neck_pitch"), "vor", ""),
-        (("left_eye_pan", "neck_pitch"), "head_part", "turns the head sideways"),
-        (("left_eye_pan", "neck_roll"), "vor", "sideways or up"),
-        (("left_eye_pan", "left_lower_lid"), "blink_rate", "no upper lids"),
-        (("left_eye_pan", "left_upper_lid"), "blink_rate", ""),
-        ((), "vor", ""),
-    ],
-)
-def test_what_cannot_be_told_says_why(names: tuple[str, ...], key: str, words: str) -> None:
-    why = JointBasis(names).left_out(key)
-    assert (words in why) if words else why == ""
-
-
-def test_a_rig_of_both_kinds_of_servos_is_measured_in_parts() -> None:
-    eyes = JointBasis(GAZE_JOINTS, tuple(name for name in GAZE_JOINTS if "eye" in name))
-    assert eyes.basis("Saccades") == "partly estimated" and eyes.basis("Lids") == "measured"
-    assert eyes.whole_basis == "partly estimated" and eyes.left_out("unasked")
-    lids = JointBasis(GAZE_JOINTS, ("left_upper_lid", "right_upper_lid"))
-    assert lids.basis("Lids") == "estimated" and lids.basis("On the face") == "measured"
-    assert not lids.left_out("unasked")
-
-
-def test_hobby_eyes_on_a_neck_that_tells_its_place(tmp_path: Path) -> None:
-    file = tmp_path / "mixed.yaml"
-    file.write_text(mixed_text(), encoding="utf-8")
-    mixed = recorded(tmp_path / "mixed.mcap", load_rig(str(file)), 1.0)
-    seen = gathered(list(mixed.recording.ticks())).joints
-    assert seen == JointBasis((*SIX, "neck_yaw", "neck_pitch"), SIX)
-    assert seen.basis("Eyes and head") == "partly estimated" and seen.basis("Lids") == "estimated"
-    trace = trace_of(mixed.ticks)
-    assert trace.basis("head") == "measured" and trace.basis("left") == "partly estimated"
-    assert {"head_yaw_deg", "head_pitch_deg"} < set(columns(trace.joints))
-    assert "head_roll_deg" not in columns(trace.joints)
-    assert rerun(mixed.recording).same
-
-
 def test_absent_lids_count_for_nothing() -> None:
     assert openings(0.2, 0.4, SIX, UPPER) == (0.2, 0.4)
     assert openings(0.2, 1.0, ("left_upper_lid",), UPPER) == (0.2, 0.2)
     assert openings(1.0, 1.0, ("eyes_pan",), UPPER) is None
-
-
-def test_a_run_without_lids_has_no_blinks(maker: Run) -> None:
-    bare = [
-        tick._replace(
-            guard_result=tick.guard_result._replace(joints=("eyes_pan", "eyes_tilt")),
-            joints=tick.joints._replace(measured=(True, True)),
-        )
-        for tick in maker.ticks[:60]
-    ]
-    run = gathered(bare)
-    assert np.isnan(run.column("lid")).all() and run.asked_blinks == ()
-    assert not {"blink_rate", "evoked"} & {measure.key for measure in build.measured(run)}
 
 
 # --- exports

@@ -13,7 +13,6 @@ pytest.importorskip("mujoco", reason="MuJoCo is not installed: pip install -e '.
 from command_line import invoked
 
 from gazerig.drivers.errors import SetupError
-from gazerig.features.lab.report.heads import mutual_gaze_report
 from gazerig.robot.analysis.kept_time import fell_behind
 from gazerig.robot.analysis.mutual_gaze import HeadPlace, mutual_gaze
 from gazerig.robot.app.options import RunOptions
@@ -162,11 +161,12 @@ def test_two_recordings_report_the_figures_of_the_run(tmp_path: Path) -> None:
 
 
 def test_the_report_refuses_a_head_that_was_alone_and_one_head_twice() -> None:
+    report = pytest.importorskip("gazerig.features.lab.report.heads").mutual_gaze_report
     here, there = HeadPlace(IDENTITY, (0.0, 0.0, 0.0)), HeadPlace(IDENTITY, (1.0, 0.0, 0.0))
     assert HeadPlace.of(there.numbers) == there
     with pytest.raises(SetupError, match="^b is of a head that was alone"):
-        mutual_gaze_report(((), ()), (here.numbers, ()), ("a", "b"))
+        report(((), ()), (here.numbers, ()), ("a", "b"))
     with pytest.raises(SetupError, match="are of one head"):
-        mutual_gaze_report(((), ()), (here.numbers, here.numbers), ("a", "b"))
+        report(((), ()), (here.numbers, here.numbers), ("a", "b"))
     with pytest.raises(SetupError, match="no time in common"):
-        mutual_gaze_report(((), ()), (here.numbers, there.numbers), ("a", "b"))
+        report(((), ()), (here.numbers, there.numbers), ("a", "b"))
