@@ -1,17 +1,16 @@
 """The program without a feature: all other modules import, help lists the rest, same bus bytes.
 
 Run by hand: ``python tests/features_apart.py`` does so for each folder of features/;
-``--tests NAME`` lists the test files that go with a feature.
+``--suite NAME`` deletes the folder with its tests in a clone, and runs all other tests there.
 """
 
 import argparse
-import ast
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
-from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -81,45 +80,28 @@ def bus_digest(package: Path, seconds: float) -> str:
     return str(json.loads(done.stdout[done.stdout.index("{") :])["bus"]["tx_sha256"])
 
 
-@cache
-def _imports(file: Path) -> frozenset[str]:
-    names: set[str] = set()
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            names |= {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
-    return frozenset(names)
-
-
-def files_of(feature: str) -> list[str]:
-    """Return the tests and their helpers that import a feature, also through other helpers."""
-    files = {
-        path.stem: path
-        for path in [*ROOT.glob("tests/*.py"), *ROOT.glob("tests/*/*.py")]
-        if path.stem != "conftest"
-    }
-    prefixes = tuple(f"gazerig.features.{name}" for name in removed_with(feature))
-    found: set[str] = set()
-    while True:
-        more = {
-            name
-            for name, path in files.items()
-            if any(one in found or one.startswith(prefixes) for one in _imports(path))
-        }
-        if more <= found:
-            return sorted(found)
-        found |= more
+def suite(feature: str) -> int:
+    """Delete a feature with its tests in a clone, run the other tests, and return the exit code."""
+    with tempfile.TemporaryDirectory() as temporary:
+        clone = Path(temporary) / "clone"
+        subprocess.run(["git", "clone", "-q", str(ROOT), str(clone)], check=True)
+        for name in removed_with(feature):
+            shutil.rmtree(clone / "features" / name)
+            shutil.rmtree(clone / "tests" / name)
+        return subprocess.run(
+            [sys.executable, "-m", "pytest", "--workers", "auto"],
+            cwd=clone,
+            env={**os.environ, "PYTHONPATH": str(clone / ".links")},
+        ).returncode
 
 
 def main() -> int:
     """Check each feature; return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--tests", choices=FEATURES, help="list the tests of this feature")
-    wanted = parser.parse_args().tests
+    parser.add_argument("--suite", choices=FEATURES, help="delete it, and run all other tests")
+    wanted = parser.parse_args().suite
     if wanted:
-        print(*files_of(wanted), sep="\n")
-        return 0
+        return suite(wanted)
     faults = 0
     with tempfile.TemporaryDirectory() as temporary:
         whole = lay_out(Path(temporary) / "whole")
