@@ -17,10 +17,11 @@ from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
 from gazerig.drivers.camera.guarded_camera import fault_of
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedFace, DetectedPalm, DetectedPerson, ImageArray
+from gazerig.drivers.vision.body_detector import DetectorWithPeople, with_people
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.model_files import FOLDER_VARIABLE, PALMS
 from gazerig.drivers.vision.palms import PalmDetector
-from gazerig.drivers.vision.people import DetectorWithPeople, anchors, with_people
+from gazerig.drivers.vision.people import anchors
 from gazerig.gaze.angles import norm, sub
 from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.model.intrinsics import project

@@ -19,12 +19,13 @@ from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
 from gazerig.drivers.camera.guarded_camera import fault_of
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.types import DetectedPerson, ImageArray, MovingBlob
+from gazerig.drivers.vision.body_detector import DetectorWithPeople, with_people
 from gazerig.drivers.vision.detector_status import detector_status
 from gazerig.drivers.vision.face.auto import AutoDetector
 from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.model_files import FOLDER_VARIABLE, PALMS, PEOPLE, YUNET
-from gazerig.drivers.vision.people import DetectorWithPeople, PeopleDetector, anchors, with_people
+from gazerig.drivers.vision.people import PeopleDetector, anchors
 from gazerig.gaze.angles import norm
 from gazerig.gaze.types import Percept, Target, Vec3
 from gazerig.robot.cli.doctor import examine_detector

@@ -8,33 +8,20 @@ Source: Bazarevsky et al., "BlazePose: on-device real-time body pose tracking" (
 output: opencv_zoo, models/person_detection_mediapipe.
 """
 
-import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from math import ceil, hypot
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from gazerig.drivers.errors import ModelFileError
-from gazerig.drivers.event_log import EventLog
-from gazerig.drivers.extras import extra_hint
 from gazerig.drivers.types import (
-    DetectedFace,
-    DetectedPalm,
     DetectedPerson,
-    FaceDetector,
     ImageArray,
 )
 from gazerig.drivers.vision.face.crops import cut_square
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.face.preprocess import as_bgr
-from gazerig.drivers.vision.model_files import PALMS, PEOPLE, ModelFile
-
-if TYPE_CHECKING:
-    from gazerig.drivers.vision.palms import PalmDetector
 
 Floats = NDArray[np.float32]
 
@@ -185,127 +172,3 @@ def _is_same(one: DetectedPerson, other: DetectedPerson) -> bool:
     """Return whether two detections are of one person."""
     apart = hypot(one.head_px[0] - other.head_px[0], one.head_px[1] - other.head_px[1])
     return apart < _SAME * max(one.trunk_px, other.trunk_px)
-
-
-class DetectorWithPeople:
-    """A face detector that also finds people whose face is not visible, and palms.
-
-    Args:
-        detector: finds faces.
-        people: finds people; None: it cannot.
-        palms: finds palms; None: it cannot.
-        faults: why it cannot, one line each.
-    """
-
-    def __init__(
-        self,
-        detector: FaceDetector,
-        people: PeopleDetector | None,
-        palms: "PalmDetector | None" = None,
-        faults: tuple[str, ...] = (),
-    ) -> None:
-        self._detector, self._people, self._palms = detector, people, palms
-        self._log = EventLog()
-        for fault in faults:
-            self._log.add(fault)
-
-    def find(self, image: ImageArray) -> tuple[DetectedFace, ...]:
-        """Find faces, the largest first, in pixels of the image given."""
-        return self._detector.find(image)
-
-    def people(self, image: ImageArray, captured_s: float) -> tuple[DetectedPerson, ...]:
-        """Find people; see ``PeopleDetector.find``."""
-        return () if self._people is None else self._people.find(image, captured_s)
-
-    def palms(
-        self,
-        image: ImageArray,
-        captured_s: float,
-        faces: tuple[DetectedFace, ...],
-        people: tuple[DetectedPerson, ...],
-    ) -> tuple[DetectedPalm, ...] | None:
-        """Find palms; see ``PalmDetector.find``."""
-        return None if self._palms is None else self._palms.find(image, captured_s, faces, people)
-
-    def meshed(
-        self, image: ImageArray, faces: tuple[DetectedFace, ...]
-    ) -> tuple[DetectedFace, ...]:
-        """Return faces that a camera itself has found, with meshes where they are wanted."""
-        meshed: Callable[..., Any] | None = getattr(self._detector, "meshed", None)
-        return faces if meshed is None else tuple(meshed(image, faces))
-
-    def events(self) -> tuple[str, ...]:
-        """Return what happened since the last call, one line each."""
-        events = getattr(self._detector, "events", None)
-        return (*self._log.drain(), *(events() if events is not None else ()))
-
-
-def with_people(detector: FaceDetector, params: FaceDetectorParams) -> FaceDetector:
-    """Return a detector that also finds people and palms, or the one given without their files.
-
-    A file that cannot be used is reported as an event.
-    """
-    from gazerig.drivers.vision.palms import PalmDetector
-
-    networks: list[Network | None] = []
-    faults: list[str] = []
-    for file, rate_hz, without in (
-        (PEOPLE, params.people_hz, "people without a visible face"),
-        (PALMS, params.hands_hz, "hands that are held still"),
-    ):
-        try:
-            networks.append(_load(file) if rate_hz > 0.0 else None)
-        except ModelFileError as error:
-            networks.append(None)
-            faults.append(f"{error}; until then {without} are not found")
-    people, palms = networks
-    if people is palms is None and not faults:
-        return detector
-    return DetectorWithPeople(
-        detector,
-        None if people is None else PeopleDetector(params, people),
-        None if palms is None else PalmDetector(params, palms),
-        tuple(faults),
-    )
-
-
-def _load(file: ModelFile) -> Network | None:
-    """Return a network, None if the user has no file of it.
-
-    Raises:
-        ModelFileError: the file is damaged, or LiteRT is not installed.
-    """
-    try:
-        content = file.read()
-    except (FileNotFoundError, NotADirectoryError):
-        return None
-    except OSError as error:
-        raise ModelFileError(f"cannot read {file.path} ({error.strerror})") from error
-    try:
-        from ai_edge_litert.interpreter import Interpreter
-    except ImportError as error:
-        raise ModelFileError(extra_hint("ai-edge-litert", "people", error)) from error
-    with _quiet_stderr():
-        net = Interpreter(model_content=content, num_threads=1)
-        net.allocate_tensors()
-    (given,), (boxes, scores) = net.get_input_details(), net.get_output_details()
-
-    def run(square: Floats) -> tuple[Floats, Floats]:
-        net.set_tensor(given["index"], square[np.newaxis])
-        net.invoke()
-        return net.get_tensor(boxes["index"])[0], net.get_tensor(scores["index"])[0, :, 0]
-
-    return run
-
-
-@contextmanager
-def _quiet_stderr() -> Iterator[None]:
-    """Keep LiteRT's greeting, which native code writes, off the terminal."""
-    kept = os.dup(2)
-    with open(os.devnull, "w") as nothing:
-        os.dup2(nothing.fileno(), 2)
-    try:
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
