@@ -4,7 +4,7 @@ import json
 import socket
 import urllib.error
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -14,9 +14,11 @@ import viser
 from websockets.sync.client import ClientConnection, connect
 
 from gazerig.robot.dashboard.door.auth_proxy import AuthProxy
+from gazerig.robot.dashboard.door.browsers import Browsers
 from gazerig.robot.dashboard.door.viser_server import open_server
 from gazerig.robot.dashboard.requests.stop_channel import StopListener
 from gazerig.robot.dashboard.requests.stop_sender import StopSender
+from gazerig.robot.dashboard.widgets.widgets import Widgets
 
 PATIENCE_S = 20.0
 
@@ -69,11 +71,12 @@ class Rig:
         ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._listener = StopListener(ours, self.stop)
         self._sender = theirs
-        self.door = AuthProxy(
-            host, port, inside, self.take, StopSender(theirs), TOKEN
-        )  # fmt: skip
         self.points: list[tuple[object, str]] = []
-        self.door.point = self.point
+        self.take_picture: Callable[[bytes], bool] = lambda jpeg: False
+        self.door = AuthProxy(
+            host, port, inside, self.take, StopSender(theirs), TOKEN, Browsers(TOKEN), Widgets(),
+            self.point, lambda jpeg: self.take_picture(jpeg),
+        )  # fmt: skip
         self.door.open()
         self.address = f"{host}:{port}"
         self.url = f"http://{self.address}"

@@ -193,7 +193,7 @@ def taker(near: Rig) -> list[bytes]:
         taken.append(data)
         return True
 
-    near.door.webcam.take = take
+    near.take_picture = take
     return taken
 
 
@@ -228,7 +228,7 @@ def test_a_flood_of_pictures_is_thinned(near: Rig) -> None:
 
 
 def test_the_newest_browser_takes_over(near: Rig) -> None:
-    near.door.webcam.take = lambda data: True
+    near.take_picture = lambda data: True
     with near.knock("/rig/webcam") as first, near.knock("/rig/webcam") as second:
         second.send(jpeg())
         assert second.recv(timeout=PATIENCE_S) == "next"

@@ -28,6 +28,7 @@ from gazerig.drivers.process import message_link
 from gazerig.drivers.process.message_link import MessageLink
 from gazerig.robot.dashboard.door.addresses import page_url
 from gazerig.robot.dashboard.door.auth_proxy import AuthProxy
+from gazerig.robot.dashboard.door.browsers import Browsers
 from gazerig.robot.dashboard.door.viser_server import browser_of, camera_of, open_server
 from gazerig.robot.dashboard.feed.live_feed import LiveFeed
 from gazerig.robot.dashboard.feed.page_feed import drain
@@ -43,6 +44,7 @@ from gazerig.robot.dashboard.page_view import PageView
 from gazerig.robot.dashboard.requests.outbox import DOOR, Outbox
 from gazerig.robot.dashboard.requests.pointer_to_look import PointerToLook
 from gazerig.robot.dashboard.requests.stop_sender import StopSender
+from gazerig.robot.dashboard.widgets.widgets import Widgets
 from gazerig.robot.model.command_json import as_json
 from gazerig.robot.model.commands import LookAt
 
@@ -78,19 +80,20 @@ def free_port(host: str, port: int) -> int:
 class Served(NamedTuple):
     """A page that can be reached: the server behind the door, the door, and where it is.
 
-    pointer: takes where browsers point
+    outbox: of requests to the rig; pointer: takes where browsers point
     words: what there is to say to the person in front of the rig, None for nothing
     """
 
     server: viser.ViserServer
     door: AuthProxy
+    outbox: Outbox
     pointer: PointerToLook
     url: str
     words: str | None
 
 
 def serve(
-    host: str, port: int, token: str, folder: Path, outbox: Outbox, stop: StopSender
+    host: str, port: int, token: str, folder: Path, feed: MessageLink, stop: StopSender
 ) -> Served:
     """Open the page's server, and its door on the first free port.
 
@@ -99,7 +102,7 @@ def serve(
         port: the first to try; a busy one moves on to the next
         token: what browsers must show
         folder: that only this user can enter, for the server's socket
-        outbox: hands on what is asked for
+        feed: to the rig
         stop: hands on stops
 
     Raises:
@@ -107,22 +110,27 @@ def serve(
     """
     open_port = free_port(host, port)
     server, inside = open_server(folder / "page.sock")
-    door = AuthProxy(host, open_port, inside, outbox.hand_on, stop, token)
-    outbox.name = lambda client: door.widgets.browser(client) or _browser(server, client)
-    outbox.leads = door.browsers.led_by
+    browsers, widgets = Browsers(token), Widgets()
+    outbox = Outbox(
+        feed,
+        name=lambda client: widgets.browser(client) or _browser(server, client),
+        leads=browsers.led_by,
+    )
     pointer = PointerToLook(
         lambda browser: camera_of(server, browser),
         # Not as the one who leads: that the pointer is there is said by its points alone.
         lambda point, who: outbox.ask(as_json(LookAt(point, who, pointer=True)), DOOR),
     )
-    door.point = pointer.take
-    door.webcam.take = outbox.picture
+    door = AuthProxy(
+        host, open_port, inside, outbox.hand_on, stop, token, browsers, widgets, pointer.take,
+        outbox.picture,
+    )  # fmt: skip
     door.open()
     text = []
     if port not in (0, open_port):  # 0 asks for any port
         text.append(f"port {port} is busy, using {open_port}")
     url = f"{page_url(host, open_port)}/?token={token}"
-    return Served(server, door, pointer, url, "; ".join(text) or None)
+    return Served(server, door, outbox, pointer, url, "; ".join(text) or None)
 
 
 def _browser(server: viser.ViserServer, client: str) -> str:
@@ -184,17 +192,16 @@ def main(arguments: list[str]) -> int:
     # and those of an exception are written only after a ``with`` has been left.
     shown = os.environ.pop(message_link.TOKEN_VARIABLE, "")
     feed = message_link.open_link(fd, shown)
-    outbox, stop = Outbox(feed), StopSender(message_link.open_link(stop_fd, shown))
+    stop = StopSender(message_link.open_link(stop_fd, shown))
     folder = Path(os.environ.pop(FOLDER_VARIABLE))
     try:
-        return _show(feed, outbox, stop, (host, int(port)), token, folder, int(parent))
+        return _show(feed, stop, (host, int(port)), token, folder, int(parent))
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
 
 def _show(
     feed: MessageLink,
-    outbox: Outbox,
     stop: StopSender,
     address: tuple[str, int],
     token: str,
@@ -203,7 +210,7 @@ def _show(
 ) -> int:
     """Serve the page until the rig is gone; give the process's exit code."""
     try:
-        served = serve(*address, token, folder, outbox, stop)
+        served = serve(*address, token, folder, feed, stop)
     except OSError as error:
         host, port = address
         sys.stderr.write(f"cannot open {host} port {port}: {error.strerror or error}\n")
@@ -211,7 +218,7 @@ def _show(
     served.door.once = os.environ.pop(ONCE_VARIABLE, "")
     if served.words is not None:
         feed.send(NOTICE + served.words.encode())
-    view = PageView(served.server, served.door.widgets, outbox, served.door.tell)
+    view = PageView(served.server, served.door.widgets, served.outbox, served.door.tell)
     feed.send(URL + served.url.encode())
     watch(feed, view, parent, served)
     served.door.close()

@@ -26,7 +26,7 @@ from gazerig.robot.dashboard.door.connection_limits import Connections
 from gazerig.robot.dashboard.door.page_files import PageFiles
 from gazerig.robot.dashboard.door.view_proxy import VIEW, ViewProxy, client_of
 from gazerig.robot.dashboard.door.viser_server import ViewAddress
-from gazerig.robot.dashboard.door.webcam_socket import WebcamSocket
+from gazerig.robot.dashboard.door.webcam_socket import TakePicture, WebcamSocket
 from gazerig.robot.dashboard.door.websocket_relay import TAKES_S, close_socket, until_one_ends
 from gazerig.robot.dashboard.door.widget_socket import WidgetSocket
 from gazerig.robot.dashboard.requests.browser_requests import (
@@ -70,12 +70,21 @@ Point = Callable[[object, str], bool]
 class AuthProxy:
     """Lets people in to the server behind it, from a thread of its own.
 
-    webcam: takes pictures of browsers' own cameras; its ``take`` is set before ``open``
-    point: takes where a browser's pointer is, which is not answered; set before ``open``
+    webcam: receives pictures of browsers' own cameras
     """
 
     def __init__(
-        self, host: str, port: int, inside: ViewAddress, ask: Ask, stop: StopSender, token: str
+        self,
+        host: str,
+        port: int,
+        inside: ViewAddress,
+        ask: Ask,
+        stop: StopSender,
+        token: str,
+        browsers: Browsers,
+        widgets: Widgets,
+        point: Point,
+        picture: TakePicture,
     ) -> None:
         """Prepare to listen.
 
@@ -86,6 +95,10 @@ class AuthProxy:
             ask: called in the door's thread with what is sent to the rig
             stop: takes stops, beside and before all else
             token: what a client must show
+            browsers: names them by that token
+            widgets: of the panels
+            point: receives where a browser's pointer is, which is not answered
+            picture: receives pictures of browsers' own cameras; False: it does not take them
         """
         self._host = host
         self._port = port
@@ -93,9 +106,9 @@ class AuthProxy:
         self._ask = ask
         self._stop = stop
         self.token = token
-        self.point: Point = _nowhere
-        self.browsers = Browsers(token)
-        self.widgets = Widgets()
+        self._point = point
+        self.browsers = browsers
+        self.widgets = widgets
         self._panel_socket = WidgetSocket(self.widgets)
         self._panel_tabs = TabLimits(MOST_LINES)
         self._cookie = f"gazerig_{port}"  # cookies do not tell ports apart
@@ -105,7 +118,7 @@ class AuthProxy:
         self._news: set[asyncio.Event] = set()
         self._lines = TabLimits(MOST_LINES)
         self._loop = asyncio.SelectorEventLoop()  # Windows' usual one waits for no socket
-        self.webcam, self._webcams = WebcamSocket(self._loop.time), TabLimits(2)
+        self.webcam, self._webcams = WebcamSocket(self._loop.time, picture), TabLimits(2)
         self._over = asyncio.Event()
         self._opened = threading.Event()
         self._failed: OSError | None = None
@@ -300,7 +313,7 @@ class AuthProxy:
             asked = from_browser(message.data, who)
             if asked is not None and "point" in asked:
                 self.browsers.led_by("")  # nobody's lead is renewed while a pointer leads
-                self.point(asked["point"], who)
+                self._point(asked["point"], who)
                 continue
             status, text = await self._handle(asked, who)
             async with asyncio.timeout(TAKES_S):
@@ -365,8 +378,3 @@ class AuthProxy:
 
     async def _nothing(self, request: web.Request) -> web.Response:
         return web.Response(status=404, text="there is nothing at this address\n", headers=_HEADERS)
-
-
-def _nowhere(asked: object, who: str) -> bool:
-    """Ignore a pointer."""
-    return False

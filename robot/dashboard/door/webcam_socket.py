@@ -26,12 +26,11 @@ class WebcamSocket:
 
     Args:
         now_s: the clock of the event loop.
-
-    take: hands pictures on; set before the door is opened
+        take: receives pictures.
     """
 
-    def __init__(self, now_s: Callable[[], float]) -> None:
-        self.take: TakePicture = _refused
+    def __init__(self, now_s: Callable[[], float], take: TakePicture) -> None:
+        self._take = take
         self._now_s = now_s
         self._rate = TokenBucket(PICTURES_PER_S, _BURST)
         self._newest: web.WebSocketResponse | None = None
@@ -52,14 +51,10 @@ class WebcamSocket:
                 await _say(socket, "only JPEG pictures are taken here")
                 return
             if self._rate.take(self._now_s()):
-                self.take(message.data)
+                self._take(message.data)
             await _say(socket, "next")
 
 
 async def _say(socket: web.WebSocketResponse, text: str) -> None:
     async with asyncio.timeout(TAKES_S):
         await socket.send_str(text)
-
-
-def _refused(jpeg: bytes) -> bool:
-    return False

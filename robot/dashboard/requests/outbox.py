@@ -19,25 +19,38 @@ _PER_S, _BURST = 100.0, 200.0
 """Requests of all browsers together; each drags one thing, at some 20 changes a second."""
 
 
+def _unnamed(client: str) -> str:
+    """Return no name: it is unknown which browser a client is."""
+    return ""
+
+
 class Outbox:
     """Sends requests over the page's socket; from any thread.
 
-    name: returns what the browser of a client of the page is called; leads: is told of one
-    that leads the head now
+    Args:
+        feed: to the rig.
+        clock: of the page.
+        name: returns the name of the browser of a client of the page.
+        leads: receives the name of a browser that leads the head now.
     """
 
-    def __init__(self, feed: MessageLink, clock: Clock | None = None) -> None:
+    def __init__(
+        self,
+        feed: MessageLink,
+        clock: Clock | None = None,
+        name: Callable[[str], str] = _unnamed,
+        leads: Callable[[str], object] = _unnamed,
+    ) -> None:
         self._feed = feed
         self._clock = clock if clock is not None else RealClock()
         self._rate = TokenBucket(_PER_S, _BURST)
         self._lock = threading.Lock()
-        self.name: Callable[[str], str] = _unnamed
-        self.leads: Callable[[str], object] = _unnamed
+        self.name, self._leads = name, leads
 
     def command(self, command: Command, who: str) -> bool:
         """Return a command; False where the rig does not take it now."""
         if isinstance(command, Leading):
-            self.leads(self.name(who))
+            self._leads(self.name(who))
             command = command._replace(who=self.name(who))
         return self.ask(as_json(command), who)
 
@@ -65,8 +78,3 @@ class Outbox:
         except OSError:  # full, or gone: then the page ends by itself
             return False
         return True
-
-
-def _unnamed(client: str) -> str:
-    """Return no name: it is unknown which browser a client is."""
-    return ""
