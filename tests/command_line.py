@@ -15,7 +15,6 @@ import typer.testing
 from typer.core import TyperGroup
 from typer.testing import CliRunner
 
-from gazerig.robot.cli.calibrate.group import DEFAULT, JointsUnlessNamed
 from gazerig.robot.cli.main import app, main
 
 # Each call in one process would build all commands anew, which one typed in a shell does once.
@@ -81,9 +80,10 @@ def parse(words: Sequence[str]) -> None:
     command, rest = typer.main.get_command(app), [word for word in words if word != "--help"]
     while isinstance(command, TyperGroup):
         if not rest or rest[0] not in command.commands:
-            if not isinstance(command, JointsUnlessNamed):
+            default = getattr(command, "default", None)  # of calibrate: joints
+            if default is None:
                 raise ValueError(f"no command {rest[:1]}; there is {', '.join(command.commands)}")
-            rest.insert(0, DEFAULT)
+            rest.insert(0, default)
         command = command.commands[rest.pop(0)]
     # Not with resilient_parsing, which swallows options that there are not.
     try:

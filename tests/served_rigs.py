@@ -13,7 +13,6 @@ from gazerig.config.load import shipped
 from gazerig.config.schema import load_rig
 from gazerig.drivers.serial.list_ports import Host
 from gazerig.robot.app.emulation import emulated_lines
-from gazerig.robot.cli import progress
 from gazerig.sim_mock.pty.client import PtyBuses
 
 
@@ -48,6 +47,7 @@ def rig_files(folder: Path) -> dict[str, str]:
 
 def hide_real_ports(monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
     """Let bring-up see none of this computer's ports."""
+    progress = pytest.importorskip("gazerig.features.bringup.cli.progress")
     host = Host(folder / "latency", folder / "by-id", folder / "processes")
     monkeypatch.setattr(progress, "host", host)
     monkeypatch.setattr(progress, "serial_ports", lambda host: ())

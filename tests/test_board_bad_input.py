@@ -21,6 +21,7 @@ PULSES = "hobby servos without pulses go to their parking place"
 
 def jog(rig: str, *words: str) -> str:
     """Type a jog that must be refused; return what is said, in one line."""
+    pytest.importorskip("gazerig.features.bringup")
     result = CliRunner().invoke(app, ["jog", rig, "eyes_pan", "5", "--yes", *words])
     assert result.exit_code == 2, result.output
     (line,) = [one for one in result.stderr.splitlines() if PULSES not in one]

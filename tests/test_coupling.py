@@ -20,8 +20,6 @@ from gazerig.robot.app.assemble import assemble
 from gazerig.robot.app.bus_wiring import rig_setups
 from gazerig.robot.app.options import RunOptions
 from gazerig.robot.app.run_bus import run_bus, true_head
-from gazerig.robot.bringup.monitor import coupled_angles
-from gazerig.robot.bringup.telemetry import Telemetry
 from gazerig.robot.control.coupled_servos import CoupledServos
 from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.model.commands import Jog
@@ -293,22 +291,6 @@ def test_a_measured_table_may_be_of_any_two_joints() -> None:
     assert table.joint_rad(table.servo_rad((2.5, 1.4))) == pytest.approx((2.5, 1.4))
 
 
-def telemetry(deg: float | None) -> Telemetry:
-    return Telemetry(deg, 0, deg, 0, deg, 0.1, 30, 5.0, True, ())
-
-
-def test_the_monitor_shows_the_joints_of_coupled_servos() -> None:
-    pair = CoupledPair("neck_pitch", "neck_roll", Differential())
-    one, other = coupled_angles(pair, telemetry(25.0), telemetry(5.0))
-    assert one is not None and other is not None
-    assert (one.goal_deg, other.goal_deg) == pytest.approx((15.0, 10.0))
-    assert (one.position_deg, other.position_deg) == pytest.approx((15.0, 10.0))
-    assert (one.velocity_deg_s, other.velocity_deg_s) == pytest.approx((15.0, 10.0))
-    one, other = coupled_angles(pair, telemetry(25.0), None)
-    assert one is not None and other is None and one.position_deg is None
-    assert coupled_angles(pair, None, telemetry(1.0))[0] is None
-
-
 def coupled_file(tmp_path: Path) -> str:
     text = shipped("rigs", "feetech").read_text(encoding="utf-8")
     text += "\ncouplings:\n  neck: {kind: differential, first: neck_pitch, second: neck_roll}\n"
@@ -318,6 +300,7 @@ def coupled_file(tmp_path: Path) -> str:
 
 
 def test_bring_up_of_a_coupled_neck(tmp_path: Path) -> None:
+    pytest.importorskip("gazerig.features.bringup")
     rig = coupled_file(tmp_path)
     assert "good: rig 'feetech'" in invoked("check", rig).err
     jog = invoked("jog", rig, "neck_roll", "6", "--mock")

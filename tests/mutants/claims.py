@@ -496,7 +496,7 @@ CLAIMS = (
     Mutant("drivers/pca9685/params.py", "            if address in RESERVED:", "            if False:",
            "reserved addresses are used",
            ("board_bad_input::test_a_file_that_cannot_be_right",), ("B20",)),
-    Mutant("robot/bringup/channel_test.py", "    finally:\n        _end(board, setup)", "    finally:\n        pass",
+    Mutant("features/bringup/channel_test.py", "    finally:\n        _end(board, setup)", "    finally:\n        pass",
            "pulses go on after a test of a channel",
            ("channel_test::test_ctrl_c_ends_the_pulses",), ("B21",)),
     Mutant("sim_mock/maestro/channel.py", "return steps * acceleration + rest // (steps + 1)", "return 2 * steps * acceleration",

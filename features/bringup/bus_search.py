@@ -1,0 +1,148 @@
+"""Who is on a port, whatever its kind; nothing is changed and nothing moves.
+
+Why the order is as it is, and what is sent at all:
+
+- To a Maestro every byte from 80 on is a command, and FF is one that moves a servo (FF,
+  channel, target), with which packets of the servos begin. So a port of Pololu's is asked
+  as a Maestro only, and every other port is asked as one first. What a Maestro is asked
+  holds no FF, so no servo can take it for the head of a packet. Where one answers nothing
+  else is sent.
+- Dynamixel servos heed FF FF FD 00, STS servos FF FF, an id and a length of 2 or more. To
+  an STS a Dynamixel packet is one with the id 253 and the length 0, which is none; to a
+  Dynamixel an STS packet has no 00 behind FD, or no FD. Even servos that took one for the
+  other would be pinged or read only: nothing else is ever sent here.
+
+A board that hears the line but cannot answer on it (one wire, a rate that is not asked)
+is not found out: with such a one on the line name the kind that is meant.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from gazerig.drivers.bus.servo_families import FAMILY_OF
+from gazerig.drivers.bus.servo_models import BUS_KINDS, BusKind
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.maestro.probe import USB_CHANNELS, DetectedMaestro, probe
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.serial.port_owner import POLOLU
+from gazerig.drivers.servo_bus.discovery import FoundServo, scan
+from gazerig.features.bringup.servo_families import KINDS
+
+BOARD_RATES = (115_200, 9_600, 57_600, 38_400, 19_200)
+"""Of a Maestro's serial pins, the usual ones first; on USB any will do."""
+
+ORDER: tuple[BusKind, ...] = ("maestro", "dynamixel", "feetech")
+"""In which kinds are asked; see above."""
+
+RATES: Mapping[BusKind, Sequence[int]] = {
+    "maestro": BOARD_RATES,
+    **{kind.name: kind.family.usual_rates for kind in KINDS.values()},
+}
+
+
+@dataclass(frozen=True)
+class SearchRound:
+    """What asking one kind at one baud rate has brought.
+
+    possible: the adaptor can run at it; junk: bytes that made no sense
+    shared: ids that two servos seem to have; protocol_1: ids that answer to the old protocol
+    board: a Maestro; channels: how many it has, None where that is not known
+    """
+
+    kind: BusKind
+    baud: int
+    possible: bool = True
+    found: tuple[FoundServo, ...] = ()
+    junk: int = 0
+    shared: tuple[int, ...] = ()
+    protocol_1: tuple[int, ...] = ()
+    board: DetectedMaestro | None = None
+    channels: int | None = None
+
+    @property
+    def answered(self) -> bool:
+        """Return whether a servo of this kind has answered."""
+        return bool(self.found) or self.board is not None
+
+
+def plan(
+    usb: str, kinds: Sequence[BusKind], rates: Sequence[int] | None
+) -> tuple[tuple[BusKind, int], ...]:
+    """Return which kinds to ask at which rates, in order.
+
+    usb: vendor and product id of the port, "" where it has none
+    kinds: those to ask; rates: likewise, None for all
+    """
+    if usb.startswith(POLOLU):
+        return (("maestro", BOARD_RATES[0]),) if "maestro" in kinds else ()
+    rows: list[tuple[BusKind, int]] = []
+    for kind in ORDER:
+        if kind in kinds:
+            some = [rate for rate in RATES[kind] if rates is None or rate in rates]
+            # Whether a board is there must be known whatever the rates are.
+            some = some or [BOARD_RATES[0]] if kind == "maestro" else some
+            rows += [(kind, rate) for rate in some]
+    return tuple(rows)
+
+
+def search(
+    port: BusPort,
+    usb: str,
+    asked: Sequence[tuple[BusKind, int]],
+    thorough: bool = False,
+    to_the_end: bool = False,
+) -> Iterator[SearchRound]:
+    """Search with one kind of bus after the other; end after the first kind that replied.
+
+    asked: as ``plan`` gives it
+    thorough: wait long for Dynamixel servos, ask each STS id even if no servo answers a
+        broadcast ping
+    to_the_end: servos of a kind do not end it, as a line can carry two kinds; a board does
+
+    Raises:
+        PortError: the port cannot be opened.
+        BusLost: it has gone away.
+    """
+    met: BusKind | None = None
+    for kind, baud in asked:
+        if met == "maestro" or (met not in (None, kind) and not to_the_end):
+            return
+        looked = _look(port, usb, kind, baud, thorough)
+        met = kind if looked.answered else met
+        yield looked
+
+
+def _look(port: BusPort, usb: str, kind: BusKind, baud: int, thorough: bool) -> SearchRound:
+    if kind == "maestro":
+        return _board(port, usb, baud)
+    (one,) = scan(port, KINDS[kind].family, (baud,), thorough, family_of=FAMILY_OF)
+    return SearchRound(kind, baud, one.possible, one.found, one.junk, one.shared, one.protocol_1)
+
+
+def _board(port: BusPort, usb: str, baud: int) -> SearchRound:
+    if not port.setBaudRate(baud):
+        return SearchRound("maestro", baud, possible=False)
+    # The first six channels are there on every board; others might be an error to it.
+    found = probe(port, replace(MaestroParams(), baud=baud))
+    return SearchRound("maestro", baud, board=found, channels=USB_CHANNELS.get(usb))
+
+
+def found_of(rounds: Iterable[SearchRound]) -> list[tuple[BusKind, FoundServo]]:
+    """Return all servos that answered, with their kinds."""
+    return [(one.kind, servo) for one in rounds for servo in one.found]
+
+
+def known_kinds(text: str) -> tuple[BusKind, ...]:
+    """Read the name of a kind, or "all".
+
+    Raises:
+        ValueError: there is no such kind.
+    """
+    for kind in ORDER:
+        if text == kind:
+            return (kind,)
+    if text in BUS_KINDS:
+        raise ValueError(f"{text}: hangs on no serial port: gazerig doctor RIG asks it")
+    if text != "all":
+        raise ValueError(f"{text}: not all or one of {', '.join(sorted(ORDER))}")
+    return ORDER

@@ -1,0 +1,139 @@
+"""Which views of the board a lens calibration needs, and what is still missing. Pure.
+
+A lens shows its focal length only on a tilted board, its centre and distortion only near
+the edges of the image: many views of a board held the same way fit well and tell little.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import asin, degrees, hypot
+from typing import Annotated, NamedTuple
+
+import numpy as np
+
+from gazerig.drivers.camera.pinhole import Intrinsics
+from gazerig.features.bringup.calibration.charuco_pose import board_poses
+from gazerig.params import Bounds
+from gazerig.robot.model.charuco_board import SeenBoard
+
+
+@dataclass(frozen=True)
+class ViewParams:
+    """How many views, and how different."""
+
+    # fmt: off
+    least_views: Annotated[int, Bounds(4, 200), "fewer are refused"] = 12
+    most_views: Annotated[int, Bounds(4, 500), "more are not kept"] = 60
+    edge_share: Annotated[float, Bounds(0.01, 0.4), "a corner nearer to an edge, as a share of the image, has reached it"] = 0.12
+    least_tilt_deg: Annotated[float, Bounds(2, 60), "counts as tilted"] = 15.0
+    near_share: Annotated[float, Bounds(0.05, 1), "the board is near where its corners span this share of width or height"] = 0.4
+    new_share: Annotated[float, Bounds(0, 0.5), "a view is new if the board has moved or grown by this share of the image"] = 0.07
+    new_tilt_deg: Annotated[float, Bounds(0, 60), "or tilted by this angle"] = 8.0
+    # fmt: on
+
+
+class Held(NamedTuple):
+    """How the board was held in one view.
+
+    left, right, top, bottom: of its corners in the image, 0..1
+    tilt_right_deg: right edge nearer; tilt_down_deg: bottom edge nearer
+    """
+
+    left: float
+    right: float
+    top: float
+    bottom: float
+    tilt_right_deg: float
+    tilt_down_deg: float
+
+    def differs(self, other: "Held", params: ViewParams) -> bool:
+        """Return whether it tells something that the other does not."""
+        moved = max(abs(a - b) for a, b in zip(self[:4], other[:4], strict=True))
+        tilted = hypot(
+            self.tilt_right_deg - other.tilt_right_deg, self.tilt_down_deg - other.tilt_down_deg
+        )
+        return moved >= params.new_share or tilted >= params.new_tilt_deg
+
+
+class Coverage(NamedTuple):
+    """What the views kept so far show, and what a person should do next.
+
+    views: number kept; missing: one instruction each, empty when all is there
+    """
+
+    views: int
+    missing: tuple[str, ...]
+
+    @property
+    def enough(self) -> bool:
+        """Return whether a calibration can be made of them."""
+        return not self.missing
+
+
+def held(seen: SeenBoard, guess: Intrinsics, width_px: int, height_px: int) -> Held | None:
+    """Return how the board is held, None where its pose cannot be found.
+
+    guess: a lens that is about right; the field of view of the data sheet will do
+    """
+    poses = board_poses(seen, guess)
+    if not poses:
+        return None
+    share = (seen.corners_px + 0.5) / (width_px, height_px)
+    (left, top), (right, bottom) = share.min(axis=0).tolist(), share.max(axis=0).tolist()
+    into_x, into_y, _ = np.clip(poses[0].R_camera_board[:, 2], -1.0, 1.0).tolist()
+    return Held(left, right, top, bottom, degrees(asin(into_x)), degrees(asin(into_y)))
+
+
+def coverage(views: Sequence[Held], params: ViewParams) -> Coverage:
+    """Return what is missing."""
+    edge, tilt = params.edge_share, params.least_tilt_deg
+    goals = {
+        "bring the board to the left edge of the image": any(v.left <= edge for v in views),
+        "bring the board to the right edge": any(v.right >= 1.0 - edge for v in views),
+        "bring the board to the upper edge": any(v.top <= edge for v in views),
+        "bring the board to the lower edge": any(v.bottom >= 1.0 - edge for v in views),
+        "tilt the board, its right side nearer": any(v.tilt_right_deg >= tilt for v in views),
+        "tilt the board, its left side nearer": any(v.tilt_right_deg <= -tilt for v in views),
+        "tilt the board, its lower side nearer": any(v.tilt_down_deg >= tilt for v in views),
+        "tilt the board, its upper side nearer": any(v.tilt_down_deg <= -tilt for v in views),
+        "hold the board nearer": any(
+            max(v.right - v.left, v.bottom - v.top) >= params.near_share for v in views
+        ),
+    }
+    missing = [desired for desired, there in goals.items() if not there]
+    short = params.least_views - len(views)
+    if short > 0:
+        missing.append(f"show {short} more {'view' if short == 1 else 'views'}, each a new one")
+    return Coverage(len(views), tuple(missing))
+
+
+class ViewCollector:
+    """Keeps the views that tell something new."""
+
+    def __init__(
+        self, guess: Intrinsics, width_px: int, height_px: int, params: ViewParams | None = None
+    ) -> None:
+        self.params = params if params is not None else ViewParams()
+        self._guess, self._size = guess, (width_px, height_px)
+        self._held: list[Held] = []
+        self.views: list[SeenBoard] = []
+
+    @property
+    def coverage(self) -> Coverage:
+        """Return what the kept views cover and what is missing."""
+        return coverage(self._held, self.params)
+
+    def offer(self, seen: SeenBoard | None) -> str:
+        """Keep a view if it is new; return the reason if it was not kept, else ""."""
+        if seen is None:
+            return "no board seen"
+        how = held(seen, self._guess, *self._size)
+        if how is None:
+            return "the board's pose cannot be told"
+        if not all(how.differs(other, self.params) for other in self._held):
+            return "too much like a view before"
+        if len(self.views) >= self.params.most_views:
+            return "there are views enough"
+        self._held.append(how)
+        self.views.append(seen)
+        return ""

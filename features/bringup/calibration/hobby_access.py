@@ -1,0 +1,191 @@
+"""One hobby servo on a board by itself, moved slowly by a person who looks at it.
+
+It has no position sensor: its position is the pulse that it gets, as far as nothing holds it back.
+The board knows no watchdog: a guardian stops its pulses when this program is killed.
+"""
+
+from collections.abc import Callable
+
+from gazerig.drivers.errors import BusLost
+from gazerig.drivers.hobby_board.models import US_STEPS
+from gazerig.drivers.maestro.bus import MaestroBus
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.pca9685.bus import Pca9685Bus
+from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.types import ServoBus, ServoConfig
+from gazerig.features.bringup.calibration.joint_access import CalibrationStopped
+from gazerig.robot.guardian.guarded_bus import GuardedBus
+from gazerig.robot.guardian.guardian import Guardian
+from gazerig.robot.model.clock import Clock
+from gazerig.robot.model.joint import JointParams
+
+PERIOD_S = 0.03
+SPEED_US_S = 200.0
+"""18 deg/s of the shaft: slow enough to stop before something bends."""
+
+NEAR_STEPS = 4
+TIMEOUT_S = 1.0
+"""A goal is given up that was not reached so long after it could have been."""
+
+SILENT_S = 2.0
+
+
+class OneHobby:
+    """The servo of one joint.
+
+    Args:
+        name: the joint's.
+        joint: as configured.
+        port: of the board; opened by ``open``.
+        params: how to speak with the board.
+        clock: the host's.
+        stopped: asked all the time; returns why to stop, None while there is no reason.
+        pulses_us: it is never sent outside.
+        guardian: has one plan, that of this servo; None: nothing stops its pulses.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        joint: JointParams,
+        port: BusPort,
+        params: MaestroParams | Pca9685Params,
+        clock: Clock,
+        stopped: Callable[[], str | None],
+        pulses_us: tuple[float, float],
+        guardian: Guardian | None = None,
+    ) -> None:
+        self.name, self.joint = name, joint
+        self.who = f"{name} (channel {joint.id})"
+        self._clock, self._stopped = clock, stopped
+        low, high = (round(end * US_STEPS) for end in pulses_us)
+        speed = SPEED_US_S * US_STEPS
+        self._setup = ServoConfig(joint.id, joint.model, low, high, speed, name)
+        bus = _bus(port, self._setup, params)
+        self._maestro = isinstance(params, MaestroParams)
+        self._bus: ServoBus = bus if guardian is None else GuardedBus(bus, 1, guardian, 0)
+        self._goal = self._pulse = 0
+        self._on = False
+        self._said: list[str] = []
+
+    @property
+    def place_us(self) -> float:
+        """Return the pulse that it has been sent to."""
+        return self._goal / US_STEPS
+
+    @property
+    def pulse_us(self) -> float:
+        """Return the pulse that it gets now, on its way to that."""
+        return self._pulse / US_STEPS
+
+    def open(self) -> float | None:
+        """Find board and channel; return the pulse width in us, None where there are no pulses.
+
+        Raises:
+            SetupError: the board or the channel does not answer.
+        """
+        self._bus.open()
+        self._read()
+        return self._pulse / US_STEPS if self._on else None
+
+    def begin(self, place_us: float) -> float:
+        """Hold the joint at its present pulse, or start with this one; return the pulse in us.
+
+        Where it had no pulses it goes there at once, at its own speed.
+
+        Raises:
+            ServoMissing: the channel does not take it.
+        """
+        self._bus.retune([self._setup._replace(rest_steps=self._within(place_us))])
+        (self._goal,) = self._bus.enable_torque()
+        return self.place_us
+
+    def aim(self, place_us: float) -> float:
+        """Move slowly to a pulse; return that pulse, limited to what is allowed."""
+        self._goal = self._within(place_us)
+        return self.place_us
+
+    def look(self) -> bool:
+        """Wait a moment and lead it on; return whether it is where it was sent.
+
+        Raises:
+            BusLost: the board does not answer any more.
+            CalibrationStopped: a person or the system asked for it.
+        """
+        why = self._stopped()
+        if why is not None:
+            raise CalibrationStopped(why)
+        self._clock.sleep_until(self._clock.now_s() + PERIOD_S)
+        at = self._read()
+        self._bus.write([self._goal])
+        return abs(at - self._goal) <= NEAR_STEPS
+
+    def arrive(self) -> float:
+        """Lead it to where it was sent; return the pulse in us that it gets in the end.
+
+        Raises:
+            BusLost, CalibrationStopped: see ``look``.
+        """
+        way = abs(self._goal - self._read()) / US_STEPS
+        end_s = self._clock.now_s() + way / SPEED_US_S + TIMEOUT_S
+        while not self.look():
+            if self._clock.now_s() > end_s:
+                self._goal = self._pulse
+                break
+        return self.place_us
+
+    def _begin_anew(self, pulse_steps: int) -> None:
+        """Stay where the board holds it, however it came there."""
+        sent_us, held_us = self._goal / US_STEPS, pulse_steps / US_STEPS
+        self._goal = pulse_steps
+        range_us = ": if it never comes farther, widen the range of its channel in Pololu's program"
+        self._said.append(
+            f"{self.who} was sent to {sent_us:g} us and is held at {held_us:g} us"
+            f"{range_us if self._maestro else ''}"
+        )
+
+    def events(self) -> tuple[str, ...]:
+        """Return the events since the last call."""
+        said, self._said = self._said, []
+        return (*self._bus.events(), *said)
+
+    def disable(self) -> None:
+        """Stop its pulses and close the port; safe to call at any time.
+
+        Raises:
+            BusLost: the port is gone.
+        """
+        try:
+            self._bus.disable_torque()
+        finally:
+            self._bus.close()
+
+    def _within(self, place_us: float) -> int:
+        low, high = self._setup.min_steps, self._setup.max_steps
+        return min(max(round(place_us * US_STEPS), low), high)
+
+    def _read(self) -> int:
+        """Read the board until it replies; return its present pulse in steps.
+
+        Raises:
+            BusLost: it does not answer any more.
+        """
+        end_s = self._clock.now_s() + SILENT_S
+        while True:
+            feedback = self._bus.read(self._clock.now_s())
+            if not feedback.missing:
+                self._pulse, self._on = int(feedback.position_steps[0]), feedback.torque[0]
+                if feedback.rearmed[0]:
+                    self._begin_anew(self._pulse)
+                return self._pulse
+            if self._clock.now_s() > end_s:
+                raise BusLost(f"{self.who}: the board does not answer: check its cable and power")
+            self._clock.sleep_until(self._clock.now_s() + PERIOD_S)
+
+
+def _bus(port: BusPort, setup: ServoConfig, params: MaestroParams | Pca9685Params) -> ServoBus:
+    """Return the bus of one servo on its board."""
+    if isinstance(params, Pca9685Params):
+        return Pca9685Bus(port, [setup], params)
+    return MaestroBus(port, [setup], params)

@@ -1,0 +1,288 @@
+"""Zero, sign and range of a joint out of servo positions: samples in, calibration out. Pure.
+
+A servo counts 4096 steps a turn; where 4095 meets 0 is its seam. After a restart it knows
+only the place within the turn, so a joint whose travel holds the seam would wake up a whole
+turn from where it is: such a joint cannot be used and must be built in again.
+Steps as in gazerig.drivers.bus.servo_models, angles in degrees at the joint.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import floor
+from typing import NamedTuple
+
+from gazerig.drivers.bus.servo_models import STEPS_PER_TURN
+from gazerig.drivers.errors import SetupError
+from gazerig.features.bringup.servo_families import kind_of
+from gazerig.robot.model.joint import JointParams
+from gazerig.robot.model.kinematics import LIDS
+from gazerig.robot.model.types import GAZE_JOINTS
+
+SMALLEST_RANGE_DEG = 5.0
+"""A joint that moves less than this was not really moved."""
+
+LONGEST_GAP_S = 0.3
+MAX_UNSEEN_JUMP_STEPS = STEPS_PER_TURN // 8
+"""A joint that turned farther unseen for longer than that may have turned the other way."""
+
+ENDS = {
+    "eye_pan": ("LEFT", "RIGHT"),
+    "eye_tilt": ("UPPER", "LOWER"),
+    "eyes_pan": ("LEFT", "RIGHT"),
+    "eyes_tilt": ("UPPER", "LOWER"),
+    "upper_lid": ("OPEN", "SHUT"),
+    "lower_lid": ("OPEN", "SHUT"),
+    "neck_yaw": ("LEFT", "RIGHT"),
+    "neck_pitch": ("UPPER", "LOWER"),
+    "neck_roll": ("RIGHT EAR DOWN", "LEFT EAR DOWN"),
+}
+"""What people call the ends of a joint, the positive one first (signs as in gaze.types)."""
+
+
+class CalibrationRefused(SetupError):
+    """The samples do not make a calibration; the message says why and what to do."""
+
+
+class Marks(NamedTuple):
+    """Where a joint was when a person or a stop said so, in unwrapped steps.
+
+    positive_end: left, upper, open, or right ear down
+    zero: straight ahead; a lid half open
+    """
+
+    positive_end: int
+    negative_end: int
+    zero: int
+
+
+class Calibration(NamedTuple):
+    """What the rig file must say of one joint; fields as in ``model.joint.JointParams``."""
+
+    zero_step: int
+    sign: int
+    min_deg: float
+    max_deg: float
+
+
+class LinkageFit(NamedTuple):
+    """What the rig file must say of a joint behind a push rod; fields as in JointParams.
+
+    transmission_points: each (joint angle in degrees, servo position in steps or us), angles rising
+    """
+
+    transmission_points: tuple[tuple[float, float], ...]
+    min_deg: float
+    max_deg: float
+
+
+Value = int | float | tuple[tuple[float, float], ...]
+"""What a calibration writes."""
+
+
+class Unwrapped:
+    """Follows a position register over the seam.
+
+    Some firmware goes on counting past 4095, some starts again at 0: a change is taken as
+    the shorter way round, so both give the same.
+    """
+
+    def __init__(self) -> None:
+        self._at: int | None = None
+        self._seen_s = 0.0
+
+    @property
+    def steps(self) -> int | None:
+        """Return the unwrapped position, in 0..4095 at the first sample; None before it."""
+        return self._at
+
+    def see(self, position_steps: int, t_s: float) -> int:
+        """Add one sample; return the unwrapped position.
+
+        Raises:
+            CalibrationRefused: it moved so far while it was not watched that its way is unknown.
+        """
+        if self._at is None:
+            self._at = position_steps % STEPS_PER_TURN
+        else:
+            half = STEPS_PER_TURN // 2
+            change = (position_steps - self._at + half) % STEPS_PER_TURN - half
+            gap_s = t_s - self._seen_s
+            if gap_s > LONGEST_GAP_S and abs(change) > MAX_UNSEEN_JUMP_STEPS:
+                raise CalibrationRefused(
+                    f"it turned by {abs(change) * 360 / STEPS_PER_TURN:.0f} deg while the servo "
+                    f"did not answer for {gap_s:.1f} s: check its cable, and start again"
+                )
+            self._at += change
+        self._seen_s = t_s
+        return self._at
+
+
+def ends_of(joint_name: str) -> tuple[str, str]:
+    """Return the names of a joint's positive and negative end."""
+    if joint_name not in GAZE_JOINTS:
+        return "POSITIVE", "NEGATIVE"
+    return next(ends for part, ends in ENDS.items() if joint_name.endswith(part))
+
+
+def zero_of(joint_name: str) -> str:
+    """Return what people call the position of a joint at 0 deg."""
+    return "straight ahead" if joint_name in GAZE_JOINTS else "at rest"
+
+
+def _plain(value: Value) -> Value:
+    """Return whole numbers of a linkage as such: 1500 us is no more exact as 1500.0."""
+    if not isinstance(value, tuple):
+        return value
+    return tuple((_short(angle), _short(at)) for angle, at in value)
+
+
+def _short(number: float) -> float:
+    return int(number) if number == int(number) else number
+
+
+def is_lid(joint_name: str) -> bool:
+    """Return whether a joint moves a lid: its ends matter, and it has no straight ahead."""
+    return joint_name in LIDS
+
+
+def lid_keys(joint_name: str) -> tuple[str, str]:
+    """Return the keys of a lid's shut and open angle under lid_joints, as in LidJoints."""
+    lid = joint_name.removesuffix("_lid").removesuffix("_upper")
+    return f"{lid}_shut_deg", f"{lid}_open_deg"
+
+
+def middle(marks: Marks) -> Marks:
+    """Set the zero half-way between the ends."""
+    return marks._replace(zero=(marks.positive_end + marks.negative_end) // 2)
+
+
+def calibration(name: str, marks: Marks, joint: JointParams, margin_deg: float) -> Calibration:
+    """Return zero, sign and range of a joint, ``margin_deg`` short of each end.
+
+    joint: as it is configured now; its gear ratio is taken as right
+
+    Raises:
+        CalibrationRefused: too small a range, zero not inside it, or the seam within it.
+    """
+    steps_per_deg = joint.ratio * STEPS_PER_TURN / 360.0
+    low, high = sorted((marks.positive_end, marks.negative_end))
+    at_end = name not in GAZE_JOINTS  # a jaw rests where it is shut, at one of its ends
+    if at_end and low - steps_per_deg <= marks.zero <= high + steps_per_deg:
+        marks = marks._replace(zero=min(max(marks.zero, low), high))
+    travel_deg = (high - low) / steps_per_deg
+    if travel_deg <= SMALLEST_RANGE_DEG:
+        raise CalibrationRefused(
+            f"{name}: only {travel_deg:.1f} deg lie between the two ends, more than "
+            f"{SMALLEST_RANGE_DEG:g} are needed: is this the joint that was turned, "
+            "and is its horn screwed on?"
+        )
+    _refuse_seam(name, low, high, steps_per_deg, kind_of(joint.model).set_middle is not None)
+    if not (low < marks.zero < high or (at_end and low <= marks.zero <= high)):
+        raise CalibrationRefused(
+            f"{name}: {zero_of(name)} (step {marks.zero % STEPS_PER_TURN}) does not lie between "
+            f"the ends (steps {low % STEPS_PER_TURN} and {high % STEPS_PER_TURN}): "
+            "mark the three places again"
+        )
+    sign = 1 if marks.positive_end > marks.negative_end else -1
+    most = abs(marks.positive_end - marks.zero) / steps_per_deg - margin_deg
+    least = abs(marks.negative_end - marks.zero) / steps_per_deg - margin_deg
+    if at_end:
+        most, least = max(0.0, most), max(0.0, least)
+    made = Calibration(marks.zero % STEPS_PER_TURN, sign, 0.0 - inwards(least), inwards(most))
+    _refuse_unfit(name, made, joint, margin_deg)
+    return made
+
+
+def inwards(angle_deg: float) -> float:
+    """Round down to tenths, so that never a hair beyond what was measured is allowed."""
+    return floor(angle_deg * 10.0 + 1e-6) / 10.0
+
+
+def _refuse_seam(name: str, low: int, high: int, steps_per_deg: float, settable: bool) -> None:
+    """Refuse a travel that leaves the turn 0..4095 in which a restarted servo counts.
+
+    settable: the servo can be told to call any place its middle, and keeps to it
+    """
+    if low // STEPS_PER_TURN == high // STEPS_PER_TURN:
+        return
+    turn_deg = STEPS_PER_TURN / steps_per_deg
+    if high - low >= STEPS_PER_TURN - 1:
+        raise CalibrationRefused(
+            f"{name}: it turns {(high - low) / steps_per_deg:.0f} deg, and its servo counts only "
+            f"one turn ({turn_deg:.0f} deg): give the joint stops, or check its ratio"
+        )
+    if settable:
+        raise CalibrationRefused(
+            f"{name}: its travel (steps {low % STEPS_PER_TURN} to {high % STEPS_PER_TURN}) crosses "
+            "the servo's seam from 4095 to 0, where a restarted servo is a whole turn wrong: "
+            "calibrate again with --set-middle, and the servo calls the middle of the travel 2048"
+        )
+    centre = (low + high) // 2 % STEPS_PER_TURN
+    off = STEPS_PER_TURN // 2 - centre
+    raise CalibrationRefused(
+        f"{name}: its travel (steps {low % STEPS_PER_TURN} to {high % STEPS_PER_TURN}) crosses "
+        "the servo's seam from 4095 to 0, where a restarted servo is a whole turn wrong: take "
+        "the horn off, hold the joint in the middle of its travel, turn the servo's shaft by "
+        f"{abs(off) * 360 / STEPS_PER_TURN:.0f} deg towards {'more' if off > 0 else 'fewer'} "
+        "steps (about 2048), put the horn on again, and calibrate again. A Homing Offset is no "
+        "cure: in position mode some firmware loses it by a turn as the torque comes on"
+    )
+
+
+def _refuse_unfit(name: str, made: Calibration, joint: JointParams, margin_deg: float) -> None:
+    """Refuse what the rig file's own rules would."""
+    if name in GAZE_JOINTS and not made.min_deg < 0.0 < made.max_deg:
+        raise CalibrationRefused(
+            f"{name}: straight ahead lies within {margin_deg:g} deg of an end (range "
+            f"{made.min_deg:g}..{made.max_deg:g} deg): build the horn in again, or lessen the margin"
+        )
+    if made.max_deg - made.min_deg <= SMALLEST_RANGE_DEG:
+        raise CalibrationRefused(
+            f"{name}: with {margin_deg:g} deg of margin at each end only "
+            f"{made.max_deg - made.min_deg:.1f} deg are left, more than {SMALLEST_RANGE_DEG:g} "
+            "are needed: lessen the margin"
+        )
+    if made.min_deg < -180.0 or made.max_deg > 180.0:
+        raise CalibrationRefused(
+            f"{name}: {made.min_deg:g}..{made.max_deg:g} deg is more than a joint may turn "
+            "(-180..180): check its ratio"
+        )
+    try:
+        applied(joint, made)
+    except ValueError as error:
+        raise CalibrationRefused(f"{name}: {error}: calibrate again") from error
+
+
+def applied(joint: JointParams, made: Calibration) -> JointParams:
+    """Return the joint as calibrated.
+
+    Raises:
+        ValueError: the joint's own rules refuse it.
+    """
+    return replace(joint, **made._asdict())
+
+
+def changes(
+    name: str,
+    joint: JointParams,
+    made: Calibration | LinkageFit,
+    park_deg: Mapping[str, float],
+) -> dict[str, Value]:
+    """Return dotted keys of the rig file and their new values, those alone that differ.
+
+    Values that stood on the old range follow: a lid's shut and open angle go to its ends,
+    a parking angle outside the new range to its nearer end.
+    """
+    wanted: dict[str, Value] = {
+        f"joints.{name}.{key}": _plain(value)
+        for key, value in made._asdict().items()
+        if getattr(joint, key) != value
+    }
+    if is_lid(name):
+        shut, wide = lid_keys(name)
+        wanted[f"lid_joints.{shut}"] = made.min_deg
+        wanted[f"lid_joints.{wide}"] = made.max_deg
+    parked = park_deg.get(name)
+    if parked is not None and not made.min_deg <= parked <= made.max_deg:
+        wanted[f"park_deg.{name}"] = made.min_deg if parked < made.min_deg else made.max_deg
+    return wanted

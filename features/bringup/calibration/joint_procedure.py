@@ -1,0 +1,158 @@
+"""Calibrating one joint, step by step: a hand or gentle motion turns it, a person judges.
+
+Nothing is printed or written here: questions go to ``Operator``, the result is a value.
+"""
+
+from collections.abc import Callable
+from typing import Literal, Protocol
+
+from gazerig.drivers.bus.servo_models import STEPS_PER_TURN
+from gazerig.features.bringup.calibration.endstop_search import EndStop, StopSearchParams
+from gazerig.features.bringup.calibration.joint_access import SingleJoint
+from gazerig.features.bringup.calibration.joint_calibration import (
+    Calibration,
+    CalibrationRefused,
+    Marks,
+    Unwrapped,
+    calibration,
+    ends_of,
+    is_lid,
+    middle,
+    zero_of,
+)
+
+ZeroBy = Literal["middle", "person"]
+
+
+class Operator(Protocol):
+    """Who is asked; ``live`` is called more than 20 times a second while they think."""
+
+    def tell(self, line: str) -> None:
+        """Show what is going on."""
+        ...
+
+    def wait(self, question: str, live: Callable[[], str]) -> None:
+        """Return when they have done what is asked; ``live`` gives the line to show meanwhile.
+
+        Raises:
+            CalibrationStopped: the user asked to end.
+        """
+        ...
+
+    def agrees(self, question: str, live: Callable[[], str]) -> bool:
+        """Return their yes or no, as ``wait``."""
+        ...
+
+
+class Watched:
+    """A joint's position followed over the seam, with a line that shows it."""
+
+    def __init__(self, single: SingleJoint) -> None:
+        self._single = single
+        self._track = Unwrapped()
+        self._first: int | None = None
+
+    def live(self) -> str:
+        """Add a sample; return it as text."""
+        steps, first = self.steps(), self._first
+        first = steps if first is None else first
+        self._first = first
+        turned = (steps - first) * 360.0 / STEPS_PER_TURN / self._single.joint.ratio
+        return (
+            f"{self._single.name}: step {steps % STEPS_PER_TURN:4d}, "
+            f"turned {turned:+7.1f} deg since the start"
+        )
+
+    def steps(self) -> int:
+        """Add a sample; return the unwrapped position."""
+        return self._track.see(*self._single.position())
+
+
+def by_hand(single: SingleJoint, person: Operator, margin_deg: float) -> Calibration:
+    """Let the user turn the joint, with torque off, to its ends and straight ahead.
+
+    Raises:
+        CalibrationRefused: what was marked makes no
+            calibration.
+        DriverError: the servo does not answer any more.
+        CalibrationStopped: the person wants it to end.
+    """
+    single.servo.disable_torque()
+    watched = Watched(single)
+    positive, negative = ends_of(single.name)
+    person.tell(f"{single.who}: torque off, it can be turned by hand")
+
+    def mark(where: str) -> int:
+        person.wait(f"turn {single.name} {where}, then press Enter", watched.live)
+        return watched.steps()
+
+    first = mark(f"to its {positive} end")
+    marks = Marks(first, mark(f"to its {negative} end"), 0)
+    marks = (
+        middle(marks) if is_lid(single.name) else marks._replace(zero=mark(zero_of(single.name)))
+    )
+    return calibration(single.name, marks, single.joint, margin_deg)
+
+
+def by_motion(
+    single: SingleJoint,
+    person: Operator,
+    margin_deg: float,
+    params: StopSearchParams,
+    zero_by: ZeroBy,
+) -> Calibration:
+    """Drive the joint slowly and weakly to both stops; the zero is half-way, or a person's.
+
+    Raises:
+        CalibrationRefused: what was found makes no
+            calibration.
+        DriverError: the servo is not fit for it, or does not answer any more.
+        CalibrationStopped: the person wants it to end.
+    """
+    try:
+        marks = _find_stops(single, person, params)
+    finally:
+        single.servo.restore()
+    person.tell(f"{single.who}: torque off")
+    if zero_by == "person" and not is_lid(single.name):
+        watched = Watched(single)
+        person.wait(f"turn {single.name} {zero_of(single.name)}, then press Enter", watched.live)
+        marks = marks._replace(zero=watched.steps())
+    else:
+        marks = middle(marks)
+    return calibration(single.name, marks, single.joint, margin_deg)
+
+
+def _find_stops(single: SingleJoint, person: Operator, params: StopSearchParams) -> Marks:
+    """Return both stops, the zero still open; the person says which way it went."""
+    positive, negative = ends_of(single.name)
+    way = single.joint.sign
+    single.enable_torque(params)
+    person.tell(
+        f"{single.who}: torque on at {params.strength:.0%} of its strength, "
+        f"moving at {params.speed_deg_s:g} deg/s"
+    )
+    if single.alone:
+        person.tell(f"{single.who}: {single.alone}")
+    first = _stop(single, person, params, way)
+    asked = f"did {single.name} just go to its {positive} end?"
+    sign = way if person.agrees(asked, Watched(single).live) else -way
+    second = _stop(single, person, params, -way)
+    single.go(params, (first + second) // 2)
+    return Marks(first, second, 0) if sign == way else Marks(second, first, 0)
+
+
+def _stop(single: SingleJoint, person: Operator, params: StopSearchParams, way: int) -> int:
+    """Find one stop; return its position."""
+    stop: EndStop = single.find_stop(params, way)
+    if stop.kind == "limit":
+        raise CalibrationRefused(
+            f"{single.name}: it came to the end of the servo's turn "
+            f"(step {stop.position_steps}) before a stop: build the horn in so that the middle "
+            "of its travel reads about 2048 (--by hand says by how much)"
+        )
+    person.tell(
+        f"{single.who}: stop at step {stop.position_steps}, pushed for "
+        f"{stop.pushed_s * 1e3:.0f} ms, went back by {params.back_off_deg:g} deg"
+    )
+    return stop.position_steps

@@ -1,0 +1,287 @@
+"""One smart servo by itself, for calibrating: the others of its line are left as they are.
+
+Where it has a bus watchdog that is armed while the torque is on, so a servo that is left alone
+stops. Where its memory has a lock its limits are opened with the lock shut: the servo obeys and
+its EEPROM keeps the old ones, so switching it off and on puts back what a killed program left.
+"""
+
+from typing import NamedTuple
+
+from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing, SetupError
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.features.bringup.servo_families import kind_of
+from gazerig.robot.guardian.guardian import Guardian
+
+WATCHDOG_S = 0.3
+"""Three readings that were lost in a row must not let it trip."""
+
+LIMITS = ("min_position_limit", "max_position_limit")
+
+
+class ServoCheck(NamedTuple):
+    """What a servo tells of itself before it is calibrated; limits are those of its goals."""
+
+    firmware: int
+    limits: tuple[int, int]
+    homing_offset: int
+
+
+class SingleServo:
+    """The servo of one joint.
+
+    What it changes in the servo it puts back. Every method raises BusLost where the servo does
+    not answer any more.
+
+    Args:
+        name: the joint's.
+        servo_id: as configured.
+        model: as configured.
+        port: opened.
+        guardian: switches the torque off should this program die; it has one plan, that of this
+            servo, and the port calls its ``beat``. None: nothing does but the servo's watchdog.
+
+    who: what messages call it, "neck_yaw (servo 7)"
+    alone: what becomes of it when this program dies while it is driven, "" where it stops by
+        itself
+    """
+
+    def __init__(
+        self,
+        name: str,
+        servo_id: int,
+        model: str,
+        port: BusPort,
+        guardian: Guardian | None = None,
+    ) -> None:
+        self.who = f"{name} (servo {servo_id})"
+        self._kind = kind_of(model)
+        if self._kind.driving is None:
+            raise SetupError(
+                f"{self.who}: {self._kind.title} servos are not calibrated by this program: turn "
+                "the joint by hand, read its steps with gazerig monitor, and write zero_step, min_deg "
+                "and max_deg into the YAML"
+            )
+        self._driving, self._family = self._kind.driving, self._kind.family
+        self.alone = ""
+        if self._family.watchdog_unit_s is None:
+            self.alone = (
+                "these servos have no watchdog: if this program is killed, it holds its last goal "
+                "weakly until the servo power is cut"
+                if guardian is None
+                else "these servos have no watchdog: should this program die, its guardian "
+                "switches the torque off"
+            )
+        self._id, self._model, self._port = servo_id, model, port
+        self._registers = Registers(port, self._kind.family)
+        self._guardian = guardian
+        self._was: dict[str, int] = {}
+
+    def check(self) -> ServoCheck:
+        """Check that it is the right servo, sound, and in position mode.
+
+        Raises:
+            ServoMissing: it does not answer, is another model, or is set up in another way.
+            ServoFault: it reports an error.
+        """
+        # A servo may be set to answer questions alone; this takes no answer and ends that.
+        self._registers.write_all((self._id,), "status_return_level", self._family.answer_level)
+        firmware = self._refuse_another()
+        value, driving = self._value, self._driving
+        self._refuse_errors(value(self._family.error_register))
+        low, high = (value(name) for name in LIMITS)
+        for setting in driving.settings:
+            now = value(setting.register)
+            if now != setting.of(now):
+                raise ServoMissing(
+                    f"{self.who}: {setting.register} is {now}, not {setting.of(now)}: "
+                    "gazerig doctor --fix sets it"
+                )
+        offset = value(driving.offset)
+        if offset and not driving.offset_usable:
+            raise ServoMissing(
+                f"{self.who}: its Homing Offset is {offset} steps, which some "
+                "firmware loses by a whole turn as the torque comes on: set it to 0 "
+                "(--clear-offset), the calibration makes up for it"
+            )
+        return ServoCheck(firmware, (low, high), offset)
+
+    def _refuse_another(self) -> int:
+        """Return the firmware of the servo, which is of the model that is wanted."""
+        found = self._registers.identify(self._id)
+        if found is None:
+            raise ServoMissing(f"{self.who} does not answer: check power, cable, id and baud rate")
+        if found.model_number != self._family.models[self._model].number:
+            raise ServoMissing(
+                f"{self.who} is {self._family.model_name(found.model_number)}, "
+                f"not {self._model}: correct the rig file, or check the ids"
+            )
+        return found.firmware
+
+    def _refuse_errors(self, status: int) -> None:
+        if status:
+            remedy = (
+                f"find the cause, then gazerig reboot {self._id}"
+                if self._family.faults_latch
+                else "let it cool, free it, check its supply"
+            )
+            names = " and ".join(self._family.name_errors(status))
+            raise ServoFault(f"{self.who}: {names}: {remedy}")
+
+    def clear_offset(self) -> int:
+        """Set the offset of its position to 0, torque off; return what it was."""
+        register = self._driving.offset
+        was = self._value(register)
+        if was:
+            self._torque_off()
+            if not self._registers.write_lasting(self._id, register, 0):
+                raise ServoMissing(f"{self.who} does not take {register} 0: restart its power")
+        return was
+
+    def set_middle(self) -> int:
+        """Set the servo's present position as its middle, 2048; return the offset that it has now.
+
+        Raises:
+            SetupError: this kind cannot.
+        """
+        if self._kind.set_middle is None:
+            raise SetupError(
+                f"{self.who}: a {self._kind.title} servo cannot set its middle: in position mode "
+                "some firmware loses its Homing Offset; take the horn off and turn the shaft"
+            )
+        self._torque_off()
+        return self._kind.set_middle(self._port, self._kind.family, self._id)
+
+    def disable_torque(self) -> None:
+        """Switch the torque off, and see that it is; the guardian has nothing to watch then.
+
+        Raises:
+            ServoFault: it is not.
+        """
+        self._torque_off()
+        self._unguard()
+
+    def _torque_off(self) -> None:
+        """Switch the torque off, and see that it is.
+
+        Raises:
+            ServoFault: it is not.
+        """
+        if self._family.watchdog_unit_s is not None:
+            self._put("bus_watchdog", 0)
+        self._put("torque_enable", 0)
+        if self._value("torque_enable"):
+            raise ServoFault(f"{self.who} does not let go: cut the servo power")
+
+    def position(self) -> int:
+        """Return the present position in steps."""
+        return self._value("present_position")
+
+    def load(self) -> float:
+        """Return the present current as a share of the stall current."""
+        return self._driving.load(self._model, self._value("present_current"))
+
+    def enable_torque(self, strength: float, speed_steps_s: float) -> None:
+        """Switch the torque on where it is, weak and slow; goals may lead anywhere in the turn.
+
+        Args:
+            strength: share of full drive.
+            speed_steps_s: top speed.
+
+        Raises:
+            ServoMissing: the position does not lie within one turn.
+            ServoFault: the torque does not come on, or the position jumped.
+            SetupError: the guardian does not start.
+        """
+        value, put = self._value, self._put
+        if self._guardian is not None:
+            self._guardian.join(0)
+            self._guardian.arm(0)
+        self._torque_off()
+        if self._family.lock is not None:
+            put(self._family.lock, 1)
+        self._borrow(strength, speed_steps_s)
+        before = self.position()
+        if not 0 <= before < self._family.steps_per_turn:
+            raise ServoMissing(
+                f"{self.who} has been turned over the seam of its encoder (it reads {before}): "
+                "turn it back, or switch the servo power off and on, and start again"
+            )
+        put("goal_position", before)
+        put("torque_enable", 1)
+        now = self.position()
+        if not value("torque_enable"):
+            raise ServoFault(f"{self.who}: the torque does not come on: gazerig doctor says why")
+        if abs(now - before) > self._family.steps_per_turn // 4:
+            raise ServoFault(f"{self.who}: its position jumped from {before} to {now}")
+        unit_s = self._family.watchdog_unit_s
+        if unit_s is not None:
+            put("bus_watchdog", round(WATCHDOG_S / unit_s))
+
+    def _borrow(self, strength: float, speed_steps_s: float) -> None:
+        """Allow goals anywhere in the turn, weak and slow, to find the end stops."""
+        value, driving = self._value, self._driving
+        wanted = {
+            **dict(zip(LIMITS, (0, self._family.steps_per_turn - 1), strict=True)),
+            **driving.gentle(value, strength, speed_steps_s),
+        }
+        was = {name: value(name) for name in wanted}
+        found = dict(was)
+        if driving.full_drive is not None:
+            register, largest = driving.full_drive
+            found[register] = value(largest)
+        self._was = found | self._was
+        for name, desired in wanted.items():
+            if was[name] != desired:
+                self._put(name, desired)
+
+    def torque_is_on(self) -> bool:
+        """Return whether the torque is on."""
+        return self._value("torque_enable") == 1
+
+    def send(self, goal_steps: int) -> None:
+        """Send a goal.
+
+        Raises:
+            ServoFault: the program stood still, and the guardian has switched the torque off.
+        """
+        if self._guardian is not None and self._guardian.released(0):
+            raise ServoFault(
+                f"{self.who}: the program stood still, so its guardian switched the torque off: "
+                "start again"
+            )
+        self._put("goal_position", goal_steps)
+
+    def restore(self) -> None:
+        """Switch the torque off and put everything else back as it was found."""
+        self._torque_off()
+        for name, value in self._was.items():
+            if self._value(name) != value:
+                self._put(name, value)
+        self._was = {}
+        self._unguard()
+
+    def _unguard(self) -> None:
+        if self._guardian is not None:
+            self._guardian.disarm(0)
+            self._guardian.leave(0)
+
+    def _value(self, register: str) -> int:
+        """Return a register's value.
+
+        Raises:
+            BusLost: it does not answer any more.
+        """
+        value = self._registers.read(self._id, register)
+        if value is None:
+            raise BusLost(f"{self.who} does not answer any more: check its cable and power")
+        return value
+
+    def _put(self, register: str, value: int) -> None:
+        """Write a register.
+
+        Raises:
+            BusLost: it does not answer any more, or refuses the value.
+        """
+        if not self._registers.write(self._id, register, value):
+            raise BusLost(f"{self.who} does not take {register} {value}: check its cable and power")

@@ -1,0 +1,1 @@
+"""The commands of bring-up, their options, ports and questions."""

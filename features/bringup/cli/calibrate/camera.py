@@ -1,0 +1,471 @@
+"""The commands that calibrate a camera: the board to print, then lens and place on the head."""
+
+import contextlib
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from enum import StrEnum
+from math import degrees, radians
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+import typer
+from rich.console import Console
+
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.camera.oak.calibration import OakCalibration
+from gazerig.drivers.camera.oak.source import OakSource
+from gazerig.drivers.camera.orientation import UprightSource
+from gazerig.drivers.camera.params import ASSUMED_FIELD_DEG
+from gazerig.drivers.camera.source import FrameSource, Shot
+from gazerig.drivers.camera.thread import CameraThread
+from gazerig.drivers.camera.webcam import Webcam
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.types import DetectedFace, ImageArray, Pixels
+from gazerig.drivers.vision.face.detector import face_detector
+from gazerig.features.bringup.calibration.camera_calibration import LensCalibration
+from gazerig.features.bringup.calibration.camera_procedure import (
+    LensSteps,
+    Neck,
+    NeckStep,
+    neck_angles,
+    neck_steps,
+)
+from gazerig.features.bringup.calibration.charuco_page import RULER_MM, write_page
+from gazerig.features.bringup.calibration.field_of_view import SIZE_SPREAD, field_by_face
+from gazerig.features.bringup.calibration.hand_eye import HandEye, HandEyeParams, camera_on_head
+from gazerig.features.bringup.cli.calibrate.difference_table import difference_table
+from gazerig.features.bringup.cli.calibrate.oak import (
+    as_seen,
+    calibration_of_file,
+    lens_params,
+    oak_changes,
+    say_calibration,
+    upright_calibration,
+)
+from gazerig.features.bringup.cli.neck_motion import go_on, moving_neck
+from gazerig.features.bringup.cli.prompts import Lines, TerminalPerson
+from gazerig.features.bringup.cli.rig_writer import refuse_unwritable, write_found
+from gazerig.features.bringup.cli.write_options import AllYesOption, DryRunOption, OutOption
+from gazerig.robot.app.camera_factory import orientation_of
+from gazerig.robot.app.rig_limits import lid_ends, neck_span
+from gazerig.robot.cli.terminal import ForceOption, RigArgument, clear_errors, say, signals, status
+from gazerig.robot.model.charuco_board import BoardParams, CharucoBoard
+from gazerig.robot.model.clock import RealClock
+from gazerig.robot.model.frames import CameraParams
+from gazerig.robot.model.intrinsics import intrinsics_of_lens
+from gazerig.robot.model.kinematics import NECK, Kinematics
+from gazerig.sim_mock.cameras.charuco_scene import BoardScene
+
+
+class Paper(StrEnum):
+    """Paper to print on; the keys of PAPERS_MM."""
+
+    a4 = "a4"
+    letter = "letter"
+
+
+class What(StrEnum):
+    """What to calibrate."""
+
+    all = "all"
+    lens = "lens"
+    mount = "mount"
+
+
+ColumnsOption = Annotated[int, typer.Option(min=3, max=20, help="Squares from left to right.")]
+RowsOption = Annotated[int, typer.Option(min=3, max=20, help="Squares from top to bottom.")]
+SquareOption = Annotated[float, typer.Option(metavar="MM", help="Side of a square.")]
+_BOARD = BoardParams()
+# Frames with a face, some seconds of them, and how long none may be seen.
+_FACE_FRAMES, _NO_FACE_S = 120, 30.0
+
+
+def calibrate_board(
+    out: Annotated[Path, typer.Argument(help="File to write, .pdf or .png.")] = Path("board.pdf"),
+    paper: Annotated[Paper, typer.Option(help="Paper, laid crosswise.")] = Paper.a4,
+    columns: ColumnsOption = _BOARD.columns,
+    rows: RowsOption = _BOARD.rows,
+    square: SquareOption = _BOARD.square_mm,
+    force: ForceOption = False,
+) -> None:
+    """Write the ChArUco board as a page to print in true size: gazerig calibrate board."""
+    with clear_errors():
+        write_page(CharucoBoard(_board(columns, rows, square, RULER_MM)), paper.value, out, force)
+        say(f"{out}: print it at 100 % on {paper.value}, glue it on something flat and stiff,")
+        say(f"and measure the ruler: if it is not {RULER_MM} mm, give --ruler when calibrating")
+
+
+def calibrate_camera(
+    rig: RigArgument = "desk",
+    what: Annotated[
+        What, typer.Option(help="The lens, its mount on the head, or all of it.")
+    ] = What.all,
+    camera: Annotated[int | None, typer.Option(min=0, help="Webcam N (default: 0).")] = None,
+    oak: Annotated[
+        bool, typer.Option("--oak", help="An OAK camera: the lens is read from its memory.")
+    ] = False,
+    oak_calibration: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="A file of depthai's instead of the memory of a camera."),
+    ] = None,
+    ruler: Annotated[
+        float, typer.Option(metavar="MM", help="Length of the printed 100 mm ruler as measured.")
+    ] = float(RULER_MM),
+    columns: ColumnsOption = _BOARD.columns,
+    rows: RowsOption = _BOARD.rows,
+    square: SquareOption = _BOARD.square_mm,
+    face_at: Annotated[
+        float | None,
+        typer.Option(
+            metavar="M",
+            min=0.3,
+            max=5.0,
+            help="Without a board: the field of view alone, by your face so far from the lens.",
+        ),
+    ] = None,
+    out: OutOption = None,
+    dry_run: DryRunOption = False,
+    yes: AllYesOption = False,
+    seed: Annotated[int, typer.Option(min=0, help="With --mock: seed of the noise.")] = 0,
+    mock: Annotated[
+        bool, typer.Option("--mock", help="Emulated servos, and a simulated board to look at.")
+    ] = False,
+    port: Annotated[str | None, typer.Option(help="Serial port instead of the rig's.")] = None,
+) -> None:
+    """Measure the lens and where the camera sits, with the printed board, or a face."""
+    with clear_errors(rig, port, mock), signals() as stopped:
+        _refuse_contradictions(what, camera, oak, oak_calibration, mock, face_at)
+        loaded = load_rig(rig)
+        if face_at is not None:
+            changes = _field_changes(loaded, Webcam(camera or 0, loaded.webcam), face_at, stopped)
+            _write(rig, loaded, changes, out, dry_run, stopped, yes)
+            return
+        board = CharucoBoard(_board(columns, rows, square, ruler))
+        if loaded.camera.mount != "head" and what is not What.lens:
+            raise SetupError(
+                "camera.mount is base: the camera does not turn with the head, so looking from "
+                "several neck angles tells nothing; use --what lens"
+            )
+        if not dry_run:
+            refuse_unwritable(rig, out)
+        job = _Job(loaded, board, stopped, _kinematics(loaded))
+        if oak_calibration is not None:
+            changes = _oak_lens(job, calibration_of_file(oak_calibration, loaded.oak)).changes
+        else:
+            source = OakSource(loaded.oak) if oak else Webcam(camera or 0, loaded.webcam)
+            with _eye(job, None if mock else source, seed) as eye:
+                lens = _known_lens(job, eye, source, what)
+                changes = lens.changes
+                if what is not What.lens:
+                    with moving_neck(loaded, eye.mock, port, stopped, yes) as neck:
+                        found = _mount(job, eye, neck, lens.camera, lens.good)
+                        changes |= mount_changes(found, lens.camera)
+        _write(rig, loaded, changes, out, dry_run, stopped, yes)
+
+
+def _write(
+    rig: str,
+    loaded: Rig,
+    changes: Mapping[str, Any],
+    out: Path | None,
+    dry_run: bool,
+    stopped: Callable[[], str | None],
+    yes: bool,
+) -> None:
+    """Show what was found beside what the rig says, and write it after a yes."""
+    Console().print(difference_table(rig, loaded, changes))
+    if not dry_run:
+        write_found(rig, changes, out, TerminalPerson(Lines(None), stopped, yes))
+
+
+def _field_changes(
+    rig: Rig, source: FrameSource, face_at_m: float, stopped: Callable[[], str | None]
+) -> dict[str, Any]:
+    """Return the field of view by a face that is looked at for some seconds."""
+    if rig.camera.lens is not None:
+        raise SetupError(
+            "camera.lens is measured and tells the field of view: measure it again with the board "
+            "(--what lens), or take it out of the rig file"
+        )
+    clock = RealClock()
+    turned = UprightSource(source, orientation_of(rig.camera))
+    thread = CameraThread(turned, face_detector(rig.detector), clock.now_s)
+    say(
+        f"sit with your face {face_at_m:g} m before the lens (lens to tip of the nose), upright and "
+        "looking at it, and hold still"
+    )
+    thread.open()
+    try:
+        seen: list[Pixels] = []
+        number, seen_s, size_px = 0, clock.now_s(), (0, 0)
+        while len(seen) < _FACE_FRAMES:
+            go_on(stopped)
+            found = thread.latest(clock.now_s())
+            if found is None or found.number == number:
+                if clock.now_s() - seen_s > _NO_FACE_S:
+                    raise SetupError("no face is seen: more light, a face from its front, nearer")
+                clock.sleep_until(clock.now_s() + 0.01)
+                continue
+            number, size_px = found.number, (found.width_px, found.height_px)
+            if found.faces:
+                seen.append(found.faces[0].landmarks_px)
+                seen_s = clock.now_s()
+            status(f"face in {len(seen)} of {_FACE_FRAMES} frames")
+    finally:
+        thread.close()
+    field = field_by_face(seen, *size_px, face_at_m)
+    say(
+        f"horizontal field of view {field.horizontal_deg:.1f} deg, between {field.low_deg:.1f} and "
+        f"{field.high_deg:.1f} as faces differ in size by {100.0 * SIZE_SPREAD:.0f} %, and so far may "
+        "distances be off; the size varied by "
+        f"{100.0 * field.moved:.1f} %. The printed board measures it to 0.2 %"
+    )
+    field_deg = round(field.horizontal_deg, 1)
+    # 69 itself stands for a lens that nobody has measured.
+    return {"camera.horizontal_field_deg": field_deg + 0.05 * (field_deg == ASSUMED_FIELD_DEG)}
+
+
+def lens_changes(lens: LensCalibration) -> dict[str, Any]:
+    """Return a measured lens as dotted keys of a rig file and values."""
+    params = lens.params()
+    return {
+        "camera.horizontal_field_deg": round(lens.horizontal_field_deg, 2),
+        "camera.lens.width_px": params.width_px,
+        "camera.lens.height_px": params.height_px,
+        "camera.lens.fx_px": params.fx_px,
+        "camera.lens.fy_px": params.fy_px,
+        "camera.lens.cx_px": params.cx_px,
+        "camera.lens.cy_px": params.cy_px,
+        "camera.lens.distortion": params.distortion,
+    }
+
+
+def mount_changes(found: HandEye, camera: CameraParams) -> dict[str, Any]:
+    """Return a camera found on the head as dotted keys of a rig file and values.
+
+    With it goes the lens that belongs to this place, at the size it was measured on.
+    """
+    params, lens = found.mounted(camera), found.lens
+    return {
+        "camera.position_mm": params.position_mm,
+        "camera.yaw_deg": params.yaw_deg,
+        "camera.pitch_deg": params.pitch_deg,
+        "camera.roll_deg": params.roll_deg,
+        "camera.lens.fx_px": round(lens.fx_px, 2),
+        "camera.lens.fy_px": round(lens.fy_px, 2),
+        "camera.lens.cx_px": round(lens.cx_px, 2),
+        "camera.lens.cy_px": round(lens.cy_px, 2),
+    }
+
+
+def sure_as(lens: LensCalibration) -> HandEyeParams:
+    """Return what hand-eye calibration may assume of a lens that was just measured."""
+    focal = max(lens.focal_std_px) / lens.intrinsics.fx_px * 100.0
+    centre = max(lens.centre_std_px) * 640.0 / lens.width_px
+    return HandEyeParams(lens_error_percent=max(focal, 0.02), centre_error_px=max(centre, 0.1))
+
+
+class _Job(NamedTuple):
+    """What all steps need."""
+
+    rig: Rig
+    board: CharucoBoard
+    stopped: Callable[[], str | None]
+    kinematics: Kinematics
+
+
+class _KnownLens(NamedTuple):
+    """What is known of the lens.
+
+    camera: with it; changes: for the rig's file; good: what may be assumed of it
+    """
+
+    camera: CameraParams
+    changes: dict[str, Any]
+    good: HandEyeParams
+
+
+class _Eye(NamedTuple):
+    """Where frames come from, and the simulated camera behind it where there is one."""
+
+    look: Callable[[], Shot | None]
+    now_s: Callable[[], float]
+    rest: Callable[[float], None]
+    mock: BoardScene | None
+
+
+class _NoFaces:
+    """Stands where faces are looked for: a board has none."""
+
+    def find(self, _: ImageArray) -> tuple[DetectedFace, ...]:
+        """Find nothing."""
+        return ()
+
+
+@contextlib.contextmanager
+def _eye(job: _Job, source: FrameSource | None, seed: int) -> Iterator[_Eye]:
+    """Open the camera, or a simulated one."""
+    clock = RealClock()
+    if source is None:
+        rng = np.random.default_rng(seed)
+        simulated = BoardScene(job.rig.camera, job.board, job.kinematics, rng)
+        yield _Eye(lambda: simulated.look(clock.now_s()), clock.now_s, lambda _: None, simulated)
+        return
+    turned = UprightSource(source, orientation_of(job.rig.camera))
+    thread = CameraThread(turned, _NoFaces(), clock.now_s)
+
+    def look() -> Shot | None:
+        found = thread.latest(clock.now_s())
+        if found is None or found.image is None:
+            return None
+        return Shot(found.captured_s, found.number, found.image, lens=found.lens)
+
+    thread.open()
+    try:
+        yield _Eye(look, clock.now_s, lambda s: clock.sleep_until(clock.now_s() + s), None)
+    finally:
+        thread.close()
+
+
+def _refuse_contradictions(
+    what: What,
+    camera: int | None,
+    oak: bool,
+    oak_calibration: Path | None,
+    mock: bool,
+    face_at: float | None,
+) -> None:
+    """Refuse options that cannot be together."""
+    if face_at is not None and (oak or oak_calibration is not None or mock or what is not What.all):
+        raise SetupError(
+            "--face-at measures a webcam's field of view alone: leave --what, --oak and --mock away "
+            "(an OAK camera knows its lens)"
+        )
+    if oak and camera is not None:
+        raise SetupError("--oak and --camera name two cameras: leave one away")
+    if mock and (oak or oak_calibration is not None):
+        raise SetupError("--mock simulates a camera without a memory: leave --oak away")
+    if oak_calibration is not None and what is not What.lens:
+        raise SetupError("--oak-calibration tells of the lens alone: add --what lens")
+
+
+def _known_lens(job: _Job, eye: _Eye, source: FrameSource, what: What) -> _KnownLens:
+    """Return the lens as the rig has it, as an OAK camera has it in memory, or measure it."""
+    if what is What.mount:
+        return _KnownLens(job.rig.camera, {}, HandEyeParams())
+    if isinstance(source, OakSource):
+        return _oak_lens(job, source.calibration(), _first(job, eye))
+    lens = _lens(job, eye)
+    camera = replace(job.rig.camera, lens=lens.params())
+    return _KnownLens(camera, lens_changes(lens), sure_as(lens))
+
+
+def _oak_lens(job: _Job, delivered: OakCalibration, shot: Shot | None = None) -> _KnownLens:
+    """Return the lens of an OAK camera for upright frames, and say what its memory holds."""
+    found = upright_calibration(delivered, orientation_of(job.rig.camera))
+    found = as_seen(found, shot.lens if shot is not None else None)
+    say_calibration(found, job.rig.oak)
+    camera = replace(job.rig.camera, lens=lens_params(found))
+    return _KnownLens(camera, oak_changes(found), HandEyeParams())
+
+
+def _lens(job: _Job, eye: _Eye) -> LensCalibration:
+    """Have the user show the board until the lens is known."""
+    steps, number = LensSteps(job.board, radians(job.rig.camera.horizontal_field_deg)), 0
+    say("hold the board before the camera and do what the line below says; Ctrl-C gives up")
+    while True:
+        go_on(job.stopped)
+        shot = eye.look()
+        if shot is None or shot.number == number:
+            eye.rest(0.01)
+            continue
+        number = shot.number
+        step = steps.take(shot)
+        lens, desired = None, step.coverage.missing[0] if step.coverage.missing else "enough"
+        if step.coverage.enough and step.kept:
+            lens, why = steps.tried()
+            desired = why or desired
+        note = "kept" if step.kept else step.why
+        status(f"{step.coverage.views} views, {step.corners} corners ({note}): {desired}")
+        if lens is not None:
+            break
+    i = lens.intrinsics
+    say(
+        f"lens: {len(lens.kept)} views, {len(lens.dropped)} dropped, reprojection error "
+        f"{lens.rms_px:.2f} px (worst view {max(lens.view_rms_px):.2f})"
+    )
+    say(
+        f"focal length {i.fx_px:.1f} +-{lens.focal_std_px[0]:.1f}, "
+        f"{i.fy_px:.1f} +-{lens.focal_std_px[1]:.1f} px; axis at {i.cx_px:.1f} "
+        f"+-{lens.centre_std_px[0]:.1f}, {i.cy_px:.1f} +-{lens.centre_std_px[1]:.1f} px"
+    )
+    if eye.mock is not None:
+        t = eye.mock.lens
+        say(f"true: {t.fx_px:.1f}, {t.fy_px:.1f} px; axis at {t.cx_px:.1f}, {t.cy_px:.1f} px")
+    return lens
+
+
+def _mount(job: _Job, eye: _Eye, neck: Neck, camera: CameraParams, good: HandEyeParams) -> HandEye:
+    """View the hanging board from several neck angles."""
+    if camera.lens is None:
+        raise SetupError("the lens is not measured yet: calibrate it first (--what lens or all)")
+    shot = _first(job, eye)
+    height, width = shot.image.shape[:2]
+    if (camera.lens.width_px, camera.lens.height_px) != (width, height):
+        raise SetupError(
+            f"frames are {width} x {height}, the lens was measured on {camera.lens.width_px} x "
+            f"{camera.lens.height_px}: calibrate it again (--what all)"
+        )
+    lens = intrinsics_of_lens(camera.lens, radians(camera.horizontal_field_deg), width, height)
+    yaw, pitch, roll = (neck_span(job.rig, name) for name in NECK)
+    planned = neck_angles((yaw, pitch, roll), lens, width, height)
+    views = []
+    for step in neck_steps(neck, eye.look, eye.now_s, job.board, job.kinematics, planned):
+        _tell_step(step)
+        if step.view is not None:
+            views.append(step.view)
+    found = camera_on_head(views, lens, width, good)
+    say(
+        f"mount: {len(found.kept)} views, {len(found.dropped)} dropped, reprojection error "
+        f"{found.rms_px:.2f} px, {found.corner_px:.2f} px with neck joints off by "
+        f"{found.joint_error_deg:.2f} deg"
+    )
+    mm, deg = found.position_std_mm, found.angle_std_deg
+    say(f"sure to {mm[0]:.1f}, {mm[1]:.1f}, {mm[2]:.1f} mm and {max(deg):.2f} deg")
+    if eye.mock is not None:
+        t = eye.mock.mount
+        at = ", ".join(f"{mm:.1f}" for mm in t.position_mm)
+        say(f"true: {at} mm, yaw {t.yaw_deg:.2f}, pitch {t.pitch_deg:.2f}, roll {t.roll_deg:.2f}")
+    return found
+
+
+def _tell_step(step: NeckStep) -> None:
+    yaw, pitch, roll = map(degrees, step.asked_rad)
+    what = f"{step.corners} corners" if step.view is not None else step.why
+    say(f"{step.number}/{step.of}: yaw {yaw:+.0f}, pitch {pitch:+.0f}, roll {roll:+.0f}: {what}")
+
+
+def _first(job: _Job, eye: _Eye) -> Shot:
+    """Wait for a frame."""
+    give_up_s = eye.now_s() + 5.0
+    while eye.now_s() < give_up_s:
+        go_on(job.stopped)
+        shot = eye.look()
+        if shot is not None:
+            return shot
+        eye.rest(0.02)
+    raise SetupError("the camera gives no frames: check its cable, or name another (--camera N)")
+
+
+def _kinematics(rig: Rig) -> Kinematics:
+    return Kinematics(rig.geometry, rig.joints, lid_ends(rig))
+
+
+def _board(columns: int, rows: int, square_mm: float, ruler_mm: float) -> BoardParams:
+    """Return the board as asked for and as printed."""
+    marker_mm = square_mm * _BOARD.marker_mm / _BOARD.square_mm
+    try:
+        return BoardParams(columns, rows, square_mm, marker_mm).scaled(ruler_mm / RULER_MM)
+    except ValueError as error:
+        raise SetupError(f"this board cannot be: {error}") from error

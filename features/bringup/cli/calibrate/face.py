@@ -1,0 +1,291 @@
+"""The command calibrate face: where one person's eyes, mouth and all else are on their face."""
+
+import contextlib
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.errors import SetupError
+from gazerig.features.bringup.calibration.face_calibration import (
+    PART_NAMES_TEXT,
+    FaceCalibration,
+    begun,
+    changes,
+)
+from gazerig.features.bringup.calibration.face_steering import FaceSteering
+from gazerig.features.bringup.calibration.joint_access import CalibrationStopped
+from gazerig.features.bringup.cli.calibration_keys import (
+    BUTTONS,
+    HELP,
+    Keys,
+    LineKeys,
+    PageKeys,
+    TerminalKeys,
+)
+from gazerig.features.bringup.cli.ports import MockOption, PortOption
+from gazerig.features.bringup.cli.prompts import Lines, TerminalPerson
+from gazerig.features.bringup.cli.rig_writer import refuse_unwritable, write_found
+from gazerig.features.bringup.cli.write_options import AllYesOption, OutOption
+from gazerig.gaze.attention.top_down import TopDown
+from gazerig.gaze.types import Vec3
+from gazerig.robot.app.assemble import Assembly, Substitutes, assemble
+from gazerig.robot.app.options import RunOptions
+from gazerig.robot.app.run_observers import RunObservers, SteeringButtons
+from gazerig.robot.app.session import way_out
+from gazerig.robot.cli.terminal import (
+    FAULT,
+    RigArgument,
+    clear_errors,
+    say,
+    signals,
+    status,
+)
+from gazerig.robot.control.event_text import drawn_together
+from gazerig.robot.control.interrupts import Interrupts
+from gazerig.robot.control.loop import LoopCount, Tick
+from gazerig.robot.control.loop import run as run_loop
+from gazerig.robot.remote.stop_only_server import StopOnlyServer
+
+STILL_SCENE = "sits-still"
+
+# A script cannot come nearer or turn to the robot, so it does not wait for ever.
+_SCRIPT_WAITS_S = 20.0
+_SHOW_S = 0.1
+# A detector that blinks is not worth a word.
+_UNSEEN_S = 1.0
+
+
+def calibrate_face(
+    rig: RigArgument = "desk",
+    scene: Annotated[
+        str | None, typer.Option(help=f"Look at a simulated scene (with --mock: {STILL_SCENE}).")
+    ] = None,
+    video: Annotated[Path | None, typer.Option(help="Look at a photo or film, looped.")] = None,
+    camera: Annotated[int | None, typer.Option(min=0, help="Look through webcam N.")] = None,
+    oak: Annotated[bool, typer.Option("--oak", help="Look through an OAK-D camera.")] = False,
+    out: OutOption = None,
+    yes: AllYesOption = False,
+    answers: Annotated[
+        Path | None, typer.Option(help="File with one key a line, e.g. left 3; empty is Enter.")
+    ] = None,
+    page: Annotated[
+        str,
+        typer.Option(
+            metavar="HOST:PORT",
+            help="Where a page with the same keys is served. Other machines reach it at "
+            "0.0.0.0:8080. It opens with the token in the address that is printed at start.",
+        ),
+    ] = "127.0.0.1:8080",
+    no_page: Annotated[
+        bool, typer.Option("--no-page", help="Without the page; with --answers there is none.")
+    ] = False,
+    mock: MockOption = False,
+    port: PortOption = None,
+) -> None:
+    """Steer the gaze over your face to each of its parts, and write down where they are."""
+    with clear_errors(rig, port, mock), signals() as stopped:
+        loaded = load_rig(rig)
+        refuse_unwritable(rig, out)
+        lines = Lines(answers)
+        nothing = scene is None and video is None and camera is None and not oak
+        options = RunOptions(
+            rig=rig,
+            mock=mock,
+            # No user watches a script on an emulated rig: simulated time will do.
+            fast=mock and answers is not None and camera is None and not oak,
+            seconds=0.0,  # that much a film in simulated time asks for; keys end it
+            scene=STILL_SCENE if mock and nothing else scene,
+            video=video,
+            camera=camera,
+            oak=oak,
+            port=port,
+            page=page,
+            no_page=no_page or answers is not None,
+        ).checked()
+        try:
+            found = _steered(options, loaded, lines, answers is not None, stopped)
+            values = changes(found)
+            if not values:
+                say("no part was chosen: nothing to write")
+                return
+            Console().print(_table(rig, loaded, found))
+            write_found(rig, values, out, TerminalPerson(lines, stopped, yes))
+        except CalibrationStopped as why:
+            say(f"stopped by {why}: nothing written")
+            raise typer.Exit(FAULT) from None
+
+
+def _steered(
+    options: RunOptions,
+    rig: Rig,
+    lines: Lines,
+    scripted: bool,
+    stopped: Callable[[], str | None],
+) -> FaceCalibration:
+    """Let the user steer the gaze from part to part; the rig ends parked, torque off.
+
+    Raises:
+        CalibrationStopped: a signal or a fault ended it.
+        DriverError: port, servos or camera are not as configured.
+    """
+    idle = rig.gaze.idle
+    rest_m = (idle.rest_distance_m, 0.0, idle.rest_height_m)
+    begin = begun(rig.face_parts_mm)
+    steering = FaceSteering(begin, TopDown(rig.gaze.top_down), rest_m, "eyes_pan" not in rig.joints)
+    made = assemble(rig, options, Substitutes(chooser=lambda own: steering))
+    # What comes through a pipe is a script, too: no user is there to give up.
+    scripted = scripted or not sys.stdin.isatty()
+    keys = PageKeys(LineKeys(lines) if scripted else TerminalKeys())
+    steer = SteeringButtons(BUTTONS, keys.press, lambda: shown(steering))
+    observers = RunObservers(made, options, say, steer=steer)
+    door = StopOnlyServer(
+        made.robot.command,
+        made.clock,
+        {"rig": rig.name, "pid": os.getpid(), "does": "calibrate"},
+        say,
+    )
+    sitting = _Sitting(steering, keys, made.clock.now_s, stopped, scripted, observers, door)
+    say("the head turns to you now, as it always does: keep your fingers out of it;")
+    say(f"{HELP}; Ctrl-C writes nothing")
+    try:
+        count = _run(made, sitting, keys, observers, door, Interrupts.of(stopped))
+    finally:
+        made.close()
+    if stopped() is not None or count.stopped_by.startswith("fault"):
+        raise CalibrationStopped(count.stopped_by)
+    return steering.state
+
+
+def _run(
+    made: Assembly,
+    sitting: "_Sitting",
+    keys: Keys,
+    observers: RunObservers,
+    door: StopOnlyServer,
+    interrupts: Interrupts,
+) -> LoopCount:
+    """Run the robot until the sitting is over."""
+    count = LoopCount(0, 0, "fault: unexpected error")
+    with contextlib.ExitStack() as closed_last, way_out(made, say, interrupts) as leaving:
+        leaving.switch_on(lambda: made.robot.start(made.clock, interrupts.refuse))
+        for note in (*made.notes, *drawn_together(made.robot.body.bus.events())):
+            say(note)
+        closed_last.callback(lambda: observers.close(count))
+        observers.open()
+        closed_last.callback(door.close)
+        door.open()
+        with keys:
+            count = run_loop(made.robot, made.clock, made.loop, sitting.over, sitting.update)
+        leaving.cause = count.stopped_by
+        observers.tell("over: the head parks; whether to write it is asked at the terminal")
+    return count
+
+
+class _Sitting:
+    """Keys in, words out on the terminal and the page, between the ticks."""
+
+    def __init__(
+        self,
+        steering: FaceSteering,
+        keys: Keys,
+        now_s: Callable[[], float],
+        stopped: Callable[[], str | None],
+        scripted: bool,
+        observers: RunObservers,
+        door: StopOnlyServer,
+    ) -> None:
+        self._steering, self._keys, self._now_s = steering, keys, now_s
+        self._stopped, self._scripted = stopped, scripted
+        self._observers, self._door = observers, door
+        self._live_line = not scripted and sys.stderr.isatty()
+        self._said: tuple[str | None, bool] | None = None
+        self._ready_s = self._shown_s = self._seen_s = now_s()
+
+    def over(self, _: float) -> str | None:
+        """Handle a key; return why the procedure ended, None while it goes on."""
+        steering, now_s = self._steering, self._now_s()
+        if (why := self._stopped()) is not None:
+            return why
+        if steering.state.part is None:
+            return "you" if steering.state.at < len(PART_NAMES_TEXT) else "the last part"
+        self._refuse_hopeless(now_s)
+        key = self._keys.next(steering.aimed)
+        if key is not None:
+            self._tell(steering.press(key, now_s))
+        return None
+
+    def update(self, tick: Tick) -> None:
+        """See what the tick did, and say what a person should know."""
+        self._observers.update(tick)
+        self._door.update(tick)
+        self._tell(self._steering.update(tick))
+        for event in drawn_together(tick.events):
+            say(event)
+        self._say_what_is_due(tick.t_s)
+        if self._live_line and tick.t_s - self._shown_s >= _SHOW_S:
+            self._shown_s = tick.t_s
+            status(shown(self._steering))
+
+    def _say_what_is_due(self, t_s: float) -> None:
+        """Name the part once, and say when no face has been seen for a while."""
+        part, seen = self._steering.state.part, self._steering.face is not None
+        if seen:
+            self._seen_s = t_s
+        if part is None or self._said == (part, seen):
+            return
+        if seen:
+            self._tell(f"{PART_NAMES_TEXT[part]}: steer until the gaze meets it, then Enter")
+        elif t_s - self._seen_s < _UNSEEN_S:
+            return
+        else:
+            self._tell("no face is seen: sit before the camera, 0.5 to 1.5 m away, and look at it")
+        self._said = part, seen
+
+    def _refuse_hopeless(self, now_s: float) -> None:
+        """End a script that nothing can happen to any more."""
+        if self._steering.aimed:
+            self._ready_s = now_s
+        if self._scripted and now_s - self._ready_s > _SCRIPT_WAITS_S:
+            what = "no face is seen" if self._steering.face is None else "the eyes cannot reach it"
+            raise SetupError(f"{what} for {_SCRIPT_WAITS_S:g} s: keys from a file or pipe end here")
+
+    def _tell(self, what: str | None) -> None:
+        if what is not None:
+            say(what)
+            self._observers.tell(what)
+
+
+def shown(steering: FaceSteering) -> str:
+    """Return the line that shows where a person is: part, how far moved, step."""
+    state = steering.state
+    if state.part is None or steering.face is None:
+        return "no face is seen"
+    left, up = state.moved_mm(state.part)
+    across = f"{abs(left):g} mm {'left' if left > 0.0 else 'right'}" if left else "0 mm across"
+    upright = f"{abs(up):g} mm {'up' if up > 0.0 else 'down'}" if up else "0 mm up"
+    return (
+        f"{state.at + 1}/{len(PART_NAMES_TEXT)} {PART_NAMES_TEXT[state.part]}: {across}, {upright}; "
+        f"step {state.step_mm:g} mm"
+    )
+
+
+def _table(rig: str, loaded: Rig, found: FaceCalibration) -> Table:
+    table = Table(caption=f"places in mm out of the face, to its owner's left, up; against {rig}")
+    for name in ("part", "old", "new"):
+        table.add_column(name, justify="left" if name == "part" else "right", no_wrap=True)
+    for key, new in changes(found).items():
+        part = key.rpartition(".")[2]
+        old = loaded.face_parts_mm.get(part)
+        table.add_row(part, _numbers(old) if old is not None else "an adult's", _numbers(new))
+    return table
+
+
+def _numbers(place_mm: Vec3) -> str:
+    return " ".join(f"{v:g}" for v in place_mm)

@@ -1,0 +1,40 @@
+"""The commands under calibrate: joints, camera, board and face; joints where none is named."""
+
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+from gazerig.features.bringup.cli.calibrate.camera import calibrate_board, calibrate_camera
+from gazerig.features.bringup.cli.calibrate.face import calibrate_face
+from gazerig.features.bringup.cli.calibrate.joints import calibrate_joints
+
+_HELP = ("--help", "-h")
+
+
+class JointsUnlessNamed(TyperGroup):
+    """Passes arguments that name none of its commands to the default command.
+
+    So ``gazerig calibrate my_rig.yaml`` stays what it was before there was anything else to
+    calibrate. A rig file that is called like a command is named ``./face``.
+    """
+
+    default = "joints"
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Insert the default command if the arguments name none."""
+        if not args or (args[0] not in self.commands and args[0] not in _HELP):
+            args = [self.default, *args]
+        return list(super().parse_args(ctx, args))
+
+
+app = typer.Typer(
+    name="calibrate",
+    cls=JointsUnlessNamed,
+    help="Find out and write into the rig's YAML: joints (the default), camera, face.",
+    subcommand_metavar="[joints|camera|board|face] [RIG] ...",
+)
+app.command("joints")(calibrate_joints)
+app.command("camera")(calibrate_camera)
+app.command("board")(calibrate_board)
+app.command("face")(calibrate_face)

@@ -1,0 +1,251 @@
+"""Calibrating the joints of one bus with a person at the terminal, by what their servos can do."""
+
+import contextlib
+from collections.abc import Callable, Iterator, Sequence
+from enum import StrEnum
+from typing import NamedTuple
+
+from gazerig.config.schema import Rig
+from gazerig.drivers.errors import ServoFault, ServoMissing, SetupError
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.serial.port_by_path import port_of
+from gazerig.features.bringup.calibration.endstop_search import StopSearchParams
+from gazerig.features.bringup.calibration.hobby_access import OneHobby
+from gazerig.features.bringup.calibration.joint_access import SingleJoint
+from gazerig.features.bringup.calibration.joint_calibration import (
+    Calibration,
+    CalibrationRefused,
+    LinkageFit,
+)
+from gazerig.features.bringup.calibration.joint_procedure import by_hand, by_motion
+from gazerig.features.bringup.calibration.linkage_procedure import (
+    HandPlacer,
+    HobbyPlacer,
+    by_places,
+)
+from gazerig.features.bringup.calibration.smart_servo_access import SingleServo
+from gazerig.features.bringup.cli.jog_prompt import SteeringPerson
+from gazerig.features.bringup.cli.ports import RigPorts, opened
+from gazerig.features.bringup.servo_families import KINDS, kind_of
+from gazerig.robot.app.bus_wiring import bus_names, joints_on, release_plan
+from gazerig.robot.cli.terminal import say
+from gazerig.robot.control.interrupts import Interrupts
+from gazerig.robot.control.power_down import PowerDown
+from gazerig.robot.guardian.guardian import Guardian
+from gazerig.robot.model.clock import RealClock
+
+Made = Calibration | LinkageFit
+
+
+class By(StrEnum):
+    """Who turns the joint."""
+
+    hand = "hand"
+    motion = "motion"
+
+
+class ZeroBy(StrEnum):
+    """Who says where straight ahead is, after the stops were found by motion."""
+
+    middle = "middle"
+    person = "person"
+
+
+class CalibrationOptions(NamedTuple):
+    """How to calibrate, as asked on the command line.
+
+    pulses_us: hobby servos are never sent outside
+    more: places of a linkage between each two that are marked
+    """
+
+    by: By
+    margin_deg: float
+    zero: ZeroBy
+    search: StopSearchParams
+    clear_offset: bool
+    set_middle: bool
+    pulses_us: tuple[float, float]
+    more: int
+
+
+class JointResults(NamedTuple):
+    """What came of it: by joint, and which joints were refused."""
+
+    found: dict[str, Made]
+    refused: tuple[str, ...]
+
+
+class CalibrationJob(NamedTuple):
+    """What calibrating needs beside the joints."""
+
+    rig: Rig
+    wire: RigPorts
+    how: CalibrationOptions
+    person: SteeringPerson
+    stopped: Callable[[], str | None]
+
+
+def measure(bench: CalibrationJob, names: Sequence[str]) -> JointResults:
+    """Calibrate one joint after the other, bus by bus.
+
+    Raises:
+        SetupError: a port cannot be opened, or there are no answers left.
+        CalibrationStopped: the user or the system asked to end.
+    """
+    found: dict[str, Made] = {}
+    refused: list[str] = []
+    for bus in bus_names(bench.rig):
+        for name in (name for name in joints_on(bench.rig, bus) if name in names):
+            try:
+                found[name] = _one(bench, name, bus)
+            except (CalibrationRefused, ServoMissing, ServoFault) as error:
+                refused.append(name)
+                say(f"refused: {error}")
+    # In the order of the rig, whatever the buses are called.
+    return JointResults({name: found[name] for name in names if name in found}, tuple(refused))
+
+
+def refuse_impossible(rig: Rig, names: Sequence[str], how: CalibrationOptions) -> None:
+    """Refuse what the servos of these joints cannot do.
+
+    Raises:
+        SetupError: says which, and what can be done.
+    """
+    without_feedback = [name for name in names if not rig.joints[name].facts.measured]
+    if how.by is By.motion and len(without_feedback) == len(names):
+        raise SetupError(
+            f"--by motion: hobby servos do not tell where they are ({', '.join(without_feedback)}), so no "
+            "stop can be found: leave --by away and steer them yourself"
+        )
+    able = [kind for kind in KINDS.values() if kind.set_middle is not None]
+    other = [
+        name
+        for name in names
+        if not rig.joints[name].facts.measured or kind_of(rig.joints[name].model).set_middle is None
+    ]
+    if how.set_middle and other:
+        titles = " and ".join(kind.title for kind in able)
+        raise SetupError(
+            f"--set-middle: only {titles} servos can be told so, not that of {', '.join(other)}: "
+            "choose joints with --joint"
+        )
+    if how.clear_offset and len(without_feedback) == len(names):
+        raise SetupError("--clear-offset: hobby servos have no offset: leave it away")
+    low, high = how.pulses_us
+    least, most = 500.0, 2500.0
+    if not least <= low < high <= most:
+        raise SetupError(f"--pulses {low:g}:{high:g}: must ascend within {least:g}:{most:g} us")
+
+
+def _one(bench: CalibrationJob, name: str, bus: str) -> Made:
+    if not bench.rig.joints[name].facts.measured:
+        return _hobby(bench, name, bus)
+    guardian = _guardian(bench, name, bus)
+    with opened(bench.rig, bench.wire, bus, guardian) as port:
+        joint = bench.rig.joints[name]
+        servo = SingleServo(name, joint.id, joint.model, port, guardian)
+        single = SingleJoint(name, joint, servo, RealClock(), bench.stopped)
+        bench.person.hand = _hand(bench.wire, bus, joint.id)
+        with _off_after(single.who, servo.disable_torque, bench.stopped):
+            return _smart(bench, single)
+
+
+def _guardian(bench: CalibrationJob, name: str, bus: str) -> Guardian:
+    """Return what switches one joint's servo off if this program dies or hangs."""
+    plan = release_plan(bench.rig, bus, bench.wire.paths[bus])
+    return Guardian((plan._replace(ids=(bench.rig.joints[name].id,)),))
+
+
+def _smart(bench: CalibrationJob, single: SingleJoint) -> Made:
+    how, person = bench.how, bench.person
+    if how.clear_offset:
+        was = single.servo.clear_offset()
+        if was:
+            say(f"{single.who}: its offset {was} -> 0; {_VOID}")
+    single.servo.check()
+    if how.set_middle:
+        _set_middle(single, person)
+    if single.joint.transmission_points:
+        if how.by is By.motion:
+            raise CalibrationRefused(
+                f"{single.name}: its push rod has measured places (transmission_points), which motion cannot "
+                "find: --by hand"
+            )
+        return by_places(HandPlacer(single, person), person, how.margin_deg, how.more)
+    if how.by is By.hand:
+        return by_hand(single, person, how.margin_deg)
+    _warn_of_neck(single.name, person)
+    return by_motion(single, person, how.margin_deg, how.search, how.zero.value)
+
+
+_VOID = "until this calibration is written the rig file's zero is wrong by that"
+
+
+def _set_middle(single: SingleJoint, person: SteeringPerson) -> None:
+    single.servo.disable_torque()
+    person.wait(
+        f"turn {single.name} to the middle of its travel, then press Enter",
+        lambda: f"{single.name}: step {single.position()[0]}",
+    )
+    say(f"{single.who}: its place is 2048 now (offset {single.servo.set_middle()}); {_VOID}")
+
+
+def _hobby(bench: CalibrationJob, name: str, bus: str) -> Made:
+    config = bench.rig.bus_named(bus)
+    guardian = _guardian(bench, name, bus)
+    port = port_of(bench.wire.paths[bus], on_traffic=guardian.beat)
+    joint, how, person = bench.rig.joints[name], bench.how, bench.person
+    boards: dict[str, MaestroParams | Pca9685Params]
+    boards = {"maestro": config.maestro, "pca9685": config.pca9685}
+    hobby = OneHobby(
+        name, joint, port, boards[config.kind], RealClock(), bench.stopped, how.pulses_us, guardian
+    )
+    person.hand = None
+    with _off_after(hobby.who, hobby.disable, bench.stopped):
+        return by_places(HobbyPlacer(hobby, person), person, how.margin_deg, how.more)
+
+
+def _hand(wire: RigPorts, bus: str, servo_id: int) -> Callable[[int], None] | None:
+    """Return what turns an emulated servo by some steps; None on real wires."""
+    if wire.buses is None:
+        return None
+
+    def turn(steps: int) -> None:
+        wire.command(f"turn {servo_id} {steps}", bus)
+
+    return turn
+
+
+@contextlib.contextmanager
+def _off_after(
+    who: str, torque_off: Callable[[], None], stopped: Callable[[], str | None]
+) -> Iterator[None]:
+    """Switch the torque off however the block ends; nothing is printed if that works."""
+
+    def report_line(line: str) -> None:
+        say(f"{who}: {line}")
+
+    with PowerDown(
+        None,
+        torque_off,
+        report_line,
+        Interrupts.of(stopped),
+        left=": cut the servo power",
+        quiet=True,
+    ) as way_out:
+        way_out.switch_on(lambda: None)  # what follows does it, at a time of its own
+        yield
+
+
+def _warn_of_neck(name: str, person: SteeringPerson) -> None:
+    """Ask for confirmation before something as heavy as a head moves by itself.
+
+    Raises:
+        CalibrationRefused: the answer was no.
+    """
+    if "neck" not in name.split("_"):
+        return
+    asked = f"{name} will move by itself, and sink when the torque goes off: hold the head. Go on?"
+    if not person.agrees(asked):
+        raise CalibrationRefused(f"{name}: left out as you asked")

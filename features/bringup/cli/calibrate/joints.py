@@ -1,0 +1,177 @@
+"""The command calibrate joints: zero, sign and range of each joint, found and written down."""
+
+from collections.abc import Mapping
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from gazerig.config.save import propose, rig_file
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.errors import SetupError
+from gazerig.features.bringup.calibration.endstop_search import StopSearchParams
+from gazerig.features.bringup.calibration.joint_access import CalibrationStopped
+from gazerig.features.bringup.calibration.joint_calibration import Value, changes
+from gazerig.features.bringup.cli.calibrate import options as options
+from gazerig.features.bringup.cli.calibrate.joint import (
+    By,
+    CalibrationJob,
+    CalibrationOptions,
+    Made,
+    ZeroBy,
+    measure,
+    refuse_impossible,
+)
+from gazerig.features.bringup.cli.jog_prompt import SteeringPerson
+from gazerig.features.bringup.cli.ports import MockOption, PortOption, refuse_packages, rig_ports
+from gazerig.features.bringup.cli.prompts import Lines
+from gazerig.features.bringup.cli.rig_writer import refuse_unwritable, write_found
+from gazerig.features.bringup.cli.write_options import AllYesOption, DryRunOption, OutOption
+from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals
+from gazerig.robot.model.coupling_params import pairs_of, partners
+
+
+def calibrate_joints(
+    rig: RigArgument = "desk",
+    joint: options.Joint = None,
+    by: options.TurnedBy = By.hand,
+    margin: options.Margin = 2.0,
+    zero: options.Zero = ZeroBy.middle,
+    strength: options.Strength = 0.3,
+    clear_offset: options.ClearOffset = False,
+    set_middle: options.SetMiddle = False,
+    pulses: options.Pulses = "500:2500",
+    more: options.More = 1,
+    out: OutOption = None,
+    dry_run: DryRunOption = False,
+    yes: AllYesOption = False,
+    answers: options.Answers = None,
+    mock: MockOption = False,
+    port: PortOption = None,
+) -> None:
+    """Find zero, sign and range of each joint and write them into the rig's YAML.
+
+    Hobby servos tell no place: you steer them by eye, and say the angles of some places.
+    """
+    with clear_errors(rig, port, mock), signals() as stopped:
+        loaded = load_rig(rig)
+        refuse_packages(loaded, "calibrate joints")
+        names = _names(loaded, joint)
+        search = StopSearchParams(strength=strength)
+        span_us = _span(pulses)
+        how = CalibrationOptions(by, margin, zero, search, clear_offset, set_middle, span_us, more)
+        if dry_run:
+            _refuse_writes(how)
+        else:
+            refuse_unwritable(rig, out)
+            if out is None:
+                _refuse_long_lists(rig, loaded, names)
+        refuse_impossible(loaded, names, how)
+        person = SteeringPerson(Lines(answers), stopped, yes)
+        try:
+            with rig_ports(loaded, mock, port) as wire:
+                found, refused = measure(CalibrationJob(loaded, wire, how, person, stopped), names)
+            if found:
+                wanted = _wanted(loaded, found)
+                Console().print(_table(rig, wanted))
+                if not dry_run:
+                    values = {key: new for key, (_, new) in wanted.items()}
+                    write_found(rig, values, out, person)
+        except CalibrationStopped as why:
+            say(f"stopped by {why}: nothing written")
+            raise typer.Exit(FAULT) from None
+    if refused:
+        say(f"not calibrated: {', '.join(refused)}")
+        raise typer.Exit(FAULT)
+
+
+_BY_LEVEL = (
+    "set zero_step of both by hand, to what gazerig monitor shows while their horns are at 0 deg "
+    "(of a differential: while the head is level)"
+)
+
+
+def _names(rig: Rig, asked: list[str] | None) -> tuple[str, ...]:
+    """Return the joints to calibrate, in the order of the rig."""
+    for name in asked or ():
+        if name not in rig.joints:
+            raise SetupError(f"--joint {name}: no such joint; there is {', '.join(rig.names)}")
+    coupled = partners(pairs_of(rig.couplings))
+    for name in rig.names:
+        if name in coupled and (not asked or name in asked):
+            text = f"{name} is moved together with {coupled[name]} by two servos: {_BY_LEVEL}"
+            if asked:
+                raise SetupError(text)
+            say(f"left out: {text}")
+    return tuple(name for name in rig.names if name not in coupled and (not asked or name in asked))
+
+
+def _refuse_writes(how: CalibrationOptions) -> None:
+    """Refuse what would write into servos, where nothing is to be written.
+
+    Raises:
+        SetupError: names the option.
+    """
+    if how.clear_offset or how.set_middle:
+        option = "--clear-offset" if how.clear_offset else "--set-middle"
+        raise SetupError(f"--dry-run and {option} exclude each other: that is a write")
+
+
+def _refuse_long_lists(rig: str, loaded: Rig, names: tuple[str, ...]) -> None:
+    """Find out before anything moves that places could not be written where they stand.
+
+    Raises:
+        gazerig.config.load.ConfigError: a linkage is spread over several lines, which are kept.
+    """
+    joints = [
+        n
+        for n in names
+        if loaded.joints[n].transmission_points or not loaded.joints[n].facts.measured
+    ]
+    propose(rig_file(rig), {f"joints.{name}.transmission_points": ((0, 0),) for name in joints})
+
+
+def _span(pulses: str) -> tuple[float, float]:
+    """Read --pulses.
+
+    Raises:
+        SetupError: these are no two numbers.
+    """
+    low, _, high = pulses.partition(":")
+    try:
+        return float(low), float(high)
+    except ValueError:
+        raise SetupError(f"--pulses {pulses}: two pulse widths in us, e.g. 900:2100") from None
+
+
+def _wanted(rig: Rig, found: Mapping[str, Made]) -> dict[str, tuple[object, Value]]:
+    """Return key -> old and new value for all joints found."""
+    wanted: dict[str, tuple[object, Value]] = {}
+    for name, made in found.items():
+        for key, value in changes(name, rig.joints[name], made, rig.park_deg).items():
+            wanted[key] = (_old(rig, key), value)
+    return wanted
+
+
+def _old(rig: Rig, key: str) -> object:
+    """Follow a dotted key through mappings and attributes."""
+    value: object = rig
+    for step in key.split("."):
+        value = value[step] if isinstance(value, Mapping) else getattr(value, step)
+    return value
+
+
+def _table(rig: str, wanted: Mapping[str, tuple[object, Value]]) -> Table:
+    table = Table(caption=f"what was found, against {rig}")
+    for name in ("key", "old", "new"):
+        table.add_column(name, justify="left" if name == "key" else "right", no_wrap=True)
+    for key, (old, new) in wanted.items():
+        table.add_row(key, _text(old), _text(new), style="bold" if key.endswith("sign") else None)
+    return table
+
+
+def _text(value: object) -> str:
+    """Write a value; the places of a linkage one below the other."""
+    if not isinstance(value, tuple):
+        return f"{value}"
+    return "\n".join(f"{angle:g} deg: {at:g}" for angle, at in value)

@@ -1,0 +1,161 @@
+"""Keys of a terminal, words of a script or buttons of the page, which steer a calibration."""
+
+from queue import Empty, Full, Queue
+from typing import Protocol, Self, cast, get_args
+
+from gazerig.drivers.errors import SetupError
+from gazerig.features.bringup.calibration.face_calibration import Key
+from gazerig.features.bringup.cli.prompts import Lines
+from gazerig.robot.cli.key_input import TerminalInput, split_keys
+
+HELP = (
+    "arrow keys or w a s d move the gaze as you see it; + and - the step; Enter: it looks at it; "
+    "n: next, leave this part; b: back; q: end"
+)
+
+BUTTONS: tuple[Key, ...] = get_args(Key)
+"""What stands on the page's buttons."""
+_MOST_WAITING = 50
+
+_PLAIN: dict[str, Key] = {
+    "w": "up", "a": "left", "s": "down", "d": "right",
+    "+": "larger", "=": "larger", "-": "smaller", "_": "smaller",
+    "\r": "enter", "\n": "enter", "n": "skip", "b": "back", "q": "end",
+}  # fmt: skip
+_WORDS: dict[str, Key] = {
+    "": "enter", "enter": "enter", "left": "left", "right": "right", "up": "up", "down": "down",
+    "+": "larger", "-": "smaller", "skip": "skip", "n": "skip", "back": "back", "b": "back",
+    "end": "end", "q": "end",
+}  # fmt: skip
+
+
+def keys_of(text: str) -> tuple[list[Key], str]:
+    """Return the keys in what a terminal has sent, and the rest that a sequence begins with."""
+    typed, rest = split_keys(text)
+    named = ((one if len(one) > 1 else _PLAIN.get(one.lower())) for one in typed)
+    return [cast(Key, key) for key in named if key is not None], rest
+
+
+def key_and_count(line: str) -> tuple[Key, int]:
+    """Read "left 3", "enter" or an empty line, which is Enter.
+
+    Raises:
+        SetupError: it is no key; with what there is.
+    """
+    word, _, number = line.strip().lower().partition(" ")
+    number = number.strip() or "1"
+    if word not in _WORDS or not number.isdecimal() or not 0 < int(number) <= 1000:
+        raise SetupError(
+            f"{line!r} is no key: left, right, up, down, +, - with a number of times (left 3), "
+            "enter or an empty line, skip, back, end"
+        )
+    return _WORDS[word], int(number)
+
+
+class Keys(Protocol):
+    """Where keys come from, one by one, for as long as the block lasts."""
+
+    def __enter__(self) -> Self:
+        """Begin."""
+        ...
+
+    def __exit__(self, *raised: object) -> None:
+        """End."""
+        ...
+
+    def next(self, ready: bool) -> Key | None:
+        """Return the next key, None where there is none; ``ready``: the last one has been done."""
+        ...
+
+
+class TerminalKeys(TerminalInput):
+    """Keys of standard input one by one."""
+
+    def __init__(self) -> None:
+        self._ready: list[Key] = []
+        self._rest = ""
+
+    def next(self, ready: bool) -> Key | None:
+        """Return the next key, None where none has been pressed; ``ready`` does not matter."""
+        if not self._ready:
+            text = self.text()
+            if text is None:
+                return "end"
+            self._ready, self._rest = keys_of(self._rest + text)
+        return self._ready.pop(0) if self._ready else None
+
+
+class LineKeys:
+    """Keys from lines of a file or a pipe, each when the eyes have done what went before."""
+
+    def __init__(self, lines: Lines) -> None:
+        self._lines = lines
+        self._ready: list[Key] = []
+
+    def __enter__(self) -> Self:
+        """Need nothing."""
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        """Leave nothing behind."""
+
+    def next(self, ready: bool) -> Key | None:
+        """Return the next key where the eyes are ready for it.
+
+        Raises:
+            SetupError: a line is no key, or there are no more.
+        """
+        if self._ready:
+            return self._ready.pop(0)
+        if not ready:
+            return None
+        try:
+            line = self._lines.next(0.0)
+        except EOFError:
+            raise SetupError(
+                "no key left: after the last part comes its Enter (an empty line) or end"
+            ) from None
+        if line is None:
+            return None
+        key, times = key_and_count(line)
+        self._ready = [key] * times
+        return self._ready.pop(0)
+
+
+class PageKeys:
+    """Keys pressed as buttons of the page, side by side with those of another source."""
+
+    def __init__(self, others: Keys) -> None:
+        self._others = others
+        self._pressed: Queue[Key] = Queue(_MOST_WAITING)
+
+    def __enter__(self) -> Self:
+        """Begin with the other source."""
+        self._others.__enter__()
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        """End with the other source."""
+        self._others.__exit__(*raised)
+
+    def press(self, word: str) -> str | None:
+        """Handle a button, for any thread; return the reason if it is refused.
+
+        Raises:
+            ValueError: there is no such button.
+        """
+        found = next((key for key in BUTTONS if key == word), None)
+        if found is None:
+            raise ValueError(f"{word!r} is no key: {', '.join(BUTTONS)}")
+        try:
+            self._pressed.put_nowait(found)
+        except Full:
+            return "refused: too many keys at once; the gaze still has to follow those before"
+        return None
+
+    def next(self, ready: bool) -> Key | None:
+        """Return the next key of either, those of the page first."""
+        try:
+            return self._pressed.get_nowait()
+        except Empty:
+            return self._others.next(ready)

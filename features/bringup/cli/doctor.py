@@ -1,0 +1,187 @@
+"""The command ``gazerig doctor``: every bus of a rig examined, and what is safe mended."""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated
+
+import typer
+
+from gazerig.config.rig import BusConfig
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.types import ServoConfig
+from gazerig.drivers.vision.detector_status import detector_status
+from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.features.bringup.cli import progress as bench
+from gazerig.features.bringup.cli.ports import (
+    MockOption,
+    PortOption,
+    bus_label,
+    refuse_packages,
+    rig_ports,
+    setups_on,
+)
+from gazerig.features.bringup.cli.progress import JsonOption, console, progress, wipe
+from gazerig.features.bringup.doctor import camera as checkup_camera
+from gazerig.features.bringup.doctor import maestro as doctor_maestro
+from gazerig.features.bringup.doctor import pca9685 as doctor_pca9685
+from gazerig.features.bringup.doctor import run as checkup
+from gazerig.features.bringup.doctor.checks import apply_fix
+from gazerig.features.bringup.doctor.diagnostics import BOARD, Diagnostic, Fix, worst
+from gazerig.features.bringup.doctor.run import AppliedFix
+from gazerig.features.bringup.doctor.text import as_plain, grouped, summed_up
+from gazerig.features.bringup.servo_families import kind_of
+from gazerig.robot.app.bus_wiring import can_be_released, release_plan
+from gazerig.robot.cli.suggestions import completed
+from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors
+from gazerig.robot.model.clock import RealClock
+
+app = typer.Typer()
+
+STYLES = {"ok": "green", "note": "cyan", "warn": "yellow", "error": "bold red"}
+
+Tell = Callable[[str], None]
+
+
+@app.command()
+def doctor(
+    rig: RigArgument = "desk",
+    port: PortOption = None,
+    mock: MockOption = False,
+    camera: Annotated[
+        int | None,
+        typer.Option(min=0, metavar="N", help="Look through webcam N for some seconds, too."),
+    ] = None,
+    fix: Annotated[
+        bool, typer.Option("--fix", help="Mend what is safe; torque stays off, nothing moves.")
+    ] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Examine every port and servo against the rig's YAML; every finding has its cure."""
+    with clear_errors(rig, port, mock):
+        model = load_rig(rig)
+        refuse_packages(model, "doctor")
+        tell: Tell = (lambda _: None) if as_json else _tell
+        with rig_ports(model, mock, port) as wired:
+            lines = wired.opened_by()
+            findings = _examined(model, lines, tell)
+            if fix:
+                _fix(model, lines, findings, tell)
+                tell("after that:")
+                findings = _examined(model, lines, tell)
+        detector = examine_detector(model.detector)
+        eyes = [detector] if camera is None else [detector, *_examine_webcam(model, camera)]
+        show_findings(eyes, tell)
+        if as_json:
+            rows = [as_plain(one, bus) for bus, some in findings.items() for one in some]
+            rows += [as_plain(one, "") for one in eyes]
+            rows = [row | {"cure": completed(str(row["cure"]))} for row in rows]
+            print(json.dumps(rows))
+        whole = [*(one for some in findings.values() for one in some), *eyes]
+        tell(summed_up(whole, rig, fix))
+    if worst(whole) == "error":
+        raise typer.Exit(FAULT)
+
+
+def examine_detector(params: FaceDetectorParams) -> Diagnostic:
+    """Return what finds faces and people, and what brings what is missing."""
+    text, cure = detector_status(params)
+    return Diagnostic("note" if cure else "ok", text, "detector", cure)
+
+
+def _examine_webcam(rig: Rig, number: int) -> list[Diagnostic]:
+    """Look through a webcam, and return what it does not take and how it sees."""
+    from gazerig.drivers.camera.webcam import Webcam
+
+    progress(f"looking through webcam {number} for {checkup_camera.LOOK_S:g} s")
+    source = Webcam(number, rig.webcam)
+    return checkup_camera.examine_camera(source, rig.camera, rig.detector, RealClock().now_s)
+
+
+def _examined(rig: Rig, lines: Mapping[str, BusPort], tell: Tell) -> dict[str, list[Diagnostic]]:
+    """Examine every bus, and tell what was found; return the findings by bus."""
+    findings = {}
+    for bus, line in lines.items():
+        findings[bus] = _examine(rig, bus, line)
+        if can_be_released(rig, bus):
+            findings[bus].append(checkup.examine_guardian(release_plan(rig, bus, line.port_name)))
+        wipe()
+        if len(lines) > 1:
+            tell(f"{bus_label(rig, bus)} ({rig.bus_named(bus).kind}, {line.port_name}):")
+        show_findings(findings[bus], tell)
+    return findings
+
+
+def _examine(rig: Rig, bus: str, line: BusPort) -> list[Diagnostic]:
+    """Examine one bus."""
+    config, setups = rig.bus_named(bus), setups_on(rig, bus)
+
+    def behind() -> list[Diagnostic]:
+        board = BOARDS.get(config.kind)
+        if board is not None:
+            return board(line, config, setups)
+        return checkup.check(line, kind_of(setups[0].model), setups, config.baud, progress)
+
+    return checkup.check_all(line, bench.host, behind)
+
+
+def _maestro(line: BusPort, config: BusConfig, setups: Sequence[ServoConfig]) -> list[Diagnostic]:
+    usb = bench.usb_id(line.port_name)
+    return doctor_maestro.visit(line, config.maestro, setups, usb)
+
+
+BOARDS: Mapping[str, Callable[[BusPort, BusConfig, Sequence[ServoConfig]], list[Diagnostic]]] = {
+    "maestro": _maestro,
+    "pca9685": lambda line, config, setups: doctor_pca9685.visit(line, config.pca9685, setups),
+}
+"""What examines boards, by the kind of bus."""
+
+
+def _tell(line: str) -> None:
+    """Print a line of the doctor's; all of it goes the same way, so that its order stays."""
+    level, space, rest = completed(line).partition(" ")
+    out = console()
+    if level in STYLES:
+        out.print(f"[{STYLES[level]}]{level:5}[/]", end=space)
+        out.print(rest, markup=False)
+    else:
+        out.print(completed(line), markup=False)
+
+
+def _fix(
+    rig: Rig,
+    lines: Mapping[str, BusPort],
+    findings: Mapping[str, Sequence[Diagnostic]],
+    tell: Tell,
+) -> None:
+    """Mend what can be, and say each thing."""
+    done: list[AppliedFix] = []
+    for bus, line in lines.items():
+        done += checkup.fix_latency(line.port_name, bench.host)
+        if any(finding.fixes for finding in findings[bus]):
+            done += _apply(rig, bus, line, findings[bus])
+            line.closePort()
+    for one in done:
+        tell(str(one))
+    if not done:
+        tell("nothing that --fix may mend")
+
+
+def _apply(rig: Rig, bus: str, line: BusPort, findings: Sequence[Diagnostic]) -> list[AppliedFix]:
+    config = rig.bus_named(bus)
+    line.setBaudRate(config.baud)
+
+    def write(one: Fix) -> str:
+        if one.servo_id == BOARD:
+            return doctor_maestro.apply_fix(line, config.maestro, one)
+        return apply_fix(line, kind_of(setups_on(rig, bus)[0].model), one)
+
+    return list(checkup.apply_fixes(write, findings))
+
+
+def show_findings(findings: Sequence[Diagnostic], tell: Tell) -> None:
+    """Print findings, the worst first, the same one at several servos once."""
+    for level, where, what, cure in grouped(findings):
+        tell(f"{level} {where}: {what}")
+        if cure:
+            tell(f"      -> {cure}")

@@ -1,0 +1,113 @@
+"""A person at the terminal who moves a servo by small steps, and says numbers."""
+
+import select
+import sys
+from collections.abc import Callable
+from math import isfinite
+
+from gazerig.drivers.errors import SetupError
+from gazerig.features.bringup.calibration.joint_access import CalibrationStopped
+from gazerig.features.bringup.calibration.linkage_procedure import Steered
+from gazerig.features.bringup.cli.calibration_keys import TerminalKeys
+from gazerig.features.bringup.cli.prompts import LOOK_S, TerminalPerson
+from gazerig.robot.cli.terminal import say, status
+
+STEPS_US = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0)
+FIRST_STEP = 3
+
+KEYS_HELP = (
+    "arrow keys left and right (or a d) move it, up and down change the step, Enter: it is there, "
+    "q ends"
+)
+LINES_HELP = "+20 or -20 moves it by so many us, 1480 to that width, Enter: it is there, q ends"
+
+
+class SteeringPerson(TerminalPerson):
+    """Asks on the terminal; implements Steerer.
+
+    Keys are taken as they are pressed where a terminal answers, lines from a file or a pipe.
+    """
+
+    def steer(self, question: str, servo: Steered) -> None:
+        """Return when the servo is where it is wanted; see Steerer."""
+        say(question)
+        if self._lines.scripted or not sys.stdin.isatty():
+            self._by_lines(question, servo)
+        else:
+            self._by_keys(servo)
+
+    def number(self, question: str, proposed: float, live: Callable[[], str]) -> float:
+        """Return the number they say, Enter is the proposed one; see Steerer."""
+        asked = f"{question} [{proposed:g}]"
+        say(asked)
+        while True:
+            line = self._line(asked, live)
+            try:
+                number = float(line) if line else proposed
+            except ValueError:
+                number = float("nan")
+            if isfinite(number):
+                return number
+            say(f"{line!r} is no number: a number, or Enter for {proposed:g}; q ends")
+
+    def _line(self, asked: str, live: Callable[[], str]) -> str:
+        """Wait for a line while something is looked after.
+
+        Raises:
+            CalibrationStopped: the user asked to end.
+            SetupError: there are no more lines.
+        """
+        while True:
+            self._look(live)
+            try:
+                line = self._lines.next(LOOK_S)
+            except EOFError:
+                raise SetupError(
+                    f"no answer left to: {asked}: answer on the terminal, or give a file with "
+                    "one line an answer (--answers; an empty line is Enter)"
+                ) from None
+            if line in ("q", "quit"):
+                raise CalibrationStopped("q")
+            if line is not None:
+                return line
+
+    def _look(self, live: Callable[[], str], more: str = "") -> None:
+        why = self._stopped()
+        if why is not None:
+            raise CalibrationStopped(why)
+        shown = live()
+        if self._live_line:
+            status(f"{shown}{more}")
+
+    def _by_lines(self, question: str, servo: Steered) -> None:
+        while line := self._line(question, servo.live):
+            try:
+                us = float(line)
+            except ValueError:
+                us = float("nan")
+            if not isfinite(us):
+                say(f"{line!r}: {LINES_HELP}")
+            elif line[0] in "+-":
+                servo.by(us)
+            else:
+                servo.to(us)
+
+    def _by_keys(self, servo: Steered) -> None:
+        step = FIRST_STEP
+        say(KEYS_HELP)
+        with TerminalKeys() as keys:
+            while True:
+                self._look(servo.live, f"; step {STEPS_US[step]:g} us: {KEYS_HELP}")
+                key = keys.next(True)
+                if key is None:
+                    select.select([sys.stdin.fileno()], [], [], LOOK_S)
+                elif key == "enter":
+                    return
+                elif key == "end":
+                    raise CalibrationStopped("q")
+                elif key in ("left", "right"):
+                    servo.nudge(STEPS_US[step] if key == "right" else -STEPS_US[step])
+                elif key in ("up", "larger"):
+                    step = min(step + 1, len(STEPS_US) - 1)
+                elif key in ("down", "smaller"):
+                    step = max(step - 1, 0)

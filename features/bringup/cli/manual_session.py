@@ -1,0 +1,104 @@
+"""A rig that holds where it is while a command moves it; whatever happens, it ends torque off."""
+
+import contextlib
+from collections.abc import Callable, Iterator, Mapping
+
+import typer
+
+from gazerig.config.schema import Rig
+from gazerig.features.bringup.manual_control import JogParams, ManualControl, parked
+from gazerig.features.bringup.move_result import Step
+from gazerig.features.bringup.servo_families import KINDS
+from gazerig.robot.app.bus_wiring import (
+    bus_names,
+    can_be_released,
+    guarded_rig_bus,
+    has_watchdog,
+)
+from gazerig.robot.app.rig_limits import limits, park_rad
+from gazerig.robot.cli.terminal import FAULT, say
+from gazerig.robot.control.body import Body
+from gazerig.robot.control.interrupts import Interrupts
+from gazerig.robot.control.power_down import PowerDown
+from gazerig.robot.model.clock import RealClock
+from gazerig.robot.model.coupling_params import pairs_of
+from gazerig.robot.safety.guard import Guard
+
+BOARDS = {"maestro": "a Maestro", "pca9685": "a PCA9685"}
+"""Boards of hobby servos by the kind of bus."""
+
+
+@contextlib.contextmanager
+def holding_rig(
+    rig: Rig,
+    paths: Mapping[str, str],
+    params: JogParams,
+    stopped: Callable[[], str | None],
+    interrupts: Interrupts,
+    park: bool = True,
+    watch: Callable[[Step], None] | None = None,
+) -> Iterator[ManualControl]:
+    """Switch torque on where the joints are; at the end of the block park, torque off, close.
+
+    Args:
+        rig: to move.
+        paths: of the serial ports, by the name of the bus.
+        params: how slowly it moves.
+        stopped: returns why to end a motion, None while there is no reason.
+        interrupts: requests to end this program.
+        park: False leaves the joints where they are.
+        watch: is shown every step.
+
+    Raises:
+        SetupError: port or servos are not as configured.
+        typer.Exit: all went well but the torque-off, which not all servos confirm.
+    """
+    body = Body(
+        guarded_rig_bus(rig, paths), rig.joints, park_rad(rig), pairs=pairs_of(rig.couplings)
+    )
+    guard = Guard(rig.guard, limits(rig.joints), rig.names, period_s=1.0 / params.rate_hz)
+    control = ManualControl(body, guard, RealClock(), params, stopped, watch)
+    with PowerDown(
+        (lambda again: parked(control, rig.park_deg, again)) if park else None,
+        control.stop,
+        say,
+        interrupts,
+        "torque off on all servos",
+        f": {left_alone(rig)}",
+    ) as way_out:
+        way_out.switch_on(control.start)
+        yield control
+    if way_out.unreleased:
+        raise typer.Exit(FAULT)
+
+
+def holding(rig: Rig) -> str:
+    """Return what the servos do once the torque is on."""
+    measured_joints = [name for name in rig.names if rig.joints[name].facts.measured]
+    without_feedback = len(rig.names) - len(measured_joints)
+    if not without_feedback:
+        return f"torque on: {len(measured_joints)} servos hold where they are"
+    pulses = f"{without_feedback} hobby servos hold where their pulses are (estimated: they tell nothing)"
+    return (
+        f"torque on: {len(measured_joints)} servos hold where they are, {pulses}"
+        if measured_joints
+        else f"pulses on: {pulses}"
+    )
+
+
+def left_alone(rig: Rig) -> str:
+    """Return what the servos do whose torque could not be switched off."""
+    return "; ".join(dict.fromkeys(_left_alone(rig, bus) for bus in bus_names(rig)))
+
+
+def _left_alone(rig: Rig, bus: str) -> str:
+    kind = rig.bus_named(bus).kind
+    until = "until the servo power is cut, or the guardian, which tries for 10 s, reaches the port"
+    if kind in BOARDS:
+        return f"{BOARDS[kind]} goes on with its last pulses {until}"
+    title = KINDS[kind].title if kind in KINDS else kind
+    if not can_be_released(rig, bus):
+        return f"the {title} servos' own watchdog stops them"
+    if has_watchdog(rig, bus):
+        return f"{title} servos stop by their own watchdog and hold {until}"
+    return f"{title} servos hold their last goal {until}"

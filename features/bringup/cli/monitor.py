@@ -1,0 +1,194 @@
+"""The command monitor: a live table of all servos, without touching them."""
+
+import contextlib
+import json
+from collections.abc import Callable, Collection, Iterator, Mapping
+from math import inf
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.live import Live
+from rich.table import Table
+
+from gazerig.config.rig import BusConfig
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.serial.port import BusPort
+from gazerig.features.bringup.cli.ports import (
+    MockOption,
+    PortOption,
+    RigPorts,
+    opened,
+    refuse_packages,
+    rig_ports,
+    setups_on,
+)
+from gazerig.features.bringup.monitor import Monitor, TelemetrySample, as_json
+from gazerig.features.bringup.servo_families import kind_of
+from gazerig.features.bringup.telemetry import (
+    MaestroTelemetry,
+    Pca9685Telemetry,
+    SmartServoTelemetry,
+    Telemetry,
+    TelemetryReader,
+)
+from gazerig.robot.app.bus_wiring import bus_names
+from gazerig.robot.cli.terminal import RigArgument, clear_errors, signals
+from gazerig.robot.model.clock import RealClock
+from gazerig.robot.model.coupling_params import pairs_of
+from gazerig.robot.model.joint import JointParams
+
+app = typer.Typer()
+
+ESTIMATED = (
+    "~ is estimated from the pulse (us); hobby servos tell nothing. The board's errors are not "
+    "asked for: reporting clears them"
+)
+_COLUMNS = 7
+_UNTOLD = "-"
+
+
+@app.command()
+def monitor(
+    rig: RigArgument = "desk",
+    seconds: Annotated[float | None, typer.Option(min=0.0, help="Stop after S seconds.")] = None,
+    rate: Annotated[
+        float, typer.Option(metavar="HZ", min=0.1, max=50.0, help="Looks a second.")
+    ] = (5.0),
+    once: Annotated[bool, typer.Option("--once", help="Print one table.")] = False,
+    as_lines: Annotated[bool, typer.Option("--json", help="Print one JSON line a look.")] = False,
+    mock: MockOption = False,
+    port: PortOption = None,
+) -> None:
+    """Watch all servos; reads alone: nothing is written, torque stays as it is."""
+    leaving = contextlib.suppress(KeyboardInterrupt)
+    with clear_errors(rig, port, mock), signals() as stopped, leaving:
+        stopped.tolerated = 0  # nothing to park: what waits for a stopped terminal ends at once
+        found, clock = load_rig(rig), RealClock()
+        refuse_packages(found, "monitor")
+        with rig_ports(found, mock, port) as wire, _readers(found, wire) as readers:
+            joints = {name: found.joints[name] for name in found.names}
+            watch = Monitor(readers, joints, clock.now_s, pairs_of(found.couplings))
+            samples = _samples(watch, clock, rate, 0.0 if once else seconds, stopped)
+            if as_lines:
+                start_s = clock.now_s()
+                for sample in samples:
+                    print(json.dumps(as_json(sample, start_s)), flush=True)
+            elif once:
+                Console().print(_table(next(samples), joints, rate))
+            else:
+                with Live(console=Console(), auto_refresh=False) as live:
+                    for sample in samples:
+                        live.update(_table(sample, joints, rate), refresh=True)
+
+
+BOARDS: Mapping[str, Callable[[BusPort, BusConfig], TelemetryReader]] = {
+    "maestro": lambda port, config: MaestroTelemetry(port, config.maestro),
+    "pca9685": lambda port, config: Pca9685Telemetry(port, config.pca9685),
+}
+"""Of the kinds of bus whose servos are not asked themselves."""
+
+
+@contextlib.contextmanager
+def _readers(rig: Rig, wire: RigPorts) -> Iterator[dict[str, TelemetryReader]]:
+    """Open every bus for reading alone."""
+    with contextlib.ExitStack() as ports:
+        readers = {}
+        for name in bus_names(rig):
+            port, config = ports.enter_context(opened(rig, wire, name)), rig.bus_named(name)
+            kind = None if config.kind in BOARDS else kind_of(setups_on(rig, name)[0].model)
+            readers[name] = (
+                BOARDS[config.kind](port, config)
+                if kind is None
+                else SmartServoTelemetry(port, kind)
+            )
+        yield readers
+
+
+def _samples(
+    watch: Monitor,
+    clock: RealClock,
+    rate: float,
+    seconds: float | None,
+    stopped: Callable[[], str | None],
+) -> Iterator[TelemetrySample]:
+    """Yield samples at absolute slots until the time is over or a signal comes; at least one."""
+    start_s = clock.now_s()
+    end_s = inf if seconds is None else start_s + seconds
+    slot = 0
+    while True:
+        yield watch.sample()
+        slot = max(slot + 1, int((clock.now_s() - start_s) * rate))
+        due_s = start_s + slot / rate
+        if due_s > end_s:
+            return
+        while clock.now_s() < due_s and not stopped():
+            clock.sleep_until(min(due_s, clock.now_s() + 0.1))
+        if stopped():
+            return
+
+
+def _table(sample: TelemetrySample, joints: Mapping[str, JointParams], rate: float) -> Table:
+    """Lay a sample out as a table."""
+    hobby = any(not joint.facts.measured for joint in joints.values())
+    share = sample.unanswered / sample.asked
+    caption = (
+        f"{rate:g} looks a second, each {1e3 * sample.took_s:.0f} ms; "
+        f"{sample.unanswered} of {sample.asked} unanswered ({share:.1%})"
+    )
+    table = Table(
+        box=None,
+        padding=(0, 1, 0, 0),
+        caption_justify="left",
+        caption=f"{caption}\n{ESTIMATED}" if hobby else caption,
+    )
+    table.add_column("joint", no_wrap=True)
+    table.add_column("id", justify="right", no_wrap=True)
+    for name in _columns(joints.values()):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("torque", no_wrap=True)
+    table.add_column("errors")
+    for name, look in sample.servos.items():
+        bus, servo_id = joints[name].bus, joints[name].id
+        table.add_row(name, f"{bus}:{servo_id}" if bus else f"{servo_id}", *_row(look))
+    return table
+
+
+def _columns(joints: Collection[JointParams]) -> tuple[str, ...]:
+    """Return the headings; a hobby servo's place is its pulse width in us."""
+    units = dict.fromkeys("step" if joint.facts.measured else "us" for joint in joints)
+    goal = "goal deg" if len(units) == 1 else "goal"  # 80 columns are soon full
+    return (goal, "at deg", "/".join(units), "deg/s", "load %", "C", "V")
+
+
+def _row(look: Telemetry | None) -> tuple[str, ...]:
+    if look is None:
+        return ("",) * (_COLUMNS + 1) + ("[red]no answer[/red]",)
+    if look.errors:
+        errors = f"[red]{', '.join(look.errors)}[/red]"
+    else:
+        errors = "none" if look.measured else _UNTOLD
+    at = _number(look.position_deg, 1)
+    return (
+        _number(look.goal_deg, 1),
+        at if look.measured or at == _UNTOLD else f"~{at}",
+        _place(look),
+        _number(look.velocity_deg_s, 0),
+        _number(None if look.load is None else 100.0 * look.load, 0),
+        _number(look.temperature_c, 0),
+        _number(look.voltage_v, 1),
+        "on" if look.torque else "off",
+        errors,
+    )
+
+
+def _place(look: Telemetry) -> str:
+    """Write the servo's own position, or the pulse that it gets."""
+    if look.pulse_us is not None:
+        return f"{look.pulse_us:g}" if look.pulse_us else "none"
+    return _UNTOLD if look.position_steps is None else str(look.position_steps)
+
+
+def _number(value: float | None, digits: int) -> str:
+    """Write a number, zero without a sign, and "-" where there is none."""
+    return _UNTOLD if value is None else f"{round(value, digits) + 0.0:.{digits}f}"

@@ -1,0 +1,261 @@
+"""The commands jog, home and look-at: a rig moved slowly, without a camera."""
+
+import contextlib
+import select
+import sys
+from collections.abc import Iterable, Iterator
+from math import degrees, inf
+from typing import Annotated, NamedTuple
+
+import typer
+
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.errors import SetupError
+from gazerig.features.bringup.cli.manual_session import holding, holding_rig
+from gazerig.features.bringup.cli.ports import MockOption, PortOption, rig_ports
+from gazerig.features.bringup.look_at import LookedAt, ends_reached, look_at, met, refuse_not_finite
+from gazerig.features.bringup.manual_control import JogParams, ManualControl, refuse_beyond
+from gazerig.features.bringup.move_result import PASSING, MoveResult, Step
+from gazerig.robot.app.rig_limits import lid_ends, limits
+from gazerig.robot.cli.rig_command import RigCommand
+from gazerig.robot.cli.terminal import FAULT, RigArgument, clear_errors, say, signals, status
+from gazerig.robot.control.event_text import drawn_together
+
+app = typer.Typer()
+
+# A number below zero is an argument, not an option.
+_NEGATIVE = {"ignore_unknown_options": True}
+
+SpeedOption = Annotated[
+    float, typer.Option(metavar="DEG_S", min=0.5, max=200.0, help="Top speed on the way.")
+]
+HoldOption = Annotated[
+    bool, typer.Option("--hold", help="Stay there, torque on, until Enter or Ctrl-C.")
+]
+YesOption = Annotated[
+    bool, typer.Option("--yes", help="Hobby servos: no hand is in the mechanism, do not ask.")
+]
+NoParkOption = Annotated[
+    bool, typer.Option("--no-park", help="Torque off where it stands, without parking first.")
+]
+
+
+@app.command(cls=RigCommand, context_settings=_NEGATIVE)
+def jog(
+    rig: RigArgument = "desk",
+    *,
+    joint: Annotated[str, typer.Argument(metavar="JOINT", help="A joint, e.g. neck_yaw.")],
+    deg: Annotated[float, typer.Argument(metavar="DEG", help="Where to, in degrees.")],
+    speed: SpeedOption = 20.0,
+    seconds: Annotated[float, typer.Option(min=0.0, help="Stay there for S seconds.")] = 1.0,
+    hold: HoldOption = False,
+    no_park: NoParkOption = False,
+    yes: YesOption = False,
+    mock: MockOption = False,
+    port: PortOption = None,
+) -> None:
+    """Move one joint slowly while the others hold: gazerig jog my.yaml neck_yaw 20."""
+    with clear_errors(rig, port, mock):
+        loaded = load_rig(rig)
+        refuse_beyond(joint, deg, loaded.names, limits(loaded.joints))
+    with _commanded(loaded, _Way(mock, port, yes, rig), speed, hold, not no_park) as control:
+        moved = control.jog(joint, deg)
+        _report(moved, (joint,))
+        _stay(control, seconds, hold)
+    _exit_unless(moved.arrived)
+
+
+@app.command()
+def home(
+    rig: RigArgument = "desk",
+    speed: SpeedOption = 20.0,
+    hold: HoldOption = False,
+    yes: YesOption = False,
+    mock: MockOption = False,
+    port: PortOption = None,
+) -> None:
+    """Move slowly to the centre: all joints to 0 deg, lids open; then torque off."""
+    with clear_errors(rig, port, mock):
+        loaded = load_rig(rig)
+    centre = dict.fromkeys(loaded.names, 0.0)
+    centre.update({name: degrees(wide) for name, (_, wide) in lid_ends(loaded).items()})
+    with _commanded(loaded, _Way(mock, port, yes, rig), speed, hold, False) as control:
+        moved = control.pose(centre)
+        _report(moved, loaded.names)
+        _stay(control, 0.0, hold)
+    _exit_unless(moved.arrived)
+
+
+@app.command("look-at", cls=RigCommand, context_settings=_NEGATIVE)
+def look_at_command(
+    rig: RigArgument = "desk",
+    *,
+    x: Annotated[float, typer.Argument(metavar="X", help="Metres forward of the neck base.")],
+    y: Annotated[float, typer.Argument(metavar="Y", help="Metres to the left.")],
+    z: Annotated[float, typer.Argument(metavar="Z", help="Metres up.")],
+    seconds: Annotated[float, typer.Option(min=1.0, help="Look for S seconds.")] = 4.0,
+    hold: HoldOption = False,
+    no_park: NoParkOption = False,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of blinks.")] = 0,
+    yes: YesOption = False,
+    mock: MockOption = False,
+    port: PortOption = None,
+) -> None:
+    """Turn eyes and head to a point and tell how well they meet it: X Y Z in metres."""
+    with clear_errors(rig, port, mock):
+        refuse_not_finite((x, y, z))
+        loaded = load_rig(rig)
+        # Imports vision as well, so only this command does, and before the torque is on: in
+        # that time the servos' watchdog would trip.
+        from gazerig.robot.app.gaze_models import gaze_parts
+
+        kinematics, oculomotor = gaze_parts(loaded, seed)
+    with _commanded(loaded, _Way(mock, port, yes, rig), 20.0, hold, not no_park) as control:
+        looked = look_at(control, kinematics, oculomotor, (x, y, z), seconds)
+        good = _report_look(looked, loaded)
+        _stay(control, 0.0, hold)
+    _exit_unless(good)
+
+
+class _Way(NamedTuple):
+    """The way to the servos, as asked on the command line.
+
+    yes: no hand is in them
+    rig: as it was named, for the commands that messages suggest
+    """
+
+    mock: bool
+    port: str | None
+    yes: bool
+    rig: str
+
+
+@contextlib.contextmanager
+def _commanded(
+    rig: Rig, way: _Way, speed: float, hold: bool, park: bool
+) -> Iterator[ManualControl]:
+    """Return a rig that holds where it is; whatever happens, it ends with the torque off."""
+    if not way.mock:
+        with clear_errors(way.rig, way.port):  # before Ctrl-C is only noted
+            _ask_for_fingers(rig, way.yes)
+    with (
+        clear_errors(way.rig, way.port, way.mock),
+        signals() as stopped,
+        rig_ports(rig, way.mock, way.port) as wire,
+    ):
+        enter = enter_pressed if hold and sys.stdin.isatty() else _never
+        params = JogParams(speed_deg_s=_gentle(rig, speed))
+        watch = _StatusLine().show if sys.stderr.isatty() else None
+        end = lambda: stopped() or enter()  # noqa: E731
+        with holding_rig(rig, wire.paths, params, end, stopped, park, watch) as control:
+            _tell(control.body.bus.events())
+            say(f"{holding(rig)}; Ctrl-C switches it off")
+            yield control
+
+
+def _ask_for_fingers(rig: Rig, yes: bool) -> None:
+    """Ask for confirmation before servos jump whose positions are not known.
+
+    Raises:
+        SetupError: no user is there to ask.
+        typer.Abort: the answer was no.
+    """
+    without_feedback = [name for name in rig.names if not rig.joints[name].facts.measured]
+    if not without_feedback:
+        return
+    why = (
+        f"{', '.join(without_feedback)}: hobby servos without pulses go to their parking place at once, at "
+        "their own full speed"
+    )
+    if not yes and not sys.stdin.isatty():
+        raise SetupError(f"{why}: take your hands out of the mechanism and say --yes")
+    say(why)
+    if not yes:
+        typer.confirm("Is no hand in the mechanism?", abort=True)
+
+
+def _gentle(rig: Rig, speed: float) -> float:
+    """Return a speed that the guard's gentle speed allows."""
+    gentle = rig.guard.soft_start_speed_deg_s
+    if speed > gentle:
+        say(f"--speed {speed:g}: no faster than the guard's gentle speed, {gentle:g} deg/s")
+    return min(speed, gentle)
+
+
+class _StatusLine:
+    """Shows what stands in the way; written only when it changes."""
+
+    def __init__(self) -> None:
+        self._shown = ""
+
+    def show(self, step: Step) -> None:
+        reasons = [r for r in step.guard_result.reasons if r.partition(": ")[2] not in PASSING]
+        line = ", ".join(reasons) or "on the way"
+        if line != self._shown:
+            self._shown = line
+            status(line)
+
+
+def _never() -> str | None:
+    return None
+
+
+def enter_pressed() -> str | None:
+    """Return whether Enter was pressed, without waiting."""
+    if not select.select([sys.stdin], [], [], 0.0)[0]:
+        return None
+    try:
+        return "Enter" if sys.stdin.readline() else "the end of standard input"
+    except OSError:
+        return "a terminal that is gone"
+
+
+def _stay(control: ManualControl, seconds: float, hold: bool) -> None:
+    if hold:
+        say("holding: Enter or Ctrl-C ends it")
+    if hold or seconds > 0.0:
+        _tell(control.hold(inf if hold else seconds).events)
+
+
+def _report(moved: MoveResult, asked: tuple[str, ...]) -> None:
+    """Print what was applied, for the joints commanded and those that were limited or failed."""
+    _tell(moved.events)
+    for applied in moved.joints:
+        if applied.joint in asked or applied.reasons:
+            say(str(applied))
+    say(f"{moved} after {moved.seconds:.1f} s")
+
+
+def _report_look(looked: LookedAt, rig: Rig) -> bool:
+    """Print how close the eyes come to the point; return whether within 2 deg."""
+    good = looked.error <= 2.0
+    ranges = rig.ranges
+    narrower = {
+        "eye_pan": ranges.eye_yaw_deg,
+        "eyes_pan": ranges.eye_yaw_deg,
+        "eye_tilt": ranges.eye_pitch_deg,
+        "eyes_tilt": ranges.eye_pitch_deg,
+        "neck_yaw": ranges.neck_yaw_deg,
+    }
+    _tell(looked.moved.events)
+    if any(name.startswith("neck") for name in rig.names):
+        yaw, pitch, roll = looked.head
+        say(f"head: yaw {yaw:+.1f}, pitch {pitch:+.1f}, roll {roll:+.1f} deg")
+    for line in met(looked):
+        say(line)
+    for applied in looked.moved.remarkable():
+        say(f"limited: {applied}")
+    for line in () if good else ends_reached(rig.joints, narrower, looked.moved):
+        say(f"limited: {line}")
+    return good
+
+
+def _tell(events: Iterable[str]) -> None:
+    """Print what was done to which servo."""
+    for line in drawn_together(events):
+        say(line)
+
+
+def _exit_unless(good: bool) -> None:
+    if not good:
+        raise typer.Exit(FAULT)

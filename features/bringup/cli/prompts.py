@@ -1,0 +1,149 @@
+"""Questions on the terminal, answered by a person, a pipe or a file, while something is watched."""
+
+import os
+import select
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.files.file_input import read_limited
+from gazerig.features.bringup.calibration.joint_access import CalibrationStopped
+from gazerig.robot.cli.terminal import say, status
+
+LOOK_S = 0.03
+"""A joint is looked at so often while the user thinks: more than 20 times a second."""
+
+HAND_STEPS = 100
+"""An emulated hand turns a joint by so much between two looks."""
+
+YES, NO = ("y", "yes"), ("n", "no")
+
+
+_LARGEST = 1_000_000  # bytes of a file of answers
+
+
+def _answers_of(file: Path) -> list[str]:
+    """Read the answers of a file.
+
+    Raises:
+        SetupError: it is no text.
+        OSError: it cannot be read.
+    """
+    try:
+        return read_limited(file, _LARGEST).decode().splitlines()
+    except UnicodeDecodeError:
+        raise SetupError(f"{file}: is no UTF-8 text; write one answer a line") from None
+
+
+class Lines:
+    """Lines of a file, or of standard input as they come."""
+
+    def __init__(self, answers: Path | None) -> None:
+        """Read the answers of a file at once; None: standard input.
+
+        Raises:
+            OSError: the file cannot be read.
+        """
+        self._file = answers
+        self._ready = [] if answers is None else _answers_of(answers)
+        self._rest = b""
+
+    @property
+    def scripted(self) -> bool:
+        """Return whether they come from a file."""
+        return self._file is not None
+
+    def next(self, wait_s: float) -> str | None:
+        """Return the next line, None where none came in time.
+
+        Raises:
+            EOFError: there are no more.
+        """
+        if self._ready:
+            return self._ready.pop(0).strip()
+        if self._file is not None:
+            raise EOFError
+        if not select.select([sys.stdin.fileno()], [], [], wait_s)[0]:
+            return None
+        try:
+            data = os.read(sys.stdin.fileno(), 4096)
+        except OSError:  # a terminal that is gone
+            data = b""
+        if not data:
+            raise EOFError
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        self._ready = [line.decode(errors="replace").strip() for line in lines]
+        return self._ready.pop(0) if self._ready else None
+
+
+class TerminalPerson:
+    """Asks on the terminal; implements Operator.
+
+    Args:
+        lines: where answers come from.
+        stopped: returns why to end, None while there is no reason.
+        yes: every question for a yes or no has the answer yes.
+    """
+
+    def __init__(self, lines: Lines, stopped: Callable[[], str | None], yes: bool) -> None:
+        self._lines = lines
+        self._stopped = stopped
+        self._yes = yes
+        self._live_line = sys.stderr.isatty()
+        self.hand: Callable[[int], None] | None = None
+        """Turns the joint at hand by some steps, where it is emulated."""
+
+    def tell(self, line: str) -> None:
+        """Print a line."""
+        say(line)
+
+    def wait(self, question: str, live: Callable[[], str]) -> None:
+        """Return at Enter; see gazerig.features.bringup.calibration.joint_procedure.Operator."""
+        self._ask(question, live, ("",))
+
+    def agrees(self, question: str, live: Callable[[], str] | None = None) -> bool:
+        """Return yes or no; see gazerig.features.bringup.calibration.joint_procedure.Operator."""
+        if self._yes:
+            say(f"{question} yes (--yes)")
+            return True
+        return self._ask(f"{question} [y/n]", live or str, (*YES, *NO)) in YES
+
+    def _ask(self, question: str, live: Callable[[], str], accepted: tuple[str, ...]) -> str:
+        say(question)
+        while True:
+            why = self._stopped()
+            if why is not None:
+                raise CalibrationStopped(why)
+            shown = live()
+            if self._live_line:
+                status(shown)
+            try:
+                line = self._lines.next(LOOK_S)
+            except EOFError:
+                raise SetupError(
+                    f"no answer left to: {question}: answer on the terminal, or give a file with "
+                    "one line an answer (--answers; an empty line is Enter)"
+                ) from None
+            if line is None:
+                continue
+            if line in accepted:
+                return line
+            self._other(line, live, accepted)
+
+    def _other(self, line: str, live: Callable[[], str], accepted: tuple[str, ...]) -> None:
+        """Obey what is no answer: q, and turning an emulated joint."""
+        if line in ("q", "quit"):
+            raise CalibrationStopped("q")
+        word, _, number = line.partition(" ")
+        if word == "turn" and self.hand is not None and number.lstrip("+-").isdecimal():
+            left = int(number)
+            while left:
+                step = max(-HAND_STEPS, min(HAND_STEPS, left))
+                self.hand(step)
+                left -= step
+                live()
+            return
+        wanted = "Enter" if accepted == ("",) else "y or n"
+        hand = ", turn STEPS moves the emulated joint" if self.hand is not None else ""
+        say(f"{line!r} is no answer: {wanted} goes on, q ends{hand}")

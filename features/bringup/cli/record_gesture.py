@@ -1,0 +1,106 @@
+"""The command record-gesture: torque off, and a gesture is recorded by hand."""
+
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from gazerig.config.gestures import gesture_name
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.files.file_output import refuse_existing
+from gazerig.features.bringup.cli.motion import enter_pressed
+from gazerig.features.bringup.cli.ports import MockOption, PortOption, opened, rig_ports
+from gazerig.features.bringup.hand_recording import LONGEST_S, HandRecording, record, switch_off
+from gazerig.features.bringup.monitor import Monitor
+from gazerig.features.bringup.servo_families import kind_of
+from gazerig.features.bringup.telemetry import SmartServoTelemetry
+from gazerig.robot.cli.gestures import FolderOption, finish
+from gazerig.robot.cli.rig_command import RigCommand
+from gazerig.robot.cli.terminal import (
+    INTERRUPTED,
+    ForceOption,
+    RigArgument,
+    clear_errors,
+    say,
+    signals,
+)
+from gazerig.robot.model.clock import RealClock
+
+app = typer.Typer()
+
+
+@app.command("record-gesture", cls=RigCommand)
+def record_gesture(
+    rig: RigArgument = "desk",
+    *,
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the gesture.")],
+    seconds: Annotated[
+        float, typer.Option(min=0.5, max=LONGEST_S, help="Longest time; Enter ends it before.")
+    ] = LONGEST_S,
+    folder: FolderOption = Path("."),
+    force: ForceOption = False,
+    yes: Annotated[
+        bool, typer.Option("--yes", help="The head is held, the torque may go off: do not ask.")
+    ] = False,
+    mock: MockOption = False,
+    port: PortOption = None,
+) -> None:
+    """Record a gesture by hand: torque off, move the head, and it is written as YAML."""
+    with clear_errors(rig, port, mock):
+        from gazerig.robot.app.gesture_file import gesture_text
+
+        loaded = load_rig(rig)
+        measured = [one for one in loaded.names if loaded.joints[one].facts.measured]
+        if not measured:
+            raise SetupError(
+                f"{rig}: hobby servos do not tell where they are: none can be recorded"
+            )
+        gesture_name(f"{name}.yaml")
+        refuse_existing(folder / f"{name}.yaml", force=force)
+        _ask_to_let_go(yes)
+        recorded = _recorded(loaded, measured, seconds, mock, port)
+        if recorded is None:
+            say("ended by Ctrl-C: the torque is off, nothing is written")
+            raise typer.Exit(INTERRUPTED)
+        for joint in recorded.left_out:
+            say(f"{joint}: answered too seldom and is left out")
+        text = gesture_text(loaded, recorded.series, "recorded by hand")
+        finish(loaded, name, text, folder, force)
+
+
+def _ask_to_let_go(yes: bool) -> None:
+    """Warn that the head drops, and ask whether it is held.
+
+    Raises:
+        SetupError: no user is there to ask.
+        typer.Abort: the answer was no.
+    """
+    why = "the torque of all servos goes off and stays off: a heavy head drops"
+    if not yes and not sys.stdin.isatty():
+        raise SetupError(f"{why}: hold it and say --yes")
+    say(why)
+    if not yes:
+        typer.confirm("Is the head held, and no finger between its parts?", abort=True)
+
+
+def _recorded(
+    rig: Rig, joints: list[str], seconds: float, mock: bool, port: str | None
+) -> HandRecording | None:
+    """Switch the torque off and record; None where it was ended by a signal."""
+    clock, there = RealClock(), {name: rig.joints[name] for name in joints}
+    with signals() as stopped, rig_ports(rig, mock, port) as wire, ExitStack() as ports:
+        readers = {}
+        for bus in dict.fromkeys(joint.bus for joint in there.values()):
+            line = ports.enter_context(opened(rig, wire, bus))
+            own = {name: joint for name, joint in there.items() if joint.bus == bus}
+            switch_off(own, line)
+            readers[bus] = SmartServoTelemetry(line, kind_of(next(iter(own.values())).model))
+        say(f"the torque is off; move the head, Enter ends it (within {seconds:g} s)")
+        watch = Monitor(readers, there, clock.now_s)
+        end = lambda: stopped() or (enter_pressed() if sys.stdin.isatty() else None)  # noqa: E731
+        recorded = record(watch.sample, clock, end, seconds)
+        say(f"recorded {len(recorded.series)} joints; the torque stays off")
+        return None if stopped() else recorded

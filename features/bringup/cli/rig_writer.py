@@ -1,0 +1,54 @@
+"""What a calibration found, written into the rig's YAML after a yes; comments are kept."""
+
+from collections.abc import Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from gazerig.config.save import copy_shipped, rig_file, save_rig
+from gazerig.drivers.errors import SetupError
+from gazerig.features.bringup.cli.prompts import TerminalPerson
+from gazerig.robot.cli.terminal import say
+
+
+def refuse_unwritable(rig: str, out: Path | None) -> None:
+    """Find out before anything is calibrated that nothing could be written.
+
+    Raises:
+        gazerig.config.load.ConfigError, SetupError: why, and what to do.
+    """
+    if out is None:
+        save_rig(rig, {}, datetime.now())
+    elif out.exists():
+        raise SetupError(f"--out {out}: there is such a file: give it as RIG instead")
+    elif "/" in rig or rig.endswith((".yaml", ".yml")):
+        raise SetupError(f"--out copies a shipped rig; {rig} is a file of yours: leave --out away")
+
+
+def write_found(
+    rig: str, values: Mapping[str, Any], out: Path | None, person: TerminalPerson
+) -> None:
+    """Write values after a yes, and say where the old file is.
+
+    Args:
+        rig: as it was named.
+        values: by the dotted keys of the rig file.
+        out: a copy of a shipped rig to write instead, None for the rig itself.
+        person: is asked.
+    """
+    if not values:
+        say("everything is as the rig file says: nothing to write")
+        return
+    where = rig_file(rig) if out is None else out
+    if not person.agrees(f"write these {len(values)} values into {where}?"):
+        say("nothing written")
+        return
+    if out is not None:
+        copy_shipped(rig, out)
+    saved = save_rig(where, dict(values), datetime.now())
+    for change in saved.changes:
+        say(str(change))
+    if saved.backup is None:
+        say(f"everything is as {saved.path} says: nothing to write")
+    else:
+        say(f"written into {saved.path}; as it was: {saved.backup}")

@@ -1,0 +1,252 @@
+"""The command ``gazerig scan``: which ports there are, and who answers on one."""
+
+import contextlib
+import json
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
+
+from gazerig.config.schema import load_rig
+from gazerig.drivers.bus.servo_families import FAMILY_OF
+from gazerig.drivers.bus.servo_models import BusKind
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.pca9685.probe import probe
+from gazerig.drivers.serial.list_ports import SerialPort
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.serial.port_by_path import port_of
+from gazerig.drivers.serial.port_owner import POLOLU, is_i2c
+from gazerig.features.bringup.bus_search import (
+    RATES,
+    SearchRound,
+    found_of,
+    known_kinds,
+    plan,
+    search,
+)
+from gazerig.features.bringup.cli import progress as bench
+from gazerig.features.bringup.cli.ports import MockOption, refuse_packages, rig_ports
+from gazerig.features.bringup.cli.progress import JsonOption, console
+from gazerig.features.bringup.doctor.port import name_ports
+from gazerig.features.bringup.scan_report import board_plain, board_text, remarks, servo_plain
+from gazerig.features.bringup.servo_families import KINDS, kind_of
+from gazerig.robot.cli.rig_command import DEFAULT_RIG, RigCommand
+from gazerig.robot.cli.suggestions import completed
+from gazerig.robot.cli.terminal import FAULT, clear_errors, complete_rig, say
+
+app = typer.Typer()
+
+
+@app.command(cls=RigCommand)
+def scan(
+    rig: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="RIG",
+            help="Ask the ports of this rig; default: the only port, with --mock rig desk.",
+            autocompletion=complete_rig,
+        ),
+    ] = None,
+    port: Annotated[str | None, typer.Option(help="Serial port; default: the only one.")] = None,
+    kind: Annotated[
+        str | None,
+        typer.Option(
+            help="dynamixel, feetech, maestro, pca9685 or all; default: one after the other until "
+            "one answers, and of an I2C bus pca9685. Name it where a Maestro only listens."
+        ),
+    ] = None,
+    bauds: Annotated[str, typer.Option(help="all, or bit/s: 1000000,57600")] = "all",
+    thorough: Annotated[
+        bool, typer.Option("--thorough", help="Wait long, and ask every id, at every baud rate.")
+    ] = False,
+    mock: MockOption = False,
+    as_json: JsonOption = False,
+) -> None:
+    """List serial ports, and who answers on one at every baud rate.
+
+    Moves and changes nothing; only a Maestro's list of errors is cleared by asking for it.
+    """
+    with clear_errors(rig or DEFAULT_RIG, port, mock):
+        rates, kinds = parse_bauds(bauds), _parse_kind(kind or "all")
+        found_ports = bench.ports_here()
+        if not as_json:
+            _show_ports(found_ports)
+        with _paths(rig, mock, port, found_ports) as paths:
+            answered = [
+                _boards(path, as_json)
+                if i2c or kind == "pca9685"
+                else _one(path, kinds, rates, thorough, kind, as_json)
+                for path, i2c in paths
+            ]
+    if not any(answered):
+        raise typer.Exit(FAULT)
+
+
+@contextlib.contextmanager
+def _paths(
+    rig: str | None, mock: bool, port: str | None, found: Sequence[SerialPort]
+) -> Iterator[list[tuple[str, bool]]]:
+    """Return the ports to search, a rig's or one, and whether each is an I2C bus."""
+    if rig is None and not mock:
+        path = port if port is not None else _only_port(found)
+        yield [(path, is_i2c(path))]
+        return
+    model = load_rig(rig or DEFAULT_RIG)
+    refuse_packages(model, "scan")
+    with rig_ports(model, mock, port) as wired:
+        yield [
+            (path, model.bus_named(name).kind == "pca9685") for name, path in wired.paths.items()
+        ]
+
+
+def _boards(path: str, as_json: bool) -> bool:
+    """Search one I2C bus and show what was found; return whether any board answered.
+
+    Of a serial port it is asked only where that was named: to a Maestro such bytes are commands.
+    """
+    with bench.to_open(path) as line:
+        found = [f"{address:#x}" for address in probe(line, Pca9685Params())]
+    if as_json:
+        boards = [{"kind": "pca9685", "address": address} for address in found]
+        print(json.dumps({"port": path, "servos": [], "boards": boards}))
+        return bool(found)
+    out = console()
+    for address in found:
+        out.print(f"{path}: PCA9685 at {address}, 16 channels", markup=False)
+    if not found:
+        out.print(
+            f"{path}: no PCA9685 answers from 0x40 to 0x77: has it its logic supply (VCC)? check "
+            "SDA, SCL and ground",
+            markup=False,
+        )
+    return bool(found)
+
+
+def _parse_kind(text: str) -> tuple[BusKind, ...]:
+    try:
+        return known_kinds(text)
+    except ValueError as error:
+        raise SetupError(f"--kind {error}") from None
+
+
+def parse_bauds(text: str) -> tuple[int, ...] | None:
+    """Read --bauds; None for all.
+
+    Raises:
+        SetupError: it holds what no servo can be set to.
+    """
+    if text == "all":
+        return None
+    known = sorted({rate for rates in RATES.values() for rate in rates})
+    rates = [int(word) if word.strip().isdecimal() else -1 for word in text.split(",")]
+    if not set(rates) <= set(known):
+        named = ", ".join(map(str, known))
+        raise SetupError(f"--bauds {text}: not all or some of {named}, with commas between")
+    return tuple(rates)
+
+
+def _only_port(ports: Sequence[SerialPort]) -> str:
+    """Return the one port on USB; asking strange devices needs a person's word."""
+    usb = [port for port in ports if port.usb]
+    if len(usb) == 2 and usb[0].usb == usb[1].usb and usb[0].usb.startswith(POLOLU):
+        # Both ports of one Maestro: its Command Port is the first.
+        return usb[0].device
+    if len(usb) == 1:
+        return usb[0].by_id or usb[0].device
+    if usb:
+        raise SetupError(f"which port? name it with --port: {name_ports(usb)}")
+    raise SetupError(
+        "no serial port on USB: plug the adaptor in (its LED should light), or name a port "
+        "with --port"
+    )
+
+
+def _one(
+    path: str,
+    kinds: Sequence[BusKind],
+    rates: Sequence[int] | None,
+    thorough: bool,
+    named: str | None,
+    as_json: bool,
+) -> bool:
+    """Search one port and show what was found; return whether a servo answered."""
+    usb = bench.usb_id(path)
+    asked = plan(usb, kinds, rates)
+    if not asked and usb.startswith(POLOLU):
+        raise SetupError(
+            f"{path} is a board of Pololu: packets for servos would move what hangs on it; "
+            "name the adaptor's port with --port, or ask with --kind maestro"
+        )
+    if not asked:
+        raise SetupError(f"--bauds: none of them is a rate of {' or '.join(kinds)}")
+    line = port_of(path)
+    try:
+        rounds = _search(line, usb, asked, thorough, named == "all")
+        if not thorough and not any(one.answered for one in rounds):
+            # Ids that lie far apart answer after a long silence; some not a ping to all.
+            servos = [row for row in asked if row[0] != "maestro"]
+            boards = [one for one in rounds if one.kind == "maestro"]
+            rounds = [*boards, *_search(line, usb, servos, True, named == "all")]
+    finally:
+        line.closePort()
+    requested = tuple(dict.fromkeys(row[0] for row in asked))
+    _show(rounds, path, requested, as_json)
+    return any(one.answered for one in rounds)
+
+
+def _search(
+    line: BusPort,
+    usb: str,
+    asked: Sequence[tuple[BusKind, int]],
+    thorough: bool,
+    to_the_end: bool,
+) -> list[SearchRound]:
+    rounds = []
+    errors = Console(stderr=True)
+    with Progress(console=errors, transient=True, disable=not errors.is_terminal) as bar:
+        task = bar.add_task("asking", total=len(asked))
+        for one in search(line, usb, asked, thorough, to_the_end):
+            rounds.append(one)
+            bar.update(task, advance=1, description=f"asked {one.kind} at {one.baud} bit/s")
+    return rounds
+
+
+def _show_ports(ports: Sequence[SerialPort]) -> None:
+    for bus in sorted(Path("/dev").glob("i2c-*")):
+        say(f"I2C bus {bus}")
+    for port in ports:
+        alias = f", lasting name {port.by_id}" if port.by_id else ""
+        say(f"port {port.device}: {port.description}{f' [{port.usb}]' if port.usb else ''}{alias}")
+
+
+def _show(
+    rounds: Sequence[SearchRound], where: str, requested: Sequence[BusKind], as_json: bool
+) -> None:
+    boards = [one for one in rounds if one.board is not None]
+    found = found_of(rounds)
+    if as_json:
+        answer: dict[str, object] = {
+            "port": where,
+            "servos": [servo_plain(kind, servo) for kind, servo in found],
+            "boards": [board_plain(one) for one in boards],
+        }
+        print(json.dumps(answer))
+        return
+    out = console()
+    if found:
+        table = Table("id", "model", "firmware", "baud", "kind")
+        for kind, servo in found:
+            made = kind_of(servo.model) if servo.model in FAMILY_OF else KINDS[kind]
+            version = made.family.version(servo.firmware)
+            table.add_row(str(servo.id), servo.model, version, str(servo.baud), made.title)
+        out.print(table)
+    for one in boards:
+        for line in board_text(one):
+            out.print(f"{where}: {line}", markup=False)
+    for line in remarks(rounds, where, requested):
+        out.print(completed(line), markup=False)

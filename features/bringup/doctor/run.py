@@ -1,0 +1,256 @@
+"""A whole bus of a rig examined: who is there, at which baud rate, and how each servo is.
+
+Reads only; ``apply_fixes`` writes what the findings offer, to servos whose torque is off, and
+moves nothing.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from gazerig.drivers.bus.servo_models import servo_label
+from gazerig.drivers.errors import DriverError, PortError, SetupError
+from gazerig.drivers.serial.list_ports import (
+    RECOMMENDED_LATENCY_MS,
+    Host,
+    latency_file,
+    latency_ms,
+    set_latency,
+)
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_bus.discovery import FoundServo, any_reply, corrupt, ping, scan_ids
+from gazerig.drivers.types import ServoConfig
+from gazerig.features.bringup.doctor.checks import visit
+from gazerig.features.bringup.doctor.diagnostics import Diagnostic, Fix, worst
+from gazerig.features.bringup.doctor.port import examine_latency, examine_port, port_facts
+from gazerig.features.bringup.servo_family import ServoKind, Tell
+from gazerig.robot.guardian.guardian import Guardian
+from gazerig.robot.guardian.release_plan import ReleasePlan, describe
+
+
+class Presence(NamedTuple):
+    """Who answered at the rig's baud rate, by id, and who not.
+
+    strangers: answered, but are not in the YAML; elsewhere: answered at other baud rates
+    corrupt: how many of six answers came in pieces, by id, where any did
+    """
+
+    there: dict[int, FoundServo]
+    missing: tuple[ServoConfig, ...]
+    strangers: tuple[FoundServo, ...]
+    elsewhere: tuple[FoundServo, ...]
+    corrupt: dict[int, int]
+
+
+@dataclass(frozen=True, slots=True)
+class AppliedFix:
+    """One thing that ``apply_fixes`` did, or why it could not."""
+
+    where: str
+    what: str
+    done: bool
+
+    def __str__(self) -> str:
+        """Write it on one line."""
+        return f"{self.where}: {self.what}"
+
+
+def check_all(
+    port: BusPort, host: Host, examine: Callable[[], list[Diagnostic]]
+) -> list[Diagnostic]:
+    """Examine a port and, where it can be used, what is behind it; the port is closed after it.
+
+    What goes wrong on the way is among the findings.
+
+    examine: asks what is behind it
+    """
+    device = port.port_name
+    findings = examine_port(port_facts(device, host))
+    if worst(findings) == "error":
+        return findings
+    try:
+        behind = examine()
+        # While it is open: the program asks the adaptor itself for low latency then.
+        return [*findings, *examine_latency(device, host), *behind]
+    except DriverError as error:
+        # The message names port and cure.
+        return [Diagnostic("error", str(error).removeprefix(device).lstrip(": "), device)]
+    finally:
+        port.closePort()
+
+
+def check(
+    port: BusPort, kind: ServoKind, setups: Sequence[ServoConfig], baud: int, tell: Tell
+) -> list[Diagnostic]:
+    """Examine every servo of a bus, and any other on it; torque is left as it is.
+
+    Raises:
+        PortError: the port cannot be opened.
+        BusLost: it has gone away.
+    """
+    presence = look(port, kind, setups, baud, tell)
+    findings = list(judge_presence(presence, kind, baud))
+    for setup in setups:
+        if setup.id in presence.there:
+            tell(f"reading {servo_label(setup)}")
+            found, spoilt = presence.there[setup.id], presence.corrupt.get(setup.id, 0)
+            findings += visit(port, kind, setup, found, spoilt)
+    if presence.there:
+        findings += [Diagnostic("note", note, "the bus") for note in kind.notes]
+    return findings
+
+
+def look(
+    port: BusPort, kind: ServoKind, setups: Sequence[ServoConfig], baud: int, tell: Tell
+) -> Presence:
+    """Find out who is on the bus; the port is left open at the rig's baud rate.
+
+    Raises:
+        PortError: the port cannot be opened.
+        BusLost: it has gone away.
+    """
+    tell(f"asking all servos at {baud} bit/s")
+    _open(port, baud)
+    answers, _ = scan_ids(port, kind.family, baud)
+    there = {found.id: found for found in answers}
+    spoilt = {i: n for i, n in Counter(found.id for found in answers).items() if n > 1}
+    for setup in setups:
+        if setup.id not in there:
+            tell(f"asking {servo_label(setup)}")
+            found = ping(port, kind.family, setup.id, baud, 2)
+            if found is not None:
+                there[setup.id] = found
+        pieces = corrupt(port, kind.family, setup.id, 6 if setup.id in there else 1)
+        if pieces:
+            spoilt[setup.id] = pieces
+    missing = tuple(setup for setup in setups if setup.id not in there)
+    known = {setup.id for setup in setups}
+    strangers = tuple(found for i, found in sorted(there.items()) if i not in known)
+    elsewhere = tuple(_elsewhere(port, kind, baud, tell)) if missing else ()
+    if missing:
+        _open(port, baud)
+    return Presence(there, missing, strangers, elsewhere, spoilt)
+
+
+def _open(port: BusPort, baud: int) -> None:
+    if not port.setBaudRate(baud):
+        raise PortError(f"{port.port_name} cannot run at {baud} bit/s: choose 57600 or 1000000")
+
+
+def _elsewhere(port: BusPort, kind: ServoKind, baud: int, tell: Tell) -> Iterator[FoundServo]:
+    """Search at all other baud rates."""
+    for other in kind.family.usual_rates:
+        if other == baud:
+            continue
+        tell(f"a servo is missing: asking at {other} bit/s")
+        if port.setBaudRate(other) and any_reply(port, kind.family):
+            yield from scan_ids(port, kind.family, other)[0]
+
+
+def judge_presence(presence: Presence, kind: ServoKind, baud: int) -> Iterator[Diagnostic]:
+    """Judge who is there and who is not."""
+    if presence.missing and not presence.there and not presence.elsewhere:
+        yield Diagnostic(
+            "error",
+            f"no servo answers, at {baud} bit/s or any other rate",
+            "the bus",
+            f"{kind.no_reply} gazerig scan asks other kinds of servos, too",
+        )
+        return
+    at = {found.id: found for found in presence.elsewhere}
+    for setup in presence.missing:
+        yield _missing(setup, at.pop(setup.id, None), presence.corrupt.get(setup.id, 0), baud)
+    for found in at.values():
+        yield Diagnostic(
+            "warn",
+            f"servo {found.id} ({found.model}) answers at {found.baud} bit/s and is none of the "
+            "missing",
+            "the bus",
+            "a new one? connect it alone and run gazerig setup",
+        )
+    for found in presence.strangers:
+        yield Diagnostic(
+            "warn",
+            f"servo {found.id} ({found.model}) answers and is not in the YAML",
+            "the bus",
+            "take it off the bus, or give it the id of a joint with gazerig setup",
+        )
+
+
+def _missing(setup: ServoConfig, at: FoundServo | None, spoilt: int, baud: int) -> Diagnostic:
+    where = servo_label(setup)
+    if at is not None:
+        return Diagnostic(
+            "error",
+            f"answers at {at.baud} bit/s, the rig's rate is {baud}",
+            where,
+            f"connect it alone and run gazerig setup --joint {setup.name}",
+        )
+    if spoilt:
+        return Diagnostic(
+            "error",
+            "answers in pieces only: two servos share its id, or a plug is loose",
+            where,
+            "connect it alone and look with gazerig scan",
+        )
+    return Diagnostic(
+        "error",
+        "does not answer",
+        where,
+        "check its two plugs; is its id set? gazerig setup, with it connected alone, tells",
+    )
+
+
+# --- fixes
+
+
+def fix_latency(device: str, host: Host) -> list[AppliedFix]:
+    """Set the adaptor's latency timer where it is too long; needs the right to write it."""
+    file = latency_file(device, host)
+    was = None if file is None else latency_ms(file)
+    if file is None or was is None or was <= RECOMMENDED_LATENCY_MS:
+        return []
+    done = set_latency(file)
+    how = "done" if done else f"not done, {file} may not be written"
+    return [AppliedFix(device, f"latency timer {was} -> {RECOMMENDED_LATENCY_MS} ms: {how}", done)]
+
+
+def apply_fixes(
+    write: Callable[[Fix], str], findings: Iterable[Diagnostic]
+) -> Iterator[AppliedFix]:
+    """Write what the findings offer, one after the other.
+
+    write: writes one, where that is safe; return "" or why it was not done
+
+    Raises:
+        BusLost: the port is gone.
+    """
+    for finding in findings:
+        for fix in finding.fixes:
+            why = write(fix)
+            yield AppliedFix(
+                finding.where, f"{fix}: {f'not done, {why}' if why else 'done'}", not why
+            )
+
+
+# --- the guardian
+
+
+def examine_guardian(plan: ReleasePlan) -> Diagnostic:
+    """Start a guardian, let it end again, and return what it would do; nothing is sent.
+
+    Args:
+        plan: what it would release.
+    """
+    guardian = Guardian((plan,))
+    try:
+        guardian.join(0)
+        guardian.wait_until_ready()
+    except SetupError as error:
+        return Diagnostic("error", str(error), "guardian", "torque stays off until it starts")
+    finally:
+        guardian.leave(0)
+    return Diagnostic(
+        "ok", f"{describe(plan)} within .5 s if the program dies or hangs", "guardian"
+    )

@@ -1,0 +1,106 @@
+"""A head moved by hand, without torque: its joints read at even times."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from gazerig.drivers.errors import DriverError, ServoFault, SetupError
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.features.bringup.monitor import TelemetrySample
+from gazerig.features.bringup.servo_families import kind_of
+from gazerig.gaze.types import Floats
+from gazerig.robot.model.clock import Clock
+from gazerig.robot.model.joint import JointParams
+
+RATE_HZ = 50.0
+LONGEST_S = 60.0
+_LEAST_SHARE = 0.5
+"""A joint that was silent at more readings than the rest of this is not recorded."""
+
+
+class HandRecording(NamedTuple):
+    """What was recorded.
+
+    series: times in seconds from the beginning, and angles in degrees, by joint
+    left_out: joints whose servos were silent too often
+    ended_by: why it ended
+    """
+
+    series: Mapping[str, tuple[Floats, Floats]]
+    left_out: tuple[str, ...]
+    ended_by: str
+
+
+def switch_off(joints: Mapping[str, JointParams], port: BusPort) -> None:
+    """Switch the torque of all servos of a line off, and see that it is.
+
+    All are tried, whatever one of them does.
+
+    Raises:
+        ServoFault: one does not let go, or does not answer.
+    """
+    holding = []
+    for name, joint in joints.items():
+        family = kind_of(joint.model).family
+        registers = Registers(port, family)
+        registers.write(joint.id, "torque_enable", 0)
+        if registers.read(joint.id, "torque_enable") != 0:
+            holding.append(f"{name} (servo {joint.id})")
+    if holding:
+        raise ServoFault(
+            f"{', '.join(holding)}: not known to have let go: cut the servo power, then find the "
+            "cause with gazerig doctor"
+        )
+
+
+def record(
+    sample: Callable[[], TelemetrySample],
+    clock: Clock,
+    stopped: Callable[[], str | None],
+    seconds: float = LONGEST_S,
+) -> HandRecording:
+    """Read the joints until the time is over or somebody ends it.
+
+    Args:
+        sample: reads every servo once.
+        clock: that of the ports.
+        stopped: returns why to end, None before.
+        seconds: longest time.
+
+    Raises:
+        SetupError: a torque came on: another program moves the head.
+        DriverError: a port is gone, or no servo answered.
+    """
+    start_s, rows = clock.now_s(), list[TelemetrySample]()
+    ended_by, slot = None, 0
+    while ended_by is None and clock.now_s() - start_s < seconds:
+        row = sample()
+        on = [name for name, seen in row.servos.items() if seen is not None and seen.torque]
+        if on:
+            raise SetupError(f"the torque of {on[0]} came on: another program moves the head")
+        rows.append(row)
+        ended_by = stopped()
+        slot = max(slot + 1, int((clock.now_s() - start_s) * RATE_HZ))
+        clock.sleep_until(start_s + slot / RATE_HZ)
+    return _gathered(rows, start_s, ended_by or "the time is over")
+
+
+def _gathered(rows: Sequence[TelemetrySample], start_s: float, ended_by: str) -> HandRecording:
+    """Turn readings into one row of times and angles for each joint."""
+    series, left_out = {}, []
+    for name in rows[0].servos if rows else ():
+        pairs = [
+            (row.at_s - start_s, seen.position_deg)
+            for row in rows
+            if (seen := row.servos[name]) is not None and seen.position_deg is not None
+        ]
+        if len(pairs) <= _LEAST_SHARE * len(rows):
+            left_out.append(name)
+        else:
+            times, angles = zip(*pairs, strict=True)
+            series[name] = np.array(times), np.array(angles)
+    if not series:
+        raise DriverError("no servo answered: check power, cable, ids and baud rate")
+    return HandRecording(series, tuple(left_out), ended_by)

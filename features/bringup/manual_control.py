@@ -1,0 +1,287 @@
+"""Moving a rig slowly, joint by joint or all at once, for bringing it up and for own programs.
+
+No camera, no attention. Every goal goes through the guard, and the caller gets back
+what was really applied:
+
+    control = ManualControl(body, guard, RealClock())
+    control.start()
+    try:
+        moved = control.jog("neck_yaw", 20.0)
+        print(moved.of("neck_yaw"))
+    finally:
+        control.stop()
+
+Between two calls nothing is sent: Dynamixel servos are held by their own bus watchdog, others
+stay at their last goal, or lose their torque where a guardian watches them
+(gazerig.robot.guardian, after .4 s), and the next call goes on from there.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import degrees, isfinite, radians, sqrt
+from typing import Annotated
+
+from gazerig.drivers.errors import SetupError
+from gazerig.features.bringup.move_result import GuardReasons, MoveResult, Step, outcome, standing
+from gazerig.gaze.minimum_jerk import Quintic
+from gazerig.params import Bounds
+from gazerig.robot.control.body import Body
+from gazerig.robot.control.command_choices import refuse_out_of_range
+from gazerig.robot.control.observers import left_out
+from gazerig.robot.control.power_down import Again
+from gazerig.robot.model.clock import Clock
+from gazerig.robot.model.commands import Jog
+from gazerig.robot.model.joint_limit import JointLimit
+from gazerig.robot.model.types import JointAngles, JointState
+from gazerig.robot.safety.guard import Guard
+
+_PEAK_SPEED, _PEAK_ACCEL = 1.875, 5.774
+"""Of a fifth-order polynomial from rest to rest, over distance/time and distance/time^2."""
+
+
+@dataclass(frozen=True)
+class JogParams:
+    """How slowly to move, and when a goal counts as reached."""
+
+    # fmt: off
+    speed_deg_s: Annotated[float, Bounds(0.5, 200), "top speed on the way; the guard's gentle speed holds as well"] = 20.0
+    accel_deg_s2: Annotated[float, Bounds(5, 5000), "top acceleration"] = 100.0
+    rate_hz: Annotated[float, Bounds(20, 500), "goals a second"] = 100.0
+    near_deg: Annotated[float, Bounds(0.1, 20), "nearer is arrived"] = 2.0
+    timeout_s: Annotated[float, Bounds(0.1, 30), "time to come near after the way is over"] = 2.0
+    # fmt: on
+
+
+DesiredPose = Callable[[JointState, float, float], JointAngles]
+"""Returns the desired pose for measured joints, the time, and the time since the step before."""
+
+Done = Callable[[Step], str | None]
+"""Returns how it ended, None while it goes on."""
+
+
+def no_reason() -> str | None:
+    """Return no reason to stop."""
+    return None
+
+
+class ManualControl:
+    """A rig whose goals come from a person.
+
+    Args:
+        body: the joints of one rig.
+        guard: the same rig's.
+        clock: the host's, or a simulated one with the emulated bus.
+        params: how slowly.
+        stopped: asked at every step; return why to stop, None while there is no reason.
+        watch: gets every step.
+    """
+
+    def __init__(
+        self,
+        body: Body,
+        guard: Guard,
+        clock: Clock,
+        params: JogParams | None = None,
+        stopped: Callable[[], str | None] = no_reason,
+        watch: Callable[[Step], None] | None = None,
+    ) -> None:
+        self.body = body
+        self._guard = guard
+        self._clock = clock
+        self._params = params if params is not None else JogParams()
+        self._stopped = stopped
+        self._watch = watch
+        self._goal: JointAngles = ()
+        self._said: list[str] = []
+
+    @property
+    def goal_rad(self) -> JointAngles:
+        """Return the goals in force."""
+        return self._goal
+
+    def start(self) -> JointAngles:
+        """Open the bus and switch torque on where the joints are; return the goals in force.
+
+        Raises:
+            SetupError: port or servos are not as configured.
+        """
+        self._goal = self.body.start()
+        self._guard.reset(self._clock.now_s(), self._goal)
+        return self._goal
+
+    def stop(self) -> tuple[str, ...]:
+        """Torque off and close the bus; return what the bus says of it."""
+        return self.body.stop()
+
+    def jog(self, joint: str, angle_deg: float) -> MoveResult:
+        """Move one joint slowly; the others hold where they are.
+
+        Raises:
+            SetupError: there is no such joint, or the angle is no number or
+                outside the joint's range.
+            DriverError: the bus is gone.
+        """
+        refuse_beyond(joint, angle_deg, self.body.names, self._guard.limits)
+        return self.pose({joint: angle_deg})
+
+    def pose(self, angles_deg: Mapping[str, float]) -> MoveResult:
+        """Move several joints slowly, so that they arrive together; the others hold.
+
+        Raises:
+            SetupError: there is no such joint, or an angle is no number.
+            DriverError: the bus is gone.
+        """
+        names = self.body.names
+        refuse_unknown(angles_deg, names)
+        desired = tuple(
+            radians(angles_deg[name]) if name in angles_deg else held
+            for name, held in zip(names, self._goal, strict=True)
+        )
+        moving = tuple(i for i, name in enumerate(names) if name in angles_deg)
+        start_s = self._clock.now_s()
+        ways = [Quintic((g, 0.0, 0.0), w, 1.0) for g, w in zip(self._goal, desired, strict=True)]
+        far = max((abs(desired[i] - self._goal[i]) for i in moving), default=0.0)
+        takes_s = duration_s(far, self._params)
+
+        def on_the_way(_: JointState, t_s: float, __: float) -> JointAngles:
+            share = min(1.0, (t_s - start_s) / takes_s)
+            return tuple(way.at(share)[0] for way in ways)
+
+        def there(step: Step) -> str | None:
+            if step.t_s - start_s < takes_s:
+                return None
+            return standing(step, desired, moving, radians(self._params.near_deg))
+
+        longest_s = takes_s + self._params.timeout_s
+        return self.follow(on_the_way, there, longest_s, desired, gently=True)
+
+    def hold(self, seconds: float) -> MoveResult:
+        """Hold the present goals for this long.
+
+        Raises:
+            DriverError: the bus is gone.
+        """
+        goal, end_s = self._goal, self._clock.now_s() + seconds
+
+        def over(step: Step) -> str | None:
+            return "arrived" if step.t_s >= end_s else None
+
+        return self.follow(
+            lambda *_: goal, lambda s: "arrived" if s.t_s >= end_s else None, seconds
+        )
+
+    def park(
+        self, angles_deg: Mapping[str, float], stopped: Callable[[], str | None] = no_reason
+    ) -> MoveResult:
+        """Move to a pose whatever asked for a stop so far; joints left out go to 0.
+
+        stopped: asked at every step; return why to stop, None while there is no reason
+
+        Raises:
+            DriverError: the bus is gone.
+        """
+        before, self._stopped = self._stopped, stopped
+        try:
+            return self.pose({name: angles_deg.get(name, 0.0) for name in self.body.names})
+        finally:
+            self._stopped = before
+
+    def follow(
+        self,
+        desired: DesiredPose,
+        done: Done,
+        longest_s: float,
+        ends_on: JointAngles | None = None,
+        gently: bool = False,
+    ) -> MoveResult:
+        """Send desired poses through the guard until ``done`` says how it ended.
+
+        longest_s: after that it has ended "not there in time"
+        ends_on: the pose that the result is judged by; None: the last one
+        gently: the guard goes slowly all the way, not only at the start
+
+        Raises:
+            DriverError: the bus is gone.
+        """
+        clock, period = self._clock, 1.0 / self._params.rate_hz
+        start_s = last_s = clock.now_s()
+        slot, notes, events = 0, GuardReasons(), list(self.body.bus.events())
+        while True:
+            slot = max(slot + 1, int((clock.now_s() - start_s) / period))
+            clock.sleep_until(start_s + slot * period)
+            if gently:
+                self._guard.go_gently()
+            step = self._step(desired, last_s)
+            last_s = step.t_s
+            notes.add(step.guard_result)
+            events += self.body.bus.events()
+            ended = done(step) or self._stopped()
+            ended = "torque_off" if step.guard_result.level == "torque_off" else ended
+            if ended is None and step.t_s - start_s >= longest_s:
+                ended = "not there in time"
+            if ended is not None:
+                break
+        self._goal = step.guard_result.command_rad
+        applied = outcome(step, step.desired_rad if ends_on is None else ends_on, notes)
+        level = step.guard_result.level
+        events += self._said
+        self._said.clear()
+        return MoveResult(ended, step.t_s - start_s, applied, level, tuple(events), step)
+
+    def _step(self, desired: DesiredPose, last_s: float) -> Step:
+        """Read, ask for the desired pose, guard, write."""
+        t_s = self._clock.now_s()
+        joints = self.body.read(t_s)
+        wanted = desired(joints, t_s, t_s - last_s)
+        # No camera is used here, so no frame can be too old.
+        guard_result = self._guard.check(wanted, joints, 0.0, t_s)
+        self.body.write(guard_result.command_rad)
+        step = Step(t_s, wanted, guard_result, joints)
+        if self._watch is not None:
+            try:
+                self._watch(step)
+            except Exception as error:
+                self._watch = None
+                self._said.append(left_out("who watches", error))
+        return step
+
+
+def parked(control: ManualControl, park_deg: Mapping[str, float], again: Again) -> str:
+    """Park slowly unless the user asks again for the end; return what to say of it."""
+    moved = control.park(park_deg, lambda: "interrupted" if again() else None)
+    return "parked" if moved.arrived else f"not parked ({moved})"
+
+
+def duration_s(distance_rad: float, params: JogParams) -> float:
+    """Return the time of a way from rest to rest that keeps to speed and acceleration."""
+    far = degrees(abs(distance_rad))
+    slow = _PEAK_SPEED * far / params.speed_deg_s
+    return max(0.05, slow, sqrt(_PEAK_ACCEL * far / params.accel_deg_s2))
+
+
+def refuse_unknown(angles_deg: Mapping[str, float], joints: tuple[str, ...]) -> None:
+    """Refuse what is no joint of the rig or no angle.
+
+    Raises:
+        SetupError: with what there is.
+    """
+    for name, angle in angles_deg.items():
+        if name not in joints:
+            raise SetupError(f"no joint {name!r}; there is {', '.join(joints)}")
+        if not isfinite(angle):
+            raise SetupError(f"{name}: {angle} is not an angle in degrees")
+
+
+def refuse_beyond(
+    joint: str, angle_deg: float, joints: tuple[str, ...], limits: Sequence[JointLimit]
+) -> None:
+    """Refuse an angle outside a joint's range, before anything moves.
+
+    Raises:
+        SetupError: with the range.
+    """
+    refuse_unknown({joint: angle_deg}, joints)
+    try:
+        refuse_out_of_range(Jog(((joint, radians(angle_deg)),)), joints, limits)
+    except ValueError as error:
+        raise SetupError(str(error)) from None

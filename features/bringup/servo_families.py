@@ -1,0 +1,118 @@
+"""The kinds of smart servos, each as bring-up deals with it: the only place that names makes."""
+
+from collections.abc import Callable
+
+from gazerig.drivers.bus.servo_models import SERVOS
+from gazerig.drivers.dynamixel import control_table as dynamixel
+from gazerig.drivers.dynamixel.family import DYNAMIXEL as DYNAMIXEL_FAMILY
+from gazerig.drivers.errors import SetupError
+from gazerig.drivers.feetech import homing
+from gazerig.drivers.feetech import memory_table as feetech
+from gazerig.drivers.feetech.family import FEETECH as FEETECH_FAMILY
+from gazerig.drivers.feetech.scs import FEETECH_SCS
+from gazerig.features.bringup.servo_family import Driving, ServoKind, Setting
+
+GENTLE_ACCELERATION = 10
+"""1000 steps/s2: a search begins within a tenth of a second."""
+
+
+def _dynamixel_load(model: str, current: int) -> float:
+    """Return Present Current, or Present Load where the model has that, as a share of the stall."""
+    return current * dynamixel.MODELS[model].load_unit
+
+
+def _feetech_load(model: str, current: int) -> float:
+    """Return Present Current as a share of the stall current."""
+    amperes = current * feetech.CURRENT_UNIT_MA / 1000.0
+    return amperes / feetech.MODELS[model].stall_current_a
+
+
+def _gentle_dynamixel(
+    value: Callable[[str], int], strength: float, speed_steps_s: float
+) -> dict[str, int]:
+    return {
+        "goal_pwm": max(1, round(value("pwm_limit") * strength)),
+        "profile_acceleration": 0,
+        "profile_velocity": max(1, round(speed_steps_s / dynamixel.VELOCITY_UNIT_STEPS_S)),
+    }
+
+
+def _gentle_feetech(
+    value: Callable[[str], int], strength: float, speed_steps_s: float
+) -> dict[str, int]:
+    return {
+        "torque_limit": max(1, round(feetech.TORQUE_FULL * strength)),
+        "goal_time": 0,
+        "goal_speed": feetech.speed_units(speed_steps_s),
+        "acceleration": GENTLE_ACCELERATION,
+    }
+
+
+DYNAMIXEL = ServoKind(
+    name="dynamixel",
+    title="Dynamixel",
+    family=DYNAMIXEL_FAMILY,
+    no_reply="is the servo supply on? does each servo's LED flash once when it comes on? is the "
+    "adaptor's plug the TTL one (3 pins), and the first cable in?",
+    notes=(),
+    driving=Driving(
+        settings=(Setting("operating_mode", 3), Setting("drive_mode", 0)),
+        offset="homing_offset",
+        offset_usable=False,
+        full_drive=("goal_pwm", "pwm_limit"),
+        gentle=_gentle_dynamixel,
+        load=_dynamixel_load,
+    ),
+)
+
+FEETECH = ServoKind(
+    name="feetech",
+    title="Feetech STS",
+    family=FEETECH_FAMILY,
+    no_reply="is the servo supply on, and its voltage that of the servos (7.4 or 12 V)? is the "
+    "first cable in, and the adaptor's jumper set to USB?",
+    notes=(
+        "an STS has no bus watchdog: if the cable or the computer dies it holds its last goal; "
+        "keep the switch of the servo supply at hand",
+    ),
+    driving=Driving(
+        settings=(
+            Setting("operating_mode", 0),
+            Setting("phase", 0, feetech.MULTI_TURN),
+            Setting("angular_resolution", 1),
+        ),
+        offset="position_offset",
+        offset_usable=True,
+        full_drive=None,
+        gentle=_gentle_feetech,
+        load=_feetech_load,
+    ),
+    set_middle=homing.set_middle,
+)
+
+SCS = FEETECH._replace(
+    title="Feetech SCS",
+    family=FEETECH_SCS,
+    no_reply="is the servo supply on, and its voltage that of the servos (6 V)? is the first "
+    "cable in, and the adaptor's jumper set to USB?",
+    notes=tuple(note.replace("STS", "SCS") for note in FEETECH.notes),
+    driving=None,
+    set_middle=None,
+)
+
+KINDS: dict[str, ServoKind] = {kind.name: kind for kind in (DYNAMIXEL, FEETECH)}
+"""By the name that a rig's YAML gives a bus; its servos are searched for as this kind."""
+
+_KIND_OF = {kind.family.name: kind for kind in (*KINDS.values(), SCS)}
+
+
+def kind_of(model: str) -> ServoKind:
+    """Return the kind of a servo by its model.
+
+    Raises:
+        SetupError: it is no smart servo.
+    """
+    kind = _KIND_OF.get(SERVOS[model].family)
+    if kind is None:
+        raise SetupError(f"{model} is no servo that answers: name a joint with a smart servo")
+    return kind

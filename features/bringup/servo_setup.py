@@ -1,0 +1,195 @@
+"""Finding the one servo that is connected, and giving it its id and baud rate.
+
+Only one servo may be connected: two with one id cannot be told apart, and an id given to
+both would make it worse.
+
+Id and baud rate act at once, after the status of their own write. Where the memory has a lock
+they are written with it open, or they would hold until the next power-off only; it is closed
+under the new id and at the new rate. Sources: ROBOTIS e-Manual; Feetech memory table STS3215.
+"""
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from gazerig.drivers.bus.servo_models import servo_label
+from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
+from gazerig.drivers.serial.port import BusPort
+from gazerig.drivers.servo_bus.discovery import (
+    SHARED,
+    FoundServo,
+    any_reply,
+    corrupt,
+    ping,
+    scan_ids,
+)
+from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.types import ServoConfig
+from gazerig.features.bringup.servo_family import ServoKind, Tell
+
+
+class SetUp(NamedTuple):
+    """What has become of one servo: as it was found, as it is now, and what was written."""
+
+    before: FoundServo
+    now: FoundServo
+    done: tuple[str, ...]
+
+
+def search_order(kind: ServoKind, baud: int) -> tuple[int, ...]:
+    """List all baud rates, those that a servo is likely to have first."""
+    return tuple(dict.fromkeys((kind.family.factory_baud, baud, *kind.family.usual_rates)))
+
+
+def find_alone(port: BusPort, kind: ServoKind, bauds: Sequence[int], tell: Tell) -> FoundServo:
+    """Find the one servo that is connected, whatever its id and baud rate; all rates are asked.
+
+    Raises:
+        ServoMissing: none answers, or more than one.
+        PortError: the port cannot be opened.
+        BusLost: it has gone away.
+    """
+    found: list[FoundServo] = []
+    junk = 0
+    for baud in bauds:
+        tell(f"asking at {baud} bit/s")
+        if not port.setBaudRate(baud) or (found and not any_reply(port, kind.family)):
+            continue
+        answers, noise = scan_ids(port, kind.family, baud)
+        found += answers
+        junk += noise
+        shared = answers and corrupt(port, kind.family, answers[0].id) >= SHARED
+        found += [answers[0]] if shared else []
+    where = port.port_name
+    if len(found) > 1:
+        raise ServoMissing(f"{where}: {_crowd(found)}: connect one servo alone")
+    if not found and junk:
+        raise ServoMissing(
+            f"{where}: answers in pieces only: connect one servo alone, and check its plug"
+        )
+    if not found:
+        raise ServoMissing(
+            f"{where}: no servo answers at any baud rate: is its supply on, its plug in?"
+        )
+    return found[0]
+
+
+def _crowd(found: Iterable[FoundServo]) -> str:
+    named = [f"id {one.id} ({one.model}) at {one.baud} bit/s" for one in found]
+    if len(set(named)) < len(named):
+        return f"two servos answer as {named[0]}"
+    return f"{len(named)} servos answer: {', '.join(named)}"
+
+
+def refuse_model(found: FoundServo, kind: ServoKind, setup: ServoConfig, where: str) -> None:
+    """See that the servo found is of the model the joint wants.
+
+    Raises:
+        ServoMissing: it is another.
+    """
+    if found.number != kind.family.models[setup.model].number:
+        raise ServoMissing(
+            f"{where}: this is {found.model}, {servo_label(setup)} wants {setup.model}: "
+            "connect the right one, or correct the model in the YAML"
+        )
+
+
+def assign(
+    port: BusPort, kind: ServoKind, found: FoundServo, setup: ServoConfig, baud: int, tell: Tell
+) -> SetUp:
+    """Return the servo found the id of a joint and the bus's baud rate, and see that it has them.
+
+    Its torque goes off. Whatever goes wrong, the message says where the servo now answers.
+
+    Raises:
+        ValueError: there is no such id or baud rate.
+        ServoMissing: of another model, or is not found again.
+        ServoFault: it refuses.
+        PortError: the adaptor cannot run at a rate.
+        BusLost: the port is gone.
+    """
+    refuse_model(found, kind, setup, port.port_name)
+    if not 0 <= setup.id <= kind.family.highest_id:
+        raise ValueError(f"id {setup.id} is not in 0..{kind.family.highest_id}")
+    if baud not in kind.family.baud_rates:
+        raise ValueError(f"{baud} bit/s is none of {', '.join(map(str, kind.family.baud_rates))}")
+    return _Assignment(port, kind, found).carry_out(setup.id, baud, tell)
+
+
+class _Assignment:
+    """One servo alone on a line, being given its id and baud rate."""
+
+    def __init__(self, port: BusPort, kind: ServoKind, found: FoundServo) -> None:
+        self._port, self._kind, self._found = port, kind, found
+        self._registers = Registers(port, kind.family)
+        self._id, self._baud = found.id, found.baud
+        self._done: list[str] = []
+
+    def carry_out(self, servo_id: int, baud: int, tell: Tell) -> SetUp:
+        """Write what differs, and see that the servo answers so."""
+        registers, kind = self._registers, self._kind
+        self._open(self._found.baud)
+        self._torque_off()
+        if self._id != servo_id:
+            tell(f"id {self._id} -> {servo_id}")
+            self._change_id(servo_id)
+        rate = kind.family.baud_rates.index(baud)
+        if self._baud != baud or registers.read(self._id, "baud_rate") != rate:
+            tell(f"baud rate {self._baud} -> {baud}")
+            self._change_baud(baud)
+        seen = ping(self._port, kind.family, self._id, self._baud, 3)
+        if seen is None or seen.number != self._found.number:
+            raise ServoMissing(
+                f"{self._port.port_name}: the servo does not answer as id {self._id} at "
+                f"{self._baud} bit/s: gazerig scan tells where it is"
+            )
+        if kind.family.lock is not None and not registers.settle(self._id, kind.family.lock, 1):
+            raise self._refused("close its lock")
+        return SetUp(self._found, seen, tuple(self._done))
+
+    def _torque_off(self) -> None:
+        """Make the servo reply to every instruction, and switch its torque off."""
+        registers = self._registers
+        registers.write_all((self._id,), "status_return_level", self._kind.family.answer_level)
+        if registers.read(self._id, "torque_enable"):
+            if not registers.write(self._id, "torque_enable", 0):
+                raise self._refused("let its torque go")
+            self._done.append("torque 1 -> 0")
+
+    def _change_id(self, servo_id: int) -> None:
+        self._unlock()
+        written = self._registers.write(self._id, "id", servo_id)
+        # The confirmation may come from either id, or be lost.
+        if not written and ping(self._port, self._kind.family, servo_id, self._baud, 2) is None:
+            raise self._refused(f"take the id {servo_id}")
+        self._done.append(f"id {self._id} -> {servo_id}")
+        self._id = servo_id
+
+    def _change_baud(self, baud: int) -> None:
+        self._unlock()
+        written = self._registers.write(
+            self._id, "baud_rate", self._kind.family.baud_rates.index(baud)
+        )
+        if not written and self._registers.refusal:  # a mere silence may be a lost confirmation
+            raise self._refused(f"take {baud} bit/s")
+        self._done.append(f"baud rate {self._baud} -> {baud} bit/s")
+        self._baud = baud
+        self._open(baud)
+
+    def _unlock(self) -> None:
+        lock = self._kind.family.lock
+        if lock is not None and not self._registers.write(self._id, lock, 0):
+            raise self._refused("open its lock")
+
+    def _open(self, baud: int) -> None:
+        if not self._port.setBaudRate(baud):
+            raise PortError(
+                f"{self._port.port_name} cannot run at {baud} bit/s: choose another rate"
+            )
+
+    def _refused(self, what: str) -> ServoFault:
+        refusal = self._registers.refusal
+        reason = f"error {refusal}" if refusal else "no answer"
+        return ServoFault(
+            f"{self._port.port_name}: the servo does not {what} ({reason}); it answered last as id "
+            f"{self._id} at {self._baud} bit/s: switch its power off and on and try again"
+        )

@@ -1,1 +1,0 @@
-"""Getting a real rig to move for the first time, and keeping it well."""

@@ -1,0 +1,109 @@
+"""Servos for the doctor to examine, well ones and others."""
+
+import pytest
+
+from gazerig.drivers.feetech.memory_table import REGISTERS
+from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.types import ServoConfig
+from gazerig.features.bringup.doctor.checks import apply_fix
+from gazerig.features.bringup.doctor.run import apply_fixes, check, check_all
+from gazerig.features.bringup.servo_families import DYNAMIXEL, FEETECH
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.feetech.chain import build_feetech
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
+
+BAUD = 1_000_000
+
+
+RANGES = ((1, 1650, 2446, "left_eye_pan"), (2, 1650, 2446, "left_eye_tilt"),
+          (7, 1252, 2844, "neck_yaw"))  # fmt: skip
+
+
+EYE = {"dynamixel": "xl330-m077", "feetech": "sts3215"}
+
+
+NECK = {"dynamixel": "xc330-m288", "feetech": "sts3215"}
+
+
+SPEED = {"dynamixel": 6000.0, "feetech": 3000.0}
+
+
+PAN, TILT, YAW = "left_eye_pan (servo 1)", "left_eye_tilt (servo 2)", "neck_yaw (servo 7)"
+
+
+each = pytest.mark.parametrize("kind", [DYNAMIXEL, FEETECH], ids=lambda kind: kind.name)
+
+
+def setups_of(kind):
+    return tuple(
+        ServoConfig(i, (NECK if i == 7 else EYE)[kind.name], low, high,
+                   2000.0 if i == 7 else SPEED[kind.name], name)
+        for i, low, high, name in RANGES
+    )  # fmt: skip
+
+
+class Rig:
+    """Three servos in this process, set as the rig wants them; some may be spoilt."""
+
+    def __init__(self, kind, specs=None):
+        self.kind, self.setups, self.now_s = kind, setups_of(kind), 10.0
+        specs = specs or [ServoSpec(s.id, s.model, 2048) for s in self.setups]
+        build = build_feetech if kind is FEETECH else build_dynamixel
+        self.chain = build(specs, lambda: self.now_s, baud=BAUD)
+        self.port = InProcessPort(self.chain)
+        self.port.setBaudRate(BAUD)
+        self.reported = []
+        for setup in self.setups:
+            if any(spec.id == setup.id for spec in specs):
+                self.set(setup.id, return_delay_time=0, min_position_limit=setup.min_steps,
+                         max_position_limit=setup.max_steps)  # fmt: skip
+
+    def set(self, servo_id, **values):
+        servo = self.chain[servo_id]
+        if self.kind is DYNAMIXEL:
+            for name, value in values.items():
+                servo.memory.set(name, value)
+        else:
+            servo.write(55, b"\0")
+            for name, value in values.items():
+                servo.write(REGISTERS[name].address, REGISTERS[name].encode(value))
+            servo.write(55, bytes((values.get("lock", 1),)))
+        self.pass_time()
+        self.chain.refresh()
+
+    def hold(self, servo_id):
+        self.chain[servo_id].write(64 if self.kind is DYNAMIXEL else 40, b"\x01")
+
+    def get(self, servo_id, name):
+        return Registers(self.port, self.kind.family).read(servo_id, name)
+
+    def command(self, text):
+        self.port.faults.command(text)
+        self.pass_time()
+
+    def pass_time(self, seconds=0.1):
+        self.now_s += seconds
+        self.chain.positions_steps()
+
+    def kept(self):
+        """Return what the servos hold, without what lives."""
+        end = 120 if self.kind is DYNAMIXEL else 56
+        return [bytes(self.chain[i].memory.bytes[:end]) for i in (1, 2, 7)]
+
+    def check(self):
+        self.reported.clear()
+        return check(self.port, self.kind, self.setups, BAUD, self.reported.append)
+
+    def fix(self, findings):
+        return list(apply_fixes(lambda fix: apply_fix(self.port, self.kind, fix), findings))
+
+    def check_all(self, host):
+        return check_all(self.port, host, self.check)
+
+
+def one(findings, level, where, words):
+    """Return the finding of this level at this place that says these words."""
+    named = [f for f in findings if f.level == level and f.where == where and words in f.what]
+    assert len(named) == 1, [str(f) for f in findings]
+    return named[0]

@@ -1,0 +1,180 @@
+"""Searching a port for every kind: who is found, and that nobody is moved or changed by it."""
+
+import pytest
+
+from gazerig.drivers.dynamixel.family import DYNAMIXEL
+from gazerig.features.bringup.bus_search import (
+    BOARD_RATES,
+    SearchRound,
+    found_of,
+    known_kinds,
+    plan,
+    search,
+)
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.feetech.chain import build_feetech
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.maestro.board import build_board
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
+
+ALL = known_kinds("all")
+FEW = (1_000_000, 57_600)
+MICRO, MINI = "1ffb:0089", "1ffb:008a"
+
+
+class Line:
+    """A port in this process, and all that was sent through it."""
+
+    def __init__(self, device):
+        self.device, self.sent = device, b""
+        self.port = InProcessPort(device, self.tap)
+
+    def tap(self, data):
+        self.sent += data
+
+    def search(self, rates=FEW, usb="", to_the_end=False, thorough=False):
+        return list(search(self.port, usb, plan(usb, ALL, rates), thorough, to_the_end))
+
+
+def maestro(channels=12, crc=False, **chosen):
+    board = build_board(channels, lambda: 0.0, crc=crc)
+    for case, value in chosen.items():
+        board.choose(case.replace("_", "-"), value)
+    return board
+
+
+# --- a board is never sent what moves it
+
+BOARDS = {
+    "as from the shop": maestro(),
+    "micro": maestro(6),
+    "with check bytes": maestro(crc=True),
+    "detects its rate": maestro(mode="uart-detect"),
+    "fixed 9600": build_board(12, lambda: 0.0, baud=9600),
+    "another number": build_board(24, lambda: 0.0, device=3),
+}
+
+
+@pytest.mark.parametrize("board", BOARDS.values(), ids=list(BOARDS))
+@pytest.mark.parametrize("to_the_end", [False, True])
+def test_a_board_is_recognised_before_anything_could_move_it(board, to_the_end):
+    board.choose("on-error", "ignore")
+    board.exchange(bytes.fromhex("AA0C0403102F"), 9600)
+    before = [one["target"] for one in board.faults.reports()]
+    line = Line(board)
+    rounds = line.search(rates=None, to_the_end=to_the_end)
+    assert rounds[-1].board is not None and {one.kind for one in rounds} == {"maestro"}
+    assert b"\xff" not in line.sent
+    assert [one["target"] for one in board.faults.reports()] == before
+
+
+def test_a_port_of_pololu_is_never_sent_servo_packets_even_where_nobody_answers():
+    board = maestro(mode="mute")
+    line = Line(board)
+    (only,) = line.search(usb=MINI, rates=None, to_the_end=True)
+    assert only.board is None and line.sent and b"\xff" not in line.sent
+    for kind in ("dynamixel", "feetech"):
+        assert plan(MINI, known_kinds(kind), None) == ()
+    assert plan(MICRO, ALL, (1_000_000,)) == (("maestro", BOARD_RATES[0]),)
+
+
+def test_a_board_on_usb_tells_its_size_by_its_product():
+    board = maestro(6)
+    (only,) = Line(board).search(usb=MICRO)
+    assert only.channels == 6 and only.board.pulses == (0,) * 6
+    (unknown,) = Line(board).search()
+    assert unknown.channels is None
+    assert board.faults.board()["errors"] == []
+
+
+def test_pulses_go_on_while_it_is_asked():
+    board = maestro()
+    board.exchange(bytes.fromhex("84 00 70 2E"))
+    (only,) = Line(board).search(usb=MINI)
+    assert only.board.pulses[0] == 6000 == board.faults.reports()[0]["position"]
+
+
+def test_kinds_that_are_named_are_asked_and_no_other():
+    assert {kind for kind, _ in plan("", ("feetech",), None)} == {"feetech"}
+    assert {kind for kind, _ in plan("", ("dynamixel",), None)} == {"dynamixel"}
+    # Whether a board is there is asked at whatever rate, before servo packets are sent.
+    assert plan("", ALL, (4_500_000,)) == (
+        ("maestro", BOARD_RATES[0]),
+        ("dynamixel", 4_500_000),
+    )
+
+
+# --- servos of each kind hear the other's packets and are left as they are
+
+
+def memory(servo):
+    return bytes(servo.memory.bytes[:80])
+
+
+def test_dynamixel_servos_are_found_and_the_search_ends_there():
+    chain = build_dynamixel([ServoSpec(1, "xl330-m077"), ServoSpec(7, "xc330-m288")], lambda: 0.0)
+    rounds = Line(chain).search()
+    assert {one.kind for one in rounds} == {"maestro", "dynamixel"}
+    kinds = {(kind, servo.id) for kind, servo in found_of(rounds)}
+    assert kinds == {("dynamixel", 1), ("dynamixel", 7)}
+
+
+def test_no_packet_changes_dynamixel_servos():
+    chain = build_dynamixel([ServoSpec(i, "xl330-m077") for i in (1, 2, 253 - 1)], lambda: 0.0)
+    for servo in chain.servos:
+        servo.memory.set("return_delay_time", 77)
+    before = [memory(servo) for servo in chain.servos]
+    places = chain.positions_steps()
+    line = Line(chain)
+    rounds = line.search(to_the_end=True, thorough=True)
+    assert {one.kind for one in rounds} == set(ALL)
+    assert bytes.fromhex("FFFF0104020009") in line.sent  # an STS packet went over the line
+    assert [memory(servo) for servo in chain.servos] == before
+    assert chain.positions_steps() == places
+    assert not any(one.found for one in rounds if one.kind == "feetech")
+
+
+def test_no_packet_changes_sts_servos():
+    chain = build_feetech([ServoSpec(i, "sts3215", 1900 + i) for i in (1, 49, 253)], lambda: 0.0)
+    before = [chain[i].read(0, 56) for i in (1, 49, 253)]
+    places = chain.positions_steps()
+    rounds = Line(chain).search(to_the_end=True, thorough=True)
+    assert {(kind, servo.id) for kind, servo in found_of(rounds)} == {
+        ("feetech", 1), ("feetech", 49), ("feetech", 253),
+    }  # fmt: skip
+    assert [chain[i].read(0, 56) for i in (1, 49, 253)] == before
+    assert chain.positions_steps() == places
+    assert not any(one.found for one in rounds if one.kind == "dynamixel")
+
+
+def test_nobody():
+    chain = build_dynamixel([ServoSpec(1, "xl330-m077")], lambda: 0.0, baud=2_000_000)
+    rounds = Line(chain).search(rates=(57_600,))
+    assert [(one.kind, one.baud) for one in rounds] == [
+        ("maestro", 57_600), ("dynamixel", 57_600), ("feetech", 57_600),
+    ]  # fmt: skip
+    assert not any(one.answered for one in rounds)
+
+
+def test_all_rates_of_a_kind_are_in_the_plan():
+    rows = plan("", ALL, None)
+    assert [rate for kind, rate in rows if kind == "dynamixel"] == list(DYNAMIXEL.usual_rates)
+    assert rows[0] == ("maestro", 115_200)
+
+
+def test_words_for_kinds():
+    assert known_kinds("feetech") == ("feetech",)
+    with pytest.raises(ValueError, match="pca: not all or one of dynamixel, feetech, maestro"):
+        known_kinds("pca")
+    assert not SearchRound("feetech", 9600).answered
+
+
+def test_sts_servos_that_answer_no_ping_to_everybody_are_found_by_a_thorough_search():
+    chain = build_feetech([ServoSpec(5, "sts3215")], lambda: 0.0)
+    chain.choose("broadcast-ping", "silence")
+    line = Line(chain)
+    asked = plan("", ("feetech",), (1_000_000,))
+    assert not any(one.found for one in search(line.port, "", asked))
+    assert len(line.sent) < 100
+    (one,) = search(line.port, "", asked, thorough=True)
+    assert [servo.id for servo in one.found] == [5]

@@ -1,0 +1,310 @@
+"""Bad conditions of a camera are told once as they begin and once as they end; good ones never."""
+
+from dataclasses import replace
+from functools import cache
+from math import nan, radians
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from present import present
+from seeing.material import background, carphone, noisy, paste, portrait
+
+from gazerig.drivers.camera.frame_analysis import FrameAnalyzer
+from gazerig.drivers.camera.guarded_camera import fault_of
+from gazerig.drivers.camera.health import (
+    FIELD_TEXT,
+    CameraHealth,
+    HealthModel,
+    Judged,
+    PictureStats,
+    TurnedFaces,
+    picture_stats,
+)
+from gazerig.drivers.camera.source import Shot
+from gazerig.drivers.errors import CameraError
+from gazerig.drivers.types import DetectedFace
+from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
+from gazerig.drivers.vision.face.params import FaceDetectorParams
+from gazerig.features.bringup.doctor.camera import examine_camera
+from gazerig.features.bringup.doctor.diagnostics import Diagnostic
+from gazerig.robot.model.frames import CameraParams, LensParams
+from gazerig.robot.perception.frame_locator import FrameLocator
+
+WIDTH, HEIGHT = 640, 480
+FAST = {"faces": 0.01}
+GOOD = PictureStats(200.0, 4.0)
+
+
+@cache
+def room(people: int = 2) -> np.ndarray:
+    """Return a real room with real heads in it."""
+    image = background(WIDTH, HEIGHT).copy()
+    for k, name in enumerate(("astronaut", "hopper")[:people]):
+        paste(image, portrait(name), (200.0 + 240.0 * k, 220.0), 36.0)
+    image.setflags(write=False)
+    return image
+
+
+def turned(image: np.ndarray, clockwise_deg: float) -> np.ndarray:
+    turn = cv2.getRotationMatrix2D((WIDTH / 2.0, HEIGHT / 2.0), -clockwise_deg, 1.0)
+    return cv2.warpAffine(image, turn, (WIDTH, HEIGHT), borderMode=cv2.BORDER_REPLICATE)
+
+
+def blurred(image: np.ndarray, px: float) -> np.ndarray:
+    soft = np.asarray(cv2.GaussianBlur(image, (0, 0), px), np.uint8)
+    return noisy(soft, 2.0, np.random.default_rng(1))
+
+
+def looked(
+    images: list[np.ndarray], detector: Any = None, rotation: int = 0
+) -> tuple[list[str], tuple[str, ...]]:
+    """Return what is told of frames that are a second apart, and the conditions at their end."""
+    health, told = CameraHealth(rotation), list[str]()
+    conditions: tuple[str, ...] = ()
+    for k, image in enumerate(images):
+        faces = detector.find(image) if detector is not None else ()
+        conditions = health.look(Shot(float(k), k + 1, image), faces, FAST)
+        told += health.events()
+    return told, conditions
+
+
+def stepped(model: HealthModel, count: int, **seen: Any) -> list[str]:
+    return [line for _ in range(count) for line in model.step(Judged(GOOD, True)._replace(**seen))]
+
+
+@pytest.mark.parametrize(
+    ("bad", "begins", "ends"),
+    [
+        (room() // 16, "camera: the picture is too dark: ", "bright enough again"),
+        (np.zeros((HEIGHT, WIDTH, 3), np.uint8), "camera: the picture is black: uncover", "bright"),
+        (blurred(room(), 5.0), "camera: the picture is out of focus: ", "sharp again"),
+    ],
+)
+def test_a_bad_picture_is_told_as_it_begins_and_as_it_ends(bad, begins, ends):
+    good = np.asarray(room())
+    told, conditions = looked([good] * 3 + [bad] * 20)
+    assert len(told) == 1 and told[0].startswith(begins)
+    assert conditions == (told[0].removeprefix("camera: "),)
+    told, conditions = looked([bad] * 20 + [good] * 20)
+    assert len(told) == 2 and told[1].endswith(ends) or ends in told[1]
+    assert conditions == ()
+
+
+def test_what_comes_and_goes_is_not_told():
+    bad, good = room() // 16, np.asarray(room())
+    assert looked(([bad] * 3 + [good] * 2) * 6) == ([], ())
+    model = HealthModel()
+    stepped(model, 5, picture=PictureStats(20.0, None))
+    # Between the two limits it stays as it is.
+    assert not stepped(model, 20, picture=PictureStats(40.0, None)) and model.conditions
+    assert stepped(model, 20, picture=PictureStats(50.0, None)) == [
+        "camera: the picture is bright enough again"
+    ]
+    assert not stepped(model, 20, picture=PictureStats(40.0, None))
+
+
+@pytest.mark.parametrize(
+    "image",
+    [
+        np.asarray(room()),
+        np.asarray(room(0)),
+        blurred(room(), 1.5),
+        noisy(room() // 4, 4.0, np.random.default_rng(2)),
+        noisy(np.full((HEIGHT, WIDTH, 3), 128, np.uint8), 5.0, np.random.default_rng(3)),
+        np.full((HEIGHT, WIDTH, 3), 200, np.uint8),
+    ],
+    ids=["people", "nobody", "soft", "dim and noisy", "wall", "one colour"],
+)
+def test_good_pictures_are_left_alone(image):
+    detector = MtcnnDetector(FaceDetectorParams())
+    assert looked([image] * 18, detector) == ([], ())
+
+
+def test_a_wall_with_a_soft_shadow_is_not_out_of_focus():
+    y, x = np.mgrid[:HEIGHT, :WIDTH]
+    wall = 200.0 - 75.0 * (((x - 320) / 320.0) ** 2 + ((y - 240) / 240.0) ** 2)
+    wall -= 60.0 / (1.0 + np.exp((x - 250) / 12.0))
+    image = noisy(
+        wall.astype(np.float32)[..., np.newaxis].repeat(3, 2), 2.0, np.random.default_rng(4)
+    )
+    assert present(picture_stats(image)).edge_px is None
+
+
+def test_edges_widen_with_blur_and_not_with_darkness():
+    widths = [
+        present(present(picture_stats(blurred(room(), px))).edge_px) for px in (0.5, 2.0, 4.0, 6.0)
+    ]
+    assert widths == sorted(widths) and widths[0] < 5.0 and widths[2] > 8.5
+    dark = noisy(room() // 3, 2.0, np.random.default_rng(5))
+    assert present(present(picture_stats(dark)).edge_px) < 5.0
+
+
+def test_a_film_is_left_alone():
+    film, images = cv2.VideoCapture(str(carphone())), list[np.ndarray]()
+    while (read := film.read())[0] and len(images) < 60:
+        images.append(read[1])
+    assert looked(images[::3], MtcnnDetector(FaceDetectorParams())) == ([], ())
+
+
+@pytest.mark.parametrize(
+    ("deg", "says", "rotation", "set_to"),
+    [
+        (180, "turned by 180 deg", 0, 180),
+        (90, "turned by 90 deg", 0, 270),
+        (270, "turned by 270 deg", 0, 90),
+        (90, "turned by 90 deg", 90, 0),
+        (180, "turned by 180 deg", 270, 90),
+    ],
+)
+def test_a_turned_camera_is_told_with_its_rotation(deg, says, rotation, set_to):
+    found = TurnedFaces()
+    image = turned(room(), deg)
+    at = [found.find(image) for _ in range(3)]
+    off = [abs((present(one) - deg + 180.0) % 360.0 - 180.0) for one in at if one]
+    assert off and max(off) < 15.0
+    model = HealthModel(rotation)
+    assert not stepped(model, 5, upright=False)
+    assert model.lacks_upright
+    told = stepped(model, 8, upright=False, turned_deg=max(at, key=lambda one: abs(one or 0.0)))
+    assert len(told) == 1 and says in told[0]
+    assert told[0].endswith(f"set camera.rotation: {set_to}")
+    assert stepped(model, 20) == ["camera: the picture is upright again"]
+
+
+@pytest.mark.parametrize("deg", [-70, -40, 40, 70])
+def test_a_rolled_camera_is_told_by_about_how_much(deg):
+    roll = present(TurnedFaces().find(turned(room(), deg), True))
+    assert abs(roll - deg) < 20.0
+
+
+def test_an_upside_down_camera_is_found_and_its_end_too():
+    down = np.ascontiguousarray(room()[::-1, ::-1])
+    told, _ = looked([down] * 22 + [np.asarray(room())] * 20, MtcnnDetector(FaceDetectorParams()))
+    assert [line.split(":")[1] for line in told] == [
+        " the camera is turned by 180 deg, by the faces that it shows",
+        " the picture is upright again",
+    ]
+
+
+def test_searches_that_do_not_agree_are_not_told():
+    model = HealthModel()
+    for turned_deg in (180.0, 180.0, 90.0, 180.0, 0.0, 180.0) * 4:
+        assert not model.step(Judged(GOOD, False, turned_deg))
+
+
+def test_frames_that_come_too_fast_are_told_with_the_stage():
+    health, told = CameraHealth(), list[str]()
+    for k in range(60):  # 60 a second, of which 8 are looked at
+        shot = Shot(k / 8.0, 1 + round(7.5 * k), np.asarray(room()))
+        health.look(shot, (), {"faces": 0.01, "motion": 0.1})
+        told += health.events()
+    assert told == [
+        "camera: 8 of 60 frames a second are looked at; motion takes 100 of 125 ms a frame: "
+        "lower motion.work_px, or set motion.enabled: false"
+    ]
+    for k in range(60, 200):
+        health.look(Shot(k / 8.0, 391 + k, np.asarray(room())), (), FAST)
+        told += health.events()
+    assert told[1:] == ["camera: frames are looked at in time again"]
+
+
+def test_twenty_of_sixty_frames_are_enough():
+    assert not stepped(HealthModel(), 20, offered=60, looked_at=20, over_s=1.0)
+    assert stepped(HealthModel(), 20, offered=120, looked_at=16, over_s=2.0)
+
+
+class Nobody:
+    def find(self, image: Any) -> tuple[DetectedFace, ...]:
+        return ()
+
+
+def test_an_assumed_field_of_view_is_told_until_it_is_known():
+    unknown = FrameLocator(None, radians(69.0))
+    frames = FrameAnalyzer(Nobody(), None, unknown, has_unknown_lens=True)
+    shots = [Shot(float(k), k, np.asarray(room(0))) for k in range(1, 9)]
+    assert frames.look(shots[0]).conditions == (FIELD_TEXT,)
+    assert frames.events() == (f"camera: {FIELD_TEXT}",)
+    assert frames.look(shots[1]).conditions == (FIELD_TEXT,) and frames.events() == ()
+    frames.retune(None, None, FrameLocator(None, radians(84.0)))
+    assert frames.look(shots[2]).conditions == ()
+    assert frames.events() == ("camera: the field of view is known now",)
+    lens = LensParams(WIDTH, HEIGHT, 500.0, 500.0, 320.0, 240.0)
+    for locate, unknown_lens in ((FrameLocator(lens, radians(69.0)), True), (unknown, False)):
+        known = FrameAnalyzer(Nobody(), None, locate, has_unknown_lens=unknown_lens)
+        assert known.look(shots[3]).conditions == ()
+
+
+@pytest.mark.parametrize(
+    "image",
+    [
+        np.full((HEIGHT, WIDTH, 3), nan),
+        np.zeros((HEIGHT, WIDTH), np.uint8),
+        np.zeros((0, 0, 3), np.uint8),
+        np.zeros((1, 1, 3), np.uint8),
+        np.zeros((4, 5000, 3), np.uint8),
+    ],
+    ids=["nan", "grey", "empty", "one pixel", "strip"],
+)
+def test_pictures_that_are_none_are_borne(image):
+    told, _ = looked([image] * 30)
+    assert len(told) <= 1
+    assert TurnedFaces().find(image) in (None, 0.0)
+
+
+def test_times_that_stand_still_or_run_back_are_borne():
+    health = CameraHealth()
+    for t_s in (5.0, 5.0, nan, 1.0, -3.0, float("inf"), 2.0, 1e9, 3.0):
+        assert health.look(Shot(t_s, 1, np.asarray(room())), (), FAST) == ()
+    assert health.events() == ()
+
+
+def test_conditions_of_a_guarded_camera_are_lines():
+    found = FrameAnalyzer(Nobody()).look(Shot(1.0, 1, np.asarray(room(0))))
+    assert fault_of(replace(found, conditions=("too dark: more light",))) == ""
+    wrong: Any = (3,)
+    assert "conditions" in fault_of(replace(found, conditions=wrong))
+
+
+class Frames:
+    """A webcam that shows one picture."""
+
+    has_unknown_lens = True
+
+    def __init__(self, image: np.ndarray, absent: bool = False) -> None:
+        self.image, self.absent, self.number = image, absent, 0
+        self.closed = False
+
+    def open(self) -> None:
+        if self.absent:
+            raise CameraError("no camera at /dev/video3: plug it in")
+
+    def take(self, now_s: Any, stop: Any) -> Shot:
+        self.number += 1
+        return Shot(0.5 * self.number, self.number, self.image)
+
+    def events(self) -> tuple[str, ...]:
+        return ("does not take webcam.gain: 3",) if self.number == 1 else ()
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def examined(source: Frames, camera: CameraParams) -> list[Diagnostic]:
+    return examine_camera(source, camera, FaceDetectorParams(), lambda: 0.0)
+
+
+def test_the_doctor_looks_through_a_camera():
+    known = CameraParams(horizontal_field_deg=70.0)
+    good = Frames(np.asarray(room()))
+    found = examined(good, known)
+    assert [one.level for one in found] == ["ok", "note"] and good.closed
+    assert "2 frames a second, faces in 25 of 25" in found[0].what
+    down = Frames(np.ascontiguousarray(room()[::-1, ::-1]) // 16)
+    levels = {one.what[:22]: (one.level, one.remedy) for one in examined(down, CameraParams())}
+    assert levels["the picture is too dar"][0] == "warn"
+    assert levels["the camera is turned b"] == ("warn", "set camera.rotation: 180")
+    assert levels["the field of view is n"][0] == "note"
+    (gone,) = examined(Frames(np.asarray(room()), absent=True), known)
+    assert (gone.level, "plug it in" in gone.what) == ("error", True)

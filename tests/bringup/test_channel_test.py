@@ -1,0 +1,178 @@
+"""One channel led slowly for a person to look at: how it moves, and that its pulses end."""
+
+import pytest
+
+from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
+from gazerig.drivers.maestro.board import MaestroBoard
+from gazerig.drivers.maestro.params import MaestroParams
+from gazerig.drivers.pca9685.board import Pca9685Board
+from gazerig.drivers.pca9685.params import Pca9685Params
+from gazerig.drivers.types import ServoConfig
+from gazerig.features.bringup.channel_test import SLOW_STEPS_S, ChannelPosition, walk
+from gazerig.sim_mock.hobby_servo import HobbySpec
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.maestro.board import build_board
+from gazerig.sim_mock.pca9685.bridge import build_bridge
+
+LID = ServoConfig(2, "hobby", 4400, 7600, 9000.0, "left_upper_lid", rest_steps=5000)
+PLACES = (5000, 4780, 5220, 5000)
+
+
+class Bench:
+    """A board whose time passes as it is waited for; every look at its channel is kept."""
+
+    def __init__(self, low=2000, high=10_000):
+        self.now_s = 5.0
+        spec = HobbySpec(2, 6500.0, min_steps=low, max_steps=high)
+        self.board = build_board(12, lambda: self.now_s, servos=[spec])
+        self.port = InProcessPort(self.board)
+        self.port.setBaudRate(115_200)
+        self.driver = MaestroBoard(self.port, MaestroParams())
+        self.seen = []
+
+    def sleep_until(self, t_s):
+        while self.now_s < t_s:
+            self.now_s = min(t_s, self.now_s + 0.01)
+            channel = self.board.faults.reports()[2]
+            self.seen.append((self.now_s, channel["position"], channel["place"]))
+
+    def walk(self, places=PLACES):
+        return walk(self.driver, LID, places, self.sleep_until)
+
+
+def test_the_first_place_at_once_the_others_slowly_and_the_pulses_end():
+    bench = Bench()
+    assert bench.walk() == tuple(ChannelPosition(p, p) for p in PLACES)
+    pulses = [pulse for _, pulse, _ in bench.seen]
+    assert pulses[0] == 5000
+    ways = [abs(b - a) for a, b in zip(pulses, pulses[1:], strict=False)]
+    assert 0 < max(ways) <= 0.011 * (SLOW_STEPS_S + 100.0)
+    assert {4780, 5220} <= set(pulses)
+    # The servo has been seen at both places, and nobody else has moved.
+    places = [place for _, _, place in bench.seen]
+    assert min(places) < 4810 and max(places[-100:]) > 5190
+    assert [c["position"] for c in bench.board.faults.reports()] == [0] * 12
+
+
+def test_it_takes_no_longer_than_a_person_waits():
+    bench = Bench()
+    bench.walk()
+    assert bench.now_s - 5.0 < 6.0
+
+
+def test_a_range_of_the_board_that_is_narrower_is_seen():
+    gone = Bench(low=4900).walk()
+    assert gone[1] == ChannelPosition(4780, 4900) and gone[2] == ChannelPosition(5220, 5220)
+
+
+def test_a_channel_that_gives_pulses_already_is_led_slowly_from_there():
+    bench = Bench()
+    bench.board.exchange(bytes.fromhex("84 02 64 32"))  # 6500
+    bench.sleep_until(5.5)
+    bench.seen.clear()
+    bench.walk()
+    pulses = [pulse for _, pulse, _ in bench.seen]
+    assert pulses[0] > 6400
+    assert max(abs(b - a) for a, b in zip(pulses, pulses[1:], strict=False)) <= 11
+    assert bench.board.faults.reports()[2]["position"] == 0
+
+
+def test_an_error_of_the_board_on_the_way_is_no_place():
+    bench = Bench()
+
+    def sleep_and_fail(t_s):
+        bench.sleep_until(t_s)
+        bench.board.faults.command("error protocol")
+
+    gone = walk(bench.driver, LID, PLACES, sleep_and_fail)
+    assert gone[0] == ChannelPosition(5000, 0)
+
+
+def test_an_input_is_refused():
+    bench = Bench()
+    bench.driver.line.pulses = lambda channels: (700,)  # type: ignore[method-assign]
+    with pytest.raises(ServoMissing, match="channel 2 is an input, left_upper_lid"):
+        bench.walk()
+
+
+def test_ctrl_c_ends_the_pulses():
+    bench = Bench()
+
+    def interrupted(t_s):
+        bench.sleep_until(t_s)
+        if len(bench.seen) > 60:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        walk(bench.driver, LID, PLACES, interrupted)
+    assert bench.board.faults.reports()[2]["position"] == 0
+
+
+def test_a_board_that_falls_silent():
+    bench = Bench()
+
+    def sleep_and_lose(t_s):
+        bench.sleep_until(t_s)
+        bench.board.faults.command("lose all")
+
+    with pytest.raises(ServoFault, match="may still get pulses: switch the servo supply off"):
+        walk(bench.driver, LID, PLACES, sleep_and_lose)
+    # It did not answer, but it obeyed.
+    assert bench.board.faults.reports()[2]["position"] == 0
+
+
+def test_a_cable_that_is_pulled_out():
+    bench = Bench()
+
+    def sleep_and_pull(t_s):
+        bench.sleep_until(t_s)
+        bench.board.faults.command("unplug")
+
+    with pytest.raises(ServoFault, match="may still get pulses") as error:
+        walk(bench.driver, LID, PLACES, sleep_and_pull)
+    assert isinstance(error.value.__context__, BusLost)
+
+
+class I2cBench(Bench):
+    """The same on a PCA9685, whose pulses the driver leads."""
+
+    def __init__(self):
+        self.now_s = 5.0
+        self.board = build_bridge(  # type: ignore[assignment]
+            (0x40,), lambda: self.now_s, 25.4e6, servos=[HobbySpec(2, 6500.0)]
+        )
+        self.port = InProcessPort(self.board)
+        self.port.setBaudRate(115_200)
+        self.driver = Pca9685Board(self.port, Pca9685Params(oscillator_hz=25.4e6))  # type: ignore[assignment]
+        self.seen = []
+
+    def sleep_until(self, t_s):
+        while self.now_s < t_s:
+            self.now_s = min(t_s, self.now_s + 0.01)
+            channel = self.board.faults.reports()[2]
+            self.seen.append((self.now_s, channel["target"], channel["place"]))
+
+
+def test_a_pca9685_is_led_as_slowly_and_its_pulses_end():
+    bench = I2cBench()
+    assert bench.walk() == tuple(ChannelPosition(p, p) for p in PLACES)
+    pulses = [pulse for _, pulse, _ in bench.seen]
+    assert abs(pulses[0] - 5000) <= 10
+    ways = [abs(b - a) for a, b in zip(pulses, pulses[1:], strict=False)]
+    assert 0 < max(ways) <= 0.02 * SLOW_STEPS_S + 20
+    assert min(pulses) < 4791 and max(pulses) > 5209
+    assert [c["target"] for c in bench.board.faults.reports()] == [0] * 16
+    assert bench.now_s - 5.0 < 6.0
+
+
+def test_a_pca9685_that_restarts_on_the_way_gives_no_pulses_and_is_told():
+    bench = I2cBench()
+
+    def sleep_and_restart(t_s):
+        bench.sleep_until(t_s)
+        if len(bench.seen) == 60:
+            bench.board.faults.command("brown-out")
+
+    gone = walk(bench.driver, LID, PLACES, sleep_and_restart)
+    assert gone[0] == ChannelPosition(5000, 5000) and gone[-1] == ChannelPosition(5000, 0)
+    assert bench.board.faults.reports()[2]["target"] == 0

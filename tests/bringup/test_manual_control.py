@@ -1,0 +1,314 @@
+"""Moving rigs of every kind slowly by command, over emulated buses in simulated time."""
+
+from collections.abc import Iterator
+from math import degrees, nan, radians
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+from desk import GAZE_JOINTS
+from emulated_rig import EmulatedRig, mixed_rig
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.errors import SetupError
+from gazerig.features.bringup.look_at import LookedAt, ends_reached, look_at, met
+from gazerig.features.bringup.manual_control import JogParams, ManualControl, duration_s
+from gazerig.features.bringup.move_result import Step
+from gazerig.gaze.types import Vec3
+from gazerig.robot.app.bus_wiring import rig_bus
+from gazerig.robot.app.gaze_models import gaze_parts
+from gazerig.robot.app.rig_limits import limits, park_rad
+from gazerig.robot.control.body import Body
+from gazerig.robot.safety.guard import Guard
+from gazerig.sim_mock.devices import DynamixelLine
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
+
+RIGS = {name: load_rig(name) for name in ("desk", "feetech", "maker")}
+RIG = RIGS["desk"]
+CROOKED = {"neck_yaw": -12.0, "left_eye_pan": 6.0, "neck_pitch": -8.0}
+
+
+class Bench(EmulatedRig):
+    """An emulated rig that is moved by command, and every step of it."""
+
+    def __init__(self, rig: Rig = RIG, params: JogParams | None = None) -> None:
+        lines = None
+        if rig is RIG:  # without a rig's mechanical stops, where the test says
+            joints = ((name, rig.joints[name]) for name in GAZE_JOINTS)
+            specs = tuple(
+                ServoSpec(j.id, j.model, round(j.steps(radians(CROOKED.get(name, 0.0)))))
+                for name, j in joints
+            )
+            lines = {"": DynamixelLine(specs)}
+        super().__init__(rig, lines)
+        guard = Guard(rig.guard, limits(rig.joints), rig.names)
+        self.steps: list[Step] = []
+        self.why: str | None = None
+        self.at: dict[float, str] = {}
+        self.control = ManualControl(
+            Body(rig_bus(rig, self.ports), rig.joints, park_rad(rig)),
+            guard,
+            self.clock,
+            params or JogParams(speed_deg_s=20.0 if rig is RIG else 40.0),
+            lambda: self.why,
+            self.note,
+        )
+
+    def note(self, step: Step) -> None:
+        """Keep a step; carry out the fault commands that are due."""
+        self.steps.append(step)
+        for due_s in [due for due in self.at if due <= step.t_s]:
+            self.command(self.at.pop(due_s))
+
+    def torque(self) -> list[bool]:
+        return [servo.torque for servo in cast(Any, self.devices[""]).servos]
+
+    def look(self, point: Vec3, seconds: float) -> LookedAt:
+        kinematics, oculomotor = gaze_parts(self.rig, 0)
+        return look_at(self.control, kinematics, oculomotor, point, seconds)
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    made = Bench()
+    made.control.start()
+    yield made
+    made.control.stop()
+    assert not any(made.torque())
+
+
+@pytest.fixture
+def other(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Bench]:
+    """Return a moving rig of the kind that the test names."""
+    made = Bench(mixed_rig(tmp_path) if request.param == "mixed" else RIGS[request.param])
+    made.control.start()
+    yield made
+    made.control.stop()
+
+
+def on(kind: str) -> pytest.MarkDecorator:
+    return pytest.mark.parametrize("other", [kind], indirect=True)
+
+
+def test_nothing_moves_at_the_start(bench: Bench) -> None:
+    before = bench.where()
+    assert all(bench.torque())
+    assert bench.control.hold(1.0).arrived
+    assert bench.where() == pytest.approx(before, abs=0.3)
+
+
+def test_one_joint_moves_and_the_others_hold(bench: Bench) -> None:
+    before = bench.where()
+    moved = bench.control.jog("neck_yaw", 20.0)
+    after = bench.where()
+    assert moved.arrived
+    assert moved.of("neck_yaw").error == pytest.approx(0.0, abs=2.0)
+    assert after.pop("neck_yaw") == pytest.approx(20.0, abs=2.0)
+    assert moved.of("neck_yaw").reasons == ()
+    del before["neck_yaw"]
+    assert after == pytest.approx(before, abs=0.5)
+
+
+@settings(max_examples=5, deadline=None)
+@given(
+    joint=st.sampled_from(["left_eye_pan", "right_upper_lid", "neck_roll"]),
+    angle=st.floats(-60.0, 60.0),
+    speed=st.floats(5.0, 60.0),
+)
+def test_no_goal_is_faster_than_asked_nor_outside_the_range(
+    joint: str, angle: float, speed: float
+) -> None:
+    bench = Bench(params=JogParams(speed_deg_s=speed))
+    bench.control.start()
+    moved = bench.control.pose({joint: angle})
+    i, params = GAZE_JOINTS.index(joint), RIG.joints[joint]
+    low, high = radians(params.min_deg), radians(params.max_deg)
+    sent = [(s.t_s, s.guard_result.command_rad[i]) for s in bench.steps]
+    for (t0, a), (t1, b) in zip(sent, sent[1:], strict=False):
+        assert low - 1e-9 <= b <= high + 1e-9
+        assert degrees(abs(b - a)) <= 1.1 * speed * (t1 - t0) + 1e-6
+    assert moved.arrived == (params.min_deg - 2.0 <= angle <= params.max_deg + 2.0)
+    bench.control.stop()
+
+
+@given(far=st.floats(0.0, 3.0), speed=st.floats(0.5, 200.0), accel=st.floats(5.0, 5000.0))
+def test_the_way_takes_long_enough_for_speed_and_acceleration(
+    far: float, speed: float, accel: float
+) -> None:
+    takes = duration_s(far, JogParams(speed_deg_s=speed, accel_deg_s2=accel))
+    assert 1.875 * degrees(far) / takes <= speed * (1.0 + 1e-9)
+    assert 5.773 * degrees(far) / takes**2 <= accel * (1.0 + 1e-9)
+
+
+def test_out_of_range_is_held_back_at_the_limit_and_says_so(bench: Bench) -> None:
+    with pytest.raises(SetupError, match="50.0 deg is outside its range, -35..35 deg"):
+        bench.control.jog("left_eye_pan", 50.0)
+    moved = bench.control.pose({"left_eye_pan": 50.0})
+    part = moved.of("left_eye_pan")
+    assert not moved.arrived and moved.ended == "held back"
+    assert part.desired == pytest.approx(50.0) and part.commanded == pytest.approx(35.0)
+    assert part.reasons == ("out of range",)
+    assert str(part).startswith("left_eye_pan: desired 50.0, measured 3")
+    assert "commanded 35.0 (out of range)" in str(part)
+
+
+def test_a_stuck_joint_is_named_and_not_pushed(bench: Bench) -> None:
+    bench.command("stick 7")
+    before = bench.where()["neck_yaw"]
+    moved = bench.control.jog("neck_yaw", 30.0)
+    assert not moved.arrived
+    assert any("not moving" in reason for reason in moved.of("neck_yaw").reasons)
+    assert moved.of("neck_yaw").commanded == pytest.approx(before, abs=15.0)
+
+
+def test_a_silent_servo_is_named(bench: Bench) -> None:
+    bench.command("lose 7")
+    moved = bench.control.jog("neck_yaw", 30.0)
+    assert not moved.arrived and "stale joints" in moved.of("neck_yaw").reasons
+    assert bench.where()["neck_yaw"] < 10.0
+
+
+def test_a_latched_fault_ends_it(bench: Bench) -> None:
+    bench.at[bench.clock.now_s() + 0.5] = "overload 7"
+    moved = bench.control.jog("neck_yaw", 40.0)
+    assert moved.ended == "torque_off" and moved.level == "torque_off"
+    assert any("overload" in reason for reason in moved.of("neck_yaw").reasons)
+
+
+def test_a_stop_ends_the_way_and_parking_goes_on(bench: Bench) -> None:
+    bench.why = "SIGINT"
+    moved = bench.control.jog("neck_yaw", 40.0)
+    assert moved.ended == "SIGINT" and moved.seconds < 0.1
+    assert bench.control.park(RIG.park_deg).arrived
+    assert bench.where()["neck_pitch"] == pytest.approx(-12.0, abs=2.0)
+
+
+def test_several_joints_arrive_together(bench: Bench) -> None:
+    moved = bench.control.pose({"neck_yaw": 10.0, "left_eye_pan": -20.0, "neck_roll": 5.0})
+    assert moved.arrived
+    where = bench.where()
+    assert where["neck_yaw"] == pytest.approx(10.0, abs=2.0)
+    assert where["left_eye_pan"] == pytest.approx(-20.0, abs=2.0)
+    halfway = bench.steps[len(bench.steps) // 3]
+    i, j = GAZE_JOINTS.index("left_eye_pan"), GAZE_JOINTS.index("neck_yaw")
+    assert halfway.desired_rad[i] < radians(6.0) and halfway.desired_rad[j] > radians(-12.0)
+
+
+@pytest.mark.parametrize(
+    ("joint", "angle", "says"),
+    [("neck", 0.0, "no joint 'neck'; there is left_eye_pan"), ("neck_yaw", nan, "not an angle")],
+)
+def test_nonsense_is_refused_before_anything_moves(
+    bench: Bench, joint: str, angle: float, says: str
+) -> None:
+    with pytest.raises(SetupError, match=says):
+        bench.control.jog(joint, angle)
+    assert bench.steps == []
+
+
+# --- other kinds of servo
+
+
+@on("maker")
+def test_hobby_servos_arrive_and_it_is_said_that_this_is_estimated(other: Bench) -> None:
+    moved = other.control.pose({"eyes_pan": -15.0, "left_lower_lid": 12.0})
+    assert moved.arrived
+    assert str(moved.of("eyes_pan")) == "eyes_pan: desired -15.0, estimated -15.0 deg"
+    where = other.where()
+    assert where["eyes_pan"] == pytest.approx(-15.0, abs=1.0)
+    assert where["left_lower_lid"] == pytest.approx(12.0, abs=1.0)
+
+
+@on("maker")
+def test_a_jammed_hobby_servo_cannot_be_known_so_nothing_is_called_measured(other: Bench) -> None:
+    other.command("stick 0")
+    moved = other.control.jog("eyes_pan", 20.0)
+    assert moved.arrived and moved.of("eyes_pan").estimated
+    assert other.where()["eyes_pan"] == pytest.approx(0.0, abs=1.0)
+
+
+@on("feetech")
+def test_sts_servos_are_measured(other: Bench) -> None:
+    moved = other.control.jog("neck_yaw", 20.0)
+    assert moved.arrived and not moved.of("neck_yaw").estimated
+    assert str(moved.of("neck_yaw")).startswith("neck_yaw: desired 20.0, measured ")
+    assert other.where()["neck_yaw"] == pytest.approx(20.0, abs=2.0)
+
+
+@on("mixed")
+def test_joints_of_three_kinds_move_together(other: Bench) -> None:
+    asked = {"eyes_pan": 10.0, "neck_yaw": 15.0, "neck_pitch": -5.0}
+    moved = other.control.pose(asked)
+    assert moved.arrived
+    estimated = {part.joint for part in moved.joints if part.estimated}
+    joints = other.rig.joints
+    assert estimated == {name for name in other.rig.names if not joints[name].facts.measured}
+    where = other.where()
+    assert {name: where[name] for name in asked} == pytest.approx(asked, abs=2.0)
+
+
+# --- looking at a point
+
+
+@pytest.mark.parametrize("point", [(1.0, 0.0, 0.3), (1.0, 0.4, 0.1), (0.4, -0.1, 0.2)])
+def test_both_eyes_meet_a_point(bench: Bench, point: Vec3) -> None:
+    looked = bench.look(point, 4.0)
+    assert max(looked.left_error, looked.right_error) < 2.0
+    assert looked.vergence == pytest.approx(looked.desired_vergence, abs=2.0)
+    assert looked.moved.arrived
+
+
+def test_a_point_behind_is_missed_and_the_error_says_so(bench: Bench) -> None:
+    looked = bench.look((-1.0, 0.1, 0.2), 4.0)
+    assert min(looked.left_error, looked.right_error) > 20.0
+    ends = ends_reached(RIG.joints, {"eye_pan": 34.0}, looked.moved)
+    assert any("left_eye_pan is at the end of its range (-34..34 deg)" in line for line in ends)
+    assert not any("tilt" in line for line in ends)
+
+
+@pytest.mark.parametrize("point", [(nan, 0.0, 0.0), (0.038, 0.0, 0.125)])
+def test_no_point_and_a_point_in_the_head_are_refused(bench: Bench, point: Vec3) -> None:
+    with pytest.raises(SetupError, match=r"e\.g\. 1\.0 0\.2 0\.3"):
+        bench.look(point, 4.0)
+
+
+@on("maker")
+@pytest.mark.parametrize("point", [(1.0, 0.2, 0.2), (0.3, 0.0, 0.09)])
+def test_eyes_on_one_linkage_are_judged_by_their_mean_line_of_sight(
+    other: Bench, point: Vec3
+) -> None:
+    looked = other.look(point, 2.0)
+    assert not looked.converges and looked.error < 1.0
+    assert looked.vergence == pytest.approx(0.0, abs=1e-6)
+    # Each eye by itself is beside the point by half the vergence that it needs.
+    worst = max(looked.left_error, looked.right_error)
+    assert worst == pytest.approx(looked.desired_vergence / 2.0, abs=1.0)
+    words = "\n".join(met(looked))
+    assert "estimated, not measured" in words and "vergence: none, as one servo" in words
+
+
+@on("maker")
+def test_eyes_that_cannot_turn_so_far_are_said_to_be_at_their_end(other: Bench) -> None:
+    looked = other.look((0.2, 1.0, 0.1), 2.0)
+    assert looked.error > 10.0
+    narrower = {"eyes_pan": other.rig.ranges.eye_yaw_deg}
+    ends = ends_reached(other.rig.joints, narrower, looked.moved)
+    assert any("eyes_pan is at the end" in line for line in ends)
+
+
+@on("feetech")
+def test_separate_eyes_converge_and_are_measured(other: Bench) -> None:
+    looked = other.look((0.5, 0.0, 0.14), 3.0)
+    assert looked.converges and looked.error == max(looked.left_error, looked.right_error) < 2.0
+    assert "estimated" not in "\n".join(met(looked))
+
+
+@on("mixed")
+def test_a_mixed_head_looks_with_a_neck_that_is_measured_and_eyes_that_are_not(
+    other: Bench,
+) -> None:
+    looked = other.look((1.0, 0.5, 0.1), 3.0)
+    assert not looked.converges and looked.error < 2.0 and looked.head[0] > 3.0
+    assert "estimated" in met(looked)[0]

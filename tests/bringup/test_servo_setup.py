@@ -1,0 +1,372 @@
+"""Setting servos up one at a time, and restarting them: on emulated servos, byte for byte."""
+
+from dataclasses import replace
+
+import pytest
+
+from gazerig.drivers.errors import PortError, ServoFault, ServoMissing
+from gazerig.drivers.servo_bus.discovery import FoundServo, any_reply, ping
+from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.drivers.types import ServoConfig
+from gazerig.features.bringup.servo_families import DYNAMIXEL, FEETECH
+from gazerig.features.bringup.servo_reboot import Standing, restart
+from gazerig.features.bringup.servo_setup import assign, find_alone, search_order
+from gazerig.sim_mock.dynamixel.chain import build_dynamixel
+from gazerig.sim_mock.dynamixel.packets import status
+from gazerig.sim_mock.feetech.chain import build_feetech
+from gazerig.sim_mock.in_process_port import InProcessPort
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
+
+BAUD = 1_000_000
+MODELS = {"dynamixel": "xc330-m288", "feetech": "sts3215"}
+YAW = ServoConfig(7, "xc330-m288", 1252, 2844, 2000.0, "neck_yaw")
+
+RATES = DYNAMIXEL.family.usual_rates
+
+each = pytest.mark.parametrize("kind", [DYNAMIXEL, FEETECH], ids=lambda kind: kind.name)
+
+
+class Bench:
+    """Servos on a table, factory fresh unless told otherwise, heard at their own rate only."""
+
+    def __init__(self, *specs, baud=None, kind=DYNAMIXEL):
+        self.now = 10.0
+        self.kind = kind
+        self.baud = kind.family.factory_baud if baud is None else baud
+        self.model = MODELS[kind.name]
+        self.yaw = YAW._replace(model=self.model)
+        build = build_feetech if kind is FEETECH else build_dynamixel
+        specs = specs or (ServoSpec(1, self.model, 2000),)
+        self.chain = build(specs, lambda: self.now, baud=self.baud)
+        self.port = InProcessPort(self.chain)
+        self.reported = []
+
+    def sleep_until(self, t_s):
+        self.now = max(self.now, t_s)
+        self.chain.positions_steps()
+
+    def find(self):
+        order = search_order(self.kind, BAUD)
+        return find_alone(self.port, self.kind, order, self.reported.append)
+
+    def assign(self, setup=None, baud=BAUD):
+        found = self.find()
+        return assign(self.port, self.kind, found, setup or self.yaw, baud, self.reported.append)
+
+    def restart(self, servo_id=1, sleep_until=None):
+        sleep_until = sleep_until or self.sleep_until
+        return restart(self.port, self.kind, servo_id, self.baud, sleep_until)
+
+    def hold(self, servo_id=1):
+        """Open the port at the servo's rate, and switch the torque on."""
+        self.port.setBaudRate(self.baud)
+        assert self.registers().write(servo_id, "torque_enable", 1)
+
+    def registers(self):
+        return Registers(self.port, self.kind.family)
+
+    def kept(self, servo_id):
+        return bytes(self.chain[servo_id].memory.bytes[:40])
+
+
+NUMBER = {"dynamixel": (1240, 53), "feetech": (777, 353)}
+"""Model number and firmware."""
+
+ANYWHERE = [
+    *((kind, *place) for kind in (DYNAMIXEL, FEETECH) for place in ((1, BAUD), (7, 115_200))),
+    *((DYNAMIXEL, 1, 57_600), (FEETECH, 200, 57_600)),
+    *((DYNAMIXEL, 200, baud) for baud in RATES if baud != 4_500_000),
+]
+
+
+@pytest.mark.parametrize(("kind", "servo_id", "baud"), ANYWHERE)
+def test_a_servo_gets_its_id_and_rate_for_good_wherever_it_was(kind, servo_id, baud):
+    bench = Bench(ServoSpec(servo_id, MODELS[kind.name]), baud=baud, kind=kind)
+    result = bench.assign()
+    assert result.before == FoundServo(servo_id, *NUMBER[kind.name], baud, bench.model)
+    assert result.now == FoundServo(7, *NUMBER[kind.name], BAUD, bench.model)
+    assert (f"id {servo_id} -> 7" in result.done) == (servo_id != 7)
+    assert (f"baud rate {baud} -> {BAUD} bit/s" in result.done) == (baud != BAUD)
+    assert len(result.done) == (servo_id != 7) + (baud != BAUD)
+    (servo,) = bench.chain.servos
+    assert (servo.id, servo.torque) == (7, False)
+    rate = bench.registers().read(7, "baud_rate")
+    assert rate == kind.family.baud_rates.index(BAUD)
+    bench.chain[7].restart()
+    bench.sleep_until(bench.now + 1.0)
+    bench.chain.refresh()
+    bench.port.setBaudRate(BAUD)
+    assert ping(bench.port, kind.family, 7, BAUD, 1) is not None
+    assert kind.family.lock is None or bench.registers().read(7, kind.family.lock) == 1
+
+
+@each
+def test_doing_it_again_changes_nothing(kind):
+    bench = Bench(kind=kind)
+    bench.assign()
+    before = bench.kept(7)
+    assert bench.assign().done == ()
+    assert bench.kept(7) == before
+
+
+@each
+def test_a_servo_whose_torque_is_on_is_let_go_first(kind):
+    bench = Bench(kind=kind)
+    bench.hold()
+    assert bench.assign().done[0] == "torque 1 -> 0"
+    assert not bench.chain[7].torque
+
+
+@each
+def test_nobody_is_there(kind):
+    bench = Bench(kind=kind)
+    bench.port.faults.command("lose all")
+    with pytest.raises(ServoMissing, match="no servo answers at any baud rate"):
+        bench.find()
+
+
+@each
+@pytest.mark.parametrize(
+    ("ids", "says"), [((1, 2), "2 servos answer: id 1 .* id 2 .*: connect"), ((1, 1), "alone")]
+)
+def test_two_servos_are_refused(kind, ids, says):
+    model = MODELS[kind.name]
+    bench = Bench(*(ServoSpec(i, model, 1000 + 500 * n) for n, i in enumerate(ids)), kind=kind)
+    with pytest.raises(ServoMissing, match=says):
+        bench.find()
+
+
+@each
+def test_two_servos_at_two_rates_are_refused(kind):
+    model = MODELS[kind.name]
+    bench = Bench(ServoSpec(1, model), ServoSpec(2, model), kind=kind)
+    bench.port.setBaudRate(bench.baud)
+    index = kind.family.baud_rates.index(115_200)
+    bench.registers().write_lasting(2, "baud_rate", index)
+    bench.chain.refresh()
+    both = rf"id 1 \({model}\) at {bench.baud} .*id 2 \({model}\) at 115200"
+    with pytest.raises(ServoMissing, match=both):
+        bench.find()
+
+
+@each
+def test_another_model_is_refused_and_left_alone(kind):
+    bench = Bench(kind=kind)
+    before = bench.kept(1)
+    models = {bench.model: kind.family.models[bench.model]._replace(number=1029)}
+    bench.kind = kind._replace(family=replace(kind.family, models=models))
+    with pytest.raises(ServoMissing, match=r"this is model number \d+, neck_yaw \(servo 7\) wants"):
+        bench.assign()
+    assert bench.kept(1) == before
+
+
+@each
+def test_what_there_is_not_is_refused(kind):
+    bench = Bench(kind=kind)
+    with pytest.raises(ValueError, match=rf"id 254 is not in 0\.\.{kind.family.highest_id}"):
+        bench.assign(bench.yaw._replace(id=254))
+    with pytest.raises(ValueError, match="1234 bit/s is none of"):
+        bench.assign(baud=1234)
+
+
+@each
+def test_a_servo_that_falls_silent_is_said_to_be_where_it_was(kind):
+    bench = Bench(kind=kind)
+    found = bench.find()
+    bench.port.faults.command("lose all")
+    where = f"it answered last as id 1 at {bench.baud} bit/s"
+    with pytest.raises(ServoFault, match=where):
+        assign(bench.port, kind, found, bench.yaw._replace(id=5), bench.baud, print)
+
+
+@each
+def test_a_restart_ends_an_overload_and_takes_the_torque(kind):
+    bench = Bench(kind=kind)
+    bench.hold()
+    bench.port.faults.command("overload 1")
+    result = bench.restart()
+    assert result.before.errors == ("overload",)
+    assert (result.after.errors, result.after.torque) == ((), False)
+    assert result.after.position == 2000 and 0.3 < result.away_s < 1.5
+    verb = "latched" if kind.family.faults_latch else "reports"
+    assert str(result.before).startswith(f"{verb}: overload, torque ")
+
+
+@each
+def test_a_restart_of_a_servo_that_holds_leaves_it_limp(kind):
+    bench = Bench(kind=kind)
+    bench.hold()
+    result = bench.restart()
+    assert (result.before.torque, result.after.torque) == (True, False)
+
+
+@each
+def test_firmware_that_does_not_know_how_to_restart_is_told_by_the_torque(kind, monkeypatch):
+    bench = Bench(kind=kind)
+    bench.hold()
+    monkeypatch.setattr("gazerig.features.bringup.servo_reboot.reboot", lambda *what: None)
+    with pytest.raises(ServoFault, match="servo 1 has not restarted, its torque is still on"):
+        bench.restart()
+
+
+@each
+def test_servos_that_do_not_answer_before_or_after_a_restart(kind):
+    bench = Bench(kind=kind)
+    bench.port.setBaudRate(bench.baud)
+    with pytest.raises(ServoMissing, match=f"servo 5 does not answer at {bench.baud}"):
+        bench.restart(5)
+
+    def sleep_and_lose(t_s):
+        bench.sleep_until(t_s)
+        bench.port.faults.command("lose 1")
+
+    with pytest.raises(ServoMissing, match="does not come back"):
+        bench.restart(sleep_until=sleep_and_lose)
+
+
+@pytest.mark.parametrize("habit", ["mute", "answer"])
+def test_a_restart_that_some_firmware_confirms(habit):
+    bench = Bench(kind=FEETECH)
+    bench.chain.choose("reboot", habit)
+    bench.hold()
+    assert bench.restart().after.torque is False
+
+
+@pytest.mark.parametrize(
+    ("standing", "text"),
+    [
+        (Standing((), None, None, None), "nothing latched, torque unknown, at step None"),
+        (
+            Standing(("overload", "encoder"), True, 5, 4.9),
+            "latched: overload and encoder, torque on, at step 5, 4.9 V",
+        ),
+        (Standing((), False, 5, 7.4, latching=False), "no errors, torque off, at step 5, 7.4 V"),
+        (
+            Standing(("overload",), None, None, None, latching=False),
+            "reports: overload, torque unknown, at step None",
+        ),
+    ],
+)
+def test_a_standing_in_words(standing, text):
+    assert str(standing) == text
+
+
+def test_kinds_write_firmware_as_their_makers_do():
+    assert [FEETECH.family.version(number) for number in (353, 310)] == ["3.53", "3.10"]
+    assert DYNAMIXEL.family.version(53) == "53"
+
+
+def test_any_reply_is_a_matter_of_answers_not_of_echoes():
+    bench = Bench(kind=FEETECH)
+    bench.port.setBaudRate(BAUD)
+    assert any_reply(bench.port, FEETECH.family)
+    bench.port.faults.command("lose all")
+    assert not any_reply(bench.port, FEETECH.family)
+    bench.port.faults.command("echo on")
+    assert not any_reply(bench.port, FEETECH.family)
+    assert any_reply(InProcessPort(build_dynamixel([], lambda: 0.0)), DYNAMIXEL.family)
+
+
+# --- Dynamixel servos, packet by packet
+
+
+def test_the_likely_rates_are_asked_first():
+    assert search_order(DYNAMIXEL, 2_000_000)[:2] == (57_600, 2_000_000)
+    assert sorted(search_order(DYNAMIXEL, 57_600)) == sorted(RATES)
+
+
+def test_a_servo_that_answers_pings_alone():
+    bench = Bench()
+    servo = bench.chain[1]
+    servo.memory.set("status_return_level", 0)
+    servo.status_level = 0
+    assert bench.assign().now.id == 7
+
+
+def test_pieces_are_refused():
+    bench = Bench()
+    bench.port.faults.command("truncate all 8")
+    with pytest.raises(ServoMissing, match="in pieces only"):
+        bench.find()
+
+
+class StubbornPort(InProcessPort):
+    """A port whose servo refuses writes to one address, or is silent under some id."""
+
+    address = silent = None
+
+    def write(self, data):
+        if data[4] == self.silent:
+            return
+        if data[7] == 0x03 and data[8] == self.address:
+            self._waiting += status(data[4], 7, b"")
+            return
+        super().write(data)
+
+
+@pytest.mark.parametrize(
+    ("address", "says"),
+    [
+        (7, r"the id 7 \(error 7\); it answered last as id 1 at 57600"),
+        (8, rf"{BAUD} bit/s \(error 7\); it answered last as id 7 at 57600"),
+    ],
+)
+def test_a_refusal_says_where_the_servo_answers_now(address, says):
+    bench = Bench()
+    bench.port = StubbornPort(bench.chain)
+    bench.port.address = address
+    with pytest.raises(ServoFault, match=says):
+        bench.assign()
+
+
+def test_an_adaptor_that_cannot_run_at_the_rate():
+    bench = Bench()
+    found = bench.find()
+    bench.port.setBaudRate = lambda baud: (  # type: ignore[assignment, method-assign]
+        baud == 57_600 and InProcessPort.setBaudRate(bench.port, baud)
+    )
+    with pytest.raises(PortError, match="cannot run at 1000000"):
+        assign(bench.port, DYNAMIXEL, found, YAW, BAUD, print)
+
+
+def test_a_servo_that_is_gone_after_is_missed():
+    bench = Bench()
+    bench.port = StubbornPort(bench.chain)
+    bench.port.silent = 7  # type: ignore[assignment]
+    with pytest.raises(ServoMissing, match=f"does not answer as id 7 at {BAUD}"):
+        bench.assign()
+    bench = Bench(ServoSpec(7, "xc330-m288"))
+    found = bench.find()
+    bench.port.faults.command("lose 7")
+    with pytest.raises(ServoMissing, match=f"does not answer as id 7 at {BAUD}"):
+        assign(bench.port, DYNAMIXEL, found, YAW, BAUD, print)
+
+
+@pytest.mark.parametrize("address", [7, 8])
+def test_a_lost_confirmation_does_not_matter(address):
+    class Lossy(InProcessPort):
+        def write(self, data):
+            super().write(data)
+            if data[7] == 0x03 and data[8] == address:
+                self.drain()
+
+    bench = Bench()
+    bench.port = Lossy(bench.chain)
+    assert bench.assign().now == FoundServo(7, 1240, 53, BAUD, "xc330-m288")
+
+
+def test_a_lost_status_of_the_restart_does_not_matter():
+    bench = Bench()
+    bench.port.setBaudRate(57_600)
+    tapped = []
+    write = bench.port.write
+
+    def lossy(data):
+        tapped.append(data)
+        write(data)
+        if data[7] == 0x08:
+            bench.port.drain()
+
+    bench.port.write = lossy  # type: ignore[method-assign]
+    assert bench.restart().after.torque is False
+    assert bytes.fromhex("FFFFFD00010300082F4E") in tapped

@@ -1,0 +1,245 @@
+"""Telemetry of servos of every kind: what is shown is what they say, and nothing is written."""
+
+import json
+from dataclasses import replace
+from math import degrees, radians
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+from emulated_rig import EmulatedRig, mixed_rig
+from present import present
+
+from gazerig.config.schema import Rig, load_rig
+from gazerig.drivers.maestro.commands import MaestroCodec
+from gazerig.drivers.servo_bus.registers import Registers
+from gazerig.features.bringup.cli.monitor import BOARDS, SmartServoTelemetry
+from gazerig.features.bringup.monitor import Monitor, as_json, coupled_angles
+from gazerig.features.bringup.servo_families import DYNAMIXEL, FEETECH, KINDS
+from gazerig.features.bringup.telemetry import Telemetry, pulse_telemetry, telemetry_of
+from gazerig.robot.app.bus_wiring import bus_names
+from gazerig.robot.model.coupling import Differential
+from gazerig.robot.model.coupling_params import CoupledPair
+from gazerig.robot.model.joint import JointParams
+from gazerig.sim_mock.devices import DynamixelLine, FeetechLine
+from gazerig.sim_mock.smart_servo.physics import ServoSpec
+
+MAKER = load_rig("maker")
+EYE = JointParams(1, "xl330-m077", -35.0, 35.0, 600.0, 45000.0)
+NECK = JointParams(7, "xc330-m288", -35.0, 35.0, 200.0, 2000.0, sign=-1, ratio=2.0, zero_step=2000)
+GET_POSITION = 0x90
+WRITES = {
+    "dynamixel": (7, {0x03, 0x04, 0x05, 0x06, 0x08, 0x10, 0x20, 0x83, 0x93}),
+    "feetech": (4, {0x03, 0x04, 0x05, 0x06, 0x08, 0x83}),
+}
+"""Where a packet's instruction stands, and those that change something."""
+
+
+def two_servos(kind: str) -> Rig:
+    """Return a rig of an eye and a geared neck on one kind of servo, and where they stand."""
+    joints = {"left_eye_pan": EYE, "neck_yaw": NECK}
+    if kind == "feetech":
+        joints = {name: replace(one, model="sts3215") for name, one in joints.items()}
+    rig = load_rig("desk" if kind == "dynamixel" else "feetech")
+    return replace(rig, joints={**rig.joints, **joints})
+
+
+class Bench(EmulatedRig):
+    """Emulated buses and what monitors them."""
+
+    def __init__(self, rig: Rig | str) -> None:
+        self.kind = rig if isinstance(rig, str) else ""
+        lines = None
+        if isinstance(rig, str):
+            rig = two_servos(rig)
+            specs = tuple(
+                ServoSpec(one.id, one.model, 2100 if name == "left_eye_pan" else 1900)
+                for name, one in rig.joints.items()
+            )
+            lines = {"": (FeetechLine if self.kind == "feetech" else DynamixelLine)(specs)}
+        super().__init__(rig, lines)
+        readers = {}
+        for name in bus_names(rig):
+            config, port = rig.bus_named(name), self.ports[name]
+            port.setBaudRate(config.baud)
+            board = BOARDS.get(config.kind)
+            readers[name] = (
+                board(port, config) if board else SmartServoTelemetry(port, KINDS[config.kind])
+            )
+        joints = {name: rig.joints[name] for name in rig.names}
+        self.monitor = Monitor(readers, joints, self.clock.now_s)
+
+    def see(self, joint: str) -> Telemetry:
+        seen = self.monitor.sample().servos[joint]
+        assert seen is not None
+        return seen
+
+    def registers(self) -> Registers:
+        return Registers(self.ports[""], KINDS[self.kind].family)
+
+
+each = pytest.mark.parametrize("kind", list(KINDS))
+
+
+@each
+def test_a_sample_says_what_the_servos_say(kind: str) -> None:
+    bench = Bench(kind)
+    bench.registers().write(1, "goal_position", 2100)
+    seen = bench.monitor.sample().servos
+    eye, neck = seen["left_eye_pan"], seen["neck_yaw"]
+    assert eye is not None and neck is not None
+    assert (eye.position_steps, eye.goal_steps) == (2100, 2100)
+    assert eye.position_deg == pytest.approx((2100 - 2048) * 360 / 4096)
+    assert neck.position_deg == pytest.approx((2000 - 1900) * 360 / 4096 / 2.0)
+    volts = 5.0 if kind == "dynamixel" else 7.4
+    assert eye.voltage_v == pytest.approx(volts, abs=0.5) and eye.temperature_c in range(15, 41)
+    assert not eye.torque and eye.errors == () and eye.measured
+
+
+@each
+def test_nothing_is_ever_written(kind: str) -> None:
+    bench = Bench(kind)
+    servo = cast(Any, bench.devices[""]).here(1)
+    before = bytes(servo.memory.bytes[:56])
+    bench.sent[""].clear()
+    for _ in range(5):
+        bench.monitor.sample()
+    at, writes = WRITES[kind]
+    instructions = {packet[at] for packet in bench.sent[""]}
+    assert instructions and not instructions & writes
+    assert bytes(servo.memory.bytes[:56]) == before
+
+
+@each
+def test_a_moving_joint_and_its_goal_are_seen(kind: str) -> None:
+    bench = Bench(kind)
+    # 20 units of 0.229 rev/min are 312 steps/s
+    speed = {"profile_velocity": 20} if kind == "dynamixel" else {"goal_speed": 312}
+    for name, value in {**speed, "torque_enable": 1, "goal_position": 1500}.items():
+        assert bench.registers().write(7, name, value)
+    bench.clock.sleep_until(0.6)
+    neck = bench.see("neck_yaw")
+    assert neck.torque and neck.goal_deg == pytest.approx((2000 - 1500) * 360 / 4096 / 2.0)
+    # Towards fewer steps, sign -1, ratio 2: 13.7 deg/s upwards.
+    assert neck.velocity_deg_s == pytest.approx(13.7, rel=0.2)
+
+
+@each
+def test_an_error_is_named(kind: str) -> None:
+    bench = Bench(kind)
+    bench.command("overload 7")
+    bench.command("encoder 7")
+    assert set(bench.see("neck_yaw").errors) == {"overload", "encoder"}
+    assert bench.see("left_eye_pan").errors == ()
+
+
+@each
+def test_a_silent_servo_is_none_and_counted(kind: str) -> None:
+    bench = Bench(kind)
+    bench.command("lose 7")
+    bench.monitor.sample()
+    sample = bench.monitor.sample()
+    assert sample.servos["neck_yaw"] is None and sample.servos["left_eye_pan"] is not None
+    assert (sample.asked, sample.unanswered) == (2 * len(bench.rig.names), 2)
+    reported = json.loads(json.dumps(as_json(sample, 0.0)))
+    assert reported["joints"]["neck_yaw"] is None and reported["unanswered"] == 2
+    assert reported["joints"]["left_eye_pan"]["position_steps"] == 2100
+    bench.command("clear")
+    assert bench.monitor.sample().servos["neck_yaw"] is not None
+
+
+def test_load_is_a_share_of_the_stall() -> None:
+    assert present(DYNAMIXEL.driving).load("xl330-m077", -147) == pytest.approx(-0.1)
+    assert present(DYNAMIXEL.driving).load("xl430-w250", 250) == pytest.approx(0.25)
+    assert -100 * FEETECH.family.models["sts3215"].load_unit == pytest.approx(-0.1)
+
+
+def test_registers_are_shown_in_units_of_the_joint() -> None:
+    values = {
+        "torque_enable": 1,
+        "goal_position": 3000,
+        "present_current": -147,
+        "present_velocity": -3,
+        "present_position": -5,
+        "present_input_voltage": 52,
+        "present_temperature": 41,
+        "hardware_error_status": 0x20,
+    }
+    seen = telemetry_of(DYNAMIXEL, replace(EYE, zero_step=0, min_deg=0.0), values)
+    assert (seen.goal_steps, seen.position_steps) == (3000, -5)
+    assert seen.load == pytest.approx(-0.1) and seen.temperature_c == 41
+    assert seen.voltage_v == pytest.approx(5.2) and seen.errors == ("overload",)
+    assert radians(seen.velocity_deg_s or 0.0) < 0.0
+
+
+# --- boards
+
+
+def test_hobby_servos_show_their_pulse_and_what_it_would_be_in_degrees() -> None:
+    bench = Bench(MAKER)
+    limp = bench.see("eyes_pan")
+    assert limp.pulse_us == 0.0 and limp.position_deg is None and not limp.torque
+    bench.ports[""].write(MaestroCodec(crc=MAKER.bus.maestro.crc).target(0, 1634 * 4))
+    bench.clock.sleep_until(0.5)
+    seen = bench.see("eyes_pan")
+    assert seen.pulse_us == 1634.0 and seen.position_deg == pytest.approx(10.0)
+    assert seen.torque and not seen.measured
+    untold = (seen.goal_deg, seen.velocity_deg_s, seen.load, seen.temperature_c, seen.voltage_v)
+    assert untold == (None,) * 5
+
+
+def test_a_board_is_asked_for_pulses_alone_and_keeps_its_errors() -> None:
+    bench = Bench(MAKER)
+    bench.command("error protocol")
+    bench.sent[""].clear()
+    for _ in range(3):
+        assert bench.monitor.sample().unanswered == 0
+    assert {packet[0] for packet in bench.sent[""]} == {GET_POSITION}
+    assert json.loads(bench.command("status"))["errors"] == ["protocol"]
+
+
+def test_a_board_that_waits_for_the_first_byte_of_the_pololu_form_is_woken_by_a_question() -> None:
+    bench = Bench(MAKER)
+    bench.command("lose all count 1")
+    assert bench.monitor.sample().servos["eyes_pan"] is None
+    bench.sent[""].clear()
+    assert bench.see("eyes_tilt").pulse_us == 0.0
+    pololu = [packet for packet in bench.sent[""] if packet[0] == 0xAA]
+    assert pololu and all(packet[2] == GET_POSITION & 0x7F for packet in pololu)
+
+
+def test_an_input_is_no_servo() -> None:
+    seen = pulse_telemetry(MAKER.joints["eyes_pan"], 700)
+    assert seen.errors == ("its channel is an input",) and seen.pulse_us is None
+
+
+def test_a_rig_of_three_kinds_is_one_sample(tmp_path: Path) -> None:
+    rig = mixed_rig(tmp_path)
+    bench = Bench(rig)
+    bench.command("lose 1", "tilt")
+    reported = json.loads(json.dumps(as_json(bench.monitor.sample(), 0.0)))
+    assert set(reported["joints"]) == set(rig.names)
+    assert reported["joints"]["neck_pitch"] is None and reported["unanswered"] == 1
+    pan, yaw = reported["joints"]["eyes_pan"], reported["joints"]["neck_yaw"]
+    assert pan["measured"] is False and pan["pulse_us"] == 0.0 and pan["load"] is None
+    assert yaw["measured"] is True and "pulse_us" not in yaw
+    start = bench.lines["neck"].servos[0].start_steps
+    assert yaw["position_deg"] == pytest.approx(
+        degrees(rig.joints["neck_yaw"].angle_rad(start)), abs=0.2
+    )
+
+
+def telemetry(deg: float | None) -> Telemetry:
+    return Telemetry(deg, 0, deg, 0, deg, 0.1, 30, 5.0, True, ())
+
+
+def test_the_monitor_shows_the_joints_of_coupled_servos() -> None:
+    pair = CoupledPair("neck_pitch", "neck_roll", Differential())
+    one, other = coupled_angles(pair, telemetry(25.0), telemetry(5.0))
+    assert one is not None and other is not None
+    assert (one.goal_deg, other.goal_deg) == pytest.approx((15.0, 10.0))
+    assert (one.position_deg, other.position_deg) == pytest.approx((15.0, 10.0))
+    assert (one.velocity_deg_s, other.velocity_deg_s) == pytest.approx((15.0, 10.0))
+    one, other = coupled_angles(pair, telemetry(25.0), None)
+    assert one is not None and other is None and one.position_deg is None
+    assert coupled_angles(pair, None, telemetry(1.0))[0] is None
