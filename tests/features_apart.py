@@ -94,7 +94,11 @@ def _imports(file: Path) -> frozenset[str]:
 
 def files_of(feature: str) -> list[str]:
     """Return the tests and their helpers that import a feature, also through other helpers."""
-    files = {path.stem: path for path in [*ROOT.glob("tests/*.py"), *ROOT.glob("tests/*/*.py")] if path.stem != "conftest"}
+    files = {
+        path.stem: path
+        for path in [*ROOT.glob("tests/*.py"), *ROOT.glob("tests/*/*.py")]
+        if path.stem != "conftest"
+    }
     prefixes = tuple(f"gazerig.features.{name}" for name in removed_with(feature))
     found: set[str] = set()
     while True:

@@ -34,12 +34,8 @@ from gazerig.features.study.design import (
 )
 from gazerig.features.study.questionnaire import Item, Questionnaire
 from gazerig.features.study.shipped import HOME
-from gazerig.gaze.gesture.gesture import LID_GROUPS, Gesture, KeyFrame
-from gazerig.robot.cli.examples import EXAMPLES
-from gazerig.robot.model.joint import JointParams
-from gazerig.sim_mock.scenes.registry import scenes
-from gazerig.sim_mock.world.camera_params import WorldCameraParams
-from gazerig.sim_mock.world.script import (
+from gazerig.features.world.camera_params import WorldCameraParams
+from gazerig.features.world.script import (
     HEAD,
     Act,
     Do,
@@ -48,6 +44,11 @@ from gazerig.sim_mock.world.script import (
     ThingScript,
     WorldScript,
 )
+from gazerig.features.world.shipped import HOME as WORLDS
+from gazerig.gaze.gesture.gesture import LID_GROUPS, Gesture, KeyFrame
+from gazerig.robot.cli.examples import EXAMPLES
+from gazerig.robot.model.joint import JointParams
+from gazerig.sim_mock.scenes.registry import scenes
 
 FOLDERS = ("api", "config", "drivers", "features", "gaze", "robot", "sim_mock")
 RIGS = {name: load_rig(name) for name in shipped_names("rigs")}
@@ -304,7 +305,7 @@ def test_every_span_names_something_that_is_there(paper: Path) -> None:
     words |= {field.name for field in (*fields(KeyFrame), *fields(Gesture))} | {*LID_GROUPS}
     scripts = (WorldScript, PersonScript, PlaceScript, ThingScript, Act)
     words |= {field.name for script in scripts for field in fields(script)}
-    words |= {*get_args(Do), *shipped_names("worlds"), HEAD}
+    words |= {*get_args(Do), *shipped_names("worlds", WORLDS), HEAD}
     forms = (
         StudyDesign,
         Presentation,

@@ -24,7 +24,19 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 from mutants import ALL, Mutant  # noqa: E402
 
-COPIED = (".links", "api", "config", "docs", "drivers", "examples", "features", "gaze", "robot", "sim_mock", "tests")
+COPIED = (
+    ".links",
+    "api",
+    "config",
+    "docs",
+    "drivers",
+    "examples",
+    "features",
+    "gaze",
+    "robot",
+    "sim_mock",
+    "tests",
+)
 
 
 def copied(to: Path) -> None:
